@@ -11,12 +11,12 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use kinetoscope::sensors::ContactSensor;
 use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::ray::{HitTargets, RayCaster};
 use launcher::spawn::SpawnFlags;
-use launcher::{Launcher, Progress, picture, stage};
+use launcher::{Launcher, MainLoop, picture, stage};
 use serde_json::{Value, json};
 use std::any::Any;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ fn main() -> ExitCode {
 }
 
 /// Steps per second.
-const SECOND: u64 = 200;
+const STEPS_PER_SECOND: u64 = 200;
 
 fn run(args: &Args) -> launcher::Result {
     let cfg = scene_cfg(args)?;
@@ -72,13 +72,13 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(scene.sim_mut())?;
     args.launcher.open_window(scene.sim_mut());
     let recording = args.launcher.start_recording(scene.sim_mut())?;
-    let progress = Progress::new(&args.launcher, 1000);
-    let mut noise: Vec<Random> =
-        (0..scene.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
+    let progress = MainLoop::new(&args.launcher, 1000);
+    let mut noise: Vec<KeyedRng> =
+        (0..scene.num_envs()).map(|env| KeyedRng::keyed(args.launcher.seed, env as u64, "reset")).collect();
     let mut heights: Vec<Vec<f64>> = vec![Vec::new(); scene.num_envs()];
     let mut totals = Totals::default();
     let mut step = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         if args.reset_every > 0 && step % args.reset_every == 0 {
             // Poses are in the environment frame: environment origins are not added.
             let mut robot = scene.robot_mut("robot")?;
@@ -90,18 +90,18 @@ fn run(args: &Args) -> launcher::Result {
             robot.set_qpos_target(&standing, None, None)?;
             // The reset keeps the written state and clears the buffers of the sensors.
             scene.reset(None)?;
-            totals.seen = [0; 3];
-            progress.say("[INFO]: Resetting robot state...");
+            totals.last_counts = [0; 3];
+            progress.print_line("[INFO]: Resetting robot state...");
         }
         scene.update(1);
         step += 1;
         totals.count(&scene)?;
-        if step % SECOND == 0 {
+        if step % STEPS_PER_SECOND == 0 {
             let base = scene.robot("robot")?.root_pose();
             heights.iter_mut().enumerate().for_each(|(env, heights)| heights.push(base[(env, 2)]));
         }
         if args.print_every > 0 && step % args.print_every == 0 {
-            progress.say(&summary(&scene)?);
+            progress.print_line(&summary(&scene)?);
         }
         progress.advance(step);
     }
@@ -109,7 +109,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("\n{step} steps x {} environments: {rate:.0} environment steps per second", scene.num_envs());
     if let Some(out) = &args.launcher.out {
         launcher::make_folder(out)?;
-        write_pictures(&mut scene, out)?;
+        write_images(&mut scene, out)?;
         println!("Pictures written to {}", out.display());
     }
     recording.finish(scene.sim_mut())?;
@@ -195,7 +195,7 @@ fn largest(forces: ArrayView3<'_, f64>) -> f64 {
 /// Statistics of the whole run; a reset restarts the counters of the sensors.
 #[derive(Default)]
 struct Totals {
-    seen: [u64; 3],
+    last_counts: [u64; 3],
     updates: [u64; 3],
     max_force: f64,
 }
@@ -204,10 +204,10 @@ impl Totals {
     fn count(&mut self, scene: &InteractiveScene) -> launcher::Result {
         let (camera, scanner, contacts) = sensors(scene)?;
         let now = [camera.frame_counts()[0], scanner.sample_counts()[0], contacts.sample_counts()[0]];
-        for ((updates, seen), now) in self.updates.iter_mut().zip(self.seen).zip(now) {
+        for ((updates, seen), now) in self.updates.iter_mut().zip(self.last_counts).zip(now) {
             *updates += now.checked_sub(seen).unwrap_or(now);
         }
-        self.seen = now;
+        self.last_counts = now;
         self.max_force = self.max_force.max(largest(contacts.net_forces_w()));
         Ok(())
     }
@@ -260,13 +260,13 @@ fn report(
 }
 
 /// Writes the camera image of each robot, and the stage with all robots and their sensor markers.
-fn write_pictures(scene: &mut InteractiveScene, out: &Path) -> launcher::Result {
+fn write_images(scene: &mut InteractiveScene, out: &Path) -> launcher::Result {
     let front = scene.sensor::<Camera>("camera")?;
     let (color, [width, height]) = (front.color()?, [640, 480]);
     for (row, env) in front.env_ids().iter().enumerate() {
         let pixels: Vec<u8> = color.index_axis(Axis(0), row).iter().copied().collect();
         let file = out.join(format!("front_camera_env{env}.png"));
-        picture::write_png(&file, &picture::color_picture([width, height], &pixels))?;
+        picture::write_png(&file, &picture::color_image([width, height], &pixels))?;
     }
     let sim = scene.sim_mut();
     let markers = sim.scene().markers();

@@ -21,12 +21,12 @@ use kinetoscope::ndarray::{Array2, Array3};
 use kinetoscope::prelude::*;
 use kinetoscope::robot::description::{Geometry, RobotDescription};
 use kinetoscope::robot::urdf::assemble;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::NoiseCfg;
 use kinetoscope::sim::WrenchFrame;
-use launcher::trial::{self, Album, Count};
-use launcher::{Launcher, Progress, grip};
+use launcher::trial::{self, ImageSeries, TrialResults};
+use launcher::{Launcher, MainLoop, grip};
 use nalgebra::{Matrix4, RowVector4, Vector3, Vector4};
 use serde_json::json;
 use std::process::ExitCode;
@@ -51,28 +51,28 @@ const DURATION: f64 = 14.0;
 
 const G: f64 = 9.81;
 /// Drop height of the robots above the floor \[m\].
-const DROP: f64 = 0.03;
+const DROP_HEIGHT: f64 = 0.03;
 
 /// Limit of the commanded acceleration \[m/s²\]: tires with friction 1 slip at 9.8.
-const MOST: f64 = 6.0;
+const MAX_ACCELERATION: f64 = 6.0;
 /// Time constant with which the accelerometer corrects the gyroscope's tilt estimate \[s\].
-const CORRECTION: f64 = 0.5;
+const CORRECTION_TIME: f64 = 0.5;
 /// Gain of the wheels' speed controllers \[N m s/rad\].
-const GRIP: f64 = 20.0;
+const WHEEL_SPEED_GAIN: f64 = 20.0;
 
 /// Pushes at the center of mass of the body: range of start times \[s\], duration \[s\], range of forces \[N\], fore or
 /// aft.
-const PUSHES: [[f64; 2]; 4] = [[2.0, 2.5], [4.5, 5.0], [7.0, 7.5], [10.0, 10.5]];
-const LENGTH: f64 = 0.15;
-const FORCES: [f64; 2] = [20.0, 35.0];
+const PUSH_START_TIMES: [[f64; 2]; 4] = [[2.0, 2.5], [4.5, 5.0], [7.0, 7.5], [10.0, 10.5]];
+const PUSH_DURATION: f64 = 0.15;
+const PUSH_FORCES: [f64; 2] = [20.0, 35.0];
 /// Upward force of the third push \[N\]: the robot weighs 94 N, and leaves the floor for about a quarter of a second.
 const LIFT: f64 = 120.0;
 
 /// Success at the end of the run: tilt at most this \[rad\], speed at most this \[m/s\], distance from the start at
 /// most this \[m\].
-const UPRIGHT: f64 = 0.05;
-const SLOW: f64 = 0.1;
-const AT_HOME: f64 = 0.5;
+const MAX_TILT: f64 = 0.05;
+const MAX_SPEED: f64 = 0.1;
+const MAX_DISTANCE: f64 = 0.5;
 
 fn main() -> ExitCode {
     trial::run("balance", || run(&trial::parse()))
@@ -91,30 +91,32 @@ fn run(args: &Args) -> launcher::Result<bool> {
         ..args.launcher.simulation()?
     })?;
     let urdf = UrdfCfg::single(assets::path("balancer/balancer.urdf")?);
-    let plant = Plant::of(&assemble(&urdf)?.description)?;
+    let plant = RobotModel::from_description(&assemble(&urdf)?.description)?;
     let robot = sim.add_robot(RobotCfg {
         uid: "balancer".into(),
         urdf,
         fix_base: false,
-        init_pose: Pose::translation(0.0, 0.0, plant.radius + DROP),
+        init_pose: Pose::translation(0.0, 0.0, plant.radius + DROP_HEIGHT),
         // Speed controllers: no stiffness, only damping.
-        drive: DriveCfg { stiffness: 0.0.into(), damping: GRIP.into(), ..Default::default() },
+        drive: DriveCfg { stiffness: 0.0.into(), damping: WHEEL_SPEED_GAIN.into(), ..Default::default() },
         ..Default::default()
     })?;
     let imu = sim.add_sensor("imu", imu_cfg())?;
-    let touch = sim.add_sensor("touch", ContactSensorCfg::of("balancer/.*"))?;
+    let touch = sim.add_sensor("touch", ContactSensorCfg::for_bodies("balancer/.*"))?;
     let out = args.launcher.out.clone();
-    let mut album = Album::new(&mut sim, "balance", out, [2.2, -2.6, 1.1], [0.2, 0.0, 0.3])?;
+    let mut album = ImageSeries::new(&mut sim, "balance", out, [2.2, -2.6, 1.1], [0.2, 0.0, 0.3])?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
     args.launcher.write_dump(&sim)?;
     // The robots start slightly tilted.
-    let tilts = grip::scatter::<1>(&sim, "tilt");
-    let start: Vec<Pose> =
-        tilts.iter().map(|[tilt]| from_xyz_rpy([0.0, 0.0, plant.radius + DROP], [0.0, 0.05 * tilt, 0.0])).collect();
-    sim.robot_mut(robot).write_root_pose(&trial::rows(&start), None)?;
-    let pushes: Vec<Pushes> = (0..sim.num_envs()).map(|env| Pushes::draw(&sim, env, args.push)).collect();
+    let tilts = grip::uniform_per_env::<1>(&sim, "tilt");
+    let start: Vec<Pose> = tilts
+        .iter()
+        .map(|[tilt]| from_xyz_rpy([0.0, 0.0, plant.radius + DROP_HEIGHT], [0.0, 0.05 * tilt, 0.0]))
+        .collect();
+    sim.robot_mut(robot).write_root_pose(&trial::pose_rows(&start), None)?;
+    let pushes: Vec<PushSchedule> = (0..sim.num_envs()).map(|env| PushSchedule::sample(&sim, env, args.push)).collect();
     let (body, tyres) = (sim.robot(robot).link_id("body")?, ["left_tyre", "right_tyre"]);
     let watched: Vec<usize> = tyres
         .iter()
@@ -126,29 +128,29 @@ fn run(args: &Args) -> launcher::Result<bool> {
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
     let steps = (DURATION / DT).round() as u64;
-    let progress = Progress::new(&args.launcher, steps);
+    let progress = MainLoop::new(&args.launcher, steps);
     let gains = plant.gains();
     // Times of the images: before all pushes, after the first, in the air, landed, at the end.
     let end_of = |push: usize| pushes[0].list[push].time[1];
-    let moments = [1.0, end_of(0) + 0.1, end_of(2) + 0.04, end_of(2) + 0.4, DURATION];
-    progress.say(&format!("Gains on distance, speed, tilt and its rate: {:.3?}", gains.as_slice()));
+    let image_times = [1.0, end_of(0) + 0.1, end_of(2) + 0.04, end_of(2) + 0.4, DURATION];
+    progress.print_line(&format!("Gains on distance, speed, tilt and its rate: {:.3?}", gains.as_slice()));
     let mut controllers = vec![Controller::default(); sim.num_envs()];
-    let mut records = vec![Record::default(); sim.num_envs()];
+    let mut records = vec![RunStats::default(); sim.num_envs()];
     let mut speeds = Array2::zeros((sim.num_envs(), 2));
     let mut step = 0;
-    while step < steps && !progress.stop(step) {
+    while step < steps && !progress.should_stop(step) {
         let time = step as f64 * DT;
         let (read, forces) = (sim.sensor(imu)?, sim.sensor(touch)?.net_forces_w());
         for (env, (controller, record)) in controllers.iter_mut().zip(&mut records).enumerate() {
-            let felt = Felt {
+            let readings = SensorReadings {
                 spin: Vector3::from_fn(|k, _| read.ang_vel_b()[(env, k)]),
                 acceleration: Vector3::from_fn(|k, _| read.lin_acc_b()[(env, k)]),
                 grounded: watched[..2].iter().all(|&tyre| forces[(env, tyre, 2)] > 1.0),
             };
-            let speed = if args.no_feedback { 0.0 } else { controller.wheels(&felt, &gains, plant.radius) };
+            let speed = if args.no_feedback { 0.0 } else { controller.wheels(&readings, &gains, plant.radius) };
             speeds.row_mut(env).fill(speed);
             // For the result only: the controller does not use it.
-            record.airborne += u64::from(!felt.grounded && time > 1.0);
+            record.steps_without_contact += u64::from(!readings.grounded && time > 1.0);
             let touching = (0..3).map(|k| forces[(env, watched[2], k)].powi(2)).sum::<f64>().sqrt();
             record.fell |= touching > 1.0;
         }
@@ -164,7 +166,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         for (record, pose) in records.iter_mut().zip(&poses) {
             record.tilt = record.tilt.max(tilt(pose));
         }
-        if moments.iter().any(|at| (at / DT).round() as u64 == step) {
+        if image_times.iter().any(|at| (at / DT).round() as u64 == step) {
             album.add(&sim)?;
         }
     }
@@ -177,8 +179,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
         let (pose, record) = (&poses[env], &records[env]);
         let away = pose.translation.x.hypot(pose.translation.y);
         let speed = velocities[(env, 0)].hypot(velocities[(env, 1)]);
-        let (last, airborne) = (tilt(pose), record.airborne as f64 * DT);
-        let stands = !record.fell && last < UPRIGHT && speed < SLOW && away < AT_HOME;
+        let (last, airborne) = (tilt(pose), record.steps_without_contact as f64 * DT);
+        let stands = !record.fell && last < MAX_TILT && speed < MAX_SPEED && away < MAX_DISTANCE;
         let success = step == steps && stands && diverged[env].is_none();
         table.push(json!({
             "env": env, "pushes": pushes[env].list.iter().map(|push| push.force).collect::<Vec<_>>(),
@@ -198,7 +200,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             },
         );
     }
-    let count = Count {
+    let count = TrialResults {
         what: "robots stand",
         setting: ("push", args.push),
         table,
@@ -207,7 +209,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         overview: ("balance_all.png", [3.6, -4.2, 3.0], [0.0, 0.0, 0.2]),
     };
     recording.finish(&mut sim)?;
-    trial::conclude(&args.launcher, &mut sim, count)
+    trial::write_results(&args.launcher, &mut sim, count)
 }
 
 /// A low-cost IMU on the axle, where tilting does not accelerate it.
@@ -221,7 +223,7 @@ fn imu_cfg() -> ImuCfg {
 
 /// The controller's model of a robot, taken from its URDF.
 #[derive(Clone, Copy, Debug)]
-struct Plant {
+struct RobotModel {
     /// Radius of the wheels \[m\].
     radius: f64,
     /// Mass of the body, and of both wheels \[kg\].
@@ -234,9 +236,9 @@ struct Plant {
     wheel_inertia: f64,
 }
 
-impl Plant {
+impl RobotModel {
     /// Takes the model from the links `body`, whose frame is at the middle of the axle, and the two tires.
-    fn of(robot: &RobotDescription) -> launcher::Result<Self> {
+    fn from_description(robot: &RobotDescription) -> launcher::Result<Self> {
         let link = |name: &str| robot.links.iter().find(|link| link.name == name).ok_or(format!("no link {name}"));
         let inertial = |name: &str| {
             let inertial = link(name)?.inertial.as_ref().ok_or(format!("the link {name} has no mass"))?;
@@ -304,7 +306,7 @@ impl Plant {
 }
 
 /// Sensor readings of a robot.
-struct Felt {
+struct SensorReadings {
     /// Angular velocity in the axes of the body \[rad/s\].
     spin: Vector3<f64>,
     /// Specific force (acceleration minus gravity) in the axes of the body \[m/s²\].
@@ -327,16 +329,16 @@ struct Controller {
 
 impl Controller {
     /// Speed of both wheels, of this radius \[m\], relative to the body \[rad/s\].
-    fn wheels(&mut self, felt: &Felt, gains: &RowVector4<f64>, radius: f64) -> f64 {
+    fn wheels(&mut self, felt: &SensorReadings, gains: &RowVector4<f64>, radius: f64) -> f64 {
         self.tilt += DT * felt.spin.y;
         let (sin, cos) = self.tilt.sin_cos();
         self.acceleration = if felt.grounded {
             // At a tilt of θ, with the axle accelerated by a, the accelerometer reads a vector along (a cos θ - g sin
             // θ, a sin θ + g cos θ), at an angle of θ - atan(a / g).
-            let leans = (-felt.acceleration.x).atan2(felt.acceleration.z) + self.acceleration.atan2(G);
-            self.tilt += DT / CORRECTION * (leans - self.tilt);
+            let tilt_measured = (-felt.acceleration.x).atan2(felt.acceleration.z) + self.acceleration.atan2(G);
+            self.tilt += DT / CORRECTION_TIME * (tilt_measured - self.tilt);
             let state = Vector4::new(self.distance, self.speed, self.tilt, felt.spin.y);
-            -(gains * state)[0].clamp(-MOST, MOST)
+            -(gains * state)[0].clamp(-MAX_ACCELERATION, MAX_ACCELERATION)
         } else {
             // In the air the accelerometer gives no vertical reference, and the wheels have no floor to push against.
             // The measured acceleration along the floor is that of the push: the wheels match the speed of the floor
@@ -361,21 +363,21 @@ struct Push {
 
 /// The pushes of an environment.
 #[derive(Clone, Debug)]
-struct Pushes {
+struct PushSchedule {
     list: Vec<Push>,
 }
 
-impl Pushes {
-    fn draw(sim: &SimulationManager, env: usize, strength: f64) -> Self {
-        let mut random = Random::keyed(sim.cfg().seed, (sim.cfg().first_env() + env) as u64, "pushes");
-        let mut between = |[low, high]: [f64; 2]| random.between(low, high);
+impl PushSchedule {
+    fn sample(sim: &SimulationManager, env: usize, strength: f64) -> Self {
+        let mut random = KeyedRng::keyed(sim.cfg().seed, (sim.cfg().first_env() + env) as u64, "pushes");
+        let mut between = |[low, high]: [f64; 2]| random.uniform_range(low, high);
         let mut push = |(k, window): (usize, [f64; 2])| {
             let begin = between(window);
             let side = if between([-1.0, 1.0]) < 0.0 { -1.0 } else { 1.0 };
-            let force = [side * strength * between(FORCES), if k == 2 { strength * LIFT } else { 0.0 }];
-            Push { time: [begin, begin + LENGTH], force }
+            let force = [side * strength * between(PUSH_FORCES), if k == 2 { strength * LIFT } else { 0.0 }];
+            Push { time: [begin, begin + PUSH_DURATION], force }
         };
-        Self { list: PUSHES.into_iter().enumerate().map(&mut push).collect() }
+        Self { list: PUSH_START_TIMES.into_iter().enumerate().map(&mut push).collect() }
     }
 
     /// Force at a time, in world axes \[N\].
@@ -387,11 +389,11 @@ impl Pushes {
 
 /// Statistics of a robot.
 #[derive(Clone, Debug, Default)]
-struct Record {
+struct RunStats {
     /// The largest tilt \[rad\].
     tilt: f64,
     /// Steps without contact of both wheels, once the robot has landed.
-    airborne: u64,
+    steps_without_contact: u64,
     /// True if the body has touched the floor.
     fell: bool,
 }

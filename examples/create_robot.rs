@@ -11,7 +11,7 @@ use clap::Parser;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use launcher::arm::ArmWithHand;
-use launcher::{Launcher, Progress, Renderer};
+use launcher::{Launcher, MainLoop, Renderer};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
@@ -45,7 +45,7 @@ fn run(args: &Args) -> launcher::Result {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
         arena_space: args.launcher.arena_space.unwrap_or(3.0),
-        ..args.launcher.simulation_drawn_anyhow()?
+        ..args.launcher.simulation_for_any_renderer()?
     })?;
 
     println!("Loading robot...");
@@ -64,13 +64,13 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, PHASE * phases.len() as u64);
+    let progress = MainLoop::new(&args.launcher, PHASE * phases.len() as u64);
     let mut finished = Vec::new();
     let mut step = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         let phase = &phases[(step / PHASE) as usize % phases.len()];
         if step % PHASE == 0 {
-            progress.say(phase.message);
+            progress.print_line(phase.message);
             let targets = phase.targets(sim.num_envs());
             sim.robot_mut(robot).set_qpos_target(&targets, Some(&phase.joints), None)?;
         }
@@ -79,7 +79,7 @@ fn run(args: &Args) -> launcher::Result {
         sim.update((end - step) as u32);
         step = end;
         progress.advance(step);
-        if step % PHASE == 0 || progress.stop(step) {
+        if step % PHASE == 0 || progress.should_stop(step) {
             finished.push(phase.report(&sim, robot, step));
         }
     }

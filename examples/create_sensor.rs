@@ -15,9 +15,9 @@ use kinetoscope::render::RenderProgress;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
 use kinetoscope::sensors::camera::{Camera, CameraConvention, SegmentLevel, Segmentation, SegmentationCfg};
 use launcher::arm::ArmWithHand;
-use launcher::panel::{self, Views, grid, tile};
+use launcher::panel::{self, CameraChannels, grid, tile};
 use launcher::views::SensorWindow;
-use launcher::{End, Launcher, PathFlags, Progress, Renderer, picture, waiting};
+use launcher::{Launcher, MainLoop, PathFlags, Renderer, StopRequest, picture, waiting};
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -85,12 +85,12 @@ fn run(args: &Args) -> launcher::Result {
         (true, Renderer::Auto) => Renderer::Rt,
         (_, renderer) => renderer,
     };
-    let renderer = renderer.of_cameras(args.paths)?;
+    let renderer = renderer.for_cameras(args.paths)?;
     println!("Creating simulation...");
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
         arena_space: args.launcher.arena_space.unwrap_or(3.0),
-        ..args.launcher.simulation_drawn_anyhow()?
+        ..args.launcher.simulation_for_any_renderer()?
     })?;
 
     println!("Loading robot...");
@@ -126,29 +126,29 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, POSITION_2_EVERY);
+    let progress = MainLoop::new(&args.launcher, POSITION_2_EVERY);
     let size = panel::tiled_size([args.width, args.height], sim.num_envs());
     let window = args.launcher.open_sensor_window("Sensor Views (Color / Depth / Mask / Normals)", size);
     let saved = args.save || args.raw || window.is_none();
-    let mut album = Album {
+    let mut album = ImageWriter {
         out: saved.then(|| args.launcher.out_folder(true)).transpose()?,
         raw: args.raw,
         instances: (args.mask == MaskLevel::Instance)
             .then(|| sim.scene().segmentation(&SegmentationCfg::default()))
             .transpose()?,
         window,
-        end: progress.end(),
+        end: progress.stop_request(),
         files: Vec::new(),
         drawing: Duration::ZERO,
         images: 0,
     };
     let mut step = 0;
-    'steps: while !progress.stop(step) {
+    'steps: while !progress.should_stop(step) {
         for (every, wrist, message) in
             [(POSITION_1_EVERY, 0.3, "Moving to arm position 1"), (POSITION_2_EVERY, -0.3, "Moving to arm position 2")]
         {
             if step % every == 0 {
-                progress.say(message);
+                progress.print_line(message);
                 let target = position(wrist);
                 sim.robot_mut(robot).set_qpos_target(
                     ArrayView1::from(&target).insert_axis(Axis(0)),
@@ -246,20 +246,20 @@ fn tutorial_rotation() -> UnitQuaternion<f64> {
 }
 
 /// Recorded images, their destination and their rendering times.
-struct Album {
+struct ImageWriter {
     /// Folder of the files; `None` if images are only shown.
     out: Option<PathBuf>,
     raw: bool,
     /// Maps link ids of the mask to instance ids, for `--mask instance`.
     instances: Option<Segmentation>,
     window: Option<SensorWindow>,
-    end: End,
+    end: StopRequest,
     files: Vec<Value>,
     drawing: Duration,
     images: u64,
 }
 
-impl Album {
+impl ImageWriter {
     /// Renders the current camera image, shows it and writes it to files. Returns false if the user ended the example
     /// meanwhile.
     fn add(&mut self, camera: &Camera, step: u64) -> launcher::Result<bool> {
@@ -268,16 +268,16 @@ impl Album {
             return Ok(true);
         }
         let start = Instant::now();
-        let look = |progress: &RenderProgress| {
-            if self.end.has_come() {
+        let on_update = |progress: &RenderProgress| {
+            if self.end.is_set() {
                 progress.cancel();
             }
             if let (Some(window), Some(share)) = (&self.window, progress.fraction()) {
                 window.announce(&format!("Ray tracing: {:.0} %", 100.0 * share));
             }
         };
-        match waiting::draw(camera.progress(), None, look, || camera.pictures().map(|_| ())) {
-            Err(_) if self.end.has_come() => return Ok(false),
+        match waiting::render_with_progress(camera.progress(), None, on_update, || camera.images().map(|_| ())) {
+            Err(_) if self.end.is_set() => return Ok(false),
             drawn => drawn?,
         }
         self.drawing += start.elapsed();
@@ -285,7 +285,7 @@ impl Album {
         let name = self.out.is_some().then(|| format!("sensor_views_{step}.png"));
         let mut panels = Vec::new();
         for (row, &env) in camera.env_ids().iter().enumerate() {
-            let views = Views::of(camera, row)?;
+            let views = CameraChannels::of(camera, row)?;
             panels.push(match &self.instances {
                 None => grid(&views),
                 Some(of) => {
@@ -295,7 +295,7 @@ impl Album {
                         .iter()
                         .copied()
                         .collect();
-                    grid(&Views { mask: &mask, ..views })
+                    grid(&CameraChannels { mask: &mask, ..views })
                 }
             });
             let depth = picture::finite_range(views.depth.iter().copied());
@@ -329,7 +329,7 @@ impl Album {
     }
 }
 
-fn print_table(album: &Album, sim: &SimulationManager) {
+fn print_table(album: &ImageWriter, sim: &SimulationManager) {
     println!("\n{:<28} {:>6} {:>5} {:>18}  seen", "image", "step", "env", "depth [m]");
     for file in &album.files {
         let number = |key: &str| file[key].as_f64().unwrap_or(f64::NAN);

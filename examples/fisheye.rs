@@ -17,7 +17,7 @@ use kinetoscope::render::lens::{
 };
 use kinetoscope::sensors::camera::{Camera, CameraInfo, PointFrame};
 use launcher::panel::tile;
-use launcher::{Launcher, PathFlags, Progress, Renderer, picture};
+use launcher::{Launcher, MainLoop, PathFlags, Renderer, picture};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -59,9 +59,9 @@ fn run(args: &Args) -> launcher::Result {
         Renderer::Auto => Renderer::FastRt,
         other => other,
     };
-    let renderer = renderer.of_cameras(args.paths)?;
+    let renderer = renderer.for_cameras(args.paths)?;
     let views = views(args)?;
-    let mut sim = SimulationManager::new(args.launcher.simulation_drawn_anyhow()?)?;
+    let mut sim = SimulationManager::new(args.launcher.simulation_for_any_renderer()?)?;
     let robot = sim.add_robot(assets::sr5_with_hand()?)?;
     add_objects(&mut sim)?;
     let cameras = views
@@ -83,9 +83,9 @@ fn run(args: &Args) -> launcher::Result {
     // Without a viewer, the images are the only output, and few steps are enough.
     let mut launcher = args.launcher.clone();
     launcher.steps = launcher.steps.or((launcher.headless && launcher.serve_address().is_none()).then_some(100));
-    let progress = Progress::new(&launcher, 100);
+    let progress = MainLoop::new(&launcher, 100);
     let mut step = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         sim.update(1);
         step += 1;
         progress.advance(step);
@@ -95,8 +95,8 @@ fn run(args: &Args) -> launcher::Result {
 
     let (mut pictures, mut lenses) = (Vec::new(), Vec::new());
     for ((name, _), camera) in views.iter().zip(cameras) {
-        let (picture, report) = show(sim.sensor(camera)?, name, &out)?;
-        println!("{name}: {}", line(&report));
+        let (picture, report) = write_images(sim.sensor(camera)?, name, &out)?;
+        println!("{name}: {}", summary_line(&report));
         pictures.push(picture);
         lenses.push(report);
     }
@@ -151,24 +151,24 @@ fn views(args: &Args) -> launcher::Result<Vec<(String, CameraCfg)>> {
         info.apply_to(&mut cfg);
         return Ok(vec![("camera_info".into(), cfg)]);
     }
-    let wanted = |lens: &Lens| args.lenses.is_empty() || args.lenses.iter().any(|name| is_called(name, lens));
+    let wanted = |lens: &Lens| args.lenses.is_empty() || args.lenses.iter().any(|name| matches_name(name, lens));
     for name in &args.lenses {
         Lens::from_name(name)?;
     }
     let of = |lens: Lens| {
-        let intrinsics = fitting(&lens, args.width, args.height)?;
+        let intrinsics = fitted_intrinsics(&lens, args.width, args.height)?;
         Ok((lens.name().to_owned(), CameraCfg { lens, intrinsics, ..base.clone() }))
     };
-    examples().into_iter().filter(wanted).map(of).collect()
+    sample_lenses().into_iter().filter(wanted).map(of).collect()
 }
 
 /// True if a name or an alias denotes a lens of this kind.
-fn is_called(name: &str, lens: &Lens) -> bool {
+fn matches_name(name: &str, lens: &Lens) -> bool {
     Lens::from_name(name).is_ok_and(|known| known.name() == lens.name())
 }
 
 /// One lens of each kind, with realistic parameters.
-fn examples() -> Vec<Lens> {
+fn sample_lenses() -> Vec<Lens> {
     vec![
         Lens::default(),
         OpenCv { k1: -0.24, k2: 0.08, p1: 0.0005, p2: -0.0003, ..OpenCv::default() }.into(),
@@ -184,7 +184,7 @@ fn examples() -> Vec<Lens> {
 
 /// Intrinsics that fit the image circle of a lens into the image; a vertical field of view of 75 degrees for lenses
 /// without an image circle.
-fn fitting(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrinsics> {
+fn fitted_intrinsics(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrinsics> {
     let Domain { radius, .. } = lens.domain()?;
     let (w, h) = (width as f64, height as f64);
     Ok(match lens {
@@ -198,7 +198,7 @@ fn fitting(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrins
 }
 
 /// One line of text about the report of a lens.
-fn line(report: &Value) -> String {
+fn summary_line(report: &Value) -> String {
     let number = |name: &str| report[name].as_f64().unwrap_or(f64::NAN);
     let files: Vec<&str> = report["files"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     format!(
@@ -219,18 +219,18 @@ fn line(report: &Value) -> String {
 
 /// Writes the images of a camera, and its calibration if ROS has a distortion model for the lens. Returns the color
 /// image and its report.
-fn show(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::RgbImage, Value)> {
+fn write_images(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::RgbImage, Value)> {
     let start = Instant::now();
     let (height, width) = camera.image_shape();
     let color: Vec<u8> = camera.color()?.index_axis(Axis(0), 0).iter().copied().collect();
     let seconds = start.elapsed().as_secs_f64();
     let size = [width, height];
-    let picture = picture::color_picture(size, &color);
+    let picture = picture::color_image(size, &color);
     let mut files = vec![format!("{name}.png"), format!("{name}_distance.png")];
     picture::write_png(&out.join(&files[0]), &picture)?;
     let distance: Vec<f32> = camera.distance()?.index_axis(Axis(0), 0).iter().copied().collect();
     let range = picture::finite_range(distance.iter().copied()).unwrap_or([0.0, 1.0]);
-    picture::write_png(&out.join(&files[1]), &picture::depth_picture(size, &distance, range))?;
+    picture::write_png(&out.join(&files[1]), &picture::depth_image(size, &distance, range))?;
     if let Ok(info) = camera.camera_info(name, 0) {
         files.push(format!("{name}.yaml"));
         info.write(&out.join(format!("{name}.yaml")))?;
@@ -249,7 +249,7 @@ fn show(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::Rgb
         "cy": f.cy,
         "largest_angle_deg": domain.angle.to_degrees(),
         "pixels_that_hit": hits,
-        "round_trip_error_pixels": round_trip(camera)?,
+        "round_trip_error_pixels": reprojection_error(camera)?,
         "seconds": seconds,
         "files": files,
     });
@@ -257,7 +257,7 @@ fn show(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::Rgb
 }
 
 /// The largest reprojection error of the point map through the lens \[pixels\].
-fn round_trip(camera: &Camera) -> launcher::Result<f64> {
+fn reprojection_error(camera: &Camera) -> launcher::Result<f64> {
     let (map, optics) = (camera.point_map(0, PointFrame::Camera)?, camera.optics(0)?);
     let mut worst = 0.0f64;
     for ((y, x), point) in map.rows().into_iter().enumerate().map(|(k, p)| ((k / map.dim().1, k % map.dim().1), p)) {

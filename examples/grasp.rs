@@ -22,12 +22,12 @@ mod launcher;
 
 use clap::Parser;
 use kinetoscope::prelude::*;
-use kinetoscope::robot::kinematics::Tip;
+use kinetoscope::robot::kinematics::TipFrame;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use kinetoscope::sim::{Cone, ObjectId};
-use launcher::motion::Motion;
-use launcher::trial::{self, Album, Count};
-use launcher::{Launcher, Progress, grip};
+use kinetoscope::sim::{FrictionCone, RigidObjectId};
+use launcher::motion::MotionPlayer;
+use launcher::trial::{self, ImageSeries, TrialResults};
+use launcher::{Launcher, MainLoop, grip};
 use nalgebra::Vector3;
 use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
@@ -52,7 +52,7 @@ const MASSES: [f64; 2] = [0.1, 0.4];
 const TABLE: [f64; 3] = [0.6, -0.15, 0.06];
 const SCATTER: f64 = 0.05;
 /// Largest start rotation of the cube \[rad\].
-const TURN: f64 = 0.6;
+const MAX_YAW: f64 = 0.6;
 /// Middle of the shelf's top \[m\]; the shelf faces the arm.
 const SHELF: [f64; 3] = [0.42, 0.42, 0.15];
 const SHELF_SIDE: f64 = 0.3;
@@ -68,7 +68,7 @@ const AT_REST_HEIGHT: f64 = 3e-3;
 const AT_REST_SPEED: f64 = 0.01;
 /// Distance of the cube's middle from the palm's frame above which the hand has released the cube \[m\]. It is 0.114 in
 /// the hand, and 0.22 once the hand has risen from the cube.
-const LET_GO: f64 = 0.17;
+const RELEASE_DISTANCE: f64 = 0.17;
 
 /// Middle of the grasped cube relative to the palm's frame \[m\]: forward, toward the thumb's side, down. The closing
 /// fingers are 0.01 and 0.03 to the side, the thumb 0.02; the table is 5 mm below their tips.
@@ -89,46 +89,47 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let manipulation = SimulationManagerCfg::manipulation();
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 0.005,
-        cone: Cone::Elliptic,
+        cone: FrictionCone::Elliptic,
         impratio: manipulation.impratio,
         friction: [args.friction, 0.005, 0.0001],
         arena_space: args.launcher.arena_space.unwrap_or(1.8),
         ..args.launcher.simulation()?
     })?;
     let robot = sim.add_robot(grip::robot_cfg(&OPEN, FINGER_EFFORT)?)?;
-    let cube = add_things(&mut sim)?;
+    let cube = add_objects(&mut sim)?;
     let out = args.launcher.out.clone();
-    let mut album = Album::new(&mut sim, "grasp", out, [1.25, -0.65, 0.75], [0.45, 0.05, 0.25])?;
-    sim.properties_mut().randomize(&Randomization::new().with(Property::Mass, "cube", Draw::Set(MASSES)), None)?;
+    let mut album = ImageSeries::new(&mut sim, "grasp", out, [1.25, -0.65, 0.75], [0.45, 0.05, 0.25])?;
+    sim.properties_mut()
+        .randomize(&Randomization::new().with(Property::Mass, "cube", RandomizationOp::Set(MASSES)), None)?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
     args.launcher.write_dump(&sim)?;
-    let cubes = scatter(&mut sim, cube)?;
+    let cubes = randomize_cubes(&mut sim, cube)?;
     let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).pose());
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, (15.6 / sim.cfg().physics_dt) as u64);
-    let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
-    let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
-    progress.say("To the cubes...");
-    let grips: Vec<Pose> = cubes.iter().map(grip_of).collect();
-    motion.reach(&above(&grips, 0.12), 2.0)?;
-    motion.line(&grips, 1.5)?;
+    let progress = MainLoop::new(&args.launcher, (15.6 / sim.cfg().physics_dt) as u64);
+    let tip = TipFrame::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
+    let mut motion = MotionPlayer::new(&mut sim, robot, "arm", tip, &progress)?;
+    progress.print_line("To the cubes...");
+    let grips: Vec<Pose> = cubes.iter().map(grip_pose).collect();
+    motion.move_joint_space(&above(&grips, 0.12), 2.0)?;
+    motion.move_linear(&grips, 1.5)?;
     album.add(motion.sim)?;
-    progress.say("Closing the hands...");
+    progress.print_line("Closing the hands...");
     let start: Vec<f64> = places(motion.sim).iter().map(|cube| cube.translation.z).collect();
-    motion.joints(&CLOSED, 1.0)?;
+    motion.move_joints(&CLOSED, 1.0)?;
     album.add(motion.sim)?;
-    progress.say("Lifting...");
-    motion.line(&above(&grips, LIFT_COMMAND), 1.5)?;
+    progress.print_line("Lifting...");
+    motion.move_linear(&above(&grips, LIFT_COMMAND), 1.5)?;
     let planned_to_lift = motion.planned().to_vec();
     motion.wait(0.3, |_| ())?;
     album.add(motion.sim)?;
-    progress.say("Holding...");
+    progress.print_line("Holding...");
     let mut rises = vec![f64::INFINITY; start.len()];
     let mut held = 0;
     motion.wait(HOLD, |sim| {
@@ -138,18 +139,18 @@ fn run(args: &Args) -> launcher::Result<bool> {
         }
     })?;
     album.add(motion.sim)?;
-    progress.say("To the shelf...");
+    progress.print_line("To the shelf...");
     // The cube has shifted in the hand, so the plan continues from its measured pose.
     let lifted = above(&grips, LIFT_COMMAND);
-    let from_cube = |(cube, grip): (&Pose, &Pose)| shelf_place() * upright(cube).inv_mul(grip);
+    let from_cube = |(cube, grip): (&Pose, &Pose)| place_pose() * without_tilt(cube).inv_mul(grip);
     let down: Vec<Pose> = places(motion.sim).iter().zip(&lifted).map(from_cube).collect();
-    motion.line(&above(&down, 0.1), 2.5)?;
-    motion.line(&down, 1.5)?;
+    motion.move_linear(&above(&down, 0.1), 2.5)?;
+    motion.move_linear(&down, 1.5)?;
     motion.wait(0.3, |_| ())?;
     album.add(motion.sim)?;
-    progress.say("Letting go...");
-    motion.joints(&OPEN, 1.0)?;
-    motion.line(&above(&down, 0.12), 1.0)?;
+    progress.print_line("Letting go...");
+    motion.move_joints(&OPEN, 1.0)?;
+    motion.move_linear(&above(&down, 0.12), 1.0)?;
     motion.wait(1.0, |_| ())?;
     album.add(motion.sim)?;
 
@@ -166,7 +167,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         let speed = velocities.row(env).iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let inside = on_shelf.x.abs().max(on_shelf.y.abs()) < SHELF_SIDE / 2.0;
         let rests = inside && (on_shelf.z - EDGE / 2.0).abs() < AT_REST_HEIGHT && speed < AT_REST_SPEED;
-        let let_go = (palms[env].translation.vector - poses[env].translation.vector).norm() > LET_GO;
+        let let_go = (palms[env].translation.vector - poses[env].translation.vector).norm() > RELEASE_DISTANCE;
         let success = planned[env] && lifted && rests && let_go && diverged[env].is_none();
         table.push(json!({
             "env": env, "mass": mass, "start": to_row(&cubes[env]), "planned": planned[env],
@@ -184,7 +185,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             trial::word(let_go),
         );
     }
-    let count = Count {
+    let count = TrialResults {
         what: "cubes were lifted, held and put down",
         setting: ("friction", args.friction),
         table,
@@ -193,19 +194,19 @@ fn run(args: &Args) -> launcher::Result<bool> {
         overview: ("grasp_all.png", [4.2, -4.8, 3.6], [0.4, 0.1, 0.0]),
     };
     recording.finish(&mut sim)?;
-    trial::conclude(&args.launcher, &mut sim, count)
+    trial::write_results(&args.launcher, &mut sim, count)
 }
 
 /// Grip frame of a cube, on the side face that points most toward the arm.
-fn grip_of(cube: &Pose) -> Pose {
+fn grip_pose(cube: &Pose) -> Pose {
     let away = cube.translation.y.atan2(cube.translation.x);
-    let yaw = upright(cube).rotation.euler_angles().2;
+    let yaw = without_tilt(cube).rotation.euler_angles().2;
     let quarter = ((away - yaw) / FRAC_PI_2).round() * FRAC_PI_2;
     from_xyz_rpy(cube.translation.vector.into(), [0.0, 0.0, yaw + quarter])
 }
 
 /// The pose with its tilt removed; only the yaw remains.
-fn upright(pose: &Pose) -> Pose {
+fn without_tilt(pose: &Pose) -> Pose {
     let ahead = pose.rotation * Vector3::x();
     from_xyz_rpy(pose.translation.vector.into(), [0.0, 0.0, ahead.y.atan2(ahead.x)])
 }
@@ -215,12 +216,12 @@ fn shelf_pose() -> Pose {
 }
 
 /// Pose of the cube on the shelf, 1 mm above it.
-fn shelf_place() -> Pose {
+fn place_pose() -> Pose {
     shelf_pose() * Pose::translation(0.0, 0.0, EDGE / 2.0 + 0.001)
 }
 
 /// Adds the cube, a table and a shelf of boards.
-fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
+fn add_objects(sim: &mut SimulationManager) -> launcher::Result<RigidObjectId> {
     let mut board = |uid: &str, size: [f64; 3], pose: Pose| {
         sim.add_rigid_object(RigidObjectCfg {
             uid: uid.into(),
@@ -254,12 +255,12 @@ fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
 }
 
 /// Moves each cube to a random place on its table. Returns the poses.
-fn scatter(sim: &mut SimulationManager, cube: ObjectId) -> launcher::Result<Vec<Pose>> {
+fn randomize_cubes(sim: &mut SimulationManager, cube: RigidObjectId) -> launcher::Result<Vec<Pose>> {
     let place = |[x, y, turn]: [f64; 3]| {
         let place = [TABLE[0] + SCATTER * x, TABLE[1] + SCATTER * y, TABLE[2] + EDGE / 2.0];
-        from_xyz_rpy(place, [0.0, 0.0, TURN * turn])
+        from_xyz_rpy(place, [0.0, 0.0, MAX_YAW * turn])
     };
-    let poses: Vec<Pose> = grip::scatter(sim, "cube").into_iter().map(place).collect();
-    sim.rigid_object_mut(cube).write_pose(&trial::rows(&poses), None)?;
+    let poses: Vec<Pose> = grip::uniform_per_env(sim, "cube").into_iter().map(place).collect();
+    sim.rigid_object_mut(cube).write_pose(&trial::pose_rows(&poses), None)?;
     Ok(poses)
 }

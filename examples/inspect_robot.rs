@@ -6,8 +6,8 @@ use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::robot::urdf::Strictness;
 use kinetoscope::sim::DriveType;
-use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use launcher::still::StillFlags;
+use kinetoscope::sim::inspect::{InspectCfg, RobotReport, inspect};
+use launcher::still::LiveViewFlags;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    live: StillFlags,
+    live: LiveViewFlags,
 }
 
 const HELP: &str = "\
@@ -95,7 +95,7 @@ pub(crate) fn run(args: impl IntoIterator<Item = OsString>, out: &mut dyn Write,
     }
 }
 
-fn print(report: &Report, json: Option<&Path>, out: &mut dyn Write) -> Result<(), String> {
+fn print(report: &RobotReport, json: Option<&Path>, out: &mut dyn Write) -> Result<(), String> {
     if let Some(path) = json {
         let text = serde_json::to_string_pretty(report).map_err(|e| e.to_string())? + "\n";
         if path == Path::new("-") {

@@ -16,12 +16,12 @@ mod launcher;
 
 use clap::Parser;
 use kinetoscope::prelude::*;
-use kinetoscope::robot::kinematics::Tip;
+use kinetoscope::robot::kinematics::TipFrame;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sim::ArticulationId;
-use launcher::motion::Motion;
-use launcher::trial::{self, Album, Count};
-use launcher::{Launcher, Progress, grip, user_or_asset};
+use launcher::motion::MotionPlayer;
+use launcher::trial::{self, ImageSeries, TrialResults};
+use launcher::{Launcher, MainLoop, grip, user_or_asset};
 use nalgebra::Vector3;
 use serde_json::json;
 use std::f64::consts::PI;
@@ -40,10 +40,10 @@ struct Args {
 }
 
 /// Position of the cabinet, its front facing the arm: middle of the random range, and largest offset from it \[m\].
-const PLACE: [f64; 2] = [0.98, 0.0];
+const CABINET_CENTER: [f64; 2] = [0.98, 0.0];
 const SCATTER: [f64; 2] = [0.03, 0.08];
 /// Largest rotation of the cabinet \[rad\].
-const TURN: f64 = 0.2;
+const MAX_YAW: f64 = 0.2;
 /// Handle in the frame of the drawer \[m\].
 const HANDLE: [f64; 3] = [0.073, 0.0, 0.0];
 
@@ -53,7 +53,7 @@ const PULL: f64 = 0.2;
 /// Speed limit of a drawer at rest \[m/s\].
 const AT_REST: f64 = 0.01;
 /// Largest accepted displacement of the cabinet \[m\].
-const CABINET_STAYS: f64 = 0.02;
+const MAX_CABINET_SHIFT: f64 = 0.02;
 
 /// Handle in the hand, forward of the palm's frame and below it \[m\]: the bent fingers are 12 mm behind the handle.
 const GRIP: [f64; 3] = [0.09, 0.0, -0.08];
@@ -90,7 +90,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         ..args.launcher.simulation()?
     })?;
     let robot = sim.add_robot(grip::robot_cfg(&BENT, FINGER_EFFORT)?)?;
-    let [x, y] = PLACE;
+    let [x, y] = CABINET_CENTER;
     let cabinet = sim.add_articulation(ArticulationCfg {
         uid: "cabinet".into(),
         urdf: UrdfCfg::single(user_or_asset(Path::new("cabinet/cabinet.urdf"))?),
@@ -99,21 +99,21 @@ fn run(args: &Args) -> launcher::Result<bool> {
         ..Default::default()
     })?;
     let out = args.launcher.out.clone();
-    let mut album = Album::new(&mut sim, "open_drawer", out, [0.3, -1.2, 0.75], [0.55, 0.0, 0.2])?;
-    let friction = Draw::Set([args.slide_friction; 2]);
+    let mut album = ImageSeries::new(&mut sim, "open_drawer", out, [0.3, -1.2, 0.75], [0.55, 0.0, 0.2])?;
+    let friction = RandomizationOp::Set([args.slide_friction; 2]);
     sim.properties_mut()
         .randomize(&Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", friction), None)?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
     args.launcher.write_dump(&sim)?;
-    let stands = scatter(&mut sim, cabinet)?;
+    let stands = randomize_cabinets(&mut sim, cabinet)?;
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, (10.0 / sim.cfg().physics_dt) as u64);
-    let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
+    let progress = MainLoop::new(&args.launcher, (10.0 / sim.cfg().physics_dt) as u64);
+    let tip = TipFrame::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let handles: Vec<Pose> = trial::poses(&sim.articulation(cabinet).link_pose("drawer")?)
         .iter()
         // The grip frame faces the drawer, so it is turned by half a turn from the frame of the handle.
@@ -121,21 +121,21 @@ fn run(args: &Args) -> launcher::Result<bool> {
         .collect();
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
     let pulled = trial::moved(&handles, |handle| (handle.rotation * Vector3::new(-PULL, 0.0, 0.0)).into());
-    let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
-    progress.say("To the handles...");
-    motion.reach(&above(&handles, 0.1), 2.0)?;
-    motion.line(&handles, 1.5)?;
+    let mut motion = MotionPlayer::new(&mut sim, robot, "arm", tip, &progress)?;
+    progress.print_line("To the handles...");
+    motion.move_joint_space(&above(&handles, 0.1), 2.0)?;
+    motion.move_linear(&handles, 1.5)?;
     album.add(motion.sim)?;
-    progress.say("Closing the hands...");
-    motion.joints(&HOOKED, 1.0)?;
+    progress.print_line("Closing the hands...");
+    motion.move_joints(&HOOKED, 1.0)?;
     album.add(motion.sim)?;
-    progress.say("Pulling...");
-    motion.line(&pulled, 2.5)?;
+    progress.print_line("Pulling...");
+    motion.move_linear(&pulled, 2.5)?;
     motion.wait(0.5, |_| ())?;
     album.add(motion.sim)?;
-    progress.say("Letting go...");
-    motion.joints(&BENT, 0.5)?;
-    motion.line(&above(&pulled, 0.1), 1.0)?;
+    progress.print_line("Letting go...");
+    motion.move_joints(&BENT, 0.5)?;
+    motion.move_linear(&above(&pulled, 0.1), 1.0)?;
     motion.wait(1.0, |_| ())?;
     album.add(motion.sim)?;
 
@@ -148,7 +148,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     for env in 0..sim.num_envs() {
         let (open, speed) = (open[(env, 0)], speed[(env, 0)].abs());
         let shift = (ends[env].translation.vector - stands[env].translation.vector).norm();
-        let (is_open, stays) = (open >= OPEN_BY && speed < AT_REST, shift < CABINET_STAYS);
+        let (is_open, stays) = (open >= OPEN_BY && speed < AT_REST, shift < MAX_CABINET_SHIFT);
         let success = planned[env] && is_open && stays && diverged[env].is_none();
         table.push(json!({
             "env": env, "cabinet": to_row(&stands[env]), "planned": planned[env], "open": open, "speed": speed,
@@ -162,7 +162,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             if stays { "it stood" } else { "too far" },
         );
     }
-    let count = Count {
+    let count = TrialResults {
         what: "drawers were opened",
         setting: ("slide_friction", args.slide_friction),
         table,
@@ -171,16 +171,16 @@ fn run(args: &Args) -> launcher::Result<bool> {
         overview: ("open_drawer_all.png", [4.2, -5.2, 3.6], [0.4, 0.0, 0.0]),
     };
     recording.finish(&mut sim)?;
-    trial::conclude(&args.launcher, &mut sim, count)
+    trial::write_results(&args.launcher, &mut sim, count)
 }
 
 /// Moves each cabinet to a random place on the floor. Returns the poses.
-fn scatter(sim: &mut SimulationManager, cabinet: ArticulationId) -> launcher::Result<Vec<Pose>> {
+fn randomize_cabinets(sim: &mut SimulationManager, cabinet: ArticulationId) -> launcher::Result<Vec<Pose>> {
     let place = |[x, y, turn]: [f64; 3]| {
-        let place = [PLACE[0] + SCATTER[0] * x, PLACE[1] + SCATTER[1] * y, 0.0];
-        from_xyz_rpy(place, [0.0, 0.0, PI + TURN * turn])
+        let place = [CABINET_CENTER[0] + SCATTER[0] * x, CABINET_CENTER[1] + SCATTER[1] * y, 0.0];
+        from_xyz_rpy(place, [0.0, 0.0, PI + MAX_YAW * turn])
     };
-    let poses: Vec<Pose> = grip::scatter(sim, "cabinet").into_iter().map(place).collect();
-    sim.articulation_mut(cabinet).write_root_pose(&trial::rows(&poses), None)?;
+    let poses: Vec<Pose> = grip::uniform_per_env(sim, "cabinet").into_iter().map(place).collect();
+    sim.articulation_mut(cabinet).write_root_pose(&trial::pose_rows(&poses), None)?;
     Ok(poses)
 }

@@ -11,12 +11,12 @@ use kinetoscope::ndarray::{Array2, ArrayView2, ArrayView3};
 use kinetoscope::prelude::*;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
-use kinetoscope::render::{ParallelRasterizer, Renderer as Known};
+use kinetoscope::render::{ParallelRenderer, Renderer as Known};
 use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::to_row;
 use kinetoscope::sensors::camera::{CameraConvention, look_at_pose};
-use kinetoscope::sim::Still;
-use launcher::still::StillFlags;
+use kinetoscope::sim::OffscreenScene;
+use launcher::still::LiveViewFlags;
 use launcher::{PathFlags, Renderer, picture, waiting};
 use serde_json::json;
 use std::path::PathBuf;
@@ -87,7 +87,7 @@ struct Args {
     #[arg(long)]
     raw: bool,
     #[command(flatten)]
-    live: StillFlags,
+    live: LiveViewFlags,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -112,7 +112,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
-    let renderer = args.renderer.of_cameras(args.paths)?;
+    let renderer = args.renderer.for_cameras(args.paths)?;
     if args.time_limit.is_some() && args.renderer != Renderer::Rt {
         return Err("--time-limit is of path tracing: use it with --renderer rt".into());
     }
@@ -123,7 +123,7 @@ fn run(args: &Args) -> launcher::Result {
         );
     }
     let still = load(args)?;
-    for left_out in still.visible().left_out() {
+    for left_out in still.visible().omitted() {
         eprintln!("warning: {left_out}");
     }
     let (view, pose, fovy) = view(args, &still)?;
@@ -139,7 +139,7 @@ fn run(args: &Args) -> launcher::Result {
         Some(threads) => return Err(format!("--threads {threads}: it must be 1 to 1024").into()),
         None => std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get),
     };
-    let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_pool(kinetoscope::exec::ThreadPool::new());
+    let mut rasterizer = ParallelRenderer::new(cfg, threads).with_pool(kinetoscope::exec::ThreadPool::new());
     rasterizer.set_renderer(renderer);
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);
@@ -148,13 +148,13 @@ fn run(args: &Args) -> launcher::Result {
         args.time_limit.map(Duration::try_from_secs_f64).transpose().map_err(|e| format!("--time-limit: {e}"))?;
     let (start, mut images) = (Instant::now(), 0u32);
     let progress = rasterizer.progress().clone();
-    waiting::draw(
+    waiting::render_with_progress(
         &progress,
         limit,
         |_| (),
         || {
             while images == 0 || start.elapsed() < seconds {
-                let mut job = [(still.shot(&view), frame.as_mut())];
+                let mut job = [(still.render_request(&view), frame.as_mut())];
                 rasterizer.render(&mut job).map_err(|(_, error)| error)?;
                 images += 1;
             }
@@ -164,12 +164,12 @@ fn run(args: &Args) -> launcher::Result {
     let rate = f64::from(images) / start.elapsed().as_secs_f64();
 
     launcher::make_folder(&args.out)?;
-    write_pictures(args, &view, &frame)?;
+    write_images(args, &view, &frame)?;
     if args.compare {
         let mut raster = Frame::new(view.width, view.height, Channels { color: true, ..Channels::default() });
         rasterizer.set_cfg(RasterCfg { occlusion_rays: 0, ..cfg });
         rasterizer.set_renderer(Known::Raster);
-        rasterizer.render(&mut [(still.shot(&view), raster.as_mut())]).map_err(|(_, error)| error)?;
+        rasterizer.render(&mut [(still.render_request(&view), raster.as_mut())]).map_err(|(_, error)| error)?;
         let both = [&raster, &frame].map(|frame| frame.color.as_deref().unwrap_or_default());
         picture::write_png(
             &args.out.join(format!("raster-and-{}.png", args.renderer.name())),
@@ -186,8 +186,8 @@ fn run(args: &Args) -> launcher::Result {
         "fovy_deg": fovy.to_degrees(),
         "pose": {
             "ros": to_row(&pose),
-            "opengl": to_row(&CameraConvention::OpenGl.of_optical(&pose)),
-            "world": to_row(&CameraConvention::World.of_optical(&pose)),
+            "opengl": to_row(&CameraConvention::OpenGl.pose_from_optical(&pose)),
+            "world": to_row(&CameraConvention::World.pose_from_optical(&pose)),
         },
         "ids": still.mask_ids().iter().map(|id| json!({
             "id": id.id, "object": id.object, "link": id.link, "class": id.class, "body": id.body, "geoms": id.geoms,
@@ -220,19 +220,19 @@ fn simulation(args: &Args) -> launcher::Result<SimulationManager> {
         let robot = sim.add_robot(RobotCfg { urdf, ..Default::default() })?;
         row.map(|row| sim.robot_mut(robot).write_qpos(&row, None, None)).transpose()?;
     } else {
-        let part = sim.add_mjcf(MjcfCfg::file("model", &args.file))?;
+        let part = sim.add_mjcf(MjcfPartCfg::file("model", &args.file))?;
         row.map(|row| sim.mjcf_part_mut(part).write_qpos(&row, None)).transpose()?;
     }
     Ok(sim)
 }
 
 /// Loads the model for rendering. A URDF goes through the whole pipeline; MuJoCo reads any other file.
-fn load(args: &Args) -> launcher::Result<Still> {
+fn load(args: &Args) -> launcher::Result<OffscreenScene> {
     if !is_urdf(args) {
-        return Ok(Still::of_mjcf(&args.file, args.qpos.as_deref())?);
+        return Ok(OffscreenScene::of_mjcf(&args.file, args.qpos.as_deref())?);
     }
     let mut sim = simulation(args)?;
-    let still = Still::of_env(&mut sim, EnvId(0))?;
+    let still = OffscreenScene::of_env(&mut sim, EnvId(0))?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
@@ -240,7 +240,7 @@ fn load(args: &Args) -> launcher::Result<Still> {
 }
 
 /// The render view, the pose of its optical frame, and its vertical field of view \[rad\].
-fn view(args: &Args, still: &Still) -> launcher::Result<(View, Pose, f64)> {
+fn view(args: &Args, still: &OffscreenScene) -> launcher::Result<(View, Pose, f64)> {
     let free = still.first_view([args.width, args.height]);
     let (pose, own_fovy) = match (&args.camera, args.eye, args.target) {
         (Some(name), ..) => {
@@ -260,7 +260,7 @@ fn view(args: &Args, still: &Still) -> launcher::Result<(View, Pose, f64)> {
     Ok((view, pose, radians))
 }
 
-fn write_pictures(args: &Args, view: &View, frame: &Frame) -> launcher::Result {
+fn write_images(args: &Args, view: &View, frame: &Frame) -> launcher::Result {
     let (Some(color), Some(depth), Some(mask), Some(normal)) = (&frame.color, &frame.depth, &frame.mask, &frame.normal)
     else {
         return Err("a channel was not drawn".into());
@@ -268,10 +268,10 @@ fn write_pictures(args: &Args, view: &View, frame: &Frame) -> launcher::Result {
     let size = [view.width, view.height];
     let range = picture::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
     let file = |name: &str| args.out.join(name);
-    picture::write_png(&file("color.png"), &picture::color_picture(size, color))?;
-    picture::write_png(&file("depth.png"), &picture::depth_picture(size, depth, range))?;
-    picture::write_png(&file("mask.png"), &picture::mask_picture(size, mask))?;
-    picture::write_png(&file("normal.png"), &picture::normal_picture(size, normal))?;
+    picture::write_png(&file("color.png"), &picture::color_image(size, color))?;
+    picture::write_png(&file("depth.png"), &picture::depth_image(size, depth, range))?;
+    picture::write_png(&file("mask.png"), &picture::mask_image(size, mask))?;
+    picture::write_png(&file("normal.png"), &picture::normal_image(size, normal))?;
     if args.raw {
         let (w, h) = (view.width, view.height);
         picture::write_npy(&file("color.npy"), &ArrayView3::from_shape((h, w, 4), color)?)?;

@@ -10,11 +10,11 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::{Marker, Random};
+use kinetoscope::scene::{KeyedRng, Marker};
 use kinetoscope::sensors::camera::colormap::mask_color;
 use kinetoscope::sensors::camera::{Camera, CameraConvention, PointFrame};
-use kinetoscope::sim::ObjectId;
-use launcher::{Launcher, Progress, cloud, picture, stage};
+use kinetoscope::sim::RigidObjectId;
+use launcher::{Launcher, MainLoop, cloud, picture, stage};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -48,9 +48,9 @@ struct Args {
 }
 
 /// Steps between two images.
-const PICTURE_EVERY: u64 = 50;
+const IMAGE_EVERY: u64 = 50;
 /// Maximum number of balls that `--draw` shows.
-const MOST_BALLS: usize = 4000;
+const MAX_BALLS: usize = 4000;
 
 fn main() -> ExitCode {
     launcher::run("run_camera", || run(&Args::parse()))
@@ -64,8 +64,8 @@ fn run(args: &Args) -> launcher::Result {
     launcher::check_camera_id(args.camera_id, &sim)?;
     let objects = add_objects(&mut sim, args)?;
     let camera = sim.add_sensor("camera", camera_cfg(args))?;
-    scatter(&mut sim, &objects, args.launcher.seed)?;
-    let eyes = launcher::two_views(sim.num_envs());
+    randomize_poses(&mut sim, &objects, args.launcher.seed)?;
+    let eyes = launcher::alternating_eyes(sim.num_envs());
     sim.sensor_mut(camera)?.look_at(&eyes, &[[0.0; 3]], &[[0.0, 0.0, 1.0]], None)?;
     args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(camera)?);
@@ -74,18 +74,18 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, 200);
+    let progress = MainLoop::new(&args.launcher, 200);
     let (mut step, mut drawing, mut images) = (0, Duration::ZERO, 0);
     let mut files: Vec<String> = Vec::new();
-    while !progress.stop(step) {
-        let end = progress.end_of_block(step, PICTURE_EVERY - step % PICTURE_EVERY);
+    while !progress.should_stop(step) {
+        let end = progress.end_of_block(step, IMAGE_EVERY - step % IMAGE_EVERY);
         sim.update((end - step) as u32);
         step = end;
         let (start, seen) = (Instant::now(), sim.sensor(camera)?);
-        seen.pictures()?;
+        seen.images()?;
         drawing += start.elapsed();
         images += seen.env_ids().len();
-        progress.say(&shapes(seen, step)?);
+        progress.print_line(&shapes(seen, step)?);
         if args.save {
             files.extend(save(&sim, camera, args.camera_id, step, &out)?);
         }
@@ -95,7 +95,7 @@ fn run(args: &Args) -> launcher::Result {
     let classes = pixels_by_class(&sim, camera, args.camera_id)?;
     println!("\npixels of camera {} by class: {classes:?}", args.camera_id);
     let points = colored_points(&sim, camera, args.camera_id)?;
-    let error = round_trip(sim.sensor(camera)?, args.camera_id)?;
+    let error = reprojection_error(sim.sensor(camera)?, args.camera_id)?;
     println!("{} points; seen by the camera again, they are {error:.1e} pixels off at most", points.len());
     if args.save {
         let path = out.join("points.ply");
@@ -140,11 +140,11 @@ fn run(args: &Args) -> launcher::Result {
 }
 
 /// Objects of random shapes, sizes and colors, of 5 kg; the semantic class is the shape.
-fn add_objects(sim: &mut SimulationManager, args: &Args) -> launcher::Result<Vec<ObjectId>> {
-    let mut random = Random::keyed(args.launcher.seed, 0, "objects");
+fn add_objects(sim: &mut SimulationManager, args: &Args) -> launcher::Result<Vec<RigidObjectId>> {
+    let mut random = KeyedRng::keyed(args.launcher.seed, 0, "objects");
     let mut objects = Vec::new();
     for k in 0..args.objects {
-        let mut between = |low: f64, high: f64| random.between(low, high);
+        let mut between = |low: f64, high: f64| random.uniform_range(low, high);
         let (size, length) = (between(0.1, 0.25), between(0.2, 0.5));
         let (class, shape) = match (between(0.0, 4.0) as usize).min(3) {
             0 => ("box", ObjectShape::Box { size: [size, length, 1.5 * size] }),
@@ -165,8 +165,9 @@ fn add_objects(sim: &mut SimulationManager, args: &Args) -> launcher::Result<Vec
 }
 
 /// Stacks the objects above each other, with a random offset and rotation in each environment.
-fn scatter(sim: &mut SimulationManager, objects: &[ObjectId], seed: u64) -> launcher::Result {
-    let mut random: Vec<Random> = (0..sim.num_envs()).map(|env| Random::keyed(seed, env as u64, "scatter")).collect();
+fn randomize_poses(sim: &mut SimulationManager, objects: &[RigidObjectId], seed: u64) -> launcher::Result {
+    let mut random: Vec<KeyedRng> =
+        (0..sim.num_envs()).map(|env| KeyedRng::keyed(seed, env as u64, "scatter")).collect();
     for (k, &object) in objects.iter().enumerate() {
         let mut poses = Array2::zeros((sim.num_envs(), 7));
         for (env, random) in random.iter_mut().enumerate() {
@@ -237,11 +238,11 @@ fn save(
     let semantic: Vec<i32> = mask.iter().map(class).collect();
     let range = picture::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
     let pictures = [
-        ("rgb", picture::color_picture(size, &color)),
-        ("depth", picture::depth_picture(size, &depth, range)),
-        ("normals", picture::normal_picture(size, &normal)),
-        ("instance_segmentation", picture::mask_picture(size, &mask)),
-        ("semantic_segmentation", picture::mask_picture(size, &semantic)),
+        ("rgb", picture::color_image(size, &color)),
+        ("depth", picture::depth_image(size, &depth, range)),
+        ("normals", picture::normal_image(size, &normal)),
+        ("instance_segmentation", picture::mask_image(size, &mask)),
+        ("semantic_segmentation", picture::mask_image(size, &semantic)),
     ];
     let mut files = Vec::new();
     for (name, picture) in &pictures {
@@ -292,7 +293,7 @@ fn colored_points(
 fn balls(camera: &Camera, env: usize) -> launcher::Result<Vec<(EnvId, Marker)>> {
     let (map, mask) = (camera.point_map(env, PointFrame::World)?, camera.mask()?);
     let mask = mask.index_axis(Axis(0), env);
-    let every = mask.len().div_ceil(MOST_BALLS).max(1);
+    let every = mask.len().div_ceil(MAX_BALLS).max(1);
     let points = map.rows().into_iter().zip(&mask).filter(|(point, _)| point[0].is_finite());
     let ball = |point: [f32; 3], id: i32| {
         let [r, g, b] = mask_color(id).map(|c| f32::from(c) / 255.0);
@@ -303,9 +304,9 @@ fn balls(camera: &Camera, env: usize) -> launcher::Result<Vec<(EnvId, Marker)>> 
 }
 
 /// The largest reprojection error of the point map \[pixels\].
-fn round_trip(camera: &Camera, env: usize) -> launcher::Result<f64> {
+fn reprojection_error(camera: &Camera, env: usize) -> launcher::Result<f64> {
     let (map, k) = (camera.point_map(env, PointFrame::World)?, camera.intrinsic_matrices());
     let pose: [f64; 7] = std::array::from_fn(|i| camera.pose_w(CameraConvention::Ros)[(env, i)]);
     let lens = [k[(env, 0, 0)], k[(env, 1, 1)], k[(env, 0, 2)], k[(env, 1, 2)]];
-    Ok(cloud::round_trip(&map, lens, &pose))
+    Ok(cloud::reprojection_error(&map, lens, &pose))
 }

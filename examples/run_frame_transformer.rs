@@ -12,7 +12,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};
 use launcher::spawn::SpawnFlags;
-use launcher::{Launcher, Progress, stage};
+use launcher::{Launcher, MainLoop, stage};
 use serde_json::{Value, json};
 use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
@@ -68,22 +68,22 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, 1000);
+    let progress = MainLoop::new(&args.launcher, 1000);
     let count = sim.sensor(frames)?.target_frame_names().len();
     let mut step = 0;
     let mut shown = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         let end = progress.end_of_block(step, FRAME_EVERY - step % FRAME_EVERY);
         sim.update((end - step) as u32);
         step = end;
-        progress.say(&line(&sim, frames, shown % count)?);
+        progress.print_line(&pose_line(&sim, frames, shown % count)?);
         shown += 1;
         progress.advance(step);
     }
     let rate = progress.env_steps_per_second(step, sim.num_envs());
     let table = table(&sim, frames)?;
-    let user = apart(&sim, frames, "LF_FOOT_USER")?;
-    let own = apart(&sim, frames, "LF_FOOT_URDF")?;
+    let user = max_distance_to_foot(&sim, frames, "LF_FOOT_USER")?;
+    let own = max_distance_to_foot(&sim, frames, "LF_FOOT_URDF")?;
     println!("LF_FOOT_URDF is {own:.1e} m from LF_FOOT, LF_FOOT_USER is {user:.6} m");
     println!("{step} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
     if let Some(out) = &args.launcher.out {
@@ -123,18 +123,21 @@ fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
 fn frames_cfg(args: &Args) -> FrameTransformerCfg {
     let quarter = from_xyz_rpy([0.0; 3], [0.0, 0.0, -FRAC_PI_2]);
     let foot = Pose::translation(FOOT[0], FOOT[1], FOOT[2]);
-    let on_shank =
-        |name: &str, offset| TargetFrameCfg { name: Some(name.into()), offset, ..TargetFrameCfg::of("LF_SHANK") };
+    let on_shank = |name: &str, offset| TargetFrameCfg {
+        name: Some(name.into()),
+        offset,
+        ..TargetFrameCfg::for_bodies("LF_SHANK")
+    };
     let targets = vec![
-        TargetFrameCfg::of(&args.targets),
+        TargetFrameCfg::for_bodies(&args.targets),
         on_shank("LF_FOOT_USER", quarter * foot),
         on_shank("LF_FOOT_URDF", foot),
     ];
-    FrameTransformerCfg { debug_vis: true, ..FrameTransformerCfg::from(&args.source, targets) }
+    FrameTransformerCfg { debug_vis: true, ..FrameTransformerCfg::new(&args.source, targets) }
 }
 
 /// The pose of one frame in environment 0, as text.
-fn line(sim: &SimulationManager, frames: SensorId<FrameTransformer>, target: usize) -> launcher::Result<String> {
+fn pose_line(sim: &SimulationManager, frames: SensorId<FrameTransformer>, target: usize) -> launcher::Result<String> {
     let (frames, time) = (sim.sensor(frames)?, sim.time().first().copied().unwrap_or(0.0));
     let (p, q) = (frames.target_pos_source(), frames.target_quat_source());
     let p = [0, 1, 2].map(|k| format!("{:7.4}", p[(0, target, k)])).join(", ");
@@ -163,7 +166,11 @@ fn table(sim: &SimulationManager, frames: SensorId<FrameTransformer>) -> launche
 }
 
 /// The largest distance, over environments, between a frame and the link LF_FOOT \[m\].
-fn apart(sim: &SimulationManager, frames: SensorId<FrameTransformer>, name: &str) -> launcher::Result<f64> {
+fn max_distance_to_foot(
+    sim: &SimulationManager,
+    frames: SensorId<FrameTransformer>,
+    name: &str,
+) -> launcher::Result<f64> {
     let robot = sim.robot(sim.entities().robot_id("robot")?);
     let (foot, frames) = (robot.link_pose("LF_FOOT")?, sim.sensor(frames)?);
     let target = frames.target_frame_names().iter().position(|n| n == name).ok_or("the frame is gone")?;

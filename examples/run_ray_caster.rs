@@ -9,12 +9,12 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use kinetoscope::scene::terrain::RoughTerrain;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
-use kinetoscope::sim::{ObjectId, TerrainId};
-use launcher::{Launcher, Progress, stage};
+use kinetoscope::sim::{RigidObjectId, TerrainId};
+use launcher::{Launcher, MainLoop, stage};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -50,7 +50,7 @@ fn main() -> ExitCode {
 
 /// The ball, its terrain and its scanner.
 struct Scene {
-    ball: ObjectId,
+    ball: RigidObjectId,
     terrain: TerrainId,
     scanner: SensorId<RayCaster>,
 }
@@ -82,10 +82,10 @@ fn run(args: &Args) -> launcher::Result {
         rgba: [0.1, 0.25, 0.8, 1.0],
         ..Default::default()
     })?;
-    let mut noise: Vec<Random> =
-        (0..sim.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
+    let mut noise: Vec<KeyedRng> =
+        (0..sim.num_envs()).map(|env| KeyedRng::keyed(args.launcher.seed, env as u64, "reset")).collect();
     // The same steps without the scanner show its cost.
-    throw(&mut sim, ball, &mut noise.clone())?;
+    randomize_ball(&mut sim, ball, &mut noise.clone())?;
     let mut totals = Totals::default();
     let bare_steps = args.launcher.steps.unwrap_or(250).min(250);
     for _ in 0..bare_steps {
@@ -101,12 +101,12 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, 1000);
+    let progress = MainLoop::new(&args.launcher, 1000);
     let mut step = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         if step == 0 || (args.reset_every > 0 && step % args.reset_every == 0) {
-            throw(&mut sim, ball, &mut noise)?;
-            progress.say("[INFO]: Resetting the balls...");
+            randomize_ball(&mut sim, ball, &mut noise)?;
+            progress.print_line("[INFO]: Resetting the balls...");
         }
         let start = Instant::now();
         sim.update(1);
@@ -115,7 +115,7 @@ fn run(args: &Args) -> launcher::Result {
         totals.count(&sim, &scene)?;
         if step % REPORT_EVERY == 0 {
             let line = summary(&sim, &scene)?;
-            progress.say(&line.0);
+            progress.print_line(&line.0);
             totals.lines.push(line.1);
         }
         progress.advance(step);
@@ -189,7 +189,7 @@ fn scanner_cfg(args: &Args) -> RayCasterCfg {
 }
 
 /// Puts every ball at a random place above the middle, with a random horizontal velocity.
-fn throw(sim: &mut SimulationManager, ball: ObjectId, noise: &mut [Random]) -> launcher::Result {
+fn randomize_ball(sim: &mut SimulationManager, ball: RigidObjectId, noise: &mut [KeyedRng]) -> launcher::Result {
     sim.reset(None)?;
     let mut between = |env: usize, most: f64| most * (2.0 * noise[env].uniform() - 1.0);
     let mut poses = sim.rigid_object(ball).pose();

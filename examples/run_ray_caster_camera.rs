@@ -12,7 +12,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::terrain::RoughTerrain;
 use kinetoscope::sensors::camera::{CameraConvention, PointFrame};
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCamera, RayCasterCameraCfg};
-use launcher::{Launcher, Progress, cloud, picture};
+use launcher::{Launcher, MainLoop, cloud, picture};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -57,7 +57,7 @@ fn run(args: &Args) -> launcher::Result {
     let rough = RoughTerrain { size: [SIDE; 2], cell: 0.2, range: [0.0, 0.3], step: 0.02, seed: args.launcher.seed };
     let terrain = sim.add_terrain(TerrainCfg { heights: rough.heights()?, size: rough.size, ..Default::default() })?;
     let camera = sim.add_sensor("camera", camera_cfg(args))?;
-    let eyes = launcher::two_views(sim.num_envs());
+    let eyes = launcher::alternating_eyes(sim.num_envs());
     sim.sensor_mut(camera)?.look_at(&eyes, &[[0.0; 3]], &[[0.0, 0.0, 1.0]], None)?;
     args.launcher.write_dump(&sim)?;
     println!("{}", sim.sensor(camera)?);
@@ -66,10 +66,10 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, 200);
+    let progress = MainLoop::new(&args.launcher, 200);
     let (mut step, mut stepping, mut files) = (0, Duration::ZERO, Vec::new());
     let (mut pictures, mut seen) = (0, 0);
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         let start = Instant::now();
         sim.update(1);
         stepping += start.elapsed();
@@ -78,7 +78,7 @@ fn run(args: &Args) -> launcher::Result {
         let count = of.frame_counts()[args.camera_id];
         if count > seen {
             (pictures, seen) = (pictures + sim.num_envs(), count);
-            progress.say(&format!(
+            progress.print_line(&format!(
                 "step {step}: depth {:?}, distance {:?}, normals {:?}",
                 of.depth().dim(),
                 of.distance().dim(),
@@ -95,7 +95,7 @@ fn run(args: &Args) -> launcher::Result {
     let map = of.point_map(args.camera_id, PointFrame::World)?;
     let points: Vec<[f32; 3]> =
         map.rows().into_iter().filter(|p| p[0].is_finite()).map(|p| [p[0], p[1], p[2]]).collect();
-    let error = cloud::round_trip(&map, lens(of, args.camera_id), &pose(of, args.camera_id));
+    let error = cloud::reprojection_error(&map, lens(of, args.camera_id), &pose(of, args.camera_id));
     // The terrain stands in the middle of its environment, without rotation.
     if points.is_empty() {
         return Err("the camera sees nothing of the terrain".into());
@@ -111,7 +111,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("Seen by the camera again, they are {error:.1e} pixels off at most");
     if args.save {
         let range = picture::finite_range(points.iter().map(|p| p[2])).unwrap_or([0.0, 1.0]);
-        let colored: Vec<_> = points.iter().map(|p| (*p, grey(p[2], range))).collect();
+        let colored: Vec<_> = points.iter().map(|p| (*p, gray(p[2], range))).collect();
         cloud::write_ply(&out.join("ray_caster_camera_points.ply"), &colored)?;
         files.push("ray_caster_camera_points.ply".into());
     }
@@ -164,7 +164,7 @@ fn pose(camera: &RayCasterCamera, env: usize) -> [f64; 7] {
 }
 
 /// Gray level of a height: low is dark.
-fn grey(height: f32, [low, high]: [f32; 2]) -> [u8; 3] {
+fn gray(height: f32, [low, high]: [f32; 2]) -> [u8; 3] {
     [(55.0 + 200.0 * (height - low) / (high - low).max(1e-6)) as u8; 3]
 }
 
@@ -179,9 +179,9 @@ fn save(camera: &RayCasterCamera, env: usize, step: u64, out: &Path) -> launcher
     let normal: Vec<f32> = camera.normal().index_axis(Axis(0), env).iter().copied().collect();
     let range = |numbers: &[f32]| picture::finite_range(numbers.iter().copied()).unwrap_or([0.0, 1.0]);
     let pictures = [
-        ("distance_to_image_plane", picture::depth_picture(size, &depth, range(&depth))),
-        ("distance_to_camera", picture::depth_picture(size, &distance, range(&distance))),
-        ("normals", picture::normal_picture(size, &normal)),
+        ("distance_to_image_plane", picture::depth_image(size, &depth, range(&depth))),
+        ("distance_to_camera", picture::depth_image(size, &distance, range(&distance))),
+        ("normals", picture::normal_image(size, &normal)),
     ];
     let mut files = Vec::new();
     for (name, picture) in &pictures {

@@ -14,7 +14,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
 use kinetoscope::sensors::camera::colormap::depth_color;
 use kinetoscope::sensors::camera::{Camera, CameraConvention, StereoCamera, StereoCameraCfg};
-use launcher::{Launcher, PathFlags, Progress, cloud, picture};
+use launcher::{Launcher, MainLoop, PathFlags, cloud, picture};
 use nalgebra::Point3;
 use serde_json::json;
 use std::process::ExitCode;
@@ -49,11 +49,11 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> launcher::Result {
-    let renderer = args.launcher.renderer.of_cameras(args.paths)?;
+    let renderer = args.launcher.renderer.for_cameras(args.paths)?;
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
         arena_space: args.launcher.arena_space.unwrap_or(3.0),
-        ..args.launcher.simulation_drawn_anyhow()?
+        ..args.launcher.simulation_for_any_renderer()?
     })?;
     launcher::check_camera_id(args.camera_id, &sim)?;
     sim.add_robot(assets::sr5_with_hand()?)?;
@@ -74,9 +74,9 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, 200);
+    let progress = MainLoop::new(&args.launcher, 200);
     let mut step = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         let end = progress.end_of_block(step, 20);
         sim.update((end - step) as u32);
         step = end;
@@ -86,14 +86,11 @@ fn run(args: &Args) -> launcher::Result {
     recording.finish(&mut sim)?;
 
     let stereo = sim.sensor(id)?;
-    let pair = Pair::of(stereo, args.camera_id)?;
+    let pair = StereoFrame::from_camera(stereo, args.camera_id)?;
     let size = [args.width, args.height];
     let files = ["stereo_left.png", "stereo_right.png", "stereo_disparity.png", "stereo_points.ply"];
-    let pictures = [
-        picture::color_picture(size, &pair.left),
-        picture::color_picture(size, &pair.right),
-        pair.disparity_picture(size),
-    ];
+    let pictures =
+        [picture::color_image(size, &pair.left), picture::color_image(size, &pair.right), pair.disparity_image(size)];
     for (file, picture) in files.iter().zip(&pictures) {
         picture::write_png(&out.join(file), picture)?;
     }
@@ -102,7 +99,7 @@ fn run(args: &Args) -> launcher::Result {
         return Err("the eyes see nothing".into());
     }
     cloud::write_ply(&out.join(files[3]), &points)?;
-    let (compared, error) = pair.disagreement(args.width);
+    let (compared, error) = pair.disparity_error(args.width);
     let range = picture::finite_range(pair.disparity.iter().copied().filter(|d| *d > 0.0));
     let [low, high] = range.unwrap_or([0.0; 2]);
     println!("\nDisparities from {low:.2} to {high:.2} pixels; {} points", points.len());
@@ -159,12 +156,12 @@ fn stereo_cfg(args: &Args, renderer: kinetoscope::render::Renderer) -> StereoCam
 }
 
 /// Images of one environment's stereo camera, with the calibration that a stereo matcher needs.
-struct Pair {
+struct StereoFrame {
     left: Vec<u8>,
     right: Vec<u8>,
     disparity: Vec<f32>,
     /// fx, fy, cx, cy of the left camera \[pixels\].
-    lens: [f64; 4],
+    intrinsics: [f64; 4],
     baseline: f64,
     world_from_left: Pose,
     /// Depth measured by the right camera itself \[m\].
@@ -173,8 +170,8 @@ struct Pair {
     right_mask: Vec<i32>,
 }
 
-impl Pair {
-    fn of(stereo: &StereoCamera, env: usize) -> launcher::Result<Self> {
+impl StereoFrame {
+    fn from_camera(stereo: &StereoCamera, env: usize) -> launcher::Result<Self> {
         let k = stereo.left().intrinsic_matrices();
         let pose = |eye: &Camera| from_row(&std::array::from_fn(|i| eye.pose_w(CameraConvention::Ros)[(env, i)]));
         let color = |eye: &Camera| -> launcher::Result<Vec<u8>> {
@@ -187,7 +184,7 @@ impl Pair {
             left: color(stereo.left())?,
             right: color(stereo.right())?,
             disparity: stereo.disparity()?.index_axis(Axis(0), env).iter().copied().collect(),
-            lens: [k[(env, 0, 0)], k[(env, 1, 1)], k[(env, 0, 2)], k[(env, 1, 2)]],
+            intrinsics: [k[(env, 0, 0)], k[(env, 1, 1)], k[(env, 0, 2)], k[(env, 1, 2)]],
             baseline: stereo.left_from_right().translation.x,
             world_from_left: pose(stereo.left()),
             right_depth: stereo.right().depth()?.index_axis(Axis(0), env).iter().copied().collect(),
@@ -198,7 +195,7 @@ impl Pair {
 
     /// Points in the environment \[m\] with the colors of the left camera, from the disparity alone: z = fx b / d.
     fn points(&self, width: usize) -> Vec<([f32; 3], [u8; 3])> {
-        let [fx, fy, cx, cy] = self.lens;
+        let [fx, fy, cx, cy] = self.intrinsics;
         let point = |(k, &d): (usize, &f32)| {
             let (u, v, z) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5, fx * self.baseline / f64::from(d));
             let at = self.world_from_left * Point3::new((u - cx) / fx * z, (v - cy) / fy * z, z);
@@ -213,8 +210,8 @@ impl Pair {
     /// gives a second disparity, which is compared with d. Depth is measured at pixel centers and interpolated between
     /// two of them: 1 / z is linear in the image of a plane. One point of ten is ignored, for edges within an object,
     /// self-occlusion and silhouettes.
-    fn disagreement(&self, width: usize) -> (usize, f64) {
-        let scale = self.lens[0] * self.baseline;
+    fn disparity_error(&self, width: usize) -> (usize, f64) {
+        let scale = self.intrinsics[0] * self.baseline;
         let mut off: Vec<f64> = Vec::new();
         for (k, &d) in self.disparity.iter().enumerate().filter(|(_, d)| **d > 0.0) {
             let (u, row) = ((k % width) as f64 - f64::from(d), k / width * width);
@@ -234,7 +231,7 @@ impl Pair {
     }
 
     /// Disparity image: near (large disparity) is red, far blue, no disparity black.
-    fn disparity_picture(&self, [width, height]: [usize; 2]) -> RgbImage {
+    fn disparity_image(&self, [width, height]: [usize; 2]) -> RgbImage {
         let seen = self.disparity.iter().copied().filter(|d| *d > 0.0);
         let range = picture::finite_range(seen).unwrap_or([0.0, 1.0]);
         RgbImage::from_fn(width as u32, height as u32, |x, y| {

@@ -10,8 +10,8 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{LampKind, SurfaceCfg};
-use launcher::{Launcher, PathFlags, Progress, picture};
+use kinetoscope::sim::{LightKindCfg, SurfaceCfg};
+use launcher::{Launcher, MainLoop, PathFlags, picture};
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
 }
 
 /// The materials: name, color and further properties.
-fn surfaces() -> [(&'static str, [f64; 4], SurfaceCfg); 8] {
+fn materials() -> [(&'static str, [f64; 4], SurfaceCfg); 8] {
     let white = [1.0; 4];
     let gold = [1.0, 0.77, 0.34, 1.0];
     let paint = SurfaceCfg { roughness: Some(0.15), specular: Some(0.5), ..SurfaceCfg::default() };
@@ -57,9 +57,9 @@ fn surfaces() -> [(&'static str, [f64; 4], SurfaceCfg); 8] {
 }
 
 fn run(args: &Args) -> launcher::Result {
-    let renderer = args.launcher.renderer.of_cameras(args.paths)?;
+    let renderer = args.launcher.renderer.for_cameras(args.paths)?;
     let lamp = LightCfg {
-        kind: LampKind::Spot { cutoff_deg: 50.0, exponent: 2.0 },
+        kind: LightKindCfg::Spot { cutoff_deg: 50.0, exponent: 2.0 },
         position: [0.8, -1.2, 2.2].into(),
         direction: [-0.35, 0.55, -1.0].into(),
         color: [1.0, 0.96, 0.9],
@@ -68,10 +68,10 @@ fn run(args: &Args) -> launcher::Result {
     };
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         lights: vec![lamp],
-        ..args.launcher.simulation_drawn_anyhow()?
+        ..args.launcher.simulation_for_any_renderer()?
     })?;
     const RADIUS: f64 = 0.16;
-    for (k, (uid, rgba, surface)) in (0..).zip(surfaces()) {
+    for (k, (uid, rgba, surface)) in (0..).zip(materials()) {
         let [x, y] = [f64::from(k % 4) * 0.42 - 0.63, f64::from(k / 4) * 0.5 - 0.25];
         sim.add_rigid_object(RigidObjectCfg {
             uid: uid.into(),
@@ -105,9 +105,9 @@ fn run(args: &Args) -> launcher::Result {
     // Without a viewer, the image is the only output, and one step is enough.
     let mut launcher = args.launcher.clone();
     launcher.steps = launcher.steps.or((launcher.headless && launcher.serve_address().is_none()).then_some(1));
-    let progress = Progress::new(&launcher, 1);
+    let progress = MainLoop::new(&launcher, 1);
     let mut step = 0;
-    while !progress.stop(step) {
+    while !progress.should_stop(step) {
         sim.update(1);
         step += 1;
         progress.advance(step);
@@ -118,7 +118,7 @@ fn run(args: &Args) -> launcher::Result {
     let camera = sim.sensor(camera)?;
     let color: Vec<u8> = camera.color()?.index_axis(Axis(0), 0).iter().copied().collect();
     let mask: Vec<i32> = camera.mask()?.index_axis(Axis(0), 0).iter().copied().collect();
-    picture::write_png(&out.join("surfaces.png"), &picture::color_picture([args.width, args.height], &color))?;
+    picture::write_png(&out.join("surfaces.png"), &picture::color_image([args.width, args.height], &color))?;
     let means: serde_json::Map<_, _> = sim
         .scene()
         .mask_ids()

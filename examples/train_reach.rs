@@ -20,11 +20,11 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::{Marker, Random};
+use kinetoscope::scene::{KeyedRng, Marker};
 use kinetoscope::tasks::{
-    CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTerm, RewardTerm, TermResult, VectorEnv, terms,
+    CommandTerm, Env, EnvBuilder, EnvCfg, ObservationTerm, RewardTerm, TermContext, TermResult, VectorEnv, terms,
 };
-use launcher::{Launcher, Progress, curve, picture, stage, trial};
+use launcher::{Launcher, MainLoop, curve, picture, stage, trial};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -61,15 +61,15 @@ const EPISODE: u64 = 60;
 /// Physics steps of 10 ms per environment step: decisions at 20 Hz.
 const DECIMATION: u32 = 5;
 /// Largest change of a joint's target per step \[rad\]: 2 rad/s.
-const TURN: f64 = 0.1;
+const MAX_TARGET_CHANGE: f64 = 0.1;
 /// Scale of the observed distances \[1/m\], which makes them about as large as joint angles.
-const SCALE: f64 = 10.0;
+const DISTANCE_SCALE: f64 = 10.0;
 
 /// Largest distance of the tip from a reached target at the end of an episode \[m\]. A ball of this radius is 0.26 % of
 /// the box: a policy that ends anywhere in the box reaches that share of the targets.
-const NEAR: f64 = 0.03;
+const REACH_DISTANCE: f64 = 0.03;
 /// Share of targets that has to be reached at the end.
-const LEARNED: f64 = 0.9;
+const REQUIRED_SHARE: f64 = 0.9;
 
 fn main() -> ExitCode {
     trial::run("train_reach", || run(&Args::parse()))
@@ -97,50 +97,51 @@ fn run(args: &Args) -> launcher::Result<bool> {
     args.launcher.serve(env.sim_mut())?;
     args.launcher.open_window(env.sim_mut());
     let recording = args.launcher.start_recording(env.sim_mut())?;
-    let progress = Progress::new(&args.launcher, (args.iterations as u64).saturating_add(2).saturating_mul(EPISODE));
-    let mut run = Run { env: &mut env, progress: &progress, step: 0 };
+    let progress = MainLoop::new(&args.launcher, (args.iterations as u64).saturating_add(2).saturating_mul(EPISODE));
+    let mut run = Rollout { env: &mut env, progress: &progress, step: 0 };
 
-    let mut policy = Policy::idle(run.env);
+    let mut policy = Policy::zero(run.env);
     // Test targets that are not used for learning.
-    let unseen = args.launcher.seed.wrapping_add(1);
-    let before = run.reached(&policy, unseen)?;
+    let test_seed = args.launcher.seed.wrapping_add(1);
+    let before = run.success_rate(&policy, test_seed)?;
     if let Some(before) = before {
-        progress.say(&format!("Before: {:.1} % of {num_envs} targets are reached", 100.0 * before));
+        progress.print_line(&format!("Before: {:.1} % of {num_envs} targets are reached", 100.0 * before));
     }
     targets.store(TARGETS, Ordering::Relaxed);
     let mut rows: Vec<[f64; 3]> = Vec::new();
-    let mut seen = run.env.reset(None, Some(args.launcher.seed))?;
+    let mut observations = run.env.reset(None, Some(args.launcher.seed))?;
     for iteration in 0..args.iterations {
-        let tried = Tried::new(&policy, args, iteration);
-        let Some((returns, distances)) = run.episode(&mut seen, |env| tried.policies[env / TARGETS].view())? else {
+        let tried = Candidates::new(&policy, args, iteration);
+        let Some((returns, distances)) = run.episode(&mut observations, |env| tried.policies[env / TARGETS].view())?
+        else {
             break;
         };
-        let told = if args.no_signal { shuffled(&returns, args.launcher.seed, iteration) } else { returns.clone() };
-        policy.learn(&tried, &told, args.step_size);
-        let reached = count(&distances) as f64 / num_envs as f64;
-        let (mean, apart) = (returns.mean().unwrap_or_default(), distances.mean().unwrap_or_default());
-        rows.push([mean, apart, reached]);
+        let permuted = if args.no_signal { shuffled(&returns, args.launcher.seed, iteration) } else { returns.clone() };
+        policy.learn(&tried, &permuted, args.step_size);
+        let reached = count_reached(&distances) as f64 / num_envs as f64;
+        let (mean, tip_to_target) = (returns.mean().unwrap_or_default(), distances.mean().unwrap_or_default());
+        rows.push([mean, tip_to_target, reached]);
         if iteration % 5 == 4 {
             let text = format!(
-                "Iteration {:>3}: return {mean:8.3}, {apart:.3} m from the target, {:.1} % reached",
+                "Iteration {:>3}: return {mean:8.3}, {tip_to_target:.3} m from the target, {:.1} % reached",
                 iteration + 1,
                 100.0 * reached
             );
-            progress.say(&text);
+            progress.print_line(&text);
         }
     }
     targets.store(num_envs, Ordering::Relaxed);
-    let after = run.reached(&policy, unseen)?;
+    let after = run.success_rate(&policy, test_seed)?;
 
     let steps = run.step;
     let rate = progress.env_steps_per_second(steps * u64::from(DECIMATION), num_envs);
     let share = |reached: Option<f64>| reached.map_or("not measured".into(), |share| format!("{:.1} %", 100.0 * share));
-    println!("\nTargets that are reached, to {NEAR} m: {} before, {} after", share(before), share(after));
+    println!("\nTargets that are reached, to {REACH_DISTANCE} m: {} before, {} after", share(before), share(after));
     println!("{} iterations, {rate:.0} physics steps of an environment per second", rows.len());
     recording.finish(env.sim_mut())?;
     if let Some(out) = &args.launcher.out {
         write_curve(&rows, out)?;
-        draw_reaching(&mut env, &policy, unseen, &out.join("train_reach_all.png"))?;
+        render_final_poses(&mut env, &policy, test_seed, &out.join("train_reach_all.png"))?;
         println!("Curve and picture written to {}", out.display());
     }
     args.launcher.write_report(&json!({
@@ -148,17 +149,17 @@ fn run(args: &Args) -> launcher::Result<bool> {
         "num_envs": num_envs,
         "seed": args.launcher.seed,
         "iterations": rows.len(),
-        "near": NEAR,
+        "near": REACH_DISTANCE,
         "reached_before": before,
         "reached_after": after,
-        "needed": LEARNED,
+        "needed": REQUIRED_SHARE,
         "signal": !args.no_signal,
         "curve": rows.iter().map(|[mean, apart, reached]| json!({ "return": mean, "distance": apart, "reached": reached })).collect::<Vec<_>>(),
         "policy": policy.weights.iter().collect::<Vec<_>>(),
         "env_steps_per_second": rate,
         "warnings": env.sim().warnings().counts(),
     }))?;
-    Ok(after.is_some_and(|after| after >= LEARNED))
+    Ok(after.is_some_and(|after| after >= REQUIRED_SHARE))
 }
 
 /// Builds the environment: arm, actions, commands, observations and rewards.
@@ -177,25 +178,25 @@ pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<E
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    let turns = terms::target_changes(&sim, "turn", arm, &["JOINT[1-6]"], TURN)?;
-    let angles = terms::joint_positions(&sim, "angle", arm, &["JOINT[1-6]"])?;
+    let turns = terms::relative_joint_positions(&sim, "turn", arm, &["JOINT[1-6]"], MAX_TARGET_CHANGE)?;
+    let angles = terms::joint_pos_rel(&sim, "angle", arm, &["JOINT[1-6]"])?;
     // Vector from the tip to the target \[m\].
-    let apart = move |now: &Now<'_>| -> TermResult<Array2<f64>> {
+    let apart = move |now: &TermContext<'_>| -> TermResult<Array2<f64>> {
         let tip = now.sim().robot(arm).link_pose("ee_link")?;
         Ok(Array2::from_shape_fn((now.num_envs(), 3), |(env, k)| -tip[(env, k)]) + now.command("target")?)
     };
-    let distance = move |now: &Now<'_>| -> TermResult<Array1<f64>> {
+    let distance = move |now: &TermContext<'_>| -> TermResult<Array1<f64>> {
         Ok(apart(now)?.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum::<f64>().sqrt()))
     };
     Ok(EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
         .action(turns)
-        .command(CommandTerm::new("target", ["x", "y", "z"], move |dice| {
+        .command(CommandTerm::new("target", ["x", "y", "z"], move |episode_rng| {
             // The target is the same for all compared policies, and changes with every episode.
-            let target = (dice.global_env() % targets.load(Ordering::Relaxed)) as u64;
-            let mut random = Random::keyed(dice.seed(), target, &format!("target {}", dice.episode()));
+            let target = (episode_rng.global_env() % targets.load(Ordering::Relaxed)) as u64;
+            let mut random = KeyedRng::keyed(episode_rng.seed(), target, &format!("target {}", episode_rng.episode()));
             std::array::from_fn(|k| MIDDLE[k] + HALF[k] * (2.0 * random.uniform() - 1.0))
         }))
-        .observation(ObservationTerm::new("to target", ["x", "y", "z"], apart).scaled(SCALE))
+        .observation(ObservationTerm::new("to target", ["x", "y", "z"], apart).scaled(DISTANCE_SCALE))
         .observation(angles)
         .reward(RewardTerm::new("far", -1.0, distance))
         .reward(RewardTerm::new("near", 0.5, move |now| Ok(distance(now)?.mapv(|d| 1.0 - (d / 0.1).tanh()))))
@@ -211,7 +212,7 @@ struct Policy {
 
 impl Policy {
     /// The zero policy: no action.
-    fn idle(env: &impl VectorEnv) -> Self {
+    fn zero(env: &impl VectorEnv) -> Self {
         Self { weights: Array2::zeros((env.observation_space().len() + 1, env.action_space().len())) }
     }
 
@@ -219,9 +220,10 @@ impl Policy {
     ///
     /// The step is the step size times the mean over perturbations, each weighted by its return difference between both
     /// signs, divided by the standard deviation of all returns.
-    fn learn(&mut self, tried: &Tried, returns: &Array1<f64>, step_size: f64) {
-        let earned = |policy: usize| (0..TARGETS).map(|t| returns[policy * TARGETS + t]).sum::<f64>() / TARGETS as f64;
-        let all: Vec<f64> = (0..tried.policies.len()).map(earned).collect();
+    fn learn(&mut self, tried: &Candidates, returns: &Array1<f64>, step_size: f64) {
+        let mean_return =
+            |policy: usize| (0..TARGETS).map(|t| returns[policy * TARGETS + t]).sum::<f64>() / TARGETS as f64;
+        let all: Vec<f64> = (0..tried.policies.len()).map(mean_return).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         let spread = (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / all.len() as f64).sqrt().max(1e-9);
         let rate = step_size / (tried.changes.len() as f64 * spread);
@@ -232,15 +234,15 @@ impl Policy {
 }
 
 /// Tested policies: each perturbation of the weights, added and subtracted.
-struct Tried {
+struct Candidates {
     changes: Vec<Array2<f64>>,
     policies: Vec<Array2<f64>>,
 }
 
-impl Tried {
+impl Candidates {
     fn new(policy: &Policy, args: &Args, iteration: usize) -> Self {
         let change = |direction: usize| {
-            let mut random = Random::keyed(args.launcher.seed, direction as u64, &format!("change {iteration}"));
+            let mut random = KeyedRng::keyed(args.launcher.seed, direction as u64, &format!("change {iteration}"));
             Array2::from_shape_simple_fn(policy.weights.dim(), || random.normal())
         };
         let changes: Vec<Array2<f64>> = (0..args.launcher.num_envs / (2 * TARGETS)).map(change).collect();
@@ -252,7 +254,7 @@ impl Tried {
 
 /// The returns in random order.
 fn shuffled(returns: &Array1<f64>, seed: u64, iteration: usize) -> Array1<f64> {
-    let mut random = Random::keyed(seed, iteration as u64, "no signal");
+    let mut random = KeyedRng::keyed(seed, iteration as u64, "no signal");
     let mut told = returns.clone();
     // Fisher-Yates shuffle: all orders are equally probable.
     for k in (1..told.len()).rev() {
@@ -263,15 +265,15 @@ fn shuffled(returns: &Array1<f64>, seed: u64, iteration: usize) -> Array1<f64> {
 }
 
 /// Runs episodes in all environments, one after the other.
-struct Run<'r, E> {
+struct Rollout<'r, E> {
     env: &'r mut E,
-    progress: &'r Progress,
+    progress: &'r MainLoop,
     /// Steps so far.
     step: u64,
 }
 
-impl<E: VectorEnv> Run<'_, E> {
-    /// Runs one episode in all environments, starting from the observations `seen`. Returns the returns, and the
+impl<E: VectorEnv> Rollout<'_, E> {
+    /// Runs one episode in all environments, starting from the observations `observations`. Returns the returns, and the
     /// distances of the tip from the target at the end \[m\]. Afterwards the next episode has begun. `None` if the user
     /// has stopped the run.
     fn episode<'p>(
@@ -282,7 +284,7 @@ impl<E: VectorEnv> Run<'_, E> {
         let mut returns = Array1::zeros(self.env.num_envs());
         let mut actions = Array2::zeros((self.env.num_envs(), self.env.action_space().len()));
         for k in 1..=EPISODE {
-            if self.progress.stop(self.step) {
+            if self.progress.should_stop(self.step) {
                 return Ok(None);
             }
             act(seen, &policy, &mut actions);
@@ -292,8 +294,9 @@ impl<E: VectorEnv> Run<'_, E> {
             returns += &step.rewards;
             *seen = step.observations;
             if k == EPISODE {
-                let apart =
-                    |row: ArrayView1<'_, f64>| row.iter().take(3).map(|x| (x / SCALE).powi(2)).sum::<f64>().sqrt();
+                let apart = |row: ArrayView1<'_, f64>| {
+                    row.iter().take(3).map(|x| (x / DISTANCE_SCALE).powi(2)).sum::<f64>().sqrt()
+                };
                 return Ok(Some((returns, step.final_observations.map_axis(Axis(1), apart))));
             }
         }
@@ -302,14 +305,14 @@ impl<E: VectorEnv> Run<'_, E> {
 
     /// Share of the environments in which the policy reaches the target in one episode with the seed; `None` if the
     /// user has stopped the run.
-    fn reached(&mut self, policy: &Policy, seed: u64) -> launcher::Result<Option<f64>> {
+    fn success_rate(&mut self, policy: &Policy, seed: u64) -> launcher::Result<Option<f64>> {
         let mut seen = self.env.reset(None, Some(seed))?;
         let done = self.episode(&mut seen, |_| policy.weights.view())?;
-        Ok(done.map(|(_, distances)| count(&distances) as f64 / distances.len() as f64))
+        Ok(done.map(|(_, distances)| count_reached(&distances) as f64 / distances.len() as f64))
     }
 }
 
-/// Computes the actions of each environment's policy from the observations `seen`.
+/// Computes the actions of each environment's policy from the observations `observations`.
 fn act<'p>(seen: &Array2<f64>, policy: impl Fn(usize) -> ArrayView2<'p, f64>, actions: &mut Array2<f64>) {
     for ((env, mut action), row) in actions.rows_mut().into_iter().enumerate().zip(seen.rows()) {
         let weights = policy(env);
@@ -319,23 +322,25 @@ fn act<'p>(seen: &Array2<f64>, policy: impl Fn(usize) -> ArrayView2<'p, f64>, ac
 }
 
 /// Renders all environments with their targets, one step before the end of an episode.
-fn draw_reaching(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> launcher::Result {
+fn render_final_poses(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> launcher::Result {
     let mut seen = env.reset(None, Some(seed))?;
     let mut actions = Array2::zeros((env.num_envs(), env.action_space().len()));
     for _ in 1..EPISODE {
         act(&seen, |_| policy.weights.view(), &mut actions);
         seen = env.step(&actions)?.observations;
     }
-    let targets = env.now().command("target")?;
-    let ball = |row: ArrayView1<'_, f64>| Marker::sphere([row[0], row[1], row[2]], NEAR as f32, [0.9, 0.2, 0.1, 1.0]);
+    let targets = env.context().command("target")?;
+    let ball = |row: ArrayView1<'_, f64>| {
+        Marker::sphere([row[0], row[1], row[2]], REACH_DISTANCE as f32, [0.9, 0.2, 0.1, 1.0])
+    };
     let balls: Vec<_> = targets.rows().into_iter().enumerate().map(|(env, row)| (EnvId(env), ball(row))).collect();
     let far = env.sim().cfg().env_origins().iter().fold(0.0, |most: f64, x| most.max(*x));
     stage::write(env.sim_mut(), &balls, [far + 2.0, -far - 1.6, 2.2], [far - 1.0, 1.0 - far, 0.0], file)
 }
 
 /// Number of distances \[m\] that count as reached.
-fn count(distances: &Array1<f64>) -> usize {
-    distances.iter().filter(|distance| **distance < NEAR).count()
+fn count_reached(distances: &Array1<f64>) -> usize {
+    distances.iter().filter(|distance| **distance < REACH_DISTANCE).count()
 }
 
 /// Writes the learning curve as numbers and as a plot.
@@ -348,6 +353,6 @@ fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
     let file = out.join("curve.csv");
     std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     let reached: Vec<f64> = rows.iter().map(|row| row[2]).collect();
-    let drawn = curve::draw("share of targets reached while trying changes, by iteration", &reached);
+    let drawn = curve::plot("share of targets reached while trying changes, by iteration", &reached);
     picture::write_png(&out.join("curve.png"), &drawn)
 }

@@ -19,15 +19,15 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::render::PixelIntrinsics;
-use kinetoscope::robot::kinematics::Tip;
+use kinetoscope::robot::kinematics::TipFrame;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::NoiseCfg;
 use kinetoscope::sensors::camera::Camera;
-use kinetoscope::sim::ObjectId;
-use launcher::motion::Motion;
-use launcher::panel::{self, Views};
-use launcher::trial::{self, Album, Count};
-use launcher::{Launcher, Progress, grip, picture};
+use kinetoscope::sim::RigidObjectId;
+use launcher::motion::MotionPlayer;
+use launcher::panel::{self, CameraChannels};
+use launcher::trial::{self, ImageSeries, TrialResults};
+use launcher::{Launcher, MainLoop, grip, picture};
 use nalgebra::{Point3, Vector3};
 use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -69,16 +69,16 @@ const DEPTH_NOISE: f64 = 0.002;
 const LOOK_HEIGHT: f64 = 0.6;
 const END_HEIGHT: f64 = 0.31;
 /// Number of control steps, and the share of the position error that the hand corrects in each.
-const LOOKS: usize = 12;
+const CONTROL_STEPS: usize = 12;
 const GAIN: f64 = 0.6;
 /// Minimum number of cube pixels for a position estimate.
-const FEW: usize = 20;
+const MIN_PIXELS: usize = 20;
 
 /// Success: largest distance between the axis of the flange and the middle of the cube's top \[m\]. It is the size of a
 /// pixel there, 0.33 m away, with a focal length of 80 / tan 30° = 139 pixels.
-const NEAR: f64 = 0.0024;
+const MAX_LATERAL_ERROR: f64 = 0.0024;
 /// Success: largest error of the height \[m\].
-const HEIGHT_ERROR: f64 = DEPTH_NOISE;
+const MAX_HEIGHT_ERROR: f64 = DEPTH_NOISE;
 
 fn main() -> ExitCode {
     trial::run("visual_servo", || run(&trial::parse()))
@@ -97,40 +97,41 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let down = [("JOINT2", 0.0), ("JOINT3", -1.6), ("JOINT5", -1.54), ("JOINT6", -FRAC_PI_2)];
     let init_qpos = down.map(|(joint, q)| (joint.to_string(), q)).to_vec();
     let robot = sim.add_robot(RobotCfg { init_qpos, ..assets::sr5_with_hand()? })?;
-    let cube = add_things(&mut sim)?;
+    let cube = add_objects(&mut sim)?;
     let camera = sim.add_sensor("hand_camera", camera_cfg())?;
     let out = args.launcher.out.clone();
-    let mut album = Album::new(&mut sim, "visual_servo", out.clone(), [1.35, -0.75, 0.8], [0.4, 0.08, 0.3])?;
+    let mut album = ImageSeries::new(&mut sim, "visual_servo", out.clone(), [1.35, -0.75, 0.8], [0.4, 0.08, 0.3])?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
     args.launcher.write_dump(&sim)?;
-    scatter(&mut sim, cube)?;
+    randomize_cubes(&mut sim, cube)?;
 
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    let progress = Progress::new(&args.launcher, ((2.5 + 0.4 * LOOKS as f64 + 0.5) / sim.cfg().physics_dt) as u64);
-    let eyes = Eyes {
+    let progress =
+        MainLoop::new(&args.launcher, ((2.5 + 0.4 * CONTROL_STEPS as f64 + 0.5) / sim.cfg().physics_dt) as u64);
+    let eyes = CubeDetector {
         camera,
         cube: if args.blind { i32::MIN } else { mask_id(&sim, "cube")? },
         intrinsics: Intrinsics::Fovy { radians: FOVY }.to_pixels(PIXELS, PIXELS)?,
         flange_from_camera: camera_cfg().extrinsics.parent_from_camera()?
             * Pose::translation(args.miscalibrated, args.miscalibrated, 0.0),
     };
-    let tip = Tip::of_part("arm").at("ee_link");
-    let mut motion = Motion::new(&mut sim, robot, "arm", tip, &progress)?;
-    progress.say("To where the whole table is seen...");
+    let tip = TipFrame::of_part("arm").at("ee_link");
+    let mut motion = MotionPlayer::new(&mut sim, robot, "arm", tip, &progress)?;
+    progress.print_line("To where the whole table is seen...");
     let mut commands = vec![above([PLACE[0], PLACE[1], TABLE + LOOK_HEIGHT]); motion.sim.num_envs()];
-    motion.reach(&commands, 2.5)?;
+    motion.move_joint_space(&commands, 2.5)?;
     let mut found = vec![false; commands.len()];
-    for look in 0..LOOKS {
-        if [0, 2, LOOKS - 1].contains(&look) {
+    for look in 0..CONTROL_STEPS {
+        if [0, 2, CONTROL_STEPS - 1].contains(&look) {
             album.add(motion.sim)?;
-            eyes.write_picture(motion.sim, &out, look)?;
+            eyes.write_image(motion.sim, &out, look)?;
         }
         let flanges = trial::poses(&motion.sim.robot(robot).compute_fk(&positions(motion.sim, robot)?, tip, None)?);
-        let mut missing = Vec::new();
+        let mut errors = Vec::new();
         for (env, (command, flange)) in commands.iter_mut().zip(&flanges).enumerate() {
             let Some(top) = eyes.top_of_cube(motion.sim, env, flange)? else { continue };
             found[env] = true;
@@ -139,20 +140,20 @@ fn run(args: &Args) -> launcher::Result<bool> {
             let wanted = top + Vector3::new(0.0, 0.0, END_HEIGHT);
             let error = wanted.coords - flange.translation.vector;
             command.translation.vector += GAIN * error;
-            missing.push(error.norm());
+            errors.push(error.norm());
         }
-        let largest = missing.iter().fold(0.0, |most: f64, x| most.max(*x));
-        let (seen, all) = (missing.len(), commands.len());
-        progress.say(&format!(
+        let largest = errors.iter().fold(0.0, |most: f64, x| most.max(*x));
+        let (seen, all) = (errors.len(), commands.len());
+        progress.print_line(&format!(
             "Look {:>2}: {seen} of {all} cubes are seen, {:.1} mm away at most",
             look + 1,
             1e3 * largest
         ));
-        motion.line(&commands, 0.4)?;
+        motion.move_linear(&commands, 0.4)?;
     }
     motion.wait(0.5, |_| ())?;
     album.add(motion.sim)?;
-    eyes.write_picture(motion.sim, &out, LOOKS)?;
+    eyes.write_image(motion.sim, &out, CONTROL_STEPS)?;
 
     let (steps, planned) = (motion.step(), motion.planned().to_vec());
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
@@ -165,7 +166,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         // Middle of the cube's top in the frame of the flange, whose axis is z.
         let place = flanges[env].inverse_transform_point(&Point3::from(top.translation.vector));
         let (beside, height) = (place.x.hypot(place.y), place.z);
-        let is_above = beside < NEAR && (height - END_HEIGHT).abs() < HEIGHT_ERROR;
+        let is_above = beside < MAX_LATERAL_ERROR && (height - END_HEIGHT).abs() < MAX_HEIGHT_ERROR;
         let success = planned[env] && found[env] && is_above && diverged[env].is_none();
         table.push(json!({
             "env": env, "cube": to_row(&cubes[env]), "found": found[env], "planned": planned[env], "beside": beside,
@@ -181,7 +182,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             if is_above { "above" } else { "not above" },
         );
     }
-    let count = Count {
+    let count = TrialResults {
         what: "hands are above their cubes",
         setting: ("miscalibrated", args.miscalibrated),
         table,
@@ -190,7 +191,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         overview: ("visual_servo_all.png", [4.2, -4.8, 3.6], [0.4, 0.1, 0.0]),
     };
     recording.finish(&mut sim)?;
-    trial::conclude(&args.launcher, &mut sim, count)
+    trial::write_results(&args.launcher, &mut sim, count)
 }
 
 /// Flange pose at a place, pointing down; its camera is on the far side of the hand.
@@ -233,7 +234,7 @@ fn camera_cfg() -> CameraCfg {
 }
 
 /// A camera with its assumed calibration.
-struct Eyes {
+struct CubeDetector {
     camera: SensorId<Camera>,
     /// Mask id of the cube.
     cube: i32,
@@ -242,7 +243,7 @@ struct Eyes {
     flange_from_camera: Pose,
 }
 
-impl Eyes {
+impl CubeDetector {
     /// Estimated middle of the cube's top in the frame of the environment \[m\], given the assumed pose of the flange.
     /// `None` if too few pixels show the cube.
     ///
@@ -261,7 +262,7 @@ impl Eyes {
                 points.push(world_from_camera * Point3::new(x * z, y * z, z));
             }
         }
-        if points.len() < FEW {
+        if points.len() < MIN_PIXELS {
             return Ok(None);
         }
         // Noise raises single points, so the reference height is the 90th percentile.
@@ -274,20 +275,15 @@ impl Eyes {
     }
 
     /// Writes the camera image of the first environment.
-    fn write_picture(
-        &self,
-        sim: &SimulationManager,
-        out: &Option<std::path::PathBuf>,
-        look: usize,
-    ) -> launcher::Result {
+    fn write_image(&self, sim: &SimulationManager, out: &Option<std::path::PathBuf>, look: usize) -> launcher::Result {
         let Some(out) = out else { return Ok(()) };
-        let views = Views::of(sim.sensor(self.camera)?, 0)?;
+        let views = CameraChannels::of(sim.sensor(self.camera)?, 0)?;
         picture::write_png(&out.join(format!("visual_servo_camera_{look}.png")), &panel::grid(&views))
     }
 }
 
 /// Adds a cube on a table.
-fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
+fn add_objects(sim: &mut SimulationManager) -> launcher::Result<RigidObjectId> {
     let [x, y] = PLACE;
     sim.add_rigid_object(RigidObjectCfg {
         uid: "table".into(),
@@ -309,12 +305,12 @@ fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
 }
 
 /// Moves each cube to a random place on its table.
-fn scatter(sim: &mut SimulationManager, cube: ObjectId) -> launcher::Result {
+fn randomize_cubes(sim: &mut SimulationManager, cube: RigidObjectId) -> launcher::Result {
     let place = |[x, y, turn]: [f64; 3]| {
         let place = [PLACE[0] + SCATTER[0] * x, PLACE[1] + SCATTER[1] * y, TABLE + EDGE / 2.0];
         from_xyz_rpy(place, [0.0, 0.0, FRAC_PI_2 / 2.0 * turn])
     };
-    let poses: Vec<Pose> = grip::scatter(sim, "cube").into_iter().map(place).collect();
-    sim.rigid_object_mut(cube).write_pose(&trial::rows(&poses), None)?;
+    let poses: Vec<Pose> = grip::uniform_per_env(sim, "cube").into_iter().map(place).collect();
+    sim.rigid_object_mut(cube).write_pose(&trial::pose_rows(&poses), None)?;
     Ok(())
 }

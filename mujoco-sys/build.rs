@@ -180,7 +180,7 @@ fn write_fields(installation: &Installation, path: &Path) {
             let (rows, cols) = (size_expression(rows), size_expression(cols));
             writeln!(
                 each,
-                "        array(ModelArray {{ name: \"{name}\", kind: \"{kind}\", pointer: ::std::mem::offset_of!(mjModel, {name}), bytes: unsafe {{ ({rows}) * ({cols}) }} * ::std::mem::size_of::<{kind}>() }});"
+                "        array(ModelArray {{ name: \"{name}\", element_type: \"{kind}\", pointer_offset: ::std::mem::offset_of!(mjModel, {name}), bytes: unsafe {{ ({rows}) * ({cols}) }} * ::std::mem::size_of::<{kind}>() }});"
             )
             .unwrap();
             let (arguments, owner) = if module == "model" {

@@ -18,14 +18,14 @@ use std::path::{Path, PathBuf};
 
 /// Error: an asset was not found.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct AssetMissing {
+pub struct AssetNotFound {
     /// Requested path.
     pub asset: PathBuf,
     /// All paths that were tried.
     pub tried: Vec<PathBuf>,
 }
 
-impl std::fmt::Display for AssetMissing {
+impl std::fmt::Display for AssetNotFound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "asset {} is not there; tried ", self.asset.display())?;
         for (i, place) in self.tried.iter().enumerate() {
@@ -36,7 +36,7 @@ impl std::fmt::Display for AssetMissing {
     }
 }
 
-impl std::error::Error for AssetMissing {}
+impl std::error::Error for AssetNotFound {}
 
 /// Returns the path of an asset such as `sr5/SR5.urdf`.
 ///
@@ -45,7 +45,7 @@ impl std::error::Error for AssetMissing {}
 ///
 /// # Errors
 /// The asset is in none of these places; the error lists them.
-pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetMissing> {
+pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetNotFound> {
     resolve(asset.as_ref(), std::env::var_os("KINETOSCOPE_ASSETS").map(PathBuf::from))
 }
 
@@ -55,7 +55,7 @@ pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetMissing> {
 ///
 /// # Errors
 /// The asset is missing.
-pub fn quadruped() -> Result<RobotCfg, AssetMissing> {
+pub fn quadruped() -> Result<RobotCfg, AssetNotFound> {
     let standing = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
     Ok(RobotCfg {
         uid: "quadruped".into(),
@@ -72,7 +72,7 @@ pub fn quadruped() -> Result<RobotCfg, AssetMissing> {
 ///
 /// # Errors
 /// The asset is missing.
-pub fn sr5() -> Result<RobotCfg, AssetMissing> {
+pub fn sr5() -> Result<RobotCfg, AssetNotFound> {
     Ok(RobotCfg {
         uid: "sr5".into(),
         urdf: UrdfCfg::single(path("sr5/SR5.urdf")?),
@@ -86,7 +86,7 @@ pub fn sr5() -> Result<RobotCfg, AssetMissing> {
 ///
 /// # Errors
 /// The asset is missing.
-pub fn revo1_left() -> Result<RobotCfg, AssetMissing> {
+pub fn revo1_left() -> Result<RobotCfg, AssetNotFound> {
     Ok(RobotCfg {
         uid: "revo1_left".into(),
         urdf: UrdfCfg::single(path("revo1_left/revo1_left.urdf")?),
@@ -102,7 +102,7 @@ pub fn revo1_left() -> Result<RobotCfg, AssetMissing> {
 ///
 /// # Errors
 /// An asset is missing.
-pub fn sr5_with_hand() -> Result<RobotCfg, AssetMissing> {
+pub fn sr5_with_hand() -> Result<RobotCfg, AssetNotFound> {
     let (arm, hand) = (sr5()?, revo1_left()?);
     let on_flange = from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]);
     let components = vec![
@@ -127,7 +127,7 @@ const ARM: &str = "JOINT[1-6]";
 /// Pattern of the hand's joints.
 const HAND: &str = "LEFT_.*";
 
-fn resolve(asset: &Path, own: Option<PathBuf>) -> Result<PathBuf, AssetMissing> {
+fn resolve(asset: &Path, own: Option<PathBuf>) -> Result<PathBuf, AssetNotFound> {
     let tried: Vec<PathBuf> = if asset.is_absolute() {
         vec![asset.to_path_buf()]
     } else {
@@ -136,6 +136,6 @@ fn resolve(asset: &Path, own: Option<PathBuf>) -> Result<PathBuf, AssetMissing> 
     };
     match tried.iter().find(|place| place.exists()) {
         Some(place) => Ok(place.clone()),
-        None => Err(AssetMissing { asset: asset.to_path_buf(), tried }),
+        None => Err(AssetNotFound { asset: asset.to_path_buf(), tried }),
     }
 }

@@ -34,7 +34,7 @@ pub use ndarray;
 #[cfg(all(feature = "record", feature = "viewer"))]
 pub use record_button::FileRecording;
 #[cfg(all(feature = "record", feature = "viewer"))]
-pub use recorded_film::RecordedFilm;
+pub use recorded_film::RecordingPlayback;
 
 /// Names that most programs need (at most 45), and the traits of their methods: `use kinetoscope::prelude::*;`.
 pub mod prelude {
@@ -49,9 +49,9 @@ pub mod prelude {
     pub use kinetoscope_sensors::ray::{RayCasterCfg, RayPattern};
     pub use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, Sampled, SamplingCfg};
     pub use kinetoscope_sim::{
-        ArticulationCfg, BodyType, Draw, DriveCfg, EntityCfg, EnvId, GroundCfg, InteractiveScene, JointIndex, LightCfg,
-        MjcfCfg, MjcfFile, ObjectShape, Property, Randomization, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId,
-        SimulationManager, SimulationManagerCfg, TerrainCfg,
+        ArticulationCfg, BodyType, DriveCfg, EntityCfg, EnvId, GroundCfg, InteractiveScene, JointIndex, LightCfg,
+        MjcfFile, MjcfPartCfg, ObjectShape, Property, Randomization, RandomizationOp, RigidObjectCfg, RobotCfg,
+        RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, TerrainCfg,
     };
     #[cfg(feature = "viewer")]
     pub use kinetoscope_viewer::{OpenWindow, Screenshot, Serve};

@@ -1,13 +1,13 @@
 //! Recordings to files, for the record button of windows and browser views.
 
-use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId};
+use kinetoscope_record::{Record, RecordError, Recorder, RecorderCfg, RecorderId, RecordingSummary};
 use kinetoscope_sim::SimulationManager;
-use kinetoscope_viewer::{Recording, RecordingState};
+use kinetoscope_viewer::{RecordControl, RecordingState};
 use std::path::{Path, PathBuf};
 
 /// Recording to files for a record button: each recording that the button starts gets a new file.
 ///
-/// A value belongs to one simulation. Dropping the simulation aborts the current recording, so call [`end`](Self::end)
+/// A value belongs to one simulation. Dropping the simulation aborts the current recording, so call [`finish`](Self::finish)
 /// before.
 ///
 /// ```no_run
@@ -33,14 +33,14 @@ use std::path::{Path, PathBuf};
 pub struct FileRecording {
     cfg: RecorderCfg,
     /// Recorder and file of the current recording.
-    now: Option<(RecorderId, PathBuf)>,
+    current: Option<(RecorderId, PathBuf)>,
     /// Number of files that were started.
-    begun: usize,
-    done: Vec<Recorded>,
-    /// First error of a recording that the button ended, until [`end`](Self::end) returns it.
+    started: usize,
+    finished: Vec<RecordingSummary>,
+    /// First error of a recording that the button ended, until [`finish`](Self::finish) returns it.
     failed: Option<RecordError>,
     /// Status text of the last recording that ended.
-    said: String,
+    status: String,
 }
 
 impl FileRecording {
@@ -49,15 +49,15 @@ impl FileRecording {
     /// The button never overwrites an existing file unless `cfg` allows it. After the file of `cfg`, for example
     /// `run.mcap`, it writes `run-2.mcap` and so on, and skips existing files.
     pub fn new(cfg: RecorderCfg) -> Self {
-        Self { cfg, now: None, begun: 0, done: Vec::new(), failed: None, said: String::new() }
+        Self { cfg, current: None, started: 0, finished: Vec::new(), failed: None, status: String::new() }
     }
 
     /// Starts a recording to exactly the file of the configuration, for programs that record without a button.
     ///
     /// # Errors
     /// As [`Record::record`].
-    pub fn begin(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
-        self.begin_at(sim, self.cfg.path.clone())
+    pub fn start(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
+        self.start_at(sim, self.cfg.path.clone())
     }
 
     /// Ends the current recording, and returns all recordings that have ended since the last call.
@@ -65,27 +65,27 @@ impl FileRecording {
     /// # Errors
     /// As [`Record::finish_recording`], also for a recording that the button ended. The next call returns complete
     /// recordings.
-    pub fn end(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<Vec<Recorded>> {
-        self.finish(sim)?;
-        self.failed.take().map_or_else(|| Ok(std::mem::take(&mut self.done)), Err)
+    pub fn finish(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<Vec<RecordingSummary>> {
+        self.finish_current(sim)?;
+        self.failed.take().map_or_else(|| Ok(std::mem::take(&mut self.finished)), Err)
     }
 
     /// Reason why the current recording has stopped, for example a full disk, as soon as it is known.
     ///
-    /// Returns `None` while the recording continues, and without a recording. [`end`](Self::end) returns the error too.
+    /// Returns `None` while the recording continues, and without a recording. [`finish`](Self::finish) returns the error too.
     pub fn failure(&self, sim: &SimulationManager) -> Option<String> {
         self.recorder(sim).and_then(|(recorder, _)| recorder.failure())
     }
 
-    fn begin_at(&mut self, sim: &mut SimulationManager, path: PathBuf) -> kinetoscope_record::Result<()> {
+    fn start_at(&mut self, sim: &mut SimulationManager, path: PathBuf) -> kinetoscope_record::Result<()> {
         let recorder = sim.record(RecorderCfg { path: path.clone(), ..self.cfg.clone() })?;
-        self.begun += 1;
-        self.now = Some((recorder, path));
+        self.started += 1;
+        self.current = Some((recorder, path));
         Ok(())
     }
 
-    fn finish(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
-        let Some((recorder, path)) = self.now.take() else { return Ok(()) };
+    fn finish_current(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
+        let Some((recorder, path)) = self.current.take() else { return Ok(()) };
         if !sim.observers().contains(recorder) {
             // The recorder was ended elsewhere.
             return Ok(());
@@ -93,12 +93,12 @@ impl FileRecording {
         let name = name(&path);
         match sim.finish_recording(recorder) {
             Ok(recorded) => {
-                self.said = format!("{name}: {:.1} MB", recorded.bytes as f64 / 1e6);
-                self.done.push(recorded);
+                self.status = format!("{name}: {:.1} MB", recorded.bytes as f64 / 1e6);
+                self.finished.push(recorded);
                 Ok(())
             }
             Err(error) => {
-                self.said = format!("{name}: broken off");
+                self.status = format!("{name}: broken off");
                 Err(error)
             }
         }
@@ -106,7 +106,7 @@ impl FileRecording {
 
     /// Recorder of the current recording, and its file.
     fn recorder<'a>(&'a self, sim: &'a SimulationManager) -> Option<(&'a Recorder, &'a Path)> {
-        let (id, path) = self.now.as_ref()?;
+        let (id, path) = self.current.as_ref()?;
         let recorder = sim.observers().contains(*id).then(|| sim.observers().get(*id).ok()).flatten()?;
         Some((recorder, path.as_path()))
     }
@@ -114,27 +114,27 @@ impl FileRecording {
     /// File of the next recording.
     fn next_path(&self) -> PathBuf {
         let is_there = |path: &Path| path.symlink_metadata().is_ok();
-        let free = |path: &PathBuf| self.cfg.overwrite || !(is_there(path) || is_there(&with_end(path, ".part")));
-        let mut names = (self.begun + 1..=self.begun + MOST).map(|k| numbered(&self.cfg.path, k));
+        let free = |path: &PathBuf| self.cfg.overwrite || !(is_there(path) || is_there(&with_suffix(path, ".part")));
+        let mut names = (self.started + 1..=self.started + MAX_NAMES).map(|k| numbered(&self.cfg.path, k));
         // If all names are taken, the recorder reports an error for the first one.
         names.find(free).unwrap_or_else(|| self.cfg.path.clone())
     }
 }
 
 /// Largest number of names that are tried.
-const MOST: usize = 10_000;
+const MAX_NAMES: usize = 10_000;
 
-impl Recording for FileRecording {
+impl RecordControl for FileRecording {
     fn set(&mut self, sim: &mut SimulationManager, on: bool) -> Result<(), String> {
-        let said = |error: RecordError| error.to_string();
+        let message = |error: RecordError| error.to_string();
         match (on, self.recorder(sim).is_some()) {
             (true, false) => {
                 let path = self.next_path();
-                self.begin_at(sim, path).map_err(said)
+                self.start_at(sim, path).map_err(message)
             }
-            (false, true) => self.finish(sim).map_err(|error| {
+            (false, true) => self.finish_current(sim).map_err(|error| {
                 self.failed.get_or_insert_with(|| error.clone());
-                said(error)
+                message(error)
             }),
             _ => Ok(()),
         }
@@ -142,9 +142,9 @@ impl Recording for FileRecording {
 
     fn state(&self, sim: &SimulationManager) -> RecordingState {
         let Some((recorder, path)) = self.recorder(sim) else {
-            return RecordingState { on: false, text: self.said.clone() };
+            return RecordingState { on: false, text: self.status.clone() };
         };
-        let rows = recorder.so_far().packets;
+        let rows = recorder.summary().packets;
         let how = recorder.failure().map_or_else(|| format!("{rows} rows"), |why| format!("broken off: {why}"));
         RecordingState { on: true, text: format!("{}: {how}", name(path)) }
     }
@@ -155,7 +155,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-fn with_end(path: &Path, end: &str) -> PathBuf {
+fn with_suffix(path: &Path, end: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(end);
     name.into()

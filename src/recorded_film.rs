@@ -1,6 +1,6 @@
 //! Playback of recordings in viewers.
 
-use kinetoscope_record::Film;
+use kinetoscope_record::Playback;
 use kinetoscope_sim::SimulationManager;
 
 /// A recording that viewers can play with [`Play::play`](kinetoscope_viewer::Play::play).
@@ -17,14 +17,14 @@ use kinetoscope_sim::SimulationManager;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct RecordedFilm(pub Film);
+pub struct RecordingPlayback(pub Playback);
 
-impl kinetoscope_viewer::Film for RecordedFilm {
+impl kinetoscope_viewer::PlaybackSource for RecordingPlayback {
     fn times(&self) -> &[f64] {
         self.0.times()
     }
 
     fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String> {
-        self.0.show(sim, frame).map_err(|error| error.to_string())
+        self.0.seek(sim, frame).map_err(|error| error.to_string())
     }
 }

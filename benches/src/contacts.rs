@@ -2,16 +2,16 @@
 //! without. The sensor measures in every step and keeps six measurements. The sides are created in both orders, half
 //! the time each.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::ContactSensor;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
 /// Target: the sensor takes at most 3 % of a step.
-const WANTED: f64 = 1.0 / 1.03;
+const TARGET_RATIO: f64 = 1.0 / 1.03;
 /// The robots stand still, so restarts are not needed.
 const STEPS: u32 = 1_000_000;
 /// Steps until the robots have settled.
@@ -23,7 +23,7 @@ struct Quadrupeds {
 }
 
 impl Quadrupeds {
-    fn new(sensor: bool) -> Outcome<Self> {
+    fn new(sensor: bool) -> BenchResult<Self> {
         let cfg = SimulationManagerCfg { num_envs: ENVS, threads: Some(1), ..SimulationManagerCfg::legged() };
         let mut sim = SimulationManager::new(cfg)?;
         let pose = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
@@ -37,18 +37,18 @@ impl Quadrupeds {
         })?;
         sim.update(SETTLING);
         let sampling = SamplingCfg { history_length: 6, ..Default::default() };
-        let cfg = ContactSensorCfg { sampling, ..ContactSensorCfg::of(".*_FOOT") };
+        let cfg = ContactSensorCfg { sampling, ..ContactSensorCfg::for_bodies(".*_FOOT") };
         let feet = if sensor { Some(sim.add_sensor("feet", cfg)?) } else { None };
         Ok(Self { sim, feet })
     }
 }
 
-impl Side for Quadrupeds {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Quadrupeds {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.sim.update(1);
@@ -64,16 +64,16 @@ impl Side for Quadrupeds {
     }
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let times = in_both_orders(|order| {
         let (mut with, mut without) = order.create(|| Quadrupeds::new(true), || Quadrupeds::new(false))?;
-        let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: STEPS };
+        let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: STEPS };
         measure(plan, &mut [&mut with, &mut without])
     })?;
     let micros = |side: usize| 1e6 / times.rate(side, ENVS);
     Ok(vec![
         Row::new("contacts", format!("quadruped, {ENVS} envs"), "us/env-step", 1, micros(0))
             .against("no sensor", micros(1), times.ratio(0, 1))
-            .wanted(WANTED),
+            .with_target_ratio(TARGET_RATIO),
     ])
 }

@@ -2,10 +2,10 @@
 //! drives. The sides are created in both orders, half the time each: the ratio is the geometric mean of the two, times
 //! are those of mean rates.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{State, drive_sr5, sr5};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
 /// Target: a step with drives takes at most 1.3 times a step without.
-const WANTED: f64 = 1.0 / 1.3;
+const TARGET_RATIO: f64 = 1.0 / 1.3;
 /// Steps between restarts, few enough that the undriven arm has hardly fallen.
 const STEPS: u32 = 16;
 /// Steps between changes of the targets.
@@ -36,8 +36,8 @@ struct Driven {
     qvel: Vec<f64>,
 }
 
-impl Side for Driven {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Driven {
+    fn restart(&mut self) -> BenchResult<()> {
         if self.steps >= PHASE {
             self.steps = 0;
             self.closed = !self.closed;
@@ -49,7 +49,7 @@ impl Side for Driven {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         self.steps += steps;
         let start = Instant::now();
         for _ in 0..steps {
@@ -68,15 +68,15 @@ struct Undriven {
     qvel: Vec<f64>,
 }
 
-impl Side for Undriven {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Undriven {
+    fn restart(&mut self) -> BenchResult<()> {
         for (i, state) in self.states.borrow().iter().enumerate() {
             self.batch.write(i, |env| env.write(|data| state.write(data)));
         }
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.batch.step(1);
@@ -95,7 +95,7 @@ fn read_back(batch: &Batch, qpos: &mut [f64], qvel: &mut [f64]) {
     });
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let model = sr5(1, 1)?.0.batch().model().clone();
     let (qpos, qvel) = (vec![0.0; ENVS * model.nq()], vec![0.0; ENVS * model.nv()]);
     let times = in_both_orders(|order| {
@@ -111,13 +111,13 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
             Ok(Undriven { batch, states: Rc::clone(&states), qpos: qpos.clone(), qvel: qvel.clone() })
         };
         let (mut driven, mut undriven) = order.create(driven, undriven)?;
-        let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: STEPS };
+        let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: STEPS };
         measure(plan, &mut [&mut driven, &mut undriven])
     })?;
     let micros = |side: usize| 1e6 / times.rate(side, ENVS);
     Ok(vec![
         Row::new("drive", format!("SR5 + hand, {ENVS} envs"), "us/env-step", 1, micros(0))
             .against("same model, no drives", micros(1), times.ratio(0, 1))
-            .wanted(WANTED),
+            .with_target_ratio(TARGET_RATIO),
     ])
 }

@@ -5,14 +5,14 @@
 //! at the limits, and the same number of restarts. MuJoCo verifies the solutions of both. A second comparison solves
 //! one pose for each of 64 environments in one call.
 
-use crate::interleave::{Plan, Side, measure, median};
+use crate::interleave::{Contender, MeasurementCfg, measure, median};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::robot::kinematics::{IkCfg, Tip};
-use kinetoscope::scene::Random;
+use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
+use kinetoscope::scene::KeyedRng;
 use kinetoscope::scene::pose::from_row;
 use nalgebra::{Matrix6, Vector6};
 use std::path::{Path, PathBuf};
@@ -22,12 +22,12 @@ const TARGETS: usize = 1000;
 /// Environments solved in one call.
 const ENVS: usize = 64;
 /// Number of solves of an unreachable pose.
-const FAR: usize = 21;
+const UNREACHABLE_SOLVES: usize = 21;
 /// Square of the baseline's damping factor.
 const DAMPING: f64 = 1e-3;
 
 /// Name, file, and link moved by the last joint.
-fn arms() -> Outcome<[(&'static str, PathBuf, &'static str); 3]> {
+fn arms() -> BenchResult<[(&'static str, PathBuf, &'static str); 3]> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/arms");
     Ok([
         ("SR5, 6 joints", assets::path("sr5/SR5.urdf")?, "link6"),
@@ -54,8 +54,8 @@ struct Ours<'t> {
 }
 
 impl Ours<'_> {
-    fn solve(&self, target: &Pose) -> Outcome<Option<Vec<f64>>> {
-        let tip = Tip::of_part("arm").at(self.task.link);
+    fn solve(&self, target: &Pose) -> BenchResult<Option<Vec<f64>>> {
+        let tip = TipFrame::of_part("arm").at(self.task.link);
         let found = self.sim.robot(self.robot).compute_ik(target, tip, &self.task.cfg, None, None)?;
         Ok(found.success[0].then(|| found.qpos.row(0).to_vec()))
     }
@@ -72,10 +72,10 @@ struct Batched<'t> {
 }
 
 /// The baseline: a loop on bare MuJoCo.
-struct Bare<'t> {
+struct MujocoLoop<'t> {
     task: &'t Task,
     /// Poses per step.
-    each: usize,
+    poses_per_step: usize,
     data: Data,
     body: usize,
     qpos: Vec<usize>,
@@ -85,15 +85,15 @@ struct Bare<'t> {
     next: usize,
 }
 
-impl<'t> Bare<'t> {
-    fn new(task: &'t Task, sim: &SimulationManager, robot: RobotId) -> Outcome<Self> {
+impl<'t> MujocoLoop<'t> {
+    fn new(task: &'t Task, sim: &SimulationManager, robot: RobotId) -> BenchResult<Self> {
         let (model, view) = (sim.batch().model(), sim.robot(robot));
         let body = model.id(ObjectKind::Body, &format!("{}/{}", view.uid(), task.link)).ok_or("no body of the link")?;
         let joint = |name: &String| model.id(ObjectKind::Joint, &format!("{}/{name}", view.uid())).ok_or("no joint");
         let joints = view.joint_names().iter().map(joint).collect::<Result<Vec<usize>, _>>()?;
         Ok(Self {
             task,
-            each: 1,
+            poses_per_step: 1,
             data: Data::new(model)?,
             body,
             qpos: joints.iter().map(|&j| model.jnt_qposadr()[j] as usize).collect(),
@@ -105,11 +105,11 @@ impl<'t> Bare<'t> {
     }
 
     /// Forward kinematics of the link in MuJoCo.
-    fn place(&mut self, positions: &[f64]) -> Outcome<Pose> {
+    fn link_pose(&mut self, positions: &[f64]) -> BenchResult<Pose> {
         for (&address, &q) in self.qpos.iter().zip(positions) {
             self.data.qpos_mut()[address] = q;
         }
-        self.data.place()?;
+        self.data.kinematics()?;
         let (p, q) = (&self.data.xpos()[3 * self.body..], &self.data.xquat()[4 * self.body..]);
         Ok(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]))
     }
@@ -121,21 +121,21 @@ impl<'t> Bare<'t> {
         (Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z), way.norm(), turn.norm())
     }
 
-    fn reaches(&mut self, positions: &[f64], target: &Pose) -> Outcome<bool> {
-        let (_, way, turn) = Self::error(&self.place(positions)?, target);
+    fn reaches(&mut self, positions: &[f64], target: &Pose) -> BenchResult<bool> {
+        let (_, way, turn) = Self::error(&self.link_pose(positions)?, target);
         Ok(way <= self.task.cfg.position_tolerance && turn <= self.task.cfg.rotation_tolerance)
     }
 
-    fn solve(&mut self, target: &Pose) -> Outcome<Option<Vec<f64>>> {
+    fn solve(&mut self, target: &Pose) -> BenchResult<Option<Vec<f64>>> {
         let task = self.task;
-        let mut random = Random::keyed(0, 0, "starts");
+        let mut random = KeyedRng::keyed(0, 0, "starts");
         for start in 0..task.cfg.num_seeds {
             let mut q = task.start.clone();
             if start > 0 {
-                q = task.limits.iter().map(|&[low, high]| random.between(low, high)).collect();
+                q = task.limits.iter().map(|&[low, high]| random.uniform_range(low, high)).collect();
             }
             for _ in 0..task.cfg.max_iterations {
-                let pose = self.place(&q)?;
+                let pose = self.link_pose(&q)?;
                 let (error, way, turn) = Self::error(&pose, target);
                 if way <= task.cfg.position_tolerance && turn <= task.cfg.rotation_tolerance {
                     return Ok(Some(q));
@@ -159,13 +159,13 @@ impl<'t> Bare<'t> {
     }
 }
 
-impl Side for Ours<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Ours<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         self.next = 0;
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.solve(&self.task.targets[self.next % TARGETS])?;
@@ -175,14 +175,14 @@ impl Side for Ours<'_> {
     }
 }
 
-impl Side for Batched<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Batched<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         self.next = 0;
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
-        let tip = Tip::of_part("arm").at(self.task.link);
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
+        let tip = TipFrame::of_part("arm").at(self.task.link);
         let start = Instant::now();
         for _ in 0..steps {
             let targets = &self.targets[self.next % self.targets.len()];
@@ -196,15 +196,15 @@ impl Side for Batched<'_> {
     }
 }
 
-impl Side for Bare<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for MujocoLoop<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         self.next = 0;
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
-        for _ in 0..steps as usize * self.each {
+        for _ in 0..steps as usize * self.poses_per_step {
             self.solve(&self.task.targets[self.next % TARGETS])?;
             self.next += 1;
         }
@@ -212,7 +212,7 @@ impl Side for Bare<'_> {
     }
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for (name, urdf, link) in arms()? {
         rows.extend(one_arm(settings, name, urdf, link)?);
@@ -220,7 +220,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     Ok(rows)
 }
 
-fn simulation(num_envs: usize, urdf: &Path) -> Outcome<(SimulationManager, RobotId)> {
+fn simulation(num_envs: usize, urdf: &Path) -> BenchResult<(SimulationManager, RobotId)> {
     let cfg = SimulationManagerCfg { num_envs, threads: Some(1), ground: None, ..SimulationManagerCfg::default() };
     let mut sim = SimulationManager::new(cfg)?;
     let robot = sim.add_robot(RobotCfg {
@@ -231,23 +231,23 @@ fn simulation(num_envs: usize, urdf: &Path) -> Outcome<(SimulationManager, Robot
     Ok((sim, robot))
 }
 
-fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -> Outcome<Vec<Row>> {
+fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -> BenchResult<Vec<Row>> {
     let (sim, robot) = simulation(1, &urdf)?;
     let view = sim.robot(robot);
     let limits: Vec<[f64; 2]> =
         view.qpos_limits().index_axis(Axis(0), 0).rows().into_iter().map(|limit| [limit[0], limit[1]]).collect();
-    let mut random = Random::keyed(1, 0, "targets");
+    let mut random = KeyedRng::keyed(1, 0, "targets");
     let reachable = Array2::from_shape_fn((TARGETS, limits.len()), |(_, j)| {
         limits[j][0] + (limits[j][1] - limits[j][0]) * random.uniform()
     });
     let start = view.default_qpos().row(0).to_vec();
     let mut task = Task { link, limits, start, targets: Vec::new(), cfg: IkCfg::default() };
-    let mut judge = Bare::new(&task, &sim, robot)?;
-    let targets = reachable.rows().into_iter().map(|row| judge.place(&row.to_vec())).collect::<Outcome<_>>()?;
+    let mut judge = MujocoLoop::new(&task, &sim, robot)?;
+    let targets = reachable.rows().into_iter().map(|row| judge.link_pose(&row.to_vec())).collect::<BenchResult<_>>()?;
     drop(judge);
     task.targets = targets;
 
-    let mut bare = Bare::new(&task, &sim, robot)?;
+    let mut bare = MujocoLoop::new(&task, &sim, robot)?;
     let mut ours = Ours { task: &task, sim, robot, next: 0 };
     let (mut micros, mut solved) = ([Vec::new(), Vec::new()], [0.0, 0.0]);
     for target in &task.targets {
@@ -264,15 +264,15 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
         }
     }
     let beyond = Pose::translation(10.0, 0.0, 0.0) * task.targets[0];
-    let far: Vec<f64> = (0..FAR)
+    let far: Vec<f64> = (0..UNREACHABLE_SOLVES)
         .map(|_| {
             let clock = Instant::now();
             let found = ours.solve(&beyond)?;
             let micros = 1e6 * clock.elapsed().as_secs_f64();
             if found.is_some() { Err("a pose out of reach was reached".into()) } else { Ok(micros) }
         })
-        .collect::<Outcome<_>>()?;
-    let plan = Plan { seconds: settings.seconds, restart_after: 1 << 20 };
+        .collect::<BenchResult<_>>()?;
+    let plan = MeasurementCfg { seconds: settings.seconds, restart_after: 1 << 20 };
     let times = measure(plan, &mut [&mut ours, &mut bare])?;
     let (many, its_robot) = simulation(ENVS, &urdf)?;
     // All targets; the last call is padded with the first targets.
@@ -280,7 +280,7 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
     let filled: Vec<Pose> = task.targets.iter().copied().cycle().take(rounds * ENVS).collect();
     let targets = filled.chunks_exact(ENVS).map(<[Pose]>::to_vec).collect();
     let mut batched = Batched { task: &task, sim: many, robot: its_robot, targets, next: 0 };
-    (bare.each, bare.next) = (ENVS, 0);
+    (bare.poses_per_step, bare.next) = (ENVS, 0);
     let together = measure(plan, &mut [&mut batched, &mut bare])?;
     let each = |side| 1e6 * together.per_step(side) / ENVS as f64;
     let [our_median, their_median] = micros.map(median);

@@ -9,17 +9,17 @@
 //! [in both orders](in_both_orders).
 
 use crate::foreign;
-use crate::settings::Outcome;
-use kinetoscope::mujoco::release_freed;
+use crate::settings::BenchResult;
+use kinetoscope::mujoco::trim_heap;
 use std::time::{Duration, Instant};
 
 /// One program of a comparison. All sides do the same work.
-pub(crate) trait Side {
+pub(crate) trait Contender {
     /// Returns to the start of the work; not timed.
-    fn restart(&mut self) -> Outcome<()>;
+    fn restart(&mut self) -> BenchResult<()>;
 
     /// Does `steps` steps in every environment; returns the time they took.
-    fn block(&mut self, steps: u32) -> Outcome<Duration>;
+    fn block(&mut self, steps: u32) -> BenchResult<Duration>;
 
     /// The id of the process that does the work, if it is another process.
     fn process(&self) -> Option<u32> {
@@ -27,19 +27,19 @@ pub(crate) trait Side {
     }
 
     /// Positions after the last block, for benchmarks in which all sides must have the same positions.
-    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
         Ok(None)
     }
 }
 
 /// Largest share of one core that other programs may take in a valid round.
-const FOREIGN: f64 = 0.05;
+const MAX_OTHER_LOAD: f64 = 0.05;
 /// On a machine that is always busy, the search for quiet rounds ends after this multiple of the planned length.
 const PATIENCE: f64 = 4.0;
 
 /// Parameters of a measurement.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct MeasurementCfg {
     /// Length of the measurement \[s\].
     pub(crate) seconds: f64,
     /// The work restarts once a side has done this many steps.
@@ -68,9 +68,9 @@ impl Times {
         median((0..rounds).map(|round| number(&of_round(round))).collect())
     }
 
-    /// Speed of side `ours` relative to side `rival`: the median ratio of their times.
-    pub(crate) fn ratio(&self, ours: usize, rival: usize) -> f64 {
-        self.median_of(|t| t[rival] / t[ours])
+    /// Speed of side `ours` relative to side `baseline`: the median ratio of their times.
+    pub(crate) fn ratio(&self, ours: usize, baseline: usize) -> f64 {
+        self.median_of(|t| t[baseline] / t[ours])
     }
 }
 
@@ -80,22 +80,22 @@ pub(crate) enum Order {
     /// Our side first.
     OursFirst,
     /// The baseline first.
-    RivalFirst,
+    BaselineFirst,
 }
 
 impl Order {
     /// Creates both sides in this order.
     pub(crate) fn create<A, B>(
         self,
-        ours: impl FnOnce() -> Outcome<A>,
-        rival: impl FnOnce() -> Outcome<B>,
-    ) -> Outcome<(A, B)> {
+        ours: impl FnOnce() -> BenchResult<A>,
+        rival: impl FnOnce() -> BenchResult<B>,
+    ) -> BenchResult<(A, B)> {
         match self {
             Self::OursFirst => {
                 let ours = ours()?;
                 Ok((ours, rival()?))
             }
-            Self::RivalFirst => {
+            Self::BaselineFirst => {
                 let rival = rival()?;
                 Ok((ours()?, rival))
             }
@@ -109,14 +109,14 @@ pub(crate) struct BothOrders([Times; 2]);
 
 /// Runs `measurement` once for each order. `measurement` must create its sides in the given order, and take half of the
 /// time. The sides are dropped in between.
-pub(crate) fn in_both_orders(mut measurement: impl FnMut(Order) -> Outcome<Times>) -> Outcome<BothOrders> {
+pub(crate) fn in_both_orders(mut measurement: impl FnMut(Order) -> BenchResult<Times>) -> BenchResult<BothOrders> {
     let mut one = |order| {
         let times = measurement(order);
         // Returns freed memory to the system, so that both orders start with the same memory.
-        release_freed();
+        trim_heap();
         times
     };
-    Ok(BothOrders([one(Order::OursFirst)?, one(Order::RivalFirst)?]))
+    Ok(BothOrders([one(Order::OursFirst)?, one(Order::BaselineFirst)?]))
 }
 
 impl BothOrders {
@@ -125,7 +125,7 @@ impl BothOrders {
         self.0.iter().map(|times| count as f64 / times.per_step(side)).sum::<f64>() / 2.0
     }
 
-    /// Speed of `ours` relative to `rival`: the geometric mean over both orders.
+    /// Speed of `ours` relative to `baseline`: the geometric mean over both orders.
     pub(crate) fn ratio(&self, ours: usize, rival: usize) -> f64 {
         self.mean_of(|t| t[rival] / t[ours])
     }
@@ -137,7 +137,7 @@ impl BothOrders {
 }
 
 /// Measures all sides. After every round, outside of the timed part, their states must agree.
-pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times> {
+pub(crate) fn measure(plan: MeasurementCfg, sides: &mut [&mut dyn Contender]) -> BenchResult<Times> {
     let mut times = vec![Vec::new(); sides.len()];
     restart_all(sides)?;
     // The first round warms up and determines the number of steps per block.
@@ -174,8 +174,8 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
         }
         let length = begin.elapsed().as_secs_f64();
         let foreign = foreign::seconds(&processes).zip(foreign_before).map_or(0.0, |(after, before)| after - before);
-        quiet.push(foreign <= FOREIGN * length);
-        measured += if foreign <= FOREIGN * length { length } else { 0.0 };
+        quiet.push(foreign <= MAX_OTHER_LOAD * length);
+        measured += if foreign <= MAX_OTHER_LOAD * length { length } else { 0.0 };
         done += per_round;
         same_physics(sides)?;
         if done + per_round > plan.restart_after {
@@ -201,17 +201,17 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
 
 /// Runs a block after one untimed step. The step reloads the caches and wakes the threads, because the previous sides
 /// have filled the caches with their data.
-fn warm_block(side: &mut dyn Side, steps: u32) -> Outcome<Duration> {
+fn warm_block(side: &mut dyn Contender, steps: u32) -> BenchResult<Duration> {
     side.block(1)?;
     side.block(steps)
 }
 
-fn restart_all(sides: &mut [&mut dyn Side]) -> Outcome<()> {
+fn restart_all(sides: &mut [&mut dyn Contender]) -> BenchResult<()> {
     sides.iter_mut().try_for_each(|side| side.restart())
 }
 
 /// Checks that all sides are in the same state, bit by bit: they have done the same steps from the same starts.
-fn same_physics(sides: &mut [&mut dyn Side]) -> Outcome<()> {
+fn same_physics(sides: &mut [&mut dyn Contender]) -> BenchResult<()> {
     let mut states = Vec::new();
     for side in sides.iter_mut() {
         states.extend(side.qpos()?);
@@ -238,12 +238,12 @@ mod tests {
 
     struct Sleeper(u64);
 
-    impl Side for Sleeper {
-        fn restart(&mut self) -> Outcome<()> {
+    impl Contender for Sleeper {
+        fn restart(&mut self) -> BenchResult<()> {
             Ok(())
         }
 
-        fn block(&mut self, steps: u32) -> Outcome<Duration> {
+        fn block(&mut self, steps: u32) -> BenchResult<Duration> {
             Ok(Duration::from_millis(self.0 * u64::from(steps)))
         }
     }
@@ -251,14 +251,14 @@ mod tests {
     #[test]
     fn a_side_that_takes_twice_as_long_has_half_the_ratio() {
         let (mut ours, mut rival) = (Sleeper(20), Sleeper(10));
-        let plan = Plan { seconds: 0.0, restart_after: 100 };
+        let plan = MeasurementCfg { seconds: 0.0, restart_after: 100 };
         let times = measure(plan, &mut [&mut ours, &mut rival]).expect("sleeps");
         assert!((times.ratio(0, 1) - 0.5).abs() < 1e-12);
         assert!((times.per_step(0) - 0.02).abs() < 1e-12);
     }
 
     #[test]
-    fn who_is_first_cancels_out() {
+    fn creation_order_cancels_out() {
         // The side that is created first is twice as fast.
         let both = in_both_orders(|order| {
             let created = std::cell::Cell::new(0);
@@ -267,7 +267,7 @@ mod tests {
                 Ok(Sleeper(created.get()))
             };
             let (mut ours, mut rival) = order.create(next, next)?;
-            measure(Plan { seconds: 0.0, restart_after: 100 }, &mut [&mut ours, &mut rival])
+            measure(MeasurementCfg { seconds: 0.0, restart_after: 100 }, &mut [&mut ours, &mut rival])
         })
         .expect("sleeps");
         assert!((both.ratio(0, 1) - 1.0).abs() < 1e-12);

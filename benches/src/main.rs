@@ -25,7 +25,7 @@ mod view;
 
 use clap::Parser;
 use row::Row;
-use settings::{Outcome, Settings};
+use settings::{BenchResult, Settings};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -46,7 +46,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("memory", memory::run),
 ];
 
-type Bench = fn(&Settings) -> Outcome<Vec<Row>>;
+type Bench = fn(&Settings) -> BenchResult<Vec<Row>>;
 
 /// Benchmarks of Kinetoscope and its baselines in one run.
 #[derive(Debug, Parser)]
@@ -76,7 +76,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(args: &Args) -> Outcome<()> {
+fn run(args: &Args) -> BenchResult<()> {
     if let Some(child) = &args.memory_of {
         return memory::child(child);
     }

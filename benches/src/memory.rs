@@ -3,35 +3,39 @@
 
 use crate::models::{Case, drive_sr5, sr5};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::mujoco::Data;
 use std::process::Command;
 
 const FEW: usize = 64;
 const MANY: usize = 1024;
 /// Target: an environment takes at most 1.1 times one `mjData`.
-const WANTED: f64 = 1.0 / 1.1;
+const TARGET_RATIO: f64 = 1.0 / 1.1;
 const STEPS: u32 = 20;
 const HUMANOID: &str = "humanoid";
 const SR5: &str = "SR5 + hand";
 const OURS: &str = "ours";
 const BARE: &str = "bare";
 
-pub(crate) fn run(_: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(_: &Settings) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for case in [HUMANOID, SR5] {
         if case == HUMANOID && Case::humanoid()?.is_none() {
             continue;
         }
         let (ours, bare) = (growth(OURS, case)?, growth(BARE, case)?);
-        rows.push(Row::new("memory", case, "KiB/env", 1, ours).against("one mjData", bare, bare / ours).wanted(WANTED));
+        rows.push(
+            Row::new("memory", case, "KiB/env", 1, ours)
+                .against("one mjData", bare, bare / ours)
+                .with_target_ratio(TARGET_RATIO),
+        );
     }
     Ok(rows)
 }
 
 /// Memory per additional environment \[KiB\].
-fn growth(side: &str, case: &str) -> Outcome<f64> {
-    let resident = |envs: usize| -> Outcome<f64> {
+fn growth(side: &str, case: &str) -> BenchResult<f64> {
+    let resident = |envs: usize| -> BenchResult<f64> {
         let output =
             Command::new(std::env::current_exe()?).args(["--memory-of", side, case, &envs.to_string()]).output()?;
         let text = String::from_utf8(output.stdout)?;
@@ -44,10 +48,10 @@ fn growth(side: &str, case: &str) -> Outcome<f64> {
 }
 
 /// The measured process: creates environments, steps them, prints the resident memory \[bytes\].
-pub(crate) fn child(args: &[String]) -> Outcome<()> {
+pub(crate) fn child(args: &[String]) -> BenchResult<()> {
     let [side, case, envs] = args else { return Err("side, case and number of environments".into()) };
     let envs: usize = envs.parse()?;
-    let case_of = |name: &str| -> Outcome<Case> {
+    let case_of = |name: &str| -> BenchResult<Case> {
         if name == SR5 { Case::sr5() } else { Case::humanoid()?.ok_or_else(|| "no humanoid".into()) }
     };
     if side == BARE {
@@ -75,7 +79,7 @@ pub(crate) fn child(args: &[String]) -> Outcome<()> {
 }
 
 /// Prints the resident memory; the measured objects must still be alive.
-fn print_resident() -> Outcome<()> {
+fn print_resident() -> BenchResult<()> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let kib = status
         .lines()

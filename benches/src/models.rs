@@ -1,6 +1,6 @@
 //! Stepped models: Debian's humanoid and the bundled arm with its hand, from many different states.
 
-use crate::settings::Outcome;
+use crate::settings::BenchResult;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model};
@@ -69,7 +69,7 @@ pub(crate) const STEPS: u32 = 96;
 
 impl Case {
     /// Debian's humanoid, falling with small constant torques; `None` with a message if it is not installed.
-    pub(crate) fn humanoid() -> Outcome<Option<Self>> {
+    pub(crate) fn humanoid() -> BenchResult<Option<Self>> {
         if !Path::new(HUMANOID).exists() {
             eprintln!("skipped: {HUMANOID} is not there (Debian's package libmujoco-samples)");
             return Ok(None);
@@ -80,12 +80,12 @@ impl Case {
     }
 
     /// The bundled arm and hand without active drives: the same model as with drives, but no drive writes.
-    pub(crate) fn sr5() -> Outcome<Self> {
+    pub(crate) fn sr5() -> BenchResult<Self> {
         let (sim, _) = sr5(1, 1)?;
         Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.scene().mjcf().into()), Loop::Step21)
     }
 
-    fn new(name: &'static str, model: Model, mjcf: Option<String>, bare: Loop) -> Outcome<Self> {
+    fn new(name: &'static str, model: Model, mjcf: Option<String>, bare: Loop) -> BenchResult<Self> {
         let model = model.with_buffers(model.small_buffers());
         let mut case = Self { name, states: trajectory(&model)?, model, bare, mjcf };
         // Buffers that no environment has to grow, so that both sides use the same memory.
@@ -103,7 +103,7 @@ impl Case {
     }
 
     /// Environments at their start states, without drives.
-    pub(crate) fn batch(&self, envs: usize, threads: usize) -> Outcome<Batch> {
+    pub(crate) fn batch(&self, envs: usize, threads: usize) -> BenchResult<Batch> {
         let mut batch = Batch::new(&self.model, &Arc::new(DriveTable::default()), envs, threads, ThreadPool::new())?;
         self.restart(&mut batch);
         Ok(batch)
@@ -134,7 +134,7 @@ impl Case {
 }
 
 /// Every second state of one environment, beginning at the initial state.
-fn trajectory(model: &Model) -> Outcome<Vec<State>> {
+fn trajectory(model: &Model) -> BenchResult<Vec<State>> {
     let mut batch = Batch::new(model, &Arc::new(DriveTable::default()), 1, 1, ThreadPool::new())?;
     let mut states = Vec::new();
     for _ in 0..STARTS {
@@ -145,7 +145,7 @@ fn trajectory(model: &Model) -> Outcome<Vec<State>> {
 }
 
 /// The bundled arm and hand as in the example `create_robot`.
-pub(crate) fn sr5(envs: usize, threads: usize) -> Outcome<(SimulationManager, RobotId)> {
+pub(crate) fn sr5(envs: usize, threads: usize) -> BenchResult<(SimulationManager, RobotId)> {
     arm_with_hand(&assets::path("sr5/SR5.urdf")?, "JOINT[1-6]", envs, threads)
 }
 
@@ -155,7 +155,7 @@ pub(crate) fn arm_with_hand(
     joints: &str,
     envs: usize,
     threads: usize,
-) -> Outcome<(SimulationManager, RobotId)> {
+) -> BenchResult<(SimulationManager, RobotId)> {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         num_envs: envs,
         threads: Some(threads),
@@ -180,7 +180,7 @@ pub(crate) fn arm_with_hand(
 }
 
 /// Sets the targets of arm and hand to one of two poses.
-pub(crate) fn drive_sr5(sim: &mut SimulationManager, robot: RobotId, closed: bool) -> Outcome<()> {
+pub(crate) fn drive_sr5(sim: &mut SimulationManager, robot: RobotId, closed: bool) -> BenchResult<()> {
     let arm = sim.robot(robot).joint_ids("arm")?;
     let hand = sim.robot(robot).joint_ids("hand")?;
     let limits = sim.robot(robot).qpos_limits();

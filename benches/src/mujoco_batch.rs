@@ -1,11 +1,11 @@
 //! Batched stepping, compared with `mujoco.batch` from Python: the same model, states and threads, in turns. The two
 //! processes are started in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{Case, STEPS};
 use crate::rival::{self, Process};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use crate::step::Ours;
 use serde_json::json;
 use std::ffi::OsString;
@@ -15,12 +15,12 @@ use std::time::Duration;
 const ENVS: [usize; 2] = [64, 1024];
 const THREADS: [usize; 2] = [1, 2];
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let python = rival::python("mujoco.batch");
     let mut rows = Vec::new();
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
-            let plan = |share| Plan { seconds: share * settings.seconds, restart_after: STEPS };
+            let plan = |share| MeasurementCfg { seconds: share * settings.seconds, restart_after: STEPS };
             let ours = || Ours::new(&case, envs, threads);
             let row =
                 |rate| Row::new("mujoco-batch", format!("{}, {envs} envs", case.name), "env-steps/s", threads, rate);
@@ -30,7 +30,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
                 continue;
             };
             let times = in_both_orders(|order| {
-                let (mut ours, mut rival) = order.create(ours, || Rival::start(python, &case, envs, threads))?;
+                let (mut ours, mut rival) = order.create(ours, || Baseline::start(python, &case, envs, threads))?;
                 measure(plan(0.5), &mut [&mut ours, &mut rival])
             })?;
             let rate = |side: usize| times.rate(side, envs);
@@ -41,10 +41,10 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
 }
 
 /// A Python process with a `mujoco.batch.Batch`.
-struct Rival(Process);
+struct Baseline(Process);
 
-impl Rival {
-    fn start(python: &OsString, case: &Case, envs: usize, threads: usize) -> Outcome<Self> {
+impl Baseline {
+    fn start(python: &OsString, case: &Case, envs: usize, threads: usize) -> BenchResult<Self> {
         let folder = tempfile::tempdir()?;
         let job = job(case, envs, threads, folder.path())?;
         let mut rival = Self(Process::start(python, "mujoco_batch.py", &job, folder)?);
@@ -55,7 +55,7 @@ impl Rival {
 }
 
 /// The job of the script: our compiled model, and the start states.
-fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> Outcome<serde_json::Value> {
+fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> BenchResult<serde_json::Value> {
     let m = &case.model;
     let file = match &case.mjcf {
         Some(text) => {
@@ -92,12 +92,12 @@ fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> Outcome<serde
     }))
 }
 
-impl Side for Rival {
-    fn restart(&mut self) -> Outcome<()> {
-        self.0.ask("restart").map(drop)
+impl Contender for Baseline {
+    fn restart(&mut self) -> BenchResult<()> {
+        self.0.request("restart").map(drop)
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         self.0.block(steps)
     }
 
@@ -105,7 +105,7 @@ impl Side for Rival {
         Some(self.0.id())
     }
 
-    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
         let bytes = self.0.bytes("qpos")?;
         Ok(Some(bytes.as_chunks::<8>().0.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect()))
     }

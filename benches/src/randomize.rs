@@ -4,13 +4,13 @@
 //! values are written, then `mj_setConst` (in a small `mjData`, created with the copy). Our side also resolves names
 //! and checks values. Neither side runs a forward pass; ours runs it at the next read or step.
 
-use crate::interleave::{Plan, Side, measure};
+use crate::interleave::{Contender, MeasurementCfg, measure};
 use crate::models::sr5;
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
-use kinetoscope::mujoco::{Editor, Model};
+use crate::settings::{BenchResult, Settings};
+use kinetoscope::mujoco::{Model, ModelEditor};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use kinetoscope::sim::Result;
 use std::time::{Duration, Instant};
 
@@ -18,25 +18,30 @@ const ENVS: usize = 64;
 const CASE: &str = "SR5 + hand, masses and friction";
 const RIVAL: &str = "whole models";
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let (sim, _) = sr5(ENVS, 1)?;
     let model = sim.batch().model().clone();
     let mut ours = Ours(sim);
-    let mut rival =
-        Whole { editors: editors(&model)?, masses: model.body_mass().to_vec(), model: model.clone(), draws: 0 };
-    let plan = Plan { seconds: settings.seconds, restart_after: u32::MAX };
+    let mut rival = ModelPerEnv {
+        editors: editors(&model)?,
+        masses: model.body_mass().to_vec(),
+        model: model.clone(),
+        randomizations: 0,
+    };
+    let plan = MeasurementCfg { seconds: settings.seconds, restart_after: u32::MAX };
     let times = measure(plan, &mut [&mut ours, &mut rival])?;
     let micros = |side| times.per_step(side) / ENVS as f64 * 1e6;
     let again = Row::new("randomize", format!("{CASE}, again"), "µs/env", 1, micros(0));
 
-    let (mut ours, mut rival) = (First, FirstWhole { masses: model.body_mass().to_vec(), model: model.clone() });
-    let plan = Plan { seconds: settings.seconds, restart_after: u32::MAX };
+    let (mut ours, mut rival) =
+        (FirstRandomization, FirstModelPerEnv { masses: model.body_mass().to_vec(), model: model.clone() });
+    let plan = MeasurementCfg { seconds: settings.seconds, restart_after: u32::MAX };
     let firsts = measure(plan, &mut [&mut ours, &mut rival])?;
     let micros_first = |side| firsts.per_step(side) / ENVS as f64 * 1e6;
     let first = Row::new("randomize", format!("{CASE}, first time"), "µs/env", 1, micros_first(0));
 
     let (mut sim, _) = sr5(ENVS, 1)?;
-    draw(&mut sim)?;
+    randomize(&mut sim)?;
     let bytes = (0..ENVS).map(|env| sim.properties().bytes(EnvId(env))).sum::<Result<usize>>()? as f64 / ENVS as f64;
     let whole = model.shared_bytes() as f64;
     let memory = Row::new("randomize", format!("{CASE}, memory"), "KiB/env", 1, bytes / 1024.0);
@@ -47,22 +52,22 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     ])
 }
 
-fn draw(sim: &mut SimulationManager) -> Outcome<()> {
-    let randomization = Randomization::new().with(Property::Mass, ".*", Draw::Scale([0.8, 1.2])).with(
+fn randomize(sim: &mut SimulationManager) -> BenchResult<()> {
+    let randomization = Randomization::new().with(Property::Mass, ".*", RandomizationOp::Scale([0.8, 1.2])).with(
         Property::Friction,
         ".*",
-        Draw::Scale([0.5, 1.5]),
+        RandomizationOp::Scale([0.5, 1.5]),
     );
     Ok(sim.properties_mut().randomize(&randomization, None)?)
 }
 
-fn editors(model: &Model) -> Outcome<Vec<Editor>> {
-    Ok((0..ENVS).map(|_| Editor::new(model)).collect::<Result<_, _>>()?)
+fn editors(model: &Model) -> BenchResult<Vec<ModelEditor>> {
+    Ok((0..ENVS).map(|_| ModelEditor::new(model)).collect::<Result<_, _>>()?)
 }
 
 /// The random writes of the baseline: as many numbers as ours.
-fn write(editor: &mut Editor, model: &Model, random: &mut Random) -> Outcome<()> {
-    let mut factor = |low: f64, high: f64| random.between(low, high);
+fn write(editor: &mut ModelEditor, model: &Model, random: &mut KeyedRng) -> BenchResult<()> {
+    let mut factor = |low: f64, high: f64| random.uniform_range(low, high);
     for body in 1..model.nbody() {
         let scale = factor(0.8, 1.2);
         editor.body_mass_mut()[body] = model.body_mass()[body] * scale;
@@ -79,40 +84,40 @@ fn write(editor: &mut Editor, model: &Model, random: &mut Random) -> Outcome<()>
 /// Randomizes environments that were randomized before.
 struct Ours(SimulationManager);
 
-impl Side for Ours {
-    fn restart(&mut self) -> Outcome<()> {
-        draw(&mut self.0)
+impl Contender for Ours {
+    fn restart(&mut self) -> BenchResult<()> {
+        randomize(&mut self.0)
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
-            draw(&mut self.0)?;
+            randomize(&mut self.0)?;
         }
         Ok(start.elapsed())
     }
 }
 
 /// The baseline: a whole model for each environment.
-struct Whole {
-    editors: Vec<Editor>,
+struct ModelPerEnv {
+    editors: Vec<ModelEditor>,
     masses: Vec<f64>,
     model: Model,
-    draws: u64,
+    randomizations: u64,
 }
 
-impl Side for Whole {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for ModelPerEnv {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             for (env, editor) in self.editors.iter_mut().enumerate() {
-                write(editor, &self.model, &mut Random::keyed(0, env as u64, &self.draws.to_string()))?;
+                write(editor, &self.model, &mut KeyedRng::keyed(0, env as u64, &self.randomizations.to_string()))?;
             }
-            self.draws += 1;
+            self.randomizations += 1;
         }
         let time = start.elapsed();
         // Checks that the work was done.
@@ -124,19 +129,19 @@ impl Side for Whole {
 }
 
 /// Randomizes a new simulation.
-struct First;
+struct FirstRandomization;
 
-impl Side for First {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for FirstRandomization {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let mut time = Duration::ZERO;
         for _ in 0..steps {
             let (mut sim, _) = sr5(ENVS, 1)?;
             let start = Instant::now();
-            draw(&mut sim)?;
+            randomize(&mut sim)?;
             time += start.elapsed();
         }
         Ok(time)
@@ -144,23 +149,23 @@ impl Side for First {
 }
 
 /// The baseline's first randomization: copies the model for each environment.
-struct FirstWhole {
+struct FirstModelPerEnv {
     masses: Vec<f64>,
     model: Model,
 }
 
-impl Side for FirstWhole {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for FirstModelPerEnv {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let mut time = Duration::ZERO;
         for _ in 0..steps {
             let start = Instant::now();
             let mut editors = editors(&self.model)?;
             for (env, editor) in editors.iter_mut().enumerate() {
-                write(editor, &self.model, &mut Random::keyed(0, env as u64, "first"))?;
+                write(editor, &self.model, &mut KeyedRng::keyed(0, env as u64, "first"))?;
             }
             time += start.elapsed();
             if editors.iter_mut().any(|editor| editor.body_mass_mut() == self.masses) {

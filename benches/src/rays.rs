@@ -11,11 +11,11 @@
 //!   points hit by the parallel rays. (2.2.2 has no `mj_multiRay`.)
 //! - A fan of rays from that point to a level grid of the scanner's size: the same rays on both sides.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco::{Data, TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, Data, SupportedVersion};
 use kinetoscope::ndarray::{Array2, Array3, Axis};
 use kinetoscope::scene::mesh::write_binary_stl;
 use kinetoscope::scene::shape::HeightField;
@@ -23,7 +23,7 @@ use kinetoscope::scene::{Pose, PoseF64, SceneState, pose};
 use kinetoscope::sensors::ray::pattern::{Custom, Grid};
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg, RayPattern};
 use kinetoscope::sensors::{Sensor, SensorCfg, SensorContext};
-use kinetoscope::sim::Visible;
+use kinetoscope::sim::VisualScene;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
@@ -34,11 +34,11 @@ const HALF: f64 = 11.2;
 const HEIGHT: f64 = 1.0;
 const FLOOR: f64 = 0.5;
 /// Height of the sensor above its body \[m\].
-const ABOVE: f64 = 20.0;
+const SENSOR_HEIGHT: f64 = 20.0;
 /// Target of the speed ratio.
-const WANTED: f64 = 5.0;
+const TARGET_RATIO: f64 = 5.0;
 /// Tolerance of distances \[m\]: mesh coordinates are in single precision on both sides, rounded in different frames.
-const SAME: f64 = 1e-4;
+const DISTANCE_TOLERANCE: f64 = 1e-4;
 
 /// Terrain as a mesh, or as a height field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,11 +56,11 @@ impl Terrain {
     }
 
     /// Number of baseline rays per step; 2.2.2 tests every triangle of a mesh.
-    fn rival_rays(self) -> usize {
-        if self == Self::Mesh && TARGET == Target::V2 { 16 } else { 4096 }
+    fn baseline_rays(self) -> usize {
+        if self == Self::Mesh && BUILD_VERSION == SupportedVersion::V2 { 16 } else { 4096 }
     }
 
-    fn data(self) -> Outcome<Data> {
+    fn data(self) -> BenchResult<Data> {
         let elevation: Vec<f32> = (0..SIDE * SIDE).map(|k| rough(k % SIDE, k / SIDE) as f32).collect();
         let (asset, geom, file) = match self {
             Self::Mesh => {
@@ -76,7 +76,7 @@ impl Terrain {
                 let mut bytes = Vec::new();
                 write_binary_stl(&mesh, &mut bytes)?;
                 // The surface has no volume; only MuJoCo 4 checks this.
-                let inertia = if TARGET == Target::V4 { "inertia='shell'" } else { "" };
+                let inertia = if BUILD_VERSION == SupportedVersion::V4 { "inertia='shell'" } else { "" };
                 (format!("<mesh name='t' file='t.stl' {inertia}/>"), "type='mesh' mesh='t'", ("t.stl", bytes))
             }
             Self::Field => {
@@ -117,11 +117,11 @@ struct Ours {
 }
 
 impl Ours {
-    fn new(data: &Data, pattern: RayPattern) -> Outcome<Self> {
-        let visible = Visible::of_model(data.model());
+    fn new(data: &Data, pattern: RayPattern) -> BenchResult<Self> {
+        let visible = VisualScene::of_model(data.model());
         let instances = visible.scene().instances().len();
         let mut poses = vec![PoseF64::IDENTITY; instances];
-        visible.read_exact(data, &mut poses);
+        visible.read_poses_f64(data, &mut poses);
         let mut bodies = Array3::zeros((ENVS, 1, 7));
         for (env, mut rows) in bodies.axis_iter_mut(Axis(0)).enumerate() {
             let (x, y) = (1.1 * (env % 8) as f64 - 3.9, 1.1 * (env / 8) as f64 - 3.9);
@@ -144,7 +144,7 @@ impl Ours {
         };
         let cfg = RayCasterCfg {
             parent: Some("base".into()),
-            offset: Pose::translation(0.0, 0.0, ABOVE),
+            offset: Pose::translation(0.0, 0.0, SENSOR_HEIGHT),
             alignment: RayAlignment::Yaw,
             targets: HitTargets::StaticOnly,
             pattern,
@@ -169,19 +169,19 @@ impl Ours {
 }
 
 /// A pattern of rays from one point to the usual grid at half the height of the terrain.
-fn fan() -> Outcome<RayPattern> {
-    let down = 1.5 + ABOVE - 0.5 * HEIGHT;
+fn fan() -> BenchResult<RayPattern> {
+    let down = 1.5 + SENSOR_HEIGHT - 0.5 * HEIGHT;
     let directions: Vec<_> =
         RayPattern::from(Grid::default()).rays()?.iter().map(|ray| [ray.origin[0], ray.origin[1], -down]).collect();
     Ok(Custom { starts: vec![[0.0; 3]; directions.len()], directions }.into())
 }
 
-impl Side for Ours {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Ours {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.state.step.iter_mut().for_each(|step| *step += 1);
@@ -192,7 +192,7 @@ impl Side for Ours {
 }
 
 /// The `mj_ray` baseline: one ray after the other, a part of all rays in every step.
-struct Bare<'d> {
+struct SingleRays<'d> {
     data: &'d Data,
     rays: Vec<([f64; 3], [f64; 3])>,
     distances: Vec<f64>,
@@ -200,13 +200,13 @@ struct Bare<'d> {
     next: usize,
 }
 
-impl<'d> Bare<'d> {
+impl<'d> SingleRays<'d> {
     fn new(data: &'d Data, ours: &Ours, per_step: usize) -> Self {
         let rays = ours.lines();
         Self { data, distances: vec![0.0; rays.len()], rays, per_step, next: 0 }
     }
 
-    fn cast(&mut self, count: usize) -> Outcome<()> {
+    fn cast(&mut self, count: usize) -> BenchResult<()> {
         for _ in 0..count {
             let (origin, direction) = self.rays[self.next];
             let hit = self.data.ray(origin, direction, 1)?;
@@ -217,13 +217,13 @@ impl<'d> Bare<'d> {
     }
 
     /// Checks that distances agree. Slow baselines check only every 37th ray, to finish within seconds.
-    fn must_agree(&mut self, ours: &Ours) -> Outcome<()> {
+    fn check_agreement(&mut self, ours: &Ours) -> BenchResult<()> {
         let (every, rays) = (if self.per_step < 1000 { 37 } else { 1 }, ours.caster.num_rays());
         for k in (0..self.rays.len()).step_by(every) {
             self.next = k;
             self.cast(1)?;
             let (a, b) = (ours.caster.distances()[(k / rays, k % rays)], self.distances[k]);
-            if a.is_nan() || a.is_infinite() || (a - b).abs() > SAME {
+            if a.is_nan() || a.is_infinite() || (a - b).abs() > DISTANCE_TOLERANCE {
                 return Err(format!("ray {k}: ours measures {a} m, mj_ray {b} m").into());
             }
         }
@@ -232,12 +232,12 @@ impl<'d> Bare<'d> {
     }
 }
 
-impl Side for Bare<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for SingleRays<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.cast(self.per_step)?;
@@ -247,16 +247,16 @@ impl Side for Bare<'_> {
 }
 
 /// The `mj_multiRay` baseline: one call for each environment, with all of its rays.
-struct Together {
+struct MultiRays {
     data: Data,
     points: Vec<[f64; 3]>,
     directions: Vec<[f64; 3]>,
     distances: Vec<f64>,
 }
 
-impl Together {
+impl MultiRays {
     /// Rays from the middle of each scanner to all points that our rays hit.
-    fn new(data: &Data, ours: &Ours) -> Outcome<Self> {
+    fn new(data: &Data, ours: &Ours) -> BenchResult<Self> {
         let mut data = Data::new(data.model())?;
         data.step1()?;
         let rays = ours.caster.num_rays();
@@ -276,7 +276,7 @@ impl Together {
         Ok(together)
     }
 
-    fn cast(&mut self) -> Outcome<()> {
+    fn cast(&mut self) -> BenchResult<()> {
         let rays = self.directions.len() / ENVS;
         let scans = self.directions.chunks(rays).zip(self.distances.chunks_mut(rays));
         for (point, (directions, distances)) in self.points.iter().zip(scans) {
@@ -286,7 +286,7 @@ impl Together {
     }
 
     /// Checks that both hit the same points, or that the terrain blocks the ray from the middle earlier.
-    fn must_agree(&mut self, ours: &Ours) -> Outcome<()> {
+    fn check_agreement(&mut self, ours: &Ours) -> BenchResult<()> {
         self.cast()?;
         let rays = ours.caster.num_rays();
         let mut before = 0;
@@ -297,9 +297,9 @@ impl Together {
             let off = off.map(|x| x * x).sum::<f64>().sqrt();
             let full = (0..3).map(|axis| ours.caster.hits()[(env, ray, axis)] - self.points[env][axis]);
             let full = full.map(|x| x * x).sum::<f64>().sqrt();
-            if distance < full - SAME && distance > 0.0 {
+            if distance < full - DISTANCE_TOLERANCE && distance > 0.0 {
                 before += 1;
-            } else if off.is_nan() || off > SAME {
+            } else if off.is_nan() || off > DISTANCE_TOLERANCE {
                 return Err(format!("ray {k}: mj_multiRay hits {off} m beside ours").into());
             }
         }
@@ -310,12 +310,12 @@ impl Together {
     }
 }
 
-impl Side for Together {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for MultiRays {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.cast()?;
@@ -324,56 +324,56 @@ impl Side for Together {
     }
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for terrain in [Terrain::Mesh, Terrain::Field] {
         let data = terrain.data()?;
-        let plan = Plan { seconds: 0.5 * settings.seconds, restart_after: u32::MAX };
+        let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: u32::MAX };
         let down = format!("{ENVS} scans of 187 rays, {}", terrain.name());
         eprintln!("  {down}");
-        rows.push(one_by_one(plan, &data, terrain, &down)?);
-        rows.push(together(plan, &data, &down, &Grid::default().into())?);
+        rows.push(against_mj_ray(plan, &data, terrain, &down)?);
+        rows.push(against_mj_multi_ray(plan, &data, &down, &Grid::default().into())?);
         let fans = format!("{ENVS} fans of 187 rays, {}", terrain.name());
         eprintln!("  {fans}");
-        rows.push(together(plan, &data, &fans, &fan()?)?);
+        rows.push(against_mj_multi_ray(plan, &data, &fans, &fan()?)?);
     }
     Ok(rows)
 }
 
 /// Vertical rays against `mj_ray`.
-fn one_by_one(plan: Plan, data: &Data, terrain: Terrain, name: &str) -> Outcome<Row> {
-    let count = [ENVS * 187, terrain.rival_rays()].map(|n| n as f64);
+fn against_mj_ray(plan: MeasurementCfg, data: &Data, terrain: Terrain, name: &str) -> BenchResult<Row> {
+    let count = [ENVS * 187, terrain.baseline_rays()].map(|n| n as f64);
     let times = in_both_orders(|_| {
         let mut ours = Ours::new(data, Grid::default().into())?;
-        let mut bare = Bare::new(data, &ours, terrain.rival_rays());
+        let mut bare = SingleRays::new(data, &ours, terrain.baseline_rays());
         if ours.rays() != ENVS * 187 {
             return Err("a scan has 187 rays".into());
         }
-        bare.must_agree(&ours)?;
+        bare.check_agreement(&ours)?;
         measure(plan, &mut [&mut ours, &mut bare])
     })?;
     let per_ray = |t: &[f64]| [t[0] / count[0], t[1] / count[1]];
     let ratio = times.mean_of(|t| per_ray(t)[1] / per_ray(t)[0]);
     let rate = |side: usize| times.rate(side, count[side] as usize);
-    Ok(Row::new("rays", name, "rays/s", 1, rate(0)).against("mj_ray", rate(1), ratio).wanted(WANTED))
+    Ok(Row::new("rays", name, "rays/s", 1, rate(0)).against("mj_ray", rate(1), ratio).with_target_ratio(TARGET_RATIO))
 }
 
 /// Rays of a pattern against `mj_multiRay`; only our side on versions without that function.
-fn together(plan: Plan, data: &Data, name: &str, pattern: &RayPattern) -> Outcome<Row> {
-    let has_rival = TARGET == Target::V4;
+fn against_mj_multi_ray(plan: MeasurementCfg, data: &Data, name: &str, pattern: &RayPattern) -> BenchResult<Row> {
+    let has_rival = BUILD_VERSION == SupportedVersion::V4;
     let times = in_both_orders(|_| {
         let mut ours = Ours::new(data, pattern.clone())?;
         if !has_rival {
             return measure(plan, &mut [&mut ours]);
         }
-        let mut together = Together::new(data, &ours)?;
-        together.must_agree(&ours)?;
+        let mut together = MultiRays::new(data, &ours)?;
+        together.check_agreement(&ours)?;
         measure(plan, &mut [&mut ours, &mut together])
     })?;
     let rate = |side: usize| times.rate(side, ENVS * 187);
     let row = Row::new("rays", name, "rays/s", 1, rate(0));
     Ok(match has_rival {
-        true => row.against("mj_multiRay", rate(1), times.ratio(0, 1)).wanted(WANTED),
+        true => row.against("mj_multiRay", rate(1), times.ratio(0, 1)).with_target_ratio(TARGET_RATIO),
         false => row.without("mj_multiRay"),
     })
 }

@@ -5,9 +5,9 @@
 //! speeds: real time, where the recorder uses the idle part of the machine, and maximum speed, where simulation and
 //! recorder compete.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::prelude::*;
 use kinetoscope::record::{RecorderCfg, RecorderId};
 use kinetoscope::sensors::camera::Camera;
@@ -17,9 +17,9 @@ const ENVS: usize = 16;
 const SIDE: usize = 128;
 /// Steps per second, and steps between two images: 30 Hz.
 const RATE: u32 = 240;
-const PICTURE_EVERY: u32 = 8;
+const IMAGE_EVERY: u32 = 8;
 /// Target: less than 5 % slower.
-const WANTED: f64 = 0.95;
+const TARGET_RATIO: f64 = 0.95;
 /// A recording restarts after this many steps, at some hundred megabytes.
 const RESTART: u32 = 4000;
 
@@ -32,7 +32,7 @@ struct Arms {
 }
 
 impl Arms {
-    fn new(recorded: bool) -> Outcome<Self> {
+    fn new(recorded: bool) -> BenchResult<Self> {
         let dt = 1.0 / f64::from(RATE);
         let cfg = SimulationManagerCfg { num_envs: ENVS, physics_dt: dt, ..Default::default() };
         let mut sim = SimulationManager::new(cfg)?;
@@ -45,7 +45,7 @@ impl Arms {
                 height: SIDE,
                 intrinsics: Intrinsics::Fovy { radians: 0.9 },
                 channels: Channels { color: true, depth: true, ..Channels::default() },
-                update_period: f64::from(PICTURE_EVERY) * dt,
+                update_period: f64::from(IMAGE_EVERY) * dt,
                 extrinsics: Extrinsics {
                     placement: Placement::LookAt { eye: [1.5, 1.0, 1.0], target: [0.2, 0.0, 0.4], up: [0.0, 0.0, 1.0] },
                     ..Extrinsics::default()
@@ -58,8 +58,8 @@ impl Arms {
     }
 }
 
-impl Side for Arms {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Arms {
+    fn restart(&mut self) -> BenchResult<()> {
         if let Some(recorder) = self.recorder.take() {
             self.sim.finish_recording(recorder)?;
         }
@@ -67,39 +67,39 @@ impl Side for Arms {
         self.step = 0;
         if let Some(folder) = &self.folder {
             let path = folder.path().join("run.mcap");
-            let cfg = RecorderCfg { every: PICTURE_EVERY.into(), overwrite: true, ..RecorderCfg::new(path) };
+            let cfg = RecorderCfg { period_steps: IMAGE_EVERY.into(), overwrite: true, ..RecorderCfg::new(path) };
             self.recorder = Some(self.sim.record(cfg)?);
         }
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.sim.update(1);
             self.step += 1;
-            if self.step.is_multiple_of(PICTURE_EVERY) {
-                self.sim.sensor(self.camera)?.pictures()?;
+            if self.step.is_multiple_of(IMAGE_EVERY) {
+                self.sim.sensor(self.camera)?.images()?;
             }
         }
         if let Some(recorder) = self.recorder {
-            self.sim.observers_mut().get(recorder)?.catch_up();
+            self.sim.observers_mut().get(recorder)?.wait_until_written();
         }
         Ok(start.elapsed())
     }
 
-    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
         let arm = self.sim.entities().robot_id("arm")?;
         Ok(Some(self.sim.robot(arm).qpos().into_iter().collect()))
     }
 }
 
 /// Simulated seconds per second in real time: each step begins on schedule, or as soon as possible.
-fn kept(recorded: bool, seconds: f64) -> Outcome<f64> {
+fn real_time_factor(recorded: bool, seconds: f64) -> BenchResult<f64> {
     let mut arms = Arms::new(recorded)?;
     arms.restart()?;
     // The first image and the first chunk of the file allocate memory.
-    arms.block(2 * PICTURE_EVERY)?;
+    arms.block(2 * IMAGE_EVERY)?;
     let steps = (seconds * f64::from(RATE)) as u32;
     let start = Instant::now();
     for step in 0..steps {
@@ -110,24 +110,24 @@ fn kept(recorded: bool, seconds: f64) -> Outcome<f64> {
     Ok(f64::from(steps) / f64::from(RATE) / start.elapsed().as_secs_f64())
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut threads = 0;
     let times = in_both_orders(|order| {
         let (mut ours, mut rival) = order.create(|| Arms::new(true), || Arms::new(false))?;
         threads = ours.sim.threads();
-        let plan = Plan { seconds: settings.seconds / 2.0, restart_after: RESTART };
+        let plan = MeasurementCfg { seconds: settings.seconds / 2.0, restart_after: RESTART };
         let times = measure(plan, &mut [&mut ours, &mut rival]);
         if let Some(recorder) = ours.recorder.take() {
             eprintln!("  {}", ours.sim.finish_recording(recorder)?);
         }
         times
     })?;
-    let [with, without] = [kept(true, settings.seconds)?, kept(false, settings.seconds)?];
+    let [with, without] = [real_time_factor(true, settings.seconds)?, real_time_factor(false, settings.seconds)?];
     let case = |speed: &str| format!("{ENVS} envs, camera {SIDE} x {SIDE} RGB-D at 30 Hz, {speed}");
     let real = Row::new("record", case("in real time"), "x real time", threads, with);
     let free = Row::new("record", case("as fast as can be"), "env-steps/s", threads, times.rate(0, ENVS));
     Ok(vec![
-        real.against("without recording", without, with / without).wanted(WANTED),
-        free.against("without recording", times.rate(1, ENVS), times.ratio(0, 1)).wanted(WANTED),
+        real.against("without recording", without, with / without).with_target_ratio(TARGET_RATIO),
+        free.against("without recording", times.rate(1, ENVS), times.ratio(0, 1)).with_target_ratio(TARGET_RATIO),
     ])
 }

@@ -1,7 +1,7 @@
 //! A baseline in Python: a process that receives commands over pipes (see `rivals/*.py`), one line each way.
 
-use crate::settings::Outcome;
-use kinetoscope::mujoco::{TARGET, Target};
+use crate::settings::BenchResult;
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -14,7 +14,7 @@ const PYTHON: &str = "KINETOSCOPE_PYTHON4";
 /// The python of the baselines; `None` with a message if there is no such python, or if this build is for another
 /// MuJoCo version.
 pub(crate) fn python(rivals: &str) -> Option<OsString> {
-    if TARGET != Target::V4 {
+    if BUILD_VERSION != SupportedVersion::V4 {
         eprintln!("  without {rivals}: the rivals have MuJoCo 4, and this build is for 2.2.2");
         return None;
     }
@@ -50,7 +50,7 @@ impl Process {
         script: &'static str,
         job: &serde_json::Value,
         folder: tempfile::TempDir,
-    ) -> Outcome<Self> {
+    ) -> BenchResult<Self> {
         let file = folder.path().join("job.json");
         std::fs::write(&file, job.to_string())?;
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("rivals").join(script);
@@ -62,7 +62,7 @@ impl Process {
     }
 
     /// Sends a line and waits for the answer.
-    pub(crate) fn ask(&mut self, command: &str) -> Outcome<String> {
+    pub(crate) fn request(&mut self, command: &str) -> BenchResult<String> {
         let commands = self.commands.as_mut().ok_or("the rival has ended")?;
         writeln!(commands, "{command}")?;
         commands.flush()?;
@@ -72,13 +72,13 @@ impl Process {
     }
 
     /// Sends the command `block`; returns the time of these steps.
-    pub(crate) fn block(&mut self, steps: u32) -> Outcome<Duration> {
-        Ok(Duration::from_secs_f64(self.ask(&format!("block {steps}"))?.parse()?))
+    pub(crate) fn block(&mut self, steps: u32) -> BenchResult<Duration> {
+        Ok(Duration::from_secs_f64(self.request(&format!("block {steps}"))?.parse()?))
     }
 
     /// Sends a command with an answer in hexadecimal bytes.
-    pub(crate) fn bytes(&mut self, command: &str) -> Outcome<Vec<u8>> {
-        let hex = self.ask(command)?;
+    pub(crate) fn bytes(&mut self, command: &str) -> BenchResult<Vec<u8>> {
+        let hex = self.request(command)?;
         let byte = |i: usize| u8::from_str_radix(hex.get(i..i + 2).unwrap_or(""), 16);
         Ok((0..hex.len()).step_by(2).map(byte).collect::<Result<_, _>>()?)
     }

@@ -62,7 +62,7 @@ impl Row {
     }
 
     /// Adds the target of the ratio.
-    pub(crate) fn wanted(mut self, ratio: f64) -> Self {
+    pub(crate) fn with_target_ratio(mut self, ratio: f64) -> Self {
         self.wanted = Some(ratio);
         self
     }
@@ -113,7 +113,7 @@ mod tests {
         let json = serde_json::to_value(&row).unwrap_or_default();
         let keys: Vec<&String> = json.as_object().map(|o| o.keys().collect()).unwrap_or_default();
         assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "rival", "rival_name", "threads", "unit"]);
-        assert!(table(&[row.clone().wanted(0.97)]).contains("MISSES"));
-        assert!(!table(&[row.wanted(0.8)]).contains("MISSES"));
+        assert!(table(&[row.clone().with_target_ratio(0.97)]).contains("MISSES"));
+        assert!(!table(&[row.with_target_ratio(0.8)]).contains("MISSES"));
     }
 }

@@ -1,7 +1,7 @@
 //! Length and result type of a measurement.
 
 /// The result of a benchmark, or the reason for its failure.
-pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+pub(crate) type BenchResult<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// Length of a measurement.
 #[derive(Clone, Copy, Debug)]

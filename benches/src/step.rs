@@ -4,10 +4,10 @@
 //! Both sides start from the same states and do the same physics; this is checked bit by bit after every round. They
 //! are created in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{Case, Loop, STEPS};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use kinetoscope::mujoco::Data;
 use kinetoscope::sim::batch::Batch;
 use std::time::{Duration, Instant};
@@ -24,19 +24,19 @@ pub(crate) struct Ours<'c> {
 }
 
 impl<'c> Ours<'c> {
-    pub(crate) fn new(case: &'c Case, envs: usize, threads: usize) -> Outcome<Self> {
+    pub(crate) fn new(case: &'c Case, envs: usize, threads: usize) -> BenchResult<Self> {
         let (qpos, qvel) = (vec![0.0; envs * case.model.nq()], vec![0.0; envs * case.model.nv()]);
         Ok(Self { case, batch: case.batch(envs, threads)?, qpos, qvel })
     }
 }
 
-impl Side for Ours<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Ours<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         self.case.restart(&mut self.batch);
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             let outs = [&mut self.qpos[..], &mut self.qvel[..]];
@@ -45,19 +45,19 @@ impl Side for Ours<'_> {
         Ok(start.elapsed())
     }
 
-    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
         Ok(Some(self.qpos.clone()))
     }
 }
 
 /// The baseline: every thread steps its share of `mjData` repeatedly, without synchronization and without reads.
-struct Bare<'c> {
+struct MujocoLoop<'c> {
     case: &'c Case,
     shares: Vec<Vec<Data>>,
 }
 
-impl<'c> Bare<'c> {
-    fn new(case: &'c Case, envs: usize, threads: usize) -> Outcome<Self> {
+impl<'c> MujocoLoop<'c> {
+    fn new(case: &'c Case, envs: usize, threads: usize) -> BenchResult<Self> {
         let share = envs.div_ceil(threads);
         let mut shares = Vec::new();
         for first in (0..envs).step_by(share) {
@@ -69,15 +69,15 @@ impl<'c> Bare<'c> {
     }
 }
 
-fn bare_step(data: &mut Data, what: Loop) -> bool {
+fn mujoco_step(data: &mut Data, what: Loop) -> bool {
     match what {
         Loop::Step => data.step().is_ok(),
         Loop::Step21 => data.step2().and_then(|()| data.step1()).is_ok(),
     }
 }
 
-impl Side for Bare<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for MujocoLoop<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         for (i, data) in self.shares.iter_mut().flatten().enumerate() {
             data.reset();
             self.case.write(i, data);
@@ -88,11 +88,11 @@ impl Side for Bare<'_> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let what = self.case.bare;
         let start = Instant::now();
-        let run = move |share: &mut Vec<Data>| (0..steps).all(|_| share.iter_mut().all(|data| bare_step(data, what)));
-        let good = match &mut *self.shares {
+        let run = move |share: &mut Vec<Data>| (0..steps).all(|_| share.iter_mut().all(|data| mujoco_step(data, what)));
+        let ok = match &mut *self.shares {
             [share] => run(share),
             // This thread takes part, as in our side.
             [share, others @ ..] => std::thread::scope(|scope| {
@@ -103,10 +103,10 @@ impl Side for Bare<'_> {
             [] => true,
         };
         let time = start.elapsed();
-        if good { Ok(time) } else { Err("MuJoCo stopped in a bare loop".into()) }
+        if ok { Ok(time) } else { Err("MuJoCo stopped in a bare loop".into()) }
     }
 
-    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
         let mut qpos = Vec::new();
         for data in self.shares.iter_mut().flatten() {
             // 2.2.2 normalizes quaternions in place at the start of a step, and our side has begun the next step.
@@ -122,7 +122,7 @@ impl Side for Bare<'_> {
     }
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let (mut rows, mut scaling) = (Vec::new(), Vec::new());
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
         for envs in ENVS {
@@ -130,10 +130,11 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
             eprintln!("  {name}");
             // All four sides run in one measurement: half of the time for each thread count, and half of that for each
             // order.
-            let plan = Plan { seconds: settings.seconds, restart_after: STEPS };
+            let plan = MeasurementCfg { seconds: settings.seconds, restart_after: STEPS };
             let times = in_both_orders(|order| {
-                let pair =
-                    |threads| order.create(|| Ours::new(&case, envs, threads), || Bare::new(&case, envs, threads));
+                let pair = |threads| {
+                    order.create(|| Ours::new(&case, envs, threads), || MujocoLoop::new(&case, envs, threads))
+                };
                 let ((mut ours1, mut bare1), (mut ours2, mut bare2)) = (pair(1)?, pair(2)?);
                 measure(plan, &mut [&mut ours1, &mut bare1, &mut ours2, &mut bare2])
             })?;
@@ -142,7 +143,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
                 rows.push(
                     Row::new("step", &name, "env-steps/s", threads, rate(side))
                         .against("bare loop", rate(side + 1), times.ratio(side, side + 1))
-                        .wanted(WANTED),
+                        .with_target_ratio(WANTED),
                 );
             }
             scaling.push(
@@ -152,7 +153,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
                         times.mean_of(|t| t[1] / t[3]),
                         times.mean_of(|t| (t[0] / t[2]) / (t[1] / t[3])),
                     )
-                    .wanted(WANTED),
+                    .with_target_ratio(WANTED),
             );
         }
     }

@@ -7,16 +7,16 @@
 //! Rows in percent split the time by leaving work out: the same image without the robot, the same paths without shadow
 //! rays, the same paths that end at the first surface. All variants take turns with the full work.
 
-use crate::camera::{Scene, by_rays};
-use crate::interleave::{Plan, Side, Times, measure};
+use crate::camera::{Scene, ray_casting};
+use crate::interleave::{Contender, MeasurementCfg, Times, measure};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
-use kinetoscope::mujoco::release_freed;
+use crate::settings::{BenchResult, Settings};
+use kinetoscope::mujoco::trim_heap;
 use kinetoscope::prelude::*;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
-use kinetoscope::render::geometry::{RayAssets, RayTargets};
-use kinetoscope::render::{ParallelRasterizer, Shot};
+use kinetoscope::render::geometry::{RayAssetCache, RayTargets};
+use kinetoscope::render::{ParallelRenderer, RenderRequest};
 use kinetoscope::scene::shape::Plane;
 use kinetoscope::scene::{Instance, Light, LightKind, Material, PoseF32, RenderScene};
 use std::time::{Duration, Instant};
@@ -25,54 +25,54 @@ const SIZE: [usize; 2] = [640, 480];
 /// Share of the image that the robot covers.
 const COVERED: f64 = 0.4;
 /// Half of the box's side \[m\].
-const WALL: f32 = 1.5;
+const BOX_HALF_SIZE: f32 = 1.5;
 /// Targets: rays per second, paths per second, nanoseconds per triangle.
-const RAYS: f64 = 8e6;
-const PATHS: f64 = 0.3e6;
-const BUILD: f64 = 60.0;
+const TARGET_RAYS: f64 = 8e6;
+const TARGET_PATHS: f64 = 0.3e6;
+const TARGET_BUILD_NS: f64 = 60.0;
 /// Steps until a restart: never reached.
-const ALWAYS: u32 = 1_000_000;
+const RESTART_AFTER: u32 = 1_000_000;
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
-    let scene = Scene::arm_alone()?.covering(COVERED)?;
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
+    let scene = Scene::arm_alone()?.with_coverage(COVERED)?;
     let name = scene.name;
-    let (robot, poses) = scene.drawn(0)?;
+    let (robot, poses) = scene.rendered(0)?;
     let view = scene.view(SIZE)?;
     let pixels = (SIZE[0] * SIZE[1]) as f64;
     let row = |case: &str, unit: &str, ours: f64| Row::new("trace", format!("{name}, {case}"), unit, 1, ours);
-    let at_least = |row: Row, aim: f64, ratio: f64| row.against("aim", aim, ratio).wanted(1.0);
+    let at_least = |row: Row, aim: f64, ratio: f64| row.against("aim", aim, ratio).with_target_ratio(1.0);
     let percent = |times: &Times, part: usize| 100.0 * times.median_of(|t| t[part] / t[0]);
 
     let geometry = Channels { depth: true, mask: true, ..Channels::default() };
     let empty = RenderScene::empty();
-    let mut seen = Pictures::new(Renderer::FastRayTraced, geometry, shot(&robot, &poses, &view));
-    let mut without = Pictures::new(Renderer::FastRayTraced, geometry, shot(&empty, &[], &view));
+    let mut seen = ImageLoop::new(Renderer::FastRayTraced, geometry, shot(&robot, &poses, &view));
+    let mut without = ImageLoop::new(Renderer::FastRayTraced, geometry, shot(&empty, &[], &view));
     let rays = times(settings, &mut [&mut seen, &mut without])?;
     let per_second = pixels / rays.per_step(0);
     let hits = seen.frame.mask.iter().flatten().filter(|&&id| id != 0).count() as f64;
     let covered = 100.0 * hits / pixels;
     let mut rows = vec![
-        at_least(row("what is seen, 640x480", "rays/s", per_second), RAYS, per_second / RAYS),
+        at_least(row("what is seen, 640x480", "rays/s", per_second), TARGET_RAYS, per_second / TARGET_RAYS),
         row("what is seen, 640x480, covered by it", "%", covered),
         // Rays that miss the robot cost little.
         row("what is seen, 640x480, rays that meet it", "rays/s", hits / rays.per_step(0)),
         row("what is seen, 640x480, time without it", "%", percent(&rays, 1)),
-        by_rays(settings, &scene)?,
+        ray_casting(settings, &scene)?,
     ];
 
-    let (boxed, poses) = boxed(&robot, &poses)?;
+    let (boxed, poses) = in_box(&robot, &poses)?;
     let mut unshaded = boxed.clone();
-    unshaded.lights.iter_mut().for_each(|lamp| lamp.cast_shadow = false);
+    unshaded.lights.iter_mut().for_each(|light| light.cast_shadow = false);
     let inside = View::look_at(SIZE, 0.9, [1.2, -1.1, 1.1], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0])?;
     let color = Channels { color: true, ..Channels::default() };
     let by = |max_bounces| Renderer::RayTraced { samples: 1, max_bounces, denoise: false, seed: 0 };
-    let mut whole = Pictures::new(by(4), color, shot(&boxed, &poses, &inside));
-    let mut without_shadows = Pictures::new(by(4), color, shot(&unshaded, &poses, &inside));
-    let mut first = Pictures::new(by(0), color, shot(&boxed, &poses, &inside));
+    let mut whole = ImageLoop::new(by(4), color, shot(&boxed, &poses, &inside));
+    let mut without_shadows = ImageLoop::new(by(4), color, shot(&unshaded, &poses, &inside));
+    let mut first = ImageLoop::new(by(0), color, shot(&boxed, &poses, &inside));
     let paths = times(settings, &mut [&mut whole, &mut without_shadows, &mut first])?;
     let (per_second, cast) = (pixels / paths.per_step(0), whole.rasterizer.progress().rays() as f64);
     rows.extend([
-        at_least(row("in a lit box, 4 bounces", "paths/s", per_second), PATHS, per_second / PATHS),
+        at_least(row("in a lit box, 4 bounces", "paths/s", per_second), TARGET_PATHS, per_second / TARGET_PATHS),
         row("in a lit box, rays of a path", "rays/path", cast / pixels),
         row("in a lit box, rays of paths", "rays/s", cast / paths.per_step(0)),
         row("in a lit box, time without shadow rays", "%", percent(&paths, 1)),
@@ -80,46 +80,46 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     ]);
 
     let triangles = robot.triangle_count() as f64;
-    let (mut warm, mut cold) = (Trees { of: &robot, cold: false }, Trees { of: &robot, cold: true });
+    let (mut warm, mut cold) = (BvhBuild { of: &robot, cold: false }, BvhBuild { of: &robot, cold: true });
     let trees = times(settings, &mut [&mut warm, &mut cold])?;
     let [warm, cold] = [0, 1].map(|side| 1e9 * trees.per_step(side) / triangles);
     rows.extend([
-        at_least(row("trees", "ns/triangle", warm), BUILD, BUILD / warm),
+        at_least(row("trees", "ns/triangle", warm), TARGET_BUILD_NS, TARGET_BUILD_NS / warm),
         // The system clears pages on first use.
         row("trees in memory that is new", "ns/triangle", cold),
     ]);
     Ok(rows)
 }
 
-fn times(settings: &Settings, sides: &mut [&mut dyn Side]) -> Outcome<Times> {
-    measure(Plan { seconds: 2.0 * settings.seconds, restart_after: ALWAYS }, sides)
+fn times(settings: &Settings, sides: &mut [&mut dyn Contender]) -> BenchResult<Times> {
+    measure(MeasurementCfg { seconds: 2.0 * settings.seconds, restart_after: RESTART_AFTER }, sides)
 }
 
-fn shot<'a>(scene: &'a RenderScene, poses: &'a [PoseF32], view: &'a View) -> Shot<'a> {
-    Shot { scene, poses, view, lights: None, lens: None, before: None }
+fn shot<'a>(scene: &'a RenderScene, poses: &'a [PoseF32], view: &'a View) -> RenderRequest<'a> {
+    RenderRequest { scene, poses, view, lights: None, lens: None, previous: None }
 }
 
 /// Renders the same image repeatedly.
-struct Pictures<'a> {
-    rasterizer: ParallelRasterizer,
+struct ImageLoop<'a> {
+    rasterizer: ParallelRenderer,
     frame: Frame,
-    shot: Shot<'a>,
+    shot: RenderRequest<'a>,
 }
 
-impl<'a> Pictures<'a> {
-    fn new(renderer: Renderer, channels: Channels, shot: Shot<'a>) -> Self {
-        let mut rasterizer = ParallelRasterizer::new(RasterCfg { samples: 1, ..RasterCfg::default() }, 1);
+impl<'a> ImageLoop<'a> {
+    fn new(renderer: Renderer, channels: Channels, shot: RenderRequest<'a>) -> Self {
+        let mut rasterizer = ParallelRenderer::new(RasterCfg { samples: 1, ..RasterCfg::default() }, 1);
         rasterizer.set_renderer(renderer);
         Self { rasterizer, frame: Frame::new(SIZE[0], SIZE[1], channels), shot }
     }
 }
 
-impl Side for Pictures<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for ImageLoop<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             self.rasterizer.render(&mut [(self.shot, self.frame.as_mut())]).map_err(|(_, error)| error)?;
@@ -129,25 +129,25 @@ impl Side for Pictures<'_> {
 }
 
 /// Builds the BVHs of a scene repeatedly: bounds, order, nodes and reordered triangles. Dropping them is not counted.
-struct Trees<'a> {
+struct BvhBuild<'a> {
     of: &'a RenderScene,
     /// True to release memory to the system before each build.
     cold: bool,
 }
 
-impl Side for Trees<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for BvhBuild<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let mut taken = Duration::ZERO;
         for _ in 0..steps {
             if self.cold {
-                release_freed();
+                trim_heap();
             }
             let start = Instant::now();
-            let targets = RayTargets::new(self.of, 0..self.of.instances().len(), &RayAssets::default());
+            let targets = RayTargets::new(self.of, 0..self.of.instances().len(), &RayAssetCache::default());
             taken += start.elapsed();
             drop(targets);
         }
@@ -156,7 +156,7 @@ impl Side for Trees<'_> {
 }
 
 /// The robot in a box of six walls, with a light under the ceiling.
-fn boxed(robot: &RenderScene, poses: &[PoseF32]) -> Outcome<(RenderScene, Vec<PoseF32>)> {
+fn in_box(robot: &RenderScene, poses: &[PoseF32]) -> BenchResult<(RenderScene, Vec<PoseF32>)> {
     let mut instances = robot.instances().to_vec();
     let mut poses = poses.to_vec();
     let material = Material { specular: 0.0, ..Material::from_rgba([0.8, 0.8, 0.8, 1.0]) };
@@ -172,9 +172,9 @@ fn boxed(robot: &RenderScene, poses: &[PoseF32]) -> Outcome<(RenderScene, Vec<Po
                 normal[i] * along[j] - normal[j] * along[i]
             });
             let rotation = [0, 1, 2].map(|k| [along[k], across[k], normal[k]]);
-            let mut translation = [0.0, 0.0, WALL];
-            translation[axis] += sign * WALL;
-            instances.push(Instance::new(Plane { half: [WALL; 2] }, material.clone(), 1));
+            let mut translation = [0.0, 0.0, BOX_HALF_SIZE];
+            translation[axis] += sign * BOX_HALF_SIZE;
+            instances.push(Instance::new(Plane { half: [BOX_HALF_SIZE; 2] }, material.clone(), 1));
             poses.push(PoseF32 { rotation, translation });
         }
     }

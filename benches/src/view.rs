@@ -4,13 +4,13 @@
 //! Sixteen of the vendor's arms with the bundled hand move all the time. Each image of 960 x 540 pixels shows all of
 //! them. The window is in a headless X server (Xvfb), which takes its share of the machine.
 
-use crate::interleave::{Plan, Side, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{arm_with_hand, drive_sr5};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
+use crate::settings::{BenchResult, Settings};
 use crate::startup::robots;
 use kinetoscope::prelude::*;
-use kinetoscope::viewer::{Viewing, Wants, Window, WindowCfg};
+use kinetoscope::viewer::{SnapshotRequest, ViewerExt, Window, WindowCfg};
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Stdio};
@@ -22,15 +22,15 @@ use std::time::{Duration, Instant};
 const ENVS: usize = 16;
 const SIZE: [usize; 2] = [960, 540];
 /// Target of the images per second.
-const PICTURES: f64 = 30.0;
+const TARGET_FPS: f64 = 30.0;
 /// Target of the real-time factor.
-const REAL: f64 = 0.98;
+const TARGET_REAL_TIME_FACTOR: f64 = 0.98;
 /// Target of the physics speed with a very slow viewer, relative to no viewer.
-const UNHINDERED: f64 = 0.9;
+const TARGET_SPEED_WITH_SLOW_VIEWER: f64 = 0.9;
 /// Rendering time of the slow viewer.
 const SLOW: Duration = Duration::from_millis(250);
 /// Number of warm-up images, and the time limit for them.
-const FIRST: u64 = 10;
+const WARM_UP_IMAGES: u64 = 10;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Steps between two changes of the arms' targets.
 const SWING: u32 = 100;
@@ -43,7 +43,7 @@ struct Arm {
 }
 
 impl Arm {
-    fn find() -> Outcome<Self> {
+    fn find() -> BenchResult<Self> {
         let vendor = robots().map(|dir| dir.join("rokae_description/urdf/SR5.urdf")).filter(|file| file.exists());
         Ok(match vendor {
             Some(file) => Self { name: "vendor SR5", file, joints: "joint[1-6]" },
@@ -54,7 +54,7 @@ impl Arm {
         })
     }
 
-    fn simulation(&self) -> Outcome<(SimulationManager, RobotId)> {
+    fn simulation(&self) -> BenchResult<(SimulationManager, RobotId)> {
         arm_with_hand(&self.file, self.joints, ENVS, cores())
     }
 }
@@ -119,21 +119,21 @@ impl Drop for Display {
 }
 
 /// Images per second of a window, and simulated seconds per second, in real time.
-fn shown(arm: &Arm, display: &Display, seconds: f64) -> Outcome<[f64; 2]> {
+fn measure_window(arm: &Arm, display: &Display, seconds: f64) -> BenchResult<[f64; 2]> {
     let (mut sim, robot) = arm.simulation()?;
     let cfg = WindowCfg { size: SIZE, display: Some(display.name.clone()), ..WindowCfg::default() };
     let window = sim.open_window_with(cfg)?;
     // The first images allocate memory and build levels of detail for distant objects.
     let start = Instant::now();
-    while window.pictures() < FIRST && start.elapsed() < PATIENCE {
+    while window.frame_count() < WARM_UP_IMAGES && start.elapsed() < PATIENCE {
         swing(&mut sim, robot, &window, 0.1)?;
     }
     swing(&mut sim, robot, &window, seconds)
 }
 
 /// Moves the arms for some seconds.
-fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: f64) -> Outcome<[f64; 2]> {
-    let (start, first, before) = (Instant::now(), sim.observers().steps(), window.pictures());
+fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: f64) -> BenchResult<[f64; 2]> {
+    let (start, first, before) = (Instant::now(), sim.observers().steps(), window.frame_count());
     while start.elapsed().as_secs_f64() < seconds {
         let step = sim.observers().steps();
         if step.is_multiple_of(SWING.into()) {
@@ -142,7 +142,7 @@ fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: 
         sim.update(1);
     }
     let elapsed = start.elapsed().as_secs_f64();
-    let pictures = (window.pictures() - before) as f64;
+    let pictures = (window.frame_count() - before) as f64;
     Ok([pictures / elapsed, (sim.observers().steps() - first) as f64 * sim.cfg().physics_dt / elapsed])
 }
 
@@ -155,10 +155,10 @@ struct Arms {
 }
 
 impl Arms {
-    fn new(arm: &Arm, watched: bool) -> Outcome<Self> {
+    fn new(arm: &Arm, watched: bool) -> BenchResult<Self> {
         let (mut sim, robot) = arm.simulation()?;
         let watcher = watched.then(|| {
-            let viewer = sim.viewer(Wants { rate: 60.0, ..Wants::default() });
+            let viewer = sim.viewer(SnapshotRequest { rate: 60.0, ..SnapshotRequest::default() });
             let mut last = 0;
             Worker::start(move || {
                 let snapshot = viewer.wait(last, SLOW);
@@ -172,13 +172,13 @@ impl Arms {
     }
 }
 
-impl Side for Arms {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for Arms {
+    fn restart(&mut self) -> BenchResult<()> {
         self.step = 0;
         Ok(self.sim.reset(None)?)
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             if self.step.is_multiple_of(SWING) {
@@ -190,21 +190,21 @@ impl Side for Arms {
         Ok(start.elapsed())
     }
 
-    fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
         Ok(Some(self.sim.robot(self.robot).qpos().into_iter().collect()))
     }
 }
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let arm = Arm::find()?;
     let display = Display::start();
     if display.is_none() {
         eprintln!("  without the window: Xvfb is not there");
     }
-    let window = display.map(|display| shown(&arm, &display, settings.seconds)).transpose()?;
+    let window = display.map(|display| measure_window(&arm, &display, settings.seconds)).transpose()?;
     let times = in_both_orders(|order| {
         let (mut watched, mut alone) = order.create(|| Arms::new(&arm, true), || Arms::new(&arm, false))?;
-        let plan = Plan { seconds: settings.seconds / 2.0, restart_after: 10 * SWING };
+        let plan = MeasurementCfg { seconds: settings.seconds / 2.0, restart_after: 10 * SWING };
         measure(plan, &mut [&mut watched, &mut alone])
     })?;
     let case = |what: &str| format!("{ENVS} x {} + hand, {what}", arm.name);
@@ -212,11 +212,13 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let mut rows = Vec::new();
     if let Some([pictures, factor]) = window {
         let row = Row::new("view", case(&format!("window of {width} x {height}")), "pictures/s", cores(), pictures);
-        rows.push(row.against("wanted", PICTURES, pictures / PICTURES).wanted(1.0));
+        rows.push(row.against("wanted", TARGET_FPS, pictures / TARGET_FPS).with_target_ratio(1.0));
         let row = Row::new("view", case("physics meanwhile"), "x real time", cores(), factor);
-        rows.push(row.against("real time", 1.0, factor).wanted(REAL));
+        rows.push(row.against("real time", 1.0, factor).with_target_ratio(TARGET_REAL_TIME_FACTOR));
     }
     let row = Row::new("view", case("drawn in 0.25 s each"), "env-steps/s", cores(), times.rate(0, ENVS));
-    rows.push(row.against("no view", times.rate(1, ENVS), times.ratio(0, 1)).wanted(UNHINDERED));
+    rows.push(
+        row.against("no view", times.rate(1, ENVS), times.ratio(0, 1)).with_target_ratio(TARGET_SPEED_WITH_SLOW_VIEWER),
+    );
     Ok(rows)
 }

@@ -1,11 +1,11 @@
 //! `kinetoscope bench`: simulation and rendering throughput of a model.
 
-use crate::ending::{Ending, Result};
+use crate::ending::{CommandStatus, Result};
 use crate::model::{Model, ModelArgs, Setup, SpawnArgs};
 use crate::progress;
-use crate::render::{Look, rate};
+use crate::render::{RenderArgs, images_per_second};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::Still;
+use kinetoscope::sim::OffscreenScene;
 use std::time::Instant;
 
 /// Steps per second and images per second of a robot on this machine, on every core
@@ -29,7 +29,7 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 2.0)]
     seconds: f64,
     #[command(flatten)]
-    look: Look,
+    look: RenderArgs,
 }
 
 const HELP: &str = "\
@@ -42,7 +42,7 @@ Examples:
 Exit codes: 0 done; 1 done, with warnings (something was repaired or ignored, an environment diverged); 2 refused, or every
 environment diverged.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if !(args.seconds > 0.0 && args.seconds <= 3600.0) {
         return Err(format!("--seconds {}: give more than 0 and at most 3600", args.seconds).into());
     }
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let mut model = args.model.build(&setup)?;
     let warned = model.print_warnings();
     let (num_envs, dt) = (model.sim.num_envs(), model.sim.cfg().physics_dt);
-    let still = Still::of_env(&mut model.sim, EnvId(0))?;
+    let still = OffscreenScene::of_env(&mut model.sim, EnvId(0))?;
     let view = args.look.view(&still)?;
     let mut rasterizer = args.look.rasterizer()?;
     let (start, mut steps) = (Instant::now(), 0u64);
@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         }
     };
     let share = || Some(start.elapsed().as_secs_f64() / args.seconds);
-    let elapsed = progress::during("steps", share, step);
+    let elapsed = progress::with_progress("steps", share, step);
     // A diverged environment no longer steps, so its later steps are not counted.
     let diverged = model.sim.diverged();
     let stopped = diverged.len();
@@ -77,11 +77,14 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         .into());
     }
     let done = diverged.iter().map(|one| one.step).sum::<u64>() + steps * (num_envs - stopped) as u64;
-    let all = done as f64 / elapsed;
-    let each = steps as f64 / elapsed;
+    let env_steps_per_second = done as f64 / elapsed;
+    let batch_steps_per_second = steps as f64 / elapsed;
     println!("{num_envs} environments on {} threads, steps of {dt} s", model.sim.threads());
-    println!("  {all:>12.0} environment steps per second, {:.0} x real time in all", all * dt);
-    println!("  {each:>12.0} steps of all environments per second");
+    println!(
+        "  {env_steps_per_second:>12.0} environment steps per second, {:.0} x real time in all",
+        env_steps_per_second * dt
+    );
+    println!("  {batch_steps_per_second:>12.0} steps of all environments per second");
     if stopped > 0 {
         println!(
             "  {stopped} of {num_envs} environments diverged and stood still from then on: the rates are too high"
@@ -90,10 +93,10 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     for one in &diverged {
         eprintln!("warning: environment {} diverged: {one}", one.env.0);
     }
-    let pictures = rate(&mut rasterizer, still.shot(&view), args.seconds)?;
+    let images_per_second = images_per_second(&mut rasterizer, still.render_request(&view), args.seconds)?;
     println!("pictures of {} x {} with color, depth, mask and normals", view.width, view.height);
-    println!("  {pictures:>12.1} per second");
-    Ok(if warned || !diverged.is_empty() { Ending::Warned } else { Ending::Done })
+    println!("  {images_per_second:>12.1} per second");
+    Ok(if warned || !diverged.is_empty() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 /// Reads the state, as a training program does after each step.

@@ -1,7 +1,7 @@
 //! `kinetoscope check`: report on the contents of robot files, with warnings.
 
-use crate::ending::{Ending, Result};
-use crate::model::{Files, ModelArgs, Setup, is_scene};
+use crate::ending::{CommandStatus, Result};
+use crate::model::{Files, ModelArgs, Setup, may_be_scene};
 use crate::scene_report::{MjcfReport, SceneReport};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Error;
@@ -16,7 +16,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
     /// Joint positions [rad or m]; joints without a value are at 0
-    #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position, allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = parse_joint_position, allow_hyphen_values = true)]
     qpos: Vec<(String, f64)>,
     /// Write the report to a JSON file
     #[arg(long, value_name = "FILE")]
@@ -32,7 +32,7 @@ Examples:
 
 Exit codes: 0 nothing is odd; 1 with warnings; 2 refused.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let mut cfg = InspectCfg { floating_base: args.model.floating_base, qpos: args.qpos.clone(), ..Default::default() };
     match args.model.files()? {
         Files::Urdf(urdf) => cfg.urdf = urdf,
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     }
     let report = match inspect(&cfg) {
         Ok(report) => report,
-        Err(InspectError::Load(error)) if matches!(&*error, Error::RobotFile { error, .. } if is_scene(error)) => {
+        Err(InspectError::Load(error)) if matches!(&*error, Error::RobotFile { error, .. } if may_be_scene(error)) => {
             return mjcf_scene(args);
         }
         Err(error) => return Err(error.into()),
@@ -49,39 +49,42 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     args.write_json(|| serde_json::to_string_pretty(&report))?;
     print(&report.without_warnings());
     // MuJoCo compiles the model as well, and its warnings are included.
-    let warned = args.model.build(&Setup::STILL)?.print_warnings();
-    Ok(if warned || !report.warnings.is_empty() { Ending::Warned } else { Ending::Done })
+    let warned = args.model.build(&Setup::STATIC)?.print_warnings();
+    Ok(if warned || !report.warnings.is_empty() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 /// Checks an MJCF file that describes a scene.
-fn mjcf_scene(args: &Args) -> Result<Ending> {
+fn mjcf_scene(args: &Args) -> Result<CommandStatus> {
     args.refuse_positions()?;
-    let model = args.model.build(&Setup::STILL)?;
-    let Some(part) = model.part else { return Err("the file is no scene".into()) };
-    let report = MjcfReport::of(&args.model.names(), &model.sim.mjcf_part(part));
+    let model = args.model.build(&Setup::STATIC)?;
+    let Some(part) = model.mjcf else { return Err("the file is no scene".into()) };
+    let report = MjcfReport::of(&args.model.file_names(), &model.sim.mjcf_part(part));
     args.write_json(|| serde_json::to_string_pretty(&report.json()))?;
     print(&report);
-    Ok(if model.print_warnings() { Ending::Warned } else { Ending::Done })
+    Ok(if model.print_warnings() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 /// Checks a scene file: reports each robot, and lists the other entities.
-fn scene(args: &Args, path: &Path) -> Result<Ending> {
+fn scene(args: &Args, path: &Path) -> Result<CommandStatus> {
     args.refuse_positions()?;
     // The whole scene is built first, because its errors name the lines of the scene file.
-    let model = args.model.build(&Setup::STILL)?;
-    let report = SceneReport::of(&args.model.names(), &SceneCfg::from_file(path)?)?;
+    let model = args.model.build(&Setup::STATIC)?;
+    let report = SceneReport::of(&args.model.file_names(), &SceneCfg::from_file(path)?)?;
     let json = report.json()?;
     args.write_json(|| serde_json::to_string_pretty(&json))?;
     print(&report);
     let warned = model.print_warnings();
-    Ok(if warned || report.has_warnings() { Ending::Warned } else { Ending::Done })
+    Ok(if warned || report.has_warnings() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 impl Args {
     fn refuse_positions(&self) -> Result<()> {
         let Some((name, _)) = self.qpos.first() else { return Ok(()) };
-        Err(format!("--qpos {name}: {} is a scene, which starts as the file says; leave it out", self.model.names())
-            .into())
+        Err(format!(
+            "--qpos {name}: {} is a scene, which starts as the file says; leave it out",
+            self.model.file_names()
+        )
+        .into())
     }
 
     fn write_json(&self, text: impl FnOnce() -> serde_json::Result<String>) -> Result<()> {
@@ -98,7 +101,7 @@ fn print(report: &dyn std::fmt::Display) {
     let _ = out.flush();
 }
 
-fn position(text: &str) -> std::result::Result<(String, f64), String> {
+fn parse_joint_position(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.rsplit_once('=').ok_or("write NAME=VALUE,NAME=VALUE, such as joint1=0.5,joint2=-1")?;
     let value = value.trim().parse().map_err(|_| format!("{value:?} is no number of radians or metres"))?;
     Ok((name.trim().to_owned(), value))

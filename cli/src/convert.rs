@@ -1,6 +1,6 @@
 //! `kinetoscope convert`: exports a robot as MJCF with its meshes, for both supported MuJoCo versions.
 
-use crate::ending::{Ending, Result};
+use crate::ending::{CommandStatus, Result};
 use crate::excerpt;
 use crate::model::{ModelArgs, Setup};
 use std::path::{Path, PathBuf};
@@ -26,17 +26,17 @@ Examples:
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or left out); 2 refused.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if !args.force && !is_empty(&args.out)? {
         return Err(format!("{}: is not empty; name another folder, or add --force", args.out.display()).into());
     }
-    let model = args.model.build(&Setup::STILL)?;
+    let model = args.model.build(&Setup::STATIC)?;
     let left_out = model.sim.dump(&args.out)?;
-    for file in written(&args.out)? {
+    for file in list_files(&args.out)? {
         println!("{}", file.display());
     }
     let warned = [model.print_warnings(), excerpt::print_warnings(&left_out)];
-    Ok(if warned.contains(&true) { Ending::Warned } else { Ending::Done })
+    Ok(if warned.contains(&true) { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 /// True if a folder is empty or does not exist.
@@ -49,7 +49,7 @@ fn is_empty(folder: &Path) -> Result<bool> {
 }
 
 /// Returns all files of a folder and its subfolders, sorted by path.
-fn written(folder: &Path) -> Result<Vec<PathBuf>> {
+fn list_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let (mut files, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))? {

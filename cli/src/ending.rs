@@ -2,7 +2,7 @@
 
 /// Outcome of a command that completed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Ending {
+pub(crate) enum CommandStatus {
     Done,
     /// A part of the input was repaired, ignored or missing.
     Warned,

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::path::Path;
 
 /// Maximum size of a file that is read for an excerpt \[bytes\].
-const LARGEST: u64 = 64 << 20;
+const MAX_FILE_SIZE: u64 = 64 << 20;
 
 /// Prints an error.
 pub(crate) fn print_error(message: &str) {
@@ -39,49 +39,51 @@ fn colored() -> bool {
 
 /// Renders a message with an excerpt of its source line, if the line can be read.
 fn render(level: Level<'_>, message: &str, kind: Option<&'static str>, colored: bool) -> String {
-    let place = place(message);
-    let said = place.as_ref().map_or(message, |place| &message[place.length..]);
+    let place = parse_location(message);
+    let said = place.as_ref().map_or(message, |place| &message[place.prefix_length..]);
     let renderer = if colored { Renderer::styled() } else { Renderer::plain() };
     let mut title = level.primary_title(said);
     if let Some(kind) = kind {
         title = title.id(kind);
     }
-    let Some(Place { path, line, text, .. }) = &place else { return renderer.render(&[Group::with_title(title)]) };
-    let marked = AnnotationKind::Primary.span(marked(text, said));
+    let Some(SourceLocation { path, line, text, .. }) = &place else {
+        return renderer.render(&[Group::with_title(title)]);
+    };
+    let marked = AnnotationKind::Primary.span(marked_range(text, said));
     let snippet = Snippet::source(text.as_str()).line_start(*line).path(*path).annotation(marked);
     renderer.render(&[title.element(snippet)])
 }
 
 /// Source location at the beginning of a message.
-struct Place<'m> {
+struct SourceLocation<'m> {
     path: &'m str,
     line: usize,
     /// The line itself.
     text: String,
     /// Length of the location prefix in the message \[bytes\].
-    length: usize,
+    prefix_length: usize,
 }
 
 /// Parses the location prefix `FILE:LINE: ` of a message. Returns `None` if the file or the line does not exist.
-fn place(message: &str) -> Option<Place<'_>> {
+fn parse_location(message: &str) -> Option<SourceLocation<'_>> {
     // A path may contain colons.
     let ends = message.match_indices(": ").map(|(at, _)| at);
     ends.take(8).find_map(|end| {
         let (path, line) = message[..end].rsplit_once(':')?;
         let line: usize = line.parse().ok().filter(|&line| line > 0)?;
         let file = Path::new(path);
-        std::fs::metadata(file).ok().filter(|about| about.is_file() && about.len() <= LARGEST)?;
+        std::fs::metadata(file).ok().filter(|about| about.is_file() && about.len() <= MAX_FILE_SIZE)?;
         let bytes = std::fs::read(file).ok()?;
         let text =
             String::from_utf8_lossy(bytes.split(|&b| b == b'\n').nth(line - 1)?).trim_end().replace('\t', "    ");
-        Some(Place { path, line, text, length: end + 2 })
+        Some(SourceLocation { path, line, text, prefix_length: end + 2 })
     })
 }
 
 /// Returns the range of a line to underline: the first quoted text of the message that occurs in the line, else the
 /// whole line without indentation. MuJoCo quotes with single quotation marks. Several occurrences are ranked: the value
 /// of an attribute named by the message, then a whole value, then the first occurrence.
-fn marked(text: &str, message: &str) -> Range<usize> {
+fn marked_range(text: &str, message: &str) -> Range<usize> {
     let of = |mark: char| message.split(mark).skip(1).step_by(2).filter(|quoted| !quoted.trim().is_empty());
     let mut quoted = of('"').chain(of('\''));
     let words = |word: &str| message.split(|c: char| !c.is_alphanumeric() && c != '_').any(|said| said == word);
@@ -154,7 +156,7 @@ mod tests {
             (zeros, "\"0\" is no color", "<box size=\"0.5 0 0.25\" rgba=\""),
             ("<a b='0.5'/>", "\"5\": x", "<a b='0."),
         ] {
-            let marked = marked(line, message);
+            let marked = marked_range(line, message);
             assert_eq!(&line[..marked.start], before, "{message}");
             assert!(message.contains(&line[marked]), "{message}");
         }

@@ -18,7 +18,7 @@ pub(crate) enum FileKind {
 }
 
 /// Extensions of files without a model, with the kind of file and a hint on how to use it.
-const OTHERS: [(&[&str], &str, &str); 7] = [
+const OTHER_EXTENSIONS: [(&[&str], &str, &str); 7] = [
     (&["png", "jpg", "jpeg", "gif", "apng", "webp", "bmp", "tga", "tif", "tiff", "ppm"], "an image", ""),
     (&["mp4", "avi", "mov", "mkv", "webm"], "a video", ""),
     (&["stl", "obj", "dae", "glb", "gltf", "ply", "msh"], "a mesh", "; name it in a URDF or MJCF file"),
@@ -29,7 +29,7 @@ const OTHERS: [(&[&str], &str, &str); 7] = [
 ];
 
 /// Signatures of binary files, with the kind of file.
-const BEGINNINGS: [(&[u8], &str); 6] = [
+const SIGNATURES: [(&[u8], &str); 6] = [
     (b"\x89PNG", "an image"),
     (b"\xff\xd8\xff", "an image"),
     (b"GIF8", "an image"),
@@ -46,15 +46,15 @@ impl FileKind {
             return Self::Other("a folder", "");
         }
         let end = path.extension().map(|end| end.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-        let begins = beginning(path);
-        if let Some((_, what)) = BEGINNINGS.iter().find(|(begins_with, _)| begins.starts_with(begins_with)) {
+        let begins = first_bytes(path);
+        if let Some((_, what)) = SIGNATURES.iter().find(|(begins_with, _)| begins.starts_with(begins_with)) {
             return Self::Other(what, "");
         }
         let by_name = match end.as_str() {
             "toml" | "yaml" | "yml" | "json" => Self::Scene,
             "xml" | "mjcf" => Self::Mjcf,
             end => {
-                let other = OTHERS.iter().find(|(ends, ..)| ends.contains(&end));
+                let other = OTHER_EXTENSIONS.iter().find(|(ends, ..)| ends.contains(&end));
                 other.map_or(Self::Urdf, |(_, what, hint)| Self::Other(what, hint))
             }
         };
@@ -72,7 +72,7 @@ impl FileKind {
 }
 
 /// Returns the first bytes of a file.
-fn beginning(path: &Path) -> Vec<u8> {
+fn first_bytes(path: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
     if let Ok(file) = File::open(path) {
         // Errors are ignored: the reader of the file reports them.

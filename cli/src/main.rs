@@ -20,7 +20,7 @@ mod scene_report;
 mod view;
 
 use clap::{Parser, Subcommand};
-use ending::Ending;
+use ending::CommandStatus;
 use std::process::ExitCode;
 
 /// Tools for robots and scenes from URDF and MJCF: check, convert, render, view, benchmark, replay. No GPU, no OpenGL
@@ -70,7 +70,7 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    let ended = match &args.command {
+    let result = match &args.command {
         Command::Check(args) => check::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Render(args) => render::run(args),
@@ -80,9 +80,9 @@ fn main() -> ExitCode {
         Command::Replay(args) => replay::run(args),
         Command::Recover(args) => recover::run(args),
     };
-    match ended {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::Warned) => ExitCode::from(1),
+    match result {
+        Ok(CommandStatus::Done) => ExitCode::SUCCESS,
+        Ok(CommandStatus::Warned) => ExitCode::from(1),
         Err(error) => {
             // Settings of the library are flags here.
             excerpt::print_error(&error.to_string().replace("UrdfCfg::packages", "--package NAME=DIR"));

@@ -20,11 +20,11 @@ pub(crate) struct ModelArgs {
     #[arg(long, alias = "floating_base")]
     pub(crate) floating_base: bool,
     /// Folder of a ROS package for package:// URIs; may be repeated
-    #[arg(long, value_name = "NAME=DIR", value_parser = package)]
+    #[arg(long, value_name = "NAME=DIR", value_parser = parse_package)]
     package: Vec<(String, PathBuf)>,
     /// Additional search folder for meshes and packages that are not found relative to the URDF, like Isaac Gym's asset
     /// root
-    #[arg(long, value_name = "DIR", value_parser = folder)]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     asset_root: Option<PathBuf>,
     /// Treat deviations from the URDF format as errors instead of warnings
     #[arg(long)]
@@ -69,7 +69,7 @@ pub(crate) struct Setup {
 
 impl Setup {
     /// One environment without a ground, for commands that do not step.
-    pub(crate) const STILL: Self = Self {
+    pub(crate) const STATIC: Self = Self {
         num_envs: Some(1),
         default_envs: 1,
         arena_space: None,
@@ -82,7 +82,7 @@ impl Setup {
     /// Settings of commands that step.
     pub(crate) fn moving(num_envs: Option<usize>, threads: Option<usize>, spawn: &SpawnArgs) -> Self {
         let SpawnArgs { spawn_height, no_ground } = *spawn;
-        Self { num_envs, threads, ground: !no_ground, spawn_height, ..Self::STILL }
+        Self { num_envs, threads, ground: !no_ground, spawn_height, ..Self::STATIC }
     }
 
     /// Returns the configuration of a simulation with one robot.
@@ -105,14 +105,14 @@ pub(crate) struct Model {
     /// Robot of the input files; `None` for a scene.
     pub(crate) robot: Option<RobotId>,
     /// MJCF file that is a scene; `None` for other input.
-    pub(crate) part: Option<MjcfId>,
+    pub(crate) mjcf: Option<MjcfId>,
     /// Warnings of the command itself.
     warnings: Vec<String>,
 }
 
 impl Model {
     fn of(sim: SimulationManager) -> Self {
-        Self { sim, robot: None, part: None, warnings: Vec::new() }
+        Self { sim, robot: None, mjcf: None, warnings: Vec::new() }
     }
 
     /// Prints all warnings. Returns true if there were any.
@@ -152,7 +152,7 @@ impl ModelArgs {
     /// # Errors
     /// A file of another kind, an MJCF or scene file together with other files, or flags of another kind of file.
     pub(crate) fn files(&self) -> Result<Files> {
-        let files: Vec<PathBuf> = self.files.iter().map(|file| user_or_asset(file)).collect();
+        let files: Vec<PathBuf> = self.files.iter().map(|file| resolve_file(file)).collect();
         let kinds: Vec<FileKind> = files.iter().map(|file| FileKind::of(file)).collect();
         for (file, kind) in files.iter().zip(&kinds) {
             if let FileKind::Other(what, hint) = kind {
@@ -238,12 +238,12 @@ impl ModelArgs {
             Err(refused) => refused,
         };
         let Some(Error::RobotFile { error, .. }) = refused.downcast_ref::<Error>() else { return Err(refused) };
-        if !is_scene(error) {
+        if !may_be_scene(error) {
             return Err(refused);
         }
         self.refuse_robot_flags(setup, path)?;
         let mut model = Model::of(SimulationManager::new(SimulationManagerCfg { ground: None, ..setup.cfg() })?);
-        model.part = Some(model.sim.add_mjcf(MjcfCfg::file("scene", path))?);
+        model.mjcf = Some(model.sim.add_mjcf(MjcfPartCfg::file("scene", path))?);
         Ok(model)
     }
 
@@ -274,19 +274,19 @@ impl ModelArgs {
     }
 
     /// Returns the file paths as given on the command line.
-    pub(crate) fn names(&self) -> String {
+    pub(crate) fn file_names(&self) -> String {
         let names: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
         names.join(" ")
     }
 }
 
 /// True if an MJCF file that was rejected as a robot may be a scene.
-pub(crate) fn is_scene(error: &RobotFileError) -> bool {
-    use RobotFileError::{Actuator, BallJoint, MocapBody, NeedsWorld, NoBody, NoJoint, SeveralRoots};
+pub(crate) fn may_be_scene(error: &RobotFileError) -> bool {
+    use RobotFileError::{Actuator, BallJoint, MocapBody, MultipleRoots, NeedsWorld, NoBody, NoJoint};
     matches!(
         error,
         NoBody
-            | SeveralRoots { .. }
+            | MultipleRoots { .. }
             | NoJoint
             | BallJoint { .. }
             | MocapBody { .. }
@@ -297,19 +297,19 @@ pub(crate) fn is_scene(error: &RobotFileError) -> bool {
 
 /// Resolves a path: an existing file, else a bundled asset, else the path unchanged, so that the loader reports the
 /// missing file.
-fn user_or_asset(file: &Path) -> PathBuf {
+fn resolve_file(file: &Path) -> PathBuf {
     if file.exists() { file.to_path_buf() } else { assets::path(file).unwrap_or_else(|_| file.to_path_buf()) }
 }
 
-fn package(text: &str) -> std::result::Result<(String, PathBuf), String> {
+fn parse_package(text: &str) -> std::result::Result<(String, PathBuf), String> {
     let (name, folder) = text.split_once('=').ok_or("write NAME=DIR, such as my_robot=robots/my_robot")?;
     if name.is_empty() {
         return Err("the package has no name; write NAME=DIR".to_owned());
     }
-    Ok((name.to_owned(), self::folder(folder)?))
+    Ok((name.to_owned(), self::parse_folder(folder)?))
 }
 
-fn folder(text: &str) -> std::result::Result<PathBuf, String> {
+fn parse_folder(text: &str) -> std::result::Result<PathBuf, String> {
     let folder = PathBuf::from(text);
     if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is no folder")) }
 }

@@ -1,7 +1,7 @@
 //! Patterns and compact lists of recorded field names.
 
 /// Merges names that differ only in their brackets: `position[J1, J2]`, `data[0..11]`.
-pub(crate) fn grouped(fields: &[String]) -> Vec<String> {
+pub(crate) fn group_fields(fields: &[String]) -> Vec<String> {
     let mut groups: Vec<((&str, &str), Vec<&str>)> = Vec::new();
     for field in fields {
         let parts = field.split_once('[').and_then(|(before, rest)| Some((before, rest.rsplit_once(']')?)));
@@ -26,7 +26,7 @@ pub(crate) fn grouped(fields: &[String]) -> Vec<String> {
 }
 
 /// True if a name matches a pattern, in which `*` stands for any characters.
-pub(crate) fn fits(pattern: &str, name: &str) -> bool {
+pub(crate) fn matches_pattern(pattern: &str, name: &str) -> bool {
     let mut parts = pattern.split('*');
     let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else { return false };
     let mut parts: Vec<&str> = parts.collect();
@@ -54,13 +54,13 @@ mod tests {
             ("", "x", false),
             ("a*a", "a", false),
         ] {
-            assert_eq!(fits(pattern, name), expected, "{pattern} {name}");
+            assert_eq!(matches_pattern(pattern, name), expected, "{pattern} {name}");
         }
     }
 
     #[test]
     fn short_lists() {
         let fields = ["a", "p[x]", "p[y]", "d[0]", "d[1]", "d[2]", "t[l].x", "t[r].x", "t[l].y"].map(String::from);
-        assert_eq!(grouped(&fields), ["a", "p[x, y]", "d[0..2]", "t[l, r].x", "t[l].y"]);
+        assert_eq!(group_fields(&fields), ["a", "p[x, y]", "d[0..2]", "t[l, r].x", "t[l].y"]);
     }
 }

@@ -1,8 +1,8 @@
 //! `kinetoscope plot`: plots recorded values over time.
 
-use crate::ending::{Ending, Result};
-use crate::names::{fits, grouped};
-use kinetoscope::record::{RecordedTopic, Recording, Wanted};
+use crate::ending::{CommandStatus, Result};
+use crate::names::{group_fields, matches_pattern};
+use kinetoscope::record::{FieldSelector, RecordedTopic, Recording};
 use kinetoscope::viewer::plot::{self, Plot, Series};
 use std::io::Write;
 use std::path::PathBuf;
@@ -49,11 +49,11 @@ Examples:
 
 Exit codes: 0 done; 1 done, with warnings; 2 refused.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let recording = Recording::open(&args.file)?;
     let mut warned = !recording.warnings().is_empty();
     recording.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let listed = if warned { Ending::Warned } else { Ending::Done };
+    let listed = if warned { CommandStatus::Warned } else { CommandStatus::Done };
     if args.topic.is_empty() {
         if args.out.is_some() || !args.field.is_empty() {
             return Err("--topic: say of which topic; without --out and --field all of them are listed".into());
@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         args.topic.iter().map(|name| recording.topic(name, args.env)).collect::<std::result::Result<_, _>>()?;
     if args.field.is_empty() {
         if args.out.is_some() {
-            let fields: Vec<String> = topics.iter().flat_map(|topic| grouped(&topic.fields)).collect();
+            let fields: Vec<String> = topics.iter().flat_map(|topic| group_fields(&topic.fields)).collect();
             return Err(format!("--field: say which numbers; there are {}", fields.join(", ")).into());
         }
         list(&recording, &topics);
@@ -79,18 +79,22 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         for field in &args.field {
             let before = wanted.len();
             wanted.extend(
-                topic.fields.iter().filter(|known| fits(field, known)).map(|known| Wanted::new(&topic.name, known)),
+                topic
+                    .fields
+                    .iter()
+                    .filter(|known| matches_pattern(field, known))
+                    .map(|known| FieldSelector::new(&topic.name, known)),
             );
             if wanted.len() == before {
                 // An unknown field is passed on: the error of the recording lists the fields.
-                wanted.push(Wanted::new(&topic.name, field));
+                wanted.push(FieldSelector::new(&topic.name, field));
             }
         }
     }
-    let samples = recording.samples(&wanted)?;
+    let samples = recording.time_series(&wanted)?;
     let names: Vec<&str> = topics.iter().map(|topic| topic.name.as_str()).collect();
-    let stem = wanted.first().map_or("", |wanted| stem(&wanted.field));
-    let same = wanted.iter().all(|wanted| self::stem(&wanted.field) == stem);
+    let stem = wanted.first().map_or("", |wanted| quantity(&wanted.field));
+    let same = wanted.iter().all(|wanted| self::quantity(&wanted.field) == stem);
     let mut plot = Plot::over_time(
         args.title.clone().unwrap_or_else(|| names.join(", ")),
         if same { with_unit(stem) } else { "value".into() },
@@ -105,11 +109,11 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         plot.series.push(Series::new(name, samples.times.into_iter().zip(samples.values).map(|(t, x)| [t, x])));
     }
     plot::write(&plot, out)?;
-    println!("{}: {} curves, {} points", out.display(), plot.series.len(), points(&plot));
-    Ok(if warned { Ending::Warned } else { Ending::Done })
+    println!("{}: {} curves, {} points", out.display(), plot.series.len(), count_points(&plot));
+    Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
-fn points(plot: &Plot) -> usize {
+fn count_points(plot: &Plot) -> usize {
     plot.series.iter().map(|series| series.points.len()).sum()
 }
 
@@ -120,14 +124,14 @@ fn list(recording: &Recording, topics: &[&RecordedTopic]) {
     let _ = writeln!(out, "{}", recording.path().display());
     for &RecordedTopic { name, kind, count, fields } in topics {
         let _ = writeln!(out, "{name}   {kind}, {count} times");
-        for field in grouped(fields) {
+        for field in group_fields(fields) {
             let _ = writeln!(out, "    {field}");
         }
     }
 }
 
 /// Returns a field name without its brackets.
-fn stem(field: &str) -> &str {
+fn quantity(field: &str) -> &str {
     field.split('[').next().unwrap_or(field)
 }
 

@@ -1,6 +1,6 @@
 //! `kinetoscope recover`: completes the file of an interrupted recording.
 
-use crate::ending::{Ending, Result};
+use crate::ending::{CommandStatus, Result};
 use kinetoscope::record::recover_to;
 use std::path::PathBuf;
 
@@ -23,17 +23,17 @@ Examples:
 
 Exit codes: 0 everything that was written whole is in the file; 1 something in between is damaged: what was left stays; 2 refused.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let is_left = args.file.extension().is_some_and(|end| end == "part");
     let file = if is_left { args.file.with_extension("") } else { args.file.clone() };
     let out = args.out.as_ref().unwrap_or(&file);
     let recovered = recover_to(&file, out)?;
     println!("{}: {} messages", out.display(), recovered.messages);
     match recovered.damage {
-        None => Ok(Ending::Done),
+        None => Ok(CommandStatus::Done),
         Some(damage) => {
             eprintln!("warning: behind them something is damaged ({damage}); what was left is still there");
-            Ok(Ending::Warned)
+            Ok(CommandStatus::Warned)
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `kinetoscope render`: renders an image of a model in its initial state.
 
-use crate::ending::{Ending, Result};
+use crate::ending::{CommandStatus, Result};
 use crate::model::{Files, ModelArgs, Setup};
 use crate::picture::{self, Channel};
 use crate::progress;
@@ -9,10 +9,10 @@ use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
-use kinetoscope::render::{ParallelRasterizer, Shot};
+use kinetoscope::render::{ParallelRenderer, RenderRequest};
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::{Error, Still};
+use kinetoscope::sim::{Error, OffscreenScene};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -29,20 +29,20 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t = Channel::Color)]
     channel: Channel,
     #[command(flatten)]
-    look: Look,
+    look: RenderArgs,
 }
 
 /// Camera and renderer settings.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Look {
+pub(crate) struct RenderArgs {
     /// Camera of an MJCF file
     #[arg(long, conflicts_with_all = ["eye", "target"])]
     camera: Option<String>,
     /// Camera position, in meters
-    #[arg(long, value_name = "X,Y,Z", requires = "target", value_parser = point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", requires = "target", value_parser = parse_point, allow_hyphen_values = true)]
     eye: Option<Point>,
     /// Point that the camera looks at, in meters
-    #[arg(long, value_name = "X,Y,Z", requires = "eye", value_parser = point, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", requires = "eye", value_parser = parse_point, allow_hyphen_values = true)]
     target: Option<Point>,
     /// Vertical field of view in degrees [default: that of the camera, or 45]
     #[arg(long)]
@@ -54,8 +54,8 @@ pub(crate) struct Look {
     #[arg(long, default_value_t = 720)]
     height: usize,
     /// Rendering method
-    #[arg(long, value_enum, default_value_t = Method::Raster)]
-    renderer: Method,
+    #[arg(long, value_enum, default_value_t = RenderMethod::Raster)]
+    renderer: RenderMethod,
     /// Paths per pixel, with --renderer rt [default: 64]
     #[arg(long)]
     samples: Option<u32>,
@@ -63,7 +63,7 @@ pub(crate) struct Look {
 
 /// Rendering method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
+enum RenderMethod {
     /// Rasterizer
     Raster,
     /// Rasterizer with ray-traced shadows
@@ -77,7 +77,7 @@ enum Method {
 #[derive(Clone, Copy, Debug)]
 struct Point([f64; 3]);
 
-fn point(text: &str) -> std::result::Result<Point, String> {
+fn parse_point(text: &str) -> std::result::Result<Point, String> {
     let numbers: Vec<f64> = text.split(',').map(|n| n.trim().parse().unwrap_or(f64::NAN)).collect();
     match numbers[..] {
         [x, y, z] if numbers.iter().all(|n| n.is_finite()) => Ok(Point([x, y, z])),
@@ -93,15 +93,15 @@ Examples:
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let (still, mut warned) = match args.model.files()? {
-        Files::Mjcf(path) => (of_mjcf(&path)?, false),
+        Files::Mjcf(path) => (load_mjcf(&path)?, false),
         Files::Urdf(_) | Files::Scene(_) => {
-            let mut model = args.model.build(&Setup::STILL)?;
-            (Still::of_env(&mut model.sim, EnvId(0))?, model.print_warnings())
+            let mut model = args.model.build(&Setup::STATIC)?;
+            (OffscreenScene::of_env(&mut model.sim, EnvId(0))?, model.print_warnings())
         }
     };
-    for left_out in still.visible().left_out() {
+    for left_out in still.visible().omitted() {
         eprintln!("warning: {left_out}");
         warned = true;
     }
@@ -111,18 +111,19 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let start = Instant::now();
     let mut rasterizer = args.look.rasterizer()?;
     let progress = rasterizer.progress().clone();
-    let mut job = [(still.shot(&view), frame.as_mut())];
-    progress::during("paths", || progress.fraction(), || rasterizer.render(&mut job)).map_err(|(_, error)| error)?;
+    let mut job = [(still.render_request(&view), frame.as_mut())];
+    progress::with_progress("paths", || progress.fraction(), || rasterizer.render(&mut job))
+        .map_err(|(_, error)| error)?;
     let seconds = start.elapsed().as_secs_f64();
     picture::write(&frame, args.channel, [view.width, view.height], &args.out)?;
     println!("{}: {} x {} pixels in {:.1} ms", args.out.display(), view.width, view.height, 1e3 * seconds);
-    Ok(if warned { Ending::Warned } else { Ending::Done })
+    Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 /// Loads a model from an MJCF file. Errors of the compiler get the file and the line that MuJoCo reports. With included
 /// files the line is omitted, because MuJoCo does not report to which file it belongs.
-fn of_mjcf(path: &Path) -> Result<Still> {
-    Still::of_mjcf(path, None).map_err(|error| {
+fn load_mjcf(path: &Path) -> Result<OffscreenScene> {
+    OffscreenScene::of_mjcf(path, None).map_err(|error| {
         let line = if let Error::Compile(refused) = &error { refused.line } else { None };
         let is_of_it = || std::fs::read_to_string(path).is_ok_and(|text| !text.contains("<include"));
         match line.filter(|_| is_of_it()) {
@@ -132,12 +133,12 @@ fn of_mjcf(path: &Path) -> Result<Still> {
     })
 }
 
-impl Look {
+impl RenderArgs {
     /// Returns the camera view of a model.
     ///
     /// # Errors
     /// The file has no such camera, or a size or angle is invalid.
-    pub(crate) fn view(&self, still: &Still) -> Result<View> {
+    pub(crate) fn view(&self, still: &OffscreenScene) -> Result<View> {
         let free = still.first_view([self.width, self.height]);
         let (pose, fovy) = match (&self.camera, self.eye, self.target) {
             (Some(name), ..) => {
@@ -161,22 +162,22 @@ impl Look {
     ///
     /// # Errors
     /// An invalid number of paths, or any number of paths without path tracing.
-    pub(crate) fn rasterizer(&self) -> Result<ParallelRasterizer> {
-        if let Some(samples) = self.samples.filter(|_| self.renderer != Method::Rt) {
+    pub(crate) fn rasterizer(&self) -> Result<ParallelRenderer> {
+        if let Some(samples) = self.samples.filter(|_| self.renderer != RenderMethod::Rt) {
             return Err(format!("--samples {samples}: paths are of --renderer rt").into());
         }
         let renderer = match self.renderer {
-            Method::Raster => Renderer::Raster,
-            Method::Hybrid => Renderer::Hybrid,
-            Method::FastRt => Renderer::FastRayTraced,
-            Method::Rt => {
+            RenderMethod::Raster => Renderer::Raster,
+            RenderMethod::Hybrid => Renderer::Hybrid,
+            RenderMethod::FastRt => Renderer::FastRayTraced,
+            RenderMethod::Rt => {
                 Renderer::RayTraced { samples: self.samples.unwrap_or(64), max_bounces: 4, denoise: true, seed: 0 }
             }
         };
         renderer.validate()?;
         let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
         let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
-        let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_pool(ThreadPool::new());
+        let mut rasterizer = ParallelRenderer::new(cfg, threads).with_pool(ThreadPool::new());
         rasterizer.set_renderer(renderer);
         Ok(rasterizer)
     }
@@ -186,7 +187,11 @@ impl Look {
 ///
 /// # Errors
 /// Rendering failed.
-pub(crate) fn rate(rasterizer: &mut ParallelRasterizer, shot: Shot<'_>, seconds: f64) -> Result<f64> {
+pub(crate) fn images_per_second(
+    rasterizer: &mut ParallelRenderer,
+    shot: RenderRequest<'_>,
+    seconds: f64,
+) -> Result<f64> {
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
     let (start, mut pictures) = (Instant::now(), 0u32);
@@ -198,5 +203,5 @@ pub(crate) fn rate(rasterizer: &mut ParallelRasterizer, shot: Shot<'_>, seconds:
             return Ok(f64::from(pictures) / elapsed);
         }
     };
-    progress::during("pictures", move || Some(start.elapsed().as_secs_f64() / seconds), draw)
+    progress::with_progress("pictures", move || Some(start.elapsed().as_secs_f64() / seconds), draw)
 }

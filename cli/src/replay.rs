@@ -1,12 +1,12 @@
 //! `kinetoscope replay`: shows a recording, renders images of it, or verifies it by running its actions again.
 
-use crate::ending::{Ending, Result};
+use crate::ending::{CommandStatus, Result};
 use crate::{excerpt, interrupt};
-use kinetoscope::RecordedFilm;
+use kinetoscope::RecordingPlayback;
 use kinetoscope::prelude::*;
-use kinetoscope::record::{Film, Recording, replay};
-use kinetoscope::sim::Still;
-use kinetoscope::viewer::{Closed, Eye, ScreenshotCfg, ServeCfg, WindowCfg};
+use kinetoscope::record::{Playback, Recording, replay};
+use kinetoscope::sim::OffscreenScene;
+use kinetoscope::viewer::{Closed, OrbitCamera, ScreenshotCfg, ServeCfg, WindowCfg};
 use kinetoscope::viewer::{Play, Speed};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -56,7 +56,7 @@ Examples:
 Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 shown or drawn, with warnings (something of the
 recording or of the scene was left out), or --verify found a difference; 2 refused, or the display was lost.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if args.verify {
         return verify(args);
     }
@@ -67,22 +67,25 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let mut warned = !recording.warnings().is_empty();
     recording.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let envs = recording.env_ids().last().map_or(1, |last| last.saturating_add(1));
-    let scene = args.scene.as_deref().map(|file| built(file, envs)).transpose()?;
+    let scene = args.scene.as_deref().map(|file| build_scene(file, envs)).transpose()?;
     warned |= scene.as_ref().is_some_and(|(_, warned)| *warned);
-    let (film, sim) = Film::of(&recording, scene.as_ref().map(|(scene, _)| scene.sim()))?;
-    if !film.unmoved().is_empty() {
+    let (film, sim) = Playback::open(&recording, scene.as_ref().map(|(scene, _)| scene.sim()))?;
+    if !film.joints_without_data().is_empty() {
         warned = true;
-        eprintln!("warning: nothing was recorded of {}: they stay where they begin", film.unmoved().join(", "));
+        eprintln!(
+            "warning: nothing was recorded of {}: they stay where they begin",
+            film.joints_without_data().join(", ")
+        );
     }
     match &args.out {
         Some(folder) => draw(args, film, sim, folder)?,
         None => show(args, film, sim)?,
     }
-    Ok(if warned { Ending::Warned } else { Ending::Done })
+    Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 /// Builds the scene of a file with the recorded number of environments. Also returns true if there were warnings.
-fn built(file: &Path, num_envs: usize) -> Result<(InteractiveScene, bool)> {
+fn build_scene(file: &Path, num_envs: usize) -> Result<(InteractiveScene, bool)> {
     let mut cfg = SceneCfg::from_file(file)?;
     cfg.simulation.num_envs = num_envs;
     let scene = InteractiveScene::new(cfg)?;
@@ -90,15 +93,15 @@ fn built(file: &Path, num_envs: usize) -> Result<(InteractiveScene, bool)> {
     Ok((scene, warned))
 }
 
-fn verify(args: &Args) -> Result<Ending> {
+fn verify(args: &Args) -> Result<CommandStatus> {
     let Some(file) = &args.scene else { return Err("--verify: give the scene with --scene".into()) };
-    let (mut scene, _) = built(file, replay::num_envs(&args.file)?)?;
+    let (mut scene, _) = build_scene(file, replay::num_envs(&args.file)?)?;
     let verdict = replay::verify(scene.sim_mut(), &args.file)?;
     println!("{}: {verdict}", args.file.display());
-    Ok(if verdict.is_same() { Ending::Done } else { Ending::Warned })
+    Ok(if verdict.is_identical() { CommandStatus::Done } else { CommandStatus::Warned })
 }
 
-fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) -> Result<()> {
+fn draw(args: &Args, mut film: Playback, mut sim: SimulationManager, folder: &Path) -> Result<()> {
     let (first, last) = (film.times()[0], film.times()[film.times().len() - 1]);
     if let Some(time) = args.at.iter().find(|time| !(first..=last).contains(*time)) {
         return Err(format!("--at {time}: the recording is from {first} s to {last} s").into());
@@ -107,13 +110,14 @@ fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) 
     // All images have the same camera, which frames everything that is visible at any of these times.
     let mut stills = Vec::new();
     for time in &args.at {
-        film.show(&mut sim, film.frame_at(*time))?;
-        stills.push(Still::overview(&mut sim, None, &[])?);
+        film.seek(&mut sim, film.frame_at(*time))?;
+        stills.push(OffscreenScene::overview(&mut sim, None, &[])?);
     }
-    let (size, placed) = ([args.width, args.height], stills.iter().map(Still::placed).collect::<Vec<_>>());
-    let cfg = ScreenshotCfg { size, eye: Some(Eye::framing(&placed, size)), ..ScreenshotCfg::default() };
+    let (size, placed) = ([args.width, args.height], stills.iter().map(OffscreenScene::placed).collect::<Vec<_>>());
+    let cfg =
+        ScreenshotCfg { size, camera: Some(OrbitCamera::frame_scenes(&placed, size)), ..ScreenshotCfg::default() };
     for time in &args.at {
-        film.show(&mut sim, film.frame_at(*time))?;
+        film.seek(&mut sim, film.frame_at(*time))?;
         let path = folder.join(format!("replay_{time:.3}s.png"));
         sim.screenshot_with(&path, &cfg)?;
         println!("{}", path.display());
@@ -121,30 +125,30 @@ fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) 
     Ok(())
 }
 
-fn show(args: &Args, mut film: Film, mut sim: SimulationManager) -> Result<()> {
-    let begun = std::time::Instant::now();
+fn show(args: &Args, mut film: Playback, mut sim: SimulationManager) -> Result<()> {
+    let start = std::time::Instant::now();
     // A new viewer sees the first frame at once, not the initial state of the scene.
-    film.show(&mut sim, 0)?;
-    let mut film = RecordedFilm(film);
-    // Ctrl+C needs no action of its own, because `goes_on` is called many times a second.
+    film.seek(&mut sim, 0)?;
+    let mut film = RecordingPlayback(film);
+    // Ctrl+C needs no action of its own, because `keep_playing` is called many times a second.
     let interrupted = interrupt::on_ctrl_c(|| ());
-    let goes_on = || {
-        let in_time = args.seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds);
+    let keep_playing = || {
+        let in_time = args.seconds.is_none_or(|seconds| start.elapsed().as_secs_f64() < seconds);
         in_time && !interrupted.load(Ordering::SeqCst)
     };
     match &args.serve {
         Some(address) => {
-            let served = sim.serve_with(address, ServeCfg { speed: Some(Speed::REAL), ..ServeCfg::default() })?;
+            let served = sim.serve_with(address, ServeCfg { speed: Some(Speed::REAL_TIME), ..ServeCfg::default() })?;
             println!("Look at {}; Ctrl+C ends it.", served.url());
-            sim.play(&mut film, &mut || goes_on())?;
+            sim.play(&mut film, &mut || keep_playing())?;
             served.close(&mut sim)?;
         }
         None => {
             let title = format!("{} - Kinetoscope", args.file.display());
             let window = sim.open_window_with(WindowCfg { title, ..WindowCfg::default() })?;
             println!("A window shows {}: closing it, or Ctrl+C here, ends it.", args.file.display());
-            sim.play(&mut film, &mut || window.is_open() && goes_on())?;
-            if let Some(reason) = window.closed().as_ref().and_then(Closed::fault) {
+            sim.play(&mut film, &mut || window.is_open() && keep_playing())?;
+            if let Some(reason) = window.closed().as_ref().and_then(Closed::error) {
                 return Err(format!("the window is gone: {reason}").into());
             }
             window.close();

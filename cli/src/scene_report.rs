@@ -4,7 +4,7 @@ use crate::ending::Result;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::MjcfPart;
-use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
+use kinetoscope::sim::inspect::{InspectCfg, RobotReport, inspect};
 use serde_json::{Value, json};
 use std::fmt;
 
@@ -123,7 +123,7 @@ pub(crate) struct SceneReport {
     file: String,
     num_envs: usize,
     dt: f64,
-    robots: Vec<(String, Report)>,
+    robots: Vec<(String, RobotReport)>,
     /// Name and kind of each entity that is neither a robot nor an articulation.
     others: Vec<(String, &'static str)>,
 }

@@ -1,13 +1,13 @@
 //! `kinetoscope view`: simulates a model in a window or a browser.
 
-use crate::ending::{Ending, Result};
+use crate::ending::{CommandStatus, Result};
 use crate::interrupt;
 use crate::model::{ModelArgs, Setup, SpawnArgs};
 use kinetoscope::FileRecording;
 use kinetoscope::prelude::*;
 use kinetoscope::record::RecorderCfg;
 use kinetoscope::viewer::{
-    Closed, Command, RecordButton, ServeCfg, Speed, Viewer, Viewing, Wants, Window, WindowCfg, WindowError,
+    Closed, Command, RecordButton, ServeCfg, SnapshotRequest, Speed, Viewer, ViewerExt, Window, WindowCfg, WindowError,
 };
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -65,8 +65,8 @@ Examples:
 Exit codes: 0 shown until a good end; 1 the same, with warnings (something was repaired or ignored, an environment diverged); 2
 refused, or the display was lost.";
 
-pub(crate) fn run(args: &Args) -> Result<Ending> {
-    let [slow, fast] = Speed::RANGE;
+pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
+    let [slow, fast] = Speed::FACTOR_RANGE;
     if !(slow..=fast).contains(&args.speed) {
         return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
     }
@@ -81,28 +81,28 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         files
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .begin(&mut sim)
+            .start(&mut sim)
             .map_err(|error| format!("--record {error}"))?;
     }
-    let window = args.show(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
+    let window = args.open_view(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
     let closed = || window.as_ref().and_then(Window::closed);
     let mut step = 0;
     while !interrupted.load(Ordering::SeqCst) && args.steps.is_none_or(|steps| step < steps) && closed().is_none() {
         sim.update(1);
         step += 1;
     }
-    let recorded = files.lock().unwrap_or_else(PoisonError::into_inner).end(&mut sim);
+    let recorded = files.lock().unwrap_or_else(PoisonError::into_inner).finish(&mut sim);
     for recorded in recorded.map_err(|error| format!("--record {error}"))? {
         println!("Recorded to {recorded}");
     }
-    if let Some(reason) = closed().as_ref().and_then(Closed::fault) {
+    if let Some(reason) = closed().as_ref().and_then(Closed::error) {
         return Err(format!("the window is gone after {step} steps: {reason}").into());
     }
     let diverged = sim.diverged();
     for one in &diverged {
         eprintln!("warning: environment {}: {one}", one.env.0);
     }
-    Ok(if warned || !diverged.is_empty() { Ending::Warned } else { Ending::Done })
+    Ok(if warned || !diverged.is_empty() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
 impl Args {
@@ -116,17 +116,17 @@ impl Args {
     ///
     /// # Errors
     /// No display is available, or the server cannot listen at the address.
-    fn show(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
-        let (speed, recording) = (Some(Speed::Times(self.speed)), Some(button));
-        let names = self.model.names();
+    fn open_view(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
+        let (speed, recording) = (Some(Speed::Factor(self.speed)), Some(button));
+        let names = self.model.file_names();
         if let Some(address) = &self.serve {
-            let served = sim.serve_with(address, ServeCfg { speed, recording, ..ServeCfg::default() });
+            let served = sim.serve_with(address, ServeCfg { speed, record_button: recording, ..ServeCfg::default() });
             let served = served.map_err(|error| format!("--serve: {error}"))?;
             println!("Open {} in a browser to see {names}; Ctrl+C here ends it.", served.url());
             return Ok(None);
         }
         let title = format!("{names} - Kinetoscope");
-        let cfg = WindowCfg { title, speed, recording, ..WindowCfg::default() };
+        let cfg = WindowCfg { title, speed, record_button: recording, ..WindowCfg::default() };
         let window = sim.open_window_with(cfg).map_err(|error| no_window(&error, &names))?;
         println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
         Ok(Some(window))
@@ -152,10 +152,10 @@ fn no_window(error: &WindowError, names: &str) -> String {
 
 /// Returns a flag that Ctrl+C sets. Ctrl+C also resumes a paused simulation and sets it to free speed.
 fn on_ctrl_c(sim: &mut SimulationManager) -> Arc<AtomicBool> {
-    let wants = Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
-    let key: Viewer = sim.viewer(wants);
+    let wants = SnapshotRequest { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
+    let resume_viewer: Viewer = sim.viewer(wants);
     interrupt::on_ctrl_c(move || {
-        key.send(Command::Resume);
-        key.send(Command::SetSpeed(Speed::Free));
+        resume_viewer.send(Command::Resume);
+        resume_viewer.send(Command::SetSpeed(Speed::Unlimited));
     })
 }

@@ -39,7 +39,7 @@ pub(crate) fn write_ply(path: &Path, points: &[([f32; 3], [u8; 3])]) -> Result {
 ///
 /// `map` has shape (H, W, 3), world frame \[m\]; `intrinsics` is (fx, fy, cx, cy) \[pixels\]; `pose` is the camera's
 /// pose row in the ROS convention.
-pub(crate) fn round_trip(map: &Array3<f32>, [fx, fy, cx, cy]: [f64; 4], pose: &[f64; 7]) -> f64 {
+pub(crate) fn reprojection_error(map: &Array3<f32>, [fx, fy, cx, cy]: [f64; 4], pose: &[f64; 7]) -> f64 {
     let camera_from_world = from_row(pose).inverse();
     let mut worst = 0.0_f64;
     for (v, line) in map.outer_iter().enumerate() {

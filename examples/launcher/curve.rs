@@ -14,7 +14,7 @@ const SIZE: [u32; 2] = [640, 360];
 const MARGIN: [i32; 4] = [56, 36, 20, 36];
 
 /// Plots numbers from 0 to 1 in their order.
-pub(crate) fn draw(title: &str, values: &[f64]) -> RgbImage {
+pub(crate) fn plot(title: &str, values: &[f64]) -> RgbImage {
     let mut canvas = Canvas(RgbImage::from_pixel(SIZE[0], SIZE[1], Rgb([250, 250, 250])));
     let [left, top, right, bottom] = MARGIN;
     let (width, height) = (SIZE[0] as i32 - left - right, SIZE[1] as i32 - top - bottom);

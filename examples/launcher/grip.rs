@@ -2,7 +2,7 @@
 
 use super::Result;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
@@ -40,10 +40,10 @@ pub(crate) fn robot_cfg(hand: &[(&str, f64)], finger_effort: f64) -> Result<Robo
 
 /// Returns uniform random numbers in -1..1 for each environment, keyed by its global index: the numbers do not depend
 /// on the number of environments or processes.
-pub(crate) fn scatter<const K: usize>(sim: &SimulationManager, what: &str) -> Vec<[f64; K]> {
+pub(crate) fn uniform_per_env<const K: usize>(sim: &SimulationManager, stream_name: &str) -> Vec<[f64; K]> {
     let (seed, first) = (sim.cfg().seed, sim.cfg().first_env());
     let of = |env: usize| {
-        let mut random = Random::keyed(seed, (first + env) as u64, what);
+        let mut random = KeyedRng::keyed(seed, (first + env) as u64, stream_name);
         std::array::from_fn(|_| 2.0 * random.uniform() - 1.0)
     };
     (0..sim.num_envs()).map(of).collect()

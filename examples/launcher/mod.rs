@@ -51,7 +51,7 @@ pub(crate) struct Launcher {
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     pub(crate) device: Device,
     #[command(flatten)]
-    elsewhere: FlagsFromElsewhere,
+    elsewhere: CompatibilityFlags,
     /// Renderer of the images
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
     pub(crate) renderer: Renderer,
@@ -100,7 +100,7 @@ pub(crate) struct Launcher {
     files: std::sync::OnceLock<Arc<std::sync::Mutex<kinetoscope::FileRecording>>>,
     /// The window, once it is open; clones share it.
     #[arg(skip)]
-    window: views::Shown,
+    window: views::SharedWindow,
 }
 
 fn rate(text: &str) -> std::result::Result<(String, u64), String> {
@@ -130,7 +130,7 @@ fn device(text: &str) -> std::result::Result<Device, String> {
 
 /// Flags of EmbodiChain's and Isaac Lab's launchers, accepted so that their command lines run here.
 #[derive(Clone, Debug, Args)]
-struct FlagsFromElsewhere {
+struct CompatibilityFlags {
     /// GPU number; without effect here
     #[arg(long = "gpu-id", alias = "gpu_id", value_name = "N", hide = true)]
     gpu_id: Option<u32>,
@@ -145,7 +145,7 @@ struct FlagsFromElsewhere {
     offscreen_render: bool,
 }
 
-impl FlagsFromElsewhere {
+impl CompatibilityFlags {
     /// One line for each given flag without effect here, with the reason.
     fn notes(&self) -> Vec<String> {
         let cameras = "cameras draw on the CPU, with or without a window";
@@ -199,7 +199,7 @@ impl Renderer {
     ///
     /// # Errors
     /// The number of paths or bounces is out of range, or the path tracing flags are given for another renderer.
-    pub(crate) fn of_cameras(self, flags: PathFlags) -> Result<kinetoscope::render::Renderer> {
+    pub(crate) fn for_cameras(self, flags: PathFlags) -> Result<kinetoscope::render::Renderer> {
         use kinetoscope::render::Renderer as Known;
         let PathFlags { rt_samples, rt_bounces, rt_noisy } = flags;
         if self != Self::Rt && (rt_samples.is_some() || rt_bounces.is_some() || rt_noisy) {
@@ -246,14 +246,14 @@ impl Launcher {
             )
             .into());
         }
-        self.simulation_drawn_anyhow()
+        self.simulation_for_any_renderer()
     }
 
     /// The simulation of these flags, for an example that supports every renderer or accepts every name.
     ///
     /// # Errors
     /// The device is not supported.
-    pub(crate) fn simulation_drawn_anyhow(&self) -> Result<SimulationManagerCfg> {
+    pub(crate) fn simulation_for_any_renderer(&self) -> Result<SimulationManagerCfg> {
         if let Device::Cuda(name) = &self.device {
             return Err(format!(
                 "--device {name} is not supported: Kinetoscope simulates on the CPU; use --device cpu, and --threads to choose \
@@ -283,13 +283,13 @@ impl Launcher {
         Ok(())
     }
 
-    /// The folder of `--out`, otherwise the working directory. Creates the folder if `wanted`.
+    /// The folder of `--out`, otherwise the working directory. Creates the folder if `create`.
     ///
     /// # Errors
     /// The folder cannot be created.
-    pub(crate) fn out_folder(&self, wanted: bool) -> Result<PathBuf> {
+    pub(crate) fn out_folder(&self, create: bool) -> Result<PathBuf> {
         let out = self.out.clone().unwrap_or_else(|| ".".into());
-        if wanted {
+        if create {
             make_folder(&out)?;
         }
         Ok(out)
@@ -338,7 +338,7 @@ pub(crate) fn check_camera_id(camera_id: usize, sim: &SimulationManager) -> Resu
 }
 
 /// Positions of the tutorial's cameras \[m\]: two places in alternation.
-pub(crate) fn two_views(num_envs: usize) -> Vec<[f64; 3]> {
+pub(crate) fn alternating_eyes(num_envs: usize) -> Vec<[f64; 3]> {
     (0..num_envs).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect()
 }
 
@@ -355,33 +355,33 @@ pub(crate) fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
 
 /// Stop request of the user: Ctrl+C, or the window closed.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct End {
+pub(crate) struct StopRequest {
     interrupted: Arc<AtomicBool>,
-    window: views::Shown,
+    window: views::SharedWindow,
 }
 
-impl End {
+impl StopRequest {
     /// True if Ctrl+C was pressed or the window was closed.
-    pub(crate) fn has_come(&self) -> bool {
+    pub(crate) fn is_set(&self) -> bool {
         self.interrupted.load(Ordering::SeqCst) || self.window.is_closed()
     }
 }
 
 /// Control of the main loop: progress bar, step limit, Ctrl+C and the closing of the window.
 #[derive(Debug)]
-pub(crate) struct Progress {
+pub(crate) struct MainLoop {
     bar: ProgressBar,
     steps: Option<u64>,
-    end: End,
+    end: StopRequest,
     start: Instant,
     /// Time of the last progress line, for runs without a terminal.
-    said: Cell<Instant>,
+    last_line: Cell<Instant>,
 }
 
 /// Interval of progress lines without a terminal.
-pub(crate) const LINE: Duration = Duration::from_secs(10);
+pub(crate) const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
-impl Progress {
+impl MainLoop {
     /// Starts the clock. `cycle` is the length of the bar if the number of steps is open.
     pub(crate) fn new(launcher: &Launcher, cycle: u64) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
@@ -391,7 +391,7 @@ impl Progress {
         let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
-            views::let_go();
+            views::release_pause();
             if first.get_or_insert_with(Instant::now).elapsed() > Duration::from_secs(1) {
                 std::process::exit(130);
             }
@@ -404,17 +404,17 @@ impl Progress {
             bar.set_style(style);
         }
         let start = Instant::now();
-        let end = End { interrupted, window: launcher.window.clone() };
-        Self { bar, steps: launcher.steps, end, start, said: Cell::new(start) }
+        let end = StopRequest { interrupted, window: launcher.window.clone() };
+        Self { bar, steps: launcher.steps, end, start, last_line: Cell::new(start) }
     }
 
     /// True if Ctrl+C was pressed, the window was closed or all steps are done.
-    pub(crate) fn stop(&self, step: u64) -> bool {
-        self.end.has_come() || self.steps.is_some_and(|steps| step >= steps)
+    pub(crate) fn should_stop(&self, step: u64) -> bool {
+        self.end.is_set() || self.steps.is_some_and(|steps| step >= steps)
     }
 
     /// The stop request, for other threads.
-    pub(crate) fn end(&self) -> End {
+    pub(crate) fn stop_request(&self) -> StopRequest {
         self.end.clone()
     }
 
@@ -424,15 +424,15 @@ impl Progress {
     }
 
     /// Prints a line above the bar.
-    pub(crate) fn say(&self, message: &str) {
+    pub(crate) fn print_line(&self, message: &str) {
         // Without a terminal the bar is hidden and would swallow the line.
         if std::io::stderr().is_terminal() { self.bar.suspend(|| println!("{message}")) } else { println!("{message}") }
     }
 
     /// Moves the bar. Without a terminal, prints a progress line every ten seconds.
     pub(crate) fn advance(&self, step: u64) {
-        if self.bar.is_hidden() && self.said.get().elapsed() >= LINE {
-            self.said.set(Instant::now());
+        if self.bar.is_hidden() && self.last_line.get().elapsed() >= LINE_INTERVAL {
+            self.last_line.set(Instant::now());
             let of = self.steps.map_or_else(String::new, |steps| format!(" of {steps}"));
             eprintln!("step {step}{of}, after {} s", self.start.elapsed().as_secs());
         }

@@ -1,28 +1,28 @@
 //! Movements of an arm and a hand: planned by inverse kinematics, played as position targets in all environments.
 
-use super::{Progress, Result, trial};
+use super::{MainLoop, Result, trial};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::robot::kinematics::{IkCfg, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
 
 /// Distance between the inverse-kinematics waypoints of a straight line \[m\].
-const SPACING: f64 = 0.02;
+const WAYPOINT_SPACING: f64 = 0.02;
 /// Largest joint change between two waypoints of a line \[rad\]. A larger one means that the joints leave the line.
-const LEAP: f64 = 0.5;
+const MAX_JOINT_JUMP: f64 = 0.5;
 
 /// Moves one robot in all environments at once, through its drives only: nothing is written into the state.
 #[derive(Debug)]
-pub(crate) struct Motion<'a> {
+pub(crate) struct MotionPlayer<'a> {
     pub(crate) sim: &'a mut SimulationManager,
     robot: RobotId,
-    tip: Tip<'a>,
+    tip: TipFrame<'a>,
     arm: Vec<JointIndex>,
-    progress: &'a Progress,
+    progress: &'a MainLoop,
     step: u64,
-    planned: Vec<bool>,
+    reachable: Vec<bool>,
 }
 
-impl<'a> Motion<'a> {
+impl<'a> MotionPlayer<'a> {
     /// Creates a motion player of the frame `tip`, moved by the joints of the control part `arm`.
     ///
     /// # Errors
@@ -31,11 +31,11 @@ impl<'a> Motion<'a> {
         sim: &'a mut SimulationManager,
         robot: RobotId,
         arm: &str,
-        tip: Tip<'a>,
-        progress: &'a Progress,
+        tip: TipFrame<'a>,
+        progress: &'a MainLoop,
     ) -> Result<Self> {
         let (arm, planned) = (sim.robot(robot).joint_ids(arm)?, vec![true; sim.num_envs()]);
-        Ok(Self { sim, robot, tip, arm, progress, step: 0, planned })
+        Ok(Self { sim, robot, tip, arm, progress, step: 0, reachable: planned })
     }
 
     /// Steps so far.
@@ -45,33 +45,33 @@ impl<'a> Motion<'a> {
 
     /// True for each environment in which every pose so far was reachable.
     pub(crate) fn planned(&self) -> &[bool] {
-        &self.planned
+        &self.reachable
     }
 
     /// Moves to one pose per environment along a joint-space interpolation.
-    pub(crate) fn reach(&mut self, poses: &[Pose], seconds: f64) -> Result {
+    pub(crate) fn move_joint_space(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
         let end = self.solve(poses, &start, f64::INFINITY)?;
         self.play(&self.arm.clone(), &[start, end], seconds, |_| ())
     }
 
     /// Moves to one pose per environment on a straight line, starting at the frame of the current targets.
-    pub(crate) fn line(&mut self, poses: &[Pose], seconds: f64) -> Result {
+    pub(crate) fn move_linear(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
         let from = trial::poses(&self.sim.robot(self.robot).compute_fk(&start, self.tip, None)?);
         let length = from.iter().zip(poses).map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
-        let points = (length.fold(0.0, f64::max) / SPACING).ceil().max(1.0) as usize;
-        let mut way = vec![start];
+        let points = (length.fold(0.0, f64::max) / WAYPOINT_SPACING).ceil().max(1.0) as usize;
+        let mut waypoints = vec![start];
         for k in 1..=points {
-            let part = k as f64 / points as f64;
-            let between: Vec<Pose> = from.iter().zip(poses).map(|(a, b)| a.lerp_slerp(b, part)).collect();
-            way.push(self.solve(&between, &way[k - 1], LEAP)?);
+            let fraction = k as f64 / points as f64;
+            let between: Vec<Pose> = from.iter().zip(poses).map(|(a, b)| a.lerp_slerp(b, fraction)).collect();
+            waypoints.push(self.solve(&between, &waypoints[k - 1], MAX_JOINT_JUMP)?);
         }
-        self.play(&self.arm.clone(), &way, seconds, |_| ())
+        self.play(&self.arm.clone(), &waypoints, seconds, |_| ())
     }
 
     /// Moves joints to positions, the same in every environment.
-    pub(crate) fn joints(&mut self, positions: &[(&str, f64)], seconds: f64) -> Result {
+    pub(crate) fn move_joints(&mut self, positions: &[(&str, f64)], seconds: f64) -> Result {
         let robot = self.sim.robot(self.robot);
         let joints =
             positions.iter().map(|(name, _)| robot.joint_id(name)).collect::<std::result::Result<Vec<_>, _>>()?;
@@ -96,7 +96,7 @@ impl<'a> Motion<'a> {
         let found =
             self.sim.robot(self.robot).compute_ik(poses, self.tip, &IkCfg::default(), Some(near.view()), None)?;
         let mut positions = near.clone();
-        for (env, planned) in self.planned.iter_mut().enumerate() {
+        for (env, planned) in self.reachable.iter_mut().enumerate() {
             let moved = (&found.qpos.row(env) - &near.row(env)).iter().fold(0.0, |most: f64, d| most.max(d.abs()));
             *planned &= found.success[env] && moved <= leap;
             if *planned {
@@ -116,7 +116,7 @@ impl<'a> Motion<'a> {
     ) -> Result {
         let steps = (seconds / self.sim.cfg().physics_dt).round() as u64;
         for k in 1..=steps {
-            if self.progress.stop(self.step) {
+            if self.progress.should_stop(self.step) {
                 return Ok(());
             }
             if let Some(last) = way.len().checked_sub(2) {

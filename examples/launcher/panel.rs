@@ -21,7 +21,7 @@ const SCALE: u32 = 24;
 
 /// The channels of one environment's camera.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Views<'a> {
+pub(crate) struct CameraChannels<'a> {
     /// Width and height \[pixels\].
     pub(crate) size: [usize; 2],
     /// RGBA, four bytes per pixel.
@@ -34,7 +34,7 @@ pub(crate) struct Views<'a> {
     pub(crate) normal: &'a [f32],
 }
 
-impl<'a> Views<'a> {
+impl<'a> CameraChannels<'a> {
     /// The images of a camera in its environment number `row`.
     ///
     /// # Errors
@@ -57,14 +57,14 @@ fn slice<T, D: RemoveAxis>(channel: ArrayView<'_, T, D>, row: usize) -> super::R
 }
 
 /// A 2 x 2 grid of color, depth, mask and normals with titles.
-pub(crate) fn grid(views: &Views<'_>) -> RgbImage {
+pub(crate) fn grid(views: &CameraChannels<'_>) -> RgbImage {
     let size = views.size;
     let range = picture::finite_range(views.depth.iter().copied()).unwrap_or([0.0, 1.0]);
     let pictures = [
-        ("Color", picture::color_picture(size, views.color)),
-        ("Depth", picture::depth_picture(size, views.depth, range)),
-        ("Mask", picture::mask_picture(size, views.mask)),
-        ("Normals", picture::normal_picture(size, views.normal)),
+        ("Color", picture::color_image(size, views.color)),
+        ("Depth", picture::depth_image(size, views.depth, range)),
+        ("Mask", picture::mask_image(size, views.mask)),
+        ("Normals", picture::normal_image(size, views.normal)),
     ];
     let (width, height) = (size[0] as u32, size[1] as u32);
     let cell = [width + 2 * GAP, height + TITLE + SCALE];

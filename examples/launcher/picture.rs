@@ -32,13 +32,13 @@ pub(crate) fn write_png(path: &Path, picture: &RgbImage) -> Result {
 }
 
 /// RGB image of RGBA bytes; the alpha channel is dropped.
-pub(crate) fn color_picture(size: [usize; 2], color: &[u8]) -> RgbImage {
-    picture(size, |k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]])
+pub(crate) fn color_image(size: [usize; 2], color: &[u8]) -> RgbImage {
+    rgb_image(size, |k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]])
 }
 
 /// Two images of the same size, side by side.
 pub(crate) fn side_by_side(size: [usize; 2], colors: [&[u8]; 2]) -> RgbImage {
-    let [left, right] = colors.map(|color| color_picture(size, color));
+    let [left, right] = colors.map(|color| color_image(size, color));
     let second = left.width() + GAP;
     let mut both = RgbImage::from_pixel(second + right.width(), left.height(), Rgb([255; 3]));
     image::imageops::replace(&mut both, &left, 0, 0);
@@ -47,21 +47,21 @@ pub(crate) fn side_by_side(size: [usize; 2], colors: [&[u8]; 2]) -> RgbImage {
 }
 
 /// Depth image, colored over `range` \[m\].
-pub(crate) fn depth_picture(size: [usize; 2], depth: &[f32], range: [f32; 2]) -> RgbImage {
-    picture(size, |k| depth_color(depth[k], range))
+pub(crate) fn depth_image(size: [usize; 2], depth: &[f32], range: [f32; 2]) -> RgbImage {
+    rgb_image(size, |k| depth_color(depth[k], range))
 }
 
 /// Mask image with one color per id.
-pub(crate) fn mask_picture(size: [usize; 2], mask: &[i32]) -> RgbImage {
-    picture(size, |k| mask_color(mask[k]))
+pub(crate) fn mask_image(size: [usize; 2], mask: &[i32]) -> RgbImage {
+    rgb_image(size, |k| mask_color(mask[k]))
 }
 
 /// Normals as colors.
-pub(crate) fn normal_picture(size: [usize; 2], normal: &[f32]) -> RgbImage {
-    picture(size, |k| normal_color([normal[3 * k], normal[3 * k + 1], normal[3 * k + 2]]))
+pub(crate) fn normal_image(size: [usize; 2], normal: &[f32]) -> RgbImage {
+    rgb_image(size, |k| normal_color([normal[3 * k], normal[3 * k + 1], normal[3 * k + 2]]))
 }
 
-fn picture([width, height]: [usize; 2], color: impl Fn(usize) -> [u8; 3]) -> RgbImage {
+fn rgb_image([width, height]: [usize; 2], color: impl Fn(usize) -> [u8; 3]) -> RgbImage {
     RgbImage::from_fn(width as u32, height as u32, |x, y| Rgb(color(y as usize * width + x as usize)))
 }
 

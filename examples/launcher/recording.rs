@@ -11,20 +11,25 @@ use kinetoscope::record::{RecorderCfg, Topic};
 mod recorded {
     use super::*;
     use kinetoscope::record::Format;
-    use kinetoscope::sim::{Moment, Observer};
+    use kinetoscope::sim::{Observer, SimEvent};
     use std::sync::{Arc, Mutex, PoisonError};
     use std::time::{Duration, Instant};
 
     impl Launcher {
         /// The recording of `--record` and of the record button. It goes to the file of `--record`, or without the flag
         /// to `recording.mcap` in the folder of `--out`.
-        pub(in super::super) fn files(&self) -> &Arc<Mutex<FileRecording>> {
+        pub(in super::super) fn recording(&self) -> &Arc<Mutex<FileRecording>> {
             self.files.get_or_init(|| {
                 let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
                 let path = self.record.clone().unwrap_or_else(folder);
                 let (every, rates) = (self.record_every, self.record_rate.clone());
-                let cfg = RecorderCfg { overwrite: self.overwrite, every, rates, ..RecorderCfg::new(path) };
-                let cfg = self.record_view.as_ref().map_or_else(|| cfg.clone(), |view| showing(cfg.clone(), view));
+                let cfg = RecorderCfg {
+                    overwrite: self.overwrite,
+                    period_steps: every,
+                    stream_periods: rates,
+                    ..RecorderCfg::new(path)
+                };
+                let cfg = self.record_view.as_ref().map_or_else(|| cfg.clone(), |view| with_view(cfg.clone(), view));
                 Arc::new(Mutex::new(FileRecording::new(cfg)))
             })
         }
@@ -34,22 +39,26 @@ mod recorded {
         /// # Errors
         /// The file cannot be written, or its format cannot hold any stream of this example.
         pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-            let files = self.files();
+            let files = self.recording();
             if self.record.is_some() {
-                let begun = files.lock().unwrap_or_else(PoisonError::into_inner).begin(sim);
+                let begun = files.lock().unwrap_or_else(PoisonError::into_inner).start(sim);
                 begun.map_err(|error| format!("--record {error}"))?;
-                sim.observers_mut().add(Watch { files: Arc::clone(files), looked: Instant::now(), told: false });
+                sim.observers_mut().add(FailureMonitor {
+                    files: Arc::clone(files),
+                    last_check: Instant::now(),
+                    reported: false,
+                });
             }
             Ok(Recording { files: Arc::clone(files) })
         }
     }
 
     /// `cfg` with the topics that `--record-view` selects.
-    fn showing(cfg: RecorderCfg, view: &str) -> RecorderCfg {
-        let film = Format::of_path(&cfg.path).is_ok_and(Format::is_animation);
-        match (view, film) {
-            ("stage", true) => cfg.with_topics([Topic::Stage]),
-            ("stage", false) => cfg.with_topics([Topic::Everything, Topic::Stage]),
+    fn with_view(cfg: RecorderCfg, view: &str) -> RecorderCfg {
+        let animation = Format::of_path(&cfg.path).is_ok_and(Format::is_animation);
+        match (view, animation) {
+            ("stage", true) => cfg.with_topics([Topic::Overview]),
+            ("stage", false) => cfg.with_topics([Topic::Everything, Topic::Overview]),
             // An unknown camera is an error that lists the cameras of the scene.
             (camera, true) => {
                 RecorderCfg { envs: Some(vec![EnvId(0)]), ..cfg }.with_topics([Topic::channel(camera, "color")])
@@ -59,33 +68,33 @@ mod recorded {
     }
 
     /// Reports a failed recording at once, not only at the end.
-    struct Watch {
+    struct FailureMonitor {
         files: Arc<Mutex<FileRecording>>,
-        looked: Instant,
-        told: bool,
+        last_check: Instant,
+        reported: bool,
     }
 
-    impl Observer for Watch {
+    impl Observer for FailureMonitor {
         fn due_in(&self, _: &SimulationManager) -> u64 {
-            if self.told { u64::MAX } else { LOOK_EVERY }
+            if self.reported { u64::MAX } else { CHECK_INTERVAL }
         }
 
-        fn observe(&mut self, sim: &mut SimulationManager, _: &Moment) {
-            if self.told || self.looked.elapsed() < Duration::from_secs(1) {
+        fn on_event(&mut self, sim: &mut SimulationManager, _: &SimEvent) {
+            if self.reported || self.last_check.elapsed() < Duration::from_secs(1) {
                 return;
             }
-            self.looked = Instant::now();
+            self.last_check = Instant::now();
             // A holder of the lock, such as the record button, reports the same failure itself.
             let failure = self.files.try_lock().ok().and_then(|files| files.failure(sim));
             if let Some(why) = &failure {
                 eprintln!("--record {why}; nothing is recorded any more");
             }
-            self.told = failure.is_some();
+            self.reported = failure.is_some();
         }
     }
 
     /// Steps between two looks at the clock.
-    const LOOK_EVERY: u64 = 10;
+    const CHECK_INTERVAL: u64 = 10;
 
     /// The recording that `--record` or the record button has begun, if any.
     #[derive(Debug)]
@@ -99,7 +108,7 @@ mod recorded {
         /// # Errors
         /// The file could not be written.
         pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
-            let ended = self.files.lock().unwrap_or_else(PoisonError::into_inner).end(sim);
+            let ended = self.files.lock().unwrap_or_else(PoisonError::into_inner).finish(sim);
             for recorded in ended.map_err(|error| format!("--record {error}"))? {
                 println!("Recorded to {recorded}");
             }

@@ -2,12 +2,12 @@
 
 use super::{Result, picture};
 use kinetoscope::prelude::*;
-use kinetoscope::render::ParallelRasterizer;
+use kinetoscope::render::ParallelRenderer;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::Still;
+use kinetoscope::sim::OffscreenScene;
 use std::path::Path;
 
 /// Renders all environments side by side, seen from `eye` toward `target` \[m\], and writes a PNG.
@@ -21,7 +21,7 @@ pub(crate) fn write(
     target: [f64; 3],
     path: &Path,
 ) -> Result {
-    let stage = Still::overview(sim, None, markers)?;
+    let stage = OffscreenScene::overview(sim, None, markers)?;
     let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0])?;
     let (width, height) = (1280, 720);
     let pixels = Intrinsics::Fovy { radians: 45f64.to_radians() }.to_pixels(width, height)?;
@@ -29,9 +29,9 @@ pub(crate) fn write(
     let world_from_camera = PoseF32::from(&pose);
     let view = View { width, height, fx, fy, cx, cy, near: 0.05, far: 500.0, world_from_camera };
     let mut frame = Frame::new(width, height, Channels { color: true, ..Channels::default() });
-    let mut job = [(stage.shot(&view), frame.as_mut())];
+    let mut job = [(stage.render_request(&view), frame.as_mut())];
     let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
-    ParallelRasterizer::new(cfg, sim.threads()).render(&mut job).map_err(|(_, error)| error)?;
+    ParallelRenderer::new(cfg, sim.threads()).render(&mut job).map_err(|(_, error)| error)?;
     let color = frame.color.unwrap_or_default();
-    picture::write_png(path, &picture::color_picture([width, height], &color))
+    picture::write_png(path, &picture::color_image([width, height], &color))
 }

@@ -1,13 +1,13 @@
 //! Live view and recording for the examples that inspect a model.
 
-use super::{Launcher, Progress, Result};
+use super::{Launcher, MainLoop, Result};
 use clap::Parser as _;
 use kinetoscope::prelude::*;
 use std::path::PathBuf;
 
 /// `--serve`, `--record`, `--steps` and `--headless` of examples that inspect a model and take no steps by themselves.
 #[derive(Clone, Debug, clap::Args)]
-pub(crate) struct StillFlags {
+pub(crate) struct LiveViewFlags {
     /// Show the moving model in browsers, in real time, until Ctrl+C; the address defaults to 127.0.0.1:8080
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
@@ -24,12 +24,12 @@ pub(crate) struct StillFlags {
 
 /// The default values of every example's flags.
 #[derive(Debug, clap::Parser)]
-struct Untyped {
+struct DefaultFlags {
     #[command(flatten)]
     launcher: Launcher,
 }
 
-impl StillFlags {
+impl LiveViewFlags {
     /// True if the flags make the model move.
     pub(crate) fn wants_motion(&self) -> bool {
         self.serve.is_some() || self.record.is_some()
@@ -40,14 +40,14 @@ impl StillFlags {
     /// # Errors
     /// The address is invalid or in use, or the file cannot be written.
     pub(crate) fn show(&self, sim: &mut SimulationManager) -> Result {
-        let Untyped { launcher } = Untyped::try_parse_from(["model", "--headless"])?;
+        let DefaultFlags { launcher } = DefaultFlags::try_parse_from(["model", "--headless"])?;
         let (serve, record) = (self.serve.clone(), self.record.clone());
         let launcher = Launcher { serve, record, steps: self.steps, ..launcher };
         launcher.serve(sim)?;
         let recording = launcher.start_recording(sim)?;
-        let progress = Progress::new(&launcher, 1000);
+        let progress = MainLoop::new(&launcher, 1000);
         let mut step = 0;
-        while !progress.stop(step) {
+        while !progress.should_stop(step) {
             sim.update(1);
             step += 1;
             progress.advance(step);

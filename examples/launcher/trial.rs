@@ -45,7 +45,7 @@ pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
 
 /// Results of an example.
 #[derive(Debug)]
-pub(crate) struct Count<'a> {
+pub(crate) struct TrialResults<'a> {
     /// Description of a success, printed after "N of 16".
     pub(crate) what: &'a str,
     /// The deciding setting: its key in the report, and its value in the unit of the key.
@@ -63,8 +63,8 @@ pub(crate) struct Count<'a> {
 ///
 /// # Errors
 /// A file cannot be written.
-pub(crate) fn conclude(launcher: &Launcher, sim: &mut SimulationManager, count: Count<'_>) -> Result<bool> {
-    let Count { what, setting, table, steps, rate, overview } = count;
+pub(crate) fn write_results(launcher: &Launcher, sim: &mut SimulationManager, count: TrialResults<'_>) -> Result<bool> {
+    let TrialResults { what, setting, table, steps, rate, overview } = count;
     let successes = table.iter().filter(|row| row["success"] == true).count();
     let needed = needed(sim.num_envs());
     println!("\n{successes} of {} {what}; {needed} are enough", sim.num_envs());
@@ -99,7 +99,7 @@ pub(crate) fn poses(rows: &Array2<f64>) -> Vec<Pose> {
 }
 
 /// Converts poses to rows `[x, y, z, qw, qx, qy, qz]`.
-pub(crate) fn rows(poses: &[Pose]) -> Array2<f64> {
+pub(crate) fn pose_rows(poses: &[Pose]) -> Array2<f64> {
     Array2::from_shape_fn((poses.len(), 7), |(env, k)| to_row(&poses[env])[k])
 }
 
@@ -110,14 +110,14 @@ pub(crate) fn moved(poses: &[Pose], by: impl Fn(&Pose) -> [f64; 3]) -> Vec<Pose>
 
 /// Images of the first environment, `NAME_1.png` and so on.
 #[derive(Debug)]
-pub(crate) struct Album {
+pub(crate) struct ImageSeries {
     out: Option<PathBuf>,
     name: &'static str,
     camera: SensorId<Camera>,
     taken: usize,
 }
 
-impl Album {
+impl ImageSeries {
     /// Adds a camera that looks from `eye` to `target` \[m\]. Images go to the folder `out`, if given.
     ///
     /// # Errors
@@ -157,6 +157,6 @@ impl Album {
         let color = camera.color()?;
         let color = color.as_slice().ok_or("the picture is not in one piece")?;
         let file = out.join(format!("{}_{}.png", self.name, self.taken));
-        picture::write_png(&file, &picture::color_picture([width, height], color))
+        picture::write_png(&file, &picture::color_image([width, height], color))
     }
 }

@@ -13,14 +13,14 @@ mod shown {
     use super::*;
     use embedded_graphics::mono_font::ascii::FONT_10X20;
     use image::RgbImage;
-    use kinetoscope::viewer::{Canvas, Command, Speed, Viewer, Viewing, Wants};
+    use kinetoscope::viewer::{Canvas, Command, SnapshotRequest, Speed, Viewer, ViewerExt};
     use std::sync::{Arc, OnceLock};
 
     /// The window of an example once it is open.
     #[derive(Clone, Debug, Default)]
-    pub(crate) struct Shown(Arc<OnceLock<Window>>);
+    pub(crate) struct SharedWindow(Arc<OnceLock<Window>>);
 
-    impl Shown {
+    impl SharedWindow {
         /// True if a window was opened and then closed, by the user or by a lost display.
         pub(crate) fn is_closed(&self) -> bool {
             self.0.get().is_some_and(|window| !window.is_open())
@@ -28,21 +28,21 @@ mod shown {
     }
 
     /// Viewer handle that resumes a paused simulation.
-    static KEY: OnceLock<Viewer> = OnceLock::new();
+    static RESUME_HANDLE: OnceLock<Viewer> = OnceLock::new();
 
     /// Makes Ctrl+C end an example even if a window or a browser has paused the simulation.
-    fn keep_key(sim: &mut SimulationManager) {
+    fn install_resume_handle(sim: &mut SimulationManager) {
         // One handle serves window and browser.
-        KEY.get_or_init(|| {
-            sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false })
+        RESUME_HANDLE.get_or_init(|| {
+            sim.viewer(SnapshotRequest { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false })
         });
     }
 
     /// Resumes a paused simulation so that the program can end.
-    pub(crate) fn let_go() {
-        if let Some(key) = KEY.get() {
+    pub(crate) fn release_pause() {
+        if let Some(key) = RESUME_HANDLE.get() {
             key.send(Command::Resume);
-            key.send(Command::SetSpeed(Speed::Free));
+            key.send(Command::SetSpeed(Speed::Unlimited));
         }
     }
 
@@ -105,10 +105,11 @@ mod shown {
         /// The address is invalid or in use.
         pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
             let Some(address) = self.serve_address() else { return Ok(()) };
-            let cfg = ServeCfg { speed: Some(Speed::REAL), recording: self.record_button(), ..ServeCfg::default() };
+            let cfg =
+                ServeCfg { speed: Some(Speed::REAL_TIME), record_button: self.record_button(), ..ServeCfg::default() };
             let served = sim.serve_with(address, cfg).map_err(|error| format!("--serve: {error}"))?;
             println!("Open {} in a browser", served.url());
-            keep_key(sim);
+            install_resume_handle(sim);
             Ok(())
         }
 
@@ -131,11 +132,11 @@ mod shown {
             if self.headless {
                 return;
             }
-            match sim.open_window_with(WindowCfg { recording: self.record_button(), ..WindowCfg::default() }) {
+            match sim.open_window_with(WindowCfg { record_button: self.record_button(), ..WindowCfg::default() }) {
                 Ok(window) => {
                     println!("A window is open, in real time: H in it shows the keys; closing it ends the example.");
                     let _ = self.window.0.set(window);
-                    keep_key(sim);
+                    install_resume_handle(sim);
                 }
                 Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
             }
@@ -144,7 +145,7 @@ mod shown {
         /// The record button of window and browser, in builds that record.
         fn record_button(&self) -> Option<RecordButton> {
             #[cfg(feature = "record")]
-            return Some(RecordButton::shared(std::sync::Arc::clone(self.files())));
+            return Some(RecordButton::shared(std::sync::Arc::clone(self.recording())));
             #[cfg(not(feature = "record"))]
             None
         }
@@ -179,7 +180,7 @@ pub(crate) fn let_go() {}
 pub(crate) struct Shown;
 
 #[cfg(not(feature = "viewer"))]
-impl Shown {
+impl SharedWindow {
     /// Always false: this build has no window.
     pub(crate) fn is_closed(&self) -> bool {
         false

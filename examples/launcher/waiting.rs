@@ -1,20 +1,20 @@
 //! Progress of a long rendering, shown at the terminal.
 
-use super::LINE;
+use super::LINE_INTERVAL;
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::render::RenderProgress;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 /// Interval between two progress updates.
-const LOOK: Duration = Duration::from_millis(100);
+const UPDATE_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Runs `work`, a path tracing job, and meanwhile shows its progress on the terminal. After `limit` the job is
-/// canceled. `look` is called every tenth of a second from another thread and may also cancel the job.
-pub(crate) fn draw<T>(
+/// canceled. `on_update` is called every tenth of a second from another thread and may also cancel the job.
+pub(crate) fn render_with_progress<T>(
     progress: &RenderProgress,
     limit: Option<Duration>,
-    mut look: impl FnMut(&RenderProgress) + Send,
+    mut on_update: impl FnMut(&RenderProgress) + Send,
     work: impl FnOnce() -> T,
 ) -> T {
     let (done, until_done) = channel::<()>();
@@ -24,21 +24,21 @@ pub(crate) fn draw<T>(
             let bar = ProgressBar::new(0);
             let style = ProgressStyle::with_template("{percent:>3} % {wide_bar} {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            let mut said = start;
+            let mut last_line = start;
             // Ends when the work is done, or when its thread has dropped the sender.
-            while until_done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+            while until_done.recv_timeout(UPDATE_INTERVAL) == Err(RecvTimeoutError::Timeout) {
                 if limit.is_some_and(|limit| start.elapsed() > limit) {
                     progress.cancel();
                 }
-                look(progress);
+                on_update(progress);
                 if progress.total() == 0 {
                     continue;
                 }
                 bar.set_length(progress.total());
                 bar.set_position(progress.samples());
                 bar.set_message(message(progress));
-                if bar.is_hidden() && said.elapsed() >= LINE {
-                    said = Instant::now();
+                if bar.is_hidden() && last_line.elapsed() >= LINE_INTERVAL {
+                    last_line = Instant::now();
                     let share = progress.fraction().map_or(0.0, |share| 100.0 * share);
                     eprintln!("{share:.0} % of the paths, {}", message(progress));
                 }

@@ -85,8 +85,8 @@ impl ThreadPool {
         };
         let (items, scratch) = (Mutex::new(items), Mutex::new(scratch.iter_mut()));
         self.run(slots, |_| {
-            let Some(mine) = next(&scratch) else { return };
-            while let Some(item) = next(&items) {
+            let Some(mine) = next_item(&scratch) else { return };
+            while let Some(item) = next_item(&items) {
                 act(mine, item);
             }
         });
@@ -107,7 +107,7 @@ impl fmt::Debug for ThreadPool {
 }
 
 /// Takes the next item. A panic of the iterator surfaces on this thread; the other threads get the remaining items.
-fn next<I: Iterator>(items: &Mutex<I>) -> Option<I::Item> {
+fn next_item<I: Iterator>(items: &Mutex<I>) -> Option<I::Item> {
     items.lock().unwrap_or_else(PoisonError::into_inner).next()
 }
 

@@ -4,14 +4,14 @@
 //! 0.05 ms and a few allocations, several times per image.
 #![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
 
-use crate::patience::Patience;
+use crate::patience::SpinLimit;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 /// Borrowed work with an extended lifetime. Its caller waits until no worker runs it.
-type Lent = &'static (dyn Fn(usize) + Sync);
+type BorrowedWork = &'static (dyn Fn(usize) + Sync);
 
 /// Number of times a waiting caller polls for its last worker before it yields its core.
 const SPINS_BEFORE_YIELD: u32 = 1_000;
@@ -40,8 +40,8 @@ struct Shared {
 #[derive(Default)]
 struct JobState {
     /// True while a job is in flight.
-    taken: bool,
-    work: Option<Lent>,
+    in_flight: bool,
+    work: Option<BorrowedWork>,
     /// Next slot to assign.
     slot: usize,
     /// Number of slots.
@@ -74,27 +74,27 @@ impl Workers {
         assert!(!panicked, "work panicked on another thread of the pool");
     }
 
-    /// Posts a job. Returns `false` if no worker can help. After `true`, the caller must call `finish` before `work`
+    /// Posts a job. Returns `false` if no worker can help. After `true`, the caller must call `finish` before `worker_loop`
     /// ends.
     fn post(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) -> bool {
         // If the operating system refuses a thread, the job runs on the existing ones.
         let _ = self.start(slots - 1);
-        let helpers = self.started().min(slots - 1);
+        let num_workers = self.started().min(slots - 1);
         let mut job = lock(&self.shared.job);
-        if helpers == 0 || job.taken {
+        if num_workers == 0 || job.in_flight {
             return false;
         }
-        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it,
+        // SAFETY: the reference is not used after the borrow ends. It stays in `job.worker_loop` until `finish` removes it,
         // and a worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches
         // `finish` on every path: its own share of the work cannot unwind past it, and nothing in between can panic.
-        let lent = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Lent>(work) };
-        job.taken = true;
-        (job.work, job.slot, job.slots) = (Some(lent), 1, 1 + helpers);
+        let lent = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), BorrowedWork>(work) };
+        job.in_flight = true;
+        (job.work, job.slot, job.slots) = (Some(lent), 1, 1 + num_workers);
         self.shared.epoch.fetch_add(1, Ordering::Release);
         let sleeping = job.sleeping;
         drop(job);
-        if sleeping > helpers {
-            (0..helpers).for_each(|_| self.shared.wake.notify_one());
+        if sleeping > num_workers {
+            (0..num_workers).for_each(|_| self.shared.wake.notify_one());
         } else if sleeping > 0 {
             self.shared.wake.notify_all();
         }
@@ -107,7 +107,7 @@ impl Workers {
         while threads.len() < wanted {
             let shared = Arc::clone(&self.shared);
             let name = format!("kinetoscope-{}", threads.len() + 1);
-            threads.push(std::thread::Builder::new().name(name).spawn(move || shared.work())?);
+            threads.push(std::thread::Builder::new().name(name).spawn(move || shared.worker_loop())?);
         }
         Ok(())
     }
@@ -146,13 +146,13 @@ impl Shared {
             job.caller_sleeps = true;
             job = self.done.wait(job).unwrap_or_else(PoisonError::into_inner);
         }
-        (job.taken, job.caller_sleeps) = (false, false);
+        (job.in_flight, job.caller_sleeps) = (false, false);
         std::mem::take(&mut job.panicked)
     }
 
     /// Runs the loop of a worker thread.
-    fn work(&self) {
-        let mut patience = Patience::LONGEST;
+    fn worker_loop(&self) {
+        let mut patience = SpinLimit::MAX;
         let mut job = lock(&self.job);
         while !job.stop {
             let free = job.slot < job.slots;
@@ -176,7 +176,7 @@ impl Shared {
                 std::hint::spin_loop();
                 self.epoch.load(Ordering::Acquire) != seen
             });
-            patience = patience.after(came);
+            patience = patience.next(came);
             job = lock(&self.job);
             while self.epoch.load(Ordering::Acquire) == seen && !job.stop {
                 job.sleeping += 1;

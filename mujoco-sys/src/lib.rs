@@ -42,9 +42,9 @@ pub mod fields {
         /// MuJoCo's name of the array.
         pub name: &'static str,
         /// Rust name of the element type.
-        pub kind: &'static str,
+        pub element_type: &'static str,
         /// Offset of the array's pointer in `mjModel` \[bytes\].
-        pub pointer: usize,
+        pub pointer_offset: usize,
         /// Size of the array \[bytes\].
         pub bytes: usize,
     }

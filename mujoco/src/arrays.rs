@@ -270,8 +270,8 @@ data_arrays! {
     xanchor: f64, "Anchors of joints \\[m\\], (njnt, 3).";
     xaxis: f64, "Axes of joints, (njnt, 3).";
     cvel: f64, "Spatial velocities about the subtree's centre of mass, (nbody, 6).";
-    cacc: f64, "Spatial accelerations about the subtree's centre of mass, minus gravity, (nbody, 6); see [`Data::solve_accelerations`].";
-    cfrc_int: f64, "Torques and forces that parents exert on bodies, about the subtree's centre of mass, (nbody, 6); see [`Data::solve_accelerations`].";
+    cacc: f64, "Spatial accelerations about the subtree's centre of mass, minus gravity, (nbody, 6); see [`Data::rne_post_constraint`].";
+    cfrc_int: f64, "Torques and forces that parents exert on bodies, about the subtree's centre of mass, (nbody, 6); see [`Data::rne_post_constraint`].";
     subtree_com: f64, "Centres of mass of subtrees \\[m\\], (nbody, 3).";
     light_xpos: f64, "Light positions \\[m\\], (nlight, 3).";
     light_xdir: f64, "Light directions, (nlight, 3).";

@@ -4,25 +4,25 @@ use super::model::Model;
 
 /// A feature of a model element that cannot be written back as MJCF.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Beyond {
+pub struct UnsupportedFeature {
     /// MJCF name of the element.
     pub element: &'static str,
     /// Index of the element among those of its kind.
     pub index: usize,
     /// Name or description of the feature, for error messages.
-    pub what: &'static str,
+    pub feature: &'static str,
 }
 
 impl Model {
     /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
     #[cfg(not(mj4))]
-    pub fn beyond(&self) -> Option<Beyond> {
+    pub fn unsupported_feature(&self) -> Option<UnsupportedFeature> {
         None
     }
 
     /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
     #[cfg(mj4)]
-    pub fn beyond(&self) -> Option<Beyond> {
+    pub fn beyond(&self) -> Option<UnsupportedFeature> {
         use super::arrays::is_set;
         use mujoco_sys::fields::model as fields;
         /// An array of this model.
@@ -35,7 +35,7 @@ impl Model {
         let header = self.header();
         let whole = [("flex", header.nflex, "a shape that deforms"), ("plugin", header.nplugin, "code of its own")];
         if let Some((element, _, what)) = whole.into_iter().find(|(_, count, _)| *count > 0) {
-            return Some(Beyond { element, index: 0, what });
+            return Some(UnsupportedFeature { element, index: 0, what });
         }
         let numbers = [
             ("joint", array!(jnt_stiffnesspoly), self.njnt(), "a stiffness of higher order"),
@@ -56,7 +56,7 @@ impl Model {
         for (element, values, count, what) in numbers {
             // An infinite `springyield` has no effect.
             if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
-                return Some(Beyond { element, index: at / (values.len() / count.max(1)).max(1), what });
+                return Some(UnsupportedFeature { element, index: at / (values.len() / count.max(1)).max(1), what });
             }
         }
         let counts = [
@@ -65,15 +65,15 @@ impl Model {
         ];
         for (element, values, one, what) in counts {
             if let Some(index) = values.iter().position(|n| *n != one) {
-                return Some(Beyond { element, index, what });
+                return Some(UnsupportedFeature { element, index, what });
             }
         }
         // `actdim` is not written back, so an actuator may have one activation at most.
         if let Some(index) = array!(actuator_actnum).iter().position(|n| *n > 1) {
-            return Some(Beyond { element: "actuator", index, what: "several activations" });
+            return Some(UnsupportedFeature { element: "actuator", index, what: "several activations" });
         }
         if let Some(index) = array!(actuator_history).iter().step_by(2).position(|n| *n > 0) {
-            return Some(Beyond { element: "actuator", index, what: "nsample" });
+            return Some(UnsupportedFeature { element: "actuator", index, what: "nsample" });
         }
         let flags = [
             ("joint", array!(jnt_actgravcomp), "actuatorgravcomp"),
@@ -81,7 +81,7 @@ impl Model {
         ];
         for (element, values, what) in flags {
             if let Some(index) = values.iter().position(|flag| is_set(*flag)) {
-                return Some(Beyond { element, index, what });
+                return Some(UnsupportedFeature { element, index, what });
             }
         }
         None
@@ -91,7 +91,7 @@ impl Model {
     ///
     /// # Panics
     /// There is no such sensor.
-    pub fn sensor_beyond(&self, sensor: usize) -> Option<&'static str> {
+    pub fn unsupported_sensor_feature(&self, sensor: usize) -> Option<&'static str> {
         #[cfg(mj4)]
         {
             use mujoco_sys::fields::model as fields;
@@ -187,7 +187,7 @@ impl Model {
     ///
     /// # Panics
     /// There is no such tendon.
-    pub fn tendon_inertia(&self, tendon: usize) -> f64 {
+    pub fn tendon_armature(&self, tendon: usize) -> f64 {
         #[cfg(mj4)]
         {
             // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.

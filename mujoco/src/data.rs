@@ -3,7 +3,7 @@
 use super::error::EngineError;
 use super::guard::guarded;
 use super::model::Model;
-use super::prefetch::Places;
+use super::prefetch::PrefetchAddresses;
 use mujoco_sys as mj;
 use std::ptr::NonNull;
 
@@ -12,7 +12,7 @@ use std::ptr::NonNull;
 pub struct Data {
     raw: NonNull<mj::mjData>,
     model: Model,
-    places: Places,
+    prefetch_addresses: PrefetchAddresses,
 }
 
 // SAFETY: an mjData is plain memory without thread affinity; `Data` is its only owner. It is not `Sync`: engine
@@ -141,8 +141,8 @@ impl Data {
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
         let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
         // SAFETY: just made; no other reference to it exists yet.
-        let places = Places::of(unsafe { raw.as_ref() });
-        Ok(Self { raw, model: model.clone(), places })
+        let places = PrefetchAddresses::new(unsafe { raw.as_ref() });
+        Ok(Self { raw, model: model.clone(), prefetch_addresses: places })
     }
 
     /// The model of this data.
@@ -150,18 +150,18 @@ impl Data {
         &self.model
     }
 
-    pub(super) fn places(&self) -> &Places {
-        &self.places
+    pub(super) fn prefetch_addresses(&self) -> &PrefetchAddresses {
+        &self.prefetch_addresses
     }
 
-    /// Replaces the model by another one of the same sizes: one [edited](super::Editor) from the same compiled model.
+    /// Replaces the model by another one of the same sizes: one [edited](super::ModelEditor) from the same compiled model.
     ///
     /// The next forward pass updates everything that depends on the model.
     ///
     /// # Panics
     /// The model was compiled separately, or its buffers have other sizes.
     pub fn set_model(&mut self, model: Model) {
-        assert!(model.fits(&self.model), "a model of other sizes");
+        assert!(model.is_compatible_with(&self.model), "a model of other sizes");
         self.model = model;
     }
 
@@ -236,7 +236,7 @@ impl Data {
     /// Computes body accelerations and the forces between bodies (`cacc`, `cfrc_int`) with `mj_rnePostConstraint`.
     ///
     /// Accelerations and constraint forces are those of the last solve. `qvel` are the velocities of that solve: those
-    /// before the integration, if the step is complete. Nothing that affects later steps changes. `spare` is scratch
+    /// before the integration, if the step is complete. Nothing that affects later steps changes. `scratch` is scratch
     /// memory for `nv` numbers.
     ///
     /// # Errors
@@ -244,14 +244,14 @@ impl Data {
     ///
     /// # Panics
     /// `qvel` does not have `nv` numbers.
-    pub fn solve_accelerations(&mut self, qvel: &[f64], spare: &mut Vec<f64>) -> Result<(), EngineError> {
-        spare.clear();
-        spare.extend_from_slice(self.qvel());
+    pub fn rne_post_constraint(&mut self, qvel: &[f64], scratch: &mut Vec<f64>) -> Result<(), EngineError> {
+        scratch.clear();
+        scratch.extend_from_slice(self.qvel());
         self.qvel_mut().copy_from_slice(qvel);
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
         let done = guarded(|| unsafe { mj::mj_rnePostConstraint(m, d) });
-        self.qvel_mut().copy_from_slice(spare);
+        self.qvel_mut().copy_from_slice(scratch);
         #[cfg(mj4)]
         {
             // Otherwise MuJoCo's own sensors would reuse these values in the next step.

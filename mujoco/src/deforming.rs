@@ -1,6 +1,6 @@
 //! Elements of a model with changing shape: skins (2.2.2 and 4.x) and flexes (4.x).
 
-use super::look::{chunks, span};
+use super::look::{as_rows, checked_slice};
 use super::model::Model;
 use mujoco_sys::fields::model as fields;
 
@@ -56,8 +56,8 @@ impl<'a> SkinArrays<'a> {
                 body: self.bodies[bone] as usize,
                 position: self.bind_positions[bone],
                 orientation: self.bind_orientations[bone],
-                vertices: span(self.vertices, vertex, vertices),
-                weights: span(self.weights, vertex, vertices),
+                vertices: checked_slice(self.vertices, vertex, vertices),
+                weights: checked_slice(self.weights, vertex, vertices),
             }
         })
     }
@@ -77,7 +77,7 @@ pub struct FlexArrays<'a> {
     /// Radius around the elements \[m\].
     pub radius: f64,
     /// True if triangles are shaded flat.
-    pub flat: bool,
+    pub flat_shading: bool,
     /// Index of the first vertex among the vertices of all flexes.
     pub first_vertex: usize,
     /// Number of vertices.
@@ -118,14 +118,14 @@ impl Model {
             group: array!(self, skin_group)[skin],
             rgba: &array!(self, skin_rgba)[4 * skin..4 * skin + 4],
             inflate: array!(self, skin_inflate)[skin],
-            positions: span(chunks(array!(self, skin_vert)), vertex, vertices),
-            texcoords: span(chunks(array!(self, skin_texcoord)), texcoord, vertices),
-            faces: span(chunks(array!(self, skin_face)), face, faces),
+            positions: checked_slice(as_rows(array!(self, skin_vert)), vertex, vertices),
+            texcoords: checked_slice(as_rows(array!(self, skin_texcoord)), texcoord, vertices),
+            faces: checked_slice(as_rows(array!(self, skin_face)), face, faces),
             bones: [bone, bones].map(|n| usize::try_from(n).unwrap_or(0)),
             first_vertices: array!(self, skin_bonevertadr),
             vertex_counts: array!(self, skin_bonevertnum),
-            bind_positions: chunks(array!(self, skin_bonebindpos)),
-            bind_orientations: chunks(array!(self, skin_bonebindquat)),
+            bind_positions: as_rows(array!(self, skin_bonebindpos)),
+            bind_orientations: as_rows(array!(self, skin_bonebindquat)),
             bodies: array!(self, skin_bonebodyid),
             vertices: array!(self, skin_bonevertid),
             weights: array!(self, skin_bonevertweight),
@@ -145,12 +145,12 @@ impl Model {
 
     /// True if the stiffness or the damping of a tendon has terms of higher order (4.x).
     #[cfg(not(mj4))]
-    pub fn tendon_has_curves(&self, _tendon: usize) -> bool {
+    pub fn tendon_has_nonlinear_terms(&self, _tendon: usize) -> bool {
         false
     }
 
     /// True if gravity is nonzero and enabled.
-    pub fn gravity_acts(&self) -> bool {
+    pub fn has_gravity(&self) -> bool {
         let disabled = self.header().opt.disableflags as u32 & mujoco_sys::mjDSBL_GRAVITY;
         disabled == 0 && self.gravity().iter().map(|g| g * g).sum::<f64>().sqrt() > 1e-15
     }
@@ -169,7 +169,7 @@ impl Model {
         let texcoord = pick(array!(self, flex_texcoordadr));
         let data = (pick(array!(self, flex_elemdataadr)), pick(array!(self, flex_elemnum)) * (dimensions + 1));
         let shell = (pick(array!(self, flex_shelldataadr)), pick(array!(self, flex_shellnum)) * dimensions);
-        let texcoords: &[[f32; 2]] = chunks(array!(self, flex_texcoord));
+        let texcoords: &[[f32; 2]] = as_rows(array!(self, flex_texcoord));
         let begin = usize::try_from(texcoord).ok();
         Some(FlexArrays {
             dimensions: size(dimensions),
@@ -180,11 +180,11 @@ impl Model {
             flat: super::arrays::is_set(array!(self, flex_flatskin)[flex]),
             first_vertex: size(vertex),
             vertices: size(vertices),
-            elements: span(array!(self, flex_elem), data.0, data.1),
-            shell: span(array!(self, flex_shell), shell.0, shell.1),
+            elements: checked_slice(array!(self, flex_elem), data.0, data.1),
+            shell: checked_slice(array!(self, flex_shell), shell.0, shell.1),
             texcoords: begin.and_then(|begin| texcoords.get(begin..)).unwrap_or(&[]),
-            element_texcoords: span(array!(self, flex_elemtexcoord), data.0, data.1),
-            edges: span(chunks(array!(self, flex_edge)), edge, edges),
+            element_texcoords: checked_slice(array!(self, flex_elemtexcoord), data.0, data.1),
+            edges: checked_slice(as_rows(array!(self, flex_edge)), edge, edges),
         })
     }
 
@@ -200,7 +200,7 @@ impl super::Data {
     #[cfg(mj4)]
     pub fn flex_vertices(&self) -> &[[f64; 3]] {
         // SAFETY: model and data are alive as long as `self`; only `&mut self` writes.
-        chunks(unsafe { mujoco_sys::fields::data::flexvert_xpos(self.model().raw(), self.raw()) })
+        as_rows(unsafe { mujoco_sys::fields::data::flexvert_xpos(self.model().raw(), self.raw()) })
     }
 
     /// Vertex positions of all flexes \[m\], shape (nflexvert, 3); empty on 2.2.2.

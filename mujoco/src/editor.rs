@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// Prefixes of arrays of shapes, images and texts. They hold no editable property and may be large, so they are not
 /// compared.
-const NOT_LOOKED_AT: [&str; 12] =
+const UNCOMPARED_PREFIXES: [&str; 12] =
     ["mesh_", "skin_", "hfield_", "tex_", "mat_", "flex", "name", "text_", "numeric_", "tuple_", "key_", "oct_"];
 
 /// An editor of model arrays, on a full copy of a compiled model.
@@ -33,7 +33,7 @@ const NOT_LOOKED_AT: [&str; 12] =
 /// Editor::new(&model).unwrap().body_simple_mut();
 /// ```
 #[derive(Debug)]
-pub struct Editor {
+pub struct ModelEditor {
     base: Model,
     copy: Storage,
     scratch: Scratch,
@@ -56,11 +56,11 @@ impl Drop for Scratch {
 
 macro_rules! edited_arrays {
     ($($visibility:vis $name:ident: $element:ty;)*) => {
-        impl Editor {
+        impl ModelEditor {
             $(
                 #[doc = concat!("MuJoCo's array of the model that is being made, for writing: `", stringify!($name), "`.")]
                 $visibility fn $name(&mut self) -> &mut [$element] {
-                    // SAFETY: the copy is alive, and `Editor`, its only owner, is borrowed mutably.
+                    // SAFETY: the copy is alive, and `ModelEditor`, its only owner, is borrowed mutably.
                     unsafe { fields::$name(self.copy.0.as_ptr()) }
                 }
             )*
@@ -91,7 +91,7 @@ edited_arrays! {
     dof_simplenum_mut: i32;
 }
 
-impl Editor {
+impl ModelEditor {
     /// Creates an editor that starts with the compiled model of `model`.
     ///
     /// # Errors
@@ -107,7 +107,7 @@ impl Editor {
         let data = guarded(|| unsafe { mj::mj_makeData(copy.0.as_ptr()) })?;
         let scratch = Scratch(NonNull::new(data).ok_or_else(no_memory)?);
         let mut fields = Vec::new();
-        let small = |name: &str| !NOT_LOOKED_AT.iter().any(|prefix| name.starts_with(prefix));
+        let small = |name: &str| !UNCOMPARED_PREFIXES.iter().any(|prefix| name.starts_with(prefix));
         let keep = |field: ModelArray| fields.extend((field.bytes > 0 && small(field.name)).then_some(field));
         // SAFETY: the compiled model is alive.
         unsafe { fields::each(model.compiled(), keep) };
@@ -156,10 +156,10 @@ impl Editor {
         // On 4.x, mj_setConst computes this flag.
         self.body_sameframe_mut()[body] = 0;
         let base = self.base.clone();
-        for geom in of_body(base.geom_bodyid(), body) {
+        for geom in indices_of_body(base.geom_bodyid(), body) {
             clear_if_inertial(&mut self.geom_sameframe_mut()[geom]);
         }
-        for site in of_body(base.site_bodyid(), body) {
+        for site in indices_of_body(base.site_bodyid(), body) {
             clear_if_inertial(&mut self.site_sameframe_mut()[site]);
         }
         if is_simple {
@@ -269,11 +269,11 @@ impl Editor {
 
     fn own(&self, field: &ModelArray) -> OwnArray {
         // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
-        OwnArray::of_bytes(*field, unsafe { bytes(self.copy.header(), field) })
+        OwnArray::from_bytes(*field, unsafe { bytes(self.copy.header(), field) })
     }
 }
 
-/// Error of [`Editor::set_center_of_mass`]: the center of mass of a body with a diagonal inertia cannot be moved.
+/// Error of [`ModelEditor::set_center_of_mass`]: the center of mass of a body with a diagonal inertia cannot be moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagonalInertia;
 
@@ -286,7 +286,7 @@ fn clear_if_inertial(sameframe: &mut u8) {
 }
 
 /// Indices of the elements of a body; `bodies` has the body of each element.
-fn of_body(bodies: &[i32], body: usize) -> impl Iterator<Item = usize> + '_ {
+fn indices_of_body(bodies: &[i32], body: usize) -> impl Iterator<Item = usize> + '_ {
     bodies.iter().enumerate().filter(move |(_, of)| **of as usize == body).map(|(index, _)| index)
 }
 
@@ -303,7 +303,7 @@ unsafe fn bytes<'m>(model: &'m mj::mjModel, field: &ModelArray) -> &'m [u8] {
 /// Sets the pointer of an array in a model header.
 pub(super) fn set_pointer(header: &mut mj::mjModel, field: &ModelArray, array: *const u8) {
     // SAFETY: the offset is that of a pointer inside of the struct.
-    let pointer = unsafe { std::ptr::from_mut(header).byte_add(field.pointer) };
+    let pointer = unsafe { std::ptr::from_mut(header).byte_add(field.pointer_offset) };
     // SAFETY: a pointer stands there, and the struct is borrowed mutably.
     unsafe { pointer.cast::<*const u8>().write(array) };
 }
@@ -363,7 +363,7 @@ mod tests {
             let numbers = |bytes: &[u8]| -> Vec<f64> {
                 bytes.as_chunks::<8>().0.iter().map(|number| f64::from_ne_bytes(*number)).collect()
             };
-            let equal = if matches!(field.kind, "mjtNum" | "f64") {
+            let equal = if matches!(field.element_type, "mjtNum" | "f64") {
                 // Sums of some dozen products of numbers up to 100.
                 numbers(left).iter().zip(numbers(right)).all(|(x, y)| (x - y).abs() <= 1e-12 * (1.0 + x.abs()))
             } else {
@@ -392,7 +392,7 @@ mod tests {
         let fresh = text([1.7, 0.9, 3.1], com, moments, 0.07).replace(r#"<freejoint/><geom size="0.1"/>"#, heavy);
         let fresh = compile(&fresh);
         assert!(differences(&model, &fresh).len() > 6, "{:?}", differences(&model, &fresh));
-        let mut editor = Editor::new(&model).expect("small");
+        let mut editor = ModelEditor::new(&model).expect("small");
         editor.body_mass_mut()[1..4].copy_from_slice(&[1.7, 0.9, 3.1]);
         editor.body_inertia_mut()[6..9].copy_from_slice(&moments);
         assert!(editor.body_simple_mut()[4] != 0 && editor.body_mass_mut()[4] != 2.5);
@@ -433,7 +433,7 @@ mod tests {
         let model = shapes(["0.1", "0.1 0.2", "0.1 0.2 0.3", "0.1 0.2", "0.1 0.2 0.3"], "0 5 0");
         let fresh = shapes(["0.11", "0.12 0.22", "0.13 0.35 0.32", "0.14 0.21", "0.2 0.1 0.35"], "0 4 1");
         assert!(!differences(&model, &fresh).is_empty());
-        let mut editor = Editor::new(&model).expect("small");
+        let mut editor = ModelEditor::new(&model).expect("small");
         let sizes = [[0.11, 0., 0.], [0.12, 0.22, 0.], [0.13, 0.35, 0.32], [0.14, 0.21, 0.], [0.2, 0.1, 0.35]];
         sizes.into_iter().enumerate().for_each(|(geom, size)| editor.set_geom_size(geom, size));
         editor.body_pos_mut()[6..9].copy_from_slice(&[0.0, 4.0, 1.0]);
@@ -446,7 +446,7 @@ mod tests {
     #[test]
     fn diagonal_inertia() {
         let model = base();
-        let mut editor = Editor::new(&model).expect("small");
+        let mut editor = ModelEditor::new(&model).expect("small");
         let with_com = |com: &str| {
             let inertial = format!(r#"<inertial pos="{com}" mass="4.1887902" diaginertia="0.0167 0.0167 0.0167"/>"#);
             let free = format!(r#"<freejoint/>{inertial}<geom size="0.1"/>"#);
@@ -458,7 +458,7 @@ mod tests {
             #[cfg(mj4)]
             assert_ne!(centred.header().nC, shifted.header().nC, "there is no room for it");
         } else {
-            let mut editor = Editor::new(&centred).expect("small");
+            let mut editor = ModelEditor::new(&centred).expect("small");
             editor.set_center_of_mass(4, [0.03, 0.0, 0.01]).expect("room");
             editor.set_constants().expect("fits");
             assert_eq!(differences(&editor.model(&centred), &shifted), Vec::<String>::new());
@@ -468,20 +468,20 @@ mod tests {
     #[test]
     fn sharing() {
         let model = base();
-        let mut editor = Editor::new(&model).expect("small");
+        let mut editor = ModelEditor::new(&model).expect("small");
         editor.geom_friction_mut()[3] = 0.4;
         editor.set_gravity([0.0, 0.0, -1.6]);
         let edited = editor.model(&model);
-        assert_eq!(edited.arrays_apart(&model), ["geom_friction"]);
+        assert_eq!(edited.unshared_arrays(&model), ["geom_friction"]);
         assert_eq!(edited.own_arrays().collect::<Vec<_>>(), [("geom_friction", 8 * 3 * model.ngeom())]);
         assert_eq!((edited.gravity(), model.gravity()), ([0.0, 0.0, -1.6], [0.0, 0.0, -9.81]));
         assert_eq!((edited.geom_friction()[3], model.geom_friction()[3]), (0.4, 1.0));
         // With other buffer sizes, and after the editor and its first model are dropped.
         let buffers = mj::Buffers { contacts: 9, constraints: 70, arena_bytes: 1 << 20 };
         let larger = edited.with_buffers(buffers);
-        assert!(larger.arrays_apart(&edited).is_empty());
+        assert!(larger.unshared_arrays(&edited).is_empty());
         let again = editor.model(&larger);
-        assert!(again.fits(&larger) && !again.fits(&edited));
+        assert!(again.is_compatible_with(&larger) && !again.is_compatible_with(&edited));
         drop((editor, model, edited));
         let mut data = Data::new(&larger).expect("small");
         (0..100).for_each(|_| data.step().expect("steps"));
@@ -492,7 +492,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "another scene")]
     fn another_scene() {
-        let _ = Editor::new(&base()).expect("small").model(&base());
+        let _ = ModelEditor::new(&base()).expect("small").model(&base());
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Errors of MuJoCo.
 
-use super::newer::Unknown;
-use super::version::{TARGET, Target, version_string};
-use kinetoscope_scene::source::Source;
+use super::newer::UnknownKeyword;
+use super::version::{BUILD_VERSION, SupportedVersion, version_string};
+use kinetoscope_scene::source::SourceLocation;
 
 /// Error of an engine call (`mju_error`). The data of the call must be reset or dropped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -28,7 +28,7 @@ pub struct CompileError {
     /// Line of the MJCF that MuJoCo names, counted from 1.
     pub line: Option<u32>,
     /// Origin of that line: the element of the user's file.
-    pub source_line: Option<Source>,
+    pub source_location: Option<SourceLocation>,
 }
 
 impl CompileError {
@@ -37,24 +37,28 @@ impl CompileError {
         let lines =
             message.lines().map(|line| line.trim().trim_end_matches(';').trim()).filter(|line| !line.is_empty());
         let lines: Vec<&str> = lines.collect();
-        Self { line: line_named_in(message), message: lines.join("; ") + &newer(message), source_line: None }
+        Self {
+            line: parse_line_number(message),
+            message: lines.join("; ") + &newer_version_hint(message),
+            source_location: None,
+        }
     }
 
     /// Returns the error with the position in `file` of the name that MuJoCo does not support, unless MuJoCo itself
     /// names a line of `file`.
-    pub(crate) fn placed_in(self, file: &std::path::Path) -> Self {
+    pub(crate) fn with_location_in(self, file: &std::path::Path) -> Self {
         // MuJoCo does not say whether a line belongs to the file itself or to an included file.
         if self.line.is_some() && !includes(file) {
             return self;
         }
-        let source_line = Unknown::of_message(&self.message).and_then(|unknown| unknown.find_in(file));
-        Self { source_line: source_line.or(self.source_line.clone()), ..self }
+        let source_line = UnknownKeyword::from_message(&self.message).and_then(|unknown| unknown.find_in(file));
+        Self { source_location: source_line.or(self.source_location.clone()), ..self }
     }
 }
 
 impl std::fmt::Display for CompileError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some(source) = &self.source_line {
+        if let Some(source) = &self.source_location {
             write!(f, "{source}: ")?;
         }
         write!(f, "MuJoCo refuses the model: {}", self.message)
@@ -66,13 +70,13 @@ fn includes(file: &std::path::Path) -> bool {
 }
 
 /// Hint for a name that 2.2.2 does not support: a newer MuJoCo may support it.
-fn newer(message: &str) -> String {
-    if TARGET != Target::V2 {
+fn newer_version_hint(message: &str) -> String {
+    if BUILD_VERSION != SupportedVersion::V2 {
         return String::new();
     }
-    let Some(unknown) = Unknown::of_message(message) else { return String::new() };
+    let Some(unknown) = UnknownKeyword::from_message(message) else { return String::new() };
     let version = version_string();
-    match unknown.since() {
+    match unknown.introduced_in() {
         Some(since) => format!(
             ". MuJoCo {since} was the first that knows it; this program was built for {version}: build it with MUJOCO_DIR set \
              to the folder of MuJoCo 4"
@@ -86,7 +90,7 @@ fn newer(message: &str) -> String {
 
 /// Line number in a message. MuJoCo writes `line 12` or `line = 12` (2.2.2 and 4.x, reader and compiler). For text that
 /// is not XML, the parser writes `Line number=12`.
-fn line_named_in(message: &str) -> Option<u32> {
+fn parse_line_number(message: &str) -> Option<u32> {
     let number_after = |word: &str| {
         let after = &message[message.rfind(word)? + word.len()..];
         let after = after.trim_start_matches([' ', '=', ':']);
@@ -103,14 +107,14 @@ mod tests {
 
     #[test]
     fn lines() {
-        assert_eq!(line_named_in("XML Error: bad\nElement 'geom', line 7\n"), Some(7));
-        assert_eq!(line_named_in("Error: mass\nObject name = a, id = 1, line = 12, column = 4"), Some(12));
+        assert_eq!(parse_line_number("XML Error: bad\nElement 'geom', line 7\n"), Some(7));
+        assert_eq!(parse_line_number("Error: mass\nObject name = a, id = 1, line = 12, column = 4"), Some(12));
         let broken = "XML parse error 6:\nError=XML_ERROR_PARSING_ELEMENT ErrorID=6 (0x6) Line number=12\n";
-        assert_eq!(line_named_in(broken), Some(12));
+        assert_eq!(parse_line_number(broken), Some(12));
         let mismatched = "Error=XML_ERROR_MISMATCHED_ELEMENT ErrorID=14 (0xe) Line number=3: XMLElement name=outline";
-        assert_eq!(line_named_in(mismatched), Some(3));
-        assert_eq!(line_named_in("Error: something else"), None);
-        assert_eq!(line_named_in("Element 'joint', line 0\n"), None);
+        assert_eq!(parse_line_number(mismatched), Some(3));
+        assert_eq!(parse_line_number("Error: something else"), None);
+        assert_eq!(parse_line_number("Element 'joint', line 0\n"), None);
     }
 
     /// Regression test: messages of 2.2.2 were shown as `...'actuatorfrcrange'; ; Element 'joint', line 77`.

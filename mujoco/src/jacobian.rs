@@ -12,7 +12,7 @@ impl Data {
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
-    pub fn place(&mut self) -> Result<(), EngineError> {
+    pub fn kinematics(&mut self) -> Result<(), EngineError> {
         let (model, data) = (self.model().raw(), self.raw_mut());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
         guarded(|| unsafe { mj::mj_kinematics(model, data) })?;
@@ -24,7 +24,7 @@ impl Data {
     ///
     /// `point` is in the world frame \[m\]. `linear` receives the velocity of the point, and `angular` the angular
     /// velocity, in world axes and per unit of each generalized velocity. Poses are those of the last forward pass or
-    /// of [`place`](Self::place).
+    /// of [`kinematics`](Self::kinematics).
     ///
     /// # Errors
     /// MuJoCo's engine stopped.

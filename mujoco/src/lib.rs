@@ -17,7 +17,7 @@
 //! | `model`, `arrays`, `control`, `options`, `name`, `weld`, `raw` | [`Model`]: sizes, arrays, options, names |
 //! | `look`, `deforming` | meshes, textures, materials, lights, skins and flexes |
 //! | `data`, `state`, `ray`, `jacobian`, `prefetch` | [`Data`]: state, steps, contacts, rays, Jacobians |
-//! | `editor` | [`Editor`]: models that share most arrays with a compiled model |
+//! | `editor` | [`ModelEditor`]: models that share most arrays with a compiled model |
 //! | `beyond`, `newer`, [`words`] | features by version, and MJCF keywords |
 //! | `version`, `guard`, `error`, `memory` | version check, error handler, error types, allocator |
 //!
@@ -60,22 +60,22 @@ mod vfs;
 mod weld;
 pub mod words;
 
-pub use beyond::Beyond;
+pub use beyond::UnsupportedFeature;
 pub use data::{Data, Overflow, Warning, WarningCounts};
 pub use deforming::{Bone, FlexArrays, SkinArrays};
-pub use editor::{DiagonalInertia, Editor};
+pub use editor::{DiagonalInertia, ModelEditor};
 pub use error::{CompileError, EngineError};
 pub use look::{
     HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,
 };
-pub use memory::release_freed;
+pub use memory::trim_heap;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use options::OptionDifference;
 pub use prefetch::prefetch;
 pub use ray::RayHit;
-pub use state::{Inputs, Motion, RawQuats};
-pub use version::{TARGET, Target, VersionError, check_version, version_string};
+pub use state::{IntegrationState, UnnormalizedQuats, UserInputs};
+pub use version::{BUILD_VERSION, SupportedVersion, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
 pub use weld::Weld;
 

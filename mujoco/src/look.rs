@@ -147,12 +147,12 @@ macro_rules! array {
 }
 
 /// Splits an array into chunks of `N` numbers. Lengths of model arrays are multiples of `N`.
-pub(super) fn chunks<T, const N: usize>(values: &[T]) -> &[[T; N]] {
+pub(super) fn as_rows<T, const N: usize>(values: &[T]) -> &[[T; N]] {
     values.as_chunks().0
 }
 
 /// `count` elements from index `first`, both as MuJoCo gives them; empty if the range is invalid.
-pub(super) fn span<T>(values: &[T], first: i64, count: i64) -> &[T] {
+pub(super) fn checked_slice<T>(values: &[T], first: i64, count: i64) -> &[T] {
     let (Ok(first), Ok(count)) = (usize::try_from(first), usize::try_from(count)) else { return &[] };
     first.checked_add(count).and_then(|end| values.get(first..end)).unwrap_or(&[])
 }
@@ -164,8 +164,8 @@ impl Model {
     /// There is no such body.
     pub fn is_fixed(&self, body: usize) -> bool {
         // MuJoCo counts mocap bodies and their descendants as welded to the world.
-        let by_hand = |body: usize| self.body_mocapid()[self.body_rootid()[body] as usize] >= 0;
-        self.body_weldid()[body] == 0 && !by_hand(body)
+        let is_mocap = |body: usize| self.body_mocapid()[self.body_rootid()[body] as usize] >= 0;
+        self.body_weldid()[body] == 0 && !is_mocap(body)
     }
 
     /// Number of height fields.
@@ -199,7 +199,7 @@ impl Model {
     }
 
     /// Distances of the near and far clipping planes \[m\].
-    pub fn clip(&self) -> [f64; 2] {
+    pub fn clip_distances(&self) -> [f64; 2] {
         let (map, extent) = (&self.header().vis.map, self.extent());
         [f64::from(map.znear) * extent, f64::from(map.zfar) * extent]
     }
@@ -238,25 +238,25 @@ impl Model {
         let (vertex, vertices) = (pick(array!(self, mesh_vertadr)), pick(array!(self, mesh_vertnum)));
         let (face, faces) = (pick(array!(self, mesh_faceadr)), pick(array!(self, mesh_facenum)));
         let texcoord = pick(array!(self, mesh_texcoordadr));
-        let positions = span(chunks(array!(self, mesh_vert)), vertex, vertices);
-        let triangles = span(chunks(array!(self, mesh_face)), face, faces);
+        let positions = checked_slice(as_rows(array!(self, mesh_vert)), vertex, vertices);
+        let triangles = checked_slice(as_rows(array!(self, mesh_face)), face, faces);
         #[cfg(mj4)]
         let (normals, face_normals, texcoords, face_texcoords) = {
             let (normal, normals) = (pick(array!(self, mesh_normaladr)), pick(array!(self, mesh_normalnum)));
             let count = pick(array!(self, mesh_texcoordnum));
             (
-                span(chunks(array!(self, mesh_normal)), normal, normals),
-                span(chunks(array!(self, mesh_facenormal)), face, faces),
-                span(chunks(array!(self, mesh_texcoord)), texcoord, count),
-                span(chunks(array!(self, mesh_facetexcoord)), face, faces),
+                checked_slice(as_rows(array!(self, mesh_normal)), normal, normals),
+                checked_slice(as_rows(array!(self, mesh_facenormal)), face, faces),
+                checked_slice(as_rows(array!(self, mesh_texcoord)), texcoord, count),
+                checked_slice(as_rows(array!(self, mesh_facetexcoord)), face, faces),
             )
         };
         // 2.2.2 splits vertices instead: one index for all three arrays.
         #[cfg(not(mj4))]
         let (normals, face_normals, texcoords, face_texcoords) = (
-            span(chunks(array!(self, mesh_normal)), vertex, vertices),
+            checked_slice(as_rows(array!(self, mesh_normal)), vertex, vertices),
             triangles,
-            span(chunks(array!(self, mesh_texcoord)), texcoord, vertices),
+            checked_slice(as_rows(array!(self, mesh_texcoord)), texcoord, vertices),
             triangles,
         );
         let texcoords = (texcoord >= 0 && !texcoords.is_empty()).then_some(texcoords);
@@ -271,10 +271,10 @@ impl Model {
         let [rows, columns] = [array!(self, hfield_nrow)[field], array!(self, hfield_ncol)[field]];
         let count = i64::from(rows) * i64::from(columns);
         HeightFieldArrays {
-            size: chunks(array!(self, hfield_size))[field],
+            size: as_rows(array!(self, hfield_size))[field],
             rows: rows as usize,
             columns: columns as usize,
-            elevation: span(array!(self, hfield_data), i64::from(array!(self, hfield_adr)[field]), count),
+            elevation: checked_slice(array!(self, hfield_data), i64::from(array!(self, hfield_adr)[field]), count),
         }
     }
 
@@ -294,7 +294,7 @@ impl Model {
         #[cfg(not(mj4))]
         let (channels, pixels, address) = (3, array!(self, tex_rgb), i64::from(array!(self, tex_adr)[texture]));
         let [width, height] = [array!(self, tex_width)[texture], array!(self, tex_height)[texture]].map(i64::from);
-        let pixels = span(pixels, address, width * height * channels);
+        let pixels = checked_slice(pixels, address, width * height * channels);
         let size = |n: i64| usize::try_from(n).unwrap_or(0);
         (!pixels.is_empty()).then_some(TextureArrays {
             kind,
@@ -326,9 +326,9 @@ impl Model {
         // MuJoCo marks values that are not set with -1.
         let unless_negative = |x: f32| (x >= 0.0).then_some(x);
         MaterialValues {
-            rgba: chunks(array!(self, mat_rgba))[material],
+            rgba: as_rows(array!(self, mat_rgba))[material],
             texture: texture.and_then(|t| usize::try_from(t).ok()),
-            tex_repeat: chunks(array!(self, mat_texrepeat))[material],
+            tex_repeat: as_rows(array!(self, mat_texrepeat))[material],
             tex_uniform: is_set(array!(self, mat_texuniform)[material]),
             emission: array!(self, mat_emission)[material],
             specular: array!(self, mat_specular)[material],
@@ -363,12 +363,12 @@ impl Model {
             radius,
             active: is_set(array!(self, light_active)[light]),
             cast_shadow: is_set(array!(self, light_castshadow)[light]),
-            attenuation: chunks(array!(self, light_attenuation))[light],
+            attenuation: as_rows(array!(self, light_attenuation))[light],
             cutoff_deg: array!(self, light_cutoff)[light],
             exponent: array!(self, light_exponent)[light],
-            ambient: chunks(array!(self, light_ambient))[light],
-            diffuse: chunks(array!(self, light_diffuse))[light],
-            specular: chunks(array!(self, light_specular))[light],
+            ambient: as_rows(array!(self, light_ambient))[light],
+            diffuse: as_rows(array!(self, light_diffuse))[light],
+            specular: as_rows(array!(self, light_specular))[light],
         }
     }
 }

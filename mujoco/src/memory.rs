@@ -4,7 +4,7 @@
 ///
 /// When a model is compiled again, all new environments are made before the old ones are dropped. The allocator would
 /// keep the pages of the old ones, up to a third of the memory of the new ones.
-pub fn release_freed() {
+pub fn trim_heap() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
         unsafe extern "C" {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 
-// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `Editor`, which
+// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `ModelEditor`, which
 // is its only owner then.
 unsafe impl Send for Storage {}
 // SAFETY: once shared in a `Model`, nothing writes to it.
@@ -59,7 +59,7 @@ impl Compiled {
         // SAFETY: a bitwise copy of the struct: its pointers lead into `storage`, which outlives it, and the copy is
         // never freed as a model (mjModel has no destructor of its own).
         let header = unsafe { std::ptr::read(self.0.0.as_ptr()) };
-        Model(Arc::new(Header { header, storage: Arc::new(self.0), own: Arc::default() }))
+        Model(Arc::new(ShallowModel { header, storage: Arc::new(self.0), own: Arc::default() }))
     }
 }
 
@@ -68,7 +68,7 @@ impl Compiled {
 ///
 /// It is not one allocation. Functions that need one (`mj_copyModel`, `mj_saveModel`, `mj_deleteModel`) must not
 /// receive it. Functions that step or read follow its pointers and may.
-pub(super) struct Header {
+pub(super) struct ShallowModel {
     header: mj::mjModel,
     storage: Arc<Storage>,
     own: Arc<[OwnArray]>,
@@ -84,7 +84,7 @@ pub(super) struct OwnArray {
 
 impl OwnArray {
     /// Creates an array from `field.bytes` bytes.
-    pub(super) fn of_bytes(field: ModelArray, values: &[u8]) -> Self {
+    pub(super) fn from_bytes(field: ModelArray, values: &[u8]) -> Self {
         let mut memory = vec![0_u64; field.bytes.div_ceil(8)];
         for (word, chunk) in memory.iter_mut().zip(values.chunks(8)) {
             let mut whole = [0; 8];
@@ -95,28 +95,28 @@ impl OwnArray {
     }
 }
 
-impl std::fmt::Debug for Header {
+impl std::fmt::Debug for ShallowModel {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("mjModel").field("nq", &self.header.nq).field("nv", &self.header.nv).finish_non_exhaustive()
     }
 }
 
-// SAFETY: the pointers in `header` lead into `storage` and `own`, which are Send + Sync; nothing writes through them.
-unsafe impl Send for Header {}
+// SAFETY: the pointers in `header` lead into `storage` and `own_array_list`, which are Send + Sync; nothing writes through them.
+unsafe impl Send for ShallowModel {}
 // SAFETY: as above.
-unsafe impl Sync for Header {}
+unsafe impl Sync for ShallowModel {}
 
 /// Pointer to an array of a model; null for an empty array. `field` is one of `fields::model::each`.
 pub(super) fn array_pointer(model: &mj::mjModel, field: &ModelArray) -> *const u8 {
     // SAFETY: the offset is that of a pointer inside of the struct.
-    let pointer = unsafe { std::ptr::from_ref(model).byte_add(field.pointer) };
+    let pointer = unsafe { std::ptr::from_ref(model).byte_add(field.pointer_offset) };
     // SAFETY: the struct has a pointer at this offset; the pointer is read and not followed.
     unsafe { pointer.cast::<*const u8>().read() }
 }
 
 /// An immutable model, cheap to clone, shared by all environments and threads.
 #[derive(Clone, Debug)]
-pub struct Model(Arc<Header>);
+pub struct Model(Arc<ShallowModel>);
 
 /// Buffer sizes of a [`Data`](super::Data) for contacts and constraints.
 ///
@@ -157,7 +157,7 @@ impl Model {
     }
 
     /// True if both are the same model, including its buffer sizes.
-    pub fn is(&self, other: &Self) -> bool {
+    pub fn ptr_eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
@@ -167,7 +167,7 @@ impl Model {
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
         let mut header = self.copy_header();
         set_buffers(&mut header, buffers);
-        Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
+        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
     }
 
     /// Copies the struct alone. Its pointers lead into memory that `self` keeps alive.
@@ -179,14 +179,14 @@ impl Model {
     /// Returns the same model with a changed struct and its own arrays.
     ///
     /// # Safety
-    /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own`, where
+    /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own_array_list`, where
     /// it has the size of its field.
     pub(super) unsafe fn with_arrays(&self, header: mj::mjModel, own: Arc<[OwnArray]>) -> Self {
-        Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own }))
+        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own }))
     }
 
     /// Arrays that this model does not share with the compiled model.
-    pub(super) fn own(&self) -> &[OwnArray] {
+    pub(super) fn own_array_list(&self) -> &[OwnArray] {
         &self.0.own
     }
 
@@ -197,7 +197,7 @@ impl Model {
 
     /// True if data of one model can be used with the other: both come from one compiled model, with equal buffer
     /// sizes.
-    pub(super) fn fits(&self, other: &Self) -> bool {
+    pub(super) fn is_compatible_with(&self, other: &Self) -> bool {
         let sizes = |m: &mj::mjModel| {
             #[cfg(mj4)]
             let stack = m.narena;
@@ -218,7 +218,7 @@ impl Model {
     /// Models that differ only in buffer sizes share these arrays.
     pub fn own_bytes(&self) -> usize {
         let array = |array: &OwnArray| size_of::<OwnArray>() + size_of_val(&*array.memory);
-        size_of::<Header>() + self.0.own.iter().map(array).sum::<usize>()
+        size_of::<ShallowModel>() + self.0.own.iter().map(array).sum::<usize>()
     }
 
     /// Memory of the arrays that models share \[bytes\].
@@ -227,7 +227,7 @@ impl Model {
     }
 
     /// Names of the arrays that are stored in different memory in the two models.
-    pub fn arrays_apart(&self, other: &Self) -> Vec<&'static str> {
+    pub fn unshared_arrays(&self, other: &Self) -> Vec<&'static str> {
         let (mine, theirs) = (self.array_pointers(), other.array_pointers());
         mine.iter().zip(&theirs).filter(|(mine, theirs)| mine.1 != theirs.1).map(|(mine, _)| mine.0).collect()
     }

@@ -1,22 +1,22 @@
 //! MJCF names that an old MuJoCo rejects: the version that introduced them, and their position in a file.
 
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::path::{Path, PathBuf};
 
 /// A name that the schema of a MuJoCo version does not contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Unknown<'m> {
+pub(super) struct UnknownKeyword<'m> {
     /// Name of the element.
     pub(super) element: &'m str,
     /// Attribute of the element, or the value of an attribute; `None` if the element itself is unknown.
-    pub(super) word: Option<&'m str>,
-    /// True if `word` is a value.
+    pub(super) keyword: Option<&'m str>,
+    /// True if `keyword` is a value.
     is_value: bool,
 }
 
 /// Elements, attributes and values that 2.2.2 does not have: element (`*` for any), attribute or value, first version.
 /// Source: MuJoCo's changelog.
-const SINCE: &[(&str, &str, &str)] = &[
+const INTRODUCED_IN: &[(&str, &str, &str)] = &[
     ("*", "gravcomp", "2.3.1"),
     ("*", "actuatorfrcrange", "2.3.7"),
     ("*", "actuatorfrclimited", "2.3.7"),
@@ -92,36 +92,36 @@ const SINCE: &[(&str, &str, &str)] = &[
     ("dcmotor", "", "3.7.0"),
 ];
 
-impl<'m> Unknown<'m> {
+impl<'m> UnknownKeyword<'m> {
     /// Parses the unknown name in a message of MuJoCo's XML reader.
-    pub(super) fn of_message(message: &'m str) -> Option<Self> {
+    pub(super) fn from_message(message: &'m str) -> Option<Self> {
         let quoted = |text: &'m str| text.split('\'').nth(1);
         let element = quoted(&message[message.find("Element '")?..])?;
         let after = |words: &str| message.find(words).and_then(|at| quoted(&message[at..]));
         if let Some(word) = after("unrecognized attribute") {
-            return Some(Self { element, word: Some(word), is_value: false });
+            return Some(Self { element, keyword: Some(word), is_value: false });
         }
         if let Some(word) = after("invalid keyword") {
-            return Some(Self { element, word: Some(word), is_value: true });
+            return Some(Self { element, keyword: Some(word), is_value: true });
         }
-        message.contains("unrecognized element").then_some(Self { element, word: None, is_value: false })
+        message.contains("unrecognized element").then_some(Self { element, keyword: None, is_value: false })
     }
 
     /// First MuJoCo version with this name, if it is known and later than 2.2.2.
-    pub(super) fn since(&self) -> Option<&'static str> {
-        let word = self.word.unwrap_or_default();
+    pub(super) fn introduced_in(&self) -> Option<&'static str> {
+        let word = self.keyword.unwrap_or_default();
         let is_it = |(element, known, _): &&(&str, &str, &str)| {
             *known == word && (*element == self.element || *element == "*" && !word.is_empty())
         };
-        SINCE.iter().find(is_it).map(|(.., since)| *since)
+        INTRODUCED_IN.iter().find(is_it).map(|(.., since)| *since)
     }
 
     /// First position of this name in a file and the files that it includes.
-    pub(super) fn find_in(&self, file: &Path) -> Option<Source> {
+    pub(super) fn find_in(&self, file: &Path) -> Option<SourceLocation> {
         self.search(file, file.parent().unwrap_or(Path::new("")), &mut Vec::new())
     }
 
-    fn search(&self, file: &Path, folder: &Path, seen: &mut Vec<PathBuf>) -> Option<Source> {
+    fn search(&self, file: &Path, folder: &Path, seen: &mut Vec<PathBuf>) -> Option<SourceLocation> {
         if seen.iter().any(|known| known == file) {
             return None;
         }
@@ -129,14 +129,14 @@ impl<'m> Unknown<'m> {
         let text = std::fs::read_to_string(file).ok()?;
         let document = roxmltree::Document::parse(&text).ok()?;
         for node in document.descendants().filter(roxmltree::Node::is_element) {
-            let has_word = || match self.word {
+            let has_word = || match self.keyword {
                 None => true,
                 Some(word) if self.is_value => node.attributes().any(|attribute| attribute.value() == word),
                 Some(word) => node.has_attribute(word),
             };
             if node.has_tag_name(self.element) && has_word() {
                 let line = document.text_pos_at(node.range().start).row;
-                return Some(Source::new(file, line));
+                return Some(SourceLocation::new(file, line));
             }
             if let Some(included) = node.attribute("file").filter(|_| node.has_tag_name("include"))
                 && let Some(found) = self.search(&folder.join(included), folder, seen)
@@ -167,10 +167,14 @@ mod tests {
             ),
             ("unrecognized attribute: 'kv'\n\nElement 'motor', line 0", "motor", Some("kv"), None),
         ] {
-            let unknown = Unknown::of_message(message).unwrap();
-            assert_eq!((unknown.element, unknown.word, unknown.since()), (element, word, since), "{message}");
+            let unknown = UnknownKeyword::from_message(message).unwrap();
+            assert_eq!(
+                (unknown.element, unknown.keyword, unknown.introduced_in()),
+                (element, word, since),
+                "{message}"
+            );
         }
-        assert_eq!(Unknown::of_message("Error: mass\nObject name = a, id = 1"), None);
+        assert_eq!(UnknownKeyword::from_message("Error: mass\nObject name = a, id = 1"), None);
     }
 
     /// Included files are searched too, and a file that includes itself ends the search.
@@ -184,9 +188,10 @@ mod tests {
             "<mujoco>\n<default>\n<joint damping='1'/>\n<joint\n actuatorfrcrange='0 1'/></default></mujoco>",
         )
         .unwrap();
-        let found = |word, is_value| Unknown { element: "joint", word: Some(word), is_value }.find_in(&path("a.xml"));
-        assert_eq!(found("actuatorfrcrange", false), Some(Source::new(path("b.xml"), 4)));
-        assert_eq!(found("1", true), Some(Source::new(path("b.xml"), 3)));
+        let found =
+            |word, is_value| UnknownKeyword { element: "joint", keyword: Some(word), is_value }.find_in(&path("a.xml"));
+        assert_eq!(found("actuatorfrcrange", false), Some(SourceLocation::new(path("b.xml"), 4)));
+        assert_eq!(found("1", true), Some(SourceLocation::new(path("b.xml"), 3)));
         assert_eq!(found("gravcomp", false), None);
     }
 }

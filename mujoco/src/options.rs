@@ -9,13 +9,13 @@ pub struct OptionDifference {
     /// MJCF name of the setting: an attribute of `<option>`, or one of its `<flag>`.
     pub name: &'static str,
     /// Value in the first model.
-    pub here: String,
+    pub first: String,
     /// Value in the second model.
-    pub there: String,
+    pub second: String,
 }
 
 /// Keyword of an `<option>` code.
-fn word(words: &[(u32, &str)], code: i32) -> String {
+fn keyword(words: &[(u32, &str)], code: i32) -> String {
     words.iter().find(|(known, _)| *known as i32 == code).map_or_else(|| code.to_string(), |(_, word)| (*word).into())
 }
 
@@ -92,11 +92,11 @@ impl Model {
             ("magnetic", numbers(&opt.magnetic)),
             ("density", opt.density.to_string()),
             ("viscosity", opt.viscosity.to_string()),
-            ("integrator", word(&integrators, opt.integrator)),
-            ("cone", word(&cones, opt.cone)),
+            ("integrator", keyword(&integrators, opt.integrator)),
+            ("cone", keyword(&cones, opt.cone)),
             ("impratio", opt.impratio.to_string()),
-            ("solver", word(&solvers, opt.solver)),
-            ("jacobian", word(&jacobians, opt.jacobian)),
+            ("solver", keyword(&solvers, opt.solver)),
+            ("jacobian", keyword(&jacobians, opt.jacobian)),
             ("iterations", opt.iterations.to_string()),
             ("tolerance", opt.tolerance.to_string()),
             ("noslip_iterations", opt.noslip_iterations.to_string()),
@@ -131,7 +131,7 @@ impl Model {
         let pairs = self.options().into_iter().zip(other.options());
         pairs
             .filter(|((_, here), (_, there))| here != there)
-            .map(|((name, here), (_, there))| OptionDifference { name, here, there })
+            .map(|((name, here), (_, there))| OptionDifference { name, first: here, second: there })
             .collect()
     }
 }

@@ -8,21 +8,21 @@ use mujoco_sys as mj;
 use std::mem::offset_of;
 
 /// Size of a cache line \[bytes\].
-const LINE: usize = 64;
+const CACHE_LINE_BYTES: usize = 64;
 
 /// Prefetched part of `mjData`'s buffer: state, kinematics, inertias \[bytes\]. More would evict data of the current
 /// step.
-const BUFFER: usize = 32 << 10;
+const BUFFER_BYTES: usize = 32 << 10;
 
 /// Prefetched part of the arena: contacts and the first constraint rows \[bytes\].
-const ARENA: usize = 8 << 10;
+const ARENA_BYTES: usize = 8 << 10;
 
 /// End of the solver's statistics, which fill most of `mjData` itself and are rarely accessed (2.2.2 and 4.x).
-const AFTER_STATISTICS: usize = offset_of!(mj::mjData, solver_fwdinv);
+const STATISTICS_END: usize = offset_of!(mj::mjData, solver_fwdinv);
 
 /// Cache levels that memory is prefetched into.
 #[derive(Clone, Copy)]
-enum Level {
+enum CacheLevel {
     /// All levels: the memory is needed at once.
     First,
     /// The second level and beyond: the first level still serves the current step.
@@ -30,16 +30,16 @@ enum Level {
 }
 
 /// Prefetches `bytes` bytes from `start` without waiting for them.
-fn ask(start: *const u8, bytes: usize, level: Level) {
+fn prefetch_bytes(start: *const u8, bytes: usize, level: CacheLevel) {
     #[cfg(target_arch = "x86_64")]
-    for offset in (0..bytes).step_by(LINE) {
+    for offset in (0..bytes).step_by(CACHE_LINE_BYTES) {
         use core::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
         let line = start.wrapping_add(offset).cast();
         match level {
             // SAFETY: a prefetch reads and changes no value, and faults at no address.
-            Level::First => unsafe { _mm_prefetch::<_MM_HINT_T0>(line) },
+            CacheLevel::First => unsafe { _mm_prefetch::<_MM_HINT_T0>(line) },
             // SAFETY: likewise.
-            Level::Second => unsafe { _mm_prefetch::<_MM_HINT_T1>(line) },
+            CacheLevel::Second => unsafe { _mm_prefetch::<_MM_HINT_T1>(line) },
         }
     }
     // Rust has no stable prefetch for other architectures.
@@ -49,13 +49,13 @@ fn ask(start: *const u8, bytes: usize, level: Level) {
 
 /// Prefetches the memory of `values`, which should be a short slice.
 pub fn prefetch<T>(values: &[T]) {
-    ask(values.as_ptr().cast(), size_of_val(values), Level::First);
+    prefetch_bytes(values.as_ptr().cast(), size_of_val(values), CacheLevel::First);
 }
 
 /// Addresses of the memory that a step reads. They are stored outside of the data, because following its pointers would
 /// wait for that memory.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Places {
+pub(super) struct PrefetchAddresses {
     header: *const u8,
     buffer: *const u8,
     buffer_bytes: usize,
@@ -63,9 +63,9 @@ pub(super) struct Places {
     arena_bytes: usize,
 }
 
-impl Places {
+impl PrefetchAddresses {
     /// Addresses of the data with this header.
-    pub(super) fn of(header: &mj::mjData) -> Self {
+    pub(super) fn new(header: &mj::mjData) -> Self {
         #[cfg(mj4)]
         let (arena, arena_bytes) = (header.arena, header.narena as usize);
         #[cfg(not(mj4))]
@@ -73,9 +73,9 @@ impl Places {
         Self {
             header: std::ptr::from_ref(header).cast(),
             buffer: header.buffer.cast_const().cast(),
-            buffer_bytes: (header.nbuffer as usize).min(BUFFER),
+            buffer_bytes: (header.nbuffer as usize).min(BUFFER_BYTES),
             arena: arena.cast_const().cast(),
-            arena_bytes: arena_bytes.min(ARENA),
+            arena_bytes: arena_bytes.min(ARENA_BYTES),
         }
     }
 }
@@ -83,22 +83,26 @@ impl Places {
 impl Data {
     /// Prefetches the counters and pointers that every step of this data reads first, without waiting for them.
     pub fn prefetch(&self) {
-        let header = self.places().header;
-        ask(header, 2 * LINE, Level::First);
-        ask(header.wrapping_add(AFTER_STATISTICS), size_of::<mj::mjData>() - AFTER_STATISTICS, Level::First);
+        let header = self.prefetch_addresses().header;
+        prefetch_bytes(header, 2 * CACHE_LINE_BYTES, CacheLevel::First);
+        prefetch_bytes(
+            header.wrapping_add(STATISTICS_END),
+            size_of::<mj::mjData>() - STATISTICS_END,
+            CacheLevel::First,
+        );
     }
 
     /// Prefetches the same memory as [`prefetch`](Self::prefetch), and the state and working memory.
     pub fn prefetch_arrays(&self) {
         self.prefetch();
-        let places = self.places();
-        ask(places.buffer, places.buffer_bytes, Level::Second);
-        ask(places.arena, places.arena_bytes, Level::Second);
+        let places = self.prefetch_addresses();
+        prefetch_bytes(places.buffer, places.buffer_bytes, CacheLevel::Second);
+        prefetch_bytes(places.arena, places.arena_bytes, CacheLevel::Second);
     }
 
     /// Size of the memory that [`prefetch_arrays`](Self::prefetch_arrays) prefetches \[bytes\].
     pub fn prefetched_bytes(&self) -> usize {
-        let places = self.places();
-        size_of::<mj::mjData>() - AFTER_STATISTICS + places.buffer_bytes + places.arena_bytes
+        let places = self.prefetch_addresses();
+        size_of::<mj::mjData>() - STATISTICS_END + places.buffer_bytes + places.arena_bytes
     }
 }

@@ -6,7 +6,7 @@ use mujoco_sys::fields::data as arrays;
 
 /// State that a step changes: time, positions, velocities, activations and the solver's warm start.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Motion {
+pub struct IntegrationState {
     values: Vec<f64>,
 }
 
@@ -15,14 +15,14 @@ pub struct Motion {
 /// The forward pass of 2.2.2 normalizes the quaternions of free and ball joints in place, and a second pass would
 /// change their last bits. On 4.x positions do not change, so no quaternion is stored.
 #[derive(Clone, Debug, Default)]
-pub struct RawQuats {
+pub struct UnnormalizedQuats {
     /// First quaternion, stored without heap memory: a robot has at most one in the common case.
-    first: Option<RawQuat>,
-    others: Box<[RawQuat]>,
+    first: Option<UnnormalizedQuat>,
+    others: Box<[UnnormalizedQuat]>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct RawQuat {
+struct UnnormalizedQuat {
     /// Index in `qpos`.
     address: usize,
     value: [f64; 4],
@@ -30,7 +30,7 @@ struct RawQuat {
 
 /// Inputs that a user sets and a step only reads: controls, applied forces, mocap poses, user data.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Inputs {
+pub struct UserInputs {
     values: Vec<f64>,
     /// Active flags of equalities. They belong to the data on 4.x, and to the model on 2.2.2.
     #[cfg(mj4)]
@@ -64,9 +64,9 @@ macro_rules! copied_arrays {
     };
 }
 
-copied_arrays!(Motion: qpos / qpos_mut, qvel / qvel_mut, act / act_mut, qacc_warmstart / qacc_warmstart_mut);
+copied_arrays!(IntegrationState: qpos / qpos_mut, qvel / qvel_mut, act / act_mut, qacc_warmstart / qacc_warmstart_mut);
 copied_arrays!(
-    Inputs: ctrl / ctrl_mut,
+    UserInputs: ctrl / ctrl_mut,
     qfrc_applied / qfrc_applied_mut,
     xfrc_applied / xfrc_applied_mut,
     mocap_pos / mocap_pos_mut,
@@ -74,7 +74,7 @@ copied_arrays!(
     userdata / userdata_mut,
 );
 
-impl Motion {
+impl IntegrationState {
     /// Empty state, which restores nothing.
     pub const EMPTY: Self = Self { values: Vec::new() };
 
@@ -86,7 +86,7 @@ impl Motion {
     }
 
     /// Resets the quaternions to their values before the forward pass of the saved data.
-    pub fn undo_normalization(&mut self, raw: &RawQuats) {
+    pub fn undo_normalization(&mut self, raw: &UnnormalizedQuats) {
         for quat in raw.iter() {
             let first = 1 + quat.address;
             self.values[first..first + 4].copy_from_slice(&quat.value);
@@ -122,7 +122,7 @@ impl Motion {
     }
 }
 
-impl RawQuats {
+impl UnnormalizedQuats {
     /// Allocates storage for the quaternions that a forward pass over `model` normalizes.
     pub fn new(model: &Model) -> Self {
         if cfg!(mj4) {
@@ -134,12 +134,12 @@ impl RawQuats {
                 mujoco_sys::mjJNT_BALL => 0,
                 _ => return None,
             };
-            Some(RawQuat { address: address as usize + offset, ..RawQuat::default() })
+            Some(UnnormalizedQuat { address: address as usize + offset, ..UnnormalizedQuat::default() })
         });
         Self { first: quats.next(), others: quats.collect() }
     }
 
-    fn iter(&self) -> impl Iterator<Item = &RawQuat> {
+    fn iter(&self) -> impl Iterator<Item = &UnnormalizedQuat> {
         self.first.iter().chain(&self.others)
     }
 
@@ -160,7 +160,7 @@ impl RawQuats {
     }
 }
 
-impl Inputs {
+impl UserInputs {
     /// All numbers, and the active flags of equalities (4.x; empty on 2.2.2).
     pub fn values(&self) -> (&[f64], &[bool]) {
         #[cfg(mj4)]
@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use crate as mj;
 
-    /// A forward pass changes no more than [`RawQuats`] keeps, on 2.2.2 and on 4.x.
+    /// A forward pass changes no more than [`UnnormalizedQuats`] keeps, on 2.2.2 and on 4.x.
     #[test]
     fn raw_quaternions() {
         const JOINTS: &str = r#"<mujoco><worldbody>
@@ -226,7 +226,8 @@ mod tests {
         }
         data.qvel_mut().fill(0.3);
         data.qacc_warmstart_mut().fill(0.7);
-        let (mut before, mut after, mut raw) = (Motion::EMPTY, Motion::EMPTY, RawQuats::new(&model));
+        let (mut before, mut after, mut raw) =
+            (IntegrationState::EMPTY, IntegrationState::EMPTY, UnnormalizedQuats::new(&model));
         before.save(&data);
         raw.save(&data);
         data.step1().expect("fits");

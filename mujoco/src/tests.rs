@@ -119,11 +119,11 @@ fn forces_before_integration() {
         found.fold(0.0_f64, |most, (found, expected)| most.max((found - expected).abs()))
     };
     let mut spare = Vec::new();
-    data.solve_accelerations(&now, &mut spare).expect("solves");
+    data.rne_post_constraint(&now, &mut spare).expect("solves");
     assert!(far(&data) < 1e-12, "{:?} instead of {expected:?}", data.cfrc_int());
     assert_eq!(data.qvel(), later, "what it was given is left as it was");
     // Control: velocities of another time give wrong forces.
-    data.solve_accelerations(&later, &mut spare).expect("solves");
+    data.rne_post_constraint(&later, &mut spare).expect("solves");
     assert!(far(&data) > 1.0, "{:?}", data.cfrc_int());
 }
 

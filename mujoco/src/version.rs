@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 /// Supported MuJoCo versions. They differ in the MJCF that they accept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Target {
+pub enum SupportedVersion {
     /// 2.2.2, as in Debian 12.
     V2,
     /// 4.x.
@@ -14,10 +14,10 @@ pub enum Target {
 
 /// MuJoCo version of the headers of this build.
 #[cfg(not(mj4))]
-pub const TARGET: Target = Target::V2;
+pub const BUILD_VERSION: SupportedVersion = SupportedVersion::V2;
 /// MuJoCo version of the headers of this build.
 #[cfg(mj4)]
-pub const TARGET: Target = Target::V4;
+pub const TARGET: SupportedVersion = SupportedVersion::V4;
 
 /// The loaded library has another version than the headers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -45,7 +45,10 @@ pub fn check_version() -> Result<(), VersionError> {
             // SAFETY: mj_version takes nothing and returns a constant.
             let library = unsafe { mj::mj_version() };
             if library != mj::mjVERSION_HEADER {
-                return Err(VersionError { headers: dotted(mj::mjVERSION_HEADER), library: dotted(library) });
+                return Err(VersionError {
+                    headers: dotted_version(mj::mjVERSION_HEADER),
+                    library: dotted_version(library),
+                });
             }
             super::guard::install_handlers();
             super::plugins::load();
@@ -56,11 +59,11 @@ pub fn check_version() -> Result<(), VersionError> {
 
 /// Version of the headers, for example `2.2.2`.
 pub fn version_string() -> String {
-    dotted(mj::mjVERSION_HEADER)
+    dotted_version(mj::mjVERSION_HEADER)
 }
 
 /// Dotted version of a version number. 222 is 2.2.2; since 3.5 it is major * 10^6 + minor * 10^3 + patch.
-fn dotted(version: i32) -> String {
+fn dotted_version(version: i32) -> String {
     if version < 1000 {
         format!("{}.{}.{}", version / 100, version / 10 % 10, version % 10)
     } else {
@@ -74,8 +77,8 @@ mod tests {
 
     #[test]
     fn number_formats() {
-        assert_eq!(dotted(222), "2.2.2");
-        assert_eq!(dotted(340), "3.4.0");
-        assert_eq!(dotted(4_000_001), "4.0.1");
+        assert_eq!(dotted_version(222), "2.2.2");
+        assert_eq!(dotted_version(340), "3.4.0");
+        assert_eq!(dotted_version(4_000_001), "4.0.1");
     }
 }

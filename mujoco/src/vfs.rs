@@ -123,7 +123,7 @@ pub fn compile_file(path: &Path) -> Result<Compiled, LoadError> {
     let name = CString::new(path.to_string_lossy().as_bytes())
         .map_err(|_| CompileError::new(&format!("{path:?} contains a NUL character")))?;
     load(&name, std::ptr::null()).map_err(|error| match error {
-        LoadError::Compile(error) => error.placed_in(path).into(),
+        LoadError::Compile(error) => error.with_location_in(path).into(),
         other => other,
     })
 }

@@ -20,7 +20,7 @@ pub struct Weld {
 }
 
 /// Number of values of an equality in `eq_data`.
-const WIDTH: usize = mj::mjNEQDATA as usize;
+const EQ_DATA_WIDTH: usize = mj::mjNEQDATA as usize;
 
 impl Model {
     /// True if equality `index` exists and is a weld.
@@ -37,7 +37,8 @@ impl Model {
     #[must_use]
     pub fn with_welds(&self, welds: &[Weld]) -> Self {
         let own_of = |field: &ModelArray| matches!(field.name, "eq_data" | "eq_active");
-        let mut own: Vec<OwnArray> = self.own().iter().filter(|array| !own_of(&array.field)).cloned().collect();
+        let mut own: Vec<OwnArray> =
+            self.own_array_list().iter().filter(|array| !own_of(&array.field)).cloned().collect();
         let compiled = self.compiled();
         let mut header = self.copy_header();
         let mut fields = Vec::new();
@@ -59,17 +60,17 @@ impl Model {
                 }
                 let numbers = weld.pose.iter().flat_map(|number| number.to_ne_bytes());
                 // Anchor in the second body (its origin), then the pose of that body in the first.
-                let row = &mut values[8 * WIDTH * weld.equality..8 * WIDTH * (weld.equality + 1)];
+                let row = &mut values[8 * EQ_DATA_WIDTH * weld.equality..8 * EQ_DATA_WIDTH * (weld.equality + 1)];
                 row[..24].fill(0);
                 row[24..80].iter_mut().zip(numbers).for_each(|(to, byte)| *to = byte);
             }
-            own.push(OwnArray::of_bytes(field, &values));
+            own.push(OwnArray::from_bytes(field, &values));
         }
         for array in &own {
             set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
         }
         // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, except
-        // those that were just set to `own`, each to memory of the size of its field: moving a box does not move its
+        // those that were just set to `own_array_list`, each to memory of the size of its field: moving a box does not move its
         // content.
         unsafe { self.with_arrays(header, Arc::from(own)) }
     }
@@ -118,9 +119,9 @@ mod tests {
         let welded = off.with_welds(&[weld]);
         let same = welded.eq_data().iter().zip(on.eq_data()).all(|(a, b)| (a - b).abs() < 1e-15);
         assert!(same, "{:?}", welded.eq_data());
-        assert_eq!(welded.eq_data().len(), WIDTH);
+        assert_eq!(welded.eq_data().len(), EQ_DATA_WIDTH);
         let expected: &[&str] = if cfg!(mj4) { &["eq_data"] } else { &["eq_active", "eq_data"] };
-        let mut apart = welded.arrays_apart(&off);
+        let mut apart = welded.unshared_arrays(&off);
         apart.sort_unstable();
         assert_eq!(apart, expected);
         #[cfg(not(mj4))]
@@ -128,7 +129,7 @@ mod tests {
         // Another pose, then no weld.
         let moved = welded.with_welds(&[Weld { equality: 0, pose: [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] }]);
         assert_eq!(moved.eq_data()[3..10], [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
-        assert!(moved.with_welds(&[]).arrays_apart(&off).is_empty());
+        assert!(moved.with_welds(&[]).unshared_arrays(&off).is_empty());
         assert!(off.is_weld(0) && !off.is_weld(1));
     }
 
@@ -136,7 +137,7 @@ mod tests {
     #[test]
     fn other_arrays() {
         let off = model("false");
-        let mut editor = mj::Editor::new(&off).expect("small");
+        let mut editor = mj::ModelEditor::new(&off).expect("small");
         editor.geom_friction_mut()[0] = 0.3;
         let edited = editor.model(&off);
         let weld = Weld { equality: 0, pose: [0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0] };

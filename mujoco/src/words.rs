@@ -3,7 +3,7 @@
 use mujoco_sys as mj;
 
 /// Keyword of a code in a list of codes and keywords.
-fn word(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
+fn keyword(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
     list.iter().find(|(known, _)| *known as i32 == code).map(|(_, word)| *word)
 }
 
@@ -11,7 +11,7 @@ fn word(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
 pub fn joint(code: i32) -> Option<&'static str> {
     let list =
         [(mj::mjJNT_FREE, "free"), (mj::mjJNT_BALL, "ball"), (mj::mjJNT_SLIDE, "slide"), (mj::mjJNT_HINGE, "hinge")];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Keyword of a geom or site type, and its number of sizes.
@@ -30,7 +30,7 @@ pub fn geom(code: i32) -> Option<(&'static str, usize)> {
 }
 
 /// Keyword of the tracking mode of a camera or light.
-pub fn follow(code: i32) -> Option<&'static str> {
+pub fn tracking_mode(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjCAMLIGHT_FIXED, "fixed"),
         (mj::mjCAMLIGHT_TRACK, "track"),
@@ -38,7 +38,7 @@ pub fn follow(code: i32) -> Option<&'static str> {
         (mj::mjCAMLIGHT_TARGETBODY, "targetbody"),
         (mj::mjCAMLIGHT_TARGETBODYCOM, "targetbodycom"),
     ];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Keyword of an equality type.
@@ -49,12 +49,12 @@ pub fn equality(code: i32) -> Option<&'static str> {
         (mj::mjEQ_JOINT, "joint"),
         (mj::mjEQ_TENDON, "tendon"),
     ];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// A point of a tendon's path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PathPoint {
+pub enum WrapType {
     /// A joint with a coefficient.
     Joint,
     /// A pulley with a divisor.
@@ -66,13 +66,13 @@ pub enum PathPoint {
 }
 
 /// Kind of a point of a tendon's path.
-pub fn path_point(code: i32) -> Option<PathPoint> {
+pub fn wrap_type(code: i32) -> Option<WrapType> {
     let list = [
-        (mj::mjWRAP_JOINT, PathPoint::Joint),
-        (mj::mjWRAP_PULLEY, PathPoint::Pulley),
-        (mj::mjWRAP_SITE, PathPoint::Site),
-        (mj::mjWRAP_SPHERE, PathPoint::Geom),
-        (mj::mjWRAP_CYLINDER, PathPoint::Geom),
+        (mj::mjWRAP_JOINT, WrapType::Joint),
+        (mj::mjWRAP_PULLEY, WrapType::Pulley),
+        (mj::mjWRAP_SITE, WrapType::Site),
+        (mj::mjWRAP_SPHERE, WrapType::Geom),
+        (mj::mjWRAP_CYLINDER, WrapType::Geom),
     ];
     list.into_iter().find(|(known, _)| *known as i32 == code).map(|(_, point)| point)
 }
@@ -87,7 +87,7 @@ pub fn transmission(code: i32) -> Option<&'static str> {
         (mj::mjTRN_SITE, "site"),
         (mj::mjTRN_BODY, "body"),
     ];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Keyword of the activation dynamics of an actuator.
@@ -102,24 +102,24 @@ pub fn dynamics(code: i32) -> Option<&'static str> {
         (mj::mjDYN_FILTER, "filter"),
         (mj::mjDYN_MUSCLE, "muscle"),
     ];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Keyword of the gain of an actuator.
 pub fn gain(code: i32) -> Option<&'static str> {
     let list = [(mj::mjGAIN_FIXED, "fixed"), (mj::mjGAIN_AFFINE, "affine"), (mj::mjGAIN_MUSCLE, "muscle")];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Keyword of the bias of an actuator.
 pub fn bias(code: i32) -> Option<&'static str> {
     let list = [(mj::mjBIAS_NONE, "none"), (mj::mjBIAS_AFFINE, "affine"), (mj::mjBIAS_MUSCLE, "muscle")];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Keyword of the kind of object that a sensor observes. MuJoCo's `body` is the frame at the center of mass, `xbody`
 /// the body's own frame.
-pub fn observed(code: i32) -> Option<&'static str> {
+pub fn object_type(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjOBJ_BODY, "body"),
         (mj::mjOBJ_XBODY, "xbody"),
@@ -130,12 +130,12 @@ pub fn observed(code: i32) -> Option<&'static str> {
         (mj::mjOBJ_TENDON, "tendon"),
         (mj::mjOBJ_ACTUATOR, "actuator"),
     ];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// Form in which MJCF names the object of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SensorObjects {
+pub enum SensorObjectSyntax {
     /// No object.
     None,
     /// An attribute with the name of the object's kind.
@@ -146,11 +146,11 @@ pub enum SensorObjects {
 
 /// A type of MuJoCo's own sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SensorWord {
+pub struct SensorKeyword {
     /// MJCF keyword.
-    pub word: &'static str,
+    pub keyword: &'static str,
     /// Form in which MJCF names the object.
-    pub objects: SensorObjects,
+    pub object_syntax: SensorObjectSyntax,
     /// Unit; `None` if it depends on the object.
     pub unit: Option<&'static str>,
     /// True if the values are a quaternion.
@@ -158,8 +158,8 @@ pub struct SensorWord {
 }
 
 /// Type of one of MuJoCo's own sensors; `None` if it is not supported.
-pub fn sensor(code: i32) -> Option<SensorWord> {
-    use SensorObjects::{Frame, Named, None as Nothing};
+pub fn sensor(code: i32) -> Option<SensorKeyword> {
+    use SensorObjectSyntax::{Frame, Named, None as Nothing};
     let list = [
         (mj::mjSENS_TOUCH, "touch", Named, "N"),
         (mj::mjSENS_ACCELEROMETER, "accelerometer", Named, "m/s²"),
@@ -206,16 +206,16 @@ pub fn sensor(code: i32) -> Option<SensorWord> {
         #[cfg(mj4)]
         (mj::mjSENS_E_KINETIC, "e_kinetic", Nothing, "J"),
     ];
-    list.into_iter().find(|(known, ..)| *known as i32 == code).map(|(_, word, objects, unit)| SensorWord {
-        word,
-        objects,
+    list.into_iter().find(|(known, ..)| *known as i32 == code).map(|(_, word, objects, unit)| SensorKeyword {
+        keyword: word,
+        object_syntax: objects,
         unit: (!unit.is_empty()).then_some(unit),
         quaternion: word.ends_with("quat"),
     })
 }
 
 /// MJCF keyword of a sensor type that [`sensor`] does not support.
-pub fn other_sensor(code: i32) -> Option<&'static str> {
+pub fn unsupported_sensor(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjSENS_USER, "user"),
         #[cfg(mj4)]
@@ -235,10 +235,10 @@ pub fn other_sensor(code: i32) -> Option<&'static str> {
         #[cfg(mj4)]
         (mj::mjSENS_PLUGIN, "plugin"),
     ];
-    word(&list, code)
+    keyword(&list, code)
 }
 
 /// True if a sensor measures results of the constraint solver (`mjSTAGE_ACC`), not only positions and velocities.
-pub fn is_solved(stage: i32) -> bool {
+pub fn needs_acceleration_stage(stage: i32) -> bool {
     stage == mj::mjSTAGE_ACC as i32
 }

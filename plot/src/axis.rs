@@ -8,14 +8,14 @@ pub(super) struct Axis {
     low: f64,
     high: f64,
     /// Pixel coordinates of `low` and `high`.
-    ends: [f64; 2],
+    pixel_range: [f64; 2],
 }
 
 /// Approximate distance between ticks \[pixels\].
-const BETWEEN: f64 = 80.0;
+const TICK_SPACING: f64 = 80.0;
 
 impl Axis {
-    /// Creates an axis that shows all `values` with a margin, from pixel `ends[0]` to pixel `ends[1]`. The values of a
+    /// Creates an axis that shows all `values` with a margin, from pixel `pixel_range[0]` to pixel `pixel_range[1]`. The values of a
     /// logarithmic axis must be above 0.
     pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, ends: [f64; 2]) -> Self {
         let values = values.map(|x| if log { x.log10() } else { x });
@@ -31,20 +31,25 @@ impl Axis {
         }
         // Halved values, so that the difference of the largest floats does not overflow.
         let margin = 0.04 * (high / 2.0 - low / 2.0);
-        Self { log, low: (low - margin).max(f64::MIN / 4.0), high: (high + margin).min(f64::MAX / 4.0), ends }
+        Self {
+            log,
+            low: (low - margin).max(f64::MIN / 4.0),
+            high: (high + margin).min(f64::MAX / 4.0),
+            pixel_range: ends,
+        }
     }
 
     /// Pixel coordinate of a value.
-    pub(super) fn place(&self, value: f64) -> f64 {
+    pub(super) fn pixel_of(&self, value: f64) -> f64 {
         let value = if self.log { value.log10() } else { value };
         let share = (value - self.low) / (self.high - self.low);
-        self.ends[0] + share * (self.ends[1] - self.ends[0])
+        self.pixel_range[0] + share * (self.pixel_range[1] - self.pixel_range[0])
     }
 
     /// Ticks with their labels, at multiples of 1, 2 or 5 times a power of ten. A logarithmic axis has its ticks at
     /// integer powers of ten.
     pub(super) fn ticks(&self) -> Vec<(f64, String)> {
-        let wanted = ((self.ends[1] - self.ends[0]).abs() / BETWEEN).clamp(2.0, 20.0);
+        let wanted = ((self.pixel_range[1] - self.pixel_range[0]).abs() / TICK_SPACING).clamp(2.0, 20.0);
         let raw = (self.high - self.low) / wanted;
         let power = 10.0_f64.powf(raw.log10().floor());
         let step = [1.0, 2.0, 5.0].map(|k| k * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power);
@@ -90,9 +95,9 @@ mod tests {
         ] {
             assert_eq!(labels(values).join(" "), expected);
         }
-        assert!(Axis::new(std::iter::empty(), false, [0.0, 1.0]).place(0.5).is_finite());
+        assert!(Axis::new(std::iter::empty(), false, [0.0, 1.0]).pixel_of(0.5).is_finite());
         for values in [[1e9, 1e9 + 50.0], [1e-9, 5e-9], [-1e300, 1e300], [f64::MIN, f64::MAX], [7.0, 7.0], [0.0, 0.0]] {
-            assert!(Axis::new(values.into_iter(), false, [0.0, 1.0]).place(0.0).is_finite());
+            assert!(Axis::new(values.into_iter(), false, [0.0, 1.0]).pixel_of(0.0).is_finite());
             let labels = labels(values);
             assert!((2..=12).contains(&labels.len()), "{values:?}: {labels:?}");
             assert!(labels.windows(2).all(|pair| pair[0] != pair[1]), "{values:?}: {labels:?}");
@@ -107,7 +112,7 @@ mod tests {
         let labels: Vec<&str> = ticks.iter().map(|(_, label)| &label[..]).collect();
         assert_eq!(labels, ["1e-8", "1e-6", "1e-4"]);
         // Equal factors are equal distances.
-        let places: Vec<f64> = ticks.iter().map(|(tick, _)| axis.place(*tick)).collect();
+        let places: Vec<f64> = ticks.iter().map(|(tick, _)| axis.pixel_of(*tick)).collect();
         assert!((places[2] - 2.0 * places[1] + places[0]).abs() < 1e-9, "{places:?}");
     }
 }

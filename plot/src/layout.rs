@@ -2,11 +2,11 @@
 
 use super::Plot;
 use super::axis::Axis;
-use super::thin::thinned;
+use super::thin::decimate_m4;
 
 /// The geometry of a plot, in pixels from the top left corner.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drawing {
+pub struct PlotLayout {
     /// Width and height.
     pub size: [usize; 2],
     /// Left, top, right and bottom of the frame.
@@ -18,7 +18,7 @@ pub struct Drawing {
     /// The curves.
     pub curves: Vec<Curve>,
     /// Line samples of the legend, with their colors.
-    pub keys: Vec<([[f64; 2]; 2], [u8; 3])>,
+    pub legend_lines: Vec<([[f64; 2]; 2], [u8; 3])>,
 }
 
 /// A text at a position.
@@ -49,9 +49,9 @@ pub struct Curve {
     /// Color as red, green, blue.
     pub color: [u8; 3],
     /// Points of each polyline.
-    pub pieces: Vec<Vec<[f64; 2]>>,
+    pub polylines: Vec<Vec<[f64; 2]>>,
     /// Positions of the markers.
-    pub marks: Vec<[f64; 2]>,
+    pub markers: Vec<[f64; 2]>,
 }
 
 /// Colors of curves. The first seven are distinguishable with any color vision; the others differ from these and from
@@ -83,63 +83,68 @@ const COLORS: [[u8; 3]; 24] = [
     [190, 170, 160],
 ];
 /// Width and height of a character \[pixels\].
-const LETTER: [f64; 2] = [7.0, 13.0];
+const CHAR_SIZE: [f64; 2] = [7.0, 13.0];
 /// Length of a line sample of the legend \[pixels\].
-const KEY: f64 = 24.0;
+const LEGEND_LINE: f64 = 24.0;
 const GAP: f64 = 8.0;
 const TOP: f64 = 46.0;
 const BOTTOM: f64 = 46.0;
 
-impl Drawing {
+impl PlotLayout {
     pub(super) fn of(plot: &Plot) -> Self {
         let [width, height] = plot.size.map(|n| n as f64);
-        let shown = |p: &&[f64; 2]| p.iter().all(|x| x.is_finite() && (!plot.log || *x > 0.0));
+        let shown = |p: &&[f64; 2]| p.iter().all(|x| x.is_finite() && (!plot.log_axes || *x > 0.0));
         let values = |k: usize| plot.series.iter().flat_map(|s| &s.points).filter(shown).map(move |p| p[k]);
         let letters = plot.series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
-        let room = (((0.4 * width - KEY - 3.0 * GAP) / LETTER[0]) as usize).min(letters);
-        let beside = if letters == 0 { 0.0 } else { KEY + 2.0 * GAP + LETTER[0] * room as f64 };
-        let (top, right, bottom) = (TOP, width - 2.0 * GAP - beside, height - BOTTOM);
-        let across = Axis::new(values(1), plot.log, [bottom, top]);
-        let rows = across.ticks();
+        let max_chars = (((0.4 * width - LEGEND_LINE - 3.0 * GAP) / CHAR_SIZE[0]) as usize).min(letters);
+        let legend_width = if letters == 0 { 0.0 } else { LEGEND_LINE + 2.0 * GAP + CHAR_SIZE[0] * max_chars as f64 };
+        let (top, right, bottom) = (TOP, width - 2.0 * GAP - legend_width, height - BOTTOM);
+        let y_axis = Axis::new(values(1), plot.log_axes, [bottom, top]);
+        let rows = y_axis.ticks();
         let longest = rows.iter().map(|(_, label)| label.len()).max().unwrap_or(0);
-        let left = LETTER[0] * longest as f64 + 3.0 * GAP;
-        let along = Axis::new(values(0), plot.log, [left, right]);
+        let left = CHAR_SIZE[0] * longest as f64 + 3.0 * GAP;
+        let x_axis = Axis::new(values(0), plot.log_axes, [left, right]);
         let mut drawing = Self {
             size: plot.size,
             frame: [left, top, right, bottom],
             grid: Vec::new(),
             labels: Vec::new(),
             curves: Vec::new(),
-            keys: Vec::new(),
+            legend_lines: Vec::new(),
         };
-        for (tick, label) in along.ticks() {
-            let x = along.place(tick);
+        for (tick, label) in x_axis.ticks() {
+            let x = x_axis.pixel_of(tick);
             drawing.grid.push([[x, bottom], [x, top]]);
-            drawing.label(label, [x, bottom + LETTER[1] + 3.0], Anchor::Middle);
+            drawing.label(label, [x, bottom + CHAR_SIZE[1] + 3.0], Anchor::Middle);
         }
         for (tick, label) in rows {
-            let y = across.place(tick);
+            let y = y_axis.pixel_of(tick);
             drawing.grid.push([[left, y], [right, y]]);
             drawing.label(label, [left - GAP, y + 4.0], Anchor::End);
         }
         let middle = (left + right) / 2.0;
         drawing.label(plot.title.clone(), [middle, 18.0], Anchor::Middle);
-        drawing.label(plot.axes[0].clone(), [middle, height - GAP], Anchor::Middle);
-        drawing.label(plot.axes[1].clone(), [GAP, top - GAP], Anchor::Start);
-        let most = ((bottom - top) / (LETTER[1] + 3.0)) as usize;
+        drawing.label(plot.axis_labels[0].clone(), [middle, height - GAP], Anchor::Middle);
+        drawing.label(plot.axis_labels[1].clone(), [GAP, top - GAP], Anchor::Start);
+        let max_entries = ((bottom - top) / (CHAR_SIZE[1] + 3.0)) as usize;
         for (k, series) in plot.series.iter().enumerate() {
             let color = COLORS[k % COLORS.len()];
             let pieces = series.points.split(|p| !shown(&p)).filter(|piece| !piece.is_empty());
-            let places = |piece: &[[f64; 2]]| piece.iter().map(|p| [along.place(p[0]), across.place(p[1])]).collect();
-            let pieces: Vec<Vec<[f64; 2]>> = pieces.map(|piece| thinned(places(piece))).collect();
-            let marks = if plot.marks { pieces.concat() } else { Vec::new() };
-            drawing.curves.push(Curve { color, pieces, marks });
-            let [from, y] = [right + GAP, top + (LETTER[1] + 3.0) * (k as f64 + 0.5)];
+            let places =
+                |piece: &[[f64; 2]]| piece.iter().map(|p| [x_axis.pixel_of(p[0]), y_axis.pixel_of(p[1])]).collect();
+            let pieces: Vec<Vec<[f64; 2]>> = pieces.map(|piece| decimate_m4(places(piece))).collect();
+            let marks = if plot.markers { pieces.concat() } else { Vec::new() };
+            drawing.curves.push(Curve { color, polylines: pieces, markers: marks });
+            let [from, y] = [right + GAP, top + (CHAR_SIZE[1] + 3.0) * (k as f64 + 0.5)];
             let more = plot.series.len() - k;
-            if k + 1 < most || more == 1 && k < most {
-                drawing.keys.push(([[from, y], [from + KEY, y]], color));
-                drawing.label(shortened(&series.name, room), [from + KEY + GAP, y + 4.0], Anchor::Start);
-            } else if k + 1 == most {
+            if k + 1 < max_entries || more == 1 && k < max_entries {
+                drawing.legend_lines.push(([[from, y], [from + LEGEND_LINE, y]], color));
+                drawing.label(
+                    truncate_start(&series.name, max_chars),
+                    [from + LEGEND_LINE + GAP, y + 4.0],
+                    Anchor::Start,
+                );
+            } else if k + 1 == max_entries {
                 drawing.label(format!("and {more} more"), [from, y + 4.0], Anchor::Start);
             }
         }
@@ -151,8 +156,8 @@ impl Drawing {
     }
 }
 
-/// Shortens a name to `room` characters. Keeps its end, because long names usually differ there.
-fn shortened(name: &str, room: usize) -> String {
+/// Shortens a name to `max_chars` characters. Keeps its end, because long names usually differ there.
+fn truncate_start(name: &str, room: usize) -> String {
     let count = name.chars().count();
     if count <= room {
         return name.into();

@@ -14,7 +14,7 @@
 //! | module | content |
 //! |---|---|
 //! | `axis` | linear and logarithmic axes, ticks |
-//! | `layout` | positions of lines and texts: [`Drawing`] |
+//! | `layout` | positions of lines and texts: [`PlotLayout`] |
 //! | `thin` | reduction of long curves to what is visible |
 //! | `svg` | SVG output |
 #![forbid(unsafe_code)]
@@ -24,7 +24,7 @@ mod layout;
 mod svg;
 mod thin;
 
-pub use layout::{Anchor, Curve, Drawing, Label};
+pub use layout::{Anchor, Curve, Label, PlotLayout};
 use std::fmt;
 
 /// A curve with a name.
@@ -50,11 +50,11 @@ pub struct Plot {
     /// Title above the frame.
     pub title: String,
     /// Labels of the horizontal and the vertical axis, with units.
-    pub axes: [String; 2],
+    pub axis_labels: [String; 2],
     /// True for two logarithmic axes.
-    pub log: bool,
+    pub log_axes: bool,
     /// True for a marker at each point.
-    pub marks: bool,
+    pub markers: bool,
     /// The curves.
     pub series: Vec<Series>,
     /// Width and height \[pixels\].
@@ -65,9 +65,9 @@ impl Default for Plot {
     fn default() -> Self {
         Self {
             title: String::new(),
-            axes: Default::default(),
-            log: false,
-            marks: false,
+            axis_labels: Default::default(),
+            log_axes: false,
+            markers: false,
             series: Vec::new(),
             size: [960, 540],
         }
@@ -82,14 +82,14 @@ pub struct SizeError {
     /// Height \[pixels\].
     pub height: usize,
     /// Smallest supported width and height \[pixels\].
-    pub least: usize,
+    pub min_size: usize,
     /// Largest supported width and height \[pixels\].
-    pub most: usize,
+    pub max_size: usize,
 }
 
 impl fmt::Display for SizeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { width, height, least, most } = self;
+        let Self { width, height, min_size: least, max_size: most } = self;
         write!(f, "a plot of {width} x {height} pixels: {least} to {most} would do for both")
     }
 }
@@ -97,12 +97,12 @@ impl fmt::Display for SizeError {
 impl std::error::Error for SizeError {}
 
 /// Smallest and largest supported width and height \[pixels\].
-const SIDES: [usize; 2] = [200, 16384];
+const SIZE_RANGE: [usize; 2] = [200, 16384];
 
 impl Plot {
     /// Creates an empty plot over time \[s\]; `label` is the label of the vertical axis, with its unit.
     pub fn over_time(title: impl Into<String>, label: impl Into<String>) -> Self {
-        Self { title: title.into(), axes: ["time [s]".into(), label.into()], ..Self::default() }
+        Self { title: title.into(), axis_labels: ["time [s]".into(), label.into()], ..Self::default() }
     }
 
     /// Adds a curve.
@@ -117,19 +117,19 @@ impl Plot {
     /// # Errors
     /// The width or the height is below 200 or above 16384 pixels.
     pub fn to_svg(&self) -> Result<String, SizeError> {
-        Ok(svg::text(&self.drawing()?))
+        Ok(svg::document(&self.layout()?))
     }
 
     /// Returns the positions of all lines and texts.
     ///
     /// # Errors
     /// The width or the height is below 200 or above 16384 pixels.
-    pub fn drawing(&self) -> Result<Drawing, SizeError> {
-        let ([width, height], [least, most]) = (self.size, SIDES);
+    pub fn layout(&self) -> Result<PlotLayout, SizeError> {
+        let ([width, height], [least, most]) = (self.size, SIZE_RANGE);
         if ![width, height].iter().all(|side| (least..=most).contains(side)) {
-            return Err(SizeError { width, height, least, most });
+            return Err(SizeError { width, height, min_size: least, max_size: most });
         }
-        Ok(Drawing::of(self))
+        Ok(PlotLayout::of(self))
     }
 }
 

@@ -1,11 +1,18 @@
 //! SVG output.
 
-use super::layout::{Anchor, Curve, Drawing, Label};
+use super::layout::{Anchor, Curve, Label, PlotLayout};
 use std::fmt::Write as _;
 
 /// Formats a drawing as an SVG document.
-pub(super) fn text(drawing: &Drawing) -> String {
-    let Drawing { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, keys } = drawing;
+pub(super) fn document(drawing: &PlotLayout) -> String {
+    let PlotLayout {
+        size: [width, height],
+        frame: [left, top, right, bottom],
+        grid,
+        labels,
+        curves,
+        legend_lines: keys,
+    } = drawing;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"monospace\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
@@ -19,7 +26,7 @@ pub(super) fn text(drawing: &Drawing) -> String {
         out,
         "<rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"none\" stroke=\"black\"/>"
     );
-    for Curve { color, pieces, marks } in curves {
+    for Curve { color, polylines: pieces, markers: marks } in curves {
         let color = hex(*color);
         for piece in pieces {
             match &piece[..] {

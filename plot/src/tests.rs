@@ -30,7 +30,7 @@ fn closed_form() {
 fn colors_of_many_curves() {
     let wave = |k: u32| Series::new(format!("joint {k}"), [[0.0, f64::from(k)], [1.0, f64::from(k) + 1.0]]);
     let plot = (0..24).fold(Plot::over_time("joints", "angle [rad]"), |plot, k| plot.with(wave(k)));
-    let colors: Vec<[u8; 3]> = plot.drawing().unwrap().curves.iter().map(|curve| curve.color).collect();
+    let colors: Vec<[u8; 3]> = plot.layout().unwrap().curves.iter().map(|curve| curve.color).collect();
     let apart =
         |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt();
     for (k, color) in colors.iter().enumerate() {
@@ -48,9 +48,9 @@ fn gaps_and_frame() {
     assert!(svg.contains("a &lt; b &amp; c") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     // Two isolated points, one line.
     assert_eq!((svg.matches("<circle").count(), svg.matches("<polyline").count()), (2, 1));
-    let drawing = plot.drawing().unwrap();
+    let drawing = plot.layout().unwrap();
     let [left, top, right, bottom] = drawing.frame;
-    for [x, y] in drawing.curves.iter().flat_map(|curve| &curve.pieces).flatten() {
+    for [x, y] in drawing.curves.iter().flat_map(|curve| &curve.polylines).flatten() {
         assert!((left..right).contains(x) && (top..bottom).contains(y), "{x}, {y}");
     }
 }
@@ -62,7 +62,7 @@ fn long_legend() {
     let plot = Plot { series: series.collect(), ..Plot::default() };
     let svg = plot.to_svg().unwrap();
     assert!(svg.contains("...") && svg.contains("end3</text>") && svg.contains("more</text>"), "{svg}");
-    let [left, _, right, _] = plot.drawing().unwrap().frame;
+    let [left, _, right, _] = plot.layout().unwrap().frame;
     assert!(right - left > 0.4 * 960.0);
     let small = Plot { size: [200, 200], ..plot.clone() };
     small.to_svg().unwrap();
@@ -73,7 +73,7 @@ fn long_legend() {
 #[test]
 fn logarithms() {
     let points = [[1e-3, 1e-9], [1e-2, 1e-5], [1e-1, 0.0]];
-    let plot = Plot { log: true, marks: true, ..Plot::default() }.with(Series::new("order", points));
+    let plot = Plot { log_axes: true, markers: true, ..Plot::default() }.with(Series::new("order", points));
     let svg = plot.to_svg().unwrap();
     assert!(svg.contains(">1e-3<") && svg.contains(">1e-6<"), "{svg}");
     assert_eq!((svg.matches("<circle").count(), svg.matches("<polyline").count()), (2, 1));

@@ -2,7 +2,7 @@
 
 /// Keeps the first, lowest, highest and last of the consecutive points in each column of pixels. The line covers the
 /// same pixels. Source: Jugel et al., "M4: A Visualization-Oriented Time Series Data Aggregation", VLDB 2014.
-pub(super) fn thinned(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+pub(super) fn decimate_m4(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut out: Vec<[f64; 2]> = Vec::new();
     for run in points.chunk_by(|a, b| a[0].floor() == b[0].floor()) {
         if run.len() <= 4 {
@@ -27,7 +27,7 @@ mod tests {
     #[test]
     fn four_points_of_each_column() {
         let points: Vec<[f64; 2]> = (0..100_000).map(|k| 1e-4 * f64::from(k)).map(|x| [x, (977.0 * x).sin()]).collect();
-        let few = thinned(points.clone());
+        let few = decimate_m4(points.clone());
         assert!(few.len() <= 40, "{}", few.len());
         for column in 0..10 {
             let of = |points: &[[f64; 2]]| {
@@ -40,6 +40,6 @@ mod tests {
         // The order of the points is unchanged.
         assert!(few.windows(2).all(|pair| pair[0][0] < pair[1][0]));
         // Control: a curve with few points is unchanged.
-        assert_eq!(thinned(points[..4].to_vec()), points[..4]);
+        assert_eq!(decimate_m4(points[..4].to_vec()), points[..4]);
     }
 }

@@ -3,10 +3,10 @@
 use crate::error::{RecordError, Result};
 use crate::format::Format;
 use crate::npy;
-use crate::npz::{ABOUT, START};
-use crate::read::{Rows, rows};
-use crate::source::Source;
-use crate::zip::{Reader, Source as From};
+use crate::npz::{INITIAL_STATE, METADATA};
+use crate::read::{McapArrays, read_arrays};
+use crate::source::StreamSource;
+use crate::zip::{ReadSeek as From, ZipReader};
 use kinetoscope_sim::{EnvId, Snapshot};
 use ndarray::{ArrayView2, ArrayView3};
 use serde_json::Value;
@@ -17,14 +17,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Numbers of the event kinds that change the state of an environment: resets and writes.
-const CHANGES: [f64; 2] = [0.0, 1.0];
+const STATE_CHANGE_KINDS: [f64; 2] = [0.0, 1.0];
 
 /// A NumPy archive whose directory was read. Arrays of numbers are read on first use, images never.
 #[derive(Debug)]
-pub(crate) struct Archive {
+pub(crate) struct RecordedArrays {
     pub(crate) path: PathBuf,
     /// Content of `recording.json`.
-    pub(crate) about: Value,
+    pub(crate) metadata: Value,
     content: Content,
     /// By name.
     arrays: BTreeMap<String, Array>,
@@ -33,7 +33,7 @@ pub(crate) struct Archive {
 /// Source of data that was not read yet.
 #[derive(Debug)]
 enum Content {
-    Npz(Mutex<Reader<'static>>),
+    Npz(Mutex<ZipReader<'static>>),
     /// Initial state of an MCAP file, whose arrays were read completely.
     Mcap(Vec<u8>),
 }
@@ -46,57 +46,59 @@ struct Array {
 }
 
 /// Upper limit of the length of an array header \[bytes\].
-const LONGEST_HEAD: u64 = 1024;
+const MAX_HEADER_LEN: u64 = 1024;
 
-impl Archive {
+impl RecordedArrays {
     /// Opens a NumPy archive, or the rows of an MCAP file as one, for replay.
-    pub(crate) fn of_any(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         if !matches!(Format::of_path(path), Ok(Format::Mcap)) {
-            return Self::read(path);
+            return Self::open_npz(path);
         }
-        let Rows { about, start, arrays } = rows(path)?;
+        let McapArrays { metadata: about, start, arrays } = read_arrays(path)?;
         let array = |(name, (shape, numbers))| (name, Array { shape, numbers: OnceLock::from(numbers) });
         let arrays = arrays.into_iter().map(array).collect();
-        Ok(Self { path: path.into(), about, content: Content::Mcap(start), arrays })
+        Ok(Self { path: path.into(), metadata: about, content: Content::Mcap(start), arrays })
     }
 
-    pub(crate) fn read(path: &Path) -> Result<Self> {
+    pub(crate) fn open_npz(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|error| RecordError::file(path, error))?;
-        Self::of(path, file)
+        Self::from_reader(path, file)
     }
 
     /// Opens an archive from any source; `path` is its name in error messages.
-    pub(crate) fn of(path: &Path, from: impl From + 'static) -> Result<Self> {
+    pub(crate) fn from_reader(path: &Path, from: impl From + 'static) -> Result<Self> {
         let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
         let none = "this is no NumPy archive of a recorder, or is damaged";
-        let mut file = Reader::open(from).map_err(|error| wrong(path, none, error))?;
-        let about = file.read(ABOUT).map_err(|error| wrong(path, none, error))?;
+        let mut file = ZipReader::open(from).map_err(|error| read_error(path, none, error))?;
+        let about = file.read(METADATA).map_err(|error| read_error(path, none, error))?;
         let about = about.and_then(|about| serde_json::from_slice(&about).ok());
         let about: Value = about.ok_or_else(|| malformed("it does not say what is in it (recording.json)"))?;
-        if !file.names().any(|name| name == START) {
+        if !file.names().any(|name| name == INITIAL_STATE) {
             return Err(malformed("it has no state to begin with (start.snapshot)"));
         }
         let names: Vec<String> = file.names().filter_map(|name| name.strip_suffix(".npy")).map(String::from).collect();
         let mut arrays = BTreeMap::new();
         for name in names {
-            let head = file.first(&format!("{name}.npy"), LONGEST_HEAD).map_err(|error| wrong(path, none, error))?;
+            let head = file
+                .read_prefix(&format!("{name}.npy"), MAX_HEADER_LEN)
+                .map_err(|error| read_error(path, none, error))?;
             let Some((descr, shape, _)) = head.as_deref().and_then(npy::parse) else { continue };
             // Images are not used by replay.
             if descr == "<f8" || (name.starts_with("events/") && ["<i4", "|u1"].contains(&descr)) {
                 arrays.insert(name, Array { shape, numbers: OnceLock::new() });
             }
         }
-        Ok(Self { path: path.into(), about, content: Content::Npz(Mutex::new(file)), arrays })
+        Ok(Self { path: path.into(), metadata: about, content: Content::Npz(Mutex::new(file)), arrays })
     }
 
     /// Reads a member of the archive; `None` if there is no such member.
     pub(crate) fn member(&self, name: &str) -> Result<Option<Vec<u8>>> {
         let file = match &self.content {
             Content::Npz(file) => file,
-            Content::Mcap(start) => return Ok((name == START).then(|| start.clone())),
+            Content::Mcap(start) => return Ok((name == INITIAL_STATE).then(|| start.clone())),
         };
         let read = file.lock().unwrap_or_else(PoisonError::into_inner).read(name);
-        read.map_err(|error| wrong(&self.path, &error.to_string(), error))
+        read.map_err(|error| read_error(&self.path, &error.to_string(), error))
     }
 
     /// Shape of an array, if it exists.
@@ -126,7 +128,7 @@ impl Archive {
     /// Initial state of the recording.
     pub(crate) fn start(&self) -> Result<Snapshot> {
         let failed = |error| RecordError::file(&self.path, error);
-        let start = self.member(START)?.unwrap_or_default();
+        let start = self.member(INITIAL_STATE)?.unwrap_or_default();
         let mut file = tempfile::NamedTempFile::new().map_err(failed)?;
         file.write_all(&start).and_then(|()| file.flush()).map_err(failed)?;
         Ok(Snapshot::load(file.path())?)
@@ -151,9 +153,9 @@ impl Archive {
     }
 
     /// Checks that the arrays of a stream have the shapes that they would have in this simulation.
-    pub(crate) fn check(&self, source: &Source, rows: usize) -> Result<()> {
-        for part in &source.stream.parts {
-            let name = crate::npz::member(&source.stream, &part.name);
+    pub(crate) fn check(&self, source: &StreamSource, rows: usize) -> Result<()> {
+        for part in &source.stream.fields {
+            let name = crate::npz::array_name(&source.stream, &part.name);
             let shape = [&[rows, source.stream.env_ids.len()][..], &part.shape].concat();
             let found = self.array(&name)?.0;
             if *found != shape {
@@ -176,23 +178,23 @@ impl Archive {
     }
 
     /// Resets and writes of an environment, in order: their steps, and the simulation times afterwards \[s\].
-    pub(crate) fn happened(&self, env: usize) -> Result<Vec<(f64, f64)>> {
+    pub(crate) fn state_changes(&self, env: usize) -> Result<Vec<(f64, f64)>> {
         let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, times) = (of("step")?, of("env")?, of("time")?);
         let kinds = of("kind")?;
         let of_env = steps.iter().zip(envs).zip(times.iter().zip(kinds));
         // Events of other kinds do not change the state.
-        let of_env = of_env.filter(|((_, of), (_, kind))| **of == env as f64 && CHANGES.contains(*kind));
+        let of_env = of_env.filter(|((_, of), (_, kind))| **of == env as f64 && STATE_CHANGE_KINDS.contains(*kind));
         Ok(of_env.map(|((step, _), (time, _))| (*step, *time)).collect())
     }
 
     /// Environments that were reset, and those that were written to, at a step.
-    pub(crate) fn events(&self, step: f64) -> Result<(Vec<EnvId>, Vec<EnvId>)> {
+    pub(crate) fn state_changes_at(&self, step: f64) -> Result<(Vec<EnvId>, Vec<EnvId>)> {
         let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, kinds) = (of("step")?, of("env")?, of("kind")?);
         let (mut reset, mut written) = (Vec::new(), Vec::new());
         for ((at, env), kind) in steps.iter().zip(envs).zip(kinds) {
-            if *at == step && CHANGES.contains(kind) {
+            if *at == step && STATE_CHANGE_KINDS.contains(kind) {
                 // Negative numbers, which no recorder writes, become 0.
                 let to = if *kind == 0.0 { &mut reset } else { &mut written };
                 to.push(EnvId(*env as usize));
@@ -205,7 +207,7 @@ impl Archive {
 }
 
 /// Converts a read error; `what` is the message for a damaged archive.
-fn wrong(path: &Path, what: &str, error: io::Error) -> RecordError {
+fn read_error(path: &Path, what: &str, error: io::Error) -> RecordError {
     match error.kind() {
         io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
             RecordError::Malformed { path: path.into(), what: what.into() }
@@ -227,12 +229,12 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Counts the bytes that are read.
-    struct Counted {
+    struct CountingReader {
         file: File,
         bytes: Arc<AtomicU64>,
     }
 
-    impl Read for Counted {
+    impl Read for CountingReader {
         fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
             let count = self.file.read(to)?;
             self.bytes.fetch_add(count as u64, Ordering::Relaxed);
@@ -240,7 +242,7 @@ mod tests {
         }
     }
 
-    impl Seek for Counted {
+    impl Seek for CountingReader {
         fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
             self.file.seek(to)
         }
@@ -262,15 +264,15 @@ mod tests {
         // 40 images of 128 x 96 f32 in two environments.
         assert!(whole > 40 * 2 * 4 * 128 * 96, "{whole}");
         let bytes = Arc::new(AtomicU64::new(0));
-        let counted = Counted { file: File::open(&path).unwrap(), bytes: Arc::clone(&bytes) };
-        let archive = Archive::of(&path, counted).unwrap();
+        let counted = CountingReader { file: File::open(&path).unwrap(), bytes: Arc::clone(&bytes) };
+        let archive = RecordedArrays::from_reader(&path, counted).unwrap();
         let opened = bytes.load(Ordering::Relaxed);
         let Content::Npz(file) = &archive.content else { panic!("{archive:?}") };
         let members = file.lock().unwrap().names().count() as u64;
-        let about = archive.member(ABOUT).unwrap().unwrap().len() as u64;
+        let about = archive.member(METADATA).unwrap().unwrap().len() as u64;
         // For each file: its directory entry (46 + 28 bytes and a name of at most 64), its local header (30) and the
         // array header. In addition the end of the archive (42 + 56) and `recording.json`.
-        let most = members * (46 + 28 + 64 + 30 + LONGEST_HEAD) + 98 + 30 + about;
+        let most = members * (46 + 28 + 64 + 30 + MAX_HEADER_LEN) + 98 + 30 + about;
         assert!(opened <= most && most < whole / 10, "{opened} bytes, at most {most} of {whole}");
         // An array takes its numbers (41 rows of two environments and seven positions), its header and its local
         // header.
@@ -296,7 +298,7 @@ mod tests {
         let place = bytes.windows(name.len()).position(|part| part == name).unwrap();
         bytes[place + name.len() + 20 + 128 + 9] ^= 1;
         std::fs::write(&path, &bytes).unwrap();
-        let archive = Archive::read(&path).unwrap();
+        let archive = RecordedArrays::open_npz(&path).unwrap();
         assert!(archive.array("ball/state/positions").is_ok());
         let error = archive.array("ball/state/velocities").unwrap_err().to_string();
         assert!(error.contains("velocities.npy is damaged"), "{error}");

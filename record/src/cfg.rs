@@ -1,7 +1,7 @@
 //! Configuration of recorders.
 
 use crate::format::Format;
-use crate::stage::StageCfg;
+use crate::stage::OverviewCfg;
 use crate::topic::Topic;
 use kinetoscope_sim::EnvId;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Configuration of a recorder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecorderCfg {
-    /// Output file; a folder for [`Format::Pictures`] and [`Format::LeRobot`].
+    /// Output file; a folder for [`Format::Images`] and [`Format::LeRobot`].
     pub path: PathBuf,
     /// Output format; `None` to choose it by the extension of the path ([`Format::all`]). A path without an extension
     /// is a folder of images.
@@ -19,14 +19,14 @@ pub struct RecorderCfg {
     /// Recorded environments; `None` for all.
     pub envs: Option<Vec<EnvId>>,
     /// Physics steps between two rows of states, targets and poses. Sensors are recorded whenever they measure. See
-    /// [`rates`](Self::rates) for other rates.
-    pub every: u64,
+    /// [`stream_periods`](Self::stream_periods) for other rates.
+    pub period_steps: u64,
     /// Rates of single streams: the name of a stream, and the number of physics steps between two of its rows.
     ///
     /// A name is that of the file, such as `arm/link_poses`, or a prefix such as `camera` for all its streams. The last
     /// entry that matches a stream applies. A sensor with a rate is recorded at these steps, with its last measurement,
     /// if that is new. Datasets of episodes have a single frame rate and do not support this.
-    pub rates: Vec<(String, u64)>,
+    pub stream_periods: Vec<(String, u64)>,
     /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. When all of them
     /// wait to be written, the simulation waits. The pool may take up to 16 GiB.
     pub packets: usize,
@@ -38,10 +38,10 @@ pub struct RecorderCfg {
     /// MCAP files additionally get scene messages for viewers (Foxglove): what cameras draw by default, attached to the
     /// recorded frames. A message is repeated when the appearance changes or an entity is added. Moving entities
     /// without a recorded pose are left out, and so are environments beyond the limit of 64 MiB for all messages.
-    /// [`Recorded::left_out`](crate::Recorded::left_out) lists both.
+    /// [`RecordingSummary::left_out`](crate::RecordingSummary::left_out) lists both.
     pub scene: bool,
-    /// Settings of the overview image, if it is recorded ([`Topic::Stage`]).
-    pub stage: StageCfg,
+    /// Settings of the overview image, if it is recorded ([`Topic::Overview`]).
+    pub overview: OverviewCfg,
     /// Description of the task in words, for all episodes of a LeRobot dataset or an HDF5 file. Other formats ignore
     /// it.
     pub task: String,
@@ -69,11 +69,11 @@ impl Default for RecorderCfg {
             format: None,
             topics: vec![Topic::Everything],
             envs: None,
-            every: 1,
-            rates: Vec::new(),
+            period_steps: 1,
+            stream_periods: Vec::new(),
             packets: 8,
             scene: true,
-            stage: StageCfg::default(),
+            overview: OverviewCfg::default(),
             task: String::new(),
             overwrite: false,
         }

@@ -6,40 +6,40 @@
 /// state. Its simulation time then jumps, which viewers do not support. Its recorded time continues from the time
 /// of the reset.
 #[derive(Clone, Debug)]
-pub(crate) struct Clock {
+pub(crate) struct RecordingClock {
     dt: f64,
     /// Number of simulation steps when the recording began.
-    first: u64,
+    first_step: u64,
     /// Simulation time of each environment when the recording began \[s\].
-    start: Vec<f64>,
+    start_times: Vec<f64>,
     /// Difference of recorded time and simulation time of each environment \[s\].
     offsets: Vec<f64>,
 }
 
-impl Clock {
+impl RecordingClock {
     pub(crate) fn new(dt: f64, steps: u64, times: &[f64]) -> Self {
-        Self { dt, first: steps, start: times.to_vec(), offsets: vec![0.0; times.len()] }
+        Self { dt, first_step: steps, start_times: times.to_vec(), offsets: vec![0.0; times.len()] }
     }
 
     /// Number of steps since the recording began.
     pub(crate) fn step(&self, steps: u64) -> u64 {
-        steps - self.first
+        steps - self.first_step
     }
 
     /// Present time of the recording \[s\]: environment 0's start time plus the elapsed time.
-    pub(crate) fn now(&self, steps: u64) -> f64 {
-        self.start.first().copied().unwrap_or(0.0) + self.elapsed(steps)
+    pub(crate) fn time(&self, steps: u64) -> f64 {
+        self.start_times.first().copied().unwrap_or(0.0) + self.elapsed(steps)
     }
 
     /// Recorded time of a simulation time of an environment \[s\].
-    pub(crate) fn stamp(&self, env: usize, time: f64) -> f64 {
+    pub(crate) fn recorded_time(&self, env: usize, time: f64) -> f64 {
         time + self.offsets[env]
     }
 
     /// Adjusts the offsets after resets and writes. `times` are the present simulation times of all environments \[s\].
-    pub(crate) fn restarted(&mut self, env_ids: &[usize], times: &[f64], steps: u64) {
+    pub(crate) fn resync(&mut self, env_ids: &[usize], times: &[f64], steps: u64) {
         for &env in env_ids {
-            let now = self.start[env] + self.elapsed(steps);
+            let now = self.start_times[env] + self.elapsed(steps);
             // Rounding errors of summed steps are far below half a step. A larger difference means that the time was
             // set.
             if (times[env] + self.offsets[env] - now).abs() > 0.5 * self.dt {
@@ -59,16 +59,16 @@ mod tests {
 
     #[test]
     fn resets() {
-        let mut clock = Clock::new(0.25, 8, &[2.0, 2.0]);
-        assert_eq!([clock.stamp(0, 2.5), clock.stamp(1, 2.5)], [2.5, 2.5]);
-        clock.restarted(&[1], &[2.5, 0.0], 10);
-        assert_eq!([clock.stamp(0, 2.75), clock.stamp(1, 0.25)], [2.75, 2.75]);
+        let mut clock = RecordingClock::new(0.25, 8, &[2.0, 2.0]);
+        assert_eq!([clock.recorded_time(0, 2.5), clock.recorded_time(1, 2.5)], [2.5, 2.5]);
+        clock.resync(&[1], &[2.5, 0.0], 10);
+        assert_eq!([clock.recorded_time(0, 2.75), clock.recorded_time(1, 0.25)], [2.75, 2.75]);
         // A write to joints does not change the time.
-        clock.restarted(&[0], &[2.5, 0.0], 10);
-        assert_eq!(clock.stamp(0, 2.75), 2.75);
-        assert_eq!((clock.step(10), clock.now(10)), (2, 2.5));
+        clock.resync(&[0], &[2.5, 0.0], 10);
+        assert_eq!(clock.recorded_time(0, 2.75), 2.75);
+        assert_eq!((clock.step(10), clock.time(10)), (2, 2.5));
         // Set to 7 s at the recorded time of 3 s: 0.25 s later is the recorded time 3.25 s.
-        clock.restarted(&[0], &[7.0, 0.5], 12);
-        assert_eq!(clock.stamp(0, 7.25), 3.25);
+        clock.resync(&[0], &[7.0, 0.5], 12);
+        assert_eq!(clock.recorded_time(0, 7.25), 3.25);
     }
 }

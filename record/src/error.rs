@@ -1,6 +1,6 @@
 //! Errors of recording, reading and replay.
 
-use crate::format::{Format, ends};
+use crate::format::{Format, extensions_text};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,29 +18,29 @@ pub enum RecordError {
         path: PathBuf,
     },
     /// The partial file of a killed recording exists.
-    #[error("{part}: an earlier recording was not finished; {}", advice(.recoverable))]
+    #[error("{partial_file}: an earlier recording was not finished; {}", advice(.recoverable))]
     Unfinished {
         /// The partial file.
-        part: PathBuf,
+        partial_file: PathBuf,
         /// True if [`recover`](crate::recover) can make a complete file of it.
         recoverable: bool,
     },
     /// Another recorder writes to this path.
-    #[error("{part}: another recorder is writing this; choose another name")]
+    #[error("{partial_file}: another recorder is writing this; choose another name")]
     Busy {
         /// The partial file or folder that it writes.
-        part: PathBuf,
+        partial_file: PathBuf,
     },
     /// No format has this file name extension.
     #[error(
-        "{path}: nothing is recorded as .{end}; known are {}, and a name without end for a folder of PNG files",
-        ends()
+        "{path}: nothing is recorded as .{extension}; known are {}, and a name without end for a folder of PNG files",
+        extensions_text()
     )]
     Format {
         /// The file.
         path: PathBuf,
         /// Extension of its name.
-        end: String,
+        extension: String,
     },
     /// This build does not support the format.
     #[error("{path}: this build does not write {}: build with the feature `{feature}` (`--features {feature}`)", .format.name())]
@@ -54,7 +54,7 @@ pub enum RecordError {
     },
     /// The format does not support a topic that was requested by name.
     #[error("{path}: {} has no place for {topic}", .format.name())]
-    NoPlace {
+    UnsupportedTopic {
         /// The file.
         path: PathBuf,
         /// Its format.
@@ -72,13 +72,13 @@ pub enum RecordError {
     },
     /// The overview image cannot be drawn.
     #[error("the picture of the stage: {what}")]
-    Stage {
+    Overview {
         /// Reason, or the invalid number.
         what: String,
     },
     /// The configuration selects no existing stream that the format supports.
     #[error("{path}: there is nothing to record for {}", .format.name())]
-    Nothing {
+    NothingToRecord {
         /// The file.
         path: PathBuf,
         /// Its format.
@@ -88,15 +88,15 @@ pub enum RecordError {
     #[error(
         "{path}: an animation shows one camera in one environment; these are {found}: choose a topic and an environment"
     )]
-    TooMany {
+    NotSingleImage {
         /// The file.
         path: PathBuf,
         /// The selected streams.
         found: String,
     },
     /// The format does not support images of this size.
-    #[error("{path}: {} has no pictures of {width} x {height} pixels: {fits}", .format.name())]
-    Size {
+    #[error("{path}: {} has no pictures of {width} x {height} pixels: {supported}", .format.name())]
+    UnsupportedSize {
         /// The file.
         path: PathBuf,
         /// Its format.
@@ -106,26 +106,26 @@ pub enum RecordError {
         /// Height \[pixels\].
         height: usize,
         /// Supported sizes.
-        fits: String,
+        supported: String,
     },
     /// The format requires a whole number of rows per second.
-    #[error("{path}: with `every` {every} there are {found:.3} rows per second, which is no whole number; {}", whole(.near))]
-    Rate {
+    #[error("{path}: with `every` {every} there are {found:.3} rows per second, which is no whole number; {}", rate_advice(.candidates))]
+    UnsupportedRate {
         /// The file.
         path: PathBuf,
-        /// [`RecorderCfg::every`](crate::RecorderCfg::every).
+        /// [`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps).
         every: u64,
         /// Rows per second \[Hz\].
         found: f64,
         /// Values of `every` that give a whole rate, the nearest first.
-        near: Vec<u64>,
+        candidates: Vec<u64>,
     },
     /// A stream is missing in an environment of a dataset, whose rows must be complete.
     #[error(
         "{path}: every row of a dataset has everything, but {stream} is not in environment {env}; record environments and topics \
          that go together"
     )]
-    NotEverywhere {
+    MissingStream {
         /// The folder.
         path: PathBuf,
         /// The missing stream, such as `camera/color`.
@@ -134,7 +134,7 @@ pub enum RecordError {
         env: usize,
     },
     /// There is no entity, topic or field of this name.
-    #[error("there is no {what} {name:?}{}", known(.candidates))]
+    #[error("there is no {what} {name:?}{}", candidates_text(.candidates))]
     UnknownName {
         /// Kind of name.
         what: &'static str,
@@ -155,19 +155,19 @@ pub enum RecordError {
     },
     /// The type of a sensor does not provide its channels.
     #[error("sensor {sensor:?} cannot be recorded: its type says nothing of its channels (Sensor::sampled)")]
-    Unreadable {
+    NoChannels {
         /// Name of the sensor.
         sensor: String,
     },
     /// A camera renders none of the recorded environments.
     #[error("sensor {sensor:?} is in none of the environments that are recorded")]
-    Elsewhere {
+    SensorNotInEnvs {
         /// Name of the sensor.
         sensor: String,
     },
     /// Two streams would have the same name in the file.
     #[error("{path}: two things that are recorded are called {name:?} there; choose topics, or rename one of them")]
-    SameName {
+    DuplicateName {
         /// The file.
         path: PathBuf,
         /// The name.
@@ -175,15 +175,15 @@ pub enum RecordError {
     },
     /// The packet pool is larger than the limit.
     #[error(
-        "{packets} packets of {bytes} bytes are more than the {most} bytes that a pool may have; choose fewer packets"
+        "{packets} packets of {bytes} bytes are more than the {max_bytes} bytes that a pool may have; choose fewer packets"
     )]
-    TooLarge {
+    PoolTooLarge {
         /// [`RecorderCfg::packets`](crate::RecorderCfg::packets).
         packets: usize,
         /// Size of a packet \[bytes\].
         bytes: u64,
         /// Largest size of the pool \[bytes\].
-        most: u64,
+        max_bytes: u64,
     },
     /// An environment does not exist, or is listed twice.
     #[error("environment {env} is not one of {count}, or is named twice")]
@@ -194,42 +194,42 @@ pub enum RecordError {
         count: usize,
     },
     /// A number of the configuration is out of range.
-    #[error("{field} is {value}: it must be at least {least}")]
+    #[error("{field} is {value}: it must be at least {min}")]
     OutOfRange {
         /// The field.
         field: &'static str,
         /// Its value.
         value: u64,
         /// Its smallest valid value.
-        least: u64,
+        min: u64,
     },
     /// A recorded stream was removed or has another shape.
     #[error("{path}: {stream} is not what it was when the recording began: something was added to the scene")]
-    Changed {
+    StreamChanged {
         /// The file.
         path: PathBuf,
         /// The changed stream.
         stream: String,
     },
     /// The file cannot be read or written.
-    #[error("{path}: {error}{}", left(.kept))]
+    #[error("{path}: {error}{}", partial_file_text(.partial_file))]
     File {
         /// The file.
         path: PathBuf,
         /// Cause.
         error: Arc<std::io::Error>,
         /// The partial file, if it can be read.
-        kept: Option<PathBuf>,
+        partial_file: Option<PathBuf>,
     },
     /// The recording was aborted.
-    #[error("{error}{}{}", unwritten(.also), left(.kept))]
-    BrokenOff {
+    #[error("{error}{}{}", write_error_text(.write_error), partial_file_text(.partial_file))]
+    Aborted {
         /// Cause.
         error: Box<RecordError>,
         /// Error of writing the rest of the file, if any.
-        also: Option<String>,
+        write_error: Option<String>,
         /// The partial file, if it can be read.
-        kept: Option<PathBuf>,
+        partial_file: Option<PathBuf>,
     },
     /// A limit of the format is exceeded.
     #[error("{path}: {what}")]
@@ -275,11 +275,11 @@ impl From<kinetoscope_sim::Error> for RecordError {
 impl RecordError {
     /// Creates [`File`](Self::File) without a partial file.
     pub(crate) fn file(path: &std::path::Path, error: std::io::Error) -> Self {
-        Self::File { path: path.into(), error: Arc::new(error), kept: None }
+        Self::File { path: path.into(), error: Arc::new(error), partial_file: None }
     }
 }
 
-fn known(candidates: &[String]) -> String {
+fn candidates_text(candidates: &[String]) -> String {
     if candidates.is_empty() { String::new() } else { format!("; known are {}", candidates.join(", ")) }
 }
 
@@ -290,15 +290,15 @@ fn advice(recoverable: &bool) -> &'static str {
     }
 }
 
-fn unwritten(error: &Option<String>) -> String {
+fn write_error_text(error: &Option<String>) -> String {
     error.as_ref().map_or_else(String::new, |error| format!("; nor can the file be written: {error}"))
 }
 
-fn left(kept: &Option<PathBuf>) -> String {
+fn partial_file_text(kept: &Option<PathBuf>) -> String {
     kept.as_ref().map_or_else(String::new, |kept| format!("; what was recorded until then is in {}", kept.display()))
 }
 
-fn whole(near: &[u64]) -> String {
+fn rate_advice(near: &[u64]) -> String {
     let near: Vec<String> = near.iter().map(u64::to_string).collect();
     match near.is_empty() {
         true => "choose another physics_dt".into(),

@@ -20,19 +20,19 @@ impl Storage for File {
 }
 
 /// A wrapper of files.
-type Through = dyn Fn(File) -> Box<dyn Storage> + Send + Sync;
+type WrapFile = dyn Fn(File) -> Box<dyn Storage> + Send + Sync;
 
 /// Storage of the files of a recording. Tests insert a wrapper that simulates a full disk.
 #[derive(Clone, Default)]
-pub(crate) struct Disk(Option<Arc<Through>>);
+pub(crate) struct StorageFactory(Option<Arc<WrapFile>>);
 
-impl std::fmt::Debug for Disk {
+impl std::fmt::Debug for StorageFactory {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Disk")
     }
 }
 
-impl Disk {
+impl StorageFactory {
     /// Wraps a file.
     pub(crate) fn storage(&self, file: File) -> Box<dyn Storage> {
         match &self.0 {
@@ -45,26 +45,26 @@ impl Disk {
 /// A file that is called `NAME.part` until it is complete. Dropping it before deletes it, unless its content is
 /// readable.
 #[derive(Debug)]
-pub(crate) struct PartFile {
+pub(crate) struct PartialFile {
     /// Locked while it is written, so that other recorders do not take it for a remainder.
     file: AtomicFile,
     overwrite: bool,
 }
 
-impl PartFile {
+impl PartialFile {
     /// Creates the partial file. `recoverable` is true if [`recover`](crate::recover) can restore it after a kill.
     ///
     /// # Errors
     /// A file of that name or a partial file of an earlier recording exists and may not be replaced, another recorder
     /// writes it, or the folder is not writable.
     pub(crate) fn create(path: &Path, overwrite: bool, recoverable: bool) -> Result<(Self, File)> {
-        let part = part_of(path);
-        if let Some(left) = lock_left(&part)? {
+        let part = partial_path_of(path);
+        if let Some(left) = lock_partial_file(&part)? {
             // An empty file has nothing to lose. Archives and animations are empty until they are finished.
             if !overwrite && left.metadata().is_ok_and(|left| left.len() > 0) {
-                return Err(RecordError::Unfinished { part, recoverable });
+                return Err(RecordError::Unfinished { partial_file: part, recoverable });
             }
-            remove(&part)?;
+            remove_file_if_exists(&part)?;
         }
         Self::create_as(path, part, overwrite)
     }
@@ -103,7 +103,7 @@ impl PartFile {
         } else {
             self.file.persist_noclobber()?;
         }
-        sync_folder(self.file.path());
+        sync_dir(self.file.path());
         Ok(bytes)
     }
 
@@ -114,13 +114,13 @@ impl PartFile {
 
     /// Path of the partial file.
     #[cfg(feature = "hdf5")]
-    pub(crate) fn part(&self) -> &Path {
-        self.file.part()
+    pub(crate) fn partial_path(&self) -> &Path {
+        self.file.temp_path()
     }
 
     /// Path of the partial file, if it remains.
-    pub(crate) fn kept(&self) -> Option<PathBuf> {
-        self.file.is_kept().then(|| self.file.part().into())
+    pub(crate) fn kept_path(&self) -> Option<PathBuf> {
+        self.file.is_kept().then(|| self.file.temp_path().into())
     }
 }
 
@@ -128,7 +128,7 @@ impl PartFile {
 ///
 /// # Errors
 /// Another recorder writes it, or it cannot be opened.
-pub(crate) fn lock_left(part: &Path) -> Result<Option<File>> {
+pub(crate) fn lock_partial_file(part: &Path) -> Result<Option<File>> {
     let left = match OpenOptions::new().read(true).write(true).open(part) {
         Ok(left) => left,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -136,13 +136,13 @@ pub(crate) fn lock_left(part: &Path) -> Result<Option<File>> {
     };
     match left.try_lock() {
         Ok(()) => Ok(Some(left)),
-        Err(TryLockError::WouldBlock) => Err(RecordError::Busy { part: part.into() }),
+        Err(TryLockError::WouldBlock) => Err(RecordError::Busy { partial_file: part.into() }),
         Err(TryLockError::Error(error)) => Err(RecordError::file(part, error)),
     }
 }
 
 /// Deletes a file, if it exists.
-pub(crate) fn remove(file: &Path) -> Result<()> {
+pub(crate) fn remove_file_if_exists(file: &Path) -> Result<()> {
     match fs::remove_file(file) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(RecordError::file(file, error)),
         _ => Ok(()),
@@ -150,20 +150,20 @@ pub(crate) fn remove(file: &Path) -> Result<()> {
 }
 
 /// Flushes the name of a file to the disk, where the system supports it.
-pub(crate) fn sync_folder(file: &Path) {
+pub(crate) fn sync_dir(file: &Path) {
     // The file is complete and has its name. A crash of the machine may undo the name, which is no error of the file.
-    let _ = File::open(folder_of(file)).and_then(|folder| folder.sync_all());
+    let _ = File::open(parent_dir(file)).and_then(|folder| folder.sync_all());
 }
 
 /// Path of the partial file.
-pub(crate) fn part_of(path: &Path) -> PathBuf {
+pub(crate) fn partial_path_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     name.into()
 }
 
 /// Folder of a file.
-pub(crate) fn folder_of(path: &Path) -> &Path {
+pub(crate) fn parent_dir(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
@@ -181,7 +181,7 @@ pub(crate) mod tests {
         left: Arc<Mutex<usize>>,
     }
 
-    impl Disk {
+    impl StorageFactory {
         /// A disk with room for a number of bytes, which all its files share.
         pub(crate) fn full_after(bytes: usize) -> Self {
             let left = Arc::new(Mutex::new(bytes));
@@ -220,23 +220,23 @@ pub(crate) mod tests {
     #[test]
     fn taken_name() {
         let (_folder, path) = crate::tests::scratch("run.npz");
-        let (mut part, mut file) = PartFile::create(&path, false, false).unwrap();
+        let (mut part, mut file) = PartialFile::create(&path, false, false).unwrap();
         file.write_all(b"whole").unwrap();
         fs::write(&path, "precious").unwrap();
         assert_eq!(part.commit().unwrap_err().kind(), io::ErrorKind::AlreadyExists);
-        let kept = part.kept().unwrap();
+        let kept = part.kept_path().unwrap();
         drop(part);
         assert_eq!((fs::read(&path).unwrap(), fs::read(&kept).unwrap()), (b"precious".to_vec(), b"whole".to_vec()));
         drop(file);
         // The partial file is not overwritten. The message does not suggest `recover`, which cannot help here.
         fs::remove_file(&path).unwrap();
-        let error = PartFile::create(&path, false, false).unwrap_err().to_string();
+        let error = PartialFile::create(&path, false, false).unwrap_err().to_string();
         assert!(error.contains("run.npz.part") && !error.contains("recover"), "{error}");
         // Control: with the name free again, the file gets it.
         fs::remove_file(kept).unwrap();
-        let (mut part, mut file) = PartFile::create(&path, false, false).unwrap();
+        let (mut part, mut file) = PartialFile::create(&path, false, false).unwrap();
         file.write_all(b"whole").unwrap();
         assert_eq!((part.commit().unwrap(), fs::read(&path).unwrap()), (5, b"whole".to_vec()));
-        assert!(!part_of(&path).exists());
+        assert!(!partial_path_of(&path).exists());
     }
 }

@@ -1,67 +1,67 @@
 //! Playback of a recording: a simulation of its scene, set to the recorded states.
 
 use crate::error::{RecordError, Result};
-use crate::read::{Recording, Samples, Wanted};
-use crate::scene_file::{self, SCENE};
+use crate::read::{FieldSelector, Recording, TimeSeries};
+use crate::scene_file::{self, SCENE_ARCHIVE};
 use kinetoscope_sim::{MjcfId, MjcfPart, SimulationManager};
 use ndarray::Array2;
 
-/// Recorded motion in its scene. [`show`](Self::show) sets the simulation to a recorded time.
+/// Recorded motion in its scene. [`seek`](Self::seek) sets the simulation to a recorded time.
 ///
 /// It includes everything that moves by itself: joints of robots, articulations and MJCF files, free bases and objects,
 /// and kinematic objects. Properties that were changed per environment (sizes, colors) appear as in the scene.
 #[derive(Debug)]
-pub struct Film {
+pub struct Playback {
     part: MjcfId,
     times: Vec<f64>,
     tracks: Vec<Track>,
     /// Positions of all joints in MuJoCo's order, shape (N, nq).
     qpos: Array2<f64>,
-    hands: Vec<Hand>,
-    unmoved: Vec<String>,
+    mocap_bodies: Vec<MocapBody>,
+    joints_without_data: Vec<String>,
 }
 
 /// One recorded number over time, and its destination.
 #[derive(Debug)]
 struct Track {
     env: usize,
-    column: Column,
-    samples: Samples,
+    target: TrackTarget,
+    samples: TimeSeries,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Column {
+enum TrackTarget {
     /// Column of `qpos`.
     Joint(usize),
     /// Index of a kinematic body, and column of its pose.
-    Hand(usize, usize),
+    MocapPose(usize, usize),
 }
 
 /// A kinematic (MuJoCo: mocap) body.
 #[derive(Debug)]
-struct Hand {
+struct MocapBody {
     body: String,
     /// Poses as rows x, y, z, qw, qx, qy, qz, shape (N, 7).
     poses: Array2<f64>,
     /// True if any value of it was recorded.
-    known: bool,
+    has_data: bool,
 }
 
 /// Number of values of a joint in `qpos`, by MuJoCo's joint type: free, ball, slide, hinge.
-const WIDTHS: [usize; 4] = [7, 4, 1, 1];
+const QPOS_WIDTHS: [usize; 4] = [7, 4, 1, 1];
 const FREE: i32 = 0;
 
-impl Film {
+impl Playback {
     /// Opens the playback of a recording, in the scene that the file contains or in `scene`, a simulation that is built
     /// as the recorded one was. Returns the playback and the simulation that displays it.
     ///
     /// # Errors
     /// The recording contains no scene and none is given, the scene cannot be compiled, or no motion was recorded.
-    pub fn of(recording: &Recording, scene: Option<&SimulationManager>) -> Result<(Self, SimulationManager)> {
+    pub fn open(recording: &Recording, scene: Option<&SimulationManager>) -> Result<(Self, SimulationManager)> {
         let malformed = |what: &str| RecordError::Malformed { path: recording.path().into(), what: what.into() };
         let packed = match scene {
             Some(sim) => scene_file::pack(sim)?.0,
-            None => recording.attachment(SCENE)?.ok_or_else(|| {
+            None => recording.attachment(SCENE_ARCHIVE)?.ok_or_else(|| {
                 malformed("it does not hold its scene; give a scene that is built as the recorded one was")
             })?,
         };
@@ -79,45 +79,46 @@ impl Film {
         let view = sim.mjcf_part(part);
         let qpos = view.qpos();
         let envs: Vec<usize> = recording.env_ids().into_iter().filter(|env| *env < sim.num_envs()).collect();
-        let by_hand = bodies_by_hand(&view);
-        let start = |body: &String| view.body_pose(body).map(|poses| Hand { body: body.clone(), poses, known: false });
-        let mut hands: Vec<Hand> = by_hand.iter().map(start).collect::<kinetoscope_sim::Result<_>>()?;
+        let by_hand = mocap_body_names(&view);
+        let start =
+            |body: &String| view.body_pose(body).map(|poses| MocapBody { body: body.clone(), poses, has_data: false });
+        let mut hands: Vec<MocapBody> = by_hand.iter().map(start).collect::<kinetoscope_sim::Result<_>>()?;
         let (mut wanted, mut places, mut unmoved) = (Vec::new(), Vec::new(), Vec::new());
-        let mut want = |topic: String, field: String, env: usize, column: Column| {
+        let mut want = |topic: String, field: String, env: usize, column: TrackTarget| {
             let known = recording.topics().iter().find(|known| known.name == topic);
             let there = known.is_some_and(|topic| topic.fields.contains(&field));
             if there {
-                wanted.push(Wanted { topic, field });
+                wanted.push(FieldSelector { topic, field });
                 places.push((env, column));
             }
             there
         };
         for &env in &envs {
             for (k, hand) in hands.iter_mut().enumerate() {
-                for (number, (topic, field)) in pose(recording, env, &hand.body).into_iter().enumerate() {
-                    hand.known |= want(topic, field, env, Column::Hand(k, number));
+                for (number, (topic, field)) in pose_fields(recording, env, &hand.body).into_iter().enumerate() {
+                    hand.has_data |= want(topic, field, env, TrackTarget::MocapPose(k, number));
                 }
             }
             for joint in joints(&view) {
                 let mut there = false;
-                for (topic, field, column) in joint.numbers(recording, env, &view) {
-                    there |= want(topic, field, env, Column::Joint(column));
+                for (topic, field, column) in joint.qpos_fields(recording, env, &view) {
+                    there |= want(topic, field, env, TrackTarget::Joint(column));
                 }
                 if !there && !unmoved.contains(&joint.name) {
                     unmoved.push(joint.name);
                 }
             }
         }
-        let samples = recording.samples(&wanted)?;
+        let samples = recording.time_series(&wanted)?;
         let mut times: Vec<f64> = samples.iter().flat_map(|samples| samples.times.iter().copied()).collect();
         // Times of a diverged environment may be NaN.
         times.retain(|time| time.is_finite());
         times.sort_by(f64::total_cmp);
         // One of the formats rounds times to nanoseconds.
         times.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-        let track = |(samples, (env, column))| Track { env, column, samples };
+        let track = |(samples, (env, column))| Track { env, target: column, samples };
         let tracks = samples.into_iter().zip(places).map(track).collect();
-        Ok(Self { part, times, tracks, qpos, hands, unmoved })
+        Ok(Self { part, times, tracks, qpos, mocap_bodies: hands, joints_without_data: unmoved })
     }
 
     /// Times with recorded values \[s\], in ascending order, on the clock of the recording.
@@ -126,8 +127,8 @@ impl Film {
     }
 
     /// Joints of the scene without recorded values. They stay in their initial state.
-    pub fn unmoved(&self) -> &[String] {
-        &self.unmoved
+    pub fn joints_without_data(&self) -> &[String] {
+        &self.joints_without_data
     }
 
     /// Index of the last recorded time that is not later than `time` \[s\]; 0 before the first.
@@ -140,9 +141,9 @@ impl Film {
     ///
     /// # Errors
     /// A recorded quaternion has length zero.
-    pub fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<()> {
+    pub fn seek(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<()> {
         let Some(&time) = self.times.get(frame.min(self.times.len().saturating_sub(1))) else { return Ok(()) };
-        for Track { env, column, samples } in &self.tracks {
+        for Track { env, target: column, samples } in &self.tracks {
             // Before its first time, a number has its first value.
             let last = samples.times.partition_point(|sample| *sample <= time + 1e-9).saturating_sub(1);
             // A diverged number keeps its last finite value, also after a jump to a later time.
@@ -150,12 +151,12 @@ impl Film {
             let value = until.and_then(|until| until.iter().rev().find(|value| value.is_finite()));
             let Some(&value) = value else { continue };
             match *column {
-                Column::Joint(column) => self.qpos[(*env, column)] = value,
-                Column::Hand(hand, number) => self.hands[hand].poses[(*env, number)] = value,
+                TrackTarget::Joint(column) => self.qpos[(*env, column)] = value,
+                TrackTarget::MocapPose(hand, number) => self.mocap_bodies[hand].poses[(*env, number)] = value,
             }
         }
         let mut part = sim.mjcf_part_mut(self.part);
-        for hand in self.hands.iter().filter(|hand| hand.known) {
+        for hand in self.mocap_bodies.iter().filter(|hand| hand.has_data) {
             part.write_mocap_pose(&hand.body, &hand.poses, None)?;
         }
         if self.qpos.ncols() > 0 {
@@ -165,7 +166,7 @@ impl Film {
     }
 }
 
-fn bodies_by_hand(view: &MjcfPart<'_>) -> Vec<String> {
+fn mocap_body_names(view: &MjcfPart<'_>) -> Vec<String> {
     // The first body is the world.
     let by_hand = view.model().body_mocapid().iter().skip(1);
     view.body_names().iter().zip(by_hand).filter(|(_, mocap)| **mocap >= 0).map(|(name, _)| name.clone()).collect()
@@ -199,7 +200,7 @@ fn joints(view: &MjcfPart<'_>) -> Vec<Joint> {
 }
 
 /// Topics and fields of the seven numbers of a pose in a recording, in the order x, y, z, qw, qx, qy, qz.
-fn pose(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7] {
+fn pose_fields(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7] {
     if recording.is_archive() {
         // The stream of an object, whose name may contain a slash, or the link poses of a robot.
         let object = format!("{frame}/pose");
@@ -221,13 +222,13 @@ fn pose(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7]
 impl Joint {
     /// Topics, fields and `qpos` columns of its numbers in a recording. A number has several entries if several topics
     /// may contain it.
-    fn numbers(&self, recording: &Recording, env: usize, view: &MjcfPart<'_>) -> Vec<(String, String, usize)> {
+    fn qpos_fields(&self, recording: &Recording, env: usize, view: &MjcfPart<'_>) -> Vec<(String, String, usize)> {
         let mut places = Vec::new();
-        let width = usize::try_from(self.kind).ok().and_then(|kind| WIDTHS.get(kind)).copied().unwrap_or(0);
+        let width = usize::try_from(self.kind).ok().and_then(|kind| QPOS_WIDTHS.get(kind)).copied().unwrap_or(0);
         let Some((uid, own)) = self.name.split_once('/') else { return places };
         if self.kind == FREE {
             let columns = (0..width).map(|k| self.first + k);
-            let numbers = pose(recording, env, &self.body).into_iter().zip(columns);
+            let numbers = pose_fields(recording, env, &self.body).into_iter().zip(columns);
             places.extend(numbers.map(|((topic, field), column)| (topic, field, column)));
         } else if width == 1 {
             places.push((format!("/env_{env}/{uid}/joint_states"), format!("position[{own}]"), self.first));

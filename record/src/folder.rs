@@ -1,7 +1,7 @@
 //! Folders that get their name when they are complete.
 
 use crate::error::{RecordError, Result};
-use crate::file::{folder_of, lock_left, part_of, sync_folder};
+use crate::file::{lock_partial_file, parent_dir, partial_path_of, sync_dir};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ const REPLACED: &str = "replaced";
 
 /// A folder that is called `NAME.part` until it is complete.
 #[derive(Debug)]
-pub(crate) struct PartFolder {
+pub(crate) struct PartialFolder {
     path: PathBuf,
     part: PathBuf,
     overwrite: bool,
@@ -19,7 +19,7 @@ pub(crate) struct PartFolder {
     marker: &'static str,
 }
 
-impl PartFolder {
+impl PartialFolder {
     /// Creates the folder, and the file `marker` in it, which is locked while the recorder exists.
     ///
     /// # Errors
@@ -31,24 +31,24 @@ impl PartFolder {
             let error = io::Error::new(io::ErrorKind::InvalidInput, "a folder needs a name of its own");
             return Err(RecordError::file(&path, error));
         }
-        let part = part_of(&path);
+        let part = partial_path_of(&path);
         let folder = Self { path, part, overwrite, marker };
         let Self { path, part, .. } = &folder;
-        if !folder.is_free(path).map_err(|error| RecordError::file(path, error))? {
+        if !folder.is_available(path).map_err(|error| RecordError::file(path, error))? {
             return Err(RecordError::Exists { path: path.clone() });
         }
         let failed = |error| RecordError::file(part, error);
-        let left = lock_left(&part.join(marker)).map_err(|error| match error {
-            RecordError::Busy { .. } => RecordError::Busy { part: part.clone() },
+        let left = lock_partial_file(&part.join(marker)).map_err(|error| match error {
+            RecordError::Busy { .. } => RecordError::Busy { partial_file: part.clone() },
             other => other,
         })?;
-        if !folder.is_free(part).map_err(failed)? {
-            return Err(RecordError::Unfinished { part: part.clone(), recoverable: false });
+        if !folder.is_available(part).map_err(failed)? {
+            return Err(RecordError::Unfinished { partial_file: part.clone(), recoverable: false });
         }
         // Some systems do not delete a folder with a locked file.
         drop(left);
         let begin = || {
-            take_away(part)?;
+            remove_dir_if_exists(part)?;
             let file = part.join(marker);
             fs::create_dir_all(file.parent().unwrap_or(part))?;
             let file = File::create_new(file)?;
@@ -60,19 +60,19 @@ impl PartFolder {
     }
 
     /// Path of the folder until it is complete.
-    pub(crate) fn part(&self) -> &Path {
+    pub(crate) fn partial_path(&self) -> &Path {
         &self.part
     }
 
     /// Renames the complete folder to its final name.
     pub(crate) fn commit(&self) -> io::Result<()> {
-        if !self.is_free(&self.path)? {
+        if !self.is_available(&self.path)? {
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a folder of that name has appeared meanwhile"));
         }
         // A replaced folder is set aside until the new one has its name, so that one of them exists at any time.
         let aside = match self.path.symlink_metadata() {
             Ok(_) => {
-                let aside = tempfile::tempdir_in(folder_of(&self.path))?;
+                let aside = tempfile::tempdir_in(parent_dir(&self.path))?;
                 fs::rename(&self.path, aside.path().join(REPLACED))?;
                 Some(aside)
             }
@@ -87,13 +87,13 @@ impl PartFolder {
             }
             return Err(error);
         }
-        sync_folder(&self.path);
+        sync_dir(&self.path);
         Ok(())
     }
 
     /// True if the folder may be created: nothing is there, or an empty folder, or a recorder's folder that may be
     /// replaced.
-    fn is_free(&self, path: &Path) -> io::Result<bool> {
+    fn is_available(&self, path: &Path) -> io::Result<bool> {
         match fs::read_dir(path) {
             Ok(mut entries) => Ok(entries.next().is_none() || (self.overwrite && path.join(self.marker).is_file())),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
@@ -103,7 +103,7 @@ impl PartFolder {
 }
 
 /// Removes a folder, if it exists.
-fn take_away(path: &Path) -> io::Result<()> {
+fn remove_dir_if_exists(path: &Path) -> io::Result<()> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
@@ -121,14 +121,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         let make = |what: &str| {
-            let (part, marker) = PartFolder::create(&path, true, "marker").unwrap();
-            fs::write(part.part().join("what"), what).unwrap();
+            let (part, marker) = PartialFolder::create(&path, true, "marker").unwrap();
+            fs::write(part.partial_path().join("what"), what).unwrap();
             drop(marker);
             part
         };
         make("old").commit().unwrap();
         let broken = make("new");
-        fs::remove_dir_all(broken.part()).unwrap();
+        fs::remove_dir_all(broken.partial_path()).unwrap();
         assert_eq!(broken.commit().unwrap_err().kind(), io::ErrorKind::NotFound);
         assert_eq!(fs::read_to_string(path.join("what")).unwrap(), "old");
         // Control: the next complete folder replaces the old one, and nothing else remains.

@@ -1,8 +1,8 @@
 //! File formats and their file name extensions.
 
-use crate::episodes::holds;
+use crate::episodes::supports;
 use crate::error::{RecordError, Result};
-use crate::stream::{Kind, Stream};
+use crate::stream::{StreamKind, StreamSchema};
 use std::path::Path;
 
 /// File format of a recording.
@@ -15,7 +15,7 @@ pub enum Format {
     Npz,
     /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters, and `times.csv` with their
     /// times.
-    Pictures,
+    Images,
     /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode. An episode lasts from one reset
     /// of an environment to the next. Frames are the rows of the recording, from the first complete one on. Their rate
     /// must be a whole number per second.
@@ -33,45 +33,50 @@ pub enum Format {
 }
 
 /// Properties of a format.
-struct Known {
+struct FormatInfo {
     format: Format,
     /// File name extension; empty for a folder of images.
-    end: &'static str,
+    extension: &'static str,
     /// Name in messages.
     name: &'static str,
     /// True for the streams that the format supports.
-    holds: fn(&Stream) -> bool,
+    supports: fn(&StreamSchema) -> bool,
 }
 
 /// All formats.
-const ALL: [Known; 9] = [
-    Known { format: Format::Mcap, end: "mcap", name: "an MCAP file", holds: |_| true },
-    Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
-    Known { format: Format::Pictures, end: "", name: "a folder of pictures", holds: is_seen },
-    Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds },
-    Known { format: Format::Hdf5, end: "hdf5", name: "an HDF5 file (robomimic)", holds: is_of_robomimic },
-    Known { format: Format::Apng, end: "apng", name: "an animated PNG", holds: is_color },
-    Known { format: Format::Gif, end: "gif", name: "an animated GIF", holds: is_color },
-    Known { format: Format::Webp, end: "webp", name: "an animated WebP", holds: is_color },
-    Known { format: Format::Mp4, end: "mp4", name: "an MP4 file", holds: is_color },
+const ALL: [FormatInfo; 9] = [
+    FormatInfo { format: Format::Mcap, extension: "mcap", name: "an MCAP file", supports: |_| true },
+    FormatInfo { format: Format::Npz, extension: "npz", name: "a NumPy archive", supports: |_| true },
+    FormatInfo { format: Format::Images, extension: "", name: "a folder of pictures", supports: is_png_image },
+    FormatInfo { format: Format::LeRobot, extension: "lerobot", name: "a LeRobot dataset", supports },
+    FormatInfo {
+        format: Format::Hdf5,
+        extension: "hdf5",
+        name: "an HDF5 file (robomimic)",
+        supports: is_robomimic_stream,
+    },
+    FormatInfo { format: Format::Apng, extension: "apng", name: "an animated PNG", supports: is_color },
+    FormatInfo { format: Format::Gif, extension: "gif", name: "an animated GIF", supports: is_color },
+    FormatInfo { format: Format::Webp, extension: "webp", name: "an animated WebP", supports: is_color },
+    FormatInfo { format: Format::Mp4, extension: "mp4", name: "an MP4 file", supports: is_color },
 ];
 
-fn is_of_robomimic(stream: &Stream) -> bool {
-    stream.kind == Kind::EngineState || holds(stream)
+fn is_robomimic_stream(stream: &StreamSchema) -> bool {
+    stream.kind == StreamKind::EngineState || supports(stream)
 }
 
-fn is_color(stream: &Stream) -> bool {
-    matches!(&stream.kind, Kind::Picture { channel, .. } if channel == "color")
+fn is_color(stream: &StreamSchema) -> bool {
+    matches!(&stream.kind, StreamKind::Image { channel, .. } if channel == "color")
 }
 
-fn is_seen(stream: &Stream) -> bool {
-    matches!(&stream.kind, Kind::Picture { channel, .. } if matches!(&**channel, "color" | "depth" | "distance"))
+fn is_png_image(stream: &StreamSchema) -> bool {
+    matches!(&stream.kind, StreamKind::Image { channel, .. } if matches!(&**channel, "color" | "depth" | "distance"))
 }
 
 impl Format {
     /// All formats with their file name extensions, such as `mcap`. An empty extension is a folder of images.
     pub fn all() -> impl Iterator<Item = (Self, &'static str)> {
-        ALL.iter().map(|known| (known.format, known.end))
+        ALL.iter().map(|known| (known.format, known.extension))
     }
 
     /// Format of a path, by its extension.
@@ -80,37 +85,37 @@ impl Format {
     /// No format has this extension; the error lists the known ones.
     pub fn of_path(path: &Path) -> Result<Self> {
         let end = path.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let found = ALL.iter().find(|known| known.end == end);
-        found.map(|known| known.format).ok_or_else(|| RecordError::Format { path: path.into(), end })
+        let found = ALL.iter().find(|known| known.extension == end);
+        found.map(|known| known.format).ok_or_else(|| RecordError::Format { path: path.into(), extension: end })
     }
 
-    fn known(self) -> &'static Known {
+    fn info(self) -> &'static FormatInfo {
         // A test checks that the list is complete.
         ALL.iter().find(|known| known.format == self).unwrap_or(&ALL[0])
     }
 
     /// Name in messages.
     pub fn name(self) -> &'static str {
-        self.known().name
+        self.info().name
     }
 
     /// True if this build supports the format: HDF5 requires a feature.
     pub fn is_built(self) -> bool {
-        self.feature().is_none()
+        self.missing_feature().is_none()
     }
 
     /// Cargo feature that this build lacks for the format.
-    pub(crate) fn feature(self) -> Option<&'static str> {
+    pub(crate) fn missing_feature(self) -> Option<&'static str> {
         (self == Self::Hdf5 && !cfg!(feature = "hdf5")).then_some("hdf5")
     }
 
     /// True if the format supports a stream.
-    pub(crate) fn holds(self, stream: &Stream) -> bool {
-        (self.known().holds)(stream)
+    pub(crate) fn supports(self, stream: &StreamSchema) -> bool {
+        (self.info().supports)(stream)
     }
 
     /// True if the format contains events of environments ([`Topic::Events`](crate::Topic::Events)).
-    pub fn has_events(self) -> bool {
+    pub fn supports_events(self) -> bool {
         matches!(self, Self::Mcap | Self::Npz)
     }
 
@@ -121,8 +126,8 @@ impl Format {
 }
 
 /// All file name extensions, for a message.
-pub(crate) fn ends() -> String {
-    let ends = ALL.iter().filter(|known| !known.end.is_empty()).map(|known| format!(".{}", known.end));
+pub(crate) fn extensions_text() -> String {
+    let ends = ALL.iter().filter(|known| !known.extension.is_empty()).map(|known| format!(".{}", known.extension));
     ends.collect::<Vec<_>>().join(", ")
 }
 
@@ -132,15 +137,15 @@ mod tests {
 
     #[test]
     fn list() {
-        use Format::{Apng, Gif, Hdf5, LeRobot, Mcap, Mp4, Npz, Pictures, Webp};
-        let wanted = [Mcap, Npz, Pictures, LeRobot, Hdf5, Apng, Gif, Webp, Mp4];
+        use Format::{Apng, Gif, Hdf5, Images, LeRobot, Mcap, Mp4, Npz, Webp};
+        let wanted = [Mcap, Npz, Images, LeRobot, Hdf5, Apng, Gif, Webp, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));
         for (format, end) in Format::all() {
             // A missing variant is a compile error here.
             match format {
-                Mcap | Npz | Pictures | LeRobot | Hdf5 | Apng | Gif | Webp | Mp4 => {}
+                Mcap | Npz | Images | LeRobot | Hdf5 | Apng | Gif | Webp | Mp4 => {}
             }
-            assert_eq!(format.known().end, end);
+            assert_eq!(format.info().extension, end);
             assert_eq!(Format::of_path(&Path::new("a.b/run").with_extension(end)).ok(), Some(format));
         }
     }

@@ -7,7 +7,7 @@
 //!
 //! A [`Recorder`] is notified of steps and copies the due values into a packet of a bounded pool. A thread of its own
 //! writes the packets in their order. No packet is dropped: while all packets are in use, the simulation waits.
-//! [`Recorded`] reports the number and the total duration of these waits.
+//! [`RecordingSummary`] reports the number and the total duration of these waits.
 //!
 //! | modules | content |
 //! |---|---|
@@ -18,7 +18,7 @@
 //! | `picture_folder`, `picture`, `animation` | PNG files and animations |
 //! | `episodes`, `lerobot`, `robomimic` | datasets of episodes for learning |
 //! | `read`, `archive`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
-//! | [`replay`], `film`, `scene_file` | simulation of recorded actions, and display of recorded motion ([`Film`]) |
+//! | [`replay`], `film`, `scene_file` | simulation of recorded actions, and display of recorded motion ([`Playback`]) |
 //!
 //! ```no_run
 //! use kinetoscope_record::{Record, RecorderCfg, Topic};
@@ -69,12 +69,12 @@ mod zip;
 
 pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};
-pub use film::Film;
+pub use film::Playback;
 pub use format::Format;
 pub use packet::{Event, EventKind};
-pub use read::{RecordedTopic, Recording, Samples, Wanted};
-pub use recorder::{Record, Recorded, Recorder, RecorderId};
+pub use read::{FieldSelector, RecordedTopic, Recording, TimeSeries};
+pub use recorder::{Record, Recorder, RecorderId, RecordingSummary};
 pub use recover::{Recovered, recover, recover_to};
-pub use stage::StageCfg;
-pub use stream::{Distortion, Element, Kind, Part, Stream};
+pub use stage::OverviewCfg;
+pub use stream::{Distortion, ElementType, StreamField, StreamKind, StreamSchema};
 pub use topic::Topic;

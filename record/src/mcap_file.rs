@@ -33,13 +33,13 @@
 //! sensors have the time of the beginning of the step. A robot's joint state message has a single time, that of its
 //! positions; its efforts are those of the step that led there.
 
-use crate::file::{PartFile, Storage};
-use crate::packet::{Block, Event, Packet, Values};
-use crate::picture::Png;
-use crate::ros::{self, Cdr, Hits, Schema, Stamp};
+use crate::file::{PartialFile, Storage};
+use crate::packet::{Event, Packet, StreamRows, ValueBuffer};
+use crate::picture::PngWriter;
+use crate::ros::{self, CdrWriter, RayHits, RosHeader, Schema};
 use crate::scene_update::SceneUpdate;
-use crate::stream::{Element, Kind, Stream};
-use crate::writer::{Sink, Written};
+use crate::stream::{ElementType, StreamKind, StreamSchema};
+use crate::writer::{FormatWriter, WriteResult};
 use kinetoscope_sim::MaskId;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
@@ -57,28 +57,28 @@ const ENCODING: &str = "cdr";
 const SCHEMA_ENCODING: &str = "ros2msg";
 
 /// Writer of an MCAP file.
-pub(crate) struct McapFile {
-    part: PartFile,
+pub(crate) struct McapWriter {
+    part: PartialFile,
     /// `None` once the file is complete.
     writer: Option<Writer<BufWriter<Box<dyn Storage>>>>,
-    channels: Channels,
+    channels: ChannelRegistry,
     /// Channels of each row of each stream, in the order in which a row is written.
     rows: Vec<Vec<Vec<u16>>>,
     events: u16,
-    cdr: Cdr,
-    png: Png,
+    cdr: CdrWriter,
+    png: PngWriter,
 }
 
 /// Channels of a file, by topic.
 #[derive(Default)]
-struct Channels {
+struct ChannelRegistry {
     schemas: BTreeMap<Schema, u16>,
     known: BTreeMap<String, u16>,
     /// Number of messages in each channel.
     counts: BTreeMap<u16, u32>,
 }
 
-impl Channels {
+impl ChannelRegistry {
     fn add(
         &mut self,
         writer: &mut Writer<impl Write + Seek>,
@@ -143,21 +143,21 @@ pub(crate) fn options() -> WriteOptions {
         .library(concat!("kinetoscope ", env!("CARGO_PKG_VERSION")))
 }
 
-impl McapFile {
+impl McapWriter {
     /// Creates a file. `origins` are the origins of all environments in the world \[m\], shape (N, 3). `start` is the
-    /// time at which the recording begins \[s\]. `held` are attachments: names, media types, bytes.
+    /// time at which the recording begins \[s\]. `attachments` are attachments: names, media types, bytes.
     pub(crate) fn create(
-        mut part: PartFile,
+        mut part: PartialFile,
         storage: Box<dyn Storage>,
-        streams: &[Stream],
+        streams: &[StreamSchema],
         origins: &Array2<f64>,
         masks: &[MaskId],
         start: f64,
-        held: &[(&str, &str, Vec<u8>)],
+        attachments: &[(&str, &str, Vec<u8>)],
     ) -> io::Result<Self> {
         let to = BufWriter::with_capacity(1 << 16, storage);
         let mut writer = options().create(to).map_err(io_error)?;
-        for (name, media_type, data) in held {
+        for (name, media_type, data) in attachments {
             let (name, media_type, data) = ((*name).into(), (*media_type).into(), data.into());
             let at = nanos(start);
             writer.attach(&Attachment { log_time: at, create_time: at, name, media_type, data }).map_err(io_error)?;
@@ -167,7 +167,7 @@ impl McapFile {
             let metadata = masks.iter().map(|id| (id.id.to_string(), of(id))).collect();
             writer.write_metadata(&Metadata { name: name.into(), metadata }).map_err(io_error)?;
         }
-        let mut channels = Channels::default();
+        let mut channels = ChannelRegistry::default();
         let mut rows = Vec::new();
         let nothing = BTreeMap::new();
         for stream in streams {
@@ -175,7 +175,7 @@ impl McapFile {
             for env in &stream.env_ids {
                 let mut of_row = Vec::new();
                 for (k, (topic, schema)) in topics(stream).into_iter().enumerate() {
-                    let about = about(stream, k);
+                    let about = channel_metadata(stream, k);
                     of_row.push(channels.add(&mut writer, format!("/env_{env}/{topic}"), schema, &about)?);
                 }
                 of_stream.push(of_row);
@@ -184,7 +184,7 @@ impl McapFile {
         }
         let events = channels.add(&mut writer, "/events".into(), Schema::Log, &nothing)?;
         let places = channels.add(&mut writer, "/tf_static".into(), Schema::TfMessage, &nothing)?;
-        let mut cdr = Cdr::default();
+        let mut cdr = CdrWriter::default();
         cdr.begin();
         let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
         envs.sort_unstable();
@@ -192,14 +192,14 @@ impl McapFile {
         let frames: Vec<String> = envs.iter().map(|env| format!("env_{env}")).collect();
         let place = |env: &usize| [origins[(*env, 0)], origins[(*env, 1)], origins[(*env, 2)], 1.0, 0.0, 0.0, 0.0];
         let poses: Vec<f64> = envs.iter().flat_map(place).collect();
-        ros::transforms(&mut cdr, Stamp { nanos: nanos(start), frame: "world" }, "", &frames, &poses);
+        ros::transforms(&mut cdr, RosHeader { nanos: nanos(start), frame: "world" }, "", &frames, &poses);
         channels.write(&mut writer, places, nanos(start), cdr.bytes())?;
         part.keep();
-        Ok(Self { part, writer: Some(writer), channels, rows, events, cdr, png: Png::default() })
+        Ok(Self { part, writer: Some(writer), channels, rows, events, cdr, png: PngWriter::default() })
     }
 
     fn write_event(&mut self, event: &Event) -> io::Result<()> {
-        let at = nanos(event.at);
+        let at = nanos(event.recorded_time);
         let writer = self.writer.as_mut().ok_or_else(finished)?;
         for (env, time) in event.env_ids.iter().zip(&event.times) {
             let (kind, step) = (event.kind.name(), event.step);
@@ -208,7 +208,7 @@ impl McapFile {
             if !event.text.is_empty() {
                 message = format!("{message}: {}", event.text);
             }
-            ros::log(&mut self.cdr, at, event.kind.is_bad(), &format!("env_{env}"), &message);
+            ros::log(&mut self.cdr, at, event.kind.is_warning(), &format!("env_{env}"), &message);
             self.channels.write(writer, self.events, at, self.cdr.bytes())?;
         }
         Ok(())
@@ -220,51 +220,51 @@ impl McapFile {
         let channel =
             self.channels.add(writer, format!("/{home}/{SCENE_TOPIC}"), Schema::SceneUpdate, &BTreeMap::new())?;
         // Scene messages are large, so that their memory is not kept.
-        let mut cdr = Cdr::default();
+        let mut cdr = CdrWriter::default();
         cdr.begin();
-        ros::scene_update(&mut cdr, Stamp { nanos: at, frame: &home }, update);
+        ros::scene_update(&mut cdr, RosHeader { nanos: at, frame: &home }, update);
         self.channels.write(writer, channel, at, cdr.bytes())
     }
 
-    fn write_row(&mut self, stream: &Stream, block: &Block, index: usize, row: usize) -> Written {
+    fn write_row(&mut self, stream: &StreamSchema, block: &StreamRows, index: usize, row: usize) -> WriteResult {
         let writer = self.writer.as_mut().ok_or_else(finished)?;
         let env = stream.env_ids[row];
-        let at = nanos(block.stamps[row]);
+        let at = nanos(block.recorded_times[row]);
         let (channels, width) = (self.rows[index][row].clone(), stream.width());
         let range = row * width..(row + 1) * width;
-        let states = block.values.states().get(range.clone()).unwrap_or(&[]);
+        let states = block.values.as_f64s().get(range.clone()).unwrap_or(&[]);
         let home = format!("env_{env}");
         let own = |name: &str| format!("{home}/{name}");
         // An object may have the name of a sensor. The prefix keeps their frames apart.
         let sensors = own("sensors/");
         let seen_by = |sensor: &str| format!("{sensors}{sensor}");
-        let (cdr, in_env) = (&mut self.cdr, Stamp { nanos: at, frame: &home });
+        let (cdr, in_env) = (&mut self.cdr, RosHeader { nanos: at, frame: &home });
         cdr.begin();
         match &stream.kind {
-            Kind::Joints { names } => ros::joint_state(cdr, in_env, names, states),
-            Kind::Poses { frames } => ros::transforms(cdr, in_env, &own(""), frames, states),
-            Kind::Picture { camera, height, width, .. } => {
+            StreamKind::Joints { names } => ros::joint_state(cdr, in_env, names, states),
+            StreamKind::Poses { frames } => ros::transforms(cdr, in_env, &own(""), frames, states),
+            StreamKind::Image { camera, height, width, .. } => {
                 let frame = seen_by(camera);
-                let stamp = Stamp { nanos: at, frame: &frame };
-                if stream.element == Element::U8 {
-                    let pixels = block.values.bytes().get(range).unwrap_or(&[]);
-                    ros::compressed_image(cdr, stamp, self.png.rgb(pixels, [*width, *height])?);
+                let stamp = RosHeader { nanos: at, frame: &frame };
+                if stream.element_type == ElementType::U8 {
+                    let pixels = block.values.as_u8s().get(range).unwrap_or(&[]);
+                    ros::compressed_image(cdr, stamp, self.png.encode_rgb(pixels, [*width, *height])?);
                 } else {
-                    let components = stream.parts.first().map_or(1, |part| part.shape.get(2).copied().unwrap_or(1));
-                    if let Some(ids) = small(&block.values, range.clone()) {
+                    let components = stream.fields.first().map_or(1, |part| part.shape.get(2).copied().unwrap_or(1));
+                    if let Some(ids) = small_mask_ids(&block.values, range.clone()) {
                         let put =
                             |bytes: &mut Vec<u8>| ids.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
                         ros::image(cdr, stamp, "16UC1", *height, *width, 2 * *width, put);
                     } else {
-                        let kind = if stream.element == Element::I32 { "32SC" } else { "32FC" };
+                        let kind = if stream.element_type == ElementType::I32 { "32SC" } else { "32FC" };
                         let (encoding, row_bytes) = (format!("{kind}{components}"), 4 * components * *width);
-                        let put = |bytes: &mut Vec<u8>| block.values.put(range, bytes);
+                        let put = |bytes: &mut Vec<u8>| block.values.append_bytes(range, bytes);
                         ros::image(cdr, stamp, &encoding, *height, *width, row_bytes, put);
                     }
                 }
             }
-            Kind::Lens { camera, height, width, distortion } => {
-                let part = |name| stream.part(states, name);
+            StreamKind::CameraInfo { camera, height, width, distortion } => {
+                let part = |name| stream.field(states, name);
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(camera), part("pose"));
                 let Some(distortion) = distortion else {
                     return Ok(self.channels.write(writer, channels[0], at, cdr.bytes())?);
@@ -272,47 +272,47 @@ impl McapFile {
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(camera);
-                let stamp = Stamp { nanos: at, frame: &frame };
+                let stamp = RosHeader { nanos: at, frame: &frame };
                 let matrices = ["intrinsics", "rectification", "projection"].map(part);
                 ros::camera_info(cdr, stamp, *height, *width, matrices, distortion);
             }
-            Kind::Imu => {
-                let part = |name| stream.part(states, name);
+            StreamKind::Imu => {
+                let part = |name| stream.field(states, name);
                 let pose = [part("pos_w"), part("quat_w")].concat();
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(&stream.name), &pose);
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(&stream.name);
-                let stamp = Stamp { nanos: at, frame: &frame };
-                ros::motion(cdr, stamp, part("lin_vel_b"), part("ang_vel_b"));
+                let stamp = RosHeader { nanos: at, frame: &frame };
+                ros::twist_or_accel(cdr, stamp, part("lin_vel_b"), part("ang_vel_b"));
                 self.channels.write(writer, channels[2], at, cdr.bytes())?;
                 cdr.begin();
-                ros::motion(cdr, stamp, part("lin_acc_b"), part("ang_acc_b"));
+                ros::twist_or_accel(cdr, stamp, part("lin_acc_b"), part("ang_acc_b"));
                 self.channels.write(writer, channels[3], at, cdr.bytes())?;
                 cdr.begin();
                 ros::imu(cdr, stamp, part("quat_w"), part("ang_vel_b"), part("lin_acc_b"));
             }
-            Kind::Points => {
-                let part = |name| stream.part(states, name);
+            StreamKind::RayHits => {
+                let part = |name| stream.field(states, name);
                 let pose = [part("pos_w"), part("quat_w")].concat();
                 ros::transforms(cdr, in_env, &sensors, std::slice::from_ref(&stream.name), &pose);
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let distances = part("distances");
-                ros::numbers(cdr, "distances", &[distances.len()], distances);
+                ros::float64_multi_array(cdr, "distances", &[distances.len()], distances);
                 self.channels.write(writer, channels[2], at, cdr.bytes())?;
                 cdr.begin();
-                let hits = Hits { points: part("hits"), distances, normals: part("normals"), ids: part("ids") };
-                ros::points(cdr, in_env, hits);
+                let hits = RayHits { points: part("hits"), distances, normals: part("normals"), ids: part("ids") };
+                ros::point_cloud(cdr, in_env, hits);
             }
-            Kind::Numbers { .. } | Kind::EngineState | Kind::Outcome => {
+            StreamKind::SensorValues { .. } | StreamKind::EngineState | StreamKind::TaskResult => {
                 let mut rest = states;
-                for (part, channel) in stream.parts.iter().zip(&channels) {
+                for (part, channel) in stream.fields.iter().zip(&channels) {
                     let (mine, after) = rest.split_at(part.width().min(rest.len()));
                     rest = after;
                     cdr.begin();
-                    ros::numbers(cdr, &part.name, &part.shape, mine);
-                    self.channels.write(writer, *channel, nanos(block.stamp(part, row)), cdr.bytes())?;
+                    ros::float64_multi_array(cdr, &part.name, &part.shape, mine);
+                    self.channels.write(writer, *channel, nanos(block.recorded_time(part, row)), cdr.bytes())?;
                 }
                 return Ok(());
             }
@@ -322,21 +322,21 @@ impl McapFile {
 }
 
 /// Mask ids as 16-bit numbers, which viewers support; `None` for other types of values, and if an id is larger.
-fn small(values: &Values, range: std::ops::Range<usize>) -> Option<Vec<u16>> {
-    let Values::I32(ids) = values else { return None };
+fn small_mask_ids(values: &ValueBuffer, range: std::ops::Range<usize>) -> Option<Vec<u16>> {
+    let ValueBuffer::I32(ids) = values else { return None };
     ids.get(range)?.iter().map(|id| u16::try_from(*id).ok()).collect()
 }
 
-/// Channel metadata of field number `part` of a stream: names, separated by commas, and the unit.
-fn about(stream: &Stream, part: usize) -> BTreeMap<String, String> {
-    let Kind::Numbers { rows, filters } = &stream.kind else { return BTreeMap::new() };
-    let unit = stream.parts.get(part).map(|part| part.unit.clone()).unwrap_or_default();
+/// Channel metadata of field number `field` of a stream: names, separated by commas, and the unit.
+fn channel_metadata(stream: &StreamSchema, part: usize) -> BTreeMap<String, String> {
+    let StreamKind::SensorValues { rows, filters } = &stream.kind else { return BTreeMap::new() };
+    let unit = stream.fields.get(part).map(|part| part.unit.clone()).unwrap_or_default();
     let all = [("rows", rows.join(",")), ("filters", filters.join(",")), ("unit", unit)];
     all.into_iter().filter(|(_, text)| !text.is_empty()).map(|(what, text)| (what.to_string(), text)).collect()
 }
 
 /// Finds a topic that streams with different message types would share. With `scenes`, includes the scene topic.
-pub(crate) fn taken(streams: &[&Stream], scenes: bool) -> Option<String> {
+pub(crate) fn topic_conflict(streams: &[&StreamSchema], scenes: bool) -> Option<String> {
     let scene = scenes.then(|| (SCENE_TOPIC.to_string(), Schema::SceneUpdate));
     let mut known: BTreeMap<String, Schema> = scene.into_iter().collect();
     streams.iter().flat_map(|stream| topics(stream)).find_map(|(topic, schema)| match known.get(&topic) {
@@ -349,17 +349,19 @@ pub(crate) fn taken(streams: &[&Stream], scenes: bool) -> Option<String> {
 }
 
 /// Topics below the environment, and message types, of a row of a stream.
-fn topics(stream: &Stream) -> Vec<(String, Schema)> {
+fn topics(stream: &StreamSchema) -> Vec<(String, Schema)> {
     let name = stream.name.clone();
     let transforms = || ("tf".to_string(), Schema::TfMessage);
     match &stream.kind {
-        Kind::Joints { .. } => vec![(name, Schema::JointState)],
-        Kind::Poses { .. } => vec![transforms()],
-        Kind::Picture { .. } if stream.element == Element::U8 => vec![(name, Schema::CompressedImage)],
-        Kind::Picture { .. } => vec![(name, Schema::Image)],
-        Kind::Lens { distortion: None, .. } => vec![transforms()],
-        Kind::Lens { camera, .. } => vec![(format!("{camera}/camera_info"), Schema::CameraInfo), transforms()],
-        Kind::Imu => {
+        StreamKind::Joints { .. } => vec![(name, Schema::JointState)],
+        StreamKind::Poses { .. } => vec![transforms()],
+        StreamKind::Image { .. } if stream.element_type == ElementType::U8 => vec![(name, Schema::CompressedImage)],
+        StreamKind::Image { .. } => vec![(name, Schema::Image)],
+        StreamKind::CameraInfo { distortion: None, .. } => vec![transforms()],
+        StreamKind::CameraInfo { camera, .. } => {
+            vec![(format!("{camera}/camera_info"), Schema::CameraInfo), transforms()]
+        }
+        StreamKind::Imu => {
             let (velocity, acceleration) = (format!("{name}/velocity"), format!("{name}/acceleration"));
             vec![
                 (name, Schema::Imu),
@@ -368,27 +370,29 @@ fn topics(stream: &Stream) -> Vec<(String, Schema)> {
                 (acceleration, Schema::AccelStamped),
             ]
         }
-        Kind::Points => vec![
+        StreamKind::RayHits => vec![
             (format!("{name}/points"), Schema::PointCloud2),
             transforms(),
             (format!("{name}/distances"), Schema::Float64MultiArray),
         ],
-        Kind::Numbers { .. } | Kind::EngineState | Kind::Outcome => {
+        StreamKind::SensorValues { .. } | StreamKind::EngineState | StreamKind::TaskResult => {
             let called = |part: &str| if part.is_empty() { name.clone() } else { format!("{name}/{part}") };
-            let topic = |part: &crate::stream::Part| (called(&part.name), Schema::Float64MultiArray);
-            stream.parts.iter().map(topic).collect()
+            let topic = |part: &crate::stream::StreamField| (called(&part.name), Schema::Float64MultiArray);
+            stream.fields.iter().map(topic).collect()
         }
     }
 }
 
-impl Sink for McapFile {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
+impl FormatWriter for McapWriter {
+    fn write(&mut self, streams: &[StreamSchema], packet: &Packet) -> WriteResult {
         if let Some(event) = &packet.event {
             self.write_event(event)?;
         }
         packet.scenes.iter().try_for_each(|update| self.write_scene(update))?;
-        for (index, (stream, block)) in streams.iter().zip(&packet.blocks).enumerate().filter(|(_, (_, b))| b.used) {
-            for row in (0..stream.env_ids.len()).filter(|row| block.fresh[*row]) {
+        for (index, (stream, block)) in
+            streams.iter().zip(&packet.streams).enumerate().filter(|(_, (_, b))| b.has_content)
+        {
+            for row in (0..stream.env_ids.len()).filter(|row| block.is_new[*row]) {
                 self.write_row(stream, block, index, row)?;
             }
         }
@@ -396,18 +400,18 @@ impl Sink for McapFile {
     }
 
     /// Ends the chunk. The remainder of a killed process ends with a complete chunk.
-    fn flush(&mut self) -> Written {
+    fn flush(&mut self) -> WriteResult {
         Ok(self.writer.as_mut().ok_or_else(finished)?.flush().map_err(io_error)?)
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
+    fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
         let mut writer = self.writer.take().ok_or_else(finished)?;
         writer.finish().map_err(io_error)?;
         writer.into_inner().flush()?;
         Ok(self.part.commit()?)
     }
 
-    fn kept(&self) -> Option<PathBuf> {
-        self.part.kept()
+    fn partial_path(&self) -> Option<PathBuf> {
+        self.part.kept_path()
     }
 }

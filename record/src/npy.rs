@@ -1,6 +1,6 @@
 //! NumPy's `.npy` array format, version 1.0, as described in `numpy.lib.format`.
 
-use crate::stream::Element;
+use crate::stream::ElementType;
 use ndarray::{ArrayBase, Data, Dimension};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -8,10 +8,10 @@ use std::io::{self, Write};
 /// Alignment of the data \[bytes\].
 const ALIGN: usize = 64;
 /// Length of magic, version and header length \[bytes\].
-const FIXED: usize = 10;
+const PREAMBLE_LEN: usize = 10;
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
 
-impl Element {
+impl ElementType {
     /// NumPy's type descriptor: byte order, kind and size.
     pub(crate) fn descr(self) -> &'static str {
         match self {
@@ -24,20 +24,20 @@ impl Element {
 }
 
 /// Types of numbers in array files.
-pub trait Number: Copy {
+pub trait NpyElement: Copy {
     /// Element type in the file.
-    const ELEMENT: Element;
+    const ELEMENT: ElementType;
 
     /// Appends the number as little-endian bytes.
-    fn put(self, bytes: &mut Vec<u8>);
+    fn append_le_bytes(self, bytes: &mut Vec<u8>);
 }
 
 macro_rules! numbers {
     ($($number:ty: $element:ident),*) => {$(
-        impl Number for $number {
-            const ELEMENT: Element = Element::$element;
+        impl NpyElement for $number {
+            const ELEMENT: ElementType = ElementType::$element;
 
-            fn put(self, bytes: &mut Vec<u8>) {
+            fn append_le_bytes(self, bytes: &mut Vec<u8>) {
                 bytes.extend_from_slice(&self.to_le_bytes());
             }
         }
@@ -53,20 +53,20 @@ numbers!(u8: U8, i32: I32, f32: F32, f64: F64);
 pub fn write<S, D>(to: &mut impl Write, array: &ArrayBase<S, D>) -> io::Result<()>
 where
     S: Data,
-    S::Elem: Number,
+    S::Elem: NpyElement,
     D: Dimension,
 {
     let head = header(S::Elem::ELEMENT, array.shape());
     to.write_all(&head.ok_or_else(|| io::Error::other("more axes than the format has room for"))?)?;
     let mut bytes = Vec::with_capacity(array.len() * size_of::<S::Elem>());
     for &number in array {
-        number.put(&mut bytes);
+        number.append_le_bytes(&mut bytes);
     }
     to.write_all(&bytes)
 }
 
 /// Returns the file header of an array in C order; `None` for more axes than the format supports.
-pub(crate) fn header(element: Element, shape: &[usize]) -> Option<Vec<u8>> {
+pub(crate) fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
     let mut axes = String::new();
     for (k, length) in shape.iter().enumerate() {
         // Writing to a `String` does not fail. Python writes (2,) and (2, 3).
@@ -77,8 +77,8 @@ pub(crate) fn header(element: Element, shape: &[usize]) -> Option<Vec<u8>> {
     }
     let mut text = format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({axes}), }}", element.descr());
     // One byte is for the newline.
-    let whole = (FIXED + text.len() + 1).next_multiple_of(ALIGN);
-    text.extend(std::iter::repeat_n(' ', whole - FIXED - text.len() - 1));
+    let whole = (PREAMBLE_LEN + text.len() + 1).next_multiple_of(ALIGN);
+    text.extend(std::iter::repeat_n(' ', whole - PREAMBLE_LEN - text.len() - 1));
     text.push('\n');
     let length = u16::try_from(text.len()).ok()?;
     let mut bytes = MAGIC.to_vec();
@@ -109,10 +109,10 @@ mod tests {
     fn headers() {
         // numpy.save writes these bytes for zeros((2,), float64) and zeros((2, 3, 4), float32), without the data.
         let one = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }";
-        let header_of_one = header(Element::F64, &[2]).unwrap();
+        let header_of_one = header(ElementType::F64, &[2]).unwrap();
         assert_eq!(&header_of_one[..one.len()], one);
         assert_eq!((header_of_one.len(), header_of_one.last()), (128, Some(&b'\n')));
-        let three = header(Element::F32, &[2, 3, 4]).unwrap();
+        let three = header(ElementType::F32, &[2, 3, 4]).unwrap();
         assert!(String::from_utf8_lossy(&three).contains("'<f4', 'fortran_order': False, 'shape': (2, 3, 4), }"));
         assert_eq!(parse(&three), Some(("<f4", vec![2, 3, 4], &[][..])));
         assert_eq!(parse(&header_of_one).unwrap().1, [2]);

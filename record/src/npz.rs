@@ -21,13 +21,13 @@
 //!
 //! Until the end, rows are in unnamed files in the same folder. A killed process leaves nothing.
 
-use crate::file::{PartFile, Storage, folder_of};
+use crate::file::{PartialFile, Storage, parent_dir};
 use crate::npy;
-use crate::packet::{Block, Event, Packet};
-use crate::scene_file::SCENE;
-use crate::stream::{Element, Kind, Part, Stream};
-use crate::writer::{Fault, Sink, Written};
-use crate::zip::Archive;
+use crate::packet::{Event, Packet, StreamRows};
+use crate::scene_file::SCENE_ARCHIVE;
+use crate::stream::{ElementType, StreamField, StreamKind, StreamSchema};
+use crate::writer::{FormatWriter, WriteError, WriteResult};
+use crate::zip::ZipWriter;
 use kinetoscope_sim::{MaskId, Snapshot};
 use serde_json::{Value, json};
 use std::fs::File;
@@ -36,91 +36,91 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Name of the member that describes the others.
-pub(crate) const ABOUT: &str = "recording.json";
+pub(crate) const METADATA: &str = "recording.json";
 /// Name of the member with the texts of events.
 const NOTES: &str = "notes.jsonl";
 /// Name of the member with the initial state.
-pub(crate) const START: &str = "start.snapshot";
+pub(crate) const INITIAL_STATE: &str = "start.snapshot";
 
 /// Writer of a NumPy archive.
-pub(crate) struct NpzFile {
-    part: PartFile,
+pub(crate) struct NpzWriter {
+    part: PartialFile,
     storage: Option<Box<dyn Storage>>,
-    about: Value,
+    metadata: Value,
     start: Vec<u8>,
     scene: Option<Vec<u8>>,
-    spools: Vec<Spool>,
+    buffers: Vec<BufferFile>,
     /// Events, one record each: step, environment, kind, time.
-    events: Spool,
+    events: BufferFile,
     /// Texts of events, a line of JSON each.
     notes: BufWriter<File>,
 }
 
 /// Buffer file for the rows of a stream. A record contains the step, one or two times of each environment, then each
 /// field of all environments.
-struct Spool {
+struct BufferFile {
     file: BufWriter<File>,
     rows: usize,
     record: Vec<u8>,
 }
 
 /// Byte ranges of the numbers in the record of an event.
-const EVENT: [(&str, Element, Range<usize>); 4] = [
-    ("step", Element::F64, 0..8),
-    ("env", Element::I32, 8..12),
-    ("kind", Element::U8, 12..13),
-    ("time", Element::F64, 13..21),
+const EVENT_FIELDS: [(&str, ElementType, Range<usize>); 4] = [
+    ("step", ElementType::F64, 0..8),
+    ("env", ElementType::I32, 8..12),
+    ("kind", ElementType::U8, 12..13),
+    ("time", ElementType::F64, 13..21),
 ];
 
-impl NpzFile {
+impl NpzWriter {
     pub(crate) fn create(
-        part: PartFile,
+        part: PartialFile,
         storage: Box<dyn Storage>,
-        streams: &[Stream],
+        streams: &[StreamSchema],
         masks: &[MaskId],
         dt: f64,
         start: &Snapshot,
         scene: Option<&[u8]>,
     ) -> io::Result<Self> {
-        let folder = folder_of(part.path());
-        let spools = streams.iter().map(|_| Spool::create(folder)).collect::<io::Result<_>>()?;
-        let (start, events) = (snapshot_bytes(start, folder)?, Spool::create(folder)?);
+        let folder = parent_dir(part.path());
+        let spools = streams.iter().map(|_| BufferFile::create(folder)).collect::<io::Result<_>>()?;
+        let (start, events) = (snapshot_bytes(start, folder)?, BufferFile::create(folder)?);
         let scene = scene.map(<[u8]>::to_vec);
-        let (about, notes) = (about(streams, masks, dt), BufWriter::new(tempfile::tempfile_in(folder)?));
-        Ok(Self { part, storage: Some(storage), about, start, scene, spools, events, notes })
+        let (about, notes) = (metadata(streams, masks, dt), BufWriter::new(tempfile::tempfile_in(folder)?));
+        Ok(Self { part, storage: Some(storage), metadata: about, start, scene, buffers: spools, events, notes })
     }
 }
 
 /// Serializes a snapshot as a file.
 pub(crate) fn snapshot_bytes(start: &Snapshot, folder: &Path) -> io::Result<Vec<u8>> {
     let scratch = tempfile::tempdir_in(folder)?;
-    let path = scratch.path().join(START);
+    let path = scratch.path().join(INITIAL_STATE);
     start.save(&path).map_err(io::Error::other)?;
     std::fs::read(path)
 }
 
 /// Describes the content of a recording as JSON.
-pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
-    let stream = |stream: &Stream| {
+pub(crate) fn metadata(streams: &[StreamSchema], masks: &[MaskId], dt: f64) -> Value {
+    let stream = |stream: &StreamSchema| {
         let names = Some(stream.kind.names()).filter(|names| !names.is_empty());
         let filters = match &stream.kind {
-            Kind::Numbers { filters, .. } if !filters.is_empty() => Some(filters),
+            StreamKind::SensorValues { filters, .. } if !filters.is_empty() => Some(filters),
             _ => None,
         };
         let distortion = match &stream.kind {
-            Kind::Lens { distortion, .. } => distortion.as_ref(),
+            StreamKind::CameraInfo { distortion, .. } => distortion.as_ref(),
             _ => None,
         };
         let distortion = distortion.map(|lens| json!({ "model": lens.model, "coefficients": lens.coefficients }));
-        let part = |part: &Part| {
-            let name = member(stream, &part.name);
-            let mut about = json!({ "name": name, "shape": part.shape, "of_forces": part.of_forces });
+        let part = |part: &StreamField| {
+            let name = array_name(stream, &part.name);
+            let mut about = json!({ "name": name, "shape": part.shape, "of_forces": part.at_force_time });
             if !part.unit.is_empty() {
                 about["unit"] = json!(part.unit);
             }
             about
         };
-        let parts = stream.parts.iter().map(part);
+        let parts = stream.fields.iter().map(part);
         json!({
             "name": stream.name,
             "env_ids": stream.env_ids,
@@ -141,19 +141,19 @@ pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
 }
 
 /// Names of all arrays of a stream.
-pub(crate) fn members(stream: &Stream) -> impl Iterator<Item = String> {
-    let times = ["step", "time"].into_iter().chain(stream.is_mixed().then_some("force_time"));
+pub(crate) fn array_names(stream: &StreamSchema) -> impl Iterator<Item = String> {
+    let times = ["step", "time"].into_iter().chain(stream.has_two_stamps().then_some("force_time"));
     times
         .map(|name| format!("{}/{name}", stream.name))
-        .chain(stream.parts.iter().map(|part| member(stream, &part.name)))
+        .chain(stream.fields.iter().map(|part| array_name(stream, &part.name)))
 }
 
 /// Name of the array of a field.
-pub(crate) fn member(stream: &Stream, part: &str) -> String {
+pub(crate) fn array_name(stream: &StreamSchema, part: &str) -> String {
     if part.is_empty() { stream.name.clone() } else { format!("{}/{part}", stream.name) }
 }
 
-impl Spool {
+impl BufferFile {
     fn create(folder: &Path) -> io::Result<Self> {
         let file = BufWriter::with_capacity(1 << 16, tempfile::tempfile_in(folder)?);
         Ok(Self { file, rows: 0, record: Vec::new() })
@@ -171,17 +171,17 @@ impl Spool {
         Ok(())
     }
 
-    fn write(&mut self, stream: &Stream, block: &Block, step: u64) -> io::Result<()> {
+    fn write(&mut self, stream: &StreamSchema, block: &StreamRows, step: u64) -> io::Result<()> {
         let (rows, width) = (stream.env_ids.len(), stream.width());
         self.record.clear();
         self.record.extend_from_slice(&(step as f64).to_le_bytes());
         let times = block.times.iter().chain(&block.force_times);
         times.for_each(|time| self.record.extend_from_slice(&time.to_le_bytes()));
         let mut first = 0;
-        for part in &stream.parts {
+        for part in &stream.fields {
             for row in 0..rows {
                 let start = row * width + first;
-                block.values.put(start..start + part.width(), &mut self.record);
+                block.values.append_bytes(start..start + part.width(), &mut self.record);
             }
             first += part.width();
         }
@@ -191,17 +191,17 @@ impl Spool {
     }
 
     /// Reads the byte range `range` of all records.
-    fn column(&mut self, range: Range<usize>, record: usize) -> io::Result<Column<'_>> {
+    fn column(&mut self, range: Range<usize>, record: usize) -> io::Result<ColumnReader<'_>> {
         self.file.flush()?;
         let file = self.file.get_mut();
         file.seek(SeekFrom::Start(0))?;
         let read = range.end;
-        Ok(Column { file: BufReader::new(file), record: vec![0; record], range, left: self.rows, at: read })
+        Ok(ColumnReader { file: BufReader::new(file), record: vec![0; record], range, left: self.rows, at: read })
     }
 }
 
 /// Reader of a byte range of each record, concatenated.
-struct Column<'f> {
+struct ColumnReader<'f> {
     file: BufReader<&'f mut File>,
     record: Vec<u8>,
     range: Range<usize>,
@@ -211,7 +211,7 @@ struct Column<'f> {
     at: usize,
 }
 
-impl Read for Column<'_> {
+impl Read for ColumnReader<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.range.end {
             if self.left == 0 || self.range.is_empty() {
@@ -227,7 +227,7 @@ impl Read for Column<'_> {
     }
 }
 
-impl Element {
+impl ElementType {
     pub(crate) fn bytes(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -237,8 +237,8 @@ impl Element {
     }
 }
 
-impl Sink for NpzFile {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
+impl FormatWriter for NpzWriter {
+    fn write(&mut self, streams: &[StreamSchema], packet: &Packet) -> WriteResult {
         if let Some(event) = &packet.event {
             for (k, env) in event.env_ids.iter().enumerate().filter(|_| !event.text.is_empty()) {
                 let line = json!({ "event": self.events.rows + k, "env": env, "step": event.step, "text": event.text });
@@ -246,60 +246,61 @@ impl Sink for NpzFile {
             }
             self.events.write_event(event)?;
         }
-        for ((stream, block), spool) in streams.iter().zip(&packet.blocks).zip(&mut self.spools) {
-            if block.used {
+        for ((stream, block), spool) in streams.iter().zip(&packet.streams).zip(&mut self.buffers) {
+            if block.has_content {
                 spool.write(stream, block, packet.step)?;
             }
         }
         Ok(())
     }
 
-    fn flush(&mut self) -> Written {
+    fn flush(&mut self) -> WriteResult {
         // An archive is not readable before its end.
         Ok(())
     }
 
-    fn finish(&mut self, streams: &[Stream]) -> Written<u64> {
+    fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64> {
         let storage = self.storage.take().ok_or_else(|| io::Error::other("finished twice"))?;
-        let mut archive = Archive::new(BufWriter::with_capacity(1 << 16, storage));
+        let mut archive = ZipWriter::new(BufWriter::with_capacity(1 << 16, storage));
         let header = |element, shape: &[usize]| {
-            npy::header(element, shape).ok_or_else(|| Fault::limit("an array has more axes than NumPy has room for"))
+            npy::header(element, shape)
+                .ok_or_else(|| WriteError::limit("an array has more axes than NumPy has room for"))
         };
-        let about = format!("{:#}\n", self.about);
-        archive.add(ABOUT, b"", &mut about.as_bytes())?;
-        archive.add(START, b"", &mut &self.start[..])?;
+        let about = format!("{:#}\n", self.metadata);
+        archive.add(METADATA, b"", &mut about.as_bytes())?;
+        archive.add(INITIAL_STATE, b"", &mut &self.start[..])?;
         if let Some(scene) = &self.scene {
-            archive.add(SCENE, b"", &mut &scene[..])?;
+            archive.add(SCENE_ARCHIVE, b"", &mut &scene[..])?;
         }
         self.notes.flush()?;
         let notes = self.notes.get_mut();
         notes.seek(SeekFrom::Start(0))?;
         archive.add(NOTES, b"", notes)?;
-        let record = EVENT[3].2.end;
-        for (name, element, range) in EVENT {
+        let record = EVENT_FIELDS[3].2.end;
+        for (name, element, range) in EVENT_FIELDS {
             let head = header(element, &[self.events.rows])?;
             archive.add(&format!("events/{name}.npy"), &head, &mut self.events.column(range, record)?)?;
         }
-        for (stream, spool) in streams.iter().zip(&mut self.spools) {
+        for (stream, spool) in streams.iter().zip(&mut self.buffers) {
             let (rows, envs) = (spool.rows, stream.env_ids.len());
-            let one = stream.element.bytes();
+            let one = stream.element_type.bytes();
             // One or two times for each environment.
-            let times = 8 * envs * (1 + usize::from(stream.is_mixed()));
+            let times = 8 * envs * (1 + usize::from(stream.has_two_stamps()));
             let record = 8 + times + envs * stream.width() * one;
-            let mut add = |name: String, element, shape: &[usize], range: Range<usize>| -> Written {
+            let mut add = |name: String, element, shape: &[usize], range: Range<usize>| -> WriteResult {
                 let head = header(element, shape)?;
                 Ok(archive.add(&format!("{name}.npy"), &head, &mut spool.column(range, record)?)?)
             };
-            add(format!("{}/step", stream.name), Element::F64, &[rows], 0..8)?;
-            add(format!("{}/time", stream.name), Element::F64, &[rows, envs], 8..8 + 8 * envs)?;
-            if stream.is_mixed() {
-                add(format!("{}/force_time", stream.name), Element::F64, &[rows, envs], 8 + 8 * envs..8 + times)?;
+            add(format!("{}/step", stream.name), ElementType::F64, &[rows], 0..8)?;
+            add(format!("{}/time", stream.name), ElementType::F64, &[rows, envs], 8..8 + 8 * envs)?;
+            if stream.has_two_stamps() {
+                add(format!("{}/force_time", stream.name), ElementType::F64, &[rows, envs], 8 + 8 * envs..8 + times)?;
             }
             let mut first = 8 + times;
-            for part in &stream.parts {
+            for part in &stream.fields {
                 let shape = [&[rows, envs][..], &part.shape].concat();
                 let end = first + envs * part.width() * one;
-                add(member(stream, &part.name), stream.element, &shape, first..end)?;
+                add(array_name(stream, &part.name), stream.element_type, &shape, first..end)?;
                 first = end;
             }
         }
@@ -307,7 +308,7 @@ impl Sink for NpzFile {
         Ok(self.part.commit()?)
     }
 
-    fn kept(&self) -> Option<PathBuf> {
-        self.part.kept()
+    fn partial_path(&self) -> Option<PathBuf> {
+        self.part.kept_path()
     }
 }

@@ -1,7 +1,7 @@
 //! Packets: data on its way from the simulation to the writer thread.
 
 use crate::scene_update::SceneUpdate;
-use crate::stream::{Element, Part, Stream};
+use crate::stream::{ElementType, StreamField, StreamSchema};
 
 /// An event of some environments.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Event {
     /// Physics steps since the recording began.
     pub step: u64,
     /// Time of the recording \[s\].
-    pub at: f64,
+    pub recorded_time: f64,
     /// Text of a note, or reason of a divergence; else empty.
     pub text: String,
 }
@@ -55,7 +55,7 @@ impl EventKind {
     }
 
     /// True if the event is logged as a warning.
-    pub(crate) fn is_bad(self) -> bool {
+    pub(crate) fn is_warning(self) -> bool {
         self == Self::Diverged
     }
 }
@@ -69,30 +69,30 @@ pub(crate) struct Packet {
     /// Changed scenes of environments, for viewers.
     pub(crate) scenes: Vec<SceneUpdate>,
     /// One for each stream.
-    pub(crate) blocks: Vec<Block>,
+    pub(crate) streams: Vec<StreamRows>,
 }
 
 /// Buffer for one row of a stream, in all its environments.
 #[derive(Debug)]
-pub(crate) struct Block {
+pub(crate) struct StreamRows {
     /// True if the buffer has content.
-    pub(crate) used: bool,
+    pub(crate) has_content: bool,
     /// Simulation time of capture in each environment \[s\].
     pub(crate) times: Vec<f64>,
     /// Recorded time of capture in each environment \[s\].
-    pub(crate) stamps: Vec<f64>,
+    pub(crate) recorded_times: Vec<f64>,
     /// `times` of the fields with the force time, if the stream has both kinds of fields; else empty.
     pub(crate) force_times: Vec<f64>,
-    /// `stamps` of the fields with the force time, if the stream has both kinds of fields; else empty.
-    pub(crate) force_stamps: Vec<f64>,
+    /// `recorded_times` of the fields with the force time, if the stream has both kinds of fields; else empty.
+    pub(crate) recorded_force_times: Vec<f64>,
     /// True for environments with a new row.
-    pub(crate) fresh: Vec<bool>,
-    pub(crate) values: Values,
+    pub(crate) is_new: Vec<bool>,
+    pub(crate) values: ValueBuffer,
 }
 
 /// Values of one type.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Values {
+pub(crate) enum ValueBuffer {
     U8(Vec<u8>),
     I32(Vec<i32>),
     F32(Vec<f32>),
@@ -101,14 +101,14 @@ pub(crate) enum Values {
 
 impl Packet {
     /// Creates an empty packet with capacity for the streams.
-    pub(crate) fn new(streams: &[Stream]) -> Self {
-        Self { step: 0, event: None, scenes: Vec::new(), blocks: streams.iter().map(Block::new).collect() }
+    pub(crate) fn new(streams: &[StreamSchema]) -> Self {
+        Self { step: 0, event: None, scenes: Vec::new(), streams: streams.iter().map(StreamRows::new).collect() }
     }
 
     /// Size of the row of a stream \[bytes\].
-    pub(crate) fn bytes(stream: &Stream) -> u64 {
-        let numbers = stream.width().saturating_mul(stream.element.bytes());
-        // For each environment four times (8 bytes each) and the `fresh` flag.
+    pub(crate) fn max_bytes(stream: &StreamSchema) -> u64 {
+        let numbers = stream.width().saturating_mul(stream.element_type.bytes());
+        // For each environment four times (8 bytes each) and the `is_new` flag.
         (stream.env_ids.len() as u64).saturating_mul((numbers as u64).saturating_add(33))
     }
 
@@ -116,48 +116,56 @@ impl Packet {
     pub(crate) fn clear(&mut self) {
         self.event = None;
         self.scenes.clear();
-        self.blocks.iter_mut().for_each(Block::clear);
+        self.streams.iter_mut().for_each(StreamRows::clear);
     }
 }
 
-impl Block {
-    fn new(stream: &Stream) -> Self {
+impl StreamRows {
+    fn new(stream: &StreamSchema) -> Self {
         let (envs, numbers) = (stream.env_ids.len(), stream.env_ids.len() * stream.width());
-        let values = match stream.element {
-            Element::U8 => Values::U8(Vec::with_capacity(numbers)),
-            Element::I32 => Values::I32(Vec::with_capacity(numbers)),
-            Element::F32 => Values::F32(Vec::with_capacity(numbers)),
-            Element::F64 => Values::F64(Vec::with_capacity(numbers)),
+        let values = match stream.element_type {
+            ElementType::U8 => ValueBuffer::U8(Vec::with_capacity(numbers)),
+            ElementType::I32 => ValueBuffer::I32(Vec::with_capacity(numbers)),
+            ElementType::F32 => ValueBuffer::F32(Vec::with_capacity(numbers)),
+            ElementType::F64 => ValueBuffer::F64(Vec::with_capacity(numbers)),
         };
         let (times, stamps) = (Vec::with_capacity(envs), Vec::with_capacity(envs));
-        let forces = if stream.is_mixed() { envs } else { 0 };
+        let forces = if stream.has_two_stamps() { envs } else { 0 };
         let (force_times, force_stamps) = (Vec::with_capacity(forces), Vec::with_capacity(forces));
-        Self { used: false, times, stamps, force_times, force_stamps, fresh: Vec::with_capacity(envs), values }
+        Self {
+            has_content: false,
+            times,
+            recorded_times: stamps,
+            force_times,
+            recorded_force_times: force_stamps,
+            is_new: Vec::with_capacity(envs),
+            values,
+        }
     }
 
     /// Recorded time of a field in a row \[s\].
-    pub(crate) fn stamp(&self, part: &Part, row: usize) -> f64 {
-        let of_forces = self.force_stamps.get(row).filter(|_| part.of_forces);
-        of_forces.copied().unwrap_or(self.stamps[row])
+    pub(crate) fn recorded_time(&self, part: &StreamField, row: usize) -> f64 {
+        let of_forces = self.recorded_force_times.get(row).filter(|_| part.at_force_time);
+        of_forces.copied().unwrap_or(self.recorded_times[row])
     }
 
     fn clear(&mut self) {
-        self.used = false;
+        self.has_content = false;
         self.times.clear();
-        self.stamps.clear();
+        self.recorded_times.clear();
         self.force_times.clear();
-        self.force_stamps.clear();
-        self.fresh.clear();
+        self.recorded_force_times.clear();
+        self.is_new.clear();
         match &mut self.values {
-            Values::U8(values) => values.clear(),
-            Values::I32(values) => values.clear(),
-            Values::F32(values) => values.clear(),
-            Values::F64(values) => values.clear(),
+            ValueBuffer::U8(values) => values.clear(),
+            ValueBuffer::I32(values) => values.clear(),
+            ValueBuffer::F32(values) => values.clear(),
+            ValueBuffer::F64(values) => values.clear(),
         }
     }
 }
 
-impl Values {
+impl ValueBuffer {
     /// Number of values.
     pub(crate) fn len(&self) -> usize {
         match self {
@@ -169,7 +177,7 @@ impl Values {
     }
 
     /// Appends a range of the values as little-endian bytes.
-    pub(crate) fn put(&self, range: std::ops::Range<usize>, out: &mut Vec<u8>) {
+    pub(crate) fn append_bytes(&self, range: std::ops::Range<usize>, out: &mut Vec<u8>) {
         match self {
             Self::U8(values) => out.extend_from_slice(&values[range]),
             Self::I32(values) => values[range].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes())),
@@ -179,17 +187,17 @@ impl Values {
     }
 
     /// The values if they are `F64` (states); else empty.
-    pub(crate) fn states(&self) -> &[f64] {
+    pub(crate) fn as_f64s(&self) -> &[f64] {
         if let Self::F64(values) = self { values } else { &[] }
     }
 
     /// The values if they are `U8` (colors); else empty.
-    pub(crate) fn bytes(&self) -> &[u8] {
+    pub(crate) fn as_u8s(&self) -> &[u8] {
         if let Self::U8(values) = self { values } else { &[] }
     }
 
     /// The values if they are `F32` (other images); else empty.
-    pub(crate) fn floats(&self) -> &[f32] {
+    pub(crate) fn as_f32s(&self) -> &[f32] {
         if let Self::F32(values) = self { values } else { &[] }
     }
 }

@@ -1,23 +1,23 @@
 //! PNG images.
 
-use crate::writer::{Fault, Written};
+use crate::writer::{WriteError, WriteResult};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use std::io;
 
 /// Depth units of PNG files (millimeters) in a meter.
-const PER_METRE: f32 = 1000.0;
+const MM_PER_METER: f32 = 1000.0;
 
 /// Encodes PNG files, reusing its buffers.
 #[derive(Debug, Default)]
-pub(crate) struct Png {
+pub(crate) struct PngWriter {
     pixels: Vec<u8>,
     file: Vec<u8>,
 }
 
-impl Png {
+impl PngWriter {
     /// Encodes RGBA pixels without their alpha channel.
-    pub(crate) fn rgb(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<&[u8]> {
+    pub(crate) fn encode_rgb(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<&[u8]> {
         self.pixels.clear();
         for pixel in rgba.as_chunks::<4>().0 {
             self.pixels.extend_from_slice(&pixel[..3]);
@@ -26,18 +26,18 @@ impl Png {
     }
 
     /// Encodes depths \[m\] as 16-bit millimeters: 0 for a miss, 65535 for 65.535 m and more.
-    pub(crate) fn millimetres(&mut self, depths: &[f32], size: [usize; 2]) -> Written<&[u8]> {
+    pub(crate) fn encode_depth(&mut self, depths: &[f32], size: [usize; 2]) -> WriteResult<&[u8]> {
         self.pixels.clear();
         for depth in depths {
-            self.pixels.extend_from_slice(&millimetres(*depth).to_ne_bytes());
+            self.pixels.extend_from_slice(&depth_mm(*depth).to_ne_bytes());
         }
         self.encode(size, ExtendedColorType::L16)
     }
 
-    fn encode(&mut self, [width, height]: [usize; 2], color: ExtendedColorType) -> Written<&[u8]> {
+    fn encode(&mut self, [width, height]: [usize; 2], color: ExtendedColorType) -> WriteResult<&[u8]> {
         self.file.clear();
         let side = |side: usize| {
-            u32::try_from(side).map_err(|_| Fault::limit("a side of a PNG file has less than 4294967296 pixels"))
+            u32::try_from(side).map_err(|_| WriteError::limit("a side of a PNG file has less than 4294967296 pixels"))
         };
         let encoder = PngEncoder::new(&mut self.file);
         encoder.write_image(&self.pixels, side(width)?, side(height)?, color).map_err(io::Error::other)?;
@@ -46,9 +46,9 @@ impl Png {
 }
 
 /// Depth in whole millimeters.
-fn millimetres(depth: f32) -> u16 {
+fn depth_mm(depth: f32) -> u16 {
     // Larger depths saturate. An infinite depth, a miss, becomes 0.
-    if depth.is_finite() { (depth * PER_METRE).round() as u16 } else { 0 }
+    if depth.is_finite() { (depth * MM_PER_METER).round() as u16 } else { 0 }
 }
 
 #[cfg(test)]
@@ -58,6 +58,6 @@ mod tests {
     #[test]
     fn whole_millimetres() {
         let depths = [0.0, 0.0014, 0.0016, 1.0, 65.535, 70.0, f32::INFINITY, f32::NAN];
-        assert_eq!(depths.map(millimetres), [0, 1, 2, 1000, 65535, 65535, 0, 0]);
+        assert_eq!(depths.map(depth_mm), [0, 1, 2, 1000, 65535, 65535, 0, 0]);
     }
 }

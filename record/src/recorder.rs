@@ -3,18 +3,18 @@
 mod resolve;
 
 use crate::cfg::RecorderCfg;
-use crate::clock::Clock;
+use crate::clock::RecordingClock;
 use crate::error::{RecordError, Result};
-use crate::file::{Disk, part_of};
+use crate::file::{StorageFactory, partial_path_of};
 use crate::format::Format;
 use crate::packet::{Event, EventKind, Packet};
-use crate::scene_update::Scenes;
-use crate::source::Source;
-use crate::stream::Stream;
+use crate::scene_update::SceneTracker;
+use crate::source::StreamSource;
+use crate::stream::StreamSchema;
 use crate::topic::Topic;
-use crate::writer::{self, Failure, Fault, Sink};
-use kinetoscope_sim::{EnvId, Moment, Observer, ObserverId, SimulationManager, StepResult};
-use resolve::{open, packed_scene, resolve};
+use crate::writer::{self, FormatWriter, WriteError, WriterFailure};
+use kinetoscope_sim::{EnvId, Observer, ObserverId, SimEvent, SimulationManager, StepResult};
+use resolve::{create_writer, packed_scene, resolve};
 use std::any::Any;
 use std::fmt;
 use std::path::PathBuf;
@@ -56,12 +56,12 @@ pub trait Record {
     ///
     /// # Panics
     /// The handle belongs to another manager.
-    fn finish_recording(&mut self, recorder: RecorderId) -> Result<Recorded>;
+    fn finish_recording(&mut self, recorder: RecorderId) -> Result<RecordingSummary>;
 }
 
 impl Record for SimulationManager {
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId> {
-        let recorder = Recorder::start(self, cfg, &Disk::default())?;
+        let recorder = Recorder::start(self, cfg, &StorageFactory::default())?;
         Ok(self.observers_mut().add(recorder))
     }
 
@@ -75,14 +75,14 @@ impl Record for SimulationManager {
     }
 
     #[track_caller]
-    fn finish_recording(&mut self, recorder: RecorderId) -> Result<Recorded> {
+    fn finish_recording(&mut self, recorder: RecorderId) -> Result<RecordingSummary> {
         self.observers_mut().remove(recorder)?.finish()
     }
 }
 
 /// Summary of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Recorded {
+pub struct RecordingSummary {
     /// Output file or folder.
     pub path: PathBuf,
     /// Size of the output \[bytes\].
@@ -92,21 +92,21 @@ pub struct Recorded {
     /// Number of times that the simulation waited for a free packet.
     pub waits: u64,
     /// Total duration of these waits.
-    pub waited: Duration,
+    pub wait_time: Duration,
     /// Parts of [`Topic::Everything`], [`Topic::Sensor`] and the scene that were left out, with the reason. Examples
     /// are sensors whose types do not provide their channels, sensors outside the recorded environments, channels that
     /// the format does not support, and meshes that cannot be read.
     pub left_out: Vec<String>,
 }
 
-impl fmt::Display for Recorded {
+impl fmt::Display for RecordingSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.bytes as f64 / 1e6;
         write!(f, "{}: {} rows, {size:.1} MB; ", self.path.display(), self.packets)?;
         match self.waits {
             0 => f.write_str("the simulation never waited for it")?,
             waits => {
-                write!(f, "the simulation waited for it {waits} times, {:.2} s in all", self.waited.as_secs_f64())?
+                write!(f, "the simulation waited for it {waits} times, {:.2} s in all", self.wait_time.as_secs_f64())?
             }
         }
         if !self.left_out.is_empty() {
@@ -122,76 +122,76 @@ impl fmt::Display for Recorded {
 /// gets the final name. A readable partial file (MCAP, folders of images) remains as `NAME.part`.
 pub struct Recorder {
     cfg: RecorderCfg,
-    sources: Vec<Source>,
-    clock: Clock,
-    full: Option<SyncSender<Packet>>,
-    free: Receiver<Packet>,
+    sources: Vec<StreamSource>,
+    clock: RecordingClock,
+    filled: Option<SyncSender<Packet>>,
+    empty: Receiver<Packet>,
     /// Free packets that were received already.
-    spare: Vec<Packet>,
-    thread: Option<JoinHandle<Result<u64, Failure>>>,
+    empty_packets: Vec<Packet>,
+    thread: Option<JoinHandle<Result<u64, WriterFailure>>>,
     failed: Arc<AtomicBool>,
     /// Error of the writer thread.
-    why: Arc<OnceLock<String>>,
+    reason: Arc<OnceLock<String>>,
     failure: Option<RecordError>,
-    recorded: Recorded,
+    summary: RecordingSummary,
     format: Format,
     /// Environments whose divergence was recorded already.
     diverged: Vec<usize>,
     /// Scenes of the environments that were written for viewers; `None` if the file has none.
-    scenes: Option<Scenes>,
+    scenes: Option<SceneTracker>,
     /// Environments whose appearance may have changed since their last scene message.
-    restyled: Vec<usize>,
+    dirty_scenes: Vec<usize>,
 }
 
 impl fmt::Debug for Recorder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Recorder").field("cfg", &self.cfg).field("recorded", &self.recorded).finish_non_exhaustive()
+        f.debug_struct("Recorder").field("cfg", &self.cfg).field("recorded", &self.summary).finish_non_exhaustive()
     }
 }
 
 /// Largest size of the packets of a pool \[bytes\]: 16 GiB. Mistakes in a configuration are far above this.
-const MAX_POOL: u64 = 1 << 34;
+const MAX_POOL_BYTES: u64 = 1 << 34;
 
 /// Approximate size of a packet besides its values \[bytes\].
-const PACKET: u64 = 256;
+const PACKET_OVERHEAD: u64 = 256;
 
 impl Recorder {
-    pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, disk: &Disk) -> Result<Self> {
+    pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, disk: &StorageFactory) -> Result<Self> {
         let format = cfg.format.map_or_else(|| Format::of_path(&cfg.path), Ok)?;
-        if let Some(feature) = format.feature() {
+        if let Some(feature) = format.missing_feature() {
             return Err(RecordError::NotBuilt { path: cfg.path, format, feature });
         }
-        for (field, value, least) in [("every", cfg.every, 1), ("packets", cfg.packets as u64, 2)] {
+        for (field, value, least) in [("every", cfg.period_steps, 1), ("packets", cfg.packets as u64, 2)] {
             if value < least {
-                return Err(RecordError::OutOfRange { field, value, least });
+                return Err(RecordError::OutOfRange { field, value, min: least });
             }
         }
         let (sources, left_out) = resolve(sim, &cfg, format)?;
-        let streams: Vec<Stream> = sources.iter().map(|source| source.stream.clone()).collect();
-        let bytes = streams.iter().map(Packet::bytes).fold(PACKET, u64::saturating_add);
-        if bytes.saturating_mul(cfg.packets as u64) > MAX_POOL {
-            return Err(RecordError::TooLarge { packets: cfg.packets, bytes, most: MAX_POOL });
+        let streams: Vec<StreamSchema> = sources.iter().map(|source| source.stream.clone()).collect();
+        let bytes = streams.iter().map(Packet::max_bytes).fold(PACKET_OVERHEAD, u64::saturating_add);
+        if bytes.saturating_mul(cfg.packets as u64) > MAX_POOL_BYTES {
+            return Err(RecordError::PoolTooLarge { packets: cfg.packets, bytes, max_bytes: MAX_POOL_BYTES });
         }
         let (scene, not_in_it) = match format {
             Format::Mcap | Format::Npz if cfg.scene => packed_scene(sim),
             _ => (None, Vec::new()),
         };
         let left_out = [left_out, not_in_it].concat();
-        let sink = open(sim, &cfg, format, &streams, scene.as_deref(), disk)?;
-        Self::begin(sim, cfg, format, sources, left_out, sink)
+        let sink = create_writer(sim, &cfg, format, &streams, scene.as_deref(), disk)?;
+        Self::start_writer(sim, cfg, format, sources, left_out, sink)
     }
 
     /// Starts the writer thread and records the initial states into `sink`.
-    fn begin(
+    fn start_writer(
         sim: &mut SimulationManager,
         cfg: RecorderCfg,
         format: Format,
-        sources: Vec<Source>,
+        sources: Vec<StreamSource>,
         left_out: Vec<String>,
-        sink: Box<dyn Sink>,
+        sink: Box<dyn FormatWriter>,
     ) -> Result<Self> {
-        let streams: Vec<Stream> = sources.iter().map(|source| source.stream.clone()).collect();
-        let scenes = (format == Format::Mcap && cfg.scene).then(|| Scenes::new(&streams));
+        let streams: Vec<StreamSchema> = sources.iter().map(|source| source.stream.clone()).collect();
+        let scenes = (format == Format::Mcap && cfg.scene).then(|| SceneTracker::new(&streams));
         let (full, filled) = sync_channel(cfg.packets);
         let (empty, free) = channel();
         for _ in 0..cfg.packets {
@@ -204,41 +204,41 @@ impl Recorder {
         let work = move || writer::run(sink, &streams, &filled, &empty, &flag, &reason);
         let thread = std::thread::Builder::new().name("recording".into()).spawn(work);
         let thread = thread.map_err(|error| RecordError::file(&cfg.path, error))?;
-        let clock = Clock::new(sim.cfg().physics_dt, sim.observers().steps(), &sim.time());
-        let recorded = Recorded { path: cfg.path.clone(), left_out, ..Recorded::default() };
+        let clock = RecordingClock::new(sim.cfg().physics_dt, sim.observers().steps(), &sim.time());
+        let recorded = RecordingSummary { path: cfg.path.clone(), left_out, ..RecordingSummary::default() };
         let mut recorder = Self {
             cfg,
             sources,
             clock,
-            full: Some(full),
-            free,
-            spare: Vec::new(),
+            filled: Some(full),
+            empty: free,
+            empty_packets: Vec::new(),
             thread: Some(thread),
             failed,
-            why,
+            reason: why,
             failure: None,
-            recorded,
+            summary: recorded,
             format,
             diverged: Vec::new(),
             scenes,
-            restyled: (0..sim.num_envs()).collect(),
+            dirty_scenes: (0..sim.num_envs()).collect(),
         };
         let all: Vec<usize> = (0..sim.num_envs()).collect();
-        recorder.take(sim, None, &all, None);
+        recorder.record_due(sim, None, &all, None);
         if recorder.failure.is_some() {
-            recorder.end()?;
+            recorder.stop()?;
         }
         Ok(recorder)
     }
 
     /// Recorded streams.
-    pub fn streams(&self) -> impl Iterator<Item = &Stream> {
+    pub fn streams(&self) -> impl Iterator<Item = &StreamSchema> {
         self.sources.iter().map(|source| &source.stream)
     }
 
     /// Summary so far. The size is known at the end.
-    pub fn so_far(&self) -> &Recorded {
-        &self.recorded
+    pub fn summary(&self) -> &RecordingSummary {
+        &self.summary
     }
 
     /// Error that stopped the recording; `None` while it goes on.
@@ -247,7 +247,7 @@ impl Recorder {
             return Some(failure.to_string());
         }
         let path = self.cfg.path.display();
-        match self.why.get() {
+        match self.reason.get() {
             Some(why) => Some(format!("{path}: {why}")),
             None => self.has_failed().then(|| format!("{path}: the thread that writes has ended")),
         }
@@ -260,13 +260,13 @@ impl Recorder {
         self.failure.is_some() || ended || self.failed.load(Ordering::Relaxed)
     }
 
-    /// Waits until the file contains everything that was recorded so far, or an error occurs. [`Recorded::waits`] does
+    /// Waits until the file contains everything that was recorded so far, or an error occurs. [`RecordingSummary::waits`] does
     /// not count this wait.
-    pub fn catch_up(&mut self) {
-        while self.spare.len() < self.cfg.packets && !self.has_failed() {
+    pub fn wait_until_written(&mut self) {
+        while self.empty_packets.len() < self.cfg.packets && !self.has_failed() {
             // The writer thread is gone if this fails.
-            let Ok(packet) = self.free.recv() else { return };
-            self.spare.push(packet);
+            let Ok(packet) = self.empty.recv() else { return };
+            self.empty_packets.push(packet);
         }
     }
 
@@ -274,173 +274,184 @@ impl Recorder {
     ///
     /// # Errors
     /// The same as [`Record::finish_recording`].
-    pub fn finish(mut self) -> Result<Recorded> {
-        self.end()
+    pub fn finish(mut self) -> Result<RecordingSummary> {
+        self.stop()
     }
 
-    fn end(&mut self) -> Result<Recorded> {
-        self.full = None;
+    fn stop(&mut self) -> Result<RecordingSummary> {
+        self.filled = None;
         if let Some(scenes) = self.scenes.take() {
-            self.recorded.left_out.extend(scenes.left_out());
+            self.summary.left_out.extend(scenes.left_out());
         }
-        let Some(thread) = self.thread.take() else { return Ok(self.recorded.clone()) };
+        let Some(thread) = self.thread.take() else { return Ok(self.summary.clone()) };
         let path = self.cfg.path.clone();
         let written = thread.join().unwrap_or_else(|_| {
             self.failure.get_or_insert(RecordError::Panicked { path: path.clone() });
             // A panic leaves the partial file in place.
-            let part = part_of(&path);
-            Err(Failure { error: None, kept: part.exists().then_some(part) })
+            let part = partial_path_of(&path);
+            Err(WriterFailure { error: None, partial_path: part.exists().then_some(part) })
         });
-        let (failure, Failure { error, kept }) = match (self.failure.take(), written) {
+        let (failure, WriterFailure { error, partial_path: kept }) = match (self.failure.take(), written) {
             (None, Ok(bytes)) => {
-                self.recorded.bytes = bytes;
-                return Ok(self.recorded.clone());
+                self.summary.bytes = bytes;
+                return Ok(self.summary.clone());
             }
-            (Some(failure), Ok(_)) => (failure, Failure { error: None, kept: None }),
+            (Some(failure), Ok(_)) => (failure, WriterFailure { error: None, partial_path: None }),
             (Some(failure), Err(written)) => (failure, written),
-            (None, Err(Failure { error, kept })) => match error {
+            (None, Err(WriterFailure { error, partial_path: kept })) => match error {
                 None => {
                     let error = Arc::new(std::io::Error::other("the recording was broken off"));
-                    return Err(RecordError::File { path, error, kept });
+                    return Err(RecordError::File { path, error, partial_file: kept });
                 }
-                Some(Fault::Io(error)) => return Err(RecordError::File { path, error: Arc::new(error), kept }),
-                Some(fault) => (fault.of_file(&path), Failure { error: None, kept }),
+                Some(WriteError::Io(error)) => {
+                    return Err(RecordError::File { path, error: Arc::new(error), partial_file: kept });
+                }
+                Some(fault) => (fault.into_record_error(&path), WriterFailure { error: None, partial_path: kept }),
             },
         };
         let failure = match failure {
-            RecordError::Changed { stream, .. } => RecordError::Changed { path: path.clone(), stream },
+            RecordError::StreamChanged { stream, .. } => RecordError::StreamChanged { path: path.clone(), stream },
             other => other,
         };
-        Err(RecordError::BrokenOff { error: Box::new(failure), also: error.map(|error| error.to_string()), kept })
+        Err(RecordError::Aborted {
+            error: Box::new(failure),
+            write_error: error.map(|error| error.to_string()),
+            partial_file: kept,
+        })
     }
 
-    /// Records the due streams, and the state streams of environments `renewed`. With the `result` of a step of a task,
+    /// Records the due streams, and the state streams of environments `changed_envs`. With the `result` of a step of a task,
     /// records only that result.
-    fn take(
+    fn record_due(
         &mut self,
         sim: &mut SimulationManager,
         event: Option<Event>,
-        renewed: &[usize],
+        changed_envs: &[usize],
         result: Option<&StepResult>,
     ) {
         if self.has_failed() {
             return;
         }
-        let Some(mut packet) = self.packet() else { return };
+        let Some(mut packet) = self.acquire_packet() else { return };
         let steps = sim.observers().steps();
         let times = sim.time();
         packet.step = self.clock.step(steps);
         packet.event = event;
-        let now = self.clock.now(steps);
+        let now = self.clock.time(steps);
         if let Some(scenes) = &mut self.scenes {
-            match scenes.changed(sim, &std::mem::take(&mut self.restyled), now) {
+            match scenes.updates(sim, &std::mem::take(&mut self.dirty_scenes), now) {
                 Ok(changed) => packet.scenes = changed,
-                Err(error) => return self.give_up(packet, error),
+                Err(error) => return self.abort_with_packet(packet, error),
             }
         }
         let mut used = packet.event.is_some() || !packet.scenes.is_empty();
-        for (source, block) in self.sources.iter_mut().zip(&mut packet.blocks) {
-            if source.is_outcome() != result.is_some() {
+        for (source, block) in self.sources.iter_mut().zip(&mut packet.streams) {
+            if source.is_task_result() != result.is_some() {
                 continue;
             }
-            let due = source.due_at <= steps;
-            if !due && (source.sensor.is_some() || source.is_stage() || renewed.is_empty()) {
+            let due = source.next_step <= steps;
+            if !due && (source.sensor.is_some() || source.is_overview() || changed_envs.is_empty()) {
                 continue;
             }
-            if let Err(error) = source.read(sim, &times, renewed, due, result, block) {
-                return self.give_up(packet, error);
+            if let Err(error) = source.read(sim, &times, changed_envs, due, result, block) {
+                return self.abort_with_packet(packet, error);
             }
-            if let Some(every) = source.every.filter(|_| due) {
-                source.due_at = steps.saturating_add(every);
+            if let Some(every) = source.period_steps.filter(|_| due) {
+                source.next_step = steps.saturating_add(every);
             }
-            if source.is_stage() {
+            if source.is_overview() {
                 // The overview shows several environments, so its time is that of the recording.
-                block.stamps.push(now);
+                block.recorded_times.push(now);
             } else {
                 let (clock, envs) = (&self.clock, &source.stream.env_ids);
                 let stamps = |times: &[f64], to: &mut Vec<f64>| {
-                    to.extend(envs.iter().zip(times).map(|(env, time)| clock.stamp(*env, *time)));
+                    to.extend(envs.iter().zip(times).map(|(env, time)| clock.recorded_time(*env, *time)));
                 };
-                stamps(&block.times, &mut block.stamps);
-                stamps(&block.force_times, &mut block.force_stamps);
+                stamps(&block.times, &mut block.recorded_times);
+                stamps(&block.force_times, &mut block.recorded_force_times);
             }
-            used |= block.used;
+            used |= block.has_content;
         }
         if !used {
             packet.clear();
-            self.spare.push(packet);
+            self.empty_packets.push(packet);
             return;
         }
-        self.recorded.packets += 1;
-        if let Some(full) = &self.full {
-            // The channel holds all packets, so this never waits. It fails if the writer thread is gone; `end` then
+        self.summary.packets += 1;
+        if let Some(full) = &self.filled {
+            // The channel holds all packets, so this never waits. It fails if the writer thread is gone; `stop` then
             // returns the reason.
             let _ = full.send(packet);
         }
     }
 
-    /// Aborts the recording, and returns the packet to the pool, since `catch_up` waits for all packets.
-    fn give_up(&mut self, mut packet: Packet, error: RecordError) {
+    /// Aborts the recording, and returns the packet to the pool, since `wait_until_written` waits for all packets.
+    fn abort_with_packet(&mut self, mut packet: Packet, error: RecordError) {
         packet.clear();
-        self.spare.push(packet);
+        self.empty_packets.push(packet);
         self.fail(error);
     }
 
     /// Returns an empty packet, after a wait if necessary.
-    fn packet(&mut self) -> Option<Packet> {
-        if let Some(packet) = self.spare.pop() {
+    fn acquire_packet(&mut self) -> Option<Packet> {
+        if let Some(packet) = self.empty_packets.pop() {
             return Some(packet);
         }
-        match self.free.try_recv() {
+        match self.empty.try_recv() {
             Ok(packet) => Some(packet),
             Err(TryRecvError::Disconnected) => None,
             Err(TryRecvError::Empty) => {
                 let start = Instant::now();
-                let packet = self.free.recv().ok();
-                self.recorded.waits += 1;
-                self.recorded.waited += start.elapsed();
+                let packet = self.empty.recv().ok();
+                self.summary.waits += 1;
+                self.summary.wait_time += start.elapsed();
                 packet
             }
         }
     }
 
     /// Handles resets and writes of environments.
-    fn happened(&mut self, sim: &mut SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
+    fn handle_state_change(&mut self, sim: &mut SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
         let envs: Vec<usize> = env_ids.iter().map(|env| env.0).collect();
         let (steps, times) = (sim.observers().steps(), sim.time());
-        self.clock.restarted(&envs, &times, steps);
-        self.recount(sim, &envs);
-        let of: Vec<usize> = envs.into_iter().filter(|env| self.records(*env)).collect();
+        self.clock.resync(&envs, &times, steps);
+        self.resync_counts(sim, &envs);
+        let of: Vec<usize> = envs.into_iter().filter(|env| self.is_recorded(*env)).collect();
         if of.is_empty() {
             return;
         }
         let times = of.iter().map(|env| times[*env]).collect();
-        let (step, at) = (self.clock.step(steps), self.clock.now(steps));
+        let (step, at) = (self.clock.step(steps), self.clock.time(steps));
         let text = String::new();
-        self.restyled.extend_from_slice(&of);
-        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at, text }), &of, None);
+        self.dirty_scenes.extend_from_slice(&of);
+        self.record_due(
+            sim,
+            Some(Event { kind, env_ids: of.clone(), times, step, recorded_time: at, text }),
+            &of,
+            None,
+        );
     }
 
-    fn records(&self, env: usize) -> bool {
+    fn is_recorded(&self, env: usize) -> bool {
         self.cfg.envs.as_ref().is_none_or(|wanted| wanted.contains(&EnvId(env)))
     }
 
     /// Records the environments that have diverged since the last call.
-    fn look_for_divergence(&mut self, sim: &SimulationManager) {
-        if !self.format.has_events() {
+    fn record_divergence(&mut self, sim: &SimulationManager) {
+        if !self.format.supports_events() {
             return;
         }
         let diverged: Vec<(usize, String)> = sim
             .diverged()
             .iter()
             .map(|one| (one.env.0, one.to_string()))
-            .filter(|(env, _)| self.records(*env))
+            .filter(|(env, _)| self.is_recorded(*env))
             .collect();
         if !diverged.is_empty() {
             let (steps, times) = (sim.observers().steps(), sim.time());
             let known = std::mem::take(&mut self.diverged);
             for (env, why) in diverged.iter().filter(|(env, _)| !known.contains(env)) {
-                self.tell(EventKind::Diverged, vec![*env], why.clone(), steps, &times);
+                self.record_event(EventKind::Diverged, vec![*env], why.clone(), steps, &times);
             }
         }
         self.diverged = diverged.into_iter().map(|(env, _)| env).collect();
@@ -448,37 +459,37 @@ impl Recorder {
 
     /// Records a note.
     fn note(&mut self, steps: u64, times: &[f64], env: Option<EnvId>, text: &str) -> Result<()> {
-        if !self.format.has_events() {
+        if !self.format.supports_events() {
             let (path, topic) = (self.cfg.path.clone(), format!("{:?}", Topic::Events));
-            return Err(RecordError::NoPlace { path, format: self.format, topic });
+            return Err(RecordError::UnsupportedTopic { path, format: self.format, topic });
         }
-        let of = |one: &usize| env.is_none_or(|env| env.0 == *one) && self.records(*one);
+        let of = |one: &usize| env.is_none_or(|env| env.0 == *one) && self.is_recorded(*one);
         let envs: Vec<usize> = (0..times.len()).filter(of).collect();
         if !envs.is_empty() {
-            self.tell(EventKind::Note, envs, text.into(), steps, times);
+            self.record_event(EventKind::Note, envs, text.into(), steps, times);
         }
         Ok(())
     }
 
     /// Records an event that changed no state.
-    fn tell(&mut self, kind: EventKind, env_ids: Vec<usize>, text: String, steps: u64, times: &[f64]) {
+    fn record_event(&mut self, kind: EventKind, env_ids: Vec<usize>, text: String, steps: u64, times: &[f64]) {
         if self.has_failed() {
             return;
         }
-        let Some(mut packet) = self.packet() else { return };
+        let Some(mut packet) = self.acquire_packet() else { return };
         let times = env_ids.iter().map(|env| times[*env]).collect();
-        let (step, at) = (self.clock.step(steps), self.clock.now(steps));
+        let (step, at) = (self.clock.step(steps), self.clock.time(steps));
         packet.step = step;
-        packet.event = Some(Event { kind, env_ids, times, step, at, text });
-        self.recorded.packets += 1;
-        if let Some(full) = &self.full {
+        packet.event = Some(Event { kind, env_ids, times, step, recorded_time: at, text });
+        self.summary.packets += 1;
+        if let Some(full) = &self.filled {
             let _ = full.send(packet);
         }
     }
 
-    fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) {
+    fn resync_counts(&mut self, sim: &SimulationManager, envs: &[usize]) {
         for source in &mut self.sources {
-            if let Err(error) = source.recount(sim, envs) {
+            if let Err(error) = source.resync_counts(sim, envs) {
                 return self.fail(error);
             }
         }
@@ -491,23 +502,23 @@ impl Recorder {
     }
 
     /// Checks after a compilation of the scene that all recorded streams still exist.
-    fn compiled(&mut self, sim: &mut SimulationManager) {
+    fn check_streams(&mut self, sim: &mut SimulationManager) {
         let format = self.cfg.format.map_or_else(|| Format::of_path(&self.cfg.path), Ok);
         match format.and_then(|format| resolve(sim, &self.cfg, format)) {
             Ok((now, _)) => {
                 let gone = self.sources.iter().find(|was| !now.iter().any(|now| now.stream == was.stream));
                 if let Some(gone) = gone {
                     let (path, stream) = (self.cfg.path.clone(), gone.stream.name.clone());
-                    return self.fail(RecordError::Changed { path, stream });
+                    return self.fail(RecordError::StreamChanged { path, stream });
                 }
             }
             Err(error) => return self.fail(error),
         }
-        self.recount(sim, &(0..sim.num_envs()).collect::<Vec<_>>());
+        self.resync_counts(sim, &(0..sim.num_envs()).collect::<Vec<_>>());
         if self.scenes.is_some() {
-            self.restyled = (0..sim.num_envs()).collect();
+            self.dirty_scenes = (0..sim.num_envs()).collect();
             // Only scene messages are due: the states were recorded after the last step.
-            self.take(sim, None, &[], None);
+            self.record_due(sim, None, &[], None);
         }
     }
 }
@@ -516,7 +527,7 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         // Only a finished recording gets its final name. Errors cannot be reported from here.
         self.failed.store(true, Ordering::Relaxed);
-        let _ = self.end();
+        let _ = self.stop();
     }
 }
 
@@ -526,33 +537,33 @@ impl Observer for Recorder {
             return u64::MAX;
         }
         let now = sim.observers().steps();
-        let wait = |source: &Source| match (&source.sensor, source.every) {
+        let wait = |source: &StreamSource| match (&source.sensor, source.period_steps) {
             (Some(uid), None) => sim.entities().sensor_due_in(uid).unwrap_or(u64::MAX),
-            _ => source.due_at.saturating_sub(now).max(1),
+            _ => source.next_step.saturating_sub(now).max(1),
         };
-        // A recording of events alone checks for divergence every `every` steps.
-        self.sources.iter().map(wait).min().unwrap_or(self.cfg.every)
+        // A recording of events alone checks for divergence every `period_steps` steps.
+        self.sources.iter().map(wait).min().unwrap_or(self.cfg.period_steps)
     }
 
-    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
+    fn on_event(&mut self, sim: &mut SimulationManager, moment: &SimEvent) {
         match moment {
-            Moment::Stepped => {
-                self.look_for_divergence(sim);
-                self.take(sim, None, &[], None);
+            SimEvent::Stepped => {
+                self.record_divergence(sim);
+                self.record_due(sim, None, &[], None);
             }
-            Moment::Reset { env_ids } => self.happened(sim, EventKind::Reset, env_ids),
-            Moment::Written { env_ids } => self.happened(sim, EventKind::Written, env_ids),
-            Moment::Compiled => self.compiled(sim),
+            SimEvent::Reset { env_ids } => self.handle_state_change(sim, EventKind::Reset, env_ids),
+            SimEvent::Written { env_ids } => self.handle_state_change(sim, EventKind::Written, env_ids),
+            SimEvent::Compiled => self.check_streams(sim),
             _ => {}
         }
     }
 
-    fn receive(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
+    fn on_published(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
         if let Some(result) = event.downcast_ref::<StepResult>()
-            && self.sources.iter().any(Source::is_outcome)
+            && self.sources.iter().any(StreamSource::is_task_result)
         {
             let all: Vec<usize> = (0..sim.num_envs()).collect();
-            self.take(sim, None, &all, Some(result));
+            self.record_due(sim, None, &all, Some(result));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Recovery of MCAP files from killed recordings.
 
 use crate::error::{RecordError, Result};
-use crate::file::{PartFile, lock_left, part_of, remove};
+use crate::file::{PartialFile, lock_partial_file, partial_path_of, remove_file_if_exists};
 use crate::mcap_file::{io_error, options};
 use mcap::records::{AttachmentHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -41,9 +41,9 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
 /// The same as [`recover`]; a file called `to` exists.
 pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovered> {
     let (path, to) = (path.as_ref(), to.as_ref());
-    let left = part_of(path);
+    let left = partial_path_of(path);
     let missing = || RecordError::file(&left, io::ErrorKind::NotFound.into());
-    let mut locked = lock_left(&left)?.ok_or_else(missing)?;
+    let mut locked = lock_partial_file(&left)?.ok_or_else(missing)?;
     let failed_to_read = |error| RecordError::file(&left, error);
     let nothing =
         |why: String| RecordError::Malformed { path: left.clone(), what: format!("nothing of it can be read: {why}") };
@@ -55,15 +55,15 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
     }
     locked.seek(SeekFrom::Start(0)).map_err(failed_to_read)?;
     // Removes the remainder of an earlier attempt that was killed.
-    let on_the_way = part_of(to).with_extension("recovered");
-    remove(&on_the_way)?;
-    let (mut part, file) = PartFile::create_as(to, on_the_way, false)?;
+    let on_the_way = partial_path_of(to).with_extension("recovered");
+    remove_file_if_exists(&on_the_way)?;
+    let (mut part, file) = PartialFile::create_as(to, on_the_way, false)?;
     let failed = |error: McapError| RecordError::file(to, io_error(error));
     let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
     let recovered = match copy(&mut locked, &mut writer) {
         Ok(recovered) => recovered,
-        Err(Broken::Read(error)) => return Err(failed_to_read(error)),
-        Err(Broken::Write(error)) => return Err(failed(error)),
+        Err(CopyError::Read(error)) => return Err(failed_to_read(error)),
+        Err(CopyError::Write(error)) => return Err(failed(error)),
     };
     if recovered.messages == 0 {
         return Err(nothing(recovered.damage.unwrap_or_else(|| "there is no whole message in it".into())));
@@ -72,21 +72,21 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
     writer.into_inner().flush().map_err(|error| RecordError::file(to, error))?;
     part.commit().map_err(|error| RecordError::file(to, error))?;
     if recovered.damage.is_none() {
-        remove(&left)?;
+        remove_file_if_exists(&left)?;
     }
     Ok(recovered)
 }
 
 /// Error of one of the two files.
-enum Broken {
+enum CopyError {
     Read(io::Error),
     Write(McapError),
 }
 
 /// Copies everything from complete and undamaged chunks at the beginning of a file. Checksums are verified before the
 /// content of a chunk is used, because a wrong length could request any amount of memory.
-fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Result<Recovered, Broken> {
-    let bytes = from.metadata().map_err(Broken::Read)?.len();
+fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Result<Recovered, CopyError> {
+    let bytes = from.metadata().map_err(CopyError::Read)?.len();
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true)
@@ -96,7 +96,7 @@ fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Res
     while let Some(event) = reader.next_event() {
         let (opcode, data) = match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let count = from.read(reader.insert(wanted)).map_err(Broken::Read)?;
+                let count = from.read(reader.insert(wanted)).map_err(CopyError::Read)?;
                 reader.notify_read(count);
                 continue;
             }
@@ -135,7 +135,7 @@ fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Res
         };
         match copied {
             Ok(()) => {}
-            Err(McapError::Io(error)) => return Err(Broken::Write(McapError::Io(error))),
+            Err(McapError::Io(error)) => return Err(CopyError::Write(McapError::Io(error))),
             // Contradicting records are damage.
             Err(error) => {
                 recovered.damage = Some(error.to_string());

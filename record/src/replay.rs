@@ -12,10 +12,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::archive::Archive;
+use crate::archive::RecordedArrays;
 use crate::error::{RecordError, Result};
-use crate::packet::{Block, Packet};
-use crate::source::Source;
+use crate::packet::{Packet, StreamRows};
+use crate::source::StreamSource;
 use kinetoscope_sim::{EnvId, SimulationManager};
 use serde_json::Value;
 use std::fmt;
@@ -23,11 +23,11 @@ use std::path::Path;
 
 /// Result of a replay.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
+pub struct ReplayResult {
     /// Number of repeated physics steps, until the end or the first difference.
     pub steps: u64,
     /// Number of recorded values that were reproduced bit by bit.
-    pub numbers: u64,
+    pub values: u64,
     /// First difference, if any.
     pub difference: Option<Difference>,
 }
@@ -46,23 +46,23 @@ pub struct Difference {
     /// Recorded value.
     pub recorded: f64,
     /// Value of the replay.
-    pub found: f64,
+    pub replayed: f64,
     /// True if the state of the environment was written at that step. Writes are no actions and are not repeated.
-    pub written: bool,
+    pub state_written: bool,
 }
 
-impl Verdict {
+impl ReplayResult {
     /// True if all values were reproduced.
-    pub fn is_same(&self) -> bool {
+    pub fn is_identical(&self) -> bool {
         self.difference.is_none()
     }
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for ReplayResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.difference {
-            None => write!(f, "the same in {} steps: {} numbers, bit for bit", self.steps, self.numbers),
-            Some(Difference { step, env, array, column, recorded, found, written }) => {
+            None => write!(f, "the same in {} steps: {} numbers, bit for bit", self.steps, self.values),
+            Some(Difference { step, env, array, column, recorded, replayed: found, state_written: written }) => {
                 write!(f, "first different at step {step} in environment {env}: {array}, column {column}, ")?;
                 write!(f, "was {recorded:e}, now {found:e}")?;
                 if *written {
@@ -75,21 +75,21 @@ impl fmt::Display for Verdict {
 }
 
 /// Streams of states, by the endings of their names.
-const STATES: [(&str, Of); 4] = [
-    ("/joint_states", Source::joint_states),
-    ("/link_poses", Source::link_poses),
-    ("/pose", Source::object_pose),
-    ("/state", Source::mjcf_state),
+const STATES: [(&str, SourceFn); 4] = [
+    ("/joint_states", StreamSource::joint_states),
+    ("/link_poses", StreamSource::link_poses),
+    ("/pose", StreamSource::object_pose),
+    ("/state", StreamSource::mjcf_state),
 ];
 const TARGETS: &str = "/targets";
 
-type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
+type SourceFn = fn(&SimulationManager, &str, &[usize]) -> Result<StreamSource>;
 
 /// Replays a NumPy archive or an MCAP file in `sim`, which must be built as the recorded simulation was.
 ///
 /// Restores the initial state, applies the recorded actions and resets, and compares the states after every step. The
 /// file must contain the targets of every robot and the controls of every MJCF part that move something, at every step
-/// ([`RecorderCfg::every`](crate::RecorderCfg::every) 1). If a step has several rows because of events, the first and
+/// ([`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) 1). If a step has several rows because of events, the first and
 /// the last are compared.
 ///
 /// External wrenches, welds, gains and poses of kinematic objects are not recorded and not repeated. The first
@@ -97,16 +97,16 @@ type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
 ///
 /// # Errors
 /// The file is not a complete recording, or is of another scene, another MuJoCo version or another time step.
-pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Verdict> {
-    let archive = Archive::of_any(path.as_ref())?;
+pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<ReplayResult> {
+    let archive = RecordedArrays::open(path.as_ref())?;
     let dt = sim.cfg().physics_dt;
-    if archive.about["physics_dt"].as_f64() != Some(dt) {
-        let recorded = &archive.about["physics_dt"];
+    if archive.metadata["physics_dt"].as_f64() != Some(dt) {
+        let recorded = &archive.metadata["physics_dt"];
         return Err(archive.malformed(format!("recorded with physics_dt {recorded}; this simulation has {dt}")));
     }
     sim.properties_mut().restore(&archive.start()?, None)?;
     let (mut states, mut targets) = (Vec::new(), Vec::new());
-    for stream in archive.about["streams"].as_array().into_iter().flatten() {
+    for stream in archive.metadata["streams"].as_array().into_iter().flatten() {
         let name = stream["name"].as_str().unwrap_or_default();
         let envs = stream["env_ids"].as_array().into_iter().flatten().filter_map(Value::as_u64);
         let envs: Vec<usize> = envs.filter_map(|env| usize::try_from(env).ok()).collect();
@@ -114,7 +114,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
             return Err(RecordError::Env { env, count: sim.num_envs() });
         }
         if let Some(uid) = name.strip_suffix(TARGETS) {
-            targets.push(Source::targets(sim, uid, &envs)?);
+            targets.push(StreamSource::targets(sim, uid, &envs)?);
         }
         for (end, of) in STATES {
             if let Some(uid) = name.strip_suffix(end) {
@@ -139,8 +139,8 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
         }
         archive.check(source, steps.len())?;
     }
-    for uid in sim.entities().jointed_uids() {
-        let moves = sim.robot(sim.entities().jointed_id(uid)?).dof() > 0;
+    for uid in sim.entities().articulated_uids() {
+        let moves = sim.robot(sim.entities().articulated_id(uid)?).dof() > 0;
         if moves && !targets.iter().any(|source| source.stream.name == format!("{uid}{TARGETS}")) {
             return Err(archive.malformed(format!("it has no targets of {uid}: record Topic::Targets({uid:?})")));
         }
@@ -151,7 +151,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
             return Err(archive.malformed(format!("it has no controls of {uid}: record Topic::MjcfState({uid:?})")));
         }
     }
-    Repetition { archive, states, targets, steps }.run(sim)
+    Replay { archive, states, targets, steps }.run(sim)
 }
 
 /// Number of environments of a NumPy archive or an MCAP file.
@@ -159,26 +159,26 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
 /// # Errors
 /// The file is not such a recording, or is incomplete.
 pub fn num_envs(path: impl AsRef<Path>) -> Result<usize> {
-    Ok(Archive::of_any(path.as_ref())?.start()?.len())
+    Ok(RecordedArrays::open(path.as_ref())?.start()?.len())
 }
 
 /// Data of a replay.
-struct Repetition {
-    archive: Archive,
-    states: Vec<Source>,
-    targets: Vec<Source>,
+struct Replay {
+    archive: RecordedArrays,
+    states: Vec<StreamSource>,
+    targets: Vec<StreamSource>,
     /// Step of each row.
     steps: Vec<f64>,
 }
 
-impl Repetition {
-    fn run(mut self, sim: &mut SimulationManager) -> Result<Verdict> {
-        let mut verdict = Verdict { steps: 0, numbers: 0, difference: None };
+impl Replay {
+    fn run(mut self, sim: &mut SimulationManager) -> Result<ReplayResult> {
+        let mut verdict = ReplayResult { steps: 0, values: 0, difference: None };
         let mut row = 0;
         while row < self.steps.len() {
             let step = self.steps[row];
             if step > verdict.steps as f64 {
-                self.act(sim, row)?;
+                self.apply_actions(sim, row)?;
                 sim.update(1);
                 verdict.steps += 1;
             }
@@ -188,7 +188,7 @@ impl Repetition {
                 return Ok(verdict);
             }
             if last > row {
-                let (reset, written) = self.archive.events(step)?;
+                let (reset, written) = self.archive.state_changes_at(step)?;
                 if !reset.is_empty() {
                     sim.reset(Some(&reset))?;
                 }
@@ -202,11 +202,11 @@ impl Repetition {
     }
 
     /// Applies the actions of a row.
-    fn act(&self, sim: &mut SimulationManager, row: usize) -> Result<()> {
+    fn apply_actions(&self, sim: &mut SimulationManager, row: usize) -> Result<()> {
         let Self { archive, states, targets, .. } = self;
         for source in targets {
             let Some(uid) = source.stream.name.strip_suffix(TARGETS) else { continue };
-            let id = sim.entities().jointed_id(uid)?;
+            let id = sim.entities().articulated_id(uid)?;
             let envs: Vec<EnvId> = source.stream.env_ids.iter().copied().map(EnvId).collect();
             let of = |part: &str| archive.rows(&format!("{}/{part}", source.stream.name), row);
             let (positions, velocities, efforts) = (of("positions")?, of("velocities")?, of("efforts")?);
@@ -230,18 +230,18 @@ impl Repetition {
         sim: &mut SimulationManager,
         row: usize,
         written: &[EnvId],
-        verdict: &mut Verdict,
+        verdict: &mut ReplayResult,
     ) -> Result<bool> {
         let times = sim.time();
         for source in &mut self.states {
             let mut packet = Packet::new(std::slice::from_ref(&source.stream));
-            let Some(block) = packet.blocks.first_mut() else { continue };
+            let Some(block) = packet.streams.first_mut() else { continue };
             source.read(sim, &times, &[], true, None, block)?;
             if let Some(difference) = difference(&self.archive, source, block, row, written)? {
                 verdict.difference = Some(Difference { step: verdict.steps, ..difference });
                 return Ok(false);
             }
-            verdict.numbers += block.values.len() as u64;
+            verdict.values += block.values.len() as u64;
         }
         Ok(true)
     }
@@ -249,25 +249,33 @@ impl Repetition {
 
 /// First value of a stream that differs from the archive.
 fn difference(
-    archive: &Archive,
-    source: &Source,
-    block: &Block,
+    archive: &RecordedArrays,
+    source: &StreamSource,
+    block: &StreamRows,
     row: usize,
     written: &[EnvId],
 ) -> Result<Option<Difference>> {
     let stream = &source.stream;
     let width = stream.width();
     let mut first = 0;
-    for part in &stream.parts {
-        let array = crate::npz::member(stream, &part.name);
+    for part in &stream.fields {
+        let array = crate::npz::array_name(stream, &part.name);
         let recorded = archive.rows(&array, row)?;
         for (k, &env) in stream.env_ids.iter().enumerate() {
             for column in 0..part.width() {
-                let found = block.values.states().get(k * width + first + column).copied().unwrap_or(f64::NAN);
+                let found = block.values.as_f64s().get(k * width + first + column).copied().unwrap_or(f64::NAN);
                 let recorded = recorded[(k, column)];
                 if recorded.to_bits() != found.to_bits() {
                     let written = written.contains(&EnvId(env));
-                    return Ok(Some(Difference { step: 0, env, array, column, recorded, found, written }));
+                    return Ok(Some(Difference {
+                        step: 0,
+                        env,
+                        array,
+                        column,
+                        recorded,
+                        replayed: found,
+                        state_written: written,
+                    }));
                 }
             }
         }

@@ -1,22 +1,22 @@
 //! Appearance of environments for viewers: shapes attached to the recorded frames.
 
 use crate::error::Result;
-use crate::stream::{Kind, Stream};
+use crate::stream::{StreamKind, StreamSchema};
 use kinetoscope_render::RasterCfg;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, Pose, RenderScene, Texture};
-use kinetoscope_sim::{EnvId, Look, SimulationManager};
+use kinetoscope_sim::{EnvId, EnvVisualState, SimulationManager};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Largest uncompressed size of all scene messages of a file \[bytes\].
-const MOST: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 /// Number of segments of tessellated round shapes.
 const SEGMENTS: usize = 32;
 /// Approximate size of an entity in a message, besides its shape \[bytes\].
-const ENTITY: u64 = 256;
+const ENTITY_OVERHEAD: u64 = 256;
 
 /// The appearance of an environment from a time on.
 #[derive(Debug)]
@@ -26,11 +26,11 @@ pub(crate) struct SceneUpdate {
     pub(crate) at: f64,
     pub(crate) entities: Vec<Entity>,
     /// Appearance of the entities, by instance.
-    pub(crate) drawn: Looks,
+    pub(crate) visuals: InstanceVisuals,
 }
 
 /// Appearance of each instance of a scene; `None` if it is not drawn.
-pub(crate) type Looks = Arc<Vec<Option<Drawn>>>;
+pub(crate) type InstanceVisuals = Arc<Vec<Option<InstanceVisual>>>;
 
 /// An instance attached to a frame.
 #[derive(Clone, Debug)]
@@ -49,19 +49,19 @@ pub(crate) struct Entity {
 
 /// Appearance of an instance.
 #[derive(Debug)]
-pub(crate) struct Drawn {
-    pub(crate) form: Form,
+pub(crate) struct InstanceVisual {
+    pub(crate) shape: VisualShape,
     /// Color in 0..=1, multiplied by the mean color of its texture, if any.
     pub(crate) rgba: [f64; 4],
 }
 
 /// Surface in the instance's own frame.
 #[derive(Debug)]
-pub(crate) enum Form {
+pub(crate) enum VisualShape {
     /// Box by its side lengths \[m\].
-    Cube([f64; 3]),
+    Box([f64; 3]),
     /// Sphere or ellipsoid by its diameters \[m\].
-    Ball([f64; 3]),
+    Ellipsoid([f64; 3]),
     /// Cylinder by its two diameters and its length along z \[m\].
     Cylinder([f64; 3]),
     /// Shared mesh, with a color of each vertex if it is textured.
@@ -70,13 +70,13 @@ pub(crate) enum Form {
     Triangles(TriMesh),
 }
 
-impl Form {
+impl VisualShape {
     /// Vertices and triangles; empty for primitives.
     pub(crate) fn triangles(&self) -> (&[[f32; 3]], &[[u32; 3]]) {
         match self {
             Self::Mesh(mesh, _) => (mesh.positions(), mesh.triangles()),
             Self::Triangles(mesh) => (&mesh.positions, &mesh.triangles),
-            Self::Cube(_) | Self::Ball(_) | Self::Cylinder(_) => (&[], &[]),
+            Self::Box(_) | Self::Ellipsoid(_) | Self::Cylinder(_) => (&[], &[]),
         }
     }
 
@@ -88,18 +88,18 @@ impl Form {
     }
 }
 
-impl Drawn {
+impl InstanceVisual {
     fn of(instance: &Instance) -> Self {
         let rgba = instance.material.rgba.map(f64::from);
         let texture = instance.material.texture.as_deref();
-        let mean = texture.map_or([1.0; 3], mean_of);
+        let mean = texture.map_or([1.0; 3], mean_color);
         let form = match &instance.shape {
-            Shape::Box(shape) => Form::Cube(shape.half.map(|half| 2.0 * f64::from(half))),
-            Shape::Sphere(shape) => Form::Ball([2.0 * f64::from(shape.radius); 3]),
-            Shape::Ellipsoid(shape) => Form::Ball(shape.radii.map(|radius| 2.0 * f64::from(radius))),
+            Shape::Box(shape) => VisualShape::Box(shape.half.map(|half| 2.0 * f64::from(half))),
+            Shape::Sphere(shape) => VisualShape::Ellipsoid([2.0 * f64::from(shape.radius); 3]),
+            Shape::Ellipsoid(shape) => VisualShape::Ellipsoid(shape.radii.map(|radius| 2.0 * f64::from(radius))),
             Shape::Cylinder(shape) => {
                 let [across, along] = [shape.radius, shape.half_length].map(|half| 2.0 * f64::from(half));
-                Form::Cylinder([across, across, along])
+                VisualShape::Cylinder([across, across, along])
             }
             Shape::Mesh(shape) => {
                 let of_vertices = texture.zip(shape.mesh.uvs());
@@ -110,17 +110,17 @@ impl Drawn {
                     };
                     uvs.iter().map(color).collect()
                 });
-                Form::Mesh(Arc::clone(&shape.mesh), colors)
+                VisualShape::Mesh(Arc::clone(&shape.mesh), colors)
             }
-            other => Form::Triangles(other.tessellate(SEGMENTS)),
+            other => VisualShape::Triangles(other.tessellate(SEGMENTS)),
         };
-        Self { form, rgba: [rgba[0] * mean[0], rgba[1] * mean[1], rgba[2] * mean[2], rgba[3]] }
+        Self { shape: form, rgba: [rgba[0] * mean[0], rgba[1] * mean[1], rgba[2] * mean[2], rgba[3]] }
     }
 }
 
 /// Mean color of a texture, computed from its smallest mipmap level.
-fn mean_of(texture: &Texture) -> [f64; 3] {
-    let Some(last) = texture.levels().last() else { return [1.0; 3] };
+fn mean_color(texture: &Texture) -> [f64; 3] {
+    let Some(last) = texture.mip_levels().last() else { return [1.0; 3] };
     // Rows have one pixel more than the width.
     let row = 4 * (last.width() as usize + 1);
     let pixels = last.bytes().chunks_exact(row).take(last.height() as usize);
@@ -131,7 +131,7 @@ fn mean_of(texture: &Texture) -> [f64; 3] {
 
 /// Color of a texture at texture coordinates, with the origin at the lower left and repetition.
 fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
-    let Some(level) = texture.levels().first() else { return [1.0; 3] };
+    let Some(level) = texture.mip_levels().first() else { return [1.0; 3] };
     let place = |x: f32, count: u32| {
         let part = f64::from(x).rem_euclid(1.0);
         ((if part.is_finite() { part } else { 0.0 } * f64::from(count)) as usize).min(count as usize - 1)
@@ -143,44 +143,51 @@ fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
 
 /// Tracks the scenes that were written for viewers.
 #[derive(Debug)]
-pub(crate) struct Scenes {
+pub(crate) struct SceneTracker {
     /// Frames with recorded poses, without the environment prefix.
     frames: BTreeSet<String>,
     /// Last written scene of each recorded environment.
-    told: BTreeMap<usize, Option<Arc<RenderScene>>>,
+    last_scenes: BTreeMap<usize, Option<Arc<RenderScene>>>,
     /// Remaining size for messages \[bytes\].
-    left: u64,
+    bytes_left: u64,
     /// Moving entities without a recorded pose.
-    lost: BTreeSet<String>,
+    without_pose: BTreeSet<String>,
     /// Entities with deforming shapes.
     deforming: BTreeSet<String>,
     /// Environments that were skipped because of the size limit.
     omitted: BTreeSet<usize>,
 }
 
-impl Scenes {
-    pub(crate) fn new(streams: &[Stream]) -> Self {
-        let of = |stream: &Stream| match &stream.kind {
-            Kind::Poses { frames } => frames.clone(),
+impl SceneTracker {
+    pub(crate) fn new(streams: &[StreamSchema]) -> Self {
+        let of = |stream: &StreamSchema| match &stream.kind {
+            StreamKind::Poses { frames } => frames.clone(),
             _ => Vec::new(),
         };
         let frames = streams.iter().flat_map(of).collect();
         let told = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
-        Self { frames, told, left: MOST, lost: BTreeSet::new(), deforming: BTreeSet::new(), omitted: BTreeSet::new() }
+        Self {
+            frames,
+            last_scenes: told,
+            bytes_left: MAX_BYTES,
+            without_pose: BTreeSet::new(),
+            deforming: BTreeSet::new(),
+            omitted: BTreeSet::new(),
+        }
     }
 
     /// Returns updates for those of `envs` that are recorded and whose appearance has changed since their last message.
     ///
     /// # Errors
     /// There is no such environment.
-    pub(crate) fn changed(&mut self, sim: &mut SimulationManager, envs: &[usize], at: f64) -> Result<Vec<SceneUpdate>> {
+    pub(crate) fn updates(&mut self, sim: &mut SimulationManager, envs: &[usize], at: f64) -> Result<Vec<SceneUpdate>> {
         let mut updates = Vec::new();
         // Most environments share one scene.
-        let mut known: Vec<(Arc<RenderScene>, Looks)> = Vec::new();
+        let mut known: Vec<(Arc<RenderScene>, InstanceVisuals)> = Vec::new();
         let groups = RasterCfg::default().groups;
         for &env in envs {
-            let Some(told) = self.told.get_mut(&env) else { continue };
-            let scene = sim.scene_mut().scene_of(EnvId(env))?;
+            let Some(told) = self.last_scenes.get_mut(&env) else { continue };
+            let scene = sim.scene_mut().env_scene(EnvId(env))?;
             if told.as_ref().is_some_and(|told| Arc::ptr_eq(told, &scene)) {
                 continue;
             }
@@ -189,22 +196,24 @@ impl Scenes {
                 Some((_, drawn)) => Arc::clone(drawn),
                 None => {
                     let is_drawn =
-                        |one: &&Instance| one.visible && !one.deforms && groups >> one.group.min(31) & 1 == 1;
-                    let of = |one: &Instance| Some(one).filter(is_drawn).map(Drawn::of);
-                    let drawn: Looks = Arc::new(scene.instances().iter().map(of).collect());
+                        |one: &&Instance| one.visible && !one.is_deformable && groups >> one.group.min(31) & 1 == 1;
+                    let of = |one: &Instance| Some(one).filter(is_drawn).map(InstanceVisual::of);
+                    let drawn: InstanceVisuals = Arc::new(scene.instances().iter().map(of).collect());
                     known.push((Arc::clone(&scene), Arc::clone(&drawn)));
                     drawn
                 }
             };
             let entities = self.entities(sim, env, &scene, &drawn)?;
-            let of = |entity: &Entity| drawn[entity.instance].as_ref().map_or(0, |drawn| ENTITY + drawn.form.bytes());
+            let of = |entity: &Entity| {
+                drawn[entity.instance].as_ref().map_or(0, |drawn| ENTITY_OVERHEAD + drawn.shape.bytes())
+            };
             let bytes: u64 = entities.iter().map(of).sum();
-            if bytes > self.left {
+            if bytes > self.bytes_left {
                 self.omitted.insert(env);
                 continue;
             }
-            self.left -= bytes;
-            updates.push(SceneUpdate { env, at, entities, drawn });
+            self.bytes_left -= bytes;
+            updates.push(SceneUpdate { env, at, entities, visuals: drawn });
         }
         Ok(updates)
     }
@@ -215,12 +224,12 @@ impl Scenes {
         sim: &mut SimulationManager,
         env: usize,
         scene: &RenderScene,
-        drawn: &[Option<Drawn>],
+        drawn: &[Option<InstanceVisual>],
     ) -> Result<Vec<Entity>> {
-        let (mut look, bodies) = (Look::default(), sim.entities().body_names());
-        sim.scene_mut().look(EnvId(env), &mut look)?;
+        let (mut look, bodies) = (EnvVisualState::default(), sim.entities().body_names());
+        sim.scene_mut().read_visual_state(EnvId(env), &mut look)?;
         let mut entities = Vec::new();
-        let deforming = scene.instances().iter().filter(|instance| instance.deforms);
+        let deforming = scene.instances().iter().filter(|instance| instance.is_deformable);
         self.deforming.extend(deforming.map(|instance| instance.name.to_string()));
         for (index, instance) in scene.instances().iter().enumerate().filter(|(index, _)| drawn[*index].is_some()) {
             let body = instance.body.and_then(|body| bodies.get(body as usize));
@@ -232,7 +241,7 @@ impl Scenes {
                 (None, None, Some(pose)) => Pose::from(pose),
                 _ => {
                     let of = body.map_or(&*instance.name, |body| body.split('/').next().unwrap_or(body));
-                    self.lost.insert(of.into());
+                    self.without_pose.insert(of.into());
                     continue;
                 }
             };
@@ -245,8 +254,8 @@ impl Scenes {
     /// Describes what the scene messages lack, and the reasons.
     pub(crate) fn left_out(&self) -> Vec<String> {
         let list = |names: Vec<String>| names.join(", ");
-        let lost = (!self.lost.is_empty()).then(|| {
-            let names = list(self.lost.iter().cloned().collect());
+        let lost = (!self.without_pose.is_empty()).then(|| {
+            let names = list(self.without_pose.iter().cloned().collect());
             format!("of the scene for viewers: {names} (poses that are not recorded)")
         });
         let deforming = (!self.deforming.is_empty()).then(|| {
@@ -255,7 +264,7 @@ impl Scenes {
         });
         let omitted = (!self.omitted.is_empty()).then(|| {
             let envs = list(self.omitted.iter().map(usize::to_string).collect());
-            format!("how environments {envs} look, for viewers (more than {} MiB in all)", MOST >> 20)
+            format!("how environments {envs} look, for viewers (more than {} MiB in all)", MAX_BYTES >> 20)
         });
         lost.into_iter().chain(deforming).chain(omitted).collect()
     }

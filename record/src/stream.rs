@@ -1,65 +1,65 @@
 //! Metadata of recorded streams: names, shapes and meaning.
 
-use kinetoscope_sensors::{Channel, Stamp};
+use kinetoscope_sensors::{SampleChannel, Stamp};
 
 /// Metadata of values that are recorded together.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stream {
+pub struct StreamSchema {
     /// Name, such as `arm/joint_states` or `camera/color`.
     pub name: String,
     /// Meaning of the values.
-    pub kind: Kind,
+    pub kind: StreamKind,
     /// Type of the values.
-    pub element: Element,
+    pub element_type: ElementType,
     /// Fields, in their order in a row.
-    pub parts: Vec<Part>,
+    pub fields: Vec<StreamField>,
     /// Recorded environments. Each has one row at a time.
     pub env_ids: Vec<usize>,
 }
 
-impl Stream {
+impl StreamSchema {
     /// Number of values in the row of one environment.
     pub fn width(&self) -> usize {
-        self.parts.iter().map(Part::width).sum()
+        self.fields.iter().map(StreamField::width).sum()
     }
 
     /// Values of the field `name` in the row of an environment; empty if there is no such field.
-    pub(crate) fn part<'v>(&self, row: &'v [f64], name: &str) -> &'v [f64] {
-        let first: usize = self.parts.iter().take_while(|part| part.name != name).map(Part::width).sum();
-        let width = self.parts.iter().find(|part| part.name == name).map_or(0, Part::width);
+    pub(crate) fn field<'v>(&self, row: &'v [f64], name: &str) -> &'v [f64] {
+        let first: usize = self.fields.iter().take_while(|part| part.name != name).map(StreamField::width).sum();
+        let width = self.fields.iter().find(|part| part.name == name).map_or(0, StreamField::width);
         row.get(first..first + width).unwrap_or(&[])
     }
 
-    /// True if some fields, but not all, are stamped with the force time ([`Part::of_forces`]).
-    pub(crate) fn is_mixed(&self) -> bool {
-        self.parts.iter().any(|part| part.of_forces) && !self.parts.iter().all(|part| part.of_forces)
+    /// True if some fields, but not all, are stamped with the force time ([`StreamField::at_force_time`]).
+    pub(crate) fn has_two_stamps(&self) -> bool {
+        self.fields.iter().any(|part| part.at_force_time) && !self.fields.iter().all(|part| part.at_force_time)
     }
 }
 
 /// One field of a stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct StreamField {
     /// Name, such as `positions`. Empty for the only field of a stream, which has the name of the stream.
     pub name: String,
     /// Shape in one environment.
     pub shape: Vec<usize>,
     /// True if a sensor measures the field at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and
     /// accelerations. The engine solves for them at the beginning of the step that leads to positions and velocities.
-    pub of_forces: bool,
-    /// Unit, as the sensor reports it ([`Channel::unit`](kinetoscope_sensors::Channel::unit)); empty if it reports
+    pub at_force_time: bool,
+    /// Unit, as the sensor reports it ([`SampleChannel::unit`](kinetoscope_sensors::SampleChannel::unit)); empty if it reports
     /// none.
     pub unit: String,
 }
 
-impl Part {
+impl StreamField {
     pub(crate) fn new(name: &str, shape: impl Into<Vec<usize>>) -> Self {
-        Self { name: name.into(), shape: shape.into(), of_forces: false, unit: String::new() }
+        Self { name: name.into(), shape: shape.into(), at_force_time: false, unit: String::new() }
     }
 
     /// A field for the channel of a sensor.
-    pub(crate) fn of_channel(channel: &Channel) -> Self {
+    pub(crate) fn of_channel(channel: &SampleChannel) -> Self {
         let (of_forces, unit) = (channel.stamp == Stamp::Force, channel.unit.to_string());
-        Self { of_forces, unit, ..Self::new(channel.name, [channel.width]) }
+        Self { at_force_time: of_forces, unit, ..Self::new(channel.name, [channel.width]) }
     }
 
     /// Number of values in one environment.
@@ -70,7 +70,7 @@ impl Part {
 
 /// Type of the values of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Element {
+pub enum ElementType {
     /// Unsigned 8-bit integers: color.
     U8,
     /// Signed 32-bit integers: mask ids.
@@ -93,7 +93,7 @@ pub struct Distortion {
 /// Meaning of the values of a stream.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Kind {
+pub enum StreamKind {
     /// Joint positions, velocities and efforts, or their targets.
     Joints {
         /// Names of the joints.
@@ -105,7 +105,7 @@ pub enum Kind {
         frames: Vec<String>,
     },
     /// An image, row by row from the top left.
-    Picture {
+    Image {
         /// Name of the camera.
         camera: String,
         /// Name of the channel.
@@ -118,7 +118,7 @@ pub enum Kind {
     /// Intrinsic matrix of a camera \[pixels\] and its pose in the environment, with ROS camera axes. A camera of a
     /// stereo pair also has `rectification` and `projection`; see
     /// [`Rectification`](kinetoscope_sensors::camera::Rectification).
-    Lens {
+    CameraInfo {
         /// Name of the camera.
         camera: String,
         /// Height of its images \[pixels\].
@@ -133,13 +133,13 @@ pub enum Kind {
     /// Ray caster; the fields have the names of its channels. Hit points in the environment \[m\], distances \[m\],
     /// normals, mask ids, and the pose of the parent body. A miss has infinite points and distances, and zero normals
     /// and ids.
-    Points,
+    RayHits,
     /// Simulation time, positions and velocities of all joints in MuJoCo's order: `clock`, `qpos`, `qvel`.
     EngineState,
     /// Result of a step of a task: `reward`, and `terminated` and `truncated` as 1 or 0.
-    Outcome,
+    TaskResult,
     /// Values of any other sensor.
-    Numbers {
+    SensorValues {
         /// Names of the bodies, links, joints, actuators or frames of the rows, in order; empty without names.
         rows: Vec<String>,
         /// Contact sensors: names of the contact filters, in the order of the second axis of matrices.
@@ -147,18 +147,18 @@ pub enum Kind {
     },
 }
 
-impl Kind {
+impl StreamKind {
     /// Values without names.
     pub(crate) fn unnamed() -> Self {
-        Self::Numbers { rows: Vec::new(), filters: Vec::new() }
+        Self::SensorValues { rows: Vec::new(), filters: Vec::new() }
     }
 
     /// Names of the columns.
     pub(crate) fn names(&self) -> &[String] {
         match self {
-            Self::Joints { names: columns } | Self::Poses { frames: columns } | Self::Numbers { rows: columns, .. } => {
-                columns
-            }
+            Self::Joints { names: columns }
+            | Self::Poses { frames: columns }
+            | Self::SensorValues { rows: columns, .. } => columns,
             _ => &[],
         }
     }

@@ -25,12 +25,12 @@ pub enum Topic {
     EngineStates,
     /// Rewards and episode ends of the task in the simulation. A task such as an `Env` publishes them after each of its
     /// steps ([`StepResult`](kinetoscope_sim::StepResult)).
-    Outcomes,
+    TaskResults,
     /// Overview image of all environments, drawn as `RecorderCfg::stage` says. Its name is that of a camera `stage` in
     /// the first recorded environment.
     ///
     /// [`Everything`](Self::Everything) includes it only in formats of images, and only if there is no camera.
-    Stage,
+    Overview,
     /// All channels of the sensor of this name, at each arrival of a measurement. Cameras and ray-caster cameras also
     /// record their intrinsics and pose.
     ///

@@ -2,7 +2,7 @@
 
 use crate::error::RecordError;
 use crate::packet::Packet;
-use crate::stream::Stream;
+use crate::stream::StreamSchema;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
 /// Result of a writer.
-pub(crate) type Written<T = ()> = std::result::Result<T, Fault>;
+pub(crate) type WriteResult<T = ()> = std::result::Result<T, WriteError>;
 
 /// Error of a writer.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum Fault {
+pub(crate) enum WriteError {
     /// The file cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -30,16 +30,16 @@ pub(crate) enum Fault {
     NoFrame(&'static str),
 }
 
-impl Fault {
+impl WriteError {
     pub(crate) fn limit(what: impl Into<String>) -> Self {
         Self::Limit(what.into())
     }
 
     /// Converts to the error of a recording, with the path of the file.
-    pub(crate) fn of_file(self, path: &Path) -> RecordError {
+    pub(crate) fn into_record_error(self, path: &Path) -> RecordError {
         let path = path.into();
         match self {
-            Self::Io(error) => RecordError::File { path, error: Arc::new(error), kept: None },
+            Self::Io(error) => RecordError::File { path, error: Arc::new(error), partial_file: None },
             Self::Limit(what) => RecordError::Limit { path, what },
             Self::NoFrame(why) => RecordError::NoFrame { path, why },
         }
@@ -47,48 +47,48 @@ impl Fault {
 }
 
 /// Writer of a file format.
-pub(crate) trait Sink: Send {
+pub(crate) trait FormatWriter: Send {
     /// Writes the content of a packet.
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written;
+    fn write(&mut self, streams: &[StreamSchema], packet: &Packet) -> WriteResult;
 
     /// Writes buffered data to the file, so that it survives a kill of the process.
-    fn flush(&mut self) -> Written;
+    fn flush(&mut self) -> WriteResult;
 
     /// Completes the file and gives it its name; returns its size \[bytes\].
-    fn finish(&mut self, streams: &[Stream]) -> Written<u64>;
+    fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64>;
 
     /// Path of the partial file after an error, if it can be read. Otherwise it is deleted when the writer is dropped.
-    fn kept(&self) -> Option<PathBuf>;
+    fn partial_path(&self) -> Option<PathBuf>;
 }
 
 /// Error of a writer, and the partial file that remains.
 #[derive(Debug)]
-pub(crate) struct Failure {
+pub(crate) struct WriterFailure {
     /// `None` if the recorder aborted the recording.
-    pub(crate) error: Option<Fault>,
-    pub(crate) kept: Option<PathBuf>,
+    pub(crate) error: Option<WriteError>,
+    pub(crate) partial_path: Option<PathBuf>,
 }
 
 /// Writes packets until the channel closes, then completes the file.
 ///
-/// After an error, packets are returned unwritten, and `failed` and `why` are set. If the recorder sets `failed`, the
+/// After an error, packets are returned unwritten, and `failed` and `reason` are set. If the recorder sets `failed`, the
 /// file is not completed.
 pub(crate) fn run(
-    mut sink: Box<dyn Sink>,
-    streams: &[Stream],
-    full: &Receiver<Packet>,
-    free: &Sender<Packet>,
+    mut sink: Box<dyn FormatWriter>,
+    streams: &[StreamSchema],
+    filled: &Receiver<Packet>,
+    empty: &Sender<Packet>,
     failed: &AtomicBool,
-    why: &OnceLock<String>,
-) -> Result<u64, Failure> {
+    reason: &OnceLock<String>,
+) -> Result<u64, WriterFailure> {
     let mut result = Ok(());
     let mut flushed = Instant::now();
     let mut dirty = false;
     loop {
         let wait = if dirty { FLUSH_EVERY.saturating_sub(flushed.elapsed()) } else { Duration::MAX };
         let received = match wait {
-            Duration::MAX => full.recv().map_err(|_| RecvTimeoutError::Disconnected),
-            wait => full.recv_timeout(wait),
+            Duration::MAX => filled.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            wait => filled.recv_timeout(wait),
         };
         match received {
             Ok(mut packet) => {
@@ -101,7 +101,7 @@ pub(crate) fn run(
                 }
                 packet.clear();
                 // Fails only after the recorder is gone.
-                let _ = free.send(packet);
+                let _ = empty.send(packet);
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
@@ -112,7 +112,7 @@ pub(crate) fn run(
         }
         if let Err(error) = &result {
             dirty = false;
-            why.get_or_init(|| error.to_string());
+            reason.get_or_init(|| error.to_string());
             failed.store(true, Ordering::Relaxed);
         }
     }
@@ -121,9 +121,9 @@ pub(crate) fn run(
         // A partial file is readable up to its end.
         result = sink.flush();
         if result.is_ok() {
-            return Err(Failure { error: None, kept: sink.kept() });
+            return Err(WriterFailure { error: None, partial_path: sink.partial_path() });
         }
     }
     let size = result.and_then(|()| sink.finish(streams));
-    size.map_err(|error| Failure { error: Some(error), kept: sink.kept() })
+    size.map_err(|error| WriterFailure { error: Some(error), partial_path: sink.partial_path() })
 }

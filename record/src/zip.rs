@@ -17,17 +17,17 @@ const VERSION: u16 = 45;
 /// January 1, 1980, the earliest date. A constant date gives the same bytes in every run.
 const DATE: u16 = 0x21;
 /// Marks a size that is in the 64-bit extension.
-const SEE_64: u32 = u32::MAX;
-const EXTENSION_64: u16 = 1;
+const ZIP64_MARKER: u32 = u32::MAX;
+const ZIP64_EXTRA_ID: u16 = 1;
 /// Compression methods.
 const STORED: u16 = 0;
 const DEFLATED: u16 = 8;
 /// Upper limit of the uncompressed size of all files of a scene \[bytes\].
-const LARGEST: u64 = 1 << 31;
+const MAX_UNCOMPRESSED: u64 = 1 << 31;
 
 /// Writer of an archive.
 #[derive(Debug)]
-pub(crate) struct Archive<W> {
+pub(crate) struct ZipWriter<W> {
     to: W,
     entries: Vec<Entry>,
     at: u64,
@@ -40,7 +40,7 @@ struct Entry {
     /// Size in the archive \[bytes\].
     size: u64,
     /// Uncompressed size of a deflated file \[bytes\].
-    unpacked: Option<u64>,
+    uncompressed_size: Option<u64>,
     crc: u32,
 }
 
@@ -50,7 +50,7 @@ fn put(out: &mut Vec<u8>, numbers: &[(u64, usize)]) {
     }
 }
 
-impl<W: Write + Seek> Archive<W> {
+impl<W: Write + Seek> ZipWriter<W> {
     pub(crate) fn new(to: W) -> Self {
         Self { to, entries: Vec::new(), at: 0 }
     }
@@ -63,9 +63,12 @@ impl<W: Write + Seek> Archive<W> {
         put(&mut header, &fields);
         // Checksum and sizes are written when they are known.
         let known_later = header.len() as u64;
-        put(&mut header, &[(0, 4), (SEE_64.into(), 4), (SEE_64.into(), 4), (name.len() as u64, 2), (20, 2)]);
+        put(
+            &mut header,
+            &[(0, 4), (ZIP64_MARKER.into(), 4), (ZIP64_MARKER.into(), 4), (name.len() as u64, 2), (20, 2)],
+        );
         header.extend_from_slice(name.as_bytes());
-        put(&mut header, &[(EXTENSION_64.into(), 2), (16, 2), (0, 8), (0, 8)]);
+        put(&mut header, &[(ZIP64_EXTRA_ID.into(), 2), (16, 2), (0, 8), (0, 8)]);
         self.to.write_all(&header)?;
         let mut crc = crc32fast::Hasher::new();
         let mut size = head.len() as u64;
@@ -89,12 +92,12 @@ impl<W: Write + Seek> Archive<W> {
         self.to.write_all(&size.to_le_bytes())?;
         self.at = offset + header.len() as u64 + size;
         self.to.seek(SeekFrom::Start(self.at))?;
-        self.entries.push(Entry { name: name.into(), offset, size, unpacked: None, crc });
+        self.entries.push(Entry { name: name.into(), offset, size, uncompressed_size: None, crc });
         Ok(())
     }
 
     /// Adds a deflated file.
-    pub(crate) fn add_packed(&mut self, name: &str, data: &[u8]) -> io::Result<()> {
+    pub(crate) fn add_deflated(&mut self, name: &str, data: &[u8]) -> io::Result<()> {
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
         packed.write_all(data)?;
         let packed = packed.finish()?;
@@ -103,7 +106,7 @@ impl<W: Write + Seek> Archive<W> {
         crc.update(data);
         if let Some(entry) = self.entries.last_mut() {
             // Replaces checksum and size of the stored bytes by those of the uncompressed data.
-            (entry.crc, entry.unpacked) = (crc.finalize(), Some(data.len() as u64));
+            (entry.crc, entry.uncompressed_size) = (crc.finalize(), Some(data.len() as u64));
             let Entry { offset, crc, size, .. } = *entry;
             self.to.seek(SeekFrom::Start(offset + 8))?;
             self.to.write_all(&DEFLATED.to_le_bytes())?;
@@ -122,27 +125,33 @@ impl<W: Write + Seek> Archive<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let start = self.at;
         let mut out = Vec::new();
-        for Entry { name, offset, size, unpacked, crc } in &self.entries {
+        for Entry { name, offset, size, uncompressed_size: unpacked, crc } in &self.entries {
             let (version, method) = (u64::from(VERSION), if unpacked.is_some() { DEFLATED } else { STORED });
             let head =
                 [(CENTRAL.into(), 4), (version, 2), (version, 2), (0, 2), (method.into(), 2), (0, 2), (DATE.into(), 2)];
             put(&mut out, &head);
             put(
                 &mut out,
-                &[((*crc).into(), 4), (SEE_64.into(), 4), (SEE_64.into(), 4), (name.len() as u64, 2), (28, 2)],
+                &[
+                    ((*crc).into(), 4),
+                    (ZIP64_MARKER.into(), 4),
+                    (ZIP64_MARKER.into(), 4),
+                    (name.len() as u64, 2),
+                    (28, 2),
+                ],
             );
             // No comment, disk 0, no attributes.
-            put(&mut out, &[(0, 2), (0, 2), (0, 2), (0, 4), (SEE_64.into(), 4)]);
+            put(&mut out, &[(0, 2), (0, 2), (0, 2), (0, 4), (ZIP64_MARKER.into(), 4)]);
             out.extend_from_slice(name.as_bytes());
             let before = unpacked.unwrap_or(*size);
-            put(&mut out, &[(EXTENSION_64.into(), 2), (24, 2), (before, 8), (*size, 8), (*offset, 8)]);
+            put(&mut out, &[(ZIP64_EXTRA_ID.into(), 2), (24, 2), (before, 8), (*size, 8), (*offset, 8)]);
         }
         let (length, count) = (out.len() as u64, self.entries.len() as u64);
         put(&mut out, &[(END_64.into(), 4), (44, 8), (VERSION.into(), 2), (VERSION.into(), 2), (0, 4), (0, 4)]);
         put(&mut out, &[(count, 8), (count, 8), (length, 8), (start, 8)]);
         put(&mut out, &[(LOCATOR_64.into(), 4), (0, 4), (start + length, 8), (1, 4)]);
-        put(&mut out, &[(END.into(), 4), (0, 2), (0, 2), (0xffff, 2), (0xffff, 2), (SEE_64.into(), 4)]);
-        put(&mut out, &[(SEE_64.into(), 4), (0, 2)]);
+        put(&mut out, &[(END.into(), 4), (0, 2), (0, 2), (0xffff, 2), (0xffff, 2), (ZIP64_MARKER.into(), 4)]);
+        put(&mut out, &[(ZIP64_MARKER.into(), 4), (0, 2)]);
         self.to.write_all(&out)?;
         self.to.flush()?;
         Ok(self.to)
@@ -150,44 +159,44 @@ impl<W: Write + Seek> Archive<W> {
 }
 
 /// Underlying reader of an archive.
-pub(crate) trait Source: Read + Seek + Send {}
+pub(crate) trait ReadSeek: Read + Seek + Send {}
 
-impl<S: Read + Seek + Send> Source for S {}
+impl<S: Read + Seek + Send> ReadSeek for S {}
 
 /// Directory entry of a file.
 #[derive(Clone, Debug)]
-struct Found {
+struct DirectoryEntry {
     name: String,
     method: u16,
     /// Offset of the local header.
     offset: u64,
     /// Size in the archive \[bytes\].
     size: u64,
-    unpacked: u64,
+    uncompressed_size: u64,
     crc: u64,
 }
 
-/// Reader of an archive that [`Archive`] has written. It reads the directory first, then only the requested files.
-pub(crate) struct Reader<'s> {
-    from: Box<dyn Source + 's>,
-    files: Vec<Found>,
+/// Reader of an archive that [`ZipWriter`] has written. It reads the directory first, then only the requested files.
+pub(crate) struct ZipReader<'s> {
+    from: Box<dyn ReadSeek + 's>,
+    files: Vec<DirectoryEntry>,
 }
 
-impl std::fmt::Debug for Reader<'_> {
+impl std::fmt::Debug for ZipReader<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Reader").field("files", &self.files).finish_non_exhaustive()
     }
 }
 
 /// Error of a file that is no archive, or is damaged.
-fn damaged(what: &str) -> io::Error {
+fn invalid_data(what: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, what.to_string())
 }
 
 /// Length of the end of an archive \[bytes\]: the locator of the 64-bit end record, then the 32-bit end record.
-const TAIL: u64 = 20 + 22;
+const END_LEN: u64 = 20 + 22;
 /// Length of a local header without the name \[bytes\].
-const HEAD: usize = 30;
+const LOCAL_HEADER_LEN: usize = 30;
 
 fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
     let mut all = [0; 8];
@@ -195,32 +204,32 @@ fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
     Some(u64::from_le_bytes(all))
 }
 
-impl<'s> Reader<'s> {
+impl<'s> ZipReader<'s> {
     /// Reads the directory.
     ///
     /// # Errors
     /// It cannot be read; `InvalidData` if this is no such archive, or is incomplete.
-    pub(crate) fn open(from: impl Source + 's) -> io::Result<Self> {
+    pub(crate) fn open(from: impl ReadSeek + 's) -> io::Result<Self> {
         let mut reader = Self { from: Box::new(from), files: Vec::new() };
         let length = reader.from.seek(SeekFrom::End(0))?;
-        let none = || damaged("this is no such archive, or it is not whole");
-        let tail = reader.bytes(length.checked_sub(TAIL).ok_or_else(none)?, TAIL, length)?;
+        let none = || invalid_data("this is no such archive, or it is not whole");
+        let tail = reader.bytes(length.checked_sub(END_LEN).ok_or_else(none)?, END_LEN, length)?;
         let is_end = number(&tail, 20, 4) == Some(END.into()) && number(&tail, 0, 4) == Some(LOCATOR_64.into());
         let end = number(&tail, 8, 8).filter(|_| is_end).ok_or_else(none)?;
         let end = reader.bytes(end, 56, length)?;
         let [count, size, start] = [32, 40, 48].map(|at| number(&end, at, 8));
         let (Some(count), Some(size), Some(start)) = (count, size, start) else { return Err(none()) };
         let directory = reader.bytes(start, size, length)?;
-        reader.files = entries(&directory, count, length).ok_or_else(none)?;
+        reader.files = parse_directory(&directory, count, length).ok_or_else(none)?;
         Ok(reader)
     }
 
     /// Reads `count` bytes at offset `at`, within the file of size `length`.
     fn bytes(&mut self, at: u64, count: u64, length: u64) -> io::Result<Vec<u8>> {
         if at.checked_add(count).is_none_or(|end| end > length) {
-            return Err(damaged("its directory leads out of it"));
+            return Err(invalid_data("its directory leads out of it"));
         }
-        let mut bytes = vec![0; usize::try_from(count).map_err(|_| damaged("it is larger than memory"))?];
+        let mut bytes = vec![0; usize::try_from(count).map_err(|_| invalid_data("it is larger than memory"))?];
         self.from.seek(SeekFrom::Start(at))?;
         self.from.read_exact(&mut bytes)?;
         Ok(bytes)
@@ -231,23 +240,23 @@ impl<'s> Reader<'s> {
         self.files.iter().map(|file| file.name.as_str())
     }
 
-    fn find(&self, name: &str) -> Option<Found> {
+    fn find(&self, name: &str) -> Option<DirectoryEntry> {
         self.files.iter().find(|file| file.name == name).cloned()
     }
 
     /// Offset of the content of a file.
-    fn begin(&mut self, file: &Found) -> io::Result<u64> {
+    fn data_offset(&mut self, file: &DirectoryEntry) -> io::Result<u64> {
         self.from.seek(SeekFrom::Start(file.offset))?;
-        let mut head = [0; HEAD];
+        let mut head = [0; LOCAL_HEADER_LEN];
         self.from.read_exact(&mut head)?;
         let [name, extension] = [26, 28].map(|at| number(&head, at, 2).unwrap_or(0));
-        Ok(file.offset + HEAD as u64 + name + extension)
+        Ok(file.offset + LOCAL_HEADER_LEN as u64 + name + extension)
     }
 
     /// The first `count` bytes of a stored file, without a check; `None` if there is no such file, or it is deflated.
-    pub(crate) fn first(&mut self, name: &str, count: u64) -> io::Result<Option<Vec<u8>>> {
+    pub(crate) fn read_prefix(&mut self, name: &str, count: u64) -> io::Result<Option<Vec<u8>>> {
         let Some(file) = self.find(name).filter(|file| file.method == STORED) else { return Ok(None) };
-        let begin = self.begin(&file)?;
+        let begin = self.data_offset(&file)?;
         let mut bytes = Vec::new();
         self.from.seek(SeekFrom::Start(begin))?;
         self.from.by_ref().take(count.min(file.size)).read_to_end(&mut bytes)?;
@@ -263,28 +272,30 @@ impl<'s> Reader<'s> {
         self.read_file(&file).map(Some)
     }
 
-    fn read_file(&mut self, file: &Found) -> io::Result<Vec<u8>> {
-        let begin = self.begin(file)?;
+    fn read_file(&mut self, file: &DirectoryEntry) -> io::Result<Vec<u8>> {
+        let begin = self.data_offset(file)?;
         self.from.seek(SeekFrom::Start(begin))?;
         let packed = self.from.by_ref().take(file.size);
         let mut data = Vec::new();
         match file.method {
-            STORED => packed.take(file.unpacked).read_to_end(&mut data)?,
+            STORED => packed.take(file.uncompressed_size).read_to_end(&mut data)?,
             // One byte more than declared reveals a wrong size.
-            DEFLATED => DeflateDecoder::new(packed).take(file.unpacked.saturating_add(1)).read_to_end(&mut data)?,
-            _ => return Err(damaged("it is packed otherwise than recorders do")),
+            DEFLATED => {
+                DeflateDecoder::new(packed).take(file.uncompressed_size.saturating_add(1)).read_to_end(&mut data)?
+            }
+            _ => return Err(invalid_data("it is packed otherwise than recorders do")),
         };
-        let whole = data.len() as u64 == file.unpacked && crc_of(&data) == file.crc;
-        if whole { Ok(data) } else { Err(damaged(&format!("{} is damaged", file.name))) }
+        let whole = data.len() as u64 == file.uncompressed_size && crc_of(&data) == file.crc;
+        if whole { Ok(data) } else { Err(invalid_data(&format!("{} is damaged", file.name))) }
     }
 }
 
 /// Reads all files of an archive; `None` if it is no archive, is damaged, or is too large.
-pub(crate) fn unpack(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
-    let mut reader = Reader::open(io::Cursor::new(bytes)).ok()?;
+pub(crate) fn read_all(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
+    let mut reader = ZipReader::open(io::Cursor::new(bytes)).ok()?;
     let files = reader.files.clone();
-    let all = files.iter().try_fold(0_u64, |all, file| all.checked_add(file.unpacked));
-    if all.is_none_or(|all| all > LARGEST) {
+    let all = files.iter().try_fold(0_u64, |all, file| all.checked_add(file.uncompressed_size));
+    if all.is_none_or(|all| all > MAX_UNCOMPRESSED) {
         return None;
     }
     files.into_iter().map(|file| Some((file.name.clone(), reader.read_file(&file).ok()?))).collect()
@@ -297,7 +308,7 @@ fn crc_of(data: &[u8]) -> u64 {
 }
 
 /// Parses the directory of an archive of `length` bytes.
-fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
+fn parse_directory(directory: &[u8], count: u64, length: u64) -> Option<Vec<DirectoryEntry>> {
     let (mut files, mut sum, mut at) = (Vec::new(), 0_u64, 0_usize);
     for _ in 0..count {
         directory.get(at..)?;
@@ -306,7 +317,7 @@ fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
         let extension = at + 46 + name_length + 4;
         let [unpacked, size, offset] = [0, 8, 16].map(|k| number(directory, extension + k, 8));
         let (unpacked, size, offset) = (unpacked?, size?, offset?);
-        let inside = offset.checked_add(HEAD as u64 + size).is_some_and(|end| end <= length);
+        let inside = offset.checked_add(LOCAL_HEADER_LEN as u64 + size).is_some_and(|end| end <= length);
         // The sum of sizes is limited by that of the archive, so that entries cannot share bytes to be read many times.
         sum = sum.checked_add(size).filter(|sum| inside && *sum <= length)?;
         let method = u16::try_from(number(directory, at + 10, 2)?).ok()?;
@@ -315,7 +326,7 @@ fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
             return None;
         }
         let crc = number(directory, at + 16, 4)?;
-        files.push(Found { name: name.into(), method, offset, size, unpacked, crc });
+        files.push(DirectoryEntry { name: name.into(), method, offset, size, uncompressed_size: unpacked, crc });
         at = extension + 24;
     }
     Some(files)
@@ -323,9 +334,9 @@ fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
 
 /// Reads the stored files of an archive; `None` if it is no archive or is damaged.
 #[cfg(test)]
-pub(crate) fn parse(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
-    let mut reader = Reader::open(io::Cursor::new(bytes)).ok()?;
-    let stored: Vec<Found> = reader.files.iter().filter(|file| file.method == STORED).cloned().collect();
+pub(crate) fn read_stored(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
+    let mut reader = ZipReader::open(io::Cursor::new(bytes)).ok()?;
+    let stored: Vec<DirectoryEntry> = reader.files.iter().filter(|file| file.method == STORED).cloned().collect();
     stored.into_iter().map(|file| Some((file.name.clone(), reader.read_file(&file).ok()?))).collect()
 }
 
@@ -337,42 +348,48 @@ mod tests {
 
     #[test]
     fn round_trip_and_damage() {
-        let mut archive = Archive::new(Cursor::new(Vec::new()));
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         archive.add("a.npy", b"head", &mut &b" and data"[..]).unwrap();
         archive.add("empty", b"", &mut io::empty()).unwrap();
         let meshes = b"v 0.1 0.2 0.3\n".repeat(1000);
-        archive.add_packed("meshes/a.obj", &meshes).unwrap();
+        archive.add_deflated("meshes/a.obj", &meshes).unwrap();
         archive.add("behind", b"", &mut &b"x"[..]).unwrap();
         let mut bytes = archive.finish().unwrap().into_inner();
         assert!(bytes.len() < 1500, "{}", bytes.len());
-        let all = unpack(&bytes).unwrap();
+        let all = read_all(&bytes).unwrap();
         assert_eq!(
             all.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(),
             ["a.npy", "empty", "meshes/a.obj", "behind"]
         );
         assert!(all[2].1 == meshes && all[3].1 == b"x" && all[0].1 == b"head and data");
         let stored = [("a.npy", &b"head and data"[..]), ("empty", &b""[..]), ("behind", &b"x"[..])];
-        assert_eq!(parse(&bytes).unwrap(), stored.map(|(name, data)| (name.to_string(), data.to_vec())));
-        let mut reader = Reader::open(Cursor::new(bytes.clone())).unwrap();
+        assert_eq!(read_stored(&bytes).unwrap(), stored.map(|(name, data)| (name.to_string(), data.to_vec())));
+        let mut reader = ZipReader::open(Cursor::new(bytes.clone())).unwrap();
         assert!(reader.names().eq(["a.npy", "empty", "meshes/a.obj", "behind"]));
-        assert_eq!(reader.first("a.npy", 4).unwrap(), Some(b"head".to_vec()));
+        assert_eq!(reader.read_prefix("a.npy", 4).unwrap(), Some(b"head".to_vec()));
         assert_eq!((reader.read("nothing").unwrap(), reader.read("behind").unwrap()), (None, Some(b"x".to_vec())));
-        assert_eq!(parse(&bytes[..bytes.len() - 1]), None);
+        assert_eq!(read_stored(&bytes[..bytes.len() - 1]), None);
         let place = bytes.windows(4).position(|four| four == b"head").unwrap();
         bytes[place] ^= 1;
-        assert_eq!(parse(&bytes), None);
-        assert_eq!(unpack(&bytes), None);
+        assert_eq!(read_stored(&bytes), None);
+        assert_eq!(read_all(&bytes), None);
         bytes[place] ^= 1;
         // Entries that share their bytes, each of which would be read again.
-        let mut archive = Archive::new(Cursor::new(Vec::new()));
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         archive.add("a", b"", &mut &[7; 1000][..]).unwrap();
         let again = archive.entries.remove(0);
-        let Entry { offset, size, unpacked, crc, .. } = again;
-        archive.entries.extend(["a", "b"].map(|name| Entry { name: name.into(), offset, size, unpacked, crc }));
+        let Entry { offset, size, uncompressed_size: unpacked, crc, .. } = again;
+        archive.entries.extend(["a", "b"].map(|name| Entry {
+            name: name.into(),
+            offset,
+            size,
+            uncompressed_size: unpacked,
+            crc,
+        }));
         let shared = archive.finish().unwrap().into_inner();
-        assert!(parse(&shared).is_none() && unpack(&shared).is_none());
+        assert!(read_stored(&shared).is_none() && read_all(&shared).is_none());
         let name = bytes.windows(12).position(|name| name == b"meshes/a.obj").unwrap();
         bytes[name + 12 + 20 + 5] ^= 1;
-        assert_eq!(unpack(&bytes), None, "what is packed is compared with its checksum too");
+        assert_eq!(read_all(&bytes), None, "what is packed is compared with its checksum too");
     }
 }

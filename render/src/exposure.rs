@@ -1,17 +1,17 @@
 //! Path tracing of one frame after the other; threads share the rows of a frame.
 
 use super::lens::LensRays;
-use super::rasterizer::Rasterizer;
+use super::rasterizer::ImageRenderer;
 use super::renderer::Renderer;
-use super::request::Shot;
-use super::shutter::{ShutterInterval, Take};
+use super::request::RenderRequest;
+use super::shutter::{FrameSample, ShutterInterval};
 use crate::frame::FrameMut;
-use crate::path::eye::{Eye, Pupil};
-use crate::path::film::{Film, develop};
+use crate::path::eye::{CameraRayGenerator, ThinLens};
+use crate::path::film::{Accumulator, tonemap};
 use crate::path::smooth;
-use crate::path::{Moving, Paths, Ways};
+use crate::path::{ExposureMotion, MisStrategy, PathTracer};
 use crate::raster::tile::BLOCK;
-use crate::shade::plan::Plan;
+use crate::shade::plan::PreparedFrame;
 use crate::trace::motion::Motion;
 use crate::visibility::RenderError;
 use kinetoscope_exec::ThreadPool;
@@ -22,51 +22,51 @@ use std::sync::{Mutex, PoisonError};
 const ROWS: usize = BLOCK;
 
 /// A frame whose request is prepared.
-struct Exposure<'a> {
-    shot: &'a Shot<'a>,
-    plan: &'a Plan,
+struct PathTraceJob<'a> {
+    request: &'a RenderRequest<'a>,
+    prepared: &'a PreparedFrame,
     /// `None` if the frame shows one instant.
     interval: Option<ShutterInterval<'a>>,
-    /// [`Take::noise`].
+    /// [`FrameSample::noise`].
     noise: u32,
 }
 
 /// Renders a frame with the threads of several rasterizers. The bits do not depend on the number of threads.
-pub(super) fn expose(
+pub(super) fn path_trace(
     pool: &ThreadPool,
-    rasterizers: &mut [Rasterizer],
-    shot: &Shot<'_>,
-    take: &Take<'_>,
+    rasterizers: &mut [ImageRenderer],
+    shot: &RenderRequest<'_>,
+    take: &FrameSample<'_>,
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
     let Some(first) = rasterizers.first_mut() else { return Ok(()) };
-    let (mut plan, mut film) = (std::mem::take(&mut first.plan), std::mem::take(&mut first.film));
-    let ready = plan.prepare(first.style(), shot, frame).and_then(|()| first.shutter.interval(shot, take));
+    let (mut plan, mut film) = (std::mem::take(&mut first.prepared), std::mem::take(&mut first.accumulator));
+    let ready = plan.prepare(first.settings(), shot, frame).and_then(|()| first.shutter.exposure_interval(shot, take));
     let result = ready.and_then(|interval| {
         if let Some(interval) = interval.filter(|_| frame.color.is_some()) {
             plan.tracer.place(shot.scene, shot.poses, Some(interval.opened.poses));
         }
-        let exposure = Exposure { shot, plan: &plan, interval, noise: take.noise };
-        draw_colors(pool, rasterizers, &exposure, &mut film, frame)?;
-        draw_others(pool, rasterizers, &exposure, frame)?;
-        show(pool, rasterizers, &plan, &film, frame);
+        let exposure = PathTraceJob { request: shot, prepared: &plan, interval, noise: take.noise };
+        trace_colors(pool, rasterizers, &exposure, &mut film, frame)?;
+        render_other_channels(pool, rasterizers, &exposure, frame)?;
+        encode_colors(pool, rasterizers, &plan, &film, frame);
         Ok(())
     });
     if let Some(first) = rasterizers.first_mut() {
-        (first.plan, first.film) = (plan, film);
+        (first.prepared, first.accumulator) = (plan, film);
     }
     result
 }
 
 /// Traces the paths of a prepared frame; writes nothing into the frame.
-fn draw_colors(
+fn trace_colors(
     pool: &ThreadPool,
-    rasterizers: &mut [Rasterizer],
-    exposure: &Exposure<'_>,
-    film: &mut Film,
+    rasterizers: &mut [ImageRenderer],
+    exposure: &PathTraceJob<'_>,
+    film: &mut Accumulator,
     frame: &FrameMut<'_>,
 ) -> Result<(), RenderError> {
-    let &Exposure { shot, plan, interval, noise } = exposure;
+    let &PathTraceJob { request: shot, prepared: plan, interval, noise } = exposure;
     let (Some(projection), Some(first)) = (&plan.projection, rasterizers.first()) else { return Ok(()) };
     let Renderer::RayTraced { samples, max_bounces, denoise, seed } = plan.renderer else { return Ok(()) };
     if frame.color.is_none() {
@@ -78,42 +78,53 @@ fn draw_colors(
     let (tracer, lens) = (&plan.tracer, shot.lens);
     let forward = lens.is_none_or(LensRays::is_forward);
     let lights = shot.lights.unwrap_or(&shot.scene.lights);
-    film.lamps.prepare(shot.scene, tracer, lights, cfg.shadows, projection, forward);
-    let moving = interval.map(|ShutterInterval { opened, clock }| Moving {
+    film.lights.prepare(shot.scene, tracer, lights, cfg.shadows, projection, forward);
+    let moving = interval.map(|ShutterInterval { opened, clock }| ExposureMotion {
         clock,
         camera: Motion::between(&opened.world_from_camera, &shot.view.world_from_camera),
     });
-    let eye = Eye { projection, lens, pupil: first.aperture.as_ref().and_then(Pupil::of) };
+    let eye =
+        CameraRayGenerator { projection, lens, thin_lens: first.aperture.as_ref().and_then(ThinLens::from_aperture) };
     let (lamps, rows) = film.rows(ROWS);
     // A noise number of 0 leaves the seed as it is.
     let seed = seed ^ noise;
     let (scene, moving) = (shot.scene, moving.as_ref());
-    let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
+    let paths = PathTracer {
+        scene,
+        tracer,
+        camera_rays: eye,
+        motion: moving,
+        samples,
+        max_bounces,
+        seed,
+        lights: lamps,
+        strategy: MisStrategy::Both,
+    };
     // Not read from the progress object afterwards: another thread may have resumed it meanwhile, with rows missing.
-    let broken_off = AtomicBool::new(false);
+    let canceled = AtomicBool::new(false);
     pool.for_each(rasterizers, rows, |rasterizer, mut rows| {
-        let level = rasterizer.brush.level;
-        if !rows.expose(level, &paths, denoise, rasterizer.brush.stack(), &progress) {
-            broken_off.store(true, Ordering::Relaxed);
+        let level = rasterizer.scratch.level;
+        if !rows.path_trace(level, &paths, denoise, rasterizer.scratch.stack(), &progress) {
+            canceled.store(true, Ordering::Relaxed);
         }
     });
-    if broken_off.into_inner() {
-        return Err(RenderError::Cancelled { samples: progress.samples(), total: progress.total() });
+    if canceled.into_inner() {
+        return Err(RenderError::Canceled { samples: progress.samples(), total: progress.total() });
     }
     let size = width * ROWS;
     if denoise && samples == 1 {
-        let Film { pixels, next, guides, .. } = &mut *film;
+        let Accumulator { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
         pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
-            smooth::guess([width, k * ROWS], pixels, guides, to);
+            smooth::estimate_variance([width, k * ROWS], pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
     }
-    for pass in (0..smooth::PASSES).filter(|_| denoise) {
-        let Film { pixels, next, guides, .. } = &mut *film;
+    for pass in (0..smooth::FILTER_PASSES).filter(|_| denoise) {
+        let Accumulator { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
         pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
-            smooth::pass([width, k * ROWS], pass, plan.exposure, pixels, guides, to);
+            smooth::filter_pass([width, k * ROWS], pass, plan.exposure, pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
     }
@@ -121,13 +132,13 @@ fn draw_colors(
 }
 
 /// Renders all channels but color, at the pixel centers.
-fn draw_others(
+fn render_other_channels(
     pool: &ThreadPool,
-    rasterizers: &mut [Rasterizer],
-    exposure: &Exposure<'_>,
+    rasterizers: &mut [ImageRenderer],
+    exposure: &PathTraceJob<'_>,
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
-    let &Exposure { shot, plan, interval, .. } = exposure;
+    let &PathTraceJob { request: shot, prepared: plan, interval, .. } = exposure;
     let Some(projection) = &plan.projection else { return Ok(()) };
     let (width, height) = (projection.width, projection.height);
     let color = frame.color.take();
@@ -138,7 +149,7 @@ fn draw_others(
             let first = Mutex::new(&mut failure);
             let rows = (0..height).map(move |y| (y, rest.split_off_first(width)));
             pool.for_each(rasterizers, rows, |rasterizer, (y, mut row)| {
-                if let Err(error) = rasterizer.draw_row(shot, &interval, y, &mut row) {
+                if let Err(error) = rasterizer.render_row(shot, &interval, y, &mut row) {
                     **first.lock().unwrap_or_else(PoisonError::into_inner) = Err(error);
                 }
             });
@@ -148,7 +159,7 @@ fn draw_others(
                 (row / BLOCK, rest.split_off_first(width * rows))
             });
             pool.for_each(rasterizers, bands, |rasterizer, (block, mut frame)| {
-                rasterizer.brush.paint(plan, shot, &mut frame, block..block + 1);
+                rasterizer.scratch.render_band(plan, shot, &mut frame, block..block + 1);
             });
         }
     }
@@ -157,13 +168,19 @@ fn draw_others(
 }
 
 /// Converts the traced light to sRGB bytes.
-fn show(pool: &ThreadPool, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, frame: &mut FrameMut<'_>) {
+fn encode_colors(
+    pool: &ThreadPool,
+    rasterizers: &mut [ImageRenderer],
+    plan: &PreparedFrame,
+    film: &Accumulator,
+    frame: &mut FrameMut<'_>,
+) {
     let Renderer::RayTraced { denoise, .. } = plan.renderer else { return };
     let Some(color) = frame.color.as_deref_mut() else { return };
     let size = film.width * ROWS;
     let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
     pool.for_each(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
         let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
-        develop(rasterizer.brush.level, plan.exposure, plan.tone, pixels, guides, out);
+        tonemap(rasterizer.scratch.level, plan.exposure, plan.tone, pixels, guides, out);
     });
 }

@@ -121,13 +121,13 @@ impl Intrinsics {
                 horizontal_offset,
                 vertical_offset,
             } => {
-                positive("focal_length", focal_length)?;
-                positive("horizontal_aperture", horizontal_aperture)?;
-                finite("horizontal_offset", horizontal_offset)?;
-                finite("vertical_offset", vertical_offset)?;
+                check_positive("focal_length", focal_length)?;
+                check_positive("horizontal_aperture", horizontal_aperture)?;
+                check_finite("horizontal_offset", horizontal_offset)?;
+                check_finite("vertical_offset", vertical_offset)?;
                 let per_x = w / horizontal_aperture;
                 let per_y = match vertical_aperture {
-                    Some(aperture) => h / positive("vertical_aperture", aperture)?,
+                    Some(aperture) => h / check_positive("vertical_aperture", aperture)?,
                     None => per_x,
                 };
                 PixelIntrinsics {
@@ -174,21 +174,21 @@ impl PixelIntrinsics {
     }
 
     fn validate(&self) -> Result<(), OpticsError> {
-        positive("fx", self.fx)?;
-        positive("fy", self.fy)?;
-        finite("cx", self.cx)?;
-        finite("cy", self.cy).map(|_| ())
+        check_positive("fx", self.fx)?;
+        check_positive("fy", self.fy)?;
+        check_finite("cx", self.cx)?;
+        check_finite("cy", self.cy).map(|_| ())
     }
 }
 
-fn positive(what: &'static str, value: f64) -> Result<f64, OpticsError> {
+fn check_positive(what: &'static str, value: f64) -> Result<f64, OpticsError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
     }
     Err(OpticsError::Lens { what, value, allowed: "positive and finite" })
 }
 
-fn finite(what: &'static str, value: f64) -> Result<f64, OpticsError> {
+fn check_finite(what: &'static str, value: f64) -> Result<f64, OpticsError> {
     if value.is_finite() { Ok(value) } else { Err(OpticsError::Lens { what, value, allowed: "finite" }) }
 }
 

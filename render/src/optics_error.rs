@@ -18,7 +18,7 @@ pub enum OpticsError {
     /// angle: pixels would have two directions.
     #[error(
         "the mapping of the {lens} lens cannot be inverted: it folds back, or nears a pole, {:.2} degrees from the optical axis, at \
-         radius {radius:.4} of the normalised picture (times fx: in pixels), and {wanted}; check the coefficients, make the picture \
+         radius {radius:.4} of the normalised picture (times fx: in pixels), and {requirement}; check the coefficients, make the picture \
          smaller, or end the lens before with max_angle",
         .angle.to_degrees()
     )]
@@ -30,11 +30,11 @@ pub enum OpticsError {
         /// Distance of that angle from the principal point in the normalized image (times fx: in pixels).
         radius: f64,
         /// The part of the image that needs more.
-        wanted: String,
+        requirement: String,
     },
     /// No pixel of the image lies in the domain of the lens.
     #[error("no pixel of the picture is within what the {lens} lens sees; check the intrinsics and max_angle")]
-    LensBlind {
+    NoVisiblePixel {
         /// Name of the lens.
         lens: &'static str,
     },

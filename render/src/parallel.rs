@@ -1,27 +1,27 @@
 //! Renders many frames on several threads.
 
 use super::aperture::Aperture;
-use super::exposure::expose;
+use super::exposure::path_trace;
 use super::progress::RenderProgress;
-use super::rasterizer::Rasterizer;
+use super::rasterizer::ImageRenderer;
 use super::renderer::Renderer;
-use super::request::{RasterCfg, Shot};
-use super::shutter::{Shutter, Take};
+use super::request::{RasterCfg, RenderRequest};
+use super::shutter::{FrameSample, Shutter};
 use crate::frame::FrameMut;
-use crate::geometry::assets::RayAssets;
+use crate::geometry::assets::RayAssetCache;
 use crate::raster::tile::BLOCK;
-use crate::shade::plan::{Plan, estimate};
+use crate::shade::plan::{PreparedFrame, estimate_cost_ns};
 use crate::visibility::RenderError;
 use kinetoscope_exec::ThreadPool;
 use std::sync::{Mutex, PoisonError};
 
 /// Less work than this is done on the calling thread: waking or starting another takes up to 0.05 ms \[ns\].
-const WORTH_A_THREAD: usize = 1_000_000;
+const MIN_THREAD_WORK_NS: usize = 1_000_000;
 /// Bands per thread, approximately: the last bands decide how long other threads wait.
-const PARTS: usize = 8;
+const BANDS_PER_THREAD: usize = 8;
 
 /// A render request and the buffers of its images.
-pub type Job<'a> = (Shot<'a>, FrameMut<'a>);
+pub type RenderJob<'a> = (RenderRequest<'a>, FrameMut<'a>);
 
 /// Renders batches of frames on several threads; keeps the scratch memory of each thread. The bits do not depend on the
 /// number of threads.
@@ -30,22 +30,22 @@ pub type Job<'a> = (Shot<'a>, FrameMut<'a>);
 /// rendered by all threads together: first their visibility is prepared, then their shadow maps in parts, then bands of
 /// the images.
 #[derive(Debug)]
-pub struct ParallelRasterizer {
-    rasterizers: Vec<Rasterizer>,
+pub struct ParallelRenderer {
+    renderers: Vec<ImageRenderer>,
     /// Number of rasterizers in use.
-    working: usize,
-    plans: Vec<Plan>,
+    active: usize,
+    prepared: Vec<PreparedFrame>,
     pool: ThreadPool,
     progress: RenderProgress,
 }
 
 /// Clones the settings. The clone has its own progress counter.
-impl Clone for ParallelRasterizer {
+impl Clone for ParallelRenderer {
     fn clone(&self) -> Self {
         let mut clone = Self {
-            rasterizers: self.rasterizers.clone(),
-            working: self.working,
-            plans: self.plans.clone(),
+            renderers: self.renderers.clone(),
+            active: self.active,
+            prepared: self.prepared.clone(),
             pool: self.pool.clone(),
             progress: RenderProgress::default(),
         };
@@ -54,20 +54,20 @@ impl Clone for ParallelRasterizer {
     }
 }
 
-impl ParallelRasterizer {
+impl ParallelRenderer {
     /// Creates a rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The other threads
     /// start and end with each batch, unless [`with_pool`](Self::with_pool) sets a thread pool.
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
-        let (working, rasterizers) = (threads.max(1), vec![Rasterizer::new(cfg); threads.max(1)]);
+        let (working, rasterizers) = (threads.max(1), vec![ImageRenderer::new(cfg); threads.max(1)]);
         let (pool, progress) = (ThreadPool::new(), RenderProgress::default());
-        let mut all = Self { rasterizers, working, plans: Vec::new(), pool, progress };
+        let mut all = Self { renderers: rasterizers, active: working, prepared: Vec::new(), pool, progress };
         all.share_progress();
         all
     }
 
     /// Lets all threads count their progress together.
     fn share_progress(&mut self) {
-        for rasterizer in &mut self.rasterizers {
+        for rasterizer in &mut self.renderers {
             rasterizer.progress = self.progress.clone();
         }
     }
@@ -80,39 +80,39 @@ impl ParallelRasterizer {
 
     /// Number of threads, the calling one included.
     pub fn threads(&self) -> usize {
-        self.rasterizers.len()
+        self.renderers.len()
     }
 
     /// Limits the number of threads from now on, to at least one; all keep their memory.
     pub fn use_threads(&mut self, most: usize) {
-        self.working = most.clamp(1, self.rasterizers.len());
+        self.active = most.clamp(1, self.renderers.len());
     }
 
     /// Sets the options of the rasterizer.
     pub fn set_cfg(&mut self, cfg: RasterCfg) {
-        for rasterizer in &mut self.rasterizers {
+        for rasterizer in &mut self.renderers {
             rasterizer.cfg = cfg;
         }
     }
 
     /// Sets the renderer.
     pub fn set_renderer(&mut self, renderer: Renderer) {
-        for rasterizer in &mut self.rasterizers {
+        for rasterizer in &mut self.renderers {
             rasterizer.renderer = renderer;
         }
     }
 
     /// Sets depth of field and exposure time: `None` and [`Shutter::default`] are a pinhole and an instant.
-    pub fn set_light(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
-        for rasterizer in &mut self.rasterizers {
+    pub fn set_exposure_optics(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
+        for rasterizer in &mut self.renderers {
             (rasterizer.aperture, rasterizer.shutter) = (aperture, shutter);
         }
     }
 
-    /// Sets the exposure compensation in stops, -20 to 20, see [`Rasterizer::stops`].
-    pub fn set_stops(&mut self, stops: f64) {
-        for rasterizer in &mut self.rasterizers {
-            rasterizer.stops = stops;
+    /// Sets the exposure compensation in stops, -20 to 20, see [`ImageRenderer::exposure_compensation`].
+    pub fn set_exposure_compensation(&mut self, stops: f64) {
+        for rasterizer in &mut self.renderers {
+            rasterizer.exposure_compensation = stops;
         }
     }
 
@@ -123,20 +123,20 @@ impl ParallelRasterizer {
 
     /// Geom groups that are rendered: bit k is group k.
     pub fn groups(&self) -> u32 {
-        self.rasterizers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
+        self.renderers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
     }
 
     /// Shares the cache of BVHs over meshes.
-    pub fn share_assets(&mut self, assets: &RayAssets) {
-        for rasterizer in &mut self.rasterizers {
+    pub fn share_assets(&mut self, assets: &RayAssetCache) {
+        for rasterizer in &mut self.renderers {
             rasterizer.assets = assets.clone();
         }
     }
 
     /// Scratch memory held \[bytes\].
     pub fn scratch_bytes(&self) -> usize {
-        let own: usize = self.rasterizers.iter().map(Rasterizer::scratch_bytes).sum();
-        own + self.plans.iter().map(Plan::bytes).sum::<usize>()
+        let own: usize = self.renderers.iter().map(ImageRenderer::scratch_bytes).sum();
+        own + self.prepared.iter().map(PreparedFrame::bytes).sum::<usize>()
     }
 
     /// Renders every request into its frame.
@@ -145,8 +145,8 @@ impl ParallelRasterizer {
     ///
     /// The error of the first frame that cannot be rendered, with its index; the other frames are rendered
     /// nevertheless.
-    pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
-        self.render_takes(jobs, &[])
+    pub fn render(&mut self, jobs: &mut [RenderJob<'_>]) -> Result<(), (usize, RenderError)> {
+        self.render_samples(jobs, &[])
     }
 
     /// As [`render`](Self::render), with noise and motion per frame for path tracing: `takes` holds the noise number of
@@ -155,22 +155,26 @@ impl ParallelRasterizer {
     /// # Errors
     ///
     /// As [`render`](Self::render).
-    pub fn render_takes(&mut self, jobs: &mut [Job<'_>], takes: &[Take<'_>]) -> Result<(), (usize, RenderError)> {
-        let Self { rasterizers, working, plans, pool, progress } = self;
+    pub fn render_samples(
+        &mut self,
+        jobs: &mut [RenderJob<'_>],
+        takes: &[FrameSample<'_>],
+    ) -> Result<(), (usize, RenderError)> {
+        let Self { renderers: rasterizers, active: working, prepared: plans, pool, progress } = self;
         let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
-        let threads = worth(cfg, renderer, jobs).min(*working);
+        let threads = worthwhile_threads(cfg, renderer, jobs).min(*working);
         let rasterizers = &mut rasterizers[..threads];
-        let failure = Failure::default();
-        progress.begin(jobs.iter().fold(0, |sum, (shot, frame)| sum.saturating_add(renderer.paths(shot, frame))));
-        if renderer.follows_paths() {
+        let failure = FirstError::default();
+        progress.begin(jobs.iter().fold(0, |sum, (shot, frame)| sum.saturating_add(renderer.path_count(shot, frame))));
+        if renderer.is_path_tracing() {
             for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
                 let take = takes.get(index).copied().unwrap_or_default();
-                let (before, paths) = (progress.samples(), renderer.paths(shot, frame));
-                let result = expose(pool, rasterizers, shot, &take, frame);
-                if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
-                    progress.refuse(paths.saturating_sub(progress.samples().saturating_sub(before)));
+                let (before, paths) = (progress.samples(), renderer.path_count(shot, frame));
+                let result = path_trace(pool, rasterizers, shot, &take, frame);
+                if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Canceled { .. })) {
+                    progress.subtract(paths.saturating_sub(progress.samples().saturating_sub(before)));
                 }
-                failure.note(index, result);
+                failure.record(index, result);
             }
             return failure.first();
         }
@@ -185,12 +189,12 @@ impl ParallelRasterizer {
         let (alone, together) = jobs.split_at_mut(count - together);
         let first = alone.len();
         pool.for_each(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
-            failure.note(index, rasterizer.render_shot(shot, frame));
+            failure.record(index, rasterizer.render_request(shot, frame));
         });
         if !together.is_empty() {
-            plans.resize_with(plans.len().max(together.len()), Plan::default);
-            draw_together(pool, rasterizers, &mut plans[..together.len()], together, |index, result| {
-                failure.note(first + index, result);
+            plans.resize_with(plans.len().max(together.len()), PreparedFrame::default);
+            render_jointly(pool, rasterizers, &mut plans[..together.len()], together, |index, result| {
+                failure.record(first + index, result);
             });
         }
         failure.first()
@@ -198,21 +202,21 @@ impl ParallelRasterizer {
 }
 
 /// Number of threads that pay off for these frames; at least 1.
-fn worth(cfg: RasterCfg, renderer: Renderer, jobs: &[Job<'_>]) -> usize {
-    let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
-    (cost.saturating_mul(renderer.slowness(cfg)) / (WORTH_A_THREAD / 2)).max(1)
+fn worthwhile_threads(cfg: RasterCfg, renderer: Renderer, jobs: &[RenderJob<'_>]) -> usize {
+    let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate_cost_ns(cfg, shot, frame)));
+    (cost.saturating_mul(renderer.relative_cost(cfg)) / (MIN_THREAD_WORK_NS / 2)).max(1)
 }
 
 /// Error of the first frame that could not be rendered.
 #[derive(Debug, Default)]
-struct Failure(Mutex<Option<(usize, RenderError)>>);
+struct FirstError(Mutex<Option<(usize, RenderError)>>);
 
-impl Failure {
+impl FirstError {
     fn first(self) -> Result<(), (usize, RenderError)> {
         self.0.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
     }
 
-    fn note(&self, index: usize, result: Result<(), RenderError>) {
+    fn record(&self, index: usize, result: Result<(), RenderError>) {
         if let Err(error) = result {
             let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             if first.as_ref().is_none_or(|(other, _)| index < *other) {
@@ -223,26 +227,26 @@ impl Failure {
 }
 
 /// Renders a few frames, each by all threads.
-fn draw_together(
+fn render_jointly(
     pool: &ThreadPool,
-    rasterizers: &mut [Rasterizer],
-    plans: &mut [Plan],
-    jobs: &mut [Job<'_>],
+    rasterizers: &mut [ImageRenderer],
+    plans: &mut [PreparedFrame],
+    jobs: &mut [RenderJob<'_>],
     note: impl Fn(usize, Result<(), RenderError>) + Sync,
 ) {
-    let parts = (PARTS * rasterizers.len()).div_ceil(jobs.len());
+    let parts = (BANDS_PER_THREAD * rasterizers.len()).div_ceil(jobs.len());
     pool.for_each(
         rasterizers,
         plans.iter_mut().zip(&*jobs).enumerate(),
         |rasterizer, (index, (plan, (shot, frame)))| {
-            note(index, plan.prepare(rasterizer.style(), shot, frame));
+            note(index, plan.prepare(rasterizer.settings(), shot, frame));
         },
     );
-    if plans.iter().any(Plan::has_shadows) {
+    if plans.iter().any(PreparedFrame::has_shadows) {
         let maps = plans.iter_mut().zip(&*jobs);
         let bands = maps.flat_map(|(plan, (shot, _))| plan.shadow_bands().map(move |band| (shot.scene, band)));
         pool.for_each(rasterizers, bands, |rasterizer, (scene, band)| {
-            rasterizer.brush.shadow(scene, band);
+            rasterizer.scratch.render_shadow_band(scene, band);
         });
     }
     let bands = plans.iter().zip(jobs).flat_map(|(plan, job)| {
@@ -251,21 +255,21 @@ fn draw_together(
         bands.map(move |band| (plan, shot, band))
     });
     pool.for_each(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
-        rasterizer.brush.paint(plan, &shot, &mut frame, first..first + rows);
+        rasterizer.scratch.render_band(plan, &shot, &mut frame, first..first + rows);
     });
 }
 
 /// Splits a frame into about `parts` bands: first row of blocks, number of rows of blocks, and the buffers of the band.
 /// Empty if the frame cannot be rendered.
 fn bands<'a>(
-    plan: &Plan,
-    shot: &Shot<'_>,
+    plan: &PreparedFrame,
+    shot: &RenderRequest<'_>,
     frame: &'a mut FrameMut<'_>,
     parts: usize,
 ) -> impl Iterator<Item = (usize, usize, FrameMut<'a>)> + use<'a> {
     let (width, height) = (shot.view.width, shot.view.height);
     let blocks = if plan.projection.is_some() { height.div_ceil(BLOCK) } else { 0 };
-    let rows = blocks.div_ceil(parts).clamp(1, plan.rows());
+    let rows = blocks.div_ceil(parts).clamp(1, plan.band_rows());
     let mut rest = frame.reborrow();
     (0..blocks).step_by(rows).map(move |first| {
         let rows = rows.min(blocks - first);
@@ -288,15 +292,15 @@ mod tests {
         let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
         let view = &View::look_at([32, 32], 0.7, [2.0, 0.0, 0.0], [0.0; 3], [0., 0., 1.]).unwrap();
         let mut frame = Frame::new(32, 32, Channels::ALL);
-        let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None, before: None };
+        let shot = RenderRequest { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None, previous: None };
         let jobs = [(shot, frame.as_mut())];
         // Without shadow maps, which cost as much as many more pixels.
         let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };
         let paths = |samples, max_bounces| Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };
-        assert_eq!(worth(cfg, Renderer::Raster, &jobs), 1);
-        assert_eq!(worth(cfg, paths(1, 0), &jobs), 1);
-        assert!(worth(cfg, paths(256, 0), &jobs) >= 64);
-        assert!(worth(cfg, paths(16, 15), &jobs) >= 64);
-        assert!(worth(cfg, paths(Renderer::MAX_SAMPLES, Renderer::MAX_BOUNCES), &jobs) >= 1 << 16);
+        assert_eq!(worthwhile_threads(cfg, Renderer::Raster, &jobs), 1);
+        assert_eq!(worthwhile_threads(cfg, paths(1, 0), &jobs), 1);
+        assert!(worthwhile_threads(cfg, paths(256, 0), &jobs) >= 64);
+        assert!(worthwhile_threads(cfg, paths(16, 15), &jobs) >= 64);
+        assert!(worthwhile_threads(cfg, paths(Renderer::MAX_SAMPLES, Renderer::MAX_BOUNCES), &jobs) >= 1 << 16);
     }
 }

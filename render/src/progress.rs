@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 ///
 /// Counts belong to the current batch of images, or to the last one. They are 0 for images without paths. Cancellation
 /// leaves all pixels of the current image unchanged, and is an error:
-/// [`RenderError::Cancelled`](crate::visibility::RenderError::Cancelled).
+/// [`RenderError::Canceled`](crate::visibility::RenderError::Canceled).
 ///
 /// ```
 /// use kinetoscope_render::ParallelRasterizer;
@@ -29,7 +29,7 @@ struct Counters {
     samples: AtomicU64,
     total: AtomicU64,
     rays: AtomicU64,
-    cancelled: AtomicBool,
+    canceled: AtomicBool,
     started: Mutex<Option<Instant>>,
 }
 
@@ -69,17 +69,17 @@ impl RenderProgress {
     /// Cancels the current path tracing, and any that starts before [`resume`](Self::resume). The steps after the
     /// paths, other channels and denoising, are completed.
     pub fn cancel(&self) {
-        self.0.cancelled.store(true, Ordering::Relaxed);
+        self.0.canceled.store(true, Ordering::Relaxed);
     }
 
     /// Allows rendering again. Canceled images are rendered when they are read again.
     pub fn resume(&self) {
-        self.0.cancelled.store(false, Ordering::Relaxed);
+        self.0.canceled.store(false, Ordering::Relaxed);
     }
 
     /// True after [`cancel`](Self::cancel), until [`resume`](Self::resume).
-    pub fn is_cancelled(&self) -> bool {
-        self.0.cancelled.load(Ordering::Relaxed)
+    pub fn is_canceled(&self) -> bool {
+        self.0.canceled.load(Ordering::Relaxed)
     }
 
     /// Starts a batch.
@@ -91,7 +91,7 @@ impl RenderProgress {
     }
 
     /// Subtracts the paths of an image that cannot be rendered.
-    pub(crate) fn refuse(&self, samples: u64) {
+    pub(crate) fn subtract(&self, samples: u64) {
         let less = |total: u64| Some(total.saturating_sub(samples));
         let _ = self.0.total.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
     }

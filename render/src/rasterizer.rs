@@ -1,19 +1,19 @@
 //! Renders single frames.
 
 use super::aperture::Aperture;
-use super::exposure::expose;
+use super::exposure::path_trace;
 use super::progress::RenderProgress;
 use super::renderer::Renderer;
-use super::rolling::Roll;
-use super::shutter::{Shutter, ShutterInterval, Take};
+use super::rolling::RollingShutter;
+use super::shutter::{FrameSample, Shutter, ShutterInterval};
 use crate::frame::{Frame, FrameMut};
-use crate::geometry::assets::RayAssets;
-use crate::path::film::Film;
+use crate::geometry::assets::RayAssetCache;
+use crate::path::film::Accumulator;
 use crate::raster::tile::BLOCK;
-use crate::request::{RasterCfg, Shot};
-use crate::shade::band::Brush;
-use crate::shade::plan::{Plan, Style};
-use crate::simd::Level;
+use crate::request::{RasterCfg, RenderRequest};
+use crate::shade::band::RasterScratch;
+use crate::shade::plan::{PreparedFrame, RenderSettings};
+use crate::simd::SimdLevel;
 use crate::visibility::{RenderError, View};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{PoseF32, RenderScene};
@@ -26,7 +26,7 @@ use kinetoscope_scene::{PoseF32, RenderScene};
 /// Only the nearest surface of each is blended. All other channels contain the nearest surface whatever its alpha,
 /// unless that is 0, as in MuJoCo. The opacity of textures is ignored.
 #[derive(Debug)]
-pub struct Rasterizer {
+pub struct ImageRenderer {
     /// Options of the rasterizer.
     pub cfg: RasterCfg,
     /// The renderer that is used.
@@ -37,76 +37,95 @@ pub struct Rasterizer {
     pub shutter: Shutter,
     /// Exposure compensation in stops, -20 to 20: light is multiplied by 2 to this power before the tone curve. Bright
     /// areas that saturate in one image keep their detail in an image with fewer stops.
-    pub stops: f64,
+    pub exposure_compensation: f64,
     /// Progress of path tracing.
     pub progress: RenderProgress,
-    pub(super) assets: RayAssets,
-    pub(super) plan: Plan,
-    pub(super) brush: Brush,
+    pub(super) assets: RayAssetCache,
+    pub(super) prepared: PreparedFrame,
+    pub(super) scratch: RasterScratch,
     /// Accumulator of path-traced images.
-    pub(super) film: Film,
+    pub(super) accumulator: Accumulator,
     /// Scratch memory of images whose rows show different instants.
-    pub(super) roll: Roll,
+    pub(super) rolling_shutter: RollingShutter,
 }
 
 /// Clones the settings. The clone has its own progress counter.
-impl Clone for Rasterizer {
+impl Clone for ImageRenderer {
     fn clone(&self) -> Self {
-        let Self { cfg, renderer, aperture, shutter, stops, progress: _, assets, plan, brush, film, roll } = self;
+        let Self {
+            cfg,
+            renderer,
+            aperture,
+            shutter,
+            exposure_compensation: stops,
+            progress: _,
+            assets,
+            prepared: plan,
+            scratch: brush,
+            accumulator: film,
+            rolling_shutter: roll,
+        } = self;
         Self {
             cfg: *cfg,
             renderer: *renderer,
             aperture: *aperture,
             shutter: *shutter,
-            stops: *stops,
+            exposure_compensation: *stops,
             progress: RenderProgress::default(),
             assets: assets.clone(),
-            plan: plan.clone(),
-            brush: brush.clone(),
-            film: film.clone(),
-            roll: roll.clone(),
+            prepared: plan.clone(),
+            scratch: brush.clone(),
+            accumulator: film.clone(),
+            rolling_shutter: roll.clone(),
         }
     }
 }
 
-impl Default for Rasterizer {
+impl Default for ImageRenderer {
     fn default() -> Self {
         Self::new(RasterCfg::default())
     }
 }
 
-impl Rasterizer {
+impl ImageRenderer {
     /// Creates a rasterizer with the best SIMD level of this machine.
     pub fn new(cfg: RasterCfg) -> Self {
-        Self::with_level(cfg, Level::best())
+        Self::with_level(cfg, SimdLevel::best())
     }
 
     /// Creates a rasterizer with a given SIMD level.
-    pub(crate) fn with_level(cfg: RasterCfg, level: Level) -> Self {
+    pub(crate) fn with_level(cfg: RasterCfg, level: SimdLevel) -> Self {
         Self {
             cfg,
             renderer: Renderer::default(),
             aperture: None,
             shutter: Shutter::default(),
-            stops: 0.0,
+            exposure_compensation: 0.0,
             progress: RenderProgress::default(),
-            assets: RayAssets::default(),
-            plan: Plan::default(),
-            brush: Brush::new(level),
-            film: Film::default(),
-            roll: Roll::default(),
+            assets: RayAssetCache::default(),
+            prepared: PreparedFrame::default(),
+            scratch: RasterScratch::new(level),
+            accumulator: Accumulator::default(),
+            rolling_shutter: RollingShutter::default(),
         }
     }
 
     /// Current settings of all frames.
-    pub(super) fn style(&self) -> Style<'_> {
-        let Self { cfg, renderer, aperture, shutter, stops, assets, .. } = self;
-        Style { cfg: *cfg, renderer: *renderer, aperture: aperture.as_ref(), shutter: *shutter, stops: *stops, assets }
+    pub(super) fn settings(&self) -> RenderSettings<'_> {
+        let Self { cfg, renderer, aperture, shutter, exposure_compensation: stops, assets, .. } = self;
+        RenderSettings {
+            cfg: *cfg,
+            renderer: *renderer,
+            aperture: aperture.as_ref(),
+            shutter: *shutter,
+            exposure_compensation: *stops,
+            assets,
+        }
     }
 
     /// Scratch memory held \[bytes\].
     pub fn scratch_bytes(&self) -> usize {
-        self.plan.bytes() + self.brush.bytes() + self.film.bytes() + self.roll.bytes()
+        self.prepared.bytes() + self.scratch.bytes() + self.accumulator.bytes() + self.rolling_shutter.bytes()
     }
 
     /// Renders the channels of `frame`.
@@ -121,7 +140,10 @@ impl Rasterizer {
         view: &View,
         frame: &mut Frame,
     ) -> Result<(), RenderError> {
-        self.render_shot(&Shot { scene, poses, view, lights: None, lens: None, before: None }, &mut frame.as_mut())
+        self.render_request(
+            &RenderRequest { scene, poses, view, lights: None, lens: None, previous: None },
+            &mut frame.as_mut(),
+        )
     }
 
     /// Renders the channels of `frame` into borrowed buffers.
@@ -129,52 +151,77 @@ impl Rasterizer {
     /// # Errors
     ///
     /// For an invalid view, pose or buffer; the frame is unchanged then.
-    pub fn render_shot(&mut self, shot: &Shot<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
-        self.render_take(shot, &Take::default(), frame)
+    pub fn render_request(&mut self, shot: &RenderRequest<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
+        self.render_sample(shot, &FrameSample::default(), frame)
     }
 
-    /// As [`render_shot`](Self::render_shot), with noise and motion for path tracing: `take` holds the noise number and
+    /// As [`render_request`](Self::render_request), with noise and motion for path tracing: `take` holds the noise number and
     /// the poses at shutter opening.
     ///
     /// # Errors
     ///
-    /// As [`render_shot`](Self::render_shot), and for invalid or too recent poses at shutter opening.
-    pub fn render_take(
+    /// As [`render_request`](Self::render_request), and for invalid or too recent poses at shutter opening.
+    pub fn render_sample(
         &mut self,
-        shot: &Shot<'_>,
-        take: &Take<'_>,
+        shot: &RenderRequest<'_>,
+        take: &FrameSample<'_>,
         frame: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let paths = self.renderer.paths(shot, frame);
+        let paths = self.renderer.path_count(shot, frame);
         self.progress.begin(paths);
-        if self.renderer.follows_paths() {
-            let result = expose(&ThreadPool::serial(), std::slice::from_mut(self), shot, take, frame);
-            if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
-                self.progress.refuse(paths.saturating_sub(self.progress.samples()));
+        if self.renderer.is_path_tracing() {
+            let result = path_trace(&ThreadPool::serial(), std::slice::from_mut(self), shot, take, frame);
+            if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Canceled { .. })) {
+                self.progress.subtract(paths.saturating_sub(self.progress.samples()));
             }
             return result;
         }
-        let Self { cfg, renderer, aperture, shutter, stops, assets, plan, brush, .. } = self;
+        let Self {
+            cfg,
+            renderer,
+            aperture,
+            shutter,
+            exposure_compensation: stops,
+            assets,
+            prepared: plan,
+            scratch: brush,
+            ..
+        } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
-        plan.prepare(Style { cfg: *cfg, renderer: *renderer, aperture, shutter, stops: *stops, assets }, shot, frame)?;
+        plan.prepare(
+            RenderSettings { cfg: *cfg, renderer: *renderer, aperture, shutter, exposure_compensation: *stops, assets },
+            shot,
+            frame,
+        )?;
         for band in plan.shadow_bands() {
-            brush.shadow(shot.scene, band);
+            brush.render_shadow_band(shot.scene, band);
         }
-        brush.paint(plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
+        brush.render_band(plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
         Ok(())
     }
 
     /// Renders one row of an image, at its own instant, into a frame of that row.
-    pub(super) fn draw_row(
+    pub(super) fn render_row(
         &mut self,
-        shot: &Shot<'_>,
+        shot: &RenderRequest<'_>,
         interval: &ShutterInterval<'_>,
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let Self { cfg, renderer, aperture, shutter, stops, assets, brush, roll, .. } = self;
+        let Self {
+            cfg,
+            renderer,
+            aperture,
+            shutter,
+            exposure_compensation: stops,
+            assets,
+            scratch: brush,
+            rolling_shutter: roll,
+            ..
+        } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
-        let style = Style { cfg: *cfg, renderer: *renderer, aperture, shutter, stops: *stops, assets };
-        roll.draw(brush, style, shot, interval, y, row)
+        let style =
+            RenderSettings { cfg: *cfg, renderer: *renderer, aperture, shutter, exposure_compensation: *stops, assets };
+        roll.render_row(brush, style, shot, interval, y, row)
     }
 }

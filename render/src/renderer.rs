@@ -1,9 +1,9 @@
 //! Selection of the renderer.
 
-use super::request::{RasterCfg, Shot};
+use super::request::{RasterCfg, RenderRequest};
 use crate::frame::FrameMut;
 use crate::visibility::RenderError;
-use kinetoscope_scene::pattern::{UnknownName, closest};
+use kinetoscope_scene::pattern::{UnknownName, closest_names};
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
@@ -108,7 +108,7 @@ impl Renderer {
         ALL.into_iter().find(|renderer| renderer.name() == name || renderer.aliases().contains(&name)).ok_or_else(
             || {
                 let all = ALL.iter().flat_map(|renderer| [&[renderer.name()], renderer.aliases()].concat());
-                let candidates = closest(name, all).into_iter().map(String::from).collect();
+                let candidates = closest_names(name, all).into_iter().map(String::from).collect();
                 UnknownName { what: "renderer", name: name.into(), candidates }
             },
         )
@@ -135,7 +135,7 @@ impl Renderer {
     }
 
     /// True if visibility is ray traced; `bent` is true for a lens that bends lines.
-    pub fn sees_by_rays(self, bent: bool) -> bool {
+    pub fn traces_visibility(self, bent: bool) -> bool {
         match self {
             Self::Raster => false,
             Self::Hybrid => bent,
@@ -144,12 +144,12 @@ impl Renderer {
     }
 
     /// True if color is path traced.
-    pub fn follows_paths(self) -> bool {
+    pub fn is_path_tracing(self) -> bool {
         matches!(self, Self::RayTraced { .. })
     }
 
     /// Number of paths of an image.
-    pub(crate) fn paths(self, shot: &Shot<'_>, frame: &FrameMut<'_>) -> u64 {
+    pub(crate) fn path_count(self, shot: &RenderRequest<'_>, frame: &FrameMut<'_>) -> u64 {
         match self {
             Self::RayTraced { samples, .. } if frame.color.is_some() => {
                 (shot.view.width as u64).saturating_mul(shot.view.height as u64).saturating_mul(samples.into())
@@ -159,7 +159,7 @@ impl Renderer {
     }
 
     /// Approximate time per pixel, relative to the rasterizer.
-    pub(crate) fn slowness(self, cfg: RasterCfg) -> usize {
+    pub(crate) fn relative_cost(self, cfg: RasterCfg) -> usize {
         match self {
             Self::Raster => 1,
             Self::Hybrid => 20 * (1 + usize::from(cfg.occlusion_rays)),
@@ -174,7 +174,7 @@ impl Renderer {
 /// Parameters of [`Renderer::RayTraced`] in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Paths {
+struct PathParameters {
     samples: Option<u32>,
     max_bounces: Option<u32>,
     denoise: Option<bool>,
@@ -182,9 +182,9 @@ struct Paths {
 }
 
 /// Deserializes a renderer from a name or a table.
-struct InFile;
+struct RendererVisitor;
 
-impl<'de> Visitor<'de> for InFile {
+impl<'de> Visitor<'de> for RendererVisitor {
     type Value = Renderer;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -201,7 +201,7 @@ impl<'de> Visitor<'de> for InFile {
         };
         let renderer = match Renderer::from_name(&name).map_err(A::Error::custom)? {
             Renderer::RayTraced { samples, max_bounces, denoise, seed } => {
-                let paths: Paths = map.next_value()?;
+                let paths: PathParameters = map.next_value()?;
                 Renderer::RayTraced {
                     samples: paths.samples.unwrap_or(samples),
                     max_bounces: paths.max_bounces.unwrap_or(max_bounces),
@@ -220,7 +220,7 @@ impl<'de> Visitor<'de> for InFile {
 
 impl<'de> Deserialize<'de> for Renderer {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(InFile)
+        deserializer.deserialize_any(RendererVisitor)
     }
 }
 

@@ -68,7 +68,7 @@ impl Default for RasterCfg {
 
 /// Render request of one frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Shot<'a> {
+pub struct RenderRequest<'a> {
     /// The scene.
     pub scene: &'a RenderScene,
     /// Pose of each instance: world from instance.
@@ -80,15 +80,15 @@ pub struct Shot<'a> {
     /// Rays of a lens, used instead of the view's focal lengths and principal point; `None` is a pinhole.
     pub lens: Option<&'a LensRays>,
     /// The previous frame, used by [`Flow`](crate::frame::Flow) only.
-    pub before: Option<Before<'a>>,
+    pub previous: Option<PreviousState<'a>>,
 }
 
 /// Poses and camera of the previous frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Before<'a> {
+pub struct PreviousState<'a> {
     /// Pose of each instance in the previous frame: world from instance.
     pub poses: &'a [PoseF32],
     /// Camera of the previous frame. With a lens, its focal lengths and principal point only show if the intrinsics
-    /// differ from those of [`Shot::view`]; if both are equal, the lens is the same.
+    /// differ from those of [`RenderRequest::view`]; if both are equal, the lens is the same.
     pub view: &'a View,
 }

@@ -1,6 +1,6 @@
 //! Exposure time and rolling shutter.
 
-use super::request::Shot;
+use super::request::RenderRequest;
 use crate::visibility::RenderError;
 use kinetoscope_scene::PoseF32;
 use serde::{Deserialize, Serialize};
@@ -28,40 +28,40 @@ pub struct Shutter {
 
 /// Noise and motion of one frame, for path tracing.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Take<'a> {
+pub struct FrameSample<'a> {
     /// Number that varies the noise: for another frame, or another environment.
     pub noise: u32,
     /// Poses at shutter opening; `None` for a static scene.
-    pub opened: Option<Opened<'a>>,
+    pub shutter_open: Option<ShutterOpenState<'a>>,
 }
 
 /// Poses at shutter opening.
 #[derive(Clone, Copy, Debug)]
-pub struct Opened<'a> {
+pub struct ShutterOpenState<'a> {
     /// Pose of each instance at shutter opening: world from instance.
     pub poses: &'a [PoseF32],
     /// Pose of the camera at shutter opening.
     pub world_from_camera: PoseF32,
     /// Time from shutter opening to the time stamp of the image \[s\]: at least the shutter's [`span`](Shutter::span).
-    pub before: f64,
+    pub age: f64,
 }
 
 /// Exposure interval of a frame: the poses at its beginning, and the instants of its rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShutterInterval<'a> {
-    pub(crate) opened: Opened<'a>,
-    pub(crate) clock: Clock,
+    pub(crate) opened: ShutterOpenState<'a>,
+    pub(crate) clock: RowClock,
 }
 
 /// Instants of rows, as a fraction of the interval from the first poses (0) to the last poses (1).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Clock {
+pub(crate) struct RowClock {
     last_row: usize,
     row: f64,
     exposure: f64,
 }
 
-impl Clock {
+impl RowClock {
     /// Instant at a fraction of a row's exposure: 0 is its end, 1 its beginning.
     pub(crate) fn at(&self, row: usize, part: f64) -> f64 {
         let before = self.last_row.saturating_sub(row) as f64 * self.row + part * self.exposure;
@@ -99,13 +99,13 @@ impl Shutter {
     /// # Errors
     ///
     /// For poses at shutter opening that are invalid, or not old enough.
-    pub(crate) fn interval<'a>(
+    pub(crate) fn exposure_interval<'a>(
         &self,
-        shot: &Shot<'_>,
-        take: &Take<'a>,
+        shot: &RenderRequest<'_>,
+        take: &FrameSample<'a>,
     ) -> Result<Option<ShutterInterval<'a>>, RenderError> {
-        let Some(opened) = take.opened.filter(|_| !self.is_instant()) else { return Ok(None) };
-        let Opened { poses, world_from_camera, before } = opened;
+        let Some(opened) = take.shutter_open.filter(|_| !self.is_instant()) else { return Ok(None) };
+        let ShutterOpenState { poses, world_from_camera, age: before } = opened;
         let expected = shot.scene.instances().len();
         if poses.len() != expected {
             return Err(RenderError::PoseCount { expected, found: poses.len() });
@@ -119,10 +119,10 @@ impl Shutter {
         let span = self.span(shot.view.height);
         // Tolerance of half a nanosecond: times are sums.
         if !(before + 5e-10 >= span && before > 0.0 && before.is_finite()) {
-            return Err(RenderError::Opened { before, span });
+            return Err(RenderError::ShutterPoses { age: before, span });
         }
         let last_row = shot.view.height.saturating_sub(1);
-        let clock = Clock { last_row, row: self.row_time / before, exposure: self.exposure_time / before };
+        let clock = RowClock { last_row, row: self.row_time / before, exposure: self.exposure_time / before };
         Ok(Some(ShutterInterval { opened, clock }))
     }
 }

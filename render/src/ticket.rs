@@ -6,27 +6,27 @@ use kinetoscope_scene::Philox;
 /// image is a function of this key and the position in the image. So threads, lazy rendering and the order of reads
 /// change no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ticket {
-    dice: Philox,
+pub struct RngKey {
+    philox: Philox,
     /// Number of images so far, including those of resets and refreshes and dropped ones.
-    number: u64,
+    image_count: u64,
     /// Image number of the last reset.
     epoch: u64,
     /// Number of images due since the last reset.
-    age: u32,
+    due_images: u32,
 }
 
 /// Purpose of random numbers: the numbers differ for every purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stream(u8);
+pub struct RngStream(u8);
 
-impl Stream {
+impl RngStream {
     /// Dropout of an image.
     pub const DROPOUT: Self = Self(0);
     /// Shot noise.
     pub const SHOT: Self = Self(1);
     /// Position of a pixel with few electrons in the distribution of its count.
-    pub const SHOT_IN_THE_DARK: Self = Self(4);
+    pub const SHOT_LOW_LIGHT: Self = Self(4);
     /// Read noise.
     pub const READ: Self = Self(2);
     /// Depth noise.
@@ -45,60 +45,60 @@ impl Stream {
     }
 
     /// Random-walk steps of the biases of a channel.
-    pub const fn walk(channel: u8) -> Self {
+    pub const fn random_walk(channel: u8) -> Self {
         Self(48 + channel)
     }
 }
 
 /// Philox counter, which yields four numbers.
-fn place(stream: Stream, block: u32, number: u64, time: u32) -> [u32; 4] {
+fn counter(stream: RngStream, block: u32, number: u64, time: u32) -> [u32; 4] {
     // A camera would have to take images for 2000 years at 1 MHz to need more than 56 bits.
     [block, time, number as u32, (((number >> 32) as u32) << 8) | u32::from(stream.0)]
 }
 
-impl Ticket {
+impl RngKey {
     /// The key before the first image of the sensor called `name`, in the environment of global index `env`.
-    pub fn first(seed: u64, env: u64, name: &str) -> Self {
-        Self { dice: Philox::keyed(seed, env, name), number: 0, epoch: 0, age: 0 }
+    pub fn new(seed: u64, env: u64, name: &str) -> Self {
+        Self { philox: Philox::keyed(seed, env, name), image_count: 0, epoch: 0, due_images: 0 }
     }
 
     /// Advances to the next scheduled image.
-    pub fn due(&mut self) {
-        self.number += 1;
-        self.age = self.age.saturating_add(1);
+    pub fn advance_scheduled(&mut self) {
+        self.image_count += 1;
+        self.due_images = self.due_images.saturating_add(1);
     }
 
     /// Advances to an unscheduled image, after a write to the state.
-    pub fn refresh(&mut self) {
-        self.number += 1;
+    pub fn advance_unscheduled(&mut self) {
+        self.image_count += 1;
     }
 
     /// Advances to the first image after a reset.
     pub fn reset(&mut self) {
-        self.number += 1;
-        (self.epoch, self.age) = (self.number, 0);
+        self.image_count += 1;
+        (self.epoch, self.due_images) = (self.image_count, 0);
     }
 
     /// Four uniform random numbers of this image, in 0 to 1; `block` selects the group of four.
     #[inline]
-    pub fn uniforms(&self, stream: Stream, block: u32) -> [f64; 4] {
-        self.dice.uniforms(place(stream, block, self.number, 0))
+    pub fn uniforms(&self, stream: RngStream, block: u32) -> [f64; 4] {
+        self.philox.uniforms(counter(stream, block, self.image_count, 0))
     }
 
     /// 32 random bits of this image.
-    pub fn bits(&self, stream: Stream) -> u32 {
-        self.dice.bits(place(stream, 0, self.number, 0))[0]
+    pub fn bits(&self, stream: RngStream) -> u32 {
+        self.philox.bits(counter(stream, 0, self.image_count, 0))[0]
     }
 
     /// Four normally distributed random numbers of this image, with mean 0 and variance 1.
     #[inline]
-    pub fn normals(&self, stream: Stream, block: u32) -> [f64; 4] {
-        self.dice.normals(place(stream, block, self.number, 0))
+    pub fn normals(&self, stream: RngStream, block: u32) -> [f64; 4] {
+        self.philox.normals(counter(stream, block, self.image_count, 0))
     }
 
     /// Four normally distributed random numbers that stay the same in all images until the next reset.
-    pub fn biases(&self, stream: Stream, block: u32) -> [f64; 4] {
-        self.dice.normals(place(stream, block, self.epoch, 0))
+    pub fn biases(&self, stream: RngStream, block: u32) -> [f64; 4] {
+        self.philox.normals(counter(stream, block, self.epoch, 0))
     }
 
     /// Positions of four random walks, with one step of variance 1 for each image that was due since the reset.
@@ -107,11 +107,11 @@ impl Ticket {
     /// normal: its mean is the mean of both, its variance a quarter of the time between them (Lévy's construction of
     /// Brownian motion). The known times are powers of two, each as far from the one before as that is from 0. So a
     /// position takes twice as many normal numbers as the time has binary digits.
-    pub fn walks(&self, stream: Stream, block: u32) -> [f64; 4] {
-        let Some(digits) = self.age.checked_ilog2() else { return [0.0; 4] };
-        let now = u64::from(self.age);
+    pub fn random_walks(&self, stream: RngStream, block: u32) -> [f64; 4] {
+        let Some(digits) = self.due_images.checked_ilog2() else { return [0.0; 4] };
+        let now = u64::from(self.due_images);
         // Every time is reached once, so it can key its own random numbers.
-        let normals = |time: u64| self.dice.normals(place(stream, block, self.epoch, time as u32));
+        let normals = |time: u64| self.philox.normals(counter(stream, block, self.epoch, time as u32));
         let step = |from: [f64; 4], variance: f64, time: u64| {
             let (normals, sigma) = (normals(time), variance.sqrt());
             std::array::from_fn(|k| from[k] + sigma * normals[k])
@@ -150,8 +150,8 @@ mod tests {
         let times = [1, 2, 3, 5, 8, 100, 777];
         let n = 20_000;
         let places = |age: u32| -> Vec<f64> {
-            let ticket = Ticket { age, epoch: 5, ..Ticket::first(1, 2, "eye") };
-            (0..n / 4).flat_map(|block| ticket.walks(Stream::walk(1), block)).collect()
+            let ticket = RngKey { due_images: age, epoch: 5, ..RngKey::new(1, 2, "eye") };
+            (0..n / 4).flat_map(|block| ticket.random_walks(RngStream::random_walk(1), block)).collect()
         };
         let walks: Vec<Vec<f64>> = times.iter().map(|&time| places(time)).collect();
         for (s, at_s) in times.iter().zip(&walks) {
@@ -163,7 +163,8 @@ mod tests {
             }
         }
         assert!(places(0).iter().all(|x| *x == 0.0));
-        let last = Ticket { age: u32::MAX, ..Ticket::first(1, 2, "eye") }.walks(Stream::walk(0), 0);
+        let last =
+            RngKey { due_images: u32::MAX, ..RngKey::new(1, 2, "eye") }.random_walks(RngStream::random_walk(0), 0);
         assert!(last.iter().all(|x| x.abs() < 7.0 * 65536.0 && *x != 0.0), "{last:?}");
     }
 
@@ -174,7 +175,10 @@ mod tests {
         let step = |age: u32| -> Vec<f64> {
             (0..10_000)
                 .flat_map(|block| {
-                    let at = |age| Ticket { age, ..Ticket::first(9, 0, "eye") }.walks(Stream::walk(2), block);
+                    let at = |age| {
+                        RngKey { due_images: age, ..RngKey::new(9, 0, "eye") }
+                            .random_walks(RngStream::random_walk(2), block)
+                    };
                     let (before, after) = (at(age - 1), at(age));
                     [0, 1, 2, 3].map(|k| after[k] - before[k])
                 })

@@ -6,7 +6,7 @@ use crate::description::{JointKind, LinkId, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::inertia::RigidInertia;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::Matrix3;
 
 /// Mass of a moving body without mass \[kg\]. One milligram disturbs no robot and is far above MuJoCo's minimum.
@@ -51,7 +51,7 @@ pub struct BodyInertia {
     /// Mass properties in the body frame, repaired where they are physically impossible.
     pub inertia: RigidInertia,
     /// Location of the first `<inertial>` of the body; `None` where no link has one.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Combines the mass properties of the links of a body.
@@ -70,7 +70,7 @@ pub fn fuse(
         source.get_or_insert_with(|| inertial.source.clone());
         fused = fused.combine(&RigidInertia::from_inertial(inertial).transformed(body_from_link));
     }
-    if is_nothing(&fused) {
+    if is_massless(&fused) {
         if !body.moves {
             return None;
         }
@@ -88,11 +88,11 @@ pub fn fuse(
         fused.inertia = Matrix3::identity() * MASSLESS_MOMENT;
     }
     let (repaired, _) = fused.repaired();
-    report_faults(description, body, fused.check().is_err(), diagnostics);
+    warn_invalid_inertias(description, body, fused.check().is_err(), diagnostics);
     Some(BodyInertia { inertia: repaired, source })
 }
 
-fn report_faults(
+fn warn_invalid_inertias(
     description: &RobotDescription,
     body: &RigidBody,
     body_is_faulty: bool,
@@ -102,7 +102,7 @@ fn report_faults(
         let described = description.link(link);
         let Some(inertial) = &described.inertial else { continue };
         let own = RigidInertia::from_inertial(inertial);
-        if is_nothing(&own) {
+        if is_massless(&own) {
             continue;
         }
         if let Err(fault) = own.check() {
@@ -120,6 +120,6 @@ fn report_faults(
     }
 }
 
-fn is_nothing(inertia: &RigidInertia) -> bool {
+fn is_massless(inertia: &RigidInertia) -> bool {
     inertia.mass == 0.0 && inertia.inertia.norm() == 0.0
 }

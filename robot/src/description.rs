@@ -2,10 +2,10 @@
 //!
 //! The URDF and MJCF readers build it (`urdf::merge`, and `mjcf::robot_file` of the simulation crate). Dynamics,
 //! kinematics, the MJCF writer and the drives read it. Names are unique, elements keep the order of the files, and each
-//! element has its [`Source`].
+//! element has its [`SourceLocation`].
 
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::{Matrix3, Unit, Vector3};
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub struct RobotDescription {
     /// Name of the robot.
     pub name: String,
     /// All links. `links[root.0]` is the only link without a parent joint. Links that are
-    /// [`between_joints`](Link::between_joints) come last.
+    /// [`is_auxiliary_frame`](Link::is_auxiliary_frame) come last.
     pub links: Vec<Link>,
     /// All joints, fixed ones included, in the order of the merged files.
     pub joints: Vec<Joint>,
@@ -37,7 +37,7 @@ pub struct Link {
     /// Unique name.
     pub name: String,
     /// Location of the link in its file.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Component of the robot that the link comes from (`arm`, `hand`, ...).
     pub component: String,
     /// Mass properties; `None` where the file has no `<inertial>`.
@@ -54,14 +54,14 @@ pub struct Link {
     pub child_joints: Vec<JointId>,
     /// True for an auxiliary frame between two joints of one body, as MJCF has them. Such a link has no mass, no shape
     /// and no body of its own in MuJoCo, and lists of links for users omit it.
-    pub between_joints: bool,
+    pub is_auxiliary_frame: bool,
 }
 
 /// Mass properties of a link as the file gives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
     /// Location of the declaration.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Pose,
     /// Mass \[kg\].
@@ -74,7 +74,7 @@ pub struct Inertial {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartialInertial {
     /// Location of the declaration.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Option<Pose>,
     /// Mass \[kg\].
@@ -89,7 +89,7 @@ pub struct PartialInertial {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
     /// Location in the file.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Pose of the shape in the link frame.
     pub link_from_shape: Pose,
     /// Shape and size.
@@ -102,7 +102,7 @@ pub struct Visual {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collision {
     /// Location in the file.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Pose of the shape in the link frame.
     pub link_from_shape: Pose,
     /// Shape and size.
@@ -164,7 +164,7 @@ pub struct Joint {
     /// Unique name.
     pub name: String,
     /// Location in the file.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Joint type.
     pub kind: JointKind,
     /// Parent link.
@@ -195,14 +195,14 @@ pub struct JointDefaults {
     /// Initial position \[rad or m\].
     pub position: f64,
     /// Actuation of the joint in the file.
-    pub drive: FileDrive,
+    pub drive: FileActuation,
 }
 
 /// Actuation of a joint as a file defines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FileDrive {
+pub enum FileActuation {
     /// The file has no actuators at all.
-    Unsaid,
+    Unspecified,
     /// The file has actuators, but no actuator acts on this joint.
     Passive,
     /// Actuated by an effort. The file gives no gains.
@@ -216,27 +216,27 @@ pub enum FileDrive {
     },
     /// Positioned by a coupling that is not a mimic, so the joint must not be driven. The curve is `None` where several
     /// couplings act on the joint, or where the couplings form a cycle.
-    Coupled(Option<Curve>),
+    Coupled(Option<CouplingPolynomial>),
 }
 
 /// Polynomial coupling of a joint to another joint: `position = start + Σ coefficients[k] (position(joint) - at)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curve {
+pub struct CouplingPolynomial {
     /// Followed joint; `None` for the constant position `start + coefficients[0]`.
     pub joint: Option<JointId>,
     /// Initial position of the followed joint \[rad or m\].
-    pub at: f64,
+    pub driver_start: f64,
     /// Initial position of the following joint \[rad or m\].
-    pub start: f64,
+    pub follower_start: f64,
     /// Coefficients in ascending order, the constant first.
     pub coefficients: [f64; 5],
 }
 
-impl Curve {
+impl CouplingPolynomial {
     /// Position of the following joint where the followed joint is at `driver` \[rad or m\].
     pub fn position(&self, driver: f64) -> f64 {
-        let by = driver - self.at;
-        self.start + self.coefficients.iter().rev().fold(0.0, |sum, c| sum * by + c)
+        let by = driver - self.driver_start;
+        self.follower_start + self.coefficients.iter().rev().fold(0.0, |sum, c| sum * by + c)
     }
 }
 
@@ -280,7 +280,7 @@ impl JointKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimit {
     /// Location of the declaration.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Lower position \[rad or m\].
     pub lower: Option<f64>,
     /// Upper position \[rad or m\].
@@ -295,7 +295,7 @@ pub struct JointLimit {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
     /// Location of the declaration.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Followed joint as the file names it. It may itself follow another joint.
     pub joint: JointId,
     /// Ratio.
@@ -306,7 +306,7 @@ pub struct Mimic {
 
 impl Link {
     /// Creates a link without mass, shapes and joints.
-    pub fn new(name: String, source: Source, component: String) -> Self {
+    pub fn new(name: String, source: SourceLocation, component: String) -> Self {
         Self {
             name,
             source,
@@ -317,7 +317,7 @@ impl Link {
             collisions: Vec::new(),
             parent_joint: None,
             child_joints: Vec::new(),
-            between_joints: false,
+            is_auxiliary_frame: false,
         }
     }
 }
@@ -325,7 +325,7 @@ impl Link {
 impl RobotDescription {
     /// Links shown to users, indexed by [`LinkId`]: all links except the auxiliary frames between joints.
     pub fn named_links(&self) -> &[Link] {
-        let named = self.links.iter().position(|link| link.between_joints).unwrap_or(self.links.len());
+        let named = self.links.iter().position(|link| link.is_auxiliary_frame).unwrap_or(self.links.len());
         &self.links[..named]
     }
 

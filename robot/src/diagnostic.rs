@@ -1,6 +1,6 @@
 //! Warnings about the user's input: repairs, ignored elements and unusual values. They are collected, never printed.
 
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -140,14 +140,14 @@ pub struct Diagnostic {
     /// Kind of the warning.
     pub kind: DiagnosticKind,
     /// Location, if the input is a file.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
     /// Full sentence that names the element: `link "LF_HIP": ...`.
     pub message: String,
 }
 
 impl Diagnostic {
     /// Creates a warning at `source`.
-    pub fn new(kind: DiagnosticKind, source: impl Into<Option<Source>>, message: impl Into<String>) -> Self {
+    pub fn new(kind: DiagnosticKind, source: impl Into<Option<SourceLocation>>, message: impl Into<String>) -> Self {
         Self { kind, source: source.into(), message: message.into() }
     }
 }

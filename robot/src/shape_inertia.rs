@@ -8,21 +8,21 @@ use crate::inertia::{InertiaFault, RigidInertia};
 use crate::mesh_key::MeshKey;
 use crate::urdf::MissingInertia;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::mesh::{HullCache, HullCfg, Solid, TriMesh};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::mesh::{HullCache, HullCfg, TriMesh, VolumeIntegrals};
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// Density of water \[kg/m³\], for a link with a mass but without shapes.
-const WATER: f64 = 1000.0;
+const WATER_DENSITY: f64 = 1000.0;
 /// Ratio of radius of gyration to reach of the shapes above which an inertia is an error of the file. The mass of a
 /// body lies inside it, so that 1 is the physical bound. Inertias often include rotors behind gears, which raise the
 /// ratio to a few.
-const FAR: f64 = 10.0;
+const MAX_GYRATION_RATIO: f64 = 10.0;
 /// Largest plausible density of a link \[kg/m³\]. Shapes that imply more are placeholders, such as boxes of 1 mm:
 /// osmium has 22 600.
-const DENSEST: f64 = 25_000.0;
+const MAX_PLAUSIBLE_DENSITY: f64 = 25_000.0;
 
 /// Error of mass properties that are computed from shapes.
 #[derive(Debug, thiserror::Error)]
@@ -39,7 +39,7 @@ pub enum ShapeInertiaError {
     #[error("{at}: link {link:?}: {error}")]
     Mesh {
         /// Location of the collision element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the link.
         link: String,
         /// Error of the mesh file.
@@ -50,16 +50,16 @@ pub enum ShapeInertiaError {
 
 /// Convex hulls of mesh files, each computed once.
 #[derive(Debug)]
-pub struct Hulls<'c> {
+pub struct HullSet<'c> {
     cache: HullCache,
     cfg: &'c HullCfg,
-    known: BTreeMap<MeshKey, TriMesh>,
+    by_mesh: BTreeMap<MeshKey, TriMesh>,
 }
 
-impl<'c> Hulls<'c> {
+impl<'c> HullSet<'c> {
     /// Creates an empty set of hulls.
     pub fn new(cfg: &'c HullCfg) -> Self {
-        Self { cache: HullCache::default_location(), cfg, known: BTreeMap::new() }
+        Self { cache: HullCache::default_location(), cfg, by_mesh: BTreeMap::new() }
     }
 
     /// Computes the convex hull of every collision mesh of a robot.
@@ -78,7 +78,7 @@ impl<'c> Hulls<'c> {
                 if hulls.contains_key(&key) {
                     continue;
                 }
-                let hull = match self.known.remove(&key) {
+                let hull = match self.by_mesh.remove(&key) {
                     Some(hull) => hull,
                     None => self.cache.hull_of_file(path, (*scale).into(), self.cfg).map_err(|error| {
                         let (at, link) = (collision.source.clone(), link.name.clone());
@@ -95,11 +95,11 @@ impl<'c> Hulls<'c> {
     fn of_mesh(&mut self, geometry: &Geometry) -> Option<&TriMesh> {
         let Geometry::Mesh { path, scale, .. } = geometry else { return None };
         let key = MeshKey::new(path, scale);
-        if !self.known.contains_key(&key) {
+        if !self.by_mesh.contains_key(&key) {
             let hull = self.cache.hull_of_file(path, (*scale).into(), self.cfg).ok()?;
-            self.known.insert(key.clone(), hull);
+            self.by_mesh.insert(key.clone(), hull);
         }
-        self.known.get(&key)
+        self.by_mesh.get(&key)
     }
 }
 
@@ -111,7 +111,7 @@ pub fn complete(
     description: &mut RobotDescription,
     missing: MissingInertia,
     floating_base: bool,
-    hulls: &mut Hulls<'_>,
+    hulls: &mut HullSet<'_>,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<(), ShapeInertiaError> {
     if let MissingInertia::Density(density) = missing
@@ -128,25 +128,25 @@ pub fn complete(
         match missing {
             MissingInertia::Density(density) if has_none => {
                 for (link, _) in &body.links {
-                    fill(&mut description.links[link.0], density, hulls, diagnostics);
+                    inertial_from_shapes(&mut description.links[link.0], density, hulls, diagnostics);
                 }
             }
-            _ => replace_absurd(description, body, floating_base, hulls, diagnostics),
+            _ => replace_implausible_inertias(description, body, floating_base, hulls, diagnostics),
         }
     }
     Ok(())
 }
 
 /// Computes the mass properties of a link without `<inertial>`.
-fn fill(link: &mut Link, density: f64, hulls: &mut Hulls<'_>, diagnostics: &mut Vec<Diagnostic>) {
-    let Some(shapes) = Shapes::of(link, hulls) else { return };
+fn inertial_from_shapes(link: &mut Link, density: f64, hulls: &mut HullSet<'_>, diagnostics: &mut Vec<Diagnostic>) {
+    let Some(shapes) = ShapeSolid::of(link, hulls) else { return };
     let mass = shapes.unit.mass * density;
     link.inertial = Some(shapes.inertial(link, mass));
     let message = format!(
         "link {:?} has no <inertial>: with {density} kg/m³ (missing_inertia) its {} shapes give it {} kg",
         link.name,
         shapes.kind,
-        short(mass)
+        format_short(mass)
     );
     diagnostics.push(Diagnostic::new(DiagnosticKind::InertiaFromShapes, link.source.clone(), message));
 }
@@ -155,7 +155,7 @@ fn fill(link: &mut Link, density: f64, hulls: &mut Hulls<'_>, diagnostics: &mut 
 fn complete_partial(
     link: &mut Link,
     missing: MissingInertia,
-    hulls: &mut Hulls<'_>,
+    hulls: &mut HullSet<'_>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let Some(given) = link.partial_inertial.take() else { return };
@@ -163,7 +163,7 @@ fn complete_partial(
         let kind = DiagnosticKind::InertiaFromShapes;
         diagnostics.push(Diagnostic::new(kind, given.source.clone(), format!("link {:?}: {message}", link.name)));
     };
-    let shapes = Shapes::of(link, hulls);
+    let shapes = ShapeSolid::of(link, hulls);
     let density = given.density.or(match missing {
         MissingInertia::Density(density) => Some(density),
         MissingInertia::Minimal => None,
@@ -175,7 +175,7 @@ fn complete_partial(
     };
     let mut inertial = match &shapes {
         Some(shapes) => shapes.inertial(link, mass),
-        None => ball(link, mass, given.density.unwrap_or(WATER)),
+        None => solid_ball_inertial(link, mass, given.density.unwrap_or(WATER_DENSITY)),
     };
     if shapes.is_none() && given.inertia.is_none() && mass > 0.0 {
         warn("it has no shapes, so its inertia is that of a ball of its mass and the density of water".to_owned());
@@ -196,13 +196,13 @@ fn complete_partial(
 /// Replaces implausible inertias by those of the shapes.
 ///
 /// A physically impossible inertia is replaced where the smallest repair would leave a body that cannot be simulated
-/// (see [`FAR`]). On a body that moves freely, an inertia that no body of these shapes has is replaced too. On a body
+/// (see [`MAX_GYRATION_RATIO`]). On a body that moves freely, an inertia that no body of these shapes has is replaced too. On a body
 /// behind a joint such an inertia is kept, with a warning: it may include the rotor of a gear.
-fn replace_absurd(
+fn replace_implausible_inertias(
     description: &mut RobotDescription,
     body: &RigidBody,
     floating_base: bool,
-    hulls: &mut Hulls<'_>,
+    hulls: &mut HullSet<'_>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let mut fused = RigidInertia::ZERO;
@@ -225,14 +225,16 @@ fn replace_absurd(
         if fault.is_none() && link.collisions.is_empty() {
             continue;
         }
-        let Some(shapes) = Shapes::of(link, hulls).filter(|shapes| own.mass < DENSEST * shapes.unit.mass) else {
+        let Some(shapes) =
+            ShapeSolid::of(link, hulls).filter(|shapes| own.mass < MAX_PLAUSIBLE_DENSITY * shapes.unit.mass)
+        else {
             continue;
         };
         let gyration = (own.principal().0[0] / own.mass).sqrt();
-        let is_far =
-            gyration > FAR * shapes.reach(&own.com) && gyration > FAR * shapes.reach_of_all(link, &own.com, hulls);
+        let is_far = gyration > MAX_GYRATION_RATIO * shapes.reach(&own.com)
+            && gyration > MAX_GYRATION_RATIO * shapes.reach_of_all(link, &own.com, hulls);
         let far = || {
-            let (gyration, reach) = (short(gyration), short(shapes.reach(&own.com)));
+            let (gyration, reach) = (format_short(gyration), format_short(shapes.reach(&own.com)));
             format!("its radius of gyration is {gyration} m, and its shapes reach {reach} m from its centre of mass")
         };
         let why = match fault {
@@ -254,7 +256,7 @@ fn replace_absurd(
         };
         let moments = |of: &RigidInertia| {
             let (moments, _) = of.principal();
-            format!("({}) kg m²", [moments[0], moments[1], moments[2]].map(short).join(", "))
+            format!("({}) kg m²", [moments[0], moments[1], moments[2]].map(format_short).join(", "))
         };
         let message = format!(
             "link {:?}: {why}; its principal moments {} were replaced by {}, those of its {} shapes with its mass of {} kg",
@@ -262,7 +264,7 @@ fn replace_absurd(
             moments(&own),
             moments(&RigidInertia::from_inertial(&replaced)),
             shapes.kind,
-            short(inertial.mass)
+            format_short(inertial.mass)
         );
         diagnostics.push(Diagnostic::new(DiagnosticKind::InertiaFromShapes, replaced.source.clone(), message));
         description.links[id.0].inertial = Some(replaced);
@@ -270,14 +272,14 @@ fn replace_absurd(
 }
 
 /// Mass properties of a solid ball about the origin of a link.
-pub fn ball(link: &Link, mass: f64, density: f64) -> Inertial {
+pub fn solid_ball_inertial(link: &Link, mass: f64, density: f64) -> Inertial {
     let radius = (mass / density * 0.75 / PI).cbrt();
     let inertia = Matrix3::from_diagonal_element(0.4 * mass * radius * radius);
     Inertial { source: link.source.clone(), link_from_com: Pose::identity(), mass, inertia }
 }
 
 /// Solid formed by the shapes of a link.
-struct Shapes {
+struct ShapeSolid {
     /// Kind of the shapes: `collision` or `visual`.
     kind: &'static str,
     /// Mass properties for a density of 1 kg/m³, in the frame of the link.
@@ -286,16 +288,16 @@ struct Shapes {
     corners: Vec<Vector3<f64>>,
 }
 
-impl Shapes {
+impl ShapeSolid {
     /// Collects the collision shapes, or the visual shapes of a link without collision shapes; `None` if they have no
     /// volume.
-    fn of(link: &Link, hulls: &mut Hulls<'_>) -> Option<Self> {
+    fn of(link: &Link, hulls: &mut HullSet<'_>) -> Option<Self> {
         let kind = if link.collisions.is_empty() { "visual" } else { "collision" };
         let collisions = link.collisions.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
         let visuals = link.visuals.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
         let mut shapes = Self { kind, unit: RigidInertia::ZERO, corners: Vec::new() };
         for (geometry, pose) in collisions.chain(visuals.filter(|_| kind == "visual")) {
-            let Some((inertia, bounds)) = solid(geometry, hulls) else { continue };
+            let Some((inertia, bounds)) = solid_inertia(geometry, hulls) else { continue };
             shapes.unit = shapes.unit.combine(&inertia.transformed(pose));
             shapes.corners.extend(corners(bounds, pose));
         }
@@ -312,10 +314,10 @@ impl Shapes {
     }
 
     /// Distance \[m\] from a center of mass to the farthest corner of all shapes of the link, visual shapes included.
-    fn reach_of_all(&self, link: &Link, com: &Vector3<f64>, hulls: &mut Hulls<'_>) -> f64 {
+    fn reach_of_all(&self, link: &Link, com: &Vector3<f64>, hulls: &mut HullSet<'_>) -> f64 {
         let shapes = link.visuals.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
         shapes
-            .filter_map(|(geometry, pose)| solid(geometry, hulls).map(|(_, bounds)| corners(bounds, pose)))
+            .filter_map(|(geometry, pose)| solid_inertia(geometry, hulls).map(|(_, bounds)| corners(bounds, pose)))
             .flatten()
             .map(|corner| (corner - com).norm())
             .fold(self.reach(com), f64::max)
@@ -339,7 +341,7 @@ fn corners([low, high]: [Vector3<f64>; 2], pose: &Pose) -> [Vector3<f64>; 8] {
 ///
 /// The closed forms are those of solids of uniform density in any textbook. A capsule is a cylinder and two half balls,
 /// each with its center of mass 3r/8 from its plane.
-fn solid(geometry: &Geometry, hulls: &mut Hulls<'_>) -> Option<(RigidInertia, [Vector3<f64>; 2])> {
+fn solid_inertia(geometry: &Geometry, hulls: &mut HullSet<'_>) -> Option<(RigidInertia, [Vector3<f64>; 2])> {
     let body = |mass: f64, moments: [f64; 3], half: Vector3<f64>| {
         let inertia = Matrix3::from_diagonal(&Vector3::from(moments));
         (RigidInertia { mass, com: Vector3::zeros(), inertia }, [-half, half])
@@ -369,7 +371,7 @@ fn solid(geometry: &Geometry, hulls: &mut Hulls<'_>) -> Option<(RigidInertia, [V
         }
         Geometry::Mesh { .. } => {
             let hull = hulls.of_mesh(geometry)?;
-            let Solid { volume, center, second_moment } = hull.solid()?;
+            let VolumeIntegrals { volume, center, second_moment } = hull.volume_integrals()?;
             let (low, high) = hull.bounds()?;
             let inertia = Matrix3::identity() * second_moment.trace() - second_moment;
             let bounds = [low, high].map(|end| Vector3::from(end.map(f64::from)));
@@ -379,7 +381,7 @@ fn solid(geometry: &Geometry, hulls: &mut Hulls<'_>) -> Option<(RigidInertia, [V
 }
 
 /// Formats a number with four digits, for messages.
-fn short(number: f64) -> String {
+fn format_short(number: f64) -> String {
     if number == 0.0 {
         "0".to_owned()
     } else if (1e-3..1e4).contains(&number.abs()) {

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
-    part: PathBuf,
+    temp_path: PathBuf,
     file: File,
     keep: bool,
 }
@@ -39,13 +39,13 @@ impl AtomicFile {
         }
     }
 
-    /// Creates a temporary file at `part`, which must be in the folder of `path`.
+    /// Creates a temporary file at `temp_path`, which must be in the folder of `path`.
     ///
     /// # Errors
     /// The temporary file cannot be created, or exists already.
     pub fn create_as(path: &Path, part: PathBuf) -> io::Result<Self> {
         let file = File::create_new(&part)?;
-        Ok(Self { path: path.into(), part, file, keep: false })
+        Ok(Self { path: path.into(), temp_path: part, file, keep: false })
     }
 
     /// Writes a complete file and replaces a previous file at `path`.
@@ -69,8 +69,8 @@ impl AtomicFile {
     }
 
     /// Path of the temporary file.
-    pub fn part(&self) -> &Path {
-        &self.part
+    pub fn temp_path(&self) -> &Path {
+        &self.temp_path
     }
 
     /// Keeps the temporary file on the disk when this value is dropped.
@@ -88,7 +88,7 @@ impl AtomicFile {
     /// # Errors
     /// The file cannot be renamed.
     pub fn persist(&mut self) -> io::Result<()> {
-        fs::rename(&self.part, &self.path)?;
+        fs::rename(&self.temp_path, &self.path)?;
         self.keep = true;
         Ok(())
     }
@@ -99,12 +99,12 @@ impl AtomicFile {
     /// The path is taken, or the file cannot be renamed.
     pub fn persist_noclobber(&mut self) -> io::Result<()> {
         let exists = || io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name has appeared meanwhile");
-        match fs::hard_link(&self.part, &self.path) {
-            Ok(()) => fs::remove_file(&self.part)?,
+        match fs::hard_link(&self.temp_path, &self.path) {
+            Ok(()) => fs::remove_file(&self.temp_path)?,
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(exists()),
             // A file system without hard links: a file may still appear between this check and the renaming.
             Err(_) if self.path.symlink_metadata().is_ok() => return Err(exists()),
-            Err(_) => fs::rename(&self.part, &self.path)?,
+            Err(_) => fs::rename(&self.temp_path, &self.path)?,
         }
         self.keep = true;
         Ok(())
@@ -115,7 +115,7 @@ impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.keep {
             // The error that led here matters more than an error of this deletion.
-            let _ = fs::remove_file(&self.part);
+            let _ = fs::remove_file(&self.temp_path);
         }
     }
 }

@@ -1,16 +1,16 @@
-//! [`Basis`]: an orthonormal basis around a normal.
+//! [`OrthonormalBasis`]: an orthonormal basis around a normal.
 
 use crate::vector::{V3, dot};
 
 /// Three perpendicular unit vectors; the third is the normal of a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis([V3; 3]);
+pub struct OrthonormalBasis([V3; 3]);
 
-impl Basis {
+impl OrthonormalBasis {
     /// Creates a basis around a unit normal. Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6(1),
     /// 2017.
     #[inline]
-    pub fn of(n: V3) -> Self {
+    pub fn from_normal(n: V3) -> Self {
         let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
         let a = -1.0 / (sign + n[2]);
         let b = n[0] * n[1] * a;

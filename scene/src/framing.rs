@@ -5,7 +5,7 @@ use crate::{Instance, PoseF32, RenderScene};
 
 /// Instances of a scene at their poses, shifted by an offset.
 #[derive(Clone, Copy, Debug)]
-pub struct Placed<'a> {
+pub struct PosedScene<'a> {
     /// Scene to draw.
     pub scene: &'a RenderScene,
     /// World-from-instance poses, one for each instance of the scene.
@@ -18,7 +18,7 @@ pub struct Placed<'a> {
 
 /// View direction and image that the scene must fit.
 #[derive(Clone, Copy, Debug)]
-pub struct Framing {
+pub struct CameraFit {
     /// Viewing direction of the camera, of any length; not vertical.
     pub forward: [f64; 3],
     /// Vertical field of view \[rad\].
@@ -31,7 +31,7 @@ pub struct Framing {
 
 /// A camera placement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
+pub struct FittedView {
     /// Position of the camera \[m\].
     pub eye: [f64; 3],
     /// Point on the optical axis, at the middle depth of the drawn scene \[m\].
@@ -41,25 +41,25 @@ pub struct Placement {
 }
 
 /// Filled fraction of the image for initial views.
-pub const FILL: f64 = 0.9;
+pub const DEFAULT_FILL: f64 = 0.9;
 /// Reach of an environment \[m\]: movable instances farther from its origin have flown away.
-pub const REACH: f32 = 20.0;
+pub const DEFAULT_REACH: f32 = 20.0;
 /// Ratio of sizes above which a static instance is a room or terrain around the moving ones.
-const SURROUNDINGS: f64 = 2.0;
+const SURROUNDINGS_SIZE_RATIO: f64 = 2.0;
 /// Geom groups that are drawn, as in MuJoCo's viewers.
-const GROUPS: std::ops::Range<u8> = 0..3;
+const DRAWN_GROUPS: std::ops::Range<u8> = 0..3;
 
-impl Framing {
+impl CameraFit {
     /// Returns the nearest placement with the whole scene in the image.
     ///
     /// Returns `None` if nothing of a finite size is drawn, or if the viewing direction is vertical. The smallest
     /// distance follows from four supporting planes of the instances, so it is exact. Planes are ignored, and so are
     /// static instances that are much larger than robots and objects, such as terrain and walls of a room.
-    pub fn place(&self, placed: &[Placed<'_>]) -> Option<Placement> {
+    pub fn fit(&self, placed: &[PosedScene<'_>]) -> Option<FittedView> {
         let forward = unit(self.forward)?;
         let right = unit([forward[1], -forward[0], 0.0])?;
         let up = cross(right, forward);
-        let framed = framed(placed);
+        let framed = drawn_instances(placed);
         let support = |direction: [f64; 3]| support(&framed, direction);
         let [low, high] = bounds(&framed)?;
         let half = (0.5 * self.fovy).tan() * self.fill;
@@ -78,43 +78,46 @@ impl Framing {
         let depth = depth.min(nearest - 1e-3 * extent.max(1e-6));
         let (x, y) = (0.5 * (right_of - left_of), 0.5 * (above - below));
         let at = |z: f64| [0, 1, 2].map(|k| x * right[k] + y * up[k] + z * forward[k]);
-        let placement = Placement { eye: at(depth), target: at(0.5 * (nearest + farthest)), extent };
+        let placement = FittedView { eye: at(depth), target: at(0.5 * (nearest + farthest)), extent };
         placement.eye.iter().chain(&placement.target).all(|x| x.is_finite()).then_some(placement)
     }
 }
 
 /// A drawn instance: the instance, its pose and its offset.
-type Framed<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
+type DrawnInstance<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
 
 /// Instances that an initial view shows.
-fn framed<'a>(placed: &[Placed<'a>]) -> Vec<Framed<'a>> {
-    let each = |placed: &Placed<'a>| {
-        let Placed { scene, poses, origin, reach } = *placed;
-        let shown = scene.instances().iter().zip(poses).filter(move |(i, pose)| is_drawn(i) && is_here(i, pose, reach));
+fn drawn_instances<'a>(placed: &[PosedScene<'a>]) -> Vec<DrawnInstance<'a>> {
+    let each = |placed: &PosedScene<'a>| {
+        let PosedScene { scene, poses, origin, reach } = *placed;
+        let shown =
+            scene.instances().iter().zip(poses).filter(move |(i, pose)| is_drawn(i) && is_within_reach(i, pose, reach));
         shown.map(move |(instance, pose)| (instance, pose, origin))
     };
-    let all: Vec<Framed<'a>> = placed.iter().flat_map(each).collect();
+    let all: Vec<DrawnInstance<'a>> = placed.iter().flat_map(each).collect();
     let of_body = |instance: &Instance| instance.body.is_some() || !instance.fixed;
-    let of_bodies: Vec<Framed<'a>> = all.iter().copied().filter(|(instance, ..)| of_body(instance)).collect();
+    let of_bodies: Vec<DrawnInstance<'a>> = all.iter().copied().filter(|(instance, ..)| of_body(instance)).collect();
     let Some(size) = bounds(&of_bodies).map(diagonal) else { return all };
-    let fits = |framed: &Framed<'a>| bounds(&[*framed]).is_some_and(|box_| diagonal(box_) <= SURROUNDINGS * size);
+    let fits = |framed: &DrawnInstance<'a>| {
+        bounds(&[*framed]).is_some_and(|box_| diagonal(box_) <= SURROUNDINGS_SIZE_RATIO * size)
+    };
     all.into_iter().filter(|framed| of_body(framed.0) || fits(framed)).collect()
 }
 
 fn is_drawn(instance: &Instance) -> bool {
-    let seen = instance.visible && instance.material.rgba[3] > 0.0 && GROUPS.contains(&instance.group);
+    let seen = instance.visible && instance.material.rgba[3] > 0.0 && DRAWN_GROUPS.contains(&instance.group);
     seen && !matches!(instance.shape, Shape::Plane(_))
 }
 
 /// True if an instance has a finite pose, and is fixed or within `reach` of the origin.
-fn is_here(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
+fn is_within_reach(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
     let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < reach);
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
 }
 
 /// Largest coordinate of the instances along a direction.
-fn support(framed: &[Framed<'_>], direction: [f64; 3]) -> f64 {
-    let of = |(instance, pose, origin): &Framed<'_>| {
+fn support(framed: &[DrawnInstance<'_>], direction: [f64; 3]) -> f64 {
+    let of = |(instance, pose, origin): &DrawnInstance<'_>| {
         let rotation = pose.rotation.map(|row| row.map(f64::from));
         let own = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * direction[i]).sum::<f64>());
         let place = (0..3).map(|k| direction[k] * (f64::from(pose.translation[k]) + origin[k])).sum::<f64>();
@@ -124,7 +127,7 @@ fn support(framed: &[Framed<'_>], direction: [f64; 3]) -> f64 {
 }
 
 /// Bounding box of instances \[m\]; `None` without instances or for an infinite box.
-fn bounds(framed: &[Framed<'_>]) -> Option<[[f64; 3]; 2]> {
+fn bounds(framed: &[DrawnInstance<'_>]) -> Option<[[f64; 3]; 2]> {
     if framed.is_empty() {
         return None;
     }
@@ -154,32 +157,32 @@ mod tests {
     use crate::Material;
     use crate::shape::{Box, Capsule, Plane, Sphere};
 
-    fn framing(aspect: f64) -> Framing {
-        Framing { forward: [1.0, 0.0, 0.0], fovy: 45f64.to_radians(), aspect, fill: FILL }
+    fn framing(aspect: f64) -> CameraFit {
+        CameraFit { forward: [1.0, 0.0, 0.0], fovy: 45f64.to_radians(), aspect, fill: DEFAULT_FILL }
     }
 
     /// A sphere of radius r at distance d has a half angle of asin(r / d). At `r / sin(atan(fill tan(fovy / 2)))` it
     /// fills the image.
     #[test]
     fn distance_of_a_ball() {
-        let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1).of_body(0);
+        let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1).with_body(0);
         let ground = Instance::new(Plane::INFINITE, Material::default(), 2);
-        let wall = Instance::new(Box { half: [0.1, 50.0, 50.0] }, Material::default(), 3).fixed();
+        let wall = Instance::new(Box { half: [0.1, 50.0, 50.0] }, Material::default(), 3).into_fixed();
         let scene = RenderScene::new(vec![ball, ground, wall]).unwrap();
         let at = PoseF32::from_translation([1.0, 2.0, 3.0]);
         let poses = [at, PoseF32::IDENTITY, PoseF32::from_translation([60.0, 0.0, 0.0])];
-        let placed = Placed { scene: &scene, poses: &poses, origin: [10.0, 0.0, 0.0], reach: REACH };
+        let placed = PosedScene { scene: &scene, poses: &poses, origin: [10.0, 0.0, 0.0], reach: DEFAULT_REACH };
         for aspect in [2.0, 1.0, 0.25] {
-            let narrow = (FILL * 22.5f64.to_radians().tan() * f64::min(aspect, 1.0)).atan();
-            let found = framing(aspect).place(&[placed]).unwrap();
+            let narrow = (DEFAULT_FILL * 22.5f64.to_radians().tan() * f64::min(aspect, 1.0)).atan();
+            let found = framing(aspect).fit(&[placed]).unwrap();
             let expected = [11.0 - 0.5 / narrow.sin(), 2.0, 3.0];
             assert!((0..3).all(|k| (found.eye[k] - expected[k]).abs() < 1e-6), "{aspect}: {found:?} {expected:?}");
             assert!((found.target[0] - 11.0).abs() < 1e-6 && (found.extent - 1.0).abs() < 1e-6, "{found:?}");
         }
         // Control: a wall alone is framed.
         let alone = RenderScene::new(vec![scene.instances()[2].clone()]).unwrap();
-        let wall = Placed { scene: &alone, poses: &poses[2..], origin: [0.0; 3], reach: REACH };
-        assert!((framing(1.0).place(&[wall]).unwrap().extent - 100.0).abs() < 1e-3);
+        let wall = PosedScene { scene: &alone, poses: &poses[2..], origin: [0.0; 3], reach: DEFAULT_REACH };
+        assert!((framing(1.0).fit(&[wall]).unwrap().extent - 100.0).abs() < 1e-3);
     }
 
     /// The support function of every shape agrees with its triangles.
@@ -215,13 +218,21 @@ mod tests {
         let far = PoseF32::from_translation([0.0, 30.0, 0.0]);
         let rows = [(&plane, PoseF32::IDENTITY), (&hidden, PoseF32::IDENTITY), (&ball, lost), (&ball, far)];
         for (scene, pose) in rows {
-            assert_eq!(framing(1.0).place(&[Placed { scene, poses: &[pose], origin: [0.0; 3], reach: REACH }]), None);
+            assert_eq!(
+                framing(1.0).fit(&[PosedScene { scene, poses: &[pose], origin: [0.0; 3], reach: DEFAULT_REACH }]),
+                None
+            );
         }
-        let down = Framing { forward: [0.0, 0.0, -1.0], ..framing(1.0) };
+        let down = CameraFit { forward: [0.0, 0.0, -1.0], ..framing(1.0) };
         assert_eq!(
-            down.place(&[Placed { scene: &ball, poses: &[PoseF32::IDENTITY], origin: [0.0; 3], reach: REACH }]),
+            down.fit(&[PosedScene {
+                scene: &ball,
+                poses: &[PoseF32::IDENTITY],
+                origin: [0.0; 3],
+                reach: DEFAULT_REACH
+            }]),
             None
         );
-        assert_eq!(framing(1.0).place(&[]), None);
+        assert_eq!(framing(1.0).fit(&[]), None);
     }
 }

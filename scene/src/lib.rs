@@ -7,8 +7,8 @@
 //! | [`Pose`], [`PoseF64`], [`PoseF32`], [`pose`], [`vector`], [`basis`] | poses, vectors and bases |
 //! | [`shape`], [`mesh`], [`terrain`] | shapes, mesh files and their convex decomposition, generated terrain |
 //! | [`RenderScene`], [`Instance`], [`Material`], [`Texture`], [`Light`], [`Sky`], [`Marker`] | a scene to render |
-//! | [`SceneState`], [`VisibleState`], [`Contacts`], [`Requires`] | state of all environments at one time |
-//! | [`Random`], [`Philox`], [`sampling`] | random numbers and sample warping |
+//! | [`SceneState`], [`VisibleState`], [`Contacts`], [`StateFields`] | state of all environments at one time |
+//! | [`KeyedRng`], [`Philox`], [`sampling`] | random numbers and sample warping |
 //! | [`Ray`], [`framing`] | rays, and camera placement around a scene |
 //! | [`file_format`], [`yaml`], [`pattern`], [`source`], [`AtomicFile`] | configuration files, name patterns, files |
 //!
@@ -49,14 +49,14 @@ pub mod vector;
 pub mod yaml;
 
 pub use atomic_file::AtomicFile;
-pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, Sky};
+pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightingSpace, Sky};
 pub use marker::{Marker, MarkerKind};
-pub use material::{Level, Material, Texture, TextureKind, decode_srgb};
+pub use material::{Material, MipLevel, Texture, TextureKind, decode_srgb};
 pub use pose::Pose;
 pub use pose_f32::PoseF32;
 pub use pose_f64::PoseF64;
-pub use random::{Philox, Random};
+pub use random::{KeyedRng, Philox};
 pub use ray::Ray;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
-pub use requires::Requires;
-pub use state::{Contact, Contacts, Lengths, OwnScene, SceneState, VisibleState};
+pub use requires::StateFields;
+pub use state::{Contact, Contacts, EnvScene, SceneState, StateDims, VisibleState};

@@ -65,7 +65,7 @@ impl Default for Light {
 
 /// Rule by which light is added up and multiplied by the color of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LightSum {
+pub enum LightingSpace {
     /// Physical rule: light is linear, and surface colors are converted from sRGB to linear.
     #[default]
     Linear,
@@ -94,10 +94,10 @@ impl Headlight {
     /// Returns the headlight as a directional light along the camera's viewing direction `forward`, as in MuJoCo's
     /// renderer.
     ///
-    /// Returns `None` if the headlight is off, for [`LightSum::Linear`], and for omnidirectional cameras (`forward` is
+    /// Returns `None` if the headlight is off, for [`LightingSpace::Linear`], and for omnidirectional cameras (`forward` is
     /// `None`). In the last two cases, the headlight shines from the camera's position.
-    pub fn along(&self, sum: LightSum, forward: Option<[f32; 3]>) -> Option<Light> {
-        let direction = forward.filter(|_| self.active && sum == LightSum::Display)?;
+    pub fn as_directional(&self, sum: LightingSpace, forward: Option<[f32; 3]>) -> Option<Light> {
+        let direction = forward.filter(|_| self.active && sum == LightingSpace::Display)?;
         Some(Light {
             kind: LightKind::Directional,
             direction,

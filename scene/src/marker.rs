@@ -106,7 +106,7 @@ fn arrow(length: f32, radius: f32) -> shape::Shape {
     let (r, head) = (f64::from(radius), f64::from(length) * 0.25);
     let (neck, tip) = (f64::from(length) - head, f64::from(length));
     let mesh: TriMesh = shape::revolve(&[[0.0, 0.0], [r, 0.0], [r, neck], [2.5 * r, neck], [0.0, tip]], 12);
-    Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) }.into()
+    Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)) }.into()
 }
 
 #[cfg(test)]

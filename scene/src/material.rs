@@ -85,12 +85,12 @@ pub enum TextureKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     kind: TextureKind,
-    levels: Vec<Level>,
+    levels: Vec<MipLevel>,
 }
 
 /// A mip level of a texture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Level {
+pub struct MipLevel {
     width: u32,
     height: u32,
     bytes: Vec<u8>,
@@ -138,14 +138,14 @@ impl Texture {
             return Err(TextureError::NotSixSquares { width, height });
         }
         let pixels: Vec<_> = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
-        let mut levels = vec![Level::new(width, height, &pixels)];
+        let mut levels = vec![MipLevel::new(width, height, &pixels)];
         // The faces of a cube must not mix, so only levels with an even side are halved.
-        let shrinks = |l: &Level| match kind {
+        let shrinks = |l: &MipLevel| match kind {
             TextureKind::TwoD => l.width > 1 || l.height > 1,
             TextureKind::Cube => l.width.is_multiple_of(2),
         };
         while let Some(last) = levels.last().filter(|l| shrinks(l)) {
-            let next = last.half();
+            let next = last.half_size();
             levels.push(next);
         }
         Ok(Self { kind, levels })
@@ -159,9 +159,9 @@ impl Texture {
         let pick = |k: u32| if (k % size < size / 2) == (k / size < size / 2) { a } else { b };
         let data: Vec<u8> = (0..size * size).flat_map(pick).collect();
         let pixels: Vec<_> = data.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]).collect();
-        let mut levels = vec![Level::new(size, size, &pixels)];
+        let mut levels = vec![MipLevel::new(size, size, &pixels)];
         while let Some(last) = levels.last().filter(|l| l.width > 1) {
-            let next = last.half();
+            let next = last.half_size();
             levels.push(next);
         }
         Self { kind: TextureKind::TwoD, levels }
@@ -173,12 +173,12 @@ impl Texture {
     }
 
     /// Mip levels, the largest first.
-    pub fn levels(&self) -> &[Level] {
+    pub fn mip_levels(&self) -> &[MipLevel] {
         &self.levels
     }
 }
 
-impl Level {
+impl MipLevel {
     fn new(width: u32, height: u32, pixels: &[[u8; 4]]) -> Self {
         let rows = pixels.chunks_exact(width as usize);
         let bytes = rows.clone().chain(rows.take(1)).flat_map(|row| row.iter().chain(&row[..1]).flatten().copied());
@@ -216,7 +216,7 @@ impl Level {
     }
 
     /// Level of half the size; each pixel is the mean of four in linear light.
-    fn half(&self) -> Self {
+    fn half_size(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let table = srgb_to_linear();
         let at = |x: u32, y: u32| self.pixel(x.min(self.width - 1), y.min(self.height - 1));

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// A name that is not in a list of known names.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("there is no {what} {name:?}; {}", known(.candidates))]
+#[error("there is no {what} {name:?}; {}", format_known(.candidates))]
 pub struct UnknownName {
     /// Kind of the name, such as `joint`.
     pub what: &'static str,
@@ -20,7 +20,7 @@ pub struct UnknownName {
     pub candidates: Vec<String>,
 }
 
-fn known(candidates: &[String]) -> String {
+fn format_known(candidates: &[String]) -> String {
     let quoted: Vec<String> = candidates.iter().map(|name| format!("{name:?}")).collect();
     if quoted.is_empty() { "there are none".into() } else { format!("known are {}", quoted.join(", ")) }
 }
@@ -53,7 +53,7 @@ pub enum PatternError {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The pattern matches no name.
-    #[error("pattern \"{pattern}\" matches no {what} (the whole name must match, case counts); {}", list(.candidates, *.total))]
+    #[error("pattern \"{pattern}\" matches no {what} (the whole name must match, case counts); {}", format_candidates(.candidates, *.total))]
     NoMatch {
         /// The pattern as written.
         pattern: String,
@@ -142,12 +142,12 @@ pub fn select<P: AsRef<str>, N: AsRef<str>>(
     names: &[N],
     what: &'static str,
 ) -> Result<Vec<usize>, PatternError> {
-    let mut taken_by: Vec<Option<&str>> = vec![None; names.len()];
+    let mut matched_by: Vec<Option<&str>> = vec![None; names.len()];
     let mut selected = Vec::new();
     for pattern in patterns {
         let pattern = pattern.as_ref();
         for index in matching(pattern, names, what)? {
-            claim(&mut taken_by, index, pattern, names, what)?;
+            mark_matched(&mut matched_by, index, pattern, names, what)?;
             selected.push(index);
         }
     }
@@ -178,7 +178,7 @@ pub fn assign<V: Clone, N: AsRef<str>>(
             None => matching(key, names, what)?,
         };
         for index in indices {
-            claim(&mut taken_by, index, key, names, what)?;
+            mark_matched(&mut taken_by, index, key, names, what)?;
             values[index] = Some(value.clone());
         }
     }
@@ -189,13 +189,14 @@ fn matching<N: AsRef<str>>(pattern: &str, names: &[N], what: &'static str) -> Re
     let compiled = Pattern::new(pattern)?;
     let found: Vec<usize> = (0..names.len()).filter(|&i| compiled.matches(names[i].as_ref())).collect();
     if found.is_empty() {
-        let candidates = closest(pattern, names.iter().map(AsRef::as_ref)).into_iter().map(str::to_owned).collect();
+        let candidates =
+            closest_names(pattern, names.iter().map(AsRef::as_ref)).into_iter().map(str::to_owned).collect();
         return Err(PatternError::NoMatch { pattern: pattern.to_owned(), what, candidates, total: names.len() });
     }
     Ok(found)
 }
 
-fn claim<'k, N: AsRef<str>>(
+fn mark_matched<'k, N: AsRef<str>>(
     taken_by: &mut [Option<&'k str>],
     index: usize,
     key: &'k str,
@@ -216,12 +217,12 @@ fn claim<'k, N: AsRef<str>>(
 /// Removes a prefix that means "in every environment" from a name or pattern: `{ENV}/`, or Isaac's `{ENV_REGEX_NS}/`.
 ///
 /// Names refer to all environments even without it.
-pub fn in_every_env(name: &str) -> &str {
+pub fn strip_env_prefix(name: &str) -> &str {
     ["{ENV}/", "{ENV_REGEX_NS}/"].into_iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name)
 }
 
 /// Candidates most similar to `name`, best first, at most [`MAX_CANDIDATES`]. Case has little weight.
-pub fn closest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Vec<&'c str> {
+pub fn closest_names<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Vec<&'c str> {
     let mut ranked: Vec<(usize, &str)> = candidates.into_iter().map(|c| (edit_distance(name, c), c)).collect();
     ranked.sort_by_key(|&(distance, _)| distance);
     ranked.truncate(MAX_CANDIDATES);
@@ -247,7 +248,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 }
 
 /// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if the list was cut.
-pub fn list(candidates: &[String], total: usize) -> String {
+pub fn format_candidates(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {
         0 => "there are none".to_owned(),
@@ -326,9 +327,9 @@ mod tests {
     }
 
     #[test]
-    fn closest_names() {
-        assert_eq!(closest("Base", ["bass", "BASE", "base", "other"])[..2], ["BASE", "base"]);
-        assert_eq!(closest("base", ["bass", "BASE", "base"])[0], "base");
+    fn closest_name_order() {
+        assert_eq!(closest_names("Base", ["bass", "BASE", "base", "other"])[..2], ["BASE", "base"]);
+        assert_eq!(closest_names("base", ["bass", "BASE", "base"])[0], "base");
     }
 
     #[test]
@@ -342,7 +343,7 @@ mod tests {
             // Only one prefix is removed; the rest is a name.
             ("{ENV}/{ENV}/robot", "{ENV}/robot"),
         ] {
-            assert_eq!(in_every_env(name), expected);
+            assert_eq!(strip_env_prefix(name), expected);
         }
     }
 }

@@ -4,30 +4,30 @@
 use ndarray::{Array, Axis, RemoveAxis};
 
 /// Values of a quantity in all environments.
-pub(crate) trait PerEnv: Clone {
+pub(crate) trait PerEnvArray: Clone {
     /// Creates default values of `shape` in each environment; empty lists for quantities without a fixed size.
-    fn with_room(num_envs: usize, shape: &[usize]) -> Self;
+    fn zeroed(num_envs: usize, shape: &[usize]) -> Self;
 
     /// True if `other` has the same sizes, in `num_envs` environments.
-    fn fits(&self, other: &Self, num_envs: usize) -> bool;
+    fn same_shape(&self, other: &Self, num_envs: usize) -> bool;
 
-    /// Copies the environments where `chosen` is true from values that [fit](Self::fits).
-    fn take_over(&mut self, other: &Self, chosen: &[bool]);
+    /// Copies the environments where `chosen` is true from values that [fit](Self::same_shape).
+    fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]);
 }
 
-impl<T: Clone + Default, D: RemoveAxis> PerEnv for Array<T, D> {
-    fn with_room(num_envs: usize, shape: &[usize]) -> Self {
+impl<T: Clone + Default, D: RemoveAxis> PerEnvArray for Array<T, D> {
+    fn zeroed(num_envs: usize, shape: &[usize]) -> Self {
         let mut lengths = D::zeros(1 + shape.len());
         lengths[0] = num_envs;
         shape.iter().enumerate().for_each(|(axis, length)| lengths[1 + axis] = *length);
         Self::default(lengths)
     }
 
-    fn fits(&self, other: &Self, _num_envs: usize) -> bool {
+    fn same_shape(&self, other: &Self, _num_envs: usize) -> bool {
         self.shape() == other.shape()
     }
 
-    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+    fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) {
         for (env, _) in (0..).zip(chosen).filter(|(_, chosen)| **chosen) {
             self.index_axis_mut(Axis(0), env).assign(&other.index_axis(Axis(0), env));
         }
@@ -35,16 +35,16 @@ impl<T: Clone + Default, D: RemoveAxis> PerEnv for Array<T, D> {
 }
 
 /// Lists of variable length, one for each environment.
-impl<T: Clone> PerEnv for Vec<Vec<T>> {
-    fn with_room(num_envs: usize, _shape: &[usize]) -> Self {
+impl<T: Clone> PerEnvArray for Vec<Vec<T>> {
+    fn zeroed(num_envs: usize, _shape: &[usize]) -> Self {
         vec![Vec::new(); num_envs]
     }
 
-    fn fits(&self, other: &Self, num_envs: usize) -> bool {
+    fn same_shape(&self, other: &Self, num_envs: usize) -> bool {
         [self.len(), other.len()] == [num_envs; 2]
     }
 
-    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+    fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) {
         for ((to, from), _) in self.iter_mut().zip(other).zip(chosen).filter(|(_, chosen)| **chosen) {
             to.clone_from(from);
         }
@@ -53,7 +53,7 @@ impl<T: Clone> PerEnv for Vec<Vec<T>> {
 
 /// Takes a list of flags of `Requires`, each with its name in messages and its fields of `SceneState`.
 ///
-/// A field has a type that implements [`PerEnv`], and its shape in an environment: an axis of `Lengths`, and the width
+/// A field has a type that implements [`PerEnvArray`], and its shape in an environment: an axis of `Lengths`, and the width
 /// of a second axis.
 macro_rules! quantities {
     ($(
@@ -77,7 +77,7 @@ macro_rules! quantities {
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
             /// Render scenes of environments with their own sizes or colors, shape \[num_envs\]; empty if all
             /// environments share one scene.
-            pub own_scenes: Vec<OwnScene>,
+            pub own_scenes: Vec<EnvScene>,
         }
 
         /// Bit numbers of the flags.
@@ -86,7 +86,7 @@ macro_rules! quantities {
             $($FLAG,)+
         }
 
-        impl Requires {
+        impl StateFields {
             $($(#[$about])* pub const $FLAG: Self = Self(1 << Bit::$FLAG as u32);)+
 
             /// All flags, with their names in messages.
@@ -116,25 +116,25 @@ macro_rules! quantities {
 
         impl SceneState {
             /// Creates a state at step 0 with default values of the quantities of `requires`.
-            pub fn with_room(requires: Requires, lengths: &Lengths) -> Self {
+            pub fn with_room(requires: StateFields, lengths: &StateDims) -> Self {
                 let n = lengths.num_envs;
                 let wants = |flag| requires.contains(flag);
                 Self {
-                    $($($field: wants(Requires::$FLAG)
-                        .then(|| <$Type as PerEnv>::with_room(n, &[$(lengths.$axis $(, $width)?)?])),)+)+
+                    $($($field: wants(StateFields::$FLAG)
+                        .then(|| <$Type as PerEnvArray>::zeroed(n, &[$(lengths.$axis $(, $width)?)?])),)+)+
                     ..Self::new(n)
                 }
             }
 
             /// Returns the first array of `requires` with a size other than in `lengths`, if any: name of the axis,
             /// expected size, found size.
-            pub fn misfit(&self, requires: Requires, lengths: &Lengths) -> Option<(&'static str, usize, usize)> {
+            pub fn misfit(&self, requires: StateFields, lengths: &StateDims) -> Option<(&'static str, usize, usize)> {
                 $($($(if let Some([envs, count, ..]) = self.$field.as_ref().map(|array| array.shape())
-                    && requires.contains(Requires::$FLAG)
+                    && requires.contains(StateFields::$FLAG)
                 {
                     let all = [
                         ("environments", lengths.num_envs, *envs),
-                        (Lengths::label(stringify!($axis)), lengths.$axis, *count),
+                        (StateDims::label(stringify!($axis)), lengths.$axis, *count),
                     ];
                     if let Some(misfit) = all.into_iter().find(|(_, expected, found)| expected != found) {
                         return Some(misfit);
@@ -149,14 +149,14 @@ macro_rules! quantities {
                 [$($(match (&self.$field, &other.$field) {
                     (None, _) => true,
                     (Some(_), None) => false,
-                    (Some(mine), Some(others)) => mine.fits(others, n),
+                    (Some(mine), Some(others)) => mine.same_shape(others, n),
                 },)+)+].iter().all(|fits| *fits)
             }
 
             /// Copies the quantities of this state from `other`, in the environments where `chosen` is true.
             fn take_over_quantities(&mut self, other: &Self, chosen: &[bool]) {
                 $($(if let (Some(mine), Some(others)) = (&mut self.$field, &other.$field) {
-                    mine.take_over(others, chosen);
+                    mine.copy_envs_from(others, chosen);
                 })+)+
             }
         }

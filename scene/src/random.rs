@@ -1,7 +1,7 @@
 //! Random numbers that depend only on their use.
 //!
 //! Every use has its own generator, keyed by the seed of the simulation, the global index of the environment and a
-//! name. Its numbers do not depend on threads, the number of environments or other random quantities. [`Random`]
+//! name. Its numbers do not depend on threads, the number of environments or other random quantities. [`KeyedRng`]
 //! generates a sequence of numbers; [`Philox`] computes the numbers at any counter.
 
 mod philox;
@@ -14,9 +14,9 @@ use sha2::{Digest, Sha256};
 
 /// A generator of random numbers: PCG XSL RR 128/64.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Random(Pcg64);
+pub struct KeyedRng(Pcg64);
 
-impl Random {
+impl KeyedRng {
     /// Creates the generator of the use `name` in the environment with global index `env`.
     ///
     /// Its state is the SHA-256 sum of all three arguments, so that similar keys give independent numbers.
@@ -34,7 +34,7 @@ impl Random {
     }
 
     /// Uniform number from `low` to `high`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn uniform_range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     fn first(seed: u64, env: u64, name: &str) -> [u64; 4] {
-        let mut random = Random::keyed(seed, env, name);
+        let mut random = KeyedRng::keyed(seed, env, name);
         std::array::from_fn(|_| random.uniform().to_bits())
     }
 
@@ -72,10 +72,10 @@ mod tests {
             (mean, values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / f64::from(n))
         };
         let root = f64::from(n).sqrt();
-        let mut random = Random::keyed(7, 0, "normal");
+        let mut random = KeyedRng::keyed(7, 0, "normal");
         let (mean, variance) = moments(Box::new(move || random.normal()));
         assert!(mean.abs() < 6.0 / root && (variance - 1.0).abs() < 6.0 * 2.0_f64.sqrt() / root, "{mean} {variance}");
-        let mut random = Random::keyed(7, 0, "uniform");
+        let mut random = KeyedRng::keyed(7, 0, "uniform");
         let (mean, variance) = moments(Box::new(move || random.uniform()));
         assert!((mean - 0.5).abs() < 6.0 * (1.0_f64 / 12.0).sqrt() / root, "{mean}");
         assert!((variance - 1.0 / 12.0).abs() < 6.0 * (1.0_f64 / 180.0).sqrt() / root, "{variance}");
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn correlation() {
         let n = 100_000;
-        let (mut a, mut b) = (Random::keyed(0, 0, "x"), Random::keyed(0, 1, "x"));
+        let (mut a, mut b) = (KeyedRng::keyed(0, 0, "x"), KeyedRng::keyed(0, 1, "x"));
         let sum: f64 = (0..n).map(|_| a.normal() * b.normal()).sum();
         assert!((sum / f64::from(n)).abs() < 6.0 / f64::from(n).sqrt(), "{sum}");
     }

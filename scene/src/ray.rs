@@ -1,7 +1,7 @@
 //! [`Ray`]: a half-line.
 
 use crate::PoseF64;
-use crate::vector::along;
+use crate::vector::add_scaled;
 
 /// A half-line with a unit direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,17 +16,17 @@ impl Ray {
     /// Point at a distance \[m\] along the ray.
     #[inline]
     pub fn at(&self, distance: f64) -> [f64; 3] {
-        along(self.origin, distance, self.direction)
+        add_scaled(self.origin, distance, self.direction)
     }
 
     /// Returns the ray in the frame that `pose` maps from.
     #[inline(always)]
-    pub fn seen_from(&self, pose: &PoseF64) -> Self {
+    pub fn inverse_transformed_by(&self, pose: &PoseF64) -> Self {
         Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
     }
 
     /// Returns the ray in the frame that `pose` maps to.
-    pub fn mapped_by(&self, pose: &PoseF64) -> Self {
+    pub fn transformed_by(&self, pose: &PoseF64) -> Self {
         Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
     }
 

@@ -1,7 +1,7 @@
 //! Scenes to render, without poses.
 
 use crate::Pose;
-use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightSum, Sky};
+use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightingSpace, Sky};
 use crate::material::{Material, Texture, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub struct Instance {
     pub fixed: bool,
     /// True if the shape may differ in every frame, as for tendons and skins. Cameras draw such instances, ray casters
     /// ignore them.
-    pub deforms: bool,
+    pub is_deformable: bool,
     /// Pose in the frame of its owner (the link or object); the identity for a geom of the world.
     pub frame_from_instance: Pose,
 }
@@ -46,20 +46,20 @@ impl Instance {
             name,
             body: None,
             fixed: false,
-            deforms: false,
+            is_deformable: false,
             frame_from_instance: Pose::identity(),
         }
     }
 
     /// Returns the instance with a name.
     #[must_use]
-    pub fn named(self, name: &str) -> Self {
+    pub fn with_name(self, name: &str) -> Self {
         Self { name: Arc::from(name), ..self }
     }
 
     /// Returns the instance as a part of a body.
     #[must_use]
-    pub fn of_body(self, body: u32) -> Self {
+    pub fn with_body(self, body: u32) -> Self {
         Self { body: Some(body), ..self }
     }
 
@@ -77,16 +77,17 @@ impl Instance {
             return (half.map(|x| if x > 0.0 && x.is_finite() { 1.0 / x } else { 1.0 }), [0.0; 2]);
         }
         let repeat = material.tex_repeat.map(|r| if r > 0.0 { r } else { 1.0 });
-        let endless = |k: usize| !(half[k] > 0.0 && half[k].is_finite());
-        let per_metre = |k: usize| material.tex_uniform || endless(k);
-        let along = |k: usize| 0.5 * repeat[k] / if per_metre(k) { 1.0 } else { half[k] };
+        let is_infinite = |k: usize| !(half[k] > 0.0 && half[k].is_finite());
+        let per_length = |k: usize| material.tex_uniform || is_infinite(k);
+        let along = |k: usize| 0.5 * repeat[k] / if per_length(k) { 1.0 } else { half[k] };
         let scale = [along(0), along(1), 0.0];
         let middle = [-0.5, 0.5];
         let offset = match &self.shape {
             // Source: `makePlane` and `settexture` of MuJoCo 4. Whole numbers are dropped, because images repeat.
             Shape::Plane(_) => {
-                let begin = if endless(0) || endless(1) { middle } else { [0.0; 2] };
-                let corner = |k: usize, sign: f32| if endless(k) { 0.0 } else { sign * (scale[k] * half[k]).fract() };
+                let begin = if is_infinite(0) || is_infinite(1) { middle } else { [0.0; 2] };
+                let corner =
+                    |k: usize, sign: f32| if is_infinite(k) { 0.0 } else { sign * (scale[k] * half[k]).fract() };
                 [begin[0] + corner(0, 1.0), begin[1] + corner(1, -1.0)]
             }
             _ => middle,
@@ -96,7 +97,7 @@ impl Instance {
 
     /// Returns the instance, welded to the world.
     #[must_use]
-    pub fn fixed(self) -> Self {
+    pub fn into_fixed(self) -> Self {
         Self { fixed: true, ..self }
     }
 }
@@ -118,7 +119,7 @@ pub struct RenderScene {
     /// Ambient light from all directions.
     pub ambient: Hemisphere,
     /// Rule by which light is added up.
-    pub light_sum: LightSum,
+    pub lighting_space: LightingSpace,
     /// Background.
     pub sky: Sky,
     /// Background image instead of `sky`: a [cube](TextureKind::Cube) around the camera in MuJoCo's axes, with faces
@@ -203,9 +204,19 @@ impl RenderScene {
     ///
     /// As [`new`](Self::new).
     pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
-        let Self { headlight, ambient, light_sum, sky, haze, horizon, .. } = *self;
+        let Self { headlight, ambient, lighting_space: light_sum, sky, haze, horizon, .. } = *self;
         let (lights, skybox) = (self.lights.clone(), self.skybox.clone());
-        Ok(Self { lights, headlight, ambient, light_sum, sky, skybox, haze, horizon, ..Self::new(instances)? })
+        Ok(Self {
+            lights,
+            headlight,
+            ambient,
+            lighting_space: light_sum,
+            sky,
+            skybox,
+            haze,
+            horizon,
+            ..Self::new(instances)?
+        })
     }
 
     /// Creates a scene without instances, with the default lights and sky.
@@ -219,7 +230,7 @@ impl RenderScene {
             lights: vec![Light::default()],
             headlight: Headlight::default(),
             ambient: Hemisphere::default(),
-            light_sum: LightSum::default(),
+            lighting_space: LightingSpace::default(),
             sky: Sky::default(),
             skybox: None,
             haze: None,
@@ -311,15 +322,15 @@ impl Instance {
         if self.mask_id == 0 {
             return Err(RenderSceneError::ZeroMaskId { instance });
         }
-        if let Some(size) = self.shape.bad_size() {
+        if let Some(size) = self.shape.invalid_size() {
             return Err(RenderSceneError::Size { instance, shape: self.shape.name(), size });
         }
         let m = &self.material;
         let numbers = [m.emission, m.specular, m.shininess, m.reflectance, m.tex_repeat[0], m.tex_repeat[1]];
         let numbers = numbers.into_iter().chain([m.metallic, m.roughness.unwrap_or_default(), m.transmission]);
         // The largest known refractive index is 4, of germanium.
-        let bends = (1.0..=10.0).contains(&m.refractive_index);
-        if !bends || m.rgba.into_iter().chain(numbers).any(|x| !x.is_finite()) {
+        let valid_refraction = (1.0..=10.0).contains(&m.refractive_index);
+        if !valid_refraction || m.rgba.into_iter().chain(numbers).any(|x| !x.is_finite()) {
             return Err(RenderSceneError::Material { instance });
         }
         Ok(())
@@ -351,8 +362,9 @@ mod tests {
     #[test]
     fn instances() {
         let half = [0.5, 0.25, 2.0];
-        let mesh =
-            Mesh { mesh: Arc::new(RenderMesh::new(&Shape::from(Box { half }).tessellate(1), RenderMesh::CREASE)) };
+        let mesh = Mesh {
+            mesh: Arc::new(RenderMesh::new(&Shape::from(Box { half }).tessellate(1), RenderMesh::DEFAULT_CREASE_ANGLE)),
+        };
         let triangles = mesh.mesh.triangles().len() as u32;
         assert_eq!(triangles, 12);
         let scene = RenderScene::new(vec![

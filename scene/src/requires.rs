@@ -1,4 +1,4 @@
-//! [`Requires`]: the fields of the scene's state that a sensor needs.
+//! [`StateFields`]: the fields of the scene's state that a sensor needs.
 
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
@@ -7,16 +7,16 @@ use std::ops::{BitOr, BitOrAssign};
 ///
 /// The flags are generated from the list in `state.rs`.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub struct Requires(pub(crate) u32);
+pub struct StateFields(pub(crate) u32);
 
-impl Requires {
+impl StateFields {
     /// The empty set.
     pub const NONE: Self = Self(0);
 
     /// Quantities that the engine solves for the beginning of a step.
     ///
     /// They are lost when the step is done, so a simulation must know before the step that a sensor needs them.
-    pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
+    pub const FORCE_STAGE: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
     /// True if this set contains all of `other`.
     pub const fn contains(self, other: Self) -> bool {
@@ -49,7 +49,7 @@ impl Requires {
     }
 }
 
-impl BitOr for Requires {
+impl BitOr for StateFields {
     type Output = Self;
 
     fn bitor(self, other: Self) -> Self {
@@ -57,14 +57,14 @@ impl BitOr for Requires {
     }
 }
 
-impl BitOrAssign for Requires {
+impl BitOrAssign for StateFields {
     fn bitor_assign(&mut self, other: Self) {
         *self = *self | other;
     }
 }
 
 /// Writes `poses, contacts`, or `nothing` for the empty set.
-impl fmt::Display for Requires {
+impl fmt::Display for StateFields {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_empty() {
             return f.write_str("nothing");
@@ -77,7 +77,7 @@ impl fmt::Display for Requires {
     }
 }
 
-impl fmt::Debug for Requires {
+impl fmt::Debug for StateFields {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Requires({self})")
     }
@@ -90,14 +90,14 @@ mod tests {
 
     #[test]
     fn requirements() {
-        let mut need = Requires::POSES | Requires::CONTACTS;
+        let mut need = StateFields::POSES | StateFields::CONTACTS;
         assert_eq!(need.to_string(), "poses, contacts");
-        assert!(need.contains(Requires::POSES) && !need.contains(Requires::POSES | Requires::SENSORDATA));
-        need |= Requires::SENSORDATA;
-        assert_eq!(need.without(Requires::POSES).names().collect::<Vec<_>>(), ["contacts", "sensordata"]);
-        assert_eq!(format!("{:?}", Requires::default()), "Requires(nothing)");
-        assert_eq!(Requires::present_in(&SceneState::new(2)), Requires::NONE);
-        let all = Requires::NAMES.iter().fold(Requires::NONE, |sum, (field, _)| sum | *field);
-        assert_eq!(all.names().count(), Requires::NAMES.len(), "every field has a bit of its own");
+        assert!(need.contains(StateFields::POSES) && !need.contains(StateFields::POSES | StateFields::SENSORDATA));
+        need |= StateFields::SENSORDATA;
+        assert_eq!(need.without(StateFields::POSES).names().collect::<Vec<_>>(), ["contacts", "sensordata"]);
+        assert_eq!(format!("{:?}", StateFields::default()), "Requires(nothing)");
+        assert_eq!(StateFields::present_in(&SceneState::new(2)), StateFields::NONE);
+        let all = StateFields::NAMES.iter().fold(StateFields::NONE, |sum, (field, _)| sum | *field);
+        assert_eq!(all.names().count(), StateFields::NAMES.len(), "every field has a bit of its own");
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 /// Cosine and sine of a fraction of a turn, 0..=1, by their series. The library's functions differ between machines.
 #[inline]
-pub fn turn(part: f64) -> [f64; 2] {
+pub fn cos_sin_turns(part: f64) -> [f64; 2] {
     let quarter = (4.0 * part + 0.5) as i64;
     let x = (part - quarter as f64 / 4.0) * (2.0 * PI);
     let (mut cos, mut sin, mut term) = (1.0, x, 1.0);
@@ -26,14 +26,14 @@ pub fn turn(part: f64) -> [f64; 2] {
 
 /// Uniformly distributed point of a disc of radius 1.
 #[inline]
-pub fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
-    let (r, [cos, sin]) = (a.sqrt(), turn(b));
+pub fn sample_disk([a, b]: [f64; 2]) -> [f64; 2] {
+    let (r, [cos, sin]) = (a.sqrt(), cos_sin_turns(b));
     [r * cos, r * sin]
 }
 
 /// Cosine-distributed direction of the hemisphere around +z.
 #[inline]
-pub fn cosine(at: [f64; 2]) -> V3 {
-    let [x, y] = on_disc(at);
+pub fn sample_cosine_hemisphere(at: [f64; 2]) -> V3 {
+    let [x, y] = sample_disk(at);
     [x, y, (1.0 - at[0]).max(0.0).sqrt()]
 }

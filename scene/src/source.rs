@@ -6,27 +6,27 @@ use std::sync::Arc;
 
 /// A position in a user's file.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Source {
+pub struct SourceLocation {
     /// Path of the file as the user gave it.
     pub file: Arc<PathBuf>,
     /// Line, counted from 1.
     pub line: u32,
 }
 
-impl Source {
+impl SourceLocation {
     /// Creates a position in `file`.
     pub fn new(file: impl AsRef<Path>, line: u32) -> Self {
         Self { file: Arc::new(file.as_ref().to_path_buf()), line }
     }
 }
 
-impl fmt::Display for Source {
+impl fmt::Display for SourceLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}", self.file.display(), self.line)
     }
 }
 
-impl fmt::Debug for Source {
+impl fmt::Debug for SourceLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
     }

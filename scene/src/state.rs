@@ -7,8 +7,8 @@
 //! A step from t_k to t_(k+1) involves two times: contacts, efforts and accelerations are solved for t_k, positions and
 //! velocities are those of t_(k+1). The state has both times.
 
-use crate::quantities::{PerEnv, quantities};
-use crate::requires::Requires;
+use crate::quantities::{PerEnvArray, quantities};
+use crate::requires::StateFields;
 use crate::{Light, Marker, PoseF32, PoseF64, RenderScene};
 use ndarray::{Array2, Array3};
 use std::sync::Arc;
@@ -120,7 +120,7 @@ quantities! {
 
 /// Lengths of the axes of a [`SceneState`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Lengths {
+pub struct StateDims {
     /// Number of environments.
     pub num_envs: usize,
     /// Number of bodies.
@@ -135,7 +135,7 @@ pub struct Lengths {
     pub instances: usize,
 }
 
-impl Lengths {
+impl StateDims {
     /// Name of the entries of an axis, for messages.
     fn label(axis: &'static str) -> &'static str {
         if axis == "engine_values" { "values of the engine's sensors" } else { axis }
@@ -147,9 +147,9 @@ impl Lengths {
 /// An own scene has the instances of the shared scene, in the same order and of the same kinds, with its own sizes or
 /// colors. Two values are equal if they are the same object in memory.
 #[derive(Clone, Debug, Default)]
-pub struct OwnScene(pub Option<Arc<RenderScene>>);
+pub struct EnvScene(pub Option<Arc<RenderScene>>);
 
-impl PartialEq for OwnScene {
+impl PartialEq for EnvScene {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
             (None, None) => true,
@@ -168,8 +168,8 @@ pub struct VisibleState {
     /// Lights of the scene at their current poses, shape \[num_envs, lights\].
     pub lights: Array2<Light>,
     /// Scenes with their current shapes, including own sizes and colors of environments, shape \[num_envs\]; empty for
-    /// a scene whose shapes do not [change](crate::Instance::deforms).
-    pub scenes: Vec<OwnScene>,
+    /// a scene whose shapes do not [change](crate::Instance::is_deformable).
+    pub scenes: Vec<EnvScene>,
 }
 
 /// Contacts of all environments in one list, ordered by environment.
@@ -212,15 +212,15 @@ impl SceneState {
     }
 
     /// Own render scene of environment `env`, if it does not use the shared scene.
-    pub fn own_scene(&self, env: usize) -> &OwnScene {
-        static AS_ALL: OwnScene = OwnScene(None);
+    pub fn env_scene(&self, env: usize) -> &EnvScene {
+        static AS_ALL: EnvScene = EnvScene(None);
         self.own_scenes.get(env).unwrap_or(&AS_ALL)
     }
 
     /// Scene that cameras see in environment `env`, with its current shapes, if it is not the shared scene.
-    pub fn seen_scene(&self, env: usize) -> &OwnScene {
+    pub fn visible_scene(&self, env: usize) -> &EnvScene {
         let shaped = self.visible.as_ref().and_then(|visible| visible.scenes.get(env));
-        shaped.unwrap_or_else(|| self.own_scene(env))
+        shaped.unwrap_or_else(|| self.env_scene(env))
     }
 
     /// Copies the environments where `chosen` is true from `other`: steps, times, and the fields that this state has.
@@ -229,8 +229,8 @@ impl SceneState {
     /// other sizes. Allocates only if the capacity of the contact list does not suffice for old and new contacts
     /// together: the new list is built behind the old one, and the capacity is kept.
     #[must_use]
-    pub fn take_over(&mut self, other: &Self, chosen: &[bool]) -> bool {
-        if !(chosen.len() == self.num_envs() && self.fits(other)) {
+    pub fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) -> bool {
+        if !(chosen.len() == self.num_envs() && self.same_shape(other)) {
             return false;
         }
         let envs = || (0..).zip(chosen).filter(|(_, chosen)| **chosen).map(|(env, _)| env);
@@ -242,52 +242,52 @@ impl SceneState {
         self.take_over_quantities(other, chosen);
         let sees = self.visible.is_some() || self.instance_poses.is_some();
         if sees && !(self.own_scenes.is_empty() && other.own_scenes.is_empty()) {
-            self.own_scenes.resize(chosen.len(), OwnScene::default());
+            self.own_scenes.resize(chosen.len(), EnvScene::default());
             for env in envs() {
-                self.own_scenes[env].clone_from(other.own_scene(env));
+                self.own_scenes[env].clone_from(other.env_scene(env));
             }
         }
         true
     }
 
     /// True if `other` has every field of this state, in the same sizes.
-    fn fits(&self, other: &Self) -> bool {
+    fn same_shape(&self, other: &Self) -> bool {
         let n = self.num_envs();
         [other.step.len(), other.time.len(), other.force_time.len()] == [n; 3] && self.has_quantities_of(other)
     }
 }
 
-impl PerEnv for VisibleState {
+impl PerEnvArray for VisibleState {
     /// Empty arrays, because the numbers of instances and lights come from a [`RenderScene`].
-    fn with_room(_num_envs: usize, _shape: &[usize]) -> Self {
+    fn zeroed(_num_envs: usize, _shape: &[usize]) -> Self {
         Self::default()
     }
 
-    fn fits(&self, other: &Self, _num_envs: usize) -> bool {
+    fn same_shape(&self, other: &Self, _num_envs: usize) -> bool {
         self.instance_poses.dim() == other.instance_poses.dim()
             && self.lights.dim() == other.lights.dim()
             && self.scenes.len() == other.scenes.len()
     }
 
-    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
-        self.instance_poses.take_over(&other.instance_poses, chosen);
-        self.lights.take_over(&other.lights, chosen);
+    fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) {
+        self.instance_poses.copy_envs_from(&other.instance_poses, chosen);
+        self.lights.copy_envs_from(&other.lights, chosen);
         for ((to, from), _) in self.scenes.iter_mut().zip(&other.scenes).zip(chosen).filter(|(_, chosen)| **chosen) {
             to.clone_from(from);
         }
     }
 }
 
-impl PerEnv for Contacts {
-    fn with_room(num_envs: usize, _shape: &[usize]) -> Self {
+impl PerEnvArray for Contacts {
+    fn zeroed(num_envs: usize, _shape: &[usize]) -> Self {
         Self { first: vec![0; num_envs + 1], list: Vec::new() }
     }
 
-    fn fits(&self, other: &Self, num_envs: usize) -> bool {
+    fn same_shape(&self, other: &Self, num_envs: usize) -> bool {
         [self.first.len(), other.first.len()] == [num_envs + 1; 2]
     }
 
-    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+    fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) {
         // The new list is built behind the old one, which is then removed. This allocates only if both exceed the
         // capacity.
         let old = self.list.len();
@@ -295,7 +295,7 @@ impl PerEnv for Contacts {
             let mine = self.first[env]..self.first[env + 1];
             self.first[env] = self.list.len() - old;
             if *chosen {
-                self.list.extend_from_slice(other.of(env));
+                self.list.extend_from_slice(other.in_env(env));
             } else {
                 self.list.extend_from_within(mine);
             }
@@ -314,7 +314,7 @@ impl Contacts {
     ///
     /// If `env` is out of range.
     #[track_caller]
-    pub fn of(&self, env: usize) -> &[Contact] {
+    pub fn in_env(&self, env: usize) -> &[Contact] {
         &self.list[self.first[env]..self.first[env + 1]]
     }
 }
@@ -338,8 +338,8 @@ mod tests {
     #[test]
     fn contacts_of_one_environment() {
         let contacts = Contacts { first: vec![0, 2, 2, 3], list: [0.0, 1.0, 2.0].map(|z| contact(z, 0.0)).to_vec() };
-        assert_eq!((contacts.of(0), contacts.of(1)), (&contacts.list[..2], &[][..]));
-        assert_eq!(contacts.of(2), &contacts.list[2..]);
+        assert_eq!((contacts.in_env(0), contacts.in_env(1)), (&contacts.list[..2], &[][..]));
+        assert_eq!(contacts.in_env(2), &contacts.list[2..]);
         assert_eq!(SceneState::new(3).num_envs(), 3);
     }
 
@@ -372,7 +372,7 @@ mod tests {
             visible: Some(VisibleState {
                 instance_poses: Array2::from_shape_fn((3, 2), |(env, _)| PoseF32::from_translation(at(env))),
                 lights: Array2::from_shape_fn((3, 1), |(env, _)| light(env)),
-                scenes: vec![OwnScene::default(); 3],
+                scenes: vec![EnvScene::default(); 3],
             }),
             instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
             markers: Some((0..3).map(|env| vec![Marker::sphere([who, f64::from(env), 0.0], 0.1, [1.0; 4])]).collect()),
@@ -384,7 +384,7 @@ mod tests {
     #[test]
     fn take_over() {
         let mut kept = state(100.0, [1, 0, 2]);
-        assert!(kept.take_over(&state(200.0, [0, 3, 5]), &[false, true, false]));
+        assert!(kept.copy_envs_from(&state(200.0, [0, 3, 5]), &[false, true, false]));
         let one = |s: &SceneState, env: usize| {
             let per_body = [&s.body_poses, &s.body_velocities, &s.body_accelerations];
             let per_body = [per_body, [&s.force_poses, &s.force_velocities, &s.joint_wrenches]].concat();
@@ -395,7 +395,7 @@ mod tests {
             let per_env = per_env.into_iter().chain(of_actuators);
             let numbers: Vec<f64> = per_env.flatten().flat_map(|a| a.row(env).to_owned()).collect();
             let seen = s.visible.as_ref().map(|v| (v.instance_poses.row(env).to_owned(), v.lights.row(env).to_owned()));
-            let contacts = s.contacts.as_ref().map(|c| c.of(env).to_vec());
+            let contacts = s.contacts.as_ref().map(|c| c.in_env(env).to_vec());
             let markers = s.markers.as_ref().map(|m| m[env].clone());
             (s.step[env], s.time[env], s.force_time[env], rows, numbers, (seen, markers), contacts)
         };
@@ -403,33 +403,33 @@ mod tests {
         for (env, from) in [&old, &new, &old].into_iter().enumerate() {
             assert_eq!(one(&kept, env), one(from, env), "environment {env}");
         }
-        assert!(kept.take_over(&state(300.0, [2, 2, 2]), &[true; 3]));
+        assert!(kept.copy_envs_from(&state(300.0, [2, 2, 2]), &[true; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
         // Control: no environment is chosen.
-        assert!(kept.take_over(&state(400.0, [1, 1, 1]), &[false; 3]));
+        assert!(kept.copy_envs_from(&state(400.0, [1, 1, 1]), &[false; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
     }
 
     #[test]
     fn own_scenes() {
-        let own = || OwnScene(Some(Arc::new(RenderScene::empty())));
+        let own = || EnvScene(Some(Arc::new(RenderScene::empty())));
         let (red, large) = (own(), own());
         assert!(red != large && red == red.clone(), "the same in memory, or not");
         let with =
-            |own: [&OwnScene; 3]| SceneState { own_scenes: own.map(Clone::clone).into(), ..state(200.0, [1; 3]) };
-        let nothing = OwnScene::default();
+            |own: [&EnvScene; 3]| SceneState { own_scenes: own.map(Clone::clone).into(), ..state(200.0, [1; 3]) };
+        let nothing = EnvScene::default();
         let mut kept = state(100.0, [1, 1, 1]);
-        assert_eq!(kept.own_scene(2), &nothing);
-        assert!(kept.take_over(&with([&red, &large, &nothing]), &[true, false, true]));
+        assert_eq!(kept.env_scene(2), &nothing);
+        assert!(kept.copy_envs_from(&with([&red, &large, &nothing]), &[true, false, true]));
         assert_eq!(kept.own_scenes, [red.clone(), nothing.clone(), nothing.clone()]);
-        assert!(kept.take_over(&with([&nothing, &large, &red]), &[false, true, true]));
+        assert!(kept.copy_envs_from(&with([&nothing, &large, &red]), &[false, true, true]));
         assert_eq!(kept.own_scenes, [red.clone(), large, red]);
         // Back to the shared scene.
-        assert!(kept.take_over(&state(300.0, [1, 1, 1]), &[true; 3]));
-        assert!((0..3).all(|env| kept.own_scene(env) == &nothing));
+        assert!(kept.copy_envs_from(&state(300.0, [1, 1, 1]), &[true; 3]));
+        assert!((0..3).all(|env| kept.env_scene(env) == &nothing));
         // Without a visual quantity, no own scene is kept.
         let mut blind = SceneState::new(3);
-        assert!(blind.take_over(&with([&nothing, &own(), &nothing]), &[true; 3]) && blind.own_scenes.is_empty());
+        assert!(blind.copy_envs_from(&with([&nothing, &own(), &nothing]), &[true; 3]) && blind.own_scenes.is_empty());
     }
 
     #[test]
@@ -437,13 +437,13 @@ mod tests {
         let mut kept = state(100.0, [1, 0, 2]);
         let mut other = state(200.0, [1, 0, 2]);
         other.joint_efforts = Some(Array2::zeros((3, 5)));
-        assert!(!kept.take_over(&other, &[true; 3]));
+        assert!(!kept.copy_envs_from(&other, &[true; 3]));
         other.joint_efforts = None;
-        assert!(!kept.take_over(&other, &[true; 3]));
-        assert!(!kept.take_over(&state(200.0, [1, 0, 2]), &[true; 2]));
-        assert!(!kept.take_over(&SceneState::new(2), &[true; 3]));
+        assert!(!kept.copy_envs_from(&other, &[true; 3]));
+        assert!(!kept.copy_envs_from(&state(200.0, [1, 0, 2]), &[true; 2]));
+        assert!(!kept.copy_envs_from(&SceneState::new(2), &[true; 3]));
         assert_eq!(kept, state(100.0, [1, 0, 2]), "nothing was changed");
         // The other state may have more fields.
-        assert!(SceneState::new(3).take_over(&state(200.0, [1, 0, 2]), &[true; 3]));
+        assert!(SceneState::new(3).copy_envs_from(&state(200.0, [1, 0, 2]), &[true; 3]));
     }
 }

@@ -23,7 +23,7 @@ pub fn sub(a: V3, b: V3) -> V3 {
 
 /// `a + k b`.
 #[inline(always)]
-pub fn along(a: V3, k: f64, b: V3) -> V3 {
+pub fn add_scaled(a: V3, k: f64, b: V3) -> V3 {
     [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]
 }
 
@@ -35,7 +35,7 @@ pub fn scale(a: V3, k: f64) -> V3 {
 
 /// Vector scaled to length 1; `None` for a zero vector and for numbers that are not finite.
 #[inline(always)]
-pub fn unit(a: V3) -> Option<V3> {
+pub fn normalize(a: V3) -> Option<V3> {
     // Divided by the largest component first, because squares of tiny or huge numbers leave the range.
     let largest = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if !(largest > 0.0 && largest.is_finite()) {

@@ -5,13 +5,13 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 /// Largest depth of nested lists and tables.
-const DEPTH: usize = 48;
+const MAX_DEPTH: usize = 48;
 /// Largest size with all aliases expanded \[bytes\]: aliases of aliases grow exponentially.
-const LARGEST: usize = 64 << 20;
+const MAX_EXPANDED_BYTES: usize = 64 << 20;
 
 /// Features that a kind of YAML file may use.
 #[derive(Clone, Copy, Debug)]
-pub struct Dialect {
+pub struct YamlFeatures {
     /// Name of these files in errors.
     pub files: &'static str,
     /// True if aliases are accepted. Otherwise they are errors.
@@ -86,7 +86,7 @@ impl Value {
 
 /// A list or table that is not complete yet.
 #[derive(Debug)]
-struct Open {
+struct OpenNode {
     line: usize,
     content: Content,
     /// Number of the anchor; 0 without an anchor.
@@ -111,7 +111,7 @@ enum Content {
 /// # Errors
 /// The text is not YAML, has several documents or duplicate keys, uses aliases or tags that `dialect` rejects, or
 /// exceeds this parser's limits of depth and size.
-pub fn parse(text: &str, dialect: &Dialect) -> Result<Option<Node>, YamlError> {
+pub fn parse(text: &str, dialect: &YamlFeatures) -> Result<Option<Node>, YamlError> {
     let mut builder = Builder { dialect, open: Vec::new(), root: None, anchors: HashMap::new(), size: 0 };
     let mut parser = Parser::new_from_str(text);
     while let Some(event) = parser.next_event() {
@@ -127,8 +127,8 @@ pub fn parse(text: &str, dialect: &Dialect) -> Result<Option<Node>, YamlError> {
 
 #[derive(Debug)]
 struct Builder<'a> {
-    dialect: &'a Dialect,
-    open: Vec<Open>,
+    dialect: &'a YamlFeatures,
+    open: Vec<OpenNode>,
     root: Option<Node>,
     /// Values of anchors, and their sizes.
     anchors: HashMap<usize, (Value, usize)>,
@@ -143,8 +143,8 @@ impl Builder<'_> {
             Event::Scalar(text, style, anchor, tag) => {
                 let is_text = self.is_text(tag.as_deref())?;
                 let text = text.into_owned();
-                let kind = if is_text || style != ScalarStyle::Plain { ScalarKind::Text } else { kind_of(&text) };
-                let begin = self.grow(text.len())?;
+                let kind = if is_text || style != ScalarStyle::Plain { ScalarKind::Text } else { scalar_kind(&text) };
+                let begin = self.count_bytes(text.len())?;
                 self.close(Node { line, value: Value::Scalar(Scalar { text, kind }) }, anchor, begin)?;
             }
             Event::SequenceStart(anchor, tag) => self.begin(line, Content::List(Vec::new()), anchor, tag.as_deref())?,
@@ -153,7 +153,7 @@ impl Builder<'_> {
                 self.begin(line, table, anchor, tag.as_deref())?;
             }
             Event::SequenceEnd | Event::MappingEnd => {
-                let Some(Open { line, content, anchor, begin }) = self.open.pop() else {
+                let Some(OpenNode { line, content, anchor, begin }) = self.open.pop() else {
                     return Err("something ends that did not begin".into());
                 };
                 let value = match content {
@@ -168,8 +168,8 @@ impl Builder<'_> {
             Event::Alias(anchor) => {
                 let known = self.anchors.get(&anchor).cloned();
                 let (value, size) = known.ok_or("an alias of something that has not ended")?;
-                self.grow(size)?;
-                self.no_key()?;
+                self.count_bytes(size)?;
+                self.reject_as_key()?;
                 self.place(Node { line, value })?;
             }
             Event::Nothing | Event::StreamStart | Event::StreamEnd | Event::DocumentStart(_) | Event::DocumentEnd => {}
@@ -194,30 +194,30 @@ impl Builder<'_> {
         if let Some(tag) = tag.filter(|_| !self.dialect.tags) {
             return Err(self.refused(tag));
         }
-        if self.open.len() == DEPTH {
-            return Err(format!("there are more than {DEPTH} lists and tables within each other"));
+        if self.open.len() == MAX_DEPTH {
+            return Err(format!("there are more than {MAX_DEPTH} lists and tables within each other"));
         }
-        self.no_key()?;
-        let begin = self.grow(0)?;
-        self.open.push(Open { line, content, anchor, begin });
+        self.reject_as_key()?;
+        let begin = self.count_bytes(0)?;
+        self.open.push(OpenNode { line, content, anchor, begin });
         Ok(())
     }
 
     /// Counts a value of `bytes` bytes, and returns the size before it.
-    fn grow(&mut self, bytes: usize) -> Result<usize, String> {
+    fn count_bytes(&mut self, bytes: usize) -> Result<usize, String> {
         let begin = self.size;
         // Two more for brackets, commas and colons.
         self.size += bytes + 2;
-        if self.size > LARGEST {
+        if self.size > MAX_EXPANDED_BYTES {
             return Err("with all its aliases the file is larger than 64 MiB".into());
         }
         Ok(begin)
     }
 
     /// Returns an error for a list or table in place of a key.
-    fn no_key(&self) -> Result<(), String> {
+    fn reject_as_key(&self) -> Result<(), String> {
         match self.open.last() {
-            Some(Open { content: Content::Table { key: None, .. }, .. }) => {
+            Some(OpenNode { content: Content::Table { key: None, .. }, .. }) => {
                 Err("a key is a word, not a list or a table".into())
             }
             _ => Ok(()),
@@ -244,7 +244,7 @@ impl Builder<'_> {
                     }
                     *key = Some((text, node.line));
                 }
-                // `no_key` has rejected it.
+                // `reject_as_key` has rejected it.
                 (None, _) => {}
             },
         }
@@ -253,7 +253,7 @@ impl Builder<'_> {
 }
 
 /// Type of a word without quotes.
-fn kind_of(text: &str) -> ScalarKind {
+fn scalar_kind(text: &str) -> ScalarKind {
     let number = |text: String| ScalarKind::Number(text);
     match text {
         "" | "~" | "null" | "Null" | "NULL" => return ScalarKind::Null,
@@ -298,7 +298,7 @@ fn kind_of(text: &str) -> ScalarKind {
 mod tests {
     use super::*;
 
-    const ALL: Dialect = Dialect { files: "these files", aliases: true, tags: false };
+    const ALL: YamlFeatures = YamlFeatures { files: "these files", aliases: true, tags: false };
 
     #[test]
     fn nodes() {
@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn dialects() {
-        let strict = Dialect { aliases: false, tags: true, ..ALL };
+        let strict = YamlFeatures { aliases: false, tags: true, ..ALL };
         let error = parse("a: &a 1\nb: *a\n", &strict).unwrap_err();
         assert_eq!(error, YamlError { line: 2, column: 4, message: "aliases are not for these files".into() });
         assert!(parse("a: !cup 1\nb: !!opencv-matrix {rows: 3}\n", &strict).is_ok());

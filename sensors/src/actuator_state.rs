@@ -1,13 +1,13 @@
 //! Actuator state sensor: controls, forces and activations.
 
 use crate::error::SensorError;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
+use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
-use crate::select::{Choice, at_least_one, read_columns, select_or_all};
+use crate::select::{Selection, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
+use kinetoscope_scene::StateFields;
 use ndarray::{ArrayView2, ArrayView3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -35,8 +35,8 @@ pub struct ActuatorState {
 impl SensorCfg for ActuatorStateCfg {
     type Sensor = ActuatorState;
 
-    fn requires(&self) -> Requires {
-        Requires::ACTUATORS
+    fn requires(&self) -> StateFields {
+        StateFields::ACTUATORS
     }
 
     fn lazy(&self, dt: f64) -> Option<Schedule> {
@@ -50,10 +50,14 @@ impl SensorCfg for ActuatorStateCfg {
     fn build(&self, context: &SensorContext) -> Result<ActuatorState, SensorError> {
         let all = &context.actuators;
         let actuators = select_or_all(self.actuators.as_deref(), all, "actuator")?;
-        at_least_one(actuators.len(), Choice { sensor: "actuator state", field: "actuators", what: "actuator" }, all)?;
+        at_least_one(
+            actuators.len(),
+            Selection { sensor: "actuator state", field: "actuators", what: "actuator" },
+            all,
+        )?;
         // No unit: each actuator of an MJCF file has its own.
-        let channel = |name| Channel::new(name, actuators.len());
-        let channels = [channel("controls"), channel("forces").at(Stamp::Force), channel("activations")];
+        let channel = |name| SampleChannel::new(name, actuators.len());
+        let channels = [channel("controls"), channel("forces").with_stamp(Stamp::Force), channel("activations")];
         Ok(ActuatorState {
             names: actuators.iter().map(|&actuator| all[actuator].clone()).collect(),
             actuators,

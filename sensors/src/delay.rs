@@ -13,7 +13,7 @@ pub(crate) struct DelayLine<T> {
     /// Values with the steps of their capture, environment by environment.
     slots: Vec<(u64, T)>,
     /// Step of the last refresh of each environment.
-    refreshed: Vec<u64>,
+    last_refresh: Vec<u64>,
 }
 
 /// A ring buffer in the slots of one environment.
@@ -35,7 +35,7 @@ impl<T: Clone> DelayLine<T> {
     pub(crate) fn new(num_envs: usize, steps: u64, period: u64, value: T) -> Self {
         let capacity = capacity(steps, period);
         let slots = vec![(0, value); num_envs * capacity];
-        Self { steps, capacity, queues: vec![Queue::default(); num_envs], slots, refreshed: vec![0; num_envs] }
+        Self { steps, capacity, queues: vec![Queue::default(); num_envs], slots, last_refresh: vec![0; num_envs] }
     }
 
     /// Puts a value of environment `env` in flight at `step`. The returned slot holds an old value, to be overwritten.
@@ -55,16 +55,16 @@ impl<T: Clone> DelayLine<T> {
     /// Takes the oldest value of environment `env` that is due for delivery by `step`, with true if it was captured
     /// after the last [`refresh`](Self::refresh).
     pub(crate) fn take(&mut self, env: usize, step: u64) -> Option<(&T, bool)> {
-        self.arrival(env).filter(|&arrival| arrival <= step)?;
+        self.next_delivery(env).filter(|&arrival| arrival <= step)?;
         let queue = &mut self.queues[env];
         let slot = env * self.capacity + queue.first;
         *queue = Queue { first: (queue.first + 1) % self.capacity, len: queue.len - 1 };
         let (captured, value) = &self.slots[slot];
-        Some((value, *captured > self.refreshed[env]))
+        Some((value, *captured > self.last_refresh[env]))
     }
 
     /// Returns the step at which the next value of environment `env` is delivered.
-    fn arrival(&self, env: usize) -> Option<u64> {
+    fn next_delivery(&self, env: usize) -> Option<u64> {
         let queue = self.queues[env];
         (queue.len > 0).then(|| self.slots[env * self.capacity + queue.first].0 + self.steps)
     }
@@ -72,14 +72,14 @@ impl<T: Clone> DelayLine<T> {
     /// Returns the steps until the next delivery in any environment, at least 1, with the environments at `steps`;
     /// `None` if no value is in flight.
     pub(crate) fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> Option<u64> {
-        let running = steps.into_iter().enumerate().filter(|(_, now)| *now != Phases::STANDS);
-        running.filter_map(|(env, now)| Some(self.arrival(env)?.saturating_sub(now).max(1))).min()
+        let running = steps.into_iter().enumerate().filter(|(_, now)| *now != Phases::QUARANTINED);
+        running.filter_map(|(env, now)| Some(self.next_delivery(env)?.saturating_sub(now).max(1))).min()
     }
 
     /// Records that the current value of environment `env` was refreshed at `step`. Values that were captured before do
     /// not replace it when they are delivered.
     pub(crate) fn refresh(&mut self, env: usize, step: u64) {
-        self.refreshed[env] = step;
+        self.last_refresh[env] = step;
     }
 
     /// Drops the values of environment `env` that are in flight.

@@ -2,7 +2,7 @@
 
 use crate::camera::{CalibrationError, CameraError};
 use crate::ray::RayError;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 
 /// Errors of building or updating a sensor.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -16,7 +16,7 @@ pub enum SensorError {
     },
     /// The sensor panicked during a measurement.
     #[error("a panic broke its measurement off")]
-    BrokenOff,
+    Panicked,
     /// The update period is negative, infinite or not a number.
     #[error("update_period is {update_period} s; it must be 0 (every step) or a positive number")]
     InvalidPeriod {
@@ -54,7 +54,7 @@ pub enum SensorError {
         /// Kind of sensor.
         sensor: &'static str,
         /// Missing fields.
-        missing: Requires,
+        missing: StateFields,
     },
     /// The state does not belong to the scene that the sensor was built for.
     #[error("the state has {found} {what}, the sensor was built for {expected}")]
@@ -67,7 +67,7 @@ pub enum SensorError {
         found: usize,
     },
     /// A name is unknown.
-    #[error("there is no {what} {name:?}; {}", known(.candidates))]
+    #[error("there is no {what} {name:?}; {}", known_names(.candidates))]
     UnknownName {
         /// Kind of item.
         what: &'static str,
@@ -106,8 +106,8 @@ pub enum SensorError {
         candidates: Vec<String>,
     },
     /// The configuration selects nothing to measure.
-    #[error("the {sensor} sensor would measure nothing: {field}: there is no {what}; {}", known(.candidates))]
-    NothingChosen {
+    #[error("the {sensor} sensor would measure nothing: {field}: there is no {what}; {}", known_names(.candidates))]
+    EmptySelection {
         /// Kind of sensor.
         sensor: &'static str,
         /// Name of the configuration field.
@@ -119,7 +119,7 @@ pub enum SensorError {
     },
     /// The filter of a contact sensor matches only its single watched body.
     #[error("the filter {filter:?} means only {body:?}, the one body that is watched: it does not touch itself")]
-    OwnFilter {
+    SelfFilter {
         /// Name of the body.
         body: String,
         /// Pattern of the filter.
@@ -127,25 +127,27 @@ pub enum SensorError {
     },
     /// A contact sensor reports forces by filter, but has no filters.
     #[error(
-        "{field} tells forces apart by filter, and there are no filters; name counterparts in `filters` (the sum over all of them is {always}, which is always there)"
+        "{field} tells forces apart by filter, and there are no filters; name counterparts in `filters` (the sum over all of them is {total_channel}, which is always there)"
     )]
     NoFilters {
         /// Name of the configuration field.
         field: &'static str,
         /// Name of the channel with the sum over all counterparts.
-        always: &'static str,
+        total_channel: &'static str,
     },
     /// A link is fused to another link by fixed joints, so it has no joint of its own.
-    #[error("the link {link:?} is fused to {carrier:?} by fixed joints; measure the joint of {carrier:?} instead")]
+    #[error(
+        "the link {link:?} is fused to {moving_link:?} by fixed joints; measure the joint of {moving_link:?} instead"
+    )]
     FusedLink {
         /// Name of the link.
         link: String,
         /// Name of the link that moves it.
-        carrier: String,
+        moving_link: String,
     },
     /// Two items of a sensor have the same name.
     #[error("there are two {what}s called {name:?}; give each a name of its own")]
-    NameTaken {
+    DuplicateName {
         /// Kind of item.
         what: &'static str,
         /// The name.
@@ -168,10 +170,10 @@ pub enum SensorError {
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// An error of one camera of a stereo camera.
-    #[error("the {eye} eye: {error}")]
-    Eye {
+    #[error("the {side} eye: {error}")]
+    StereoCamera {
         /// `left` or `right`.
-        eye: &'static str,
+        side: &'static str,
         /// The error.
         error: Box<SensorError>,
     },
@@ -185,8 +187,8 @@ pub enum SensorError {
 
 impl SensorError {
     /// Wraps an error of one camera of a stereo camera.
-    pub(crate) fn of_eye(eye: &'static str) -> impl FnOnce(Self) -> Self {
-        move |error| Self::Eye { eye, error: Box::new(error) }
+    pub(crate) fn of_stereo_camera(eye: &'static str) -> impl FnOnce(Self) -> Self {
+        move |error| Self::StereoCamera { side: eye, error: Box::new(error) }
     }
 }
 
@@ -195,7 +197,7 @@ fn quoted(names: &[String]) -> String {
     quoted.join(", ")
 }
 
-fn known(candidates: &[String]) -> String {
+fn known_names(candidates: &[String]) -> String {
     if candidates.is_empty() { "there are none".into() } else { format!("known are {}", quoted(candidates)) }
 }
 

@@ -2,21 +2,21 @@
 
 use crate::error::SensorError;
 use crate::sensor::SensorContext;
-use kinetoscope_scene::Requires;
-use kinetoscope_scene::{Lengths, SceneState};
+use kinetoscope_scene::StateFields;
+use kinetoscope_scene::{SceneState, StateDims};
 
 /// Requirements of a sensor on a state.
 #[derive(Clone, Debug)]
-pub struct Expected {
+pub struct StateRequirements {
     sensor: &'static str,
-    requires: Requires,
-    lengths: Lengths,
+    requires: StateFields,
+    lengths: StateDims,
 }
 
-impl Expected {
+impl StateRequirements {
     /// Creates the requirements of the kind of sensor named `sensor`, for states of the scene of `context`.
-    pub fn new(sensor: &'static str, requires: Requires, context: &SensorContext) -> Self {
-        let lengths = Lengths {
+    pub fn new(sensor: &'static str, requires: StateFields, context: &SensorContext) -> Self {
+        let lengths = StateDims {
             num_envs: context.num_envs,
             bodies: context.bodies.len(),
             joints: context.joints.len(),
@@ -38,7 +38,7 @@ impl Expected {
     ///
     /// [`SensorError::MissingFields`] or [`SensorError::WrongShape`].
     pub fn check(&self, state: &SceneState) -> Result<(), SensorError> {
-        let missing = self.requires.without(Requires::present_in(state));
+        let missing = self.requires.without(StateFields::present_in(state));
         if !missing.is_empty() {
             return Err(SensorError::MissingFields { sensor: self.sensor, missing });
         }

@@ -1,13 +1,13 @@
 //! Frame transformer: poses of frames in the world and relative to a source frame.
 
 use crate::error::SensorError;
-use crate::frames::{check_offset, pose, put};
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::frames::{check_offset, pose, write_front};
+use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{Choice, at_least_one, matching};
+use crate::select::{Selection, at_least_one, matching};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::pose::{from_row, to_wxyz};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::{ArrayView2, ArrayView3};
@@ -49,14 +49,14 @@ pub struct TargetFrameCfg {
 
 impl TargetFrameCfg {
     /// Creates target frames at the origins of the bodies that a pattern matches.
-    pub fn of(bodies: impl Into<String>) -> Self {
+    pub fn for_bodies(bodies: impl Into<String>) -> Self {
         Self { bodies: bodies.into(), name: None, offset: Pose::identity() }
     }
 }
 
 impl FrameTransformerCfg {
     /// Creates a configuration with targets relative to a source body.
-    pub fn from(source: impl Into<String>, targets: Vec<TargetFrameCfg>) -> Self {
+    pub fn new(source: impl Into<String>, targets: Vec<TargetFrameCfg>) -> Self {
         let sampling = SamplingCfg::default();
         Self { source: source.into(), source_offset: Pose::identity(), targets, sampling, debug_vis: false }
     }
@@ -83,8 +83,8 @@ pub struct FrameTransformer {
 impl SensorCfg for FrameTransformerCfg {
     type Sensor = FrameTransformer;
 
-    fn requires(&self) -> Requires {
-        Requires::POSES
+    fn requires(&self) -> StateFields {
+        StateFields::POSES
     }
 
     fn debug_vis(&self) -> bool {
@@ -103,7 +103,7 @@ impl SensorCfg for FrameTransformerCfg {
         let source = context.body(&self.source)?;
         at_least_one(
             self.targets.len(),
-            Choice { sensor: "frame transformer", field: "targets", what: "target" },
+            Selection { sensor: "frame transformer", field: "targets", what: "target" },
             &context.bodies,
         )?;
         let (mut targets, mut names) = (Vec::new(), Vec::<String>::new());
@@ -116,7 +116,7 @@ impl SensorCfg for FrameTransformerCfg {
                     Some(name) => format!("{name}/{}", context.bodies[body]),
                 };
                 if names.contains(&name) {
-                    return Err(SensorError::NameTaken { what: "target frame", name });
+                    return Err(SensorError::DuplicateName { what: "target frame", name });
                 }
                 names.push(name);
                 targets.push(BodyFrame { body, body_from_frame: target.offset });
@@ -128,12 +128,12 @@ impl SensorCfg for FrameTransformerCfg {
             .try_for_each(|t| check_offset(&format!("the offset of target {:?}", t.bodies), &t.offset))?;
         let m = targets.len();
         let channels = [
-            Channel::new("source_pos_w", 3).in_unit("m"),
-            Channel::exact("source_quat_w", 4),
-            Channel::new("target_pos_w", 3 * m).in_unit("m"),
-            Channel::exact("target_quat_w", 4 * m),
-            Channel::new("target_pos_source", 3 * m).in_unit("m"),
-            Channel::exact("target_quat_source", 4 * m),
+            SampleChannel::new("source_pos_w", 3).with_unit("m"),
+            SampleChannel::noiseless("source_quat_w", 4),
+            SampleChannel::new("target_pos_w", 3 * m).with_unit("m"),
+            SampleChannel::noiseless("target_quat_w", 4 * m),
+            SampleChannel::new("target_pos_source", 3 * m).with_unit("m"),
+            SampleChannel::noiseless("target_quat_source", 4 * m),
         ];
         Ok(FrameTransformer {
             source_name: context.bodies[source].clone(),
@@ -151,18 +151,18 @@ fn read(source: &BodyFrame, targets: &[BodyFrame], state: &SceneState, env: usiz
     let world_from = |frame: &BodyFrame| pose(poses, env, frame.body) * frame.body_from_frame;
     let world_from_source = world_from(source);
     let source_from_world = world_from_source.inverse();
-    let row = put(row, world_from_source.translation.vector.as_slice());
-    let row = put(row, &to_wxyz(&world_from_source.rotation));
+    let row = write_front(row, world_from_source.translation.vector.as_slice());
+    let row = write_front(row, &to_wxyz(&world_from_source.rotation));
     let (mut positions, row) = row.split_at_mut(3 * targets.len());
     let (mut rotations, row) = row.split_at_mut(4 * targets.len());
     let (mut seen_positions, mut seen_rotations) = row.split_at_mut(3 * targets.len());
     for target in targets {
         let world_from_target = world_from(target);
         let source_from_target = source_from_world * world_from_target;
-        positions = put(positions, world_from_target.translation.vector.as_slice());
-        rotations = put(rotations, &to_wxyz(&world_from_target.rotation));
-        seen_positions = put(seen_positions, source_from_target.translation.vector.as_slice());
-        seen_rotations = put(seen_rotations, &to_wxyz(&source_from_target.rotation));
+        positions = write_front(positions, world_from_target.translation.vector.as_slice());
+        rotations = write_front(rotations, &to_wxyz(&world_from_target.rotation));
+        seen_positions = write_front(seen_positions, source_from_target.translation.vector.as_slice());
+        seen_rotations = write_front(seen_rotations, &to_wxyz(&source_from_target.rotation));
     }
 }
 

@@ -32,7 +32,7 @@ pub(crate) fn check_offset(field: &str, offset: &Pose) -> Result<(), SensorError
 }
 
 /// Writes numbers to the beginning of `row`; returns the rest of the row.
-pub(crate) fn put<'r>(row: &'r mut [f64], values: &[f64]) -> &'r mut [f64] {
+pub(crate) fn write_front<'r>(row: &'r mut [f64], values: &[f64]) -> &'r mut [f64] {
     let (mine, rest) = row.split_at_mut(values.len());
     mine.copy_from_slice(values);
     rest

@@ -16,7 +16,7 @@ pub struct History<T> {
 impl<T: Copy + Default> History<T> {
     /// Allocates `length` rows of `width` numbers in each of `num_envs` environments. A length of 0 stores nothing.
     pub fn new(num_envs: usize, length: usize, width: usize) -> Self {
-        Self::of(num_envs, length, width, T::default())
+        Self::filled_with(num_envs, length, width, T::default())
     }
 
     /// Adds the newest row of environment `env`; a full history drops its oldest row.
@@ -51,7 +51,7 @@ impl<T: Copy + Default> History<T> {
 
 impl<T: Clone> History<T> {
     /// Allocates rows as [`new`](Self::new), filled with `value`.
-    pub(crate) fn of(num_envs: usize, length: usize, width: usize, value: T) -> Self {
+    pub(crate) fn filled_with(num_envs: usize, length: usize, width: usize, value: T) -> Self {
         Self { rows: Array3::from_elem((num_envs, length, width), value), filled: vec![0; num_envs] }
     }
 
@@ -77,7 +77,7 @@ impl<T: Clone> History<T> {
 
     /// Clears the rows of environment `env`; their memory is reused by [`push_reused`](Self::push_reused).
     #[track_caller]
-    pub(crate) fn forget(&mut self, env: usize) {
+    pub(crate) fn clear(&mut self, env: usize) {
         self.filled[env] = 0;
     }
 

@@ -1,12 +1,12 @@
 //! Inertial measurement units (IMU).
 
 use crate::error::SensorError;
-use crate::frames::{check_offset, pose, put, vector};
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
+use crate::frames::{check_offset, pose, vector, write_front};
+use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::pose::{from_row, to_wxyz};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;
@@ -59,12 +59,12 @@ impl Default for ImuCfg {
 pub struct Imu {
     /// Name of the body.
     body: String,
-    mount: Mount,
+    frame: ImuFrame,
     sampler: Sampler,
 }
 
 #[derive(Clone, Debug)]
-struct Mount {
+struct ImuFrame {
     body: usize,
     body_from_imu: Pose,
     gravity_bias: Vector3<f64>,
@@ -73,8 +73,8 @@ struct Mount {
 impl SensorCfg for ImuCfg {
     type Sensor = Imu;
 
-    fn requires(&self) -> Requires {
-        Requires::ACCELERATIONS
+    fn requires(&self) -> StateFields {
+        StateFields::ACCELERATIONS
     }
 
     fn debug_vis(&self) -> bool {
@@ -97,23 +97,23 @@ impl SensorCfg for ImuCfg {
             return Err(SensorError::OutOfRange { field, value, expected: "every number must be finite" });
         }
         let channels = [
-            Channel::new("pos_w", 3).in_unit("m"),
-            Channel::exact("quat_w", 4),
-            Channel::new("lin_vel_b", 3).in_unit("m/s"),
-            Channel::new("ang_vel_b", 3).in_unit("rad/s"),
-            Channel::new("lin_acc_b", 3).in_unit("m/s²"),
-            Channel::new("ang_acc_b", 3).in_unit("rad/s²"),
+            SampleChannel::new("pos_w", 3).with_unit("m"),
+            SampleChannel::noiseless("quat_w", 4),
+            SampleChannel::new("lin_vel_b", 3).with_unit("m/s"),
+            SampleChannel::new("ang_vel_b", 3).with_unit("rad/s"),
+            SampleChannel::new("lin_acc_b", 3).with_unit("m/s²"),
+            SampleChannel::new("ang_acc_b", 3).with_unit("rad/s²"),
         ]
-        .map(|channel| channel.at(Stamp::Force));
+        .map(|channel| channel.with_stamp(Stamp::Force));
         Ok(Imu {
             body: context.bodies[body].clone(),
-            mount: Mount { body, body_from_imu: self.offset, gravity_bias },
+            frame: ImuFrame { body, body_from_imu: self.offset, gravity_bias },
             sampler: Sampler::new("imu", self.requires(), context, &self.sampling, &channels)?,
         })
     }
 }
 
-impl Mount {
+impl ImuFrame {
     /// Writes the measurement of environment `env` to `row`.
     fn read(&self, state: &SceneState, env: usize, row: &mut [f64]) {
         let (Some(poses), Some(velocities), Some(accelerations)) =
@@ -124,31 +124,32 @@ impl Mount {
         let world_from_body = pose(poses, env, self.body);
         let world_from_imu = world_from_body * self.body_from_imu;
         let arm = world_from_body.rotation * self.body_from_imu.translation.vector;
-        let spin = vector(velocities, env, self.body, 3);
-        let spin_up = vector(accelerations, env, self.body, 3);
+        let angular_velocity = vector(velocities, env, self.body, 3);
+        let angular_acceleration = vector(accelerations, env, self.body, 3);
         // Velocity and acceleration of another point of the same rigid body.
-        let velocity = vector(velocities, env, self.body, 0) + spin.cross(&arm);
-        let acceleration =
-            vector(accelerations, env, self.body, 0) + spin_up.cross(&arm) + spin.cross(&spin.cross(&arm));
-        let mut row = put(row, world_from_imu.translation.vector.as_slice());
-        row = put(row, &to_wxyz(&world_from_imu.rotation));
-        for world in [velocity, spin, acceleration + self.gravity_bias, spin_up] {
-            row = put(row, world_from_imu.rotation.inverse_transform_vector(&world).as_slice());
+        let velocity = vector(velocities, env, self.body, 0) + angular_velocity.cross(&arm);
+        let acceleration = vector(accelerations, env, self.body, 0)
+            + angular_acceleration.cross(&arm)
+            + angular_velocity.cross(&angular_velocity.cross(&arm));
+        let mut row = write_front(row, world_from_imu.translation.vector.as_slice());
+        row = write_front(row, &to_wxyz(&world_from_imu.rotation));
+        for world in [velocity, angular_velocity, acceleration + self.gravity_bias, angular_acceleration] {
+            row = write_front(row, world_from_imu.rotation.inverse_transform_vector(&world).as_slice());
         }
     }
 }
 
 impl Sensor for Imu {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        self.sampler.update(state, |env, row| self.mount.read(state, env, row))
+        self.sampler.update(state, |env, row| self.frame.read(state, env, row))
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.sampler.reset(env_ids, state, |env, row| self.mount.read(state, env, row))
+        self.sampler.reset(env_ids, state, |env, row| self.frame.read(state, env, row))
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.sampler.refresh(env_ids, state, |env, row| self.mount.read(state, env, row))
+        self.sampler.refresh(env_ids, state, |env, row| self.frame.read(state, env, row))
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {

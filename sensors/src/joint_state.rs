@@ -4,13 +4,13 @@
 //! accessors.
 
 use crate::error::SensorError;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
+use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
-use crate::select::{Choice, at_least_one, read_columns, select_or_all};
+use crate::select::{Selection, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
+use kinetoscope_scene::StateFields;
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -37,8 +37,8 @@ pub struct JointState {
 impl SensorCfg for JointStateCfg {
     type Sensor = JointState;
 
-    fn requires(&self) -> Requires {
-        Requires::JOINT_STATE | Requires::JOINT_EFFORTS
+    fn requires(&self) -> StateFields {
+        StateFields::JOINT_STATE | StateFields::JOINT_EFFORTS
     }
 
     fn lazy(&self, dt: f64) -> Option<Schedule> {
@@ -54,14 +54,14 @@ impl SensorCfg for JointStateCfg {
         if self.joints.is_some() {
             at_least_one(
                 joints.len(),
-                Choice { sensor: "joint state", field: "joints", what: "joint" },
+                Selection { sensor: "joint state", field: "joints", what: "joint" },
                 &context.joints,
             )?;
         }
         let channels = [
-            Channel::new("positions", joints.len()).in_unit("rad or m"),
-            Channel::new("velocities", joints.len()).in_unit("rad/s or m/s"),
-            Channel::new("efforts", joints.len()).in_unit("N m or N").at(Stamp::Force),
+            SampleChannel::new("positions", joints.len()).with_unit("rad or m"),
+            SampleChannel::new("velocities", joints.len()).with_unit("rad/s or m/s"),
+            SampleChannel::new("efforts", joints.len()).with_unit("N m or N").with_stamp(Stamp::Force),
         ];
         Ok(JointState {
             names: joints.iter().map(|&joint| context.joints[joint].clone()).collect(),

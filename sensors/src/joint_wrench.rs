@@ -1,13 +1,13 @@
 //! Joint wrench sensor: six-axis force and torque in joints.
 
 use crate::error::SensorError;
-use crate::frames::{pose, put, vector};
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
+use crate::frames::{pose, vector, write_front};
+use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
-use crate::select::{Choice, at_least_one, select};
+use crate::select::{Selection, at_least_one, select};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;
 use ndarray::ArrayView3;
@@ -46,14 +46,14 @@ pub struct JointWrenchCfg {
 /// the robot; for a floating base it is 0.
 #[derive(Clone, Debug)]
 pub struct JointWrench {
-    measured: Vec<Measured>,
+    measured: Vec<MeasuredWrench>,
     names: Vec<String>,
     sampler: Sampler,
 }
 
 /// A measured wrench.
 #[derive(Clone, Copy, Debug)]
-struct Measured {
+struct MeasuredWrench {
     /// Link whose joint is measured.
     link: usize,
     /// Link in whose frame the wrench is expressed, if that is another link.
@@ -63,8 +63,12 @@ struct Measured {
 impl SensorCfg for JointWrenchCfg {
     type Sensor = JointWrench;
 
-    fn requires(&self) -> Requires {
-        if !self.frames.is_empty() { Requires::JOINT_WRENCHES | Requires::POSES } else { Requires::JOINT_WRENCHES }
+    fn requires(&self) -> StateFields {
+        if !self.frames.is_empty() {
+            StateFields::JOINT_WRENCHES | StateFields::POSES
+        } else {
+            StateFields::JOINT_WRENCHES
+        }
     }
 
     fn debug_vis(&self) -> bool {
@@ -82,26 +86,26 @@ impl SensorCfg for JointWrenchCfg {
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;
         for &link in &links {
-            if let Some(&carrier) = context.carriers.get(link).filter(|&&carrier| carrier != link) {
+            if let Some(&carrier) = context.moving_bodies.get(link).filter(|&&carrier| carrier != link) {
                 let (link, carrier) = (context.bodies[link].clone(), context.bodies[carrier].clone());
-                return Err(SensorError::FusedLink { link, carrier });
+                return Err(SensorError::FusedLink { link, moving_link: carrier });
             }
         }
         let frames = select(&self.frames, &context.bodies, "link")?;
         at_least_one(
             links.len() + frames.len(),
-            Choice { sensor: "joint wrench", field: "links and frames", what: "link" },
+            Selection { sensor: "joint wrench", field: "links and frames", what: "link" },
             &context.bodies,
         )?;
         let names = links.iter().chain(&frames).map(|&link| context.bodies[link].clone()).collect();
         let in_frame = |frame: usize| {
-            let link = context.carriers.get(frame).copied().unwrap_or(frame);
-            Measured { link, frame: (link != frame).then_some(frame) }
+            let link = context.moving_bodies.get(frame).copied().unwrap_or(frame);
+            MeasuredWrench { link, frame: (link != frame).then_some(frame) }
         };
-        let in_links = links.into_iter().map(|link| Measured { link, frame: None });
-        let measured: Vec<Measured> = in_links.chain(frames.into_iter().map(in_frame)).collect();
+        let in_links = links.into_iter().map(|link| MeasuredWrench { link, frame: None });
+        let measured: Vec<MeasuredWrench> = in_links.chain(frames.into_iter().map(in_frame)).collect();
         let channels = [("forces", "N"), ("torques", "N m")]
-            .map(|(name, unit)| Channel::new(name, 3 * measured.len()).in_unit(unit).at(Stamp::Force));
+            .map(|(name, unit)| SampleChannel::new(name, 3 * measured.len()).with_unit(unit).with_stamp(Stamp::Force));
         Ok(JointWrench {
             names,
             measured,
@@ -111,22 +115,23 @@ impl SensorCfg for JointWrenchCfg {
 }
 
 /// Writes the measurement of environment `env` to `row`.
-fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) {
+fn read(measured: &[MeasuredWrench], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(wrenches) = &state.joint_wrenches else { return };
     let (mut forces, mut torques) = row.split_at_mut(3 * measured.len());
-    for Measured { link, frame } in measured {
+    for MeasuredWrench { link, frame } in measured {
         let (mut force, mut torque) = (vector(wrenches, env, *link, 0), vector(wrenches, env, *link, 3));
         if let (Some(frame), Some(poses)) = (frame, &state.body_poses) {
             // Both frames are on one rigid body: their relative pose is constant.
-            (force, torque) = moved(&(pose(poses, env, *link).inverse() * pose(poses, env, *frame)), force, torque);
+            (force, torque) =
+                wrench_in_frame(&(pose(poses, env, *link).inverse() * pose(poses, env, *frame)), force, torque);
         }
-        forces = put(forces, force.as_slice());
-        torques = put(torques, torque.as_slice());
+        forces = write_front(forces, force.as_slice());
+        torques = write_front(torques, torque.as_slice());
     }
 }
 
 /// Expresses a force, and a torque about the origin of a link, in a frame of the link.
-fn moved(link_from_frame: &Pose, force: Vector3<f64>, torque: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+fn wrench_in_frame(link_from_frame: &Pose, force: Vector3<f64>, torque: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let Pose { translation, rotation } = link_from_frame;
     let torque = torque - translation.vector.cross(&force);
     (rotation.inverse_transform_vector(&force), rotation.inverse_transform_vector(&torque))
@@ -156,10 +161,10 @@ impl Sensor for JointWrench {
     /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) at their frames.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (forces, torques) = (self.forces(), self.torques());
-        let arrows = |(k, measured): (usize, &Measured)| {
+        let arrows = |(k, measured): (usize, &MeasuredWrench)| {
             let place = pose(measured.frame.unwrap_or(measured.link));
-            let arrow = |values: &ArrayView3<'_, f64>, per_metre: f64, rgba| {
-                let vector = place.rotation * Vector3::from_fn(|axis, _| values[(env, k, axis)]) / per_metre;
+            let arrow = |values: &ArrayView3<'_, f64>, per_meter: f64, rgba| {
+                let vector = place.rotation * Vector3::from_fn(|axis, _| values[(env, k, axis)]) / per_meter;
                 Marker::arrow(place.translation.vector.into(), vector.into(), rgba)
             };
             let force = arrow(&forces, 500.0, [0.95, 0.6, 0.1, 1.0]);

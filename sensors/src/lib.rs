@@ -1,7 +1,7 @@
 //! Sensors of a robot simulation, independent of the physics engine.
 //!
 //! A configuration ([`SensorCfg`]) states the fields of the simulation state that a sensor needs
-//! ([`kinetoscope_scene::Requires`]) and builds the sensor ([`Sensor`]). The sensor reads each
+//! ([`kinetoscope_scene::StateFields`]) and builds the sensor ([`Sensor`]). The sensor reads each
 //! [`kinetoscope_scene::SceneState`] and writes its measurements to its own buffers, with the environment as first
 //! axis. Numeric sensors share a [`Sampler`]: rate, history, latency, dropout and noise.
 //!
@@ -66,7 +66,7 @@ mod summary;
 pub use actuator_state::{ActuatorState, ActuatorStateCfg};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use error::SensorError;
-pub use expected::Expected;
+pub use expected::StateRequirements;
 pub use frame_transformer::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};
 pub use history::History;
 pub use imu::{Imu, ImuCfg};
@@ -74,7 +74,7 @@ pub use joint_state::{JointState, JointStateCfg};
 pub use joint_wrench::{JointWrench, JointWrenchCfg};
 pub use mujoco_sensor::{MujocoSensor, MujocoSensorCfg};
 pub use noise::NoiseCfg;
-pub use sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
+pub use sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 pub use slot::SensorSlot;

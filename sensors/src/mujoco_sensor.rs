@@ -1,14 +1,14 @@
 //! Sensors of the physics engine, declared in its models: MuJoCo's `<sensor>` elements.
 
 use crate::error::SensorError;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
+use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
-use crate::select::{Choice, at_least_one, select};
+use crate::select::{Selection, at_least_one, select};
 use crate::sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 use crate::summary;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::StateFields;
+use kinetoscope_scene::pattern::closest_names;
 use ndarray::{ArrayView2, ArrayView3, Axis, Slice};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -28,7 +28,7 @@ pub struct MujocoSensorCfg {
 /// Values of MuJoCo sensors in all environments. Shapes: N environments, D values, sensor by sensor.
 ///
 /// The values are MuJoCo's numbers, bit for bit. They refer to two instants, as all states do. Sensors of positions and
-/// velocities are captured at [`Sampled::stamps`]. Sensors of accelerations and forces ([`EngineSensor::solved`]) are
+/// velocities are captured at [`Sampled::stamps`]. Sensors of accelerations and forces ([`EngineSensor::force_stage`]) are
 /// captured at [`Sampled::force_stamps`], one step earlier. After a reset or a write to the state, both refer to the
 /// current state.
 #[derive(Clone, Debug)]
@@ -42,8 +42,8 @@ pub struct MujocoSensor {
 impl SensorCfg for MujocoSensorCfg {
     type Sensor = MujocoSensor;
 
-    fn requires(&self) -> Requires {
-        Requires::SENSORDATA
+    fn requires(&self) -> StateFields {
+        StateFields::SENSORDATA
     }
 
     fn lazy(&self, dt: f64) -> Option<Schedule> {
@@ -60,7 +60,7 @@ impl SensorCfg for MujocoSensorCfg {
             Some(patterns) => select(patterns, &known, "MuJoCo sensor")?,
             None => (0..known.len()).collect(),
         };
-        at_least_one(chosen.len(), Choice { sensor: "MuJoCo", field: "sensors", what: "MuJoCo sensor" }, &known)?;
+        at_least_one(chosen.len(), Selection { sensor: "MuJoCo", field: "sensors", what: "MuJoCo sensor" }, &known)?;
         let sensors: Vec<EngineSensor> = chosen.iter().map(|&s| context.engine_sensors[s].clone()).collect();
         let mut columns = Vec::with_capacity(sensors.len());
         let mut width = 0;
@@ -68,10 +68,13 @@ impl SensorCfg for MujocoSensorCfg {
             columns.push(width..width + sensor.width);
             width += sensor.width;
         }
-        let noisy = !sensors.iter().any(|s| s.quaternion);
+        let noisy = !sensors.iter().any(|s| s.is_quaternion);
         // All values are one channel: a mix of both kinds is stamped as positions.
-        let stamp = if sensors.iter().all(|s| s.solved) { Stamp::Force } else { Stamp::State };
-        let channels = [Channel { noisy, ..Channel::new("values", width).in_unit(unit(&sensors)).at(stamp) }];
+        let stamp = if sensors.iter().all(|s| s.force_stage) { Stamp::Force } else { Stamp::State };
+        let channels = [SampleChannel {
+            noisy,
+            ..SampleChannel::new("values", width).with_unit(unit(&sensors)).with_stamp(stamp)
+        }];
         Ok(MujocoSensor {
             names: sensors.iter().map(|s| s.name.clone()).collect(),
             sensors,
@@ -162,7 +165,7 @@ impl MujocoSensor {
     /// # Errors
     ///
     /// A name that matches none or several of the sensors; the error lists candidates.
-    pub fn columns(&self, name: &str) -> Result<Range<usize>, SensorError> {
+    pub fn columns_of(&self, name: &str) -> Result<Range<usize>, SensorError> {
         let bare = |full: &str| full.split_once('/').is_some_and(|(_, rest)| rest == name);
         let exact = self.names.iter().position(|full| full == name);
         let matches: Vec<usize> = match exact {
@@ -174,7 +177,10 @@ impl MujocoSensor {
             [] => Err(SensorError::UnknownName {
                 what: "MuJoCo sensor",
                 name: name.into(),
-                candidates: closest(name, self.names.iter().map(String::as_str)).into_iter().map(Into::into).collect(),
+                candidates: closest_names(name, self.names.iter().map(String::as_str))
+                    .into_iter()
+                    .map(Into::into)
+                    .collect(),
             }),
             several => Err(SensorError::AmbiguousName {
                 what: "MuJoCo sensor",
@@ -193,9 +199,9 @@ impl MujocoSensor {
     ///
     /// # Errors
     ///
-    /// Same as [`columns`](Self::columns).
+    /// Same as [`columns_of`](Self::columns_of).
     pub fn value(&self, name: &str) -> Result<ArrayView2<'_, f64>, SensorError> {
-        let columns = self.columns(name)?;
+        let columns = self.columns_of(name)?;
         let mut values = self.values();
         values.slice_axis_inplace(Axis(1), Slice::from(columns));
         Ok(values)
@@ -221,8 +227,8 @@ mod tests {
             unit: Some("m".into()),
             first,
             width,
-            solved,
-            quaternion: kind == "framequat",
+            force_stage: solved,
+            is_quaternion: kind == "framequat",
         };
         let engine_sensors = [
             sensor("a/pos", "framepos", 0, 3, false),
@@ -265,9 +271,9 @@ mod tests {
         let nothing =
             "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
         assert!(wrong(cfg(&[])).starts_with(nothing), "{}", wrong(cfg(&[])));
-        let nobody = SensorContext { engine_sensors: [].into(), ..context() };
-        let error = MujocoSensorCfg::default().build(&nobody).unwrap_err();
-        assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if candidates.is_empty()), "{error}");
+        let without_sensors = SensorContext { engine_sensors: [].into(), ..context() };
+        let error = MujocoSensorCfg::default().build(&without_sensors).unwrap_err();
+        assert!(matches!(&error, SensorError::EmptySelection { candidates, .. } if candidates.is_empty()), "{error}");
         assert!(wrong(cfg(&["pso"])).starts_with("there is no MuJoCo sensor \"pso\"; known are \"pos\""));
         assert!(wrong(cfg(&["a/.*", "pos"])).contains("matched by both"));
         let noise = BTreeMap::from([("values".to_string(), NoiseCfg::default())]);

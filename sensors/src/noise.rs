@@ -1,10 +1,10 @@
 //! Noise model of numeric sensors: white noise, bias with random walk, quantization and dropout.
 
 use crate::error::SensorError;
-use crate::sampling::{Channel, SamplingCfg};
+use crate::sampling::{SampleChannel, SamplingCfg};
 use crate::sensor::SensorContext;
-use kinetoscope_scene::Random;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::KeyedRng;
+use kinetoscope_scene::pattern::closest_names;
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -36,7 +36,7 @@ impl NoiseCfg {
     }
 
     /// Rounds a noisy value and clamps it to the measurable range.
-    pub(crate) fn settle(&self, value: f64, [least, most]: [f64; 2]) -> f64 {
+    pub(crate) fn quantize_and_clamp(&self, value: f64, [least, most]: [f64; 2]) -> f64 {
         let steps = value / self.resolution;
         // A step finer than the precision of the value has no effect.
         let rounded = if self.resolution > 0.0 && steps.is_finite() { steps.round() * self.resolution } else { value };
@@ -48,16 +48,16 @@ impl NoiseCfg {
 pub(crate) fn check<'a>(
     dropout: f64,
     noise: impl IntoIterator<Item = (&'a str, &'a NoiseCfg)>,
-    channels: &[Channel],
-) -> Result<Vec<Noisy>, SensorError> {
+    channels: &[SampleChannel],
+) -> Result<Vec<ChannelNoise>, SensorError> {
     if !(0.0..=1.0).contains(&dropout) {
         let expected = "it must be a probability, 0 to 1";
         return Err(SensorError::OutOfRange { field: "dropout".into(), value: dropout, expected });
     }
-    let mut wanted = Vec::new();
+    let mut noisy_channels = Vec::new();
     for (name, noise) in noise {
         let (columns, range) = columns(name, channels)?;
-        wanted.push(Noisy { columns, range, noise: *noise });
+        noisy_channels.push(ChannelNoise { columns, range, noise: *noise });
         for (field, value) in [
             ("std", noise.std),
             ("bias_std", noise.bias_std),
@@ -70,12 +70,12 @@ pub(crate) fn check<'a>(
             }
         }
     }
-    Ok(wanted)
+    Ok(noisy_channels)
 }
 
 /// Noise of a channel.
 #[derive(Clone, Debug)]
-pub(crate) struct Noisy {
+pub(crate) struct ChannelNoise {
     columns: Range<usize>,
     /// Smallest and largest value.
     range: [f64; 2],
@@ -84,81 +84,81 @@ pub(crate) struct Noisy {
 
 /// Noise of a sensor in all environments.
 #[derive(Clone, Debug)]
-pub(crate) struct Noise {
-    channels: Vec<Noisy>,
+pub(crate) struct NoiseState {
+    channels: Vec<ChannelNoise>,
     dropout: f64,
     /// Square root of the time between measurements \[√s\].
     sqrt_period: f64,
     /// Biases, shape \[num_envs, row\].
     biases: Array2<f64>,
-    randoms: Vec<Random>,
+    rngs: Vec<KeyedRng>,
 }
 
-impl Noise {
+impl NoiseState {
     /// Creates the noise that `cfg` describes; `None` without noise and dropout.
     pub(crate) fn new(
         context: &SensorContext,
         cfg: &SamplingCfg,
         period: f64,
-        channels: &[Channel],
+        channels: &[SampleChannel],
     ) -> Result<Option<Self>, SensorError> {
         let wanted = check(cfg.dropout, cfg.noise.iter().map(|(name, noise)| (name.as_str(), noise)), channels)?;
         if wanted.is_empty() && cfg.dropout == 0.0 {
             return Ok(None);
         }
         let width = channels.iter().map(|c| c.width).sum();
-        let random = |env: usize| Random::keyed(context.seed, (context.first_env + env) as u64, &context.name);
+        let random = |env: usize| KeyedRng::keyed(context.seed, (context.first_env + env) as u64, &context.name);
         Ok(Some(Self {
             channels: wanted,
             dropout: cfg.dropout,
             sqrt_period: period.sqrt(),
             biases: Array2::zeros((context.num_envs, width)),
-            randoms: (0..context.num_envs).map(random).collect(),
+            rngs: (0..context.num_envs).map(random).collect(),
         }))
     }
 
     /// Samples new biases of environment `env`.
     pub(crate) fn reset(&mut self, env: usize) {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
-        for Noisy { columns, noise, .. } in &self.channels {
+        for ChannelNoise { columns, noise, .. } in &self.channels {
             for column in columns.clone().filter(|_| noise.bias_std > 0.0 || noise.bias_walk > 0.0) {
-                biases[column] = noise.bias_std * self.randoms[env].normal();
+                biases[column] = noise.bias_std * self.rngs[env].normal();
             }
         }
     }
 
     /// Applies noise to the true values of environment `env`; returns true if the measurement is delivered. The number
     /// of random numbers used does not depend on the values.
-    pub(crate) fn measure(&mut self, env: usize, row: &mut [f64]) -> bool {
+    pub(crate) fn apply_to_measurement(&mut self, env: usize, row: &mut [f64]) -> bool {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
-        for Noisy { columns, noise, .. } in self.channels.iter().filter(|c| c.noise.bias_walk > 0.0) {
+        for ChannelNoise { columns, noise, .. } in self.channels.iter().filter(|c| c.noise.bias_walk > 0.0) {
             for column in columns.clone() {
-                biases[column] += noise.bias_walk * self.sqrt_period * self.randoms[env].normal();
+                biases[column] += noise.bias_walk * self.sqrt_period * self.rngs[env].normal();
             }
         }
-        self.disturb(env, row);
-        self.dropout == 0.0 || self.randoms[env].uniform() >= self.dropout
+        self.apply(env, row);
+        self.dropout == 0.0 || self.rngs[env].uniform() >= self.dropout
     }
 
     /// Adds noise to the true values of environment `env`; biases do not change.
-    pub(crate) fn disturb(&mut self, env: usize, row: &mut [f64]) {
+    pub(crate) fn apply(&mut self, env: usize, row: &mut [f64]) {
         let biases = self.biases.index_axis(Axis(0), env);
-        for Noisy { columns, range, noise } in &self.channels {
+        for ChannelNoise { columns, range, noise } in &self.channels {
             for column in columns.clone() {
-                let normal = if noise.std > 0.0 { self.randoms[env].normal() } else { 0.0 };
+                let normal = if noise.std > 0.0 { self.rngs[env].normal() } else { 0.0 };
                 let value = &mut row[column];
                 // Misses have no noise: they must not become hits or NaN.
                 if !value.is_finite() {
                     continue;
                 }
-                *value = noise.settle(*value + biases[column] + noise.std * normal, *range);
+                *value = noise.quantize_and_clamp(*value + biases[column] + noise.std * normal, *range);
             }
         }
     }
 }
 
 /// Returns the columns of the channel `name`, and its smallest and largest value.
-fn columns(name: &str, channels: &[Channel]) -> Result<(Range<usize>, [f64; 2]), SensorError> {
+fn columns(name: &str, channels: &[SampleChannel]) -> Result<(Range<usize>, [f64; 2]), SensorError> {
     let mut first = 0;
     for channel in channels {
         if channel.name == name && channel.noisy {
@@ -170,6 +170,6 @@ fn columns(name: &str, channels: &[Channel]) -> Result<(Range<usize>, [f64; 2]),
     Err(SensorError::UnknownName {
         what: "channel that can have noise",
         name: name.into(),
-        candidates: closest(name, noisy).into_iter().map(str::to_owned).collect(),
+        candidates: closest_names(name, noisy).into_iter().map(str::to_owned).collect(),
     })
 }

@@ -1,17 +1,17 @@
 //! Sampling of numeric sensors: rate, history, latency, dropout and noise.
 //!
-//! A sensor declares its [`Channel`]s and reads the true values of one environment; the [`Sampler`] does the rest.
+//! A sensor declares its [`SampleChannel`]s and reads the true values of one environment; the [`Sampler`] does the rest.
 //! [`crate::joint_state`] is the template.
 
 use crate::delay::{self, DelayLine};
 use crate::error::SensorError;
-use crate::expected::Expected;
+use crate::expected::StateRequirements;
 use crate::history::History;
-use crate::noise::{Noise, NoiseCfg};
+use crate::noise::{NoiseCfg, NoiseState};
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::SensorContext;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
+use kinetoscope_scene::StateFields;
 use ndarray::{Array1, Array2, ArrayView, ArrayView1, ArrayView2, ArrayView3, Axis, Dimension, IntoDimension};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -53,9 +53,10 @@ impl SamplingCfg {
     /// [`SensorCfg::lazy`](crate::SensorCfg::lazy). `None` for an eager sensor: [`lazy`](Self::lazy) is off, or its
     /// values depend on more than one instant.
     pub fn lazy_schedule(&self, dt: f64) -> Option<Schedule> {
-        let alone = self.history_length == 0 && self.latency_steps == 0 && self.dropout == 0.0 && self.noise.is_empty();
+        let single_instant =
+            self.history_length == 0 && self.latency_steps == 0 && self.dropout == 0.0 && self.noise.is_empty();
         // An invalid period is reported when the sensor is built.
-        (self.lazy && alone).then(|| Schedule::new(self.update_period, dt, self.round_period).ok()).flatten()
+        (self.lazy && single_instant).then(|| Schedule::new(self.update_period, dt, self.round_period).ok()).flatten()
     }
 }
 
@@ -71,7 +72,7 @@ pub enum Stamp {
 
 /// One kind of numbers in a measurement. Recorders take name, unit and instant from here.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Channel {
+pub struct SampleChannel {
     /// Name of the channel, also in [`SamplingCfg::noise`].
     pub name: &'static str,
     /// Count of numbers per environment.
@@ -87,7 +88,7 @@ pub struct Channel {
     pub range: [f64; 2],
 }
 
-impl Channel {
+impl SampleChannel {
     /// Creates a channel of `width` numbers without a unit that can have noise, captured with positions and velocities.
     pub const fn new(name: &'static str, width: usize) -> Self {
         let range = [f64::NEG_INFINITY, f64::INFINITY];
@@ -95,24 +96,24 @@ impl Channel {
     }
 
     /// Creates a channel of `width` numbers that can have noise and are clamped to `range`.
-    pub fn within(name: &'static str, width: usize, range: [f64; 2]) -> Self {
+    pub fn bounded(name: &'static str, width: usize, range: [f64; 2]) -> Self {
         Self { range, ..Self::new(name, width) }
     }
 
     /// Creates a channel of `width` numbers without noise.
-    pub fn exact(name: &'static str, width: usize) -> Self {
+    pub fn noiseless(name: &'static str, width: usize) -> Self {
         Self { noisy: false, ..Self::new(name, width) }
     }
 
     /// Sets the unit.
     #[must_use]
-    pub fn in_unit(self, unit: impl Into<Cow<'static, str>>) -> Self {
+    pub fn with_unit(self, unit: impl Into<Cow<'static, str>>) -> Self {
         Self { unit: unit.into(), ..self }
     }
 
     /// Sets the instant of capture.
     #[must_use]
-    pub fn at(self, stamp: Stamp) -> Self {
+    pub fn with_stamp(self, stamp: Stamp) -> Self {
         Self { stamp, ..self }
     }
 }
@@ -121,18 +122,18 @@ impl Channel {
 #[derive(Clone, Debug)]
 pub struct Sampler {
     name: Arc<str>,
-    expected: Expected,
+    expected: StateRequirements,
     phases: Phases,
     period: f64,
-    quantities: Vec<Quantity>,
+    quantities: Vec<ChannelBuffer>,
     stamps: Array1<f64>,
     force_stamps: Array1<f64>,
     /// Both stamps of past measurements.
     stamp_history: History<f64>,
     /// Both stamps of the latest delivered measurement; empty without a latency.
-    arrived: History<f64>,
+    latest_delivered: History<f64>,
     counts: Array1<u64>,
-    noise: Option<Noise>,
+    noise: Option<NoiseState>,
     delay: Option<DelayLine<Vec<f64>>>,
     /// Buffer for one measurement: two stamps, then the channels.
     row: Vec<f64>,
@@ -140,16 +141,16 @@ pub struct Sampler {
 
 /// Current values of a channel, shape \[num_envs, width\], and those of past measurements.
 #[derive(Clone, Debug)]
-struct Quantity {
-    channel: Channel,
-    now: Array2<f64>,
+struct ChannelBuffer {
+    channel: SampleChannel,
+    current: Array2<f64>,
     history: History<f64>,
-    /// The latest delivered measurement, with a latency; without a latency this is `now`.
-    arrived: History<f64>,
+    /// The latest delivered measurement, with a latency; without a latency this is `current`.
+    latest_delivered: History<f64>,
 }
 
 /// Number of stamps at the beginning of a row.
-const STAMPS: usize = 2;
+const STAMP_COUNT: usize = 2;
 
 /// Maximum count of numbers per sensor: 4 GiB. Configurations made by mistake exceed it by far.
 const MAX_NUMBERS: usize = 1 << 29;
@@ -163,17 +164,17 @@ impl Sampler {
     /// or not finite; a dropout that is not a probability; a history or a latency that does not fit into memory.
     pub fn new(
         sensor: &'static str,
-        requires: Requires,
+        requires: StateFields,
         context: &SensorContext,
         cfg: &SamplingCfg,
-        channels: &[Channel],
+        channels: &[SampleChannel],
     ) -> Result<Self, SensorError> {
         let schedule = Schedule::new(cfg.update_period, context.dt, cfg.round_period)?;
         let period = schedule.period_steps();
         let seconds = period as f64 * context.dt;
-        let noise = Noise::new(context, cfg, seconds, channels)?;
+        let noise = NoiseState::new(context, cfg, seconds, channels)?;
         let n = context.num_envs;
-        let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
+        let width = STAMP_COUNT + channels.iter().map(|c| c.width).sum::<usize>();
         let latency = u64::from(cfg.latency_steps);
         let late = usize::from(latency > 0);
         let rows = delay::capacity(latency, period).saturating_add(cfg.history_length).saturating_add(late);
@@ -181,22 +182,22 @@ impl Sampler {
         if numbers > MAX_NUMBERS {
             return Err(SensorError::TooLarge { rows, width, num_envs: n });
         }
-        let quantity = |channel: &Channel| Quantity {
+        let quantity = |channel: &SampleChannel| ChannelBuffer {
             channel: channel.clone(),
-            now: Array2::zeros((n, channel.width)),
+            current: Array2::zeros((n, channel.width)),
             history: History::new(n, cfg.history_length, channel.width),
-            arrived: History::new(n, late, channel.width),
+            latest_delivered: History::new(n, late, channel.width),
         };
         Ok(Self {
             name: Arc::clone(&context.name),
-            expected: Expected::new(sensor, requires, context),
+            expected: StateRequirements::new(sensor, requires, context),
             phases: schedule.phases(n),
             period: seconds,
             quantities: channels.iter().map(quantity).collect(),
             stamps: Array1::zeros(n),
             force_stamps: Array1::zeros(n),
-            stamp_history: History::new(n, cfg.history_length, STAMPS),
-            arrived: History::new(n, late, STAMPS),
+            stamp_history: History::new(n, cfg.history_length, STAMP_COUNT),
+            latest_delivered: History::new(n, late, STAMP_COUNT),
             counts: Array1::zeros(n),
             noise,
             delay: (latency > 0).then(|| DelayLine::new(n, latency, period, vec![0.0; width])),
@@ -238,26 +239,29 @@ impl Sampler {
         self.check(state)?;
         for env in 0..self.expected.num_envs() {
             let step = state.step[env];
-            let fallen_due = self.phases.fallen_due(env, step);
+            let fallen_due = self.phases.take_due_count(env, step);
             if fallen_due > 0 {
                 self.read(env, state, &mut read);
-                let arrives = self.noise.as_mut().is_none_or(|noise| noise.measure(env, &mut self.row[STAMPS..]));
+                let arrives = self
+                    .noise
+                    .as_mut()
+                    .is_none_or(|noise| noise.apply_to_measurement(env, &mut self.row[STAMP_COUNT..]));
                 match &mut self.delay {
                     _ if !arrives => {}
                     Some(delay) => delay.push(env, step).copy_from_slice(&self.row),
                     None => {
-                        self.remember(env);
+                        self.push_to_history(env);
                         // A lazy sensor also counts the measurements that were not read.
                         self.counts[env] += fallen_due - 1;
-                        self.show(env);
+                        self.set_current(env);
                     }
                 }
             }
             while let Some((row, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(env, step)) {
                 self.row.copy_from_slice(row);
-                self.remember(env);
+                self.push_to_history(env);
                 if is_newest {
-                    self.show(env);
+                    self.set_current(env);
                 }
             }
         }
@@ -268,7 +272,7 @@ impl Sampler {
     /// `step`.
     #[track_caller]
     pub(crate) fn is_due(&self, env: usize, step: u64) -> bool {
-        self.phases.fallen_due_by(env, step) > 0
+        self.phases.due_count(env, step) > 0
     }
 
     /// Resets the environments `env_ids` to `state`: see [`Sensor::reset`](crate::Sensor::reset). Samples new biases.
@@ -288,10 +292,10 @@ impl Sampler {
             self.phases.reset(env, state.step[env]);
             self.counts[env] = 0;
             self.stamp_history.reset(env);
-            self.arrived.reset(env);
+            self.latest_delivered.reset(env);
             for quantity in &mut self.quantities {
                 quantity.history.reset(env);
-                quantity.arrived.reset(env);
+                quantity.latest_delivered.reset(env);
             }
             if let Some(delay) = &mut self.delay {
                 delay.clear(env);
@@ -324,12 +328,12 @@ impl Sampler {
             }
             self.read(env, state, &mut read);
             if let Some(noise) = &mut self.noise {
-                noise.disturb(env, &mut self.row[STAMPS..]);
+                noise.apply(env, &mut self.row[STAMP_COUNT..]);
             }
-            self.show(env);
+            self.set_current(env);
             // Before the first measurement is delivered, the values of the reset count as the latest.
-            if self.arrived.filled(env) == 0 {
-                self.arrive(env);
+            if self.latest_delivered.filled(env) == 0 {
+                self.set_latest_delivered(env);
             }
         }
         Ok(())
@@ -337,44 +341,44 @@ impl Sampler {
 
     /// Writes the stamps and true values of an environment to `row`.
     fn read(&mut self, env: usize, state: &SceneState, read: &mut impl FnMut(usize, &mut [f64])) {
-        let (stamps, values) = self.row.split_at_mut(STAMPS);
+        let (stamps, values) = self.row.split_at_mut(STAMP_COUNT);
         stamps.copy_from_slice(&[state.time[env], state.force_time[env]]);
         values.fill(0.0);
         read(env, values);
     }
 
     /// Adds `row` to the history.
-    fn remember(&mut self, env: usize) {
-        let (stamps, mut values) = self.row.split_at(STAMPS);
+    fn push_to_history(&mut self, env: usize) {
+        let (stamps, mut values) = self.row.split_at(STAMP_COUNT);
         self.stamp_history.push(env, stamps);
         for quantity in &mut self.quantities {
-            let (mine, rest) = values.split_at(quantity.now.ncols());
+            let (mine, rest) = values.split_at(quantity.current.ncols());
             quantity.history.push(env, mine);
             values = rest;
         }
         self.counts[env] += 1;
-        self.arrive(env);
+        self.set_latest_delivered(env);
     }
 
     /// Makes `row` the latest delivered measurement.
-    fn arrive(&mut self, env: usize) {
-        let (stamps, mut values) = self.row.split_at(STAMPS);
-        self.arrived.push(env, stamps);
+    fn set_latest_delivered(&mut self, env: usize) {
+        let (stamps, mut values) = self.row.split_at(STAMP_COUNT);
+        self.latest_delivered.push(env, stamps);
         for quantity in &mut self.quantities {
-            let (mine, rest) = values.split_at(quantity.now.ncols());
-            quantity.arrived.push(env, mine);
+            let (mine, rest) = values.split_at(quantity.current.ncols());
+            quantity.latest_delivered.push(env, mine);
             values = rest;
         }
     }
 
     /// Makes `row` the current values.
-    fn show(&mut self, env: usize) {
+    fn set_current(&mut self, env: usize) {
         (self.stamps[env], self.force_stamps[env]) = (self.row[0], self.row[1]);
-        let mut values = &self.row[STAMPS..];
+        let mut values = &self.row[STAMP_COUNT..];
         for quantity in &mut self.quantities {
-            let width = quantity.now.ncols();
+            let width = quantity.current.ncols();
             let (mine, rest) = values.split_at(width);
-            if let Some(now) = quantity.now.as_slice_mut() {
+            if let Some(now) = quantity.current.as_slice_mut() {
                 now[env * width..(env + 1) * width].copy_from_slice(mine);
             }
             values = rest;
@@ -415,12 +419,12 @@ impl Sampler {
     }
 
     /// Channels, in the order of the numbers in a measurement.
-    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+    pub fn channels(&self) -> impl Iterator<Item = &SampleChannel> {
         self.quantities.iter().map(|quantity| &quantity.channel)
     }
 
     #[track_caller]
-    fn quantity(&self, channel: &str) -> &Quantity {
+    fn quantity(&self, channel: &str) -> &ChannelBuffer {
         let found = self.quantities.iter().find(|quantity| quantity.channel.name == channel);
         found.unwrap_or_else(|| panic!("this sampler was built without the channel {channel:?}"))
     }
@@ -432,7 +436,7 @@ impl Sampler {
     /// If the sampler was built without the channel.
     #[track_caller]
     pub fn values(&self, channel: &str) -> ArrayView2<'_, f64> {
-        self.quantity(channel).now.view()
+        self.quantity(channel).current.view()
     }
 
     /// Values of a channel in the latest delivered measurement, shape \[num_envs, width\]; those of the reset before
@@ -443,12 +447,12 @@ impl Sampler {
     ///
     /// If the sampler was built without the channel.
     #[track_caller]
-    pub fn arrived(&self, channel: &str) -> ArrayView2<'_, f64> {
+    pub fn latest_delivered(&self, channel: &str) -> ArrayView2<'_, f64> {
         let quantity = self.quantity(channel);
-        if self.arrived.length() == 0 {
-            quantity.now.view()
+        if self.latest_delivered.length() == 0 {
+            quantity.current.view()
         } else {
-            quantity.arrived.view().index_axis_move(Axis(1), 0)
+            quantity.latest_delivered.view().index_axis_move(Axis(1), 0)
         }
     }
 
@@ -458,21 +462,21 @@ impl Sampler {
     }
 
     /// Returns true if the sensor has a latency.
-    pub(crate) fn is_late(&self) -> bool {
-        self.arrived.length() > 0
+    pub(crate) fn has_latency(&self) -> bool {
+        self.latest_delivered.length() > 0
     }
 
-    fn stamps_arrived(&self, which: usize) -> ArrayView1<'_, f64> {
-        if self.arrived.length() == 0 {
+    fn delivered_stamps(&self, which: usize) -> ArrayView1<'_, f64> {
+        if self.latest_delivered.length() == 0 {
             return [&self.stamps, &self.force_stamps][which].view();
         }
-        self.arrived.view().index_axis_move(Axis(2), which).index_axis_move(Axis(1), 0)
+        self.latest_delivered.view().index_axis_move(Axis(2), which).index_axis_move(Axis(1), 0)
     }
 
     /// Current values of a channel in one environment.
     #[track_caller]
     pub(crate) fn row(&self, channel: &str, env: usize) -> &[f64] {
-        let now = &self.quantity(channel).now;
+        let now = &self.quantity(channel).current;
         let width = now.ncols();
         now.as_slice().map_or(&[], |all| &all[env * width..(env + 1) * width])
     }
@@ -484,7 +488,7 @@ impl Sampler {
     /// If the sampler was built without the channel, or with another number of values.
     #[track_caller]
     pub fn values_as<D: Dimension>(&self, channel: &str, shape: impl IntoDimension<Dim = D>) -> ArrayView<'_, f64, D> {
-        shaped(self.quantity(channel).now.as_slice(), shape.into_dimension())
+        shaped(self.quantity(channel).current.as_slice(), shape.into_dimension())
     }
 
     /// Past values of a channel, newest first, shape \[num_envs, history_length, width\]; 0 where not filled yet.
@@ -553,14 +557,14 @@ pub trait Sampled {
         self.sampler().force_stamps.view()
     }
 
-    /// [`stamps`](Self::stamps) of the measurements of [`Sampler::arrived`].
-    fn arrived_stamps(&self) -> ArrayView1<'_, f64> {
-        self.sampler().stamps_arrived(0)
+    /// [`stamps`](Self::stamps) of the measurements of [`Sampler::latest_delivered`].
+    fn latest_delivered_stamps(&self) -> ArrayView1<'_, f64> {
+        self.sampler().delivered_stamps(0)
     }
 
-    /// [`force_stamps`](Self::force_stamps) of the measurements of [`Sampler::arrived`].
-    fn arrived_force_stamps(&self) -> ArrayView1<'_, f64> {
-        self.sampler().stamps_arrived(1)
+    /// [`force_stamps`](Self::force_stamps) of the measurements of [`Sampler::latest_delivered`].
+    fn latest_delivered_force_stamps(&self) -> ArrayView1<'_, f64> {
+        self.sampler().delivered_stamps(1)
     }
 
     /// Times of past measurements \[s\], newest first, shape \[num_envs, history_length\]; 0 where not filled yet.

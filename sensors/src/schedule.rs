@@ -51,7 +51,7 @@ impl Schedule {
 
     /// Creates counters for `num_envs` environments, all at step 0.
     pub fn phases(self, num_envs: usize) -> Phases {
-        Phases { schedule: self, envs: vec![Phase { start: 0, seen: 0 }; num_envs] }
+        Phases { schedule: self, envs: vec![Phase { start: 0, last_query: 0 }; num_envs] }
     }
 }
 
@@ -67,12 +67,12 @@ struct Phase {
     /// Step of the environment at which the sensor was reset.
     start: u64,
     /// Step of the environment at the last query.
-    seen: u64,
+    last_query: u64,
 }
 
 impl Phases {
     /// Step that marks a quarantined environment for [`due_in`](Self::due_in): no measurement is due there.
-    pub const STANDS: u64 = u64::MAX;
+    pub const QUARANTINED: u64 = u64::MAX;
 
     /// The schedule.
     pub fn schedule(&self) -> Schedule {
@@ -90,7 +90,7 @@ impl Phases {
     /// If the environment does not exist, or if steps went backwards without [`reset`](Self::reset).
     #[track_caller]
     pub fn is_due(&mut self, env: usize, step: u64) -> bool {
-        self.fallen_due(env, step) > 0
+        self.take_due_count(env, step) > 0
     }
 
     /// Returns the number of measurements of environment `env`, which is at physics step `step`, since the last query.
@@ -101,36 +101,41 @@ impl Phases {
     ///
     /// Same as [`is_due`](Self::is_due).
     #[track_caller]
-    pub fn fallen_due(&mut self, env: usize, step: u64) -> u64 {
-        let fallen_due = self.fallen_due_by(env, step);
-        self.envs[env].seen = step;
+    pub fn take_due_count(&mut self, env: usize, step: u64) -> u64 {
+        let fallen_due = self.due_count(env, step);
+        self.envs[env].last_query = step;
         fallen_due
     }
 
-    /// Returns the result of [`fallen_due`](Self::fallen_due) without recording a query.
+    /// Returns the result of [`take_due_count`](Self::take_due_count) without recording a query.
     #[track_caller]
-    pub(crate) fn fallen_due_by(&self, env: usize, step: u64) -> u64 {
+    pub(crate) fn due_count(&self, env: usize, step: u64) -> u64 {
         let (phase, period) = (&self.envs[env], self.schedule.period_steps);
-        assert!(step >= phase.seen, "environment {env} went from step {} to {step} without a reset", phase.seen);
-        let before = (phase.seen - phase.start) / period;
+        assert!(
+            step >= phase.last_query,
+            "environment {env} went from step {} to {step} without a reset",
+            phase.last_query
+        );
+        let before = (phase.last_query - phase.start) / period;
         let run = step - phase.start;
         if run.is_multiple_of(period) { run / period - before } else { 0 }
     }
 
     /// Returns the steps until the next environment is due, at least 1, with the environments at `steps`.
     pub fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> u64 {
-        self.first_of(steps, |wait| wait)
+        self.min_wait(steps, |wait| wait)
     }
 
     /// Returns the minimum over all environments of `of` applied to the steps until the environment is due.
-    pub(crate) fn first_of(&self, steps: impl IntoIterator<Item = u64>, of: impl Fn(u64) -> u64) -> u64 {
-        let running = steps.into_iter().take(self.envs.len()).enumerate().filter(|(_, step)| *step != Self::STANDS);
-        running.map(|(env, step)| of(self.wait(env, step))).min().unwrap_or(self.schedule.period_steps)
+    pub(crate) fn min_wait(&self, steps: impl IntoIterator<Item = u64>, of: impl Fn(u64) -> u64) -> u64 {
+        let running =
+            steps.into_iter().take(self.envs.len()).enumerate().filter(|(_, step)| *step != Self::QUARANTINED);
+        running.map(|(env, step)| of(self.steps_until_due(env, step))).min().unwrap_or(self.schedule.period_steps)
     }
 
     /// Returns the steps until environment `env`, which is at physics step `step`, is due: 1 to a period.
     #[track_caller]
-    pub(crate) fn wait(&self, env: usize, step: u64) -> u64 {
+    pub(crate) fn steps_until_due(&self, env: usize, step: u64) -> u64 {
         let period = self.schedule.period_steps;
         period - step.saturating_sub(self.envs[env].start) % period
     }
@@ -142,7 +147,7 @@ impl Phases {
     /// If the environment does not exist.
     #[track_caller]
     pub fn reset(&mut self, env: usize, step: u64) {
-        self.envs[env] = Phase { start: step, seen: step };
+        self.envs[env] = Phase { start: step, last_query: step };
     }
 }
 
@@ -200,7 +205,7 @@ mod tests {
     fn skipped_steps() {
         let mut phases = schedule(0.02, 0.005).phases(1);
         phases.reset(0, 3);
-        assert_eq!([3, 7, 7, 19, 20, 23].map(|step| phases.fallen_due(0, step)), [0, 1, 0, 3, 0, 1]);
+        assert_eq!([3, 7, 7, 19, 20, 23].map(|step| phases.take_due_count(0, step)), [0, 1, 0, 3, 0, 1]);
         let mut phases = schedule(0.02, 0.005).phases(2);
         phases.reset(1, 3);
         let (mut step, mut due) = (0, [Vec::new(), Vec::new()]);
@@ -213,8 +218,8 @@ mod tests {
         // A quarantined environment one step before its due step would otherwise make every block one step long.
         let phases = schedule(0.1, 0.005).phases(2);
         assert_eq!(phases.due_in([19, 5]), 1, "running, it is due in a step");
-        assert_eq!(phases.due_in([Phases::STANDS, 5]), 15);
-        assert_eq!(phases.due_in([Phases::STANDS; 2]), 20, "nothing is due where nothing runs");
+        assert_eq!(phases.due_in([Phases::QUARANTINED, 5]), 15);
+        assert_eq!(phases.due_in([Phases::QUARANTINED; 2]), 20, "nothing is due where nothing runs");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Selection of bodies, joints and other items by name patterns.
 
 use crate::error::SensorError;
-use kinetoscope_scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest, in_every_env};
+use kinetoscope_scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest_names, strip_env_prefix};
 use ndarray::Array2;
 
 /// Returns the indices of the names that the patterns match, pattern by pattern, in the order of the names within a
@@ -56,7 +56,7 @@ pub(crate) fn read_columns(fields: [&Option<Array2<f64>>; 3], columns: &[usize],
 
 /// A configuration field that selects items by name, for errors.
 #[derive(Clone, Copy)]
-pub(crate) struct Choice {
+pub(crate) struct Selection {
     /// Kind of sensor.
     pub(crate) sensor: &'static str,
     pub(crate) field: &'static str,
@@ -68,14 +68,14 @@ pub(crate) struct Choice {
 ///
 /// # Errors
 ///
-/// [`SensorError::NothingChosen`] with the first of the names.
-pub(crate) fn at_least_one(count: usize, choice: Choice, names: &[String]) -> Result<(), SensorError> {
+/// [`SensorError::EmptySelection`] with the first of the names.
+pub(crate) fn at_least_one(count: usize, choice: Selection, names: &[String]) -> Result<(), SensorError> {
     if count > 0 {
         return Ok(());
     }
-    let Choice { sensor, field, what } = choice;
+    let Selection { sensor, field, what } = choice;
     let candidates = names.iter().take(MAX_CANDIDATES).cloned().collect();
-    Err(SensorError::NothingChosen { sensor, field, what, candidates })
+    Err(SensorError::EmptySelection { sensor, field, what, candidates })
 }
 
 /// Returns the indices of the names that one pattern matches, at least one.
@@ -84,15 +84,15 @@ pub(crate) fn at_least_one(count: usize, choice: Choice, names: &[String]) -> Re
 ///
 /// Same as [`select`].
 pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
-    let pattern = in_every_env(pattern);
+    let pattern = strip_env_prefix(pattern);
     let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;
-    let matches = |name: &str| compiled.matches(name) || compiled.matches(bare(name));
+    let matches = |name: &str| compiled.matches(name) || compiled.matches(name_without_prefix(name));
     let found: Vec<usize> = (0..names.len()).filter(|&i| matches(&names[i])).collect();
     if found.is_empty() {
         let candidates = if pattern.contains('/') {
-            closest(pattern, names.iter().map(String::as_str))
+            closest_names(pattern, names.iter().map(String::as_str))
         } else {
-            closest(pattern, names.iter().map(|name| bare(name)))
+            closest_names(pattern, names.iter().map(|name| name_without_prefix(name)))
         };
         let candidates = candidates.into_iter().map(str::to_owned).collect();
         return Err(SensorError::UnknownName { what, name: pattern.into(), candidates });
@@ -101,7 +101,7 @@ pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> R
 }
 
 /// Returns the part of a name after the first slash, or the whole name.
-fn bare(name: &str) -> &str {
+fn name_without_prefix(name: &str) -> &str {
     name.split_once('/').map_or(name, |(_, rest)| rest)
 }
 

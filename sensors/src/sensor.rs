@@ -4,10 +4,10 @@ use crate::error::SensorError;
 use crate::sampling::Sampled;
 use crate::schedule::Schedule;
 use kinetoscope_exec::ThreadPool;
-use kinetoscope_render::geometry::RayAssets;
-use kinetoscope_scene::Requires;
-use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
-use kinetoscope_scene::{Marker, OwnScene, Pose, RenderScene, SceneState};
+use kinetoscope_render::geometry::RayAssetCache;
+use kinetoscope_scene::StateFields;
+use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest_names, strip_env_prefix};
+use kinetoscope_scene::{EnvScene, Marker, Pose, RenderScene, SceneState};
 use nalgebra::Vector3;
 use std::any::Any;
 use std::fmt;
@@ -19,7 +19,7 @@ pub trait SensorCfg {
     type Sensor: Sensor;
 
     /// Fields of the state that the sensor needs. The simulation gathers the union over all sensors, and nothing else.
-    fn requires(&self) -> Requires;
+    fn requires(&self) -> StateFields;
 
     /// True if the sensor's [`markers`](Sensor::markers) are shown initially. Built-in sensors have a field `debug_vis`
     /// for it, off by default as in Isaac Lab. A sensor without such a field shows its markers.
@@ -36,7 +36,7 @@ pub trait SensorCfg {
     /// take effect at once.
     ///
     /// Return a schedule only if a measurement depends on the state at its instant alone. [`Sensor::update`] must also
-    /// count correctly with [`Phases::fallen_due`](crate::Phases::fallen_due), as a [`Sampler`](crate::Sampler) does.
+    /// count correctly with [`Phases::take_due_count`](crate::Phases::take_due_count), as a [`Sampler`](crate::Sampler) does.
     /// For sensors with a sampler, [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides. The
     /// [`Camera`](crate::camera::Camera) stores and renders its frames itself.
     fn lazy(&self, dt: f64) -> Option<Schedule> {
@@ -95,7 +95,7 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
 
     /// Physics steps until the next measurement of any environment, at least 1, with the environments at `step`. The
     /// owner may skip updates before. The step of a quarantined environment is
-    /// [`Phases::STANDS`](crate::Phases::STANDS).
+    /// [`Phases::QUARANTINED`](crate::Phases::QUARANTINED).
     fn due_in(&self, step: &[u64]) -> u64 {
         let _ = step;
         1
@@ -128,7 +128,7 @@ pub struct SensorContext {
     pub bodies: Arc<[String]>,
     /// For every body, the index of the body that moves it. This is the body itself if it has its own joint or cannot
     /// move, else the body that fixed joints fuse it to. As long as `bodies`, or empty if unknown.
-    pub carriers: Arc<[usize]>,
+    pub moving_bodies: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
     /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot
@@ -136,14 +136,14 @@ pub struct SensorContext {
     pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,
-    /// Scene of the visual geometry; present for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
+    /// Scene of the visual geometry; present for sensors that require [`StateFields::VISIBLE`] or [`StateFields::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
     /// Scenes of environments that differ from `scene`; present for the same sensors.
-    pub own_scenes: Vec<OwnScene>,
+    pub own_scenes: Vec<EnvScene>,
     /// True if an existing sensor is rebuilt after a scene change; checks made only at creation are skipped.
     pub rebuilt: bool,
     /// BVHs and other ray-casting data of the assets of the scene, shared by all ray casters.
-    pub ray_assets: RayAssets,
+    pub ray_assets: RayAssetCache,
     /// Number of threads that a sensor may use; 0 counts as 1.
     pub threads: usize,
     /// Thread pool shared by all sensors.
@@ -158,7 +158,7 @@ impl SensorContext {
     ///
     /// [`SensorError::UnknownName`] with the nearest names, [`SensorError::AmbiguousName`] with all matching names.
     pub fn body(&self, name: &str) -> Result<usize, SensorError> {
-        let name = in_every_env(name);
+        let name = strip_env_prefix(name);
         if let Some(index) = self.bodies.iter().position(|b| b == name) {
             return Ok(index);
         }
@@ -185,7 +185,7 @@ fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
     let bare: Vec<&str> = bodies.iter().map(|b| b.split_once('/').map_or(b.as_str(), |(_, link)| link)).collect();
     let wanted = if name.contains('/') { bodies.iter().map(String::as_str).collect() } else { bare.clone() };
     let mut found = Vec::new();
-    for candidate in closest(name, wanted) {
+    for candidate in closest_names(name, wanted) {
         found.extend((0..bodies.len()).filter(|&i| bodies[i] == candidate || bare[i] == candidate).map(|i| &bodies[i]));
     }
     found.dedup();
@@ -207,9 +207,9 @@ pub struct EngineSensor {
     pub width: usize,
     /// True for quantities that the engine solves for (accelerations, forces), captured at [`SceneState::force_time`].
     /// False for positions and velocities, captured at [`SceneState::time`].
-    pub solved: bool,
+    pub force_stage: bool,
     /// True if the values are a quaternion, w x y z.
-    pub quaternion: bool,
+    pub is_quaternion: bool,
 }
 
 #[cfg(test)]

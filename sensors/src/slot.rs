@@ -4,8 +4,8 @@ use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::Sensor;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
+use kinetoscope_scene::StateFields;
 
 /// An eager or [lazy](crate::SensorCfg::lazy) sensor in its owner. The owner forwards all updates, resets and refreshes
 /// to the slot, and reads the sensor through it.
@@ -13,29 +13,29 @@ use kinetoscope_scene::SceneState;
 /// After an error, the sensor is not called any more; reading returns the error.
 #[derive(Debug)]
 pub struct SensorSlot {
-    requires: Requires,
+    requires: StateFields,
     /// Step counters of a lazy sensor.
     phases: Option<Phases>,
     /// Stored state of a lazy sensor: each environment as of its last due step, reset or write.
-    kept: Option<SceneState>,
+    stored_state: Option<SceneState>,
     /// Environments that are due. Only used within an update, kept for its memory.
     due: Vec<bool>,
     /// The sensor, outdated while the stored state is not measured yet. Empty after a panic during a measurement.
-    sensor: Cached<Holder>,
+    sensor: Cached<SensorAndError>,
 }
 
 /// A sensor, and the error after which it is not called any more.
 #[derive(Debug)]
-struct Holder {
+struct SensorAndError {
     sensor: Box<dyn Sensor>,
-    fault: Option<SensorError>,
+    error: Option<SensorError>,
 }
 
-impl Holder {
+impl SensorAndError {
     /// Calls the sensor, unless it failed before.
-    fn ask(&mut self, act: impl FnOnce(&mut dyn Sensor) -> Result<(), SensorError>) {
-        if self.fault.is_none() {
-            self.fault = act(self.sensor.as_mut()).err();
+    fn call(&mut self, act: impl FnOnce(&mut dyn Sensor) -> Result<(), SensorError>) {
+        if self.error.is_none() {
+            self.error = act(self.sensor.as_mut()).err();
         }
     }
 }
@@ -43,12 +43,12 @@ impl Holder {
 impl SensorSlot {
     /// Creates a slot for a sensor of `num_envs` environments. `requires` are the requirements of its configuration,
     /// and `lazy` its schedule if it is lazy. The slot must be reset before any other call.
-    pub fn new(sensor: Box<dyn Sensor>, requires: Requires, lazy: Option<Schedule>, num_envs: usize) -> Self {
-        let holder = Holder { sensor, fault: None };
+    pub fn new(sensor: Box<dyn Sensor>, requires: StateFields, lazy: Option<Schedule>, num_envs: usize) -> Self {
+        let holder = SensorAndError { sensor, error: None };
         Self {
             requires,
             phases: lazy.map(|schedule| schedule.phases(num_envs)),
-            kept: None,
+            stored_state: None,
             due: vec![false; num_envs],
             sensor: Cached::current(holder),
         }
@@ -61,17 +61,17 @@ impl SensorSlot {
 
     /// Forwards [`Sensor::update`]: measures, or stores the state to measure.
     pub fn update(&mut self, state: &SceneState) {
-        if self.keep(state) {
-            return self.wait();
+        if self.store_due(state) {
+            return self.invalidate_if_due();
         }
-        if let Some(holder) = self.now() {
-            holder.ask(|sensor| sensor.update(state));
+        if let Some(holder) = self.up_to_date() {
+            holder.call(|sensor| sensor.update(state));
         }
     }
 
     /// Stores the environments that are due if the sensor is lazy; returns false if it must measure at once.
-    fn keep(&mut self, state: &SceneState) -> bool {
-        let (Some(phases), Some(kept)) = (&mut self.phases, &mut self.kept) else { return false };
+    fn store_due(&mut self, state: &SceneState) -> bool {
+        let (Some(phases), Some(kept)) = (&mut self.phases, &mut self.stored_state) else { return false };
         // The sensor reports a state of another scene as an error.
         if state.num_envs() != self.due.len() {
             return false;
@@ -79,11 +79,11 @@ impl SensorSlot {
         for (env, due) in self.due.iter_mut().enumerate() {
             *due = phases.is_due(env, state.step[env]);
         }
-        kept.take_over(state, &self.due)
+        kept.copy_envs_from(state, &self.due)
     }
 
     /// Marks the sensor as outdated if an environment is due, unless the sensor failed.
-    fn wait(&mut self) {
+    fn invalidate_if_due(&mut self) {
         if self.due.contains(&true) && !self.has_failed() {
             self.sensor.invalidate();
         }
@@ -92,8 +92,8 @@ impl SensorSlot {
     /// Forwards [`Sensor::reset`] at once. Stored states of these environments are dropped.
     pub fn reset(&mut self, env_ids: &[usize], state: &SceneState) {
         if let Some(holder) = self.sensor.value_mut() {
-            holder.ask(|sensor| sensor.reset(env_ids, state));
-            if holder.fault.is_some() {
+            holder.call(|sensor| sensor.reset(env_ids, state));
+            if holder.error.is_some() {
                 return;
             }
         }
@@ -101,19 +101,19 @@ impl SensorSlot {
             let known = env_ids.iter().filter(|&&env| env < self.due.len());
             known.filter_map(|&env| Some((env, *state.step.get(env)?))).for_each(|(env, step)| phases.reset(env, step));
         }
-        self.keep_written(env_ids, state);
+        self.store_written(env_ids, state);
     }
 
     /// Forwards [`Sensor::refresh`] at once, after measuring the stored state.
     pub fn refresh(&mut self, env_ids: &[usize], state: &SceneState) {
-        if let Some(holder) = self.now() {
-            holder.ask(|sensor| sensor.refresh(env_ids, state));
+        if let Some(holder) = self.up_to_date() {
+            holder.call(|sensor| sensor.refresh(env_ids, state));
         }
-        self.keep_written(env_ids, state);
+        self.store_written(env_ids, state);
     }
 
     /// Stores environments that were reset or written to; their earlier states are never measured.
-    fn keep_written(&mut self, env_ids: &[usize], state: &SceneState) {
+    fn store_written(&mut self, env_ids: &[usize], state: &SceneState) {
         if self.phases.is_none() {
             return;
         }
@@ -123,9 +123,9 @@ impl SensorSlot {
                 *written = true;
             }
         }
-        let taken = self.kept.as_mut().is_some_and(|kept| kept.take_over(state, &self.due));
+        let taken = self.stored_state.as_mut().is_some_and(|kept| kept.copy_envs_from(state, &self.due));
         if !taken {
-            self.kept = Some(self.requires.part_of(state));
+            self.stored_state = Some(self.requires.part_of(state));
         }
     }
 
@@ -140,7 +140,7 @@ impl SensorSlot {
     /// True if the sensor is known to have failed; a stored state that is not measured yet may still fail.
     pub fn has_failed(&self) -> bool {
         match self.sensor.get() {
-            Some(holder) => holder.fault.is_some(),
+            Some(holder) => holder.error.is_some(),
             None => self.sensor.is_empty(),
         }
     }
@@ -153,16 +153,16 @@ impl SensorSlot {
     /// failed.
     pub fn sensor(&self) -> Result<&dyn Sensor, &SensorError> {
         // A sensor that panicked is lost: its state is unknown.
-        let lost = || Err(&SensorError::BrokenOff);
-        let holder = self.sensor.get_or_update(lost, |holder| {
-            if let Some(kept) = &self.kept {
-                holder.ask(|sensor| sensor.update(kept));
+        let panicked = || Err(&SensorError::Panicked);
+        let holder = self.sensor.get_or_update(panicked, |holder| {
+            if let Some(kept) = &self.stored_state {
+                holder.call(|sensor| sensor.update(kept));
             }
             Ok(())
         })?;
         match holder {
-            Holder { fault: None, sensor } => Ok(sensor.as_ref()),
-            Holder { fault: Some(fault), .. } => Err(fault),
+            SensorAndError { error: None, sensor } => Ok(sensor.as_ref()),
+            SensorAndError { error: Some(fault), .. } => Err(fault),
         }
     }
 
@@ -172,15 +172,15 @@ impl SensorSlot {
     ///
     /// Same as [`sensor`](Self::sensor).
     pub fn sensor_mut(&mut self) -> Result<&mut dyn Sensor, &SensorError> {
-        match self.now() {
-            Some(Holder { fault: None, sensor }) => Ok(sensor.as_mut()),
-            Some(Holder { fault: Some(fault), .. }) => Err(fault),
-            None => Err(&SensorError::BrokenOff),
+        match self.up_to_date() {
+            Some(SensorAndError { error: None, sensor }) => Ok(sensor.as_mut()),
+            Some(SensorAndError { error: Some(fault), .. }) => Err(fault),
+            None => Err(&SensorError::Panicked),
         }
     }
 
     /// Returns the sensor after measuring the stored state.
-    fn now(&mut self) -> Option<&mut Holder> {
+    fn up_to_date(&mut self) -> Option<&mut SensorAndError> {
         // An error is returned by the next read.
         let _ = self.sensor();
         self.sensor.value_mut()

@@ -5,10 +5,10 @@ use crate::sensor::SensorContext;
 use std::fmt;
 
 /// Labels and values of the properties of a sensor.
-type Lines<'a> = [(&'a str, &'a dyn fmt::Display)];
+type Properties<'a> = [(&'a str, &'a dyn fmt::Display)];
 
 /// Writes `title @ "path":` and the properties.
-pub(crate) fn write(f: &mut fmt::Formatter<'_>, title: &str, path: &str, lines: &Lines<'_>) -> fmt::Result {
+pub(crate) fn write(f: &mut fmt::Formatter<'_>, title: &str, path: &str, lines: &Properties<'_>) -> fmt::Result {
     write!(f, "{title} @ {path:?}:")?;
     lines.iter().try_for_each(|(label, value)| write!(f, "\n\t{label:<21}: {value}"))
 }
@@ -18,7 +18,7 @@ pub(crate) fn write_sampled(
     f: &mut fmt::Formatter<'_>,
     title: &str,
     sampler: &Sampler,
-    lines: &Lines<'_>,
+    lines: &Properties<'_>,
 ) -> fmt::Result {
     let shared: [(&str, &dyn fmt::Display); 3] = [
         ("update period (s)", &sampler.period()),
@@ -52,7 +52,7 @@ mod tests {
             num_envs: 3,
             dt: 0.005,
             bodies: ["arm/base".to_string(), "arm/tip".to_string()].into(),
-            carriers: [0, 1].into(),
+            moving_bodies: [0, 1].into(),
             joints: ["arm/elbow".to_string()].into(),
             name: "mine".into(),
             ..SensorContext::default()

@@ -6,9 +6,9 @@
 //! model.
 
 use crate::batch_error::BatchError;
-use crate::capture::Capture;
+use crate::capture::CaptureRequest;
 use crate::drive::table::{DriveState, DriveTable};
-use crate::env::Env;
+use crate::env::SimEnv;
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco::Model;
 use ndarray::{Array2, Array3, Axis, aview1};
@@ -18,26 +18,26 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Consecutive environments that one thread processes together.
 struct Chunk {
-    envs: Vec<Env>,
+    envs: Vec<SimEnv>,
     /// Values read by [`Batch::step_and_read`], environment by environment.
-    read: Vec<f64>,
+    read_values: Vec<f64>,
 }
 
 /// A chunk that a thread has locked.
-struct Taken<'a> {
+struct LockedChunk<'a> {
     /// Index of the first environment of the chunk.
     first: usize,
     chunk: MutexGuard<'a, Chunk>,
     /// The chunk that the thread will probably take next, for prefetching.
     next: Option<&'a Mutex<Chunk>>,
     /// True if environments leave the cache between their steps.
-    cold: bool,
+    exceeds_cache: bool,
 }
 
 /// Batch size above which environments are assumed to leave the cache between their steps \[bytes\]. Measured with 64
 /// to 1024 humanoids and arms on 2 MiB of cache per core: prefetching all arrays of the next environment makes a step 5
 /// % slower at 3 MB and 7 % faster at 11 MB.
-const CACHE: usize = 8 << 20;
+const CACHE_BYTES: usize = 8 << 20;
 
 /// N environments of one model, stepped in parallel.
 #[derive(Debug)]
@@ -53,7 +53,7 @@ struct Chunks {
     chunks: Vec<Mutex<Chunk>>,
     chunk_size: usize,
     /// True if environments leave the cache between their steps.
-    cold: bool,
+    exceeds_cache: bool,
     /// One share of the chunks for each thread.
     shares: Vec<Share>,
 }
@@ -104,21 +104,21 @@ impl Batch {
         let mut bytes = 0;
         let mut chunks = Vec::with_capacity(num_envs.div_ceil(chunk_size));
         for first in (0..num_envs).step_by(chunk_size) {
-            let chunk: Result<Vec<Env>, BatchError> = (first..(first + chunk_size).min(num_envs))
+            let chunk: Result<Vec<SimEnv>, BatchError> = (first..(first + chunk_size).min(num_envs))
                 .map(|index| {
-                    Env::with_drives(model, drives.clone()).map_err(|error| BatchError::Environment { index, error })
+                    SimEnv::with_drives(model, drives.clone()).map_err(|error| BatchError::Environment { index, error })
                 })
                 .collect();
             let envs = chunk?;
             bytes += envs.iter().map(|env| env.data().prefetched_bytes()).sum::<usize>();
-            chunks.push(Mutex::new(Chunk { envs, read: Vec::new() }));
+            chunks.push(Mutex::new(Chunk { envs, read_values: Vec::new() }));
         }
         let count = chunks.len();
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
         pool.start(threads).map_err(|error| BatchError::Thread(error.to_string()))?;
         let shares = (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect();
-        let chunks = Chunks { chunks, chunk_size, cold: bytes > CACHE, shares };
+        let chunks = Chunks { chunks, chunk_size, exceeds_cache: bytes > CACHE_BYTES, shares };
         Ok(Self { chunks, pool, model: model.clone(), num_envs })
     }
 
@@ -139,45 +139,45 @@ impl Batch {
 
     /// Does `count` steps in every environment.
     pub fn step(&mut self, count: u32) {
-        self.run_chunks(|taken| taken.each(|_, env, _| env.step(count)));
+        self.run_chunks(|taken| taken.for_each_env(|_, env, _| env.step(count)));
     }
 
     /// As [`step`](Self::step), and captures quantities of the last step in the environments.
-    pub(crate) fn step_and_capture(&mut self, count: u32, capture: Capture) {
-        self.run_chunks(|taken| taken.each(|_, env, _| env.step_and_capture(count, Some(&capture))));
+    pub(crate) fn step_and_capture(&mut self, count: u32, capture: CaptureRequest) {
+        self.run_chunks(|taken| taken.for_each_env(|_, env, _| env.step_and_capture(count, Some(&capture))));
     }
 
     /// Captures the solution of the current state in the environments `chosen`.
-    pub(crate) fn capture_present(&mut self, chosen: &[usize], capture: Capture) {
+    pub(crate) fn capture_present(&mut self, chosen: &[usize], capture: CaptureRequest) {
         let mut mask = vec![false; self.num_envs];
         chosen.iter().for_each(|&env| mask[env] = true);
         self.run(|i, env| {
             if mask[i] {
-                env.capture_present(&capture);
+                env.capture_current(&capture);
             }
         });
     }
 
-    /// Does `count` steps in every environment and copies the slices that `read` returns to `outs`, one row per
+    /// Does `count` steps in every environment and copies the slices that `read_values` returns to `outs`, one row per
     /// environment: `batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel])`.
     ///
     /// The thread that stepped an environment reads it immediately, while its data is in that core's cache. A separate
     /// read of 1024 humanoids after the step takes 2 % of the step time.
     ///
     /// # Panics
-    /// The sizes of `outs` and of the slices differ, or `read` panics.
+    /// The sizes of `outs` and of the slices differ, or `read_values` panics.
     #[track_caller]
     pub fn step_and_read<const K: usize>(
         &mut self,
         count: u32,
-        read: impl for<'e> Fn(&'e Env) -> [&'e [f64]; K] + Sync,
+        read: impl for<'e> Fn(&'e SimEnv) -> [&'e [f64]; K] + Sync,
         mut outs: [&mut [f64]; K],
     ) {
         let widths = self.read(0, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
         }
-        let step = |env: &mut Env, take: &mut dyn FnMut(usize, &[f64])| {
+        let step = |env: &mut SimEnv, take: &mut dyn FnMut(usize, &[f64])| {
             env.step(count);
             for (k, (values, width)) in read(env).into_iter().zip(widths).enumerate() {
                 assert!(values.len() == width, "{} numbers from one environment, {width} from another", values.len());
@@ -187,7 +187,7 @@ impl Batch {
         if self.threads() == 1 {
             // A single thread writes directly to the outputs.
             for c in 0..self.chunks.chunks.len() {
-                self.chunks.take(c).each(|index, env, _| {
+                self.chunks.lock_chunk(c).for_each_env(|index, env, _| {
                     step(env, &mut |k, values| {
                         outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
                     });
@@ -195,13 +195,13 @@ impl Batch {
             }
             return;
         }
-        let job = |taken: &mut Taken| {
-            taken.chunk.read.clear();
-            taken.each(|_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
+        let job = |taken: &mut LockedChunk| {
+            taken.chunk.read_values.clear();
+            taken.for_each_env(|_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
         };
         let mut copied = vec![false; self.chunks.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
-            let mut values = &chunk.read[..];
+            let mut values = &chunk.read_values[..];
             for index in first..first + chunk.envs.len() {
                 for (out, width) in outs.iter_mut().zip(widths) {
                     let (mine, rest) = values.split_at(width);
@@ -225,16 +225,16 @@ impl Batch {
     ///
     /// # Panics
     /// `job` panics.
-    pub fn run(&mut self, job: impl Fn(usize, &mut Env) + Sync) {
-        self.run_chunks(|taken| taken.each(|i, env, _| job(i, env)));
+    pub fn run(&mut self, job: impl Fn(usize, &mut SimEnv) + Sync) {
+        self.run_chunks(|taken| taken.for_each_env(|i, env, _| job(i, env)));
     }
 
-    fn run_chunks(&mut self, job: impl Fn(&mut Taken) + Sync) {
+    fn run_chunks(&mut self, job: impl Fn(&mut LockedChunk) + Sync) {
         self.run_chunks_then(job, |_| {});
     }
 
     /// As [`run_chunks`](Self::run_chunks); `then` is called after each chunk that the calling thread has processed.
-    fn run_chunks_then(&mut self, job: impl Fn(&mut Taken) + Sync, then: impl FnMut(&Taken) + Send) {
+    fn run_chunks_then(&mut self, job: impl Fn(&mut LockedChunk) + Sync, then: impl FnMut(&LockedChunk) + Send) {
         let chunks = &self.chunks;
         for share in &chunks.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
@@ -244,12 +244,12 @@ impl Batch {
         self.pool.run(chunks.shares.len(), |slot| {
             if slot == 0 {
                 let then = &mut *lock(&then);
-                chunks.take_chunks(slot, |taken| {
+                chunks.process_shares(slot, |taken| {
                     job(taken);
                     then(taken);
                 });
             } else {
-                chunks.take_chunks(slot, &job);
+                chunks.process_shares(slot, &job);
             }
         });
     }
@@ -259,32 +259,32 @@ impl Batch {
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
-    pub fn read<T>(&self, index: usize, read: impl FnOnce(&Env) -> T) -> T {
-        self.edit(index, |env| {
-            env.freshen();
+    pub fn read<T>(&self, index: usize, read: impl FnOnce(&SimEnv) -> T) -> T {
+        self.with_env(index, |env| {
+            env.forward_if_dirty();
             read(env)
         })
     }
 
     /// Reads all environments in order.
-    pub fn for_each(&self, mut read: impl FnMut(usize, &Env)) {
+    pub fn for_each(&self, mut read: impl FnMut(usize, &SimEnv)) {
         for (c, chunk) in self.chunks.chunks.iter().enumerate() {
             for (i, env) in lock(chunk).envs.iter_mut().enumerate() {
-                env.freshen();
+                env.forward_if_dirty();
                 read(c * self.chunks.chunk_size + i, env);
             }
         }
     }
 
     /// Reads K numbers of each environment, shape (N, K).
-    pub(crate) fn gather_rows<const K: usize>(&self, mut read: impl FnMut(&Env) -> [f64; K]) -> Array2<f64> {
+    pub(crate) fn gather_rows<const K: usize>(&self, mut read: impl FnMut(&SimEnv) -> [f64; K]) -> Array2<f64> {
         let mut rows = Vec::with_capacity(self.num_envs);
         self.for_each(|_, env| rows.push(read(env)));
         rows.into()
     }
 
     /// Reads a value of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather<I, T>(&self, items: &[I], read: impl Fn(&Env, &I) -> T) -> Array2<T>
+    pub(crate) fn gather<I, T>(&self, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
     where
         T: Copy + Default,
     {
@@ -301,7 +301,7 @@ impl Batch {
     pub(crate) fn gather_rows_of<I, const K: usize>(
         &self,
         items: &[I],
-        read: impl Fn(&Env, &I) -> [f64; K],
+        read: impl Fn(&SimEnv, &I) -> [f64; K],
     ) -> Array3<f64> {
         let mut values = Array3::zeros((self.num_envs, items.len(), K));
         self.for_each(|env_id, env| {
@@ -317,37 +317,37 @@ impl Batch {
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
-    pub fn write<T>(&mut self, index: usize, write: impl FnOnce(&mut Env) -> T) -> T {
-        self.edit(index, |env| {
-            env.freshen();
+    pub fn write<T>(&mut self, index: usize, write: impl FnOnce(&mut SimEnv) -> T) -> T {
+        self.with_env(index, |env| {
+            env.forward_if_dirty();
             write(env)
         })
     }
 
-    /// Accesses environment `index` without its deferred forward pass: the data may be [stale](Env::freshen).
+    /// Accesses environment `index` without its deferred forward pass: the data may be [stale](SimEnv::forward_if_dirty).
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
-    pub(crate) fn edit<T>(&self, index: usize, edit: impl FnOnce(&mut Env) -> T) -> T {
+    pub(crate) fn with_env<T>(&self, index: usize, edit: impl FnOnce(&mut SimEnv) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
         edit(&mut chunk.envs[index % self.chunks.chunk_size])
     }
 }
 
-impl Taken<'_> {
+impl LockedChunk<'_> {
     /// Calls `act` for every environment of the chunk, with its index and the read buffer of the chunk.
-    fn each(&mut self, mut act: impl FnMut(usize, &mut Env, &mut Vec<f64>)) {
-        let Chunk { envs, read } = &mut *self.chunk;
+    fn for_each_env(&mut self, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
+        let Chunk { envs, read_values: read } = &mut *self.chunk;
         for i in 0..envs.len() {
             // Prefetch the next environment while this one steps.
             if let Some(next) = envs.get(i + 1) {
-                next.prefetch(self.cold);
+                next.prefetch(self.exceeds_cache);
             } else if let Some(next) = self.next.and_then(|next| next.try_lock().ok()) {
-                next.envs.iter().take(1).for_each(|env| env.prefetch(self.cold));
+                next.envs.iter().take(1).for_each(|env| env.prefetch(self.exceeds_cache));
             }
-            envs[i].freshen();
+            envs[i].forward_if_dirty();
             act(self.first + i, &mut envs[i], read);
         }
     }
@@ -355,17 +355,17 @@ impl Taken<'_> {
 
 impl Chunks {
     /// Locks chunk `c`.
-    fn take(&self, c: usize) -> Taken<'_> {
-        Taken {
+    fn lock_chunk(&self, c: usize) -> LockedChunk<'_> {
+        LockedChunk {
             first: c * self.chunk_size,
             chunk: lock(&self.chunks[c]),
             next: self.chunks.get(c + 1),
-            cold: self.cold,
+            exceeds_cache: self.exceeds_cache,
         }
     }
 
     /// Processes the share of `thread`, then the remaining chunks of the following shares.
-    fn take_chunks(&self, thread: usize, mut job: impl FnMut(&mut Taken)) {
+    fn process_shares(&self, thread: usize, mut job: impl FnMut(&mut LockedChunk)) {
         let (before, from) = self.shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
@@ -373,7 +373,7 @@ impl Chunks {
                 if c >= share.chunks.end {
                     break;
                 }
-                job(&mut self.take(c));
+                job(&mut self.lock_chunk(c));
             }
         }
     }
@@ -422,7 +422,7 @@ mod tests {
     #[test]
     fn beyond_the_cache() {
         let (mut many, mut few) = (pendulums(1000, 3), pendulums(10, 1));
-        assert!(many.chunks.cold && !few.chunks.cold);
+        assert!(many.chunks.exceeds_cache && !few.chunks.exceeds_cache);
         many.step(7);
         few.step(7);
         let mut expected = Vec::new();

@@ -2,24 +2,26 @@
 
 use crate::batch::Batch;
 use crate::body_pose::BodyFrame;
-use crate::capture::Plan;
-use crate::contents::{Contents, GROUND_MASK_ID};
+use crate::capture::BodyAxis;
+use crate::contents::{EntitySet, GROUND_MASK_ID};
 use crate::drive::gains::Gains;
 use crate::drive::table::{Drive, DriveTable, Realization};
 use crate::drive::{DriveModel, implicit};
-use crate::env::{Env, with_small_buffers};
+use crate::env::{SimEnv, with_small_buffers};
 use crate::error::{Error, Result};
-use crate::index::{FreeIndex, GeomIndex, JointIndexing, PartIndex, RobotIndex, WeldIndex, joint_widths};
+use crate::index::{
+    BodyIndexing, GeomIndexing, JointIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths,
+};
 use crate::mjcf::document::{Mjcf, WeldEquality};
-use crate::mjcf::robot::{self, Purpose, RobotLayout};
+use crate::mjcf::robot::{self, MjcfDialect, RobotLayout};
 use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part_data::MjcfData;
 use crate::objects::rigid_object_data::RigidObjectData;
 use crate::objects::weld_data::WeldCfg;
-use crate::simulation::{Simulation, Start};
+use crate::simulation::{InitialState, Simulation};
 use crate::simulation_cfg::SimulationManagerCfg;
-use crate::snapshot::Layout;
-use crate::visible::{self, Identities, Owner};
+use crate::snapshot::StateLayout;
+use crate::visible::{self, ElementOwner, MaskIdMap};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::ObjectKind;
@@ -29,8 +31,8 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
 /// Compiles a scene. Self-collision pairs that overlap in the initial pose are excluded and reported.
-pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &Contents, pool: &ThreadPool) -> Result<Simulation> {
-    let first = build(cfg, contents, &[])?;
+pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &EntitySet, pool: &ThreadPool) -> Result<Simulation> {
+    let first = compile_scene(cfg, contents, &[])?;
     if !contents.robots.iter().any(|r| r.cfg().self_collision) {
         return first.into_simulation(cfg, pool, Vec::new());
     }
@@ -38,15 +40,15 @@ pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &Contents, pool: &Th
     if excluded.is_empty() {
         return first.into_simulation(cfg, pool, excluded);
     }
-    build(cfg, contents, &excluded)?.into_simulation(cfg, pool, excluded)
+    compile_scene(cfg, contents, &excluded)?.into_simulation(cfg, pool, excluded)
 }
 
 /// Builds the MJCF document of a scene, for running or for an export.
 pub(crate) fn document(
     cfg: &SimulationManagerCfg,
-    contents: &Contents,
+    contents: &EntitySet,
     excluded: &[(String, String)],
-    purpose: &Purpose<'_>,
+    purpose: &MjcfDialect<'_>,
     mut mjcf: Mjcf,
 ) -> Result<(Mjcf, Vec<RobotLayout>, Vec<Diagnostic>)> {
     if let Some(ground) = &cfg.ground {
@@ -59,18 +61,20 @@ pub(crate) fn document(
     let mut layouts = Vec::new();
     for (index, data) in contents.robots.iter().enumerate() {
         let purpose = match purpose {
-            Purpose::Run { .. } => Purpose::Run { friction_tendons: data.cfg().drive.model == DriveModel::Implicit },
+            MjcfDialect::Simulation { .. } => {
+                MjcfDialect::Simulation { friction_tendons: data.cfg().drive.model == DriveModel::Implicit }
+            }
             export => export.clone(),
         };
-        let robot_cfg = robot::RobotCfg {
+        let robot_cfg = robot::RobotMjcfCfg {
             uid: data.uid(),
             contact: scene::robot_contact(index, data.cfg().self_collision),
             fix_base: data.cfg().fix_base,
             base_pose: data.cfg().init_pose,
             plans: data.plans(),
             hulls: data.hulls(),
-            room_for_friction: data.cfg().drive.friction.is_some(),
-            purpose,
+            reserve_friction_tendons: data.cfg().drive.friction.is_some(),
+            dialect: purpose,
         };
         let layout = match data.file() {
             None => robot::add(data.description(), &robot_cfg, &mut mjcf, &mut diagnostics)?,
@@ -79,7 +83,7 @@ pub(crate) fn document(
                 .map_err(|error| data.file_error(error.into()))?,
         };
         if data.cfg().self_collision {
-            mjcf.excludes.extend(layout.base_pairs.iter().cloned());
+            mjcf.excludes.extend(layout.base_contact_exclusions.iter().cloned());
         }
         layouts.push(layout);
     }
@@ -89,21 +93,21 @@ pub(crate) fn document(
     for (index, terrain) in contents.terrains.iter().enumerate() {
         scene::add_terrain(&mut mjcf, index, terrain);
     }
-    mjcf.parts.extend(contents.parts.iter().map(|part| Arc::clone(part.document())));
+    mjcf.parts.extend(contents.mjcf_models.iter().map(|part| Arc::clone(part.document())));
     for pair in excluded {
         if !mjcf.excludes.contains(pair) {
             mjcf.excludes.push(pair.clone());
         }
     }
     let bodies = contents.mujoco_bodies(&layouts);
-    let called = |name: &str| -> Result<Vec<String>> {
-        let places = contents.bodies_called(name)?;
+    let mujoco_body_names = |name: &str| -> Result<Vec<String>> {
+        let places = contents.find_bodies(name)?;
         Ok(places.map_or_else(|| vec!["world".into()], |all| all.iter().map(|&k| bodies[k].clone()).collect()))
     };
-    for [one, other] in &contents.apart {
-        for (a, b) in called(one)?
+    for [one, other] in &contents.collision_exclusions {
+        for (a, b) in mujoco_body_names(one)?
             .iter()
-            .flat_map(|a| called(other).map(|all| (a.clone(), all)))
+            .flat_map(|a| mujoco_body_names(other).map(|all| (a.clone(), all)))
             .flat_map(|(a, all)| all.into_iter().map(move |b| (a.clone(), b)))
         {
             let known = |pair: &(String, String)| *pair == (a.clone(), b.clone()) || *pair == (b.clone(), a.clone());
@@ -113,7 +117,7 @@ pub(crate) fn document(
         }
     }
     for weld in &contents.welds {
-        let body = |name: &str| -> Result<String> { Ok(called(name)?.swap_remove(0)) };
+        let body = |name: &str| -> Result<String> { Ok(mujoco_body_names(name)?.swap_remove(0)) };
         let (first, second) = (body(&weld.cfg.first)?, body(&weld.cfg.second)?);
         // MuJoCo evaluates a weld at the origin of the second body, so the fixed body, which may be far away, comes
         // first.
@@ -123,26 +127,30 @@ pub(crate) fn document(
     Ok((mjcf, layouts, diagnostics))
 }
 
-struct Built {
+struct CompiledScene {
     model: mj::Model,
     table: Arc<DriveTable>,
-    robots: Vec<RobotIndex>,
-    objects: Vec<FreeIndex>,
-    parts: Vec<PartIndex>,
-    welds: Vec<WeldIndex>,
-    identities: Identities,
-    plan: Arc<Plan>,
-    start: Arc<Start>,
+    robots: Vec<RobotIndexing>,
+    objects: Vec<BodyIndexing>,
+    parts: Vec<MjcfIndexing>,
+    welds: Vec<WeldIndexing>,
+    identities: MaskIdMap,
+    plan: Arc<BodyAxis>,
+    start: Arc<InitialState>,
     xml: String,
     diagnostics: Vec<Diagnostic>,
     proxies: Vec<bool>,
 }
 
-fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, String)]) -> Result<Built> {
+fn compile_scene(
+    cfg: &SimulationManagerCfg,
+    contents: &EntitySet,
+    excluded: &[(String, String)],
+) -> Result<CompiledScene> {
     let empty = Mjcf::new("kinetoscope", cfg.physics_option());
-    let run = Purpose::Run { friction_tendons: true };
+    let run = MjcfDialect::Simulation { friction_tendons: true };
     let (mjcf, layouts, diagnostics) = document(cfg, contents, excluded, &run, empty)?;
-    let text = write::write(&mjcf, mj::TARGET);
+    let text = write::write(&mjcf, mj::BUILD_VERSION);
     let files: Vec<mj::Asset> = contents
         .terrains
         .iter()
@@ -154,21 +162,34 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
         mj::LoadError::Compile(error) => Error::Compile(text.locate(error)),
         other => other.into(),
     })?;
-    let mut objects = find_objects(&compiled, contents)?;
-    damp_objects(&mut compiled, contents, &objects);
+    let mut objects = index_objects(&compiled, contents)?;
+    set_object_damping(&mut compiled, contents, &objects);
     let (model, table, robots, start) = set_up_drives(compiled, contents, &layouts)?;
     objects.iter_mut().for_each(|o| o.mocap = usize::try_from(model.body_mocapid()[o.body]).ok());
-    let parts = contents.parts.iter().map(|part| find_part(&model, part)).collect::<Result<Vec<_>>>()?;
-    let welds = contents.welds.iter().map(|weld| find_weld(&model, &weld.cfg)).collect::<Result<Vec<_>>>()?;
-    let identities = identify(&model, contents, &robots, &objects, &parts);
-    let plan = Arc::new(Plan::new(&model, &robots, &objects, &parts, &contents.carriers()));
+    let parts = contents.mjcf_models.iter().map(|part| index_mjcf(&model, part)).collect::<Result<Vec<_>>>()?;
+    let welds = contents.welds.iter().map(|weld| index_weld(&model, &weld.cfg)).collect::<Result<Vec<_>>>()?;
+    let identities = assign_geom_owners(&model, contents, &robots, &objects, &parts);
+    let plan = Arc::new(BodyAxis::new(&model, &robots, &objects, &parts, &contents.moving_bodies()));
     let (table, start) = (Arc::new(table), Arc::new(start));
-    let (proxies, xml) = (find_proxies(&model, contents, &robots), text.xml);
-    Ok(Built { model, table, robots, objects, parts, welds, identities, plan, start, xml, diagnostics, proxies })
+    let (proxies, xml) = (find_visual_proxies(&model, contents, &robots), text.xml);
+    Ok(CompiledScene {
+        model,
+        table,
+        robots,
+        objects,
+        parts,
+        welds,
+        identities,
+        plan,
+        start,
+        xml,
+        diagnostics,
+        proxies,
+    })
 }
 
 /// Marks the geoms that stand in for visual meshes.
-fn find_proxies(model: &mj::Model, contents: &Contents, robots: &[RobotIndex]) -> Vec<bool> {
+fn find_visual_proxies(model: &mj::Model, contents: &EntitySet, robots: &[RobotIndexing]) -> Vec<bool> {
     let mut proxies = vec![false; model.ngeom()];
     for (data, index) in contents.robots.iter().zip(robots) {
         for geom in &index.geoms {
@@ -185,24 +206,25 @@ fn find_proxies(model: &mj::Model, contents: &Contents, robots: &[RobotIndex]) -
     proxies
 }
 
-fn missing(what: &'static str, name: &str) -> Error {
+fn missing_name_error(what: &'static str, name: &str) -> Error {
     Error::UnknownName { what, name: name.into(), candidates: Vec::new() }
 }
 
 /// Finds every rigid object in the compiled model.
-fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<FreeIndex>> {
+fn index_objects(compiled: &mj::Compiled, contents: &EntitySet) -> Result<Vec<BodyIndexing>> {
     let find = |object: &RigidObjectData| {
-        let body = compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing("body", object.uid()))?;
+        let body =
+            compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing_name_error("body", object.uid()))?;
         let joint = compiled.joint_address(&format!("{}/free", object.uid()));
-        Ok(FreeIndex { body, joint, mocap: None })
+        Ok(BodyIndexing { body, free_joint: joint, mocap: None })
     };
     contents.objects.iter().map(|object| find(object)).collect()
 }
 
 /// Sets linear and angular damping of free joints separately, which MJCF cannot express for a free joint.
-fn damp_objects(compiled: &mut mj::Compiled, contents: &Contents, objects: &[FreeIndex]) {
+fn set_object_damping(compiled: &mut mj::Compiled, contents: &EntitySet, objects: &[BodyIndexing]) {
     for (object, index) in contents.objects.iter().zip(objects) {
-        if let Some((_, dof)) = index.joint {
+        if let Some((_, dof)) = index.free_joint {
             let damping = compiled.dof_damping_mut();
             damping[dof..dof + 3].fill(object.cfg().linear_damping);
             damping[dof + 3..dof + 6].fill(object.cfg().angular_damping);
@@ -210,18 +232,18 @@ fn damp_objects(compiled: &mut mj::Compiled, contents: &Contents, objects: &[Fre
     }
 }
 
-fn find_weld(model: &mj::Model, weld: &WeldCfg) -> Result<WeldIndex> {
-    let equality = model.id(ObjectKind::Equality, &weld.uid).ok_or_else(|| missing("weld", &weld.uid))?;
+fn index_weld(model: &mj::Model, weld: &WeldCfg) -> Result<WeldIndexing> {
+    let equality = model.id(ObjectKind::Equality, &weld.uid).ok_or_else(|| missing_name_error("weld", &weld.uid))?;
     let bodies = [model.eq_obj1id()[equality], model.eq_obj2id()[equality]].map(|body| body.max(0) as usize);
-    Ok(WeldIndex { equality, bodies })
+    Ok(WeldIndexing { equality, bodies })
 }
 
 /// Finds all elements of an attached MJCF file in the compiled model, by name.
-fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
+fn index_mjcf(model: &mj::Model, part: &MjcfData) -> Result<MjcfIndexing> {
     let (file, names) = (part.model(), part.names());
-    let find = |kind, what, name: &str| model.id(kind, name).ok_or_else(|| missing(what, name));
+    let find = |kind, what, name: &str| model.id(kind, name).ok_or_else(|| missing_name_error(what, name));
     let all = |kind, what, names: &[String]| -> Result<Vec<usize>> {
-        names.iter().map(|name| find(kind, what, &part.full(name))).collect()
+        names.iter().map(|name| find(kind, what, &part.scoped_name(name))).collect()
     };
     let mut bodies = vec![find(ObjectKind::Body, "body", part.uid())?];
     bodies.extend(all(ObjectKind::Body, "body", &names.bodies[1..])?);
@@ -241,7 +263,7 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
     let frames =
         frames.map(|frame| BodyFrame { body: bodies[frame.body], body_from_frame: frame.body_from_frame }).collect();
     let mocaps = (0..file.nbody()).filter(|&body| file.body_mocapid()[body] >= 0).map(|body| bodies[body]).collect();
-    Ok(PartIndex {
+    Ok(MjcfIndexing {
         geoms: all(ObjectKind::Geom, "geom", &names.geoms)?,
         qpos,
         dofs,
@@ -249,27 +271,27 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
         controls: actuators.iter().map(|&actuator| model.actuator_control(actuator)).collect(),
         activations: actuators.iter().flat_map(|&actuator| model.actuator_activation(actuator)).collect(),
         actuators,
-        mocaps,
+        mocap_bodies: mocaps,
         frames,
         bodies,
     })
 }
 
 /// Owner of every geom, for mask ids and labels.
-fn identify(
+fn assign_geom_owners(
     model: &mj::Model,
-    contents: &Contents,
-    robots: &[RobotIndex],
-    objects: &[FreeIndex],
-    parts: &[PartIndex],
-) -> Identities {
+    contents: &EntitySet,
+    robots: &[RobotIndexing],
+    objects: &[BodyIndexing],
+    parts: &[MjcfIndexing],
+) -> MaskIdMap {
     let ground =
-        || Owner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground".into(), body: None };
-    let mut owners: Vec<Owner> = (0..model.ngeom()).map(|_| ground()).collect();
+        || ElementOwner { id: GROUND_MASK_ID, object: "ground".into(), link: None, class: "ground".into(), body: None };
+    let mut owners: Vec<ElementOwner> = (0..model.ngeom()).map(|_| ground()).collect();
     let mut first = 0;
     for (data, index) in contents.robots.iter().zip(robots) {
         for geom in &index.geoms {
-            owners[geom.geom] = Owner {
+            owners[geom.geom] = ElementOwner {
                 id: data.mask_id(geom.link),
                 object: data.uid().into(),
                 link: Some(data.description().links[geom.link].name.clone()),
@@ -284,14 +306,14 @@ fn identify(
             let object = &contents.objects[k];
             let body = Some((first + k) as u32);
             let class = object.cfg().semantic_class.clone().unwrap_or_else(|| "object".into());
-            owners[geom] = Owner { id: object.mask_id(), object: object.uid().into(), link: None, class, body };
+            owners[geom] = ElementOwner { id: object.mask_id(), object: object.uid().into(), link: None, class, body };
         }
     }
     first += objects.len();
-    for (data, index) in contents.parts.iter().zip(parts) {
+    for (data, index) in contents.mjcf_models.iter().zip(parts) {
         for (geom, &here) in index.geoms.iter().enumerate() {
             let of = data.model().geom_bodyid()[geom] as usize;
-            owners[here] = Owner {
+            owners[here] = ElementOwner {
                 id: data.mask_id(of),
                 object: data.uid().into(),
                 link: (of > 0).then(|| data.names().bodies[of].clone()),
@@ -305,7 +327,7 @@ fn identify(
     for terrain in &contents.terrains {
         if let Some(geom) = model.id(ObjectKind::Geom, terrain.uid()) {
             let (id, object) = (terrain.mask_id(), terrain.uid().into());
-            owners[geom] = Owner { id, object, link: None, class: "terrain".into(), body: None };
+            owners[geom] = ElementOwner { id, object, link: None, class: "terrain".into(), body: None };
         }
     }
     visible::of_simulation(model, &owners, &visible::tendon_owners(model, contents))
@@ -314,12 +336,12 @@ fn identify(
 /// Finds every joint and link in the compiled model, and replaces actuators of implicit drives by constraint rows.
 fn set_up_drives(
     mut compiled: mj::Compiled,
-    contents: &Contents,
+    contents: &EntitySet,
     layouts: &[RobotLayout],
-) -> Result<(mj::Model, DriveTable, Vec<RobotIndex>, Start)> {
+) -> Result<(mj::Model, DriveTable, Vec<RobotIndexing>, InitialState)> {
     let mut table = DriveTable::default();
     let mut indices = Vec::new();
-    let mut start = Start::default();
+    let mut start = InitialState::default();
     let mut row_drives: Vec<(usize, usize)> = Vec::new();
     let (mut row_actuators, mut native_actuators, mut effort_sources) = (Vec::new(), Vec::new(), Vec::new());
     for (data, layout) in contents.robots.iter().zip(layouts) {
@@ -327,14 +349,15 @@ fn set_up_drives(
         let mut joints = Vec::new();
         for plan in data.plans() {
             let name = format!("{}/{}", data.uid(), data.description().joint(plan.joint).name);
-            let (qpos, dof) = compiled.joint_address(&name).ok_or_else(|| missing("joint", &name))?;
+            let (qpos, dof) = compiled.joint_address(&name).ok_or_else(|| missing_name_error("joint", &name))?;
             start.qpos.push((qpos, plan.initial));
             let mut drive = None;
             if let Some(actuator) = plan.actuator {
-                let ctrl = compiled.id(ObjectKind::Actuator, &name).ok_or_else(|| missing("actuator", &name))?;
+                let ctrl =
+                    compiled.id(ObjectKind::Actuator, &name).ok_or_else(|| missing_name_error("actuator", &name))?;
                 let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
                 let initial = Gains { kp: actuator.kp, kd: actuator.kd, max_effort, max_velocity };
-                let (realization, setting, range) = (Realization::Actuator, plan.setting, plan.usable);
+                let (realization, setting, range) = (Realization::Actuator, plan.setting, plan.target_range);
                 let index = table.drives.len();
                 table.drives.push(Drive { qpos, dof, ctrl, realization, initial, setting, range });
                 start.targets.push((index, plan.initial));
@@ -352,7 +375,8 @@ fn set_up_drives(
             joints.push(JointIndexing { qpos, dof, drive });
         }
         for damped in &layout.damped {
-            let (_, dof) = compiled.joint_address(&damped.joint).ok_or_else(|| missing("joint", &damped.joint))?;
+            let (_, dof) =
+                compiled.joint_address(&damped.joint).ok_or_else(|| missing_name_error("joint", &damped.joint))?;
             table.damped.extend((dof..dof + damped.dofs).map(|dof| (dof, damped.damping)));
             table.undamped_armature.extend(std::iter::repeat_n(damped.armature, damped.dofs));
         }
@@ -360,7 +384,9 @@ fn set_up_drives(
             .links
             .iter()
             .map(|frame| {
-                let body = compiled.id(ObjectKind::Body, &frame.body).ok_or_else(|| missing("body", &frame.body))?;
+                let body = compiled
+                    .id(ObjectKind::Body, &frame.body)
+                    .ok_or_else(|| missing_name_error("body", &frame.body))?;
                 Ok(BodyFrame { body, body_from_frame: frame.body_from_link })
             })
             .collect::<Result<Vec<_>>>()?;
@@ -368,16 +394,18 @@ fn set_up_drives(
             .geoms
             .iter()
             .map(|owner| {
-                let geom = compiled.id(ObjectKind::Geom, &owner.geom).ok_or_else(|| missing("geom", &owner.geom))?;
-                Ok(GeomIndex { geom, link: owner.link.0, visual: owner.visual })
+                let geom = compiled
+                    .id(ObjectKind::Geom, &owner.geom)
+                    .ok_or_else(|| missing_name_error("geom", &owner.geom))?;
+                Ok(GeomIndexing { geom, link: owner.link.0, visual: owner.visual })
             })
             .collect::<Result<_>>()?;
-        let root = FreeIndex {
+        let root = BodyIndexing {
             body: links[data.description().root.0].body,
-            joint: layout.free_joint.as_ref().and_then(|joint| compiled.joint_address(joint)),
+            free_joint: layout.free_joint.as_ref().and_then(|joint| compiled.joint_address(joint)),
             mocap: None,
         };
-        indices.push(RobotIndex { joints, links, root, geoms });
+        indices.push(RobotIndexing { joints, links, root, geoms });
     }
     let dofs: Vec<usize> = row_drives.iter().map(|&(dof, _)| dof).collect();
     implicit::prepare(&mut compiled, &dofs, &row_actuators);
@@ -387,14 +415,14 @@ fn set_up_drives(
     let model = compiled.into_model();
     for (dof, index) in row_drives {
         if model.dof_frictionloss()[dof] <= 0.0 {
-            return Err(missing("friction row", &format!("{dof}")));
+            return Err(missing_name_error("friction row", &format!("{dof}")));
         }
-        table.drives[index].realization = Realization::Row;
+        table.drives[index].realization = Realization::ConstraintRow;
     }
     Ok((model, table, indices, start))
 }
 
-impl Built {
+impl CompiledScene {
     fn into_simulation(
         self,
         cfg: &SimulationManagerCfg,
@@ -415,21 +443,21 @@ impl Built {
             batch,
             robots: self.robots,
             objects: self.objects,
-            parts: self.parts,
+            mjcf_models: self.parts,
             welds: self.welds,
             identities: self.identities,
-            plan: self.plan,
-            visible: None,
+            body_axis: self.plan,
+            visual_scene: None,
             xml: self.xml,
             diagnostics,
-            start: self.start,
-            layout: Arc::new(Layout::of(&self.model, &self.table, cfg.substeps)),
-            tables: OnceLock::new(),
-            maker: None,
-            own_values: vec![None; cfg.num_envs],
-            own_scenes: Vec::new(),
-            proxies: self.proxies,
-            excluded,
+            initial_state: self.start,
+            layout: Arc::new(StateLayout::of(&self.model, &self.table, cfg.substeps)),
+            property_tables: OnceLock::new(),
+            model_patcher: None,
+            property_overrides: vec![None; cfg.num_envs],
+            env_scenes: Vec::new(),
+            visual_proxies: self.proxies,
+            overlap_exclusions: excluded,
         };
         simulation.reset(&vec![true; cfg.num_envs]);
         Ok(simulation)
@@ -437,9 +465,9 @@ impl Built {
 }
 
 /// Pairs of bodies of one robot that overlap in the initial pose.
-fn overlapping_pairs(built: &Built, contents: &Contents) -> Result<Vec<(String, String)>> {
+fn overlapping_pairs(built: &CompiledScene, contents: &EntitySet) -> Result<Vec<(String, String)>> {
     // Uses an environment because its buffers grow until all contacts fit.
-    let mut env = Env::new(&with_small_buffers(&built.model), &built.table)?;
+    let mut env = SimEnv::new(&with_small_buffers(&built.model), &built.table)?;
     env.write(|data| {
         for &(address, position) in &built.start.qpos {
             data.qpos_mut()[address] = position;

@@ -1,7 +1,7 @@
 //! Entities of a simulation by name, for code that did not create them: recorders, inspectors, viewers.
 
 use crate::error::{Error, Result};
-use crate::ids::{MjcfId, ObjectId, RobotId, TerrainId};
+use crate::ids::{MjcfId, RigidObjectId, RobotId, TerrainId};
 use crate::manager::SimulationManager;
 use crate::objects::articulation::ArticulationId;
 use crate::objects::robot_data::RobotData;
@@ -40,7 +40,7 @@ impl<'a> Entities<'a> {
 
     /// All robots and articulations with their uids, in insertion order.
     pub fn robot_ids(&self) -> Vec<(&'a str, RobotId)> {
-        let robots = self.sim.contents.robots.iter().enumerate();
+        let robots = self.sim.entities.robots.iter().enumerate();
         robots.map(|(index, robot)| (robot.uid(), RobotId { manager: self.sim.serial, index })).collect()
     }
 
@@ -48,12 +48,12 @@ impl<'a> Entities<'a> {
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
-    pub fn rigid_object_id(&self, uid: &str) -> Result<ObjectId> {
-        let index = self.sim.contents.objects.iter().position(|o| o.uid() == uid);
-        index.map(|index| ObjectId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
+    pub fn rigid_object_id(&self, uid: &str) -> Result<RigidObjectId> {
+        let index = self.sim.entities.objects.iter().position(|o| o.uid() == uid);
+        index.map(|index| RigidObjectId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
             what: "rigid object",
             name: uid.into(),
-            candidates: self.sim.contents.objects.iter().map(|o| o.uid().to_string()).collect(),
+            candidates: self.sim.entities.objects.iter().map(|o| o.uid().to_string()).collect(),
         })
     }
 
@@ -62,11 +62,11 @@ impl<'a> Entities<'a> {
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
     pub fn mjcf_id(&self, uid: &str) -> Result<MjcfId> {
-        let index = self.sim.contents.parts.iter().position(|p| p.uid() == uid);
+        let index = self.sim.entities.mjcf_models.iter().position(|p| p.uid() == uid);
         index.map(|index| MjcfId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
             what: "MJCF part",
             name: uid.into(),
-            candidates: self.sim.contents.parts.iter().map(|p| p.uid().to_string()).collect(),
+            candidates: self.sim.entities.mjcf_models.iter().map(|p| p.uid().to_string()).collect(),
         })
     }
 
@@ -79,8 +79,8 @@ impl<'a> Entities<'a> {
     }
 
     /// Uids of all robots, then of all passive articulations, each in insertion order.
-    pub fn jointed_uids(&self) -> Vec<&'a str> {
-        let of = |robots: bool| self.sim.contents.robots.iter().filter(move |data| data.is_robot() == robots);
+    pub fn articulated_uids(&self) -> Vec<&'a str> {
+        let of = |robots: bool| self.sim.entities.robots.iter().filter(move |data| data.is_robot() == robots);
         of(true).chain(of(false)).map(|data| data.uid()).collect()
     }
 
@@ -88,18 +88,18 @@ impl<'a> Entities<'a> {
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
-    pub fn jointed_id(&self, uid: &str) -> Result<RobotId> {
+    pub fn articulated_id(&self, uid: &str) -> Result<RobotId> {
         self.sim.find_robot(uid, "robot or articulation", |_: &RobotData| true)
     }
 
     /// Uids of all rigid objects, in insertion order.
     pub fn rigid_object_uids(&self) -> Vec<&'a str> {
-        self.sim.contents.objects.iter().map(|object| object.uid()).collect()
+        self.sim.entities.objects.iter().map(|object| object.uid()).collect()
     }
 
     /// Uids of all attached MJCF files, in insertion order.
     pub fn mjcf_uids(&self) -> Vec<&'a str> {
-        self.sim.contents.parts.iter().map(|part| part.uid()).collect()
+        self.sim.entities.mjcf_models.iter().map(|part| part.uid()).collect()
     }
 
     /// Uids of all sensors, in insertion order.
@@ -112,8 +112,8 @@ impl<'a> Entities<'a> {
     ///
     /// # Errors
     /// The uid is unknown, or the sensor failed, in an earlier step or now.
-    pub fn sensor_called(&self, uid: &str) -> Result<&'a dyn Sensor> {
-        self.sim.sensors.called(uid)
+    pub fn sensor_by_uid(&self, uid: &str) -> Result<&'a dyn Sensor> {
+        self.sim.sensors.by_uid(uid)
     }
 
     /// Physics steps until the sensor `uid` measures next in any environment, at least 1; [`u64::MAX`] if it never
@@ -136,13 +136,13 @@ impl<'a> Entities<'a> {
     /// The handle belongs to another manager.
     #[track_caller]
     pub fn terrain(&self, id: TerrainId) -> &'a Terrain {
-        &self.sim.contents.terrains[self.sim.index_of(id.manager, id.index)]
+        &self.sim.entities.terrains[self.sim.index_of(id.manager, id.index)]
     }
 
     /// Names of all bodies, in the order in which sensors and viewers number them: links of all robots (`uid/link`),
     /// objects, then bodies and sites of attached MJCF files (`uid/body`).
     pub fn body_names(&self) -> Arc<[String]> {
-        self.sim.contents.body_names()
+        self.sim.entities.body_names()
     }
 
     /// Positions and velocities of all joints in MuJoCo's layout (`qpos`, `qvel`), shapes (N, nq) and (N, nv).
@@ -162,11 +162,11 @@ impl<'a> Entities<'a> {
     /// Column names of the controls of a [rollout](SimulationManager::rollout): movable joints of all robots
     /// (`uid/joint`), then actuators of all attached MJCF files (`uid/actuator`), each in insertion order.
     pub fn control_names(&self) -> Vec<String> {
-        let parts = self.sim.contents.parts.iter();
-        let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.full(name)));
+        let parts = self.sim.entities.mjcf_models.iter();
+        let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.scoped_name(name)));
         let drives = self
             .sim
-            .contents
+            .entities
             .robots
             .iter()
             .flat_map(|robot| robot.joint_names().iter().map(|joint| format!("{}/{joint}", robot.uid())));

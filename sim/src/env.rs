@@ -9,12 +9,13 @@
 //! comes. Every cache line that a step touches beside MuJoCo's then costs a miss. Scratch memory of a step is therefore
 //! per thread, and rarely used fields are stored apart from the hot ones.
 
-use crate::capture::{Capture, Solved};
+use crate::capture::{CaptureRequest, CapturedStep};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
+    Buffers, Data, EngineError, IntegrationState, Model, Overflow, UnnormalizedQuats, UserInputs, Warning,
+    WarningCounts, Weld,
 };
 use kinetoscope_scene::Contact;
 use std::cell::Cell;
@@ -56,11 +57,11 @@ impl std::fmt::Display for Divergence {
 }
 
 /// Memory of one environment above which its buffers no longer grow \[bytes\].
-const LARGEST_ENVIRONMENT: usize = 2 << 30;
+const MAX_ENV_BYTES: usize = 2 << 30;
 
 /// One environment of a batch.
 #[derive(Debug)]
-pub struct Env {
+pub struct SimEnv {
     data: Data,
     /// Targets, gains and efforts of the drives.
     pub drives: DriveState,
@@ -68,32 +69,32 @@ pub struct Env {
     /// Divergence status; `None` while the environment runs.
     diverged: Option<Box<EnvStatus>>,
     /// Quaternions before the last forward pass; the rest of the state is in `data`.
-    raw_quats: RawQuats,
+    raw_quats: UnnormalizedQuats,
     /// True if forces and accelerations were solved for the current state, false if for the state before the last step.
-    solved_now: bool,
+    solved_current: bool,
     /// True after the model was replaced and before the next forward pass. The pass is deferred to the next read or
     /// step, so that several property changes and a reset share one pass. Until then, quaternions in `qpos` are those
     /// before a pass.
-    stale: bool,
-    seldom: Box<Seldom>,
+    dirty: bool,
+    cold: Box<ColdState>,
     /// External wrenches of the user; `None` in most environments.
     wrenches: Option<Box<Wrenches>>,
 }
 
 /// Fields that a successful step does not touch.
 #[derive(Debug, Default)]
-struct Seldom {
+struct ColdState {
     warnings: WarningCounts,
-    growths: u32,
+    buffer_growths: u32,
     /// User inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
-    inputs: Inputs,
+    inputs: UserInputs,
     /// Quantities captured in the last step that sensors needed.
-    solved: Solved,
+    captured: CapturedStep,
     /// Attached welds; their relative poses are in the model.
     welds: Vec<Weld>,
 }
 
-impl Env {
+impl SimEnv {
     /// Creates an environment in the model's initial state and runs one forward pass.
     ///
     /// # Errors
@@ -109,14 +110,14 @@ impl Env {
             drives,
             steps: 0,
             diverged: None,
-            raw_quats: RawQuats::new(model),
-            solved_now: true,
-            stale: false,
-            seldom: Box::default(),
+            raw_quats: UnnormalizedQuats::new(model),
+            solved_current: true,
+            dirty: false,
+            cold: Box::default(),
             wrenches: None,
         };
-        let initial = env.saved();
-        env.refresh(&initial);
+        let initial = env.current_motion();
+        env.forward(&initial);
         Ok(env)
     }
 
@@ -131,56 +132,56 @@ impl Env {
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
         // Quaternions that `change` leaves alone must be normalized once, not twice.
         self.raw_quats.restore(&mut self.data);
-        let good = self.saved();
+        let good = self.current_motion();
         change(&mut self.data);
-        self.solved_now = true;
-        self.refresh(&good);
+        self.solved_current = true;
+        self.forward(&good);
     }
 
-    /// Replaces the model by one of the same sizes. The forward pass is deferred: [`freshen`](Self::freshen) must
+    /// Replaces the model by one of the same sizes. The forward pass is deferred: [`forward_if_dirty`](Self::forward_if_dirty) must
     /// follow before any other use except another replacement.
     pub(crate) fn set_model(&mut self, model: Model) {
-        if !self.stale {
+        if !self.dirty {
             self.raw_quats.restore(&mut self.data);
         }
-        let welds = &self.seldom.welds;
+        let welds = &self.cold.welds;
         self.data.set_model(if welds.is_empty() { model } else { model.with_welds(welds) });
-        self.solved_now = true;
-        self.stale = true;
+        self.solved_current = true;
+        self.dirty = true;
     }
 
     /// Runs the forward pass that a replaced model needs.
-    pub(crate) fn freshen(&mut self) {
-        if self.stale {
-            self.stale = false;
-            let good = self.saved();
-            self.refresh(&good);
+    pub(crate) fn forward_if_dirty(&mut self) {
+        if self.dirty {
+            self.dirty = false;
+            let good = self.current_motion();
+            self.forward(&good);
         }
     }
 
     /// Attached welds.
     pub(crate) fn welds(&self) -> &[Weld] {
-        &self.seldom.welds
+        &self.cold.welds
     }
 
     /// Attaches these welds, releases all others, and runs a forward pass.
     pub(crate) fn set_welds(&mut self, welds: Vec<Weld>) {
-        if welds == self.seldom.welds {
+        if welds == self.cold.welds {
             return;
         }
         self.raw_quats.restore(&mut self.data);
-        let good = self.saved();
-        self.exchange_welds(welds);
-        self.solved_now = true;
-        self.refresh(&good);
+        let good = self.current_motion();
+        self.replace_welds(welds);
+        self.solved_current = true;
+        self.forward(&good);
     }
 
     /// As [`set_welds`](Self::set_welds), without the forward pass.
-    fn exchange_welds(&mut self, welds: Vec<Weld>) {
-        if welds == self.seldom.welds {
+    fn replace_welds(&mut self, welds: Vec<Weld>) {
+        if welds == self.cold.welds {
             return;
         }
-        for weld in &self.seldom.welds {
+        for weld in &self.cold.welds {
             self.data.set_equality_active(weld.equality, false);
         }
         let model = self.data.model().with_welds(&welds);
@@ -188,18 +189,18 @@ impl Env {
         for weld in &welds {
             self.data.set_equality_active(weld.equality, true);
         }
-        self.seldom.welds = welds;
+        self.cold.welds = welds;
     }
 
     /// Sets controls. They are not part of the state, so no forward pass is needed.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
         change(self.data.ctrl_mut());
-        self.seldom.inputs.save(&self.data);
+        self.cold.inputs.save(&self.data);
     }
 
     /// External wrenches and weightless bodies.
     pub(crate) fn wrenches(&self) -> &Wrenches {
-        static NONE: Wrenches = Wrenches { list: Vec::new(), weightless: Vec::new() };
+        static NONE: Wrenches = Wrenches { list: Vec::new(), gravity_compensated: Vec::new() };
         self.wrenches.as_deref().unwrap_or(&NONE)
     }
 
@@ -212,7 +213,7 @@ impl Env {
         if **wrenches == Wrenches::default() {
             self.wrenches = None;
         }
-        self.seldom.inputs.save(&self.data);
+        self.cold.inputs.save(&self.data);
     }
 
     /// Writes the efforts of drives and the wrenches to `data`, for the next `mj_step2`.
@@ -225,107 +226,107 @@ impl Env {
 
     /// Announces a [`reset`](Self::reset), which makes a deferred forward pass unnecessary.
     pub(crate) fn expect_reset(&mut self) {
-        self.stale = false;
+        self.dirty = false;
     }
 
     /// Resets to the model's initial state, modified by `change`. A diverged environment runs again.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
-        self.stale = false;
+        self.dirty = false;
         self.data.reset();
         self.data.take_warnings();
         self.drives.reset();
         if let Some(wrenches) = &mut self.wrenches {
             wrenches.list.clear();
         }
-        self.exchange_welds(Vec::new());
+        self.replace_welds(Vec::new());
         self.diverged = None;
         self.steps = 0;
-        self.solved_now = true;
-        let initial = self.saved();
+        self.solved_current = true;
+        let initial = self.current_motion();
         change(&mut self.data, &mut self.drives);
-        self.drives.start();
-        self.refresh(&initial);
+        self.drives.reset_memory();
+        self.forward(&initial);
     }
 
     /// Ends external wrenches and clears the memory of actuator models (delays, motor states). The state stays.
     pub(crate) fn reset_buffers(&mut self) {
         self.set_wrenches(|wrenches| wrenches.list.clear());
-        self.drives.start();
+        self.drives.reset_memory();
     }
 
     /// Copy of the current state in `data`.
-    fn saved(&self) -> Motion {
-        let mut motion = Motion::default();
+    fn current_motion(&self) -> IntegrationState {
+        let mut motion = IntegrationState::default();
         motion.save(&self.data);
         motion
     }
 
     /// Saves the current state with its quaternions as they were before the forward pass.
-    fn save_present(&self, state: &mut Motion) {
+    fn save_raw_motion(&self, state: &mut IntegrationState) {
         state.save(&self.data);
         state.undo_normalization(&self.raw_quats);
     }
 
     /// Restores a state and the user inputs; the caller must run the forward pass.
-    fn go_to(&mut self, state: &Motion) {
-        self.seldom.inputs.restore(&mut self.data);
+    fn restore_motion(&mut self, state: &IntegrationState) {
+        self.cold.inputs.restore(&mut self.data);
         state.restore(&mut self.data);
         self.raw_quats.save(&self.data);
     }
 
     /// Adds steps, warnings and divergence of `other`, whose state was copied to this environment.
-    pub(crate) fn take_history(&mut self, other: &History) {
+    pub(crate) fn add_stats(&mut self, other: &EnvStats) {
         self.steps = other.steps;
-        self.seldom.warnings.add(&other.warnings);
-        self.seldom.growths += other.growths;
+        self.cold.warnings.add(&other.warnings);
+        self.cold.buffer_growths += other.growths;
         if self.diverged.is_none() {
             self.diverged.clone_from(&other.diverged);
         }
     }
 
     /// Counters and divergence since the environment was created.
-    pub(crate) fn history(&self) -> History {
-        History {
+    pub(crate) fn stats(&self) -> EnvStats {
+        EnvStats {
             diverged: self.diverged.clone(),
             steps: self.steps,
-            warnings: self.seldom.warnings,
-            growths: self.seldom.growths,
+            warnings: self.cold.warnings,
+            growths: self.cold.buffer_growths,
         }
     }
 
     /// Saves everything that determines future steps.
-    pub(crate) fn remember(&self) -> EnvState {
-        let (mut motion, mut inputs) = (Motion::default(), Inputs::default());
-        self.save_present(&mut motion);
+    pub(crate) fn save_state(&self) -> EnvState {
+        let (mut motion, mut inputs) = (IntegrationState::default(), UserInputs::default());
+        self.save_raw_motion(&mut motion);
         inputs.save(&self.data);
-        let (drives, diverged) = (self.drives.numbers(), self.diverged.clone());
-        let (wrenches, welds) = (self.wrenches().clone(), self.seldom.welds.clone());
+        let (drives, diverged) = (self.drives.to_flat(), self.diverged.clone());
+        let (wrenches, welds) = (self.wrenches().clone(), self.cold.welds.clone());
         EnvState { motion, inputs, drives, wrenches, welds, steps: self.steps, diverged }
     }
 
-    /// Restores `state`, which comes from a model of the same layout and [fits](EnvState::fits).
-    pub(crate) fn recall(&mut self, state: &EnvState) {
-        self.drives.set_numbers(&state.drives);
+    /// Restores `state`, which comes from a model of the same layout and [fits](EnvState::has_same_lengths).
+    pub(crate) fn load_state(&mut self, state: &EnvState) {
+        self.drives.set_from_flat(&state.drives);
         // A hand-made file may name a body that does not exist.
         let bodies = self.data.model().nbody();
-        let wrenches = state.wrenches.moved(|body| (body < bodies).then_some(body));
+        let wrenches = state.wrenches.remapped(|body| (body < bodies).then_some(body));
         self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
         let welds = state.welds.iter().filter(|weld| self.data.model().is_weld(weld.equality)).copied().collect();
-        self.exchange_welds(welds);
+        self.replace_welds(welds);
         self.diverged.clone_from(&state.diverged);
         self.steps = state.steps;
-        self.solved_now = true;
-        self.seldom.solved.clear();
-        self.seldom.inputs.clone_from(&state.inputs);
-        self.go_to(&state.motion);
-        self.refresh(&state.motion);
+        self.solved_current = true;
+        self.cold.captured.clear();
+        self.cold.inputs.clone_from(&state.inputs);
+        self.restore_motion(&state.motion);
+        self.forward(&state.motion);
     }
 
     /// Positions, velocities and warm start, for a transfer to another model.
-    pub(crate) fn saved_arrays(&self) -> SavedArrays {
-        let mut state = Motion::default();
-        self.save_present(&mut state);
-        SavedArrays {
+    pub(crate) fn state_arrays(&self) -> StateArrays {
+        let mut state = IntegrationState::default();
+        self.save_raw_motion(&mut state);
+        StateArrays {
             qpos: state.qpos(self.data.model()).to_vec(),
             qvel: self.data.qvel().to_vec(),
             warmstart: self.data.qacc_warmstart().to_vec(),
@@ -344,12 +345,12 @@ impl Env {
 
     /// Counts of MuJoCo's warnings since the environment was created, without overflows that a repeated step resolved.
     pub fn warnings(&self) -> &WarningCounts {
-        &self.seldom.warnings
+        &self.cold.warnings
     }
 
     /// Number of times the buffers were doubled.
-    pub fn growths(&self) -> u32 {
-        self.seldom.growths
+    pub fn buffer_growths(&self) -> u32 {
+        self.cold.buffer_growths
     }
 
     /// Prefetches memory for the next step without waiting; `arrays` includes the large arrays.
@@ -368,7 +369,7 @@ impl Env {
     }
 
     /// As [`step`](Self::step), and captures the quantities of `capture` in the last step.
-    pub(crate) fn step_and_capture(&mut self, count: u32, capture: Option<&Capture>) {
+    pub(crate) fn step_and_capture(&mut self, count: u32, capture: Option<&CaptureRequest>) {
         for left in (0..count).rev() {
             if self.diverged.is_some() {
                 return;
@@ -377,51 +378,51 @@ impl Env {
         }
     }
 
-    fn step_once(&mut self, mut capture: Option<&Capture>) {
+    fn step_once(&mut self, mut capture: Option<&CaptureRequest>) {
         if let Some(wanted) = capture.take_if(|_| self.data.model().integrator() == mj::mjINT_RK4) {
             // RK4 ends with the solution of an intermediate state, so the state before the step is captured.
-            self.capture_present(wanted);
+            self.capture_current(wanted);
         }
         let mut scratch = SCRATCH.take();
         self.step_with(&mut scratch, capture);
         SCRATCH.set(scratch);
     }
 
-    fn step_with(&mut self, scratch: &mut Scratch, capture: Option<&Capture>) {
+    fn step_with(&mut self, scratch: &mut Scratch, capture: Option<&CaptureRequest>) {
         let Scratch { before, efforts } = scratch;
-        self.save_present(before);
+        self.save_raw_motion(before);
         loop {
-            let done = self.attempt(before, efforts, capture);
+            let done = self.try_step(before, efforts, capture);
             let raised = self.data.take_warnings();
-            match judge(done, &raised) {
-                Verdict::Good => {
+            match classify_step(done, &raised) {
+                StepOutcome::Succeeded => {
                     if raised != WarningCounts::default() {
-                        self.seldom.warnings.add(&raised);
+                        self.cold.warnings.add(&raised);
                     }
                     self.drives.finish_step(efforts);
                     self.steps = self.steps.saturating_add(1);
-                    self.solved_now = false;
+                    self.solved_current = false;
                     return;
                 }
-                Verdict::NeedsRoom(what) => {
-                    if let Err(reason) = self.grow(what, before) {
-                        return self.quarantine(reason, before);
+                StepOutcome::Overflowed(what) => {
+                    if let Err(reason) = self.grow_and_restore(what, before) {
+                        return self.mark_diverged(reason, before);
                     }
                 }
-                Verdict::Bad(reason) => {
-                    self.seldom.warnings.add(&raised);
-                    return self.quarantine(reason, before);
+                StepOutcome::Diverged(reason) => {
+                    self.cold.warnings.add(&raised);
+                    return self.mark_diverged(reason, before);
                 }
             }
         }
     }
 
     /// Does one step from `before` and reads the efforts that the drives applied.
-    fn attempt(
+    fn try_step(
         &mut self,
-        before: &Motion,
+        before: &IntegrationState,
         efforts: &mut Vec<f64>,
-        capture: Option<&Capture>,
+        capture: Option<&CaptureRequest>,
     ) -> Result<(), EngineError> {
         self.apply_inputs();
         if self.data.model().integrator() == mj::mjINT_RK4 {
@@ -440,56 +441,59 @@ impl Env {
     }
 
     /// Captures quantities after `mj_step2` of a step from `before`.
-    fn capture(&mut self, before: &Motion, capture: &Capture) -> Result<(), EngineError> {
+    fn capture(&mut self, before: &IntegrationState, capture: &CaptureRequest) -> Result<(), EngineError> {
         let qvel = before.qvel(self.data.model());
-        capture.take(&mut self.data, qvel, &mut self.seldom.solved)
+        capture.capture(&mut self.data, qvel, &mut self.cold.captured)
     }
 
     /// Captures the solution of the current state with the current drives; the state stays the same, bit for bit. The
     /// capture is empty for a diverged environment and for one whose next step will fail.
-    pub(crate) fn capture_present(&mut self, capture: &Capture) {
-        self.seldom.solved.clear();
-        self.solved_now = true;
-        if !self.solve_aside(|env, before| env.capture(before, capture)) {
-            self.seldom.solved.clear();
+    pub(crate) fn capture_current(&mut self, capture: &CaptureRequest) {
+        self.cold.captured.clear();
+        self.solved_current = true;
+        if !self.with_solved_state(|env, before| env.capture(before, capture)) {
+            self.cold.captured.clear();
         }
     }
 
     /// Writes the contacts of the current state with their solved forces to `contacts`; empty if the solve fails.
     /// Earlier captures and later steps are not affected.
-    pub(crate) fn present_contacts(&mut self, capture: &Capture, contacts: &mut Vec<Contact>) {
-        let mut solved = Solved::default();
-        let take = |env: &mut Self, before: &Motion| {
+    pub(crate) fn current_contacts(&mut self, capture: &CaptureRequest, contacts: &mut Vec<Contact>) {
+        let mut solved = CapturedStep::default();
+        let take = |env: &mut Self, before: &IntegrationState| {
             let qvel = before.qvel(env.data.model());
-            capture.take(&mut env.data, qvel, &mut solved)
+            capture.capture(&mut env.data, qvel, &mut solved)
         };
-        let done = self.solve_aside(take);
+        let done = self.with_solved_state(take);
         contacts.clear();
         contacts.extend(solved.contacts.iter().filter(|_| done));
     }
 
-    /// Solves the current state, passes the solution to `take`, and restores the state. Returns true if the solve
+    /// Solves the current state, passes the solution to `capture`, and restores the state. Returns true if the solve
     /// succeeded.
-    fn solve_aside(&mut self, mut take: impl FnMut(&mut Self, &Motion) -> Result<(), EngineError>) -> bool {
+    fn with_solved_state(
+        &mut self,
+        mut take: impl FnMut(&mut Self, &IntegrationState) -> Result<(), EngineError>,
+    ) -> bool {
         if self.diverged.is_some() {
             return false;
         }
         let mut scratch = SCRATCH.take();
         let before = &mut scratch.before;
-        self.save_present(before);
+        self.save_raw_motion(before);
         let good = loop {
             self.apply_inputs();
             let done = self.data.step2().and_then(|()| take(self, before));
-            match judge(done, &self.data.take_warnings()) {
-                Verdict::Good => break true,
-                Verdict::NeedsRoom(what) if self.grow(what, before).is_ok() => {}
-                Verdict::NeedsRoom(_) | Verdict::Bad(_) => {
+            match classify_step(done, &self.data.take_warnings()) {
+                StepOutcome::Succeeded => break true,
+                StepOutcome::Overflowed(what) if self.grow_and_restore(what, before).is_ok() => {}
+                StepOutcome::Overflowed(_) | StepOutcome::Diverged(_) => {
                     self.data.reset();
                     break false;
                 }
             }
         };
-        self.go_to(before);
+        self.restore_motion(before);
         // Cannot fail: this state had a forward pass before, with these or smaller buffers.
         let _ = self.data.step1();
         self.data.take_warnings();
@@ -498,74 +502,74 @@ impl Env {
     }
 
     /// Quantities of the last capture.
-    pub(crate) fn solved(&self) -> &Solved {
-        &self.seldom.solved
+    pub(crate) fn captured(&self) -> &CapturedStep {
+        &self.cold.captured
     }
 
     /// Time of the state for which forces and accelerations were last solved \[s\].
     pub(crate) fn solved_time(&self) -> f64 {
-        if self.solved_now { self.data.time() } else { self.data.time() - self.data.model().timestep() }
+        if self.solved_current { self.data.time() } else { self.data.time() - self.data.model().timestep() }
     }
 
     /// Runs one forward pass over positions and velocities, growing the buffers as needed. On failure, restores `good`.
-    fn refresh(&mut self, good: &Motion) {
-        let state = self.saved();
+    fn forward(&mut self, good: &IntegrationState) {
+        let state = self.current_motion();
         self.raw_quats.save(&self.data);
-        self.seldom.inputs.save(&self.data);
+        self.cold.inputs.save(&self.data);
         loop {
             let done = self.data.step1();
             let raised = self.data.take_warnings();
-            match judge(done, &raised) {
-                Verdict::Good => {
-                    self.seldom.warnings.add(&raised);
+            match classify_step(done, &raised) {
+                StepOutcome::Succeeded => {
+                    self.cold.warnings.add(&raised);
                     return;
                 }
-                Verdict::NeedsRoom(what) => {
-                    if let Err(reason) = self.enlarge(what, &state) {
-                        return self.quarantine(reason, good);
+                StepOutcome::Overflowed(what) => {
+                    if let Err(reason) = self.grow_buffers(what, &state) {
+                        return self.mark_diverged(reason, good);
                     }
                 }
-                Verdict::Bad(reason) => {
-                    self.seldom.warnings.add(&raised);
-                    return self.quarantine(reason, good);
+                StepOutcome::Diverged(reason) => {
+                    self.cold.warnings.add(&raised);
+                    return self.mark_diverged(reason, good);
                 }
             }
         }
     }
 
     /// Restores the state before the step, with larger buffers and a forward pass done.
-    fn grow(&mut self, mut what: Overflow, before: &Motion) -> Result<(), Divergence> {
+    fn grow_and_restore(&mut self, mut what: Overflow, before: &IntegrationState) -> Result<(), Divergence> {
         loop {
-            self.enlarge(what, before)?;
+            self.grow_buffers(what, before)?;
             let done = self.data.step1();
             let raised = self.data.take_warnings();
-            match judge(done, &raised) {
-                Verdict::Good => return Ok(()),
-                Verdict::NeedsRoom(next) => what = next,
-                Verdict::Bad(reason) => return Err(reason),
+            match classify_step(done, &raised) {
+                StepOutcome::Succeeded => return Ok(()),
+                StepOutcome::Overflowed(next) => what = next,
+                StepOutcome::Diverged(reason) => return Err(reason),
             }
         }
     }
 
     /// Replaces the data by data with twice the buffer size of `what`, in `state`.
-    fn enlarge(&mut self, what: Overflow, state: &Motion) -> Result<(), Divergence> {
+    fn grow_buffers(&mut self, what: Overflow, state: &IntegrationState) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().enlarged(what);
-        if self.data.bytes() > LARGEST_ENVIRONMENT {
+        if self.data.bytes() > MAX_ENV_BYTES {
             return Err(Divergence::BuffersExhausted(buffers));
         }
         let model = self.data.model().with_buffers(buffers);
         self.data = Data::new(&model).map_err(Divergence::Engine)?;
-        self.go_to(state);
-        self.seldom.growths += 1;
+        self.restore_motion(state);
+        self.cold.buffer_growths += 1;
         Ok(())
     }
 
     /// Marks the environment as diverged and restores `good`, the last valid state.
-    fn quarantine(&mut self, reason: Divergence, good: &Motion) {
+    fn mark_diverged(&mut self, reason: Divergence, good: &IntegrationState) {
         self.diverged = Some(Box::new(EnvStatus::Diverged { step: self.steps, reason }));
-        self.seldom.solved.clear();
+        self.cold.captured.clear();
         self.data.reset();
-        self.go_to(good);
+        self.restore_motion(good);
         // Cannot fail: the last valid state had a forward pass before, with these or smaller buffers.
         let _ = self.data.step1();
         self.data.take_warnings();
@@ -575,9 +579,9 @@ impl Env {
 /// State that determines future steps. Quaternions are those before the last forward pass.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct EnvState {
-    pub motion: Motion,
-    pub inputs: Inputs,
-    /// Flat array of [`DriveState::numbers`].
+    pub motion: IntegrationState,
+    pub inputs: UserInputs,
+    /// Flat array of [`DriveState::to_flat`].
     pub drives: Vec<f64>,
     pub wrenches: Wrenches,
     pub welds: Vec<Weld>,
@@ -587,7 +591,7 @@ pub(crate) struct EnvState {
 
 impl EnvState {
     /// True if all arrays have the same lengths as those of `other`.
-    pub(crate) fn fits(&self, other: &Self) -> bool {
+    pub(crate) fn has_same_lengths(&self, other: &Self) -> bool {
         let lengths = |state: &Self| {
             let (inputs, active) = state.inputs.values();
             [state.motion.values().len(), inputs.len(), active.len(), state.drives.len()]
@@ -598,7 +602,7 @@ impl EnvState {
 
 /// Copies of the arrays that carry a state to another model.
 #[derive(Clone, Debug)]
-pub(crate) struct SavedArrays {
+pub(crate) struct StateArrays {
     pub qpos: Vec<f64>,
     pub qvel: Vec<f64>,
     pub warmstart: Vec<f64>,
@@ -606,7 +610,7 @@ pub(crate) struct SavedArrays {
 
 /// Counters and divergence of an environment.
 #[derive(Clone, Debug)]
-pub(crate) struct History {
+pub(crate) struct EnvStats {
     diverged: Option<Box<EnvStatus>>,
     steps: u64,
     warnings: WarningCounts,
@@ -617,35 +621,35 @@ pub(crate) struct History {
 #[derive(Default)]
 struct Scratch {
     /// The state before the step.
-    before: Motion,
+    before: IntegrationState,
     /// Efforts of the drives in the step; kept only if the step succeeds.
     efforts: Vec<f64>,
 }
 
 thread_local! {
     /// One per thread, not per environment: a thousand copies would not stay in the cache.
-    static SCRATCH: Cell<Scratch> = const { Cell::new(Scratch { before: Motion::EMPTY, efforts: Vec::new() }) };
+    static SCRATCH: Cell<Scratch> = const { Cell::new(Scratch { before: IntegrationState::EMPTY, efforts: Vec::new() }) };
 }
 
-enum Verdict {
-    Good,
-    NeedsRoom(Overflow),
-    Bad(Divergence),
+enum StepOutcome {
+    Succeeded,
+    Overflowed(Overflow),
+    Diverged(Divergence),
 }
 
-fn judge(done: Result<(), EngineError>, raised: &WarningCounts) -> Verdict {
+fn classify_step(done: Result<(), EngineError>, raised: &WarningCounts) -> StepOutcome {
     match done {
-        Err(error) if error.is_out_of_memory() => Verdict::NeedsRoom(raised.overflow().unwrap_or(Overflow::Stack)),
-        Err(error) => Verdict::Bad(Divergence::Engine(error)),
+        Err(error) if error.is_out_of_memory() => StepOutcome::Overflowed(raised.overflow().unwrap_or(Overflow::Stack)),
+        Err(error) => StepOutcome::Diverged(Divergence::Engine(error)),
         Ok(()) => match (raised.overflow(), raised.diverged()) {
-            (Some(what), _) => Verdict::NeedsRoom(what),
-            (None, Some(warning)) => Verdict::Bad(Divergence::Warning(warning)),
-            (None, None) => Verdict::Good,
+            (Some(what), _) => StepOutcome::Overflowed(what),
+            (None, Some(warning)) => StepOutcome::Diverged(Divergence::Warning(warning)),
+            (None, None) => StepOutcome::Succeeded,
         },
     }
 }
 
-/// Returns the model with small initial buffers for [`Env`], which grow on demand.
+/// Returns the model with small initial buffers for [`SimEnv`], which grow on demand.
 pub fn with_small_buffers(model: &mj::Model) -> mj::Model {
     model.with_buffers(model.small_buffers())
 }
@@ -672,8 +676,8 @@ mod tests {
     }
 
     /// An environment with quaternions far from unit length.
-    fn tumbling(model: &Model, buffers: Buffers) -> Env {
-        let mut env = Env::new(&model.with_buffers(buffers), &Arc::default()).expect("small");
+    fn tumbling(model: &Model, buffers: Buffers) -> SimEnv {
+        let mut env = SimEnv::new(&model.with_buffers(buffers), &Arc::default()).expect("small");
         env.reset(|data, _| {
             for (body, qpos) in data.qpos_mut().chunks_exact_mut(11).enumerate() {
                 for (k, q) in qpos[3..].iter_mut().enumerate() {
@@ -685,9 +689,9 @@ mod tests {
         env
     }
 
-    fn bits(env: &Env) -> Vec<u64> {
+    fn bits(env: &SimEnv) -> Vec<u64> {
         let data = env.data();
-        let saved = env.saved_arrays();
+        let saved = env.state_arrays();
         let raw = [&[data.time()], &saved.qpos[..], &saved.qvel, &saved.warmstart];
         raw.into_iter().chain([data.qpos(), data.xquat()]).flatten().map(|x| x.to_bits()).collect()
     }
@@ -699,7 +703,7 @@ mod tests {
     fn repeated_steps() {
         let model = falling();
         let (mut tiny, mut huge) = (tumbling(&model, TINY), tumbling(&model, HUGE));
-        let at_first = tiny.growths();
+        let at_first = tiny.buffer_growths();
         for step in 0..150 {
             assert!(bits(&tiny) == bits(&huge), "before step {step}");
             tiny.step(1);
@@ -711,7 +715,7 @@ mod tests {
             }
         }
         assert!(bits(&tiny) == bits(&huge));
-        assert!(tiny.growths() > at_first && huge.growths() == 0);
+        assert!(tiny.buffer_growths() > at_first && huge.buffer_growths() == 0);
         assert_eq!((tiny.status(), huge.status()), (&EnvStatus::Running, &EnvStatus::Running));
     }
 

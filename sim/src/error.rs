@@ -2,10 +2,10 @@
 
 use crate::batch_error::BatchError;
 use crate::drive::plan::PlanError;
-use crate::mjcf::error::EmitError;
+use crate::mjcf::error::RobotMjcfError;
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot_file::RobotFileError;
-use crate::named::Named;
+use crate::named::EntityLabel;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
 use crate::shard::ShardError;
@@ -14,7 +14,7 @@ use kinetoscope_mujoco::{CompileError, EngineError, LoadError, VersionError};
 use kinetoscope_robot::kinematics::KinematicsError;
 use kinetoscope_robot::shape_inertia::ShapeInertiaError;
 use kinetoscope_robot::urdf::UrdfError;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::path::PathBuf;
 
 /// Result of the public API.
@@ -26,7 +26,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 pub enum Error {
     /// The observer was removed, or is handling an event right now.
     #[error("this observer was taken away, or is being told of something right now")]
-    NoObserver,
+    ObserverUnavailable,
     /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
@@ -34,7 +34,7 @@ pub enum Error {
     #[error("{at}: link {link:?}: {error}")]
     CollisionMesh {
         /// File and line that name the mesh.
-        at: Source,
+        at: SourceLocation,
         /// The link.
         link: String,
         /// Error of the mesh file.
@@ -52,9 +52,9 @@ pub enum Error {
     },
     /// A drive property or a start position is invalid.
     #[error("{robot}: {error}")]
-    Plan {
+    DrivePlan {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// Cause.
         #[source]
         error: Box<PlanError>,
@@ -63,7 +63,7 @@ pub enum Error {
     #[error("{robot}, control part {part:?}: {error}")]
     ControlPart {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// Name of the control part.
         part: String,
         /// Cause.
@@ -74,16 +74,16 @@ pub enum Error {
     #[error("{robot}, payload: {error}")]
     Payload {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// Cause.
         #[source]
         error: Box<PatternError>,
     },
     /// The patterns of surfaces are invalid.
-    #[error("{of}, surfaces: {error}")]
+    #[error("{entity}, surfaces: {error}")]
     Surfaces {
         /// The robot, articulation or attached MJCF file.
-        of: Named,
+        entity: EntityLabel,
         /// Cause.
         #[source]
         error: Box<PatternError>,
@@ -92,7 +92,7 @@ pub enum Error {
     #[error("{robot}: {error}")]
     Kinematics {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// Cause.
         #[source]
         error: Box<KinematicsError>,
@@ -104,21 +104,21 @@ pub enum Error {
     #[error("{robot}: control part {part:?} is given twice; join its patterns in one list")]
     ControlPartRepeated {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// Name of the control part.
         part: String,
     },
     /// The robot cannot be written as MJCF.
     #[error(transparent)]
-    Emit(#[from] EmitError),
+    MjcfWrite(#[from] RobotMjcfError),
     /// MuJoCo rejects the model.
     #[error(transparent)]
     Compile(#[from] CompileError),
     /// MuJoCo rejects an attached MJCF file; its message names element and line.
-    #[error("{}", in_file(&format_args!("part {part:?}"), .file, .error))]
+    #[error("{}", with_position_first(&format_args!("part {uid:?}"), .file, .error))]
     MjcfFile {
         /// Uid of the attached MJCF file.
-        part: String,
+        uid: String,
         /// The file.
         file: String,
         /// Cause.
@@ -126,10 +126,10 @@ pub enum Error {
         error: Box<CompileError>,
     },
     /// An MJCF file cannot be loaded as a robot.
-    #[error("{}", in_file(.robot, .file, .error))]
+    #[error("{}", with_position_first(.robot, .file, .error))]
     RobotFile {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// The file.
         file: String,
         /// Cause.
@@ -137,10 +137,10 @@ pub enum Error {
         error: Box<RobotFileError>,
     },
     /// An MJCF file has an element that cannot be attached to a scene.
-    #[error("part {part:?}: {file}: {error}")]
-    MjcfPart {
+    #[error("part {uid:?}: {file}: {error}")]
+    MjcfAttach {
         /// Uid of the attached MJCF file.
-        part: String,
+        uid: String,
         /// The file.
         file: String,
         /// Cause.
@@ -148,10 +148,10 @@ pub enum Error {
         error: Box<PartError>,
     },
     /// Name patterns for an attached MJCF file are invalid or match nothing.
-    #[error("part {part:?}: {error}")]
+    #[error("part {uid:?}: {error}")]
     MjcfNames {
         /// Uid of the attached MJCF file.
-        part: String,
+        uid: String,
         /// Cause.
         #[source]
         error: Box<PatternError>,
@@ -182,7 +182,7 @@ pub enum Error {
     )]
     Integrator {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// MuJoCo's name of the integrator.
         integrator: &'static str,
         /// Further integrators that this MuJoCo version supports.
@@ -190,7 +190,7 @@ pub enum Error {
     },
     /// This MuJoCo version lacks the integrator.
     #[error("MuJoCo {version} has no integrator {integrator}; it has Euler, RK4 and implicit")]
-    IntegratorUnknown {
+    UnsupportedIntegrator {
         /// MuJoCo's name of the integrator.
         integrator: &'static str,
         /// Version of MuJoCo.
@@ -255,7 +255,7 @@ pub enum Error {
     #[error("{at}: entity {name:?}: {error}")]
     Entity {
         /// File and line of the declaration.
-        at: Source,
+        at: SourceLocation,
         /// The entity.
         name: String,
         /// Cause.
@@ -266,7 +266,7 @@ pub enum Error {
     #[error("{at}: pair that never collides: {error}")]
     Exclusion {
         /// File and line of the declaration.
-        at: Source,
+        at: SourceLocation,
         /// Cause.
         #[source]
         error: Box<Error>,
@@ -275,7 +275,7 @@ pub enum Error {
     #[error("{at}: {reason}")]
     SceneFile {
         /// File and line.
-        at: Source,
+        at: SourceLocation,
         /// The problem and the fix.
         reason: String,
     },
@@ -298,24 +298,24 @@ pub enum Error {
         count: usize,
     },
     /// Two columns of an array refer to the same item.
-    #[error("{argument} has two columns for {of} (columns {first} and {second}); give it one")]
+    #[error("{argument} has two columns for {item} (columns {first} and {second}); give it one")]
     RepeatedColumn {
         /// Name of the argument.
         argument: &'static str,
         /// The item: `actuator "a"`.
-        of: String,
+        item: String,
         /// First column of the item.
         first: usize,
         /// Second column of the item.
         second: usize,
     },
     /// A list contains an item twice.
-    #[error("{argument} names {of} twice (places {first} and {second} of its list); name it once")]
-    Repeated {
+    #[error("{argument} names {item} twice (places {first} and {second} of its list); name it once")]
+    RepeatedItem {
         /// Name of the argument.
         argument: &'static str,
         /// The item: `joint "a"`, `environment 3`.
-        of: String,
+        item: String,
         /// First position in the list.
         first: usize,
         /// Second position in the list.
@@ -334,7 +334,7 @@ pub enum Error {
         meaning: &'static str,
     },
     /// A value is NaN or infinite.
-    #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be finite")]
+    #[error("{argument}[{row}, {column}] ({item}) is {value}; it must be finite")]
     NotFinite {
         /// Name of the argument.
         argument: &'static str,
@@ -343,12 +343,12 @@ pub enum Error {
         /// Column of the array.
         column: usize,
         /// The item that the value belongs to: `joint "a"`, `object "cube"`.
-        of: String,
+        item: String,
         /// The value.
         value: f64,
     },
     /// A value is outside the allowed set.
-    #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be {expected}")]
+    #[error("{argument}[{row}, {column}] ({item}) is {value}; it must be {expected}")]
     OutOfRange {
         /// Name of the argument.
         argument: &'static str,
@@ -357,7 +357,7 @@ pub enum Error {
         /// Column of the array.
         column: usize,
         /// The item that the value belongs to: `joint "a"`.
-        of: String,
+        item: String,
         /// The value.
         value: f64,
         /// Allowed values.
@@ -373,7 +373,7 @@ pub enum Error {
         /// Name of the method.
         argument: &'static str,
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// The joint.
         joint: String,
     },
@@ -386,7 +386,7 @@ pub enum Error {
         /// Name of the method.
         argument: &'static str,
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// The joint.
         joint: String,
     },
@@ -397,7 +397,7 @@ pub enum Error {
     )]
     NoDelay {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// The joint.
         joint: String,
     },
@@ -405,7 +405,7 @@ pub enum Error {
     #[error("{robot}: {error}")]
     RobotNames {
         /// The robot or articulation.
-        robot: Named,
+        robot: EntityLabel,
         /// Cause.
         #[source]
         error: Box<PatternError>,
@@ -421,7 +421,7 @@ pub enum Error {
     },
     /// Segmentation labels name an unknown item, or one item twice.
     #[error("labels: {0}")]
-    Labels(#[source] Box<kinetoscope_sensors::SensorError>),
+    SegmentationLabels(#[source] Box<kinetoscope_sensors::SensorError>),
     /// A sensor needs a quantity that is not gathered.
     #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]
     SensorRequires {
@@ -477,15 +477,15 @@ impl From<LoadError> for Error {
 
 /// Formats an error of an MJCF file. A position (`file:line`) in the message moves to the front, as in all other
 /// messages.
-fn in_file(of: &dyn std::fmt::Display, file: &str, error: &dyn std::fmt::Display) -> String {
-    let said = error.to_string();
-    let place = said.split_once(": ").filter(|(place, _)| {
+fn with_position_first(of: &dyn std::fmt::Display, file: &str, error: &dyn std::fmt::Display) -> String {
+    let message = error.to_string();
+    let place = message.split_once(": ").filter(|(place, _)| {
         let line = place.strip_prefix(file).and_then(|rest| rest.strip_prefix(':'));
         !file.is_empty() && line.is_some_and(|line| line.parse::<u32>().is_ok())
     });
     match place {
         Some((place, rest)) => format!("{place}: {of}: {rest}"),
-        None => format!("{of}: {file}: {said}"),
+        None => format!("{of}: {file}: {message}"),
     }
 }
 

@@ -1,23 +1,23 @@
 //! Export of every stage of the pipeline: URDF, description, MJCF with meshes for both supported MuJoCo versions.
 
 use crate::compile::document;
-use crate::contents::Contents;
+use crate::contents::EntitySet;
 use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::drive::plan::JointPlan;
 use crate::error::{Error, Result};
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
-use crate::mjcf::part::MjcfPart;
-use crate::mjcf::robot::{Purpose, VisualAssets};
+use crate::mjcf::part::PartDocument;
+use crate::mjcf::robot::{MjcfDialect, VisualAssets};
 use crate::mjcf::{scene as world, write};
 use crate::objects::robot_data::RobotData;
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
-use kinetoscope_mujoco::Target;
+use kinetoscope_mujoco::SupportedVersion;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_robot::urdf::write_urdf;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufWriter;
 use std::path::Path;
@@ -26,14 +26,14 @@ use std::sync::Arc;
 /// Writes all files to `dir`, which is created if missing.
 pub(crate) fn dump(
     cfg: &SimulationManagerCfg,
-    contents: &Contents,
+    contents: &EntitySet,
     simulation: &Simulation,
     diagnostics: &[Diagnostic],
     dir: &Path,
 ) -> Result<Vec<Diagnostic>> {
     let robots = &contents.robots[..];
     let meshes = dir.join("meshes");
-    std::fs::create_dir_all(&meshes).map_err(at(&meshes))?;
+    std::fs::create_dir_all(&meshes).map_err(file_error(&meshes))?;
     for robot in robots {
         // A single robot is exported as `robot.*`, several robots under their uids.
         let stem = if robots.len() == 1 { "robot" } else { robot.uid() };
@@ -44,53 +44,53 @@ pub(crate) fn dump(
     write_file(&dir.join("run.mjcf.xml"), &simulation.xml)?;
     for (index, terrain) in contents.terrains.iter().enumerate() {
         let path = dir.join(world::terrain_file(index));
-        std::fs::write(&path, terrain.file()).map_err(at(&path))?;
+        std::fs::write(&path, terrain.file()).map_err(file_error(&path))?;
     }
     for file in contents.files() {
         let path = dir.join(&file.name);
-        std::fs::write(&path, &file.bytes).map_err(at(&path))?;
+        std::fs::write(&path, &file.bytes).map_err(file_error(&path))?;
     }
 
     let mut empty = Mjcf::new("kinetoscope", cfg.physics_option());
-    let mut left_out = Vec::new();
-    let assets = export_meshes(contents, &mut empty, dir, &mut left_out)?;
-    for (target, file) in [(Target::V2, "robot.mjcf2.xml"), (Target::V4, "robot.mjcf4.xml")] {
-        let purpose = Purpose::Export(&assets);
-        let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
-        let heavier = prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
+    let mut omitted = Vec::new();
+    let assets = export_meshes(contents, &mut empty, dir, &mut omitted)?;
+    for (target, file) in [(SupportedVersion::V2, "robot.mjcf2.xml"), (SupportedVersion::V4, "robot.mjcf4.xml")] {
+        let purpose = MjcfDialect::Export(&assets);
+        let (mut mjcf, _, _) = document(cfg, contents, &simulation.overlap_exclusions, &purpose, empty.clone())?;
+        let raised_armature = prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
         // Both files have the same entry, so it is reported once.
-        left_out.extend(heavier.filter(|_| target == Target::V2));
-        let reduced = reduced(&mjcf, target, file);
+        omitted.extend(raised_armature.filter(|_| target == SupportedVersion::V2));
+        let reduced = unsupported_elements(&mjcf, target, file);
         mjcf.comments.extend(reduced.iter().map(|diagnostic| diagnostic.message.clone()));
-        left_out.extend(reduced);
+        omitted.extend(reduced);
         write_file(&dir.join(file), &write::write(&mjcf, target).xml)?;
     }
-    let text: String = diagnostics.iter().chain(&left_out).map(|d| format!("{d}\n")).collect();
+    let text: String = diagnostics.iter().chain(&omitted).map(|d| format!("{d}\n")).collect();
     write_file(&dir.join("diagnostics.txt"), &text)?;
-    Ok(left_out)
+    Ok(omitted)
 }
 
 /// Elements of MJCF files that are left out of `file` because the MuJoCo version lacks them.
-fn reduced(mjcf: &Mjcf, target: Target, file: &str) -> Vec<Diagnostic> {
-    let version = if target == Target::V2 { "2.2.2" } else { "4.x" };
-    let of_part = |part: &Arc<MjcfPart>| {
+fn unsupported_elements(mjcf: &Mjcf, target: SupportedVersion, file: &str) -> Vec<Diagnostic> {
+    let version = if target == SupportedVersion::V2 { "2.2.2" } else { "4.x" };
+    let of_part = |part: &Arc<PartDocument>| {
         let lines = part.lines(target);
         let message = |left_out| {
             let uid = part.uid();
             format!("part {uid:?}: {left_out}: MuJoCo {version} does not know it, and it is left out of {file}")
         };
         let say = |left_out| Diagnostic::new(DiagnosticKind::ExportReduced, lines.source.clone(), message(left_out));
-        lines.left_out.iter().map(say).collect::<Vec<_>>()
+        lines.omitted.iter().map(say).collect::<Vec<_>>()
     };
     mjcf.parts.iter().flat_map(of_part).collect()
 }
 
-fn at(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
+fn file_error(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
     move |error| Error::File { path: path.to_path_buf(), error }
 }
 
 fn write_file(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(at(path))
+    std::fs::write(path, text).map_err(file_error(path))
 }
 
 /// Time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
@@ -131,7 +131,7 @@ fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<
 fn prepare_for_plain_mujoco(
     mjcf: &mut Mjcf,
     robots: &[Arc<RobotData>],
-    target: Target,
+    target: SupportedVersion,
     simulation: &Simulation,
 ) -> Option<Diagnostic> {
     let followers = robots.iter().flat_map(|r| r.plans()).any(|plan| plan.mimic.is_some());
@@ -145,8 +145,8 @@ fn prepare_for_plain_mujoco(
     let (explicit, implicit) = (bound(Scheme::Explicit), bound(Scheme::ImplicitDamping));
     let limited = plans.iter().flatten().any(|plan| plan.actuator.is_some() && plan.max_effort.is_finite());
     let (version, integrator) = match target {
-        Target::V2 => ("2.2.2", Integrator::Implicit),
-        Target::V4 => ("4.x", Integrator::ImplicitFast),
+        SupportedVersion::V2 => ("2.2.2", Integrator::Implicit),
+        SupportedVersion::V4 => ("4.x", Integrator::ImplicitFast),
     };
     mjcf.option.integrator = integrator;
     mjcf.comments.push("Written by Kinetoscope. Drives are plain MuJoCo actuators here.".into());
@@ -156,7 +156,7 @@ fn prepare_for_plain_mujoco(
         // explicit integrator does not have this problem.
         mjcf.option.integrator = Integrator::Euler;
         (explicit, ": joints that follow others (mimic) and stiff drives do not go together in implicit integrators.")
-    } else if target == Target::V2 {
+    } else if target == SupportedVersion::V2 {
         (implicit, "; saturated drives are sluggish.")
     } else if limited {
         (explicit.min(implicit), ", where drives saturate at their force limits.")
@@ -168,17 +168,17 @@ fn prepare_for_plain_mujoco(
     } else {
         format!("MuJoCo {version}: stable at every time step.")
     });
-    if target == Target::V4 && limited && !followers && implicit.is_finite() {
+    if target == SupportedVersion::V4 && limited && !followers && implicit.is_finite() {
         mjcf.comments.push(format!("While no drive saturates, up to {implicit:.3e} s."));
     }
-    let given_up = (!heavier.is_empty()).then(|| {
+    let warning = (!heavier.is_empty()).then(|| {
         format!(
             "{}: its drives have an armature of {step} s times their damping in the export, so that plain MuJoCo is stable with \
              followers (mimic) at a time step of {step} s; a drive at its effort limit accelerates more slowly for that",
             heavier.join(", ")
         )
     });
-    mjcf.comments.extend(given_up.clone());
+    mjcf.comments.extend(warning.clone());
     if !heavier.is_empty() {
         mjcf.option.timestep = step;
     }
@@ -189,7 +189,7 @@ fn prepare_for_plain_mujoco(
             .push(format!("The time step is smaller than the simulation's {} s for that.", mjcf.option.timestep));
         mjcf.option.timestep = two_digits(0.9 * holds_up_to);
     }
-    let (start, model) = (&simulation.start, simulation.batch.model());
+    let (start, model) = (&simulation.initial_state, simulation.batch.model());
     let mut qpos = model.qpos0().to_vec();
     for &(address, position) in &start.qpos {
         qpos[address] = position;
@@ -201,14 +201,14 @@ fn prepare_for_plain_mujoco(
             if let (Some(drive), Some(actuator)) = (joint.drive, plan.actuator)
                 && actuator.kp > 0.0
             {
-                ctrl[simulation.drive_ctrl(drive)] = plan.initial;
+                ctrl[simulation.drive_ctrl_index(drive)] = plan.initial;
             }
         }
     }
     if !qpos.is_empty() {
         mjcf.keyframes.push(Keyframe { name: "start".into(), qpos, ctrl });
     }
-    given_up.map(|message| Diagnostic::new(DiagnosticKind::ExportHeavier, None, message))
+    warning.map(|message| Diagnostic::new(DiagnosticKind::ExportHeavier, None, message))
 }
 
 /// Rounds to two significant digits, at most 5 % off.
@@ -218,7 +218,7 @@ fn two_digits(x: f64) -> f64 {
 
 /// Writes every visual mesh once, one file per material, and declares the assets in `mjcf`.
 fn export_meshes(
-    contents: &Contents,
+    contents: &EntitySet,
     mjcf: &mut Mjcf,
     dir: &Path,
     left_out: &mut Vec<Diagnostic>,
@@ -226,7 +226,7 @@ fn export_meshes(
     let mut assets = VisualAssets::default();
     let mut textures: BTreeMap<TextureKey, String> = BTreeMap::new();
     let mut names = BTreeSet::new();
-    let mut export = |key: MeshKey, of: &str, source: Option<&Source>| -> Result<()> {
+    let mut export = |key: MeshKey, of: &str, source: Option<&SourceLocation>| -> Result<()> {
         if assets.parts.contains_key(&key) {
             return Ok(());
         }
@@ -276,19 +276,19 @@ fn export_parts(
     mjcf: &mut Mjcf,
     textures: &mut BTreeMap<TextureKey, String>,
     dir: &Path,
-) -> Result<Vec<crate::mjcf::robot::VisualPart>> {
+) -> Result<Vec<crate::mjcf::robot::VisualSubmesh>> {
     let mut parts = Vec::new();
-    for (i, part) in mesh.parts.iter().enumerate() {
+    for (i, part) in mesh.submeshes.iter().enumerate() {
         // MuJoCo rejects meshes with fewer than four vertices.
         if part.triangles.len() < 2 {
             continue;
         }
-        let wanted = if mesh.parts.len() == 1 { stem.to_string() } else { format!("{stem}_{i}") };
+        let wanted = if mesh.submeshes.len() == 1 { stem.to_string() } else { format!("{stem}_{i}") };
         let name = unique_name(wanted, names);
         let file = format!("meshes/{name}.obj");
         let path = dir.join(&file);
-        let out = BufWriter::new(std::fs::File::create(&path).map_err(at(&path))?);
-        kinetoscope_scene::mesh::write_obj(mesh, part.triangles.clone(), out).map_err(at(&path))?;
+        let out = BufWriter::new(std::fs::File::create(&path).map_err(file_error(&path))?);
+        kinetoscope_scene::mesh::write_obj(mesh, part.triangles.clone(), out).map_err(file_error(&path))?;
         let material = match part.material.map(|m| &mesh.materials[m]) {
             Some(material) => Some(export_material(material, &name, mjcf, textures, dir)?),
             None => None,

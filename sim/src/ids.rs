@@ -15,7 +15,7 @@ pub struct RobotId {
 
 /// Handle of a rigid object, valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ObjectId {
+pub struct RigidObjectId {
     pub(crate) manager: u64,
     pub(crate) index: usize,
 }

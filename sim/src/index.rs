@@ -5,20 +5,20 @@ use kinetoscope_mujoco as mj;
 
 /// Indices of one robot in MuJoCo's arrays.
 #[derive(Clone, Debug)]
-pub(crate) struct RobotIndex {
+pub(crate) struct RobotIndexing {
     /// Addresses of each drivable joint.
     pub joints: Vec<JointIndexing>,
     /// Frame of each link.
     pub links: Vec<BodyFrame>,
     /// The body of the root link.
-    pub root: FreeIndex,
+    pub root: BodyIndexing,
     /// All geoms of the robot.
-    pub geoms: Vec<GeomIndex>,
+    pub geoms: Vec<GeomIndexing>,
 }
 
 /// A geom of a robot.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct GeomIndex {
+pub(crate) struct GeomIndexing {
     /// Index in MuJoCo's geom arrays.
     pub geom: usize,
     /// Index of the link that owns the geom.
@@ -29,18 +29,18 @@ pub(crate) struct GeomIndex {
 
 /// Indices of a free, mocap or fixed body in MuJoCo's arrays.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FreeIndex {
+pub(crate) struct BodyIndexing {
     pub body: usize,
     /// Address of its seven positions and of its six velocities; `None` without a free joint.
-    pub joint: Option<(usize, usize)>,
+    pub free_joint: Option<(usize, usize)>,
     /// Mocap index; `None` for a body without mocap pose.
     pub mocap: Option<usize>,
 }
 
-impl FreeIndex {
+impl BodyIndexing {
     /// True if the body has neither a free joint nor a mocap pose.
-    pub(crate) fn stands(&self) -> bool {
-        self.joint.is_none() && self.mocap.is_none()
+    pub(crate) fn is_static(&self) -> bool {
+        self.free_joint.is_none() && self.mocap.is_none()
     }
 }
 
@@ -55,7 +55,7 @@ pub(crate) struct JointIndexing {
 
 /// Indices of an attached MJCF file in MuJoCo's arrays.
 #[derive(Clone, Debug)]
-pub(crate) struct PartIndex {
+pub(crate) struct MjcfIndexing {
     /// Bodies of the file; the first is the body that holds the content of the file's world.
     pub bodies: Vec<usize>,
     /// Geoms of the file.
@@ -73,14 +73,14 @@ pub(crate) struct PartIndex {
     /// Indices in `act` of the file's actuators.
     pub activations: Vec<usize>,
     /// Mocap bodies of the file.
-    pub mocaps: Vec<usize>,
+    pub mocap_bodies: Vec<usize>,
     /// Frames of bodies and sites, for sensors.
     pub frames: Vec<BodyFrame>,
 }
 
 /// Equality constraint of a weld and the two MuJoCo bodies that it connects.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct WeldIndex {
+pub(crate) struct WeldIndexing {
     pub(crate) equality: usize,
     pub(crate) bodies: [usize; 2],
 }

@@ -40,7 +40,7 @@
 //! # Errors and panics
 //!
 //! Invalid input (names, numbers, files, environment indices) gives an [`Error`] that states the problem and the fix.
-//! The only exception is a handle ([`RobotId`], [`ObjectId`], [`SensorId`] and the like) used with a
+//! The only exception is a handle ([`RobotId`], [`RigidObjectId`], [`SensorId`] and the like) used with a
 //! [`SimulationManager`] that did not create it. That panics, like a slice index out of bounds, because only a bug in
 //! the calling program can cause it. Methods such as [`SimulationManager::robot`] therefore return no `Result`.
 
@@ -112,26 +112,26 @@ pub use drive::plan::PlanError;
 pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveCfgError, DriveModel, DriveType, IdealPd, PerJoint};
 pub use entities::Entities;
 pub use error::{Error, Result};
-pub use ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId};
+pub use ids::{EnvId, MjcfId, RigidObjectId, RobotId, TerrainId};
 pub use interactive_scene::{
-    EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg, SensorEntity, SensorHandle,
+    AnySensorCfg, AnySensorId, EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg,
 };
 pub(crate) use kinetoscope_scene::pattern;
-pub use light_cfg::{LampKind, LightCfg};
-pub use look::{BodyMotion, JointAxis, Look};
+pub use light_cfg::{LightCfg, LightKindCfg};
+pub use look::{BodyMotion, EnvVisualState, JointAxis};
 pub use manager::SimulationManager;
-pub use mjcf::document::{Cone, Integrator};
-pub use mjcf::error::EmitError;
+pub use mjcf::document::{FrictionCone, Integrator};
+pub use mjcf::error::RobotMjcfError;
 pub use mjcf::part::PartError;
 pub use mjcf::robot_file::RobotFileError;
-pub use named::Named;
+pub use named::EntityLabel;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};
 pub use objects::kinematics::IkResult;
 pub use objects::mesh_collision::MeshCollision;
 pub use objects::mjcf_part::{MjcfPart, MjcfPartMut};
-pub use objects::mjcf_part_data::{ActuatorIndex, MjcfCfg};
+pub use objects::mjcf_part_data::{ActuatorIndex, MjcfPartCfg};
 pub use objects::object_group::{RigidObjectGroup, RigidObjectGroupMut};
-pub use objects::object_group_data::{GroupId, RigidObjectGroupCfg};
+pub use objects::object_group_data::{RigidObjectGroupCfg, RigidObjectGroupId};
 pub use objects::rigid_object::{RigidObject, RigidObjectMut};
 pub use objects::rigid_object_data::{BodyType, RigidObjectCfg};
 pub use objects::robot::{Robot, RobotCfg, RobotMut};
@@ -142,9 +142,10 @@ pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
 pub use objects::weld::{Weld, WeldMut};
 pub use objects::weld_data::{WeldCfg, WeldId};
-pub use observer::{Moment, Observer, ObserverId, Observers, ObserversMut};
+pub use observer::{Observer, ObserverId, Observers, ObserversMut, SimEvent};
 pub use randomization::{
-    Draw, EnvProperties, EnvPropertiesMut, Properties, Property, Randomization, RandomizationError, Term,
+    EnvProperties, EnvPropertiesMut, Properties, Property, Randomization, RandomizationError, RandomizationOp,
+    RandomizationTerm,
 };
 pub use rollout::Rollout;
 pub use scene_view::{SceneView, SceneViewMut};
@@ -155,6 +156,6 @@ pub use snapshot::{Snapshot, SnapshotError};
 pub use step_result::StepResult;
 pub use surface_cfg::SurfaceCfg;
 pub use viewpoint::Viewpoint;
-pub use visible::{FreeCamera, MaskId, ModelCamera, Still, Visible};
+pub use visible::{FreeCamera, MaskId, ModelCamera, OffscreenScene, VisualScene};
 pub use warnings::Warnings;
 pub use wrenches::WrenchFrame;

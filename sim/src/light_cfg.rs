@@ -9,7 +9,7 @@ use std::fmt::Debug;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
-pub enum LampKind {
+pub enum LightKindCfg {
     /// Parallel rays along the direction, such as sunlight.
     #[default]
     Directional,
@@ -36,7 +36,7 @@ pub enum LampKind {
 #[serde(default, deny_unknown_fields)]
 pub struct LightCfg {
     /// Type of the light.
-    pub kind: LampKind,
+    pub kind: LightKindCfg,
     /// Position in the environment \[m\]; unused by directional lights and domes.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub position: Vector3<f64>,
@@ -59,7 +59,7 @@ pub struct LightCfg {
 impl Default for LightCfg {
     fn default() -> Self {
         Self {
-            kind: LampKind::Directional,
+            kind: LightKindCfg::Directional,
             position: Vector3::new(0.0, 0.0, 4.0),
             direction: Vector3::new(-0.3, 0.4, -1.0),
             color: [0.8, 0.8, 0.8],
@@ -71,9 +71,9 @@ impl Default for LightCfg {
 }
 
 impl LightCfg {
-    /// Creates a dome light: uniform light from all directions ([`LampKind::Dome`]).
+    /// Creates a dome light: uniform light from all directions ([`LightKindCfg::Dome`]).
     pub fn dome(intensity: f64, color: [f64; 3]) -> Self {
-        Self { kind: LampKind::Dome { intensity }, color, ..Self::default() }
+        Self { kind: LightKindCfg::Dome { intensity }, color, ..Self::default() }
     }
 
     /// Checks every number.
@@ -83,7 +83,7 @@ impl LightCfg {
     pub fn validate(&self) -> Result<()> {
         let fail =
             |field, value: &dyn Debug, expected| Err(Error::Config { field, value: format!("{value:?}"), expected });
-        if let LampKind::Spot { cutoff_deg, exponent } = self.kind {
+        if let LightKindCfg::Spot { cutoff_deg, exponent } = self.kind {
             if !(cutoff_deg > 0.0 && cutoff_deg <= 90.0) {
                 return fail("lights.kind.spot.cutoff_deg", &cutoff_deg, "it must be above 0 and at most 90 degrees");
             }
@@ -91,7 +91,7 @@ impl LightCfg {
                 return fail("lights.kind.spot.exponent", &exponent, "it must be a whole number, 0 to 128, such as 10");
             }
         }
-        if let LampKind::Dome { intensity } = self.kind
+        if let LightKindCfg::Dome { intensity } = self.kind
             && !(0.0..=1000.0).contains(&intensity)
         {
             let expected =

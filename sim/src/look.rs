@@ -1,26 +1,26 @@
 //! Visual state of one environment, for viewers.
 
-use kinetoscope_scene::{Light, OwnScene, Pose, PoseF32};
+use kinetoscope_scene::{EnvScene, Light, Pose, PoseF32};
 
 /// Visual state of one environment at the current time, in the frame of the environment. See
-/// [`SceneViewMut::look`](crate::SceneViewMut::look).
+/// [`SceneViewMut::read_visual_state`](crate::SceneViewMut::read_visual_state).
 #[derive(Clone, Debug, Default)]
-pub struct Look {
+pub struct EnvVisualState {
     /// Simulation time \[s\].
     pub time: f64,
     /// Reason of the divergence; `None` while the environment runs.
     pub diverged: Option<String>,
     /// Scene with the environment's own sizes or colors, or with shapes that
-    /// [deform](kinetoscope_scene::Instance::deforms).
-    pub own_scene: OwnScene,
-    /// Poses of the instances in the world, in the order of the instances of [`Visible::scene`](crate::Visible::scene).
+    /// [deform](kinetoscope_scene::Instance::is_deformable).
+    pub env_scene: EnvScene,
+    /// Poses of the instances in the world, in the order of the instances of [`VisualScene::scene`](crate::VisualScene::scene).
     pub instances: Vec<PoseF32>,
     /// Lights of that scene at their current poses.
     pub lights: Vec<Light>,
     /// Poses of links and objects, in the order of [`Entities::body_names`](crate::Entities::body_names).
     pub bodies: Vec<Pose>,
     /// Center of mass \[m\] and mass \[kg\] of each MuJoCo body with a mass.
-    pub masses: Vec<([f64; 3], f64)>,
+    pub mass_points: Vec<([f64; 3], f64)>,
     /// Axes of all hinge and slide joints.
     pub joints: Vec<JointAxis>,
 }
@@ -33,7 +33,7 @@ pub struct JointAxis {
     /// Direction of the axis, a unit vector.
     pub axis: [f64; 3],
     /// True for a slide joint, false for a hinge joint.
-    pub slides: bool,
+    pub is_slide: bool,
 }
 
 /// Motion of a link or object; see [`SceneView::body_motion`](crate::SceneView::body_motion).

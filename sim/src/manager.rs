@@ -2,32 +2,32 @@
 
 use crate::batch::Batch;
 use crate::compile::compile;
-use crate::contents::Contents;
+use crate::contents::EntitySet;
 use crate::diverged::DivergedEnv;
-use crate::env::{Env, EnvStatus};
+use crate::env::{EnvStatus, SimEnv};
 use crate::error::{Error, Result};
-use crate::ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId, env_mask};
+use crate::ids::{EnvId, MjcfId, RigidObjectId, RobotId, TerrainId, env_mask};
 use crate::mjcf::document::Integrator;
 use crate::mjcf::scene_names::MAX_ROBOTS;
 use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
-use crate::objects::mjcf_part_data::{MjcfCfg, MjcfData};
+use crate::objects::mjcf_part_data::{MjcfData, MjcfPartCfg};
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::rigid_object_data::{RigidObjectCfg, RigidObjectData};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut};
-use crate::objects::robot_data::{RobotData, Role};
+use crate::objects::robot_data::{RobotData, RobotKind};
 use crate::objects::terrain::{Terrain, TerrainCfg};
-use crate::observer::{Moment, ObserverSlots};
+use crate::observer::{ObserverList, SimEvent};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::viewpoint::Viewpoint;
-use crate::visible::{Visible, VisualCache};
+use crate::visible::{VisualCache, VisualScene};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
-use kinetoscope_render::geometry::RayAssets;
+use kinetoscope_render::geometry::RayAssetCache;
 use kinetoscope_robot::diagnostic::Diagnostic;
-use kinetoscope_scene::OwnScene;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::EnvScene;
+use kinetoscope_scene::StateFields;
 use kinetoscope_sensors::{Sensor, SensorCfg, SensorContext};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,18 +40,18 @@ static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 pub struct SimulationManager {
     pub(crate) serial: u64,
     pub(crate) cfg: SimulationManagerCfg,
-    pub(crate) contents: Contents,
+    pub(crate) entities: EntitySet,
     visuals: VisualCache,
     /// Acceleration structures shared by all ray casters.
-    ray_assets: RayAssets,
+    ray_assets: RayAssetCache,
     /// Thread pool shared by batch, sensors and renderers.
     pool: ThreadPool,
     diagnostics: Vec<Diagnostic>,
     pub(crate) simulation: Simulation,
     pub(crate) sensors: SensorList,
-    pub(crate) observers: ObserverSlots,
+    pub(crate) observers: ObserverList,
     /// Number of randomization passes done in each environment.
-    pub(crate) draws: Vec<u64>,
+    pub(crate) randomization_count: Vec<u64>,
     /// Point of view of windows, browser views and screenshots; `None` until the program sets one.
     pub(crate) viewpoint: Option<Viewpoint>,
 }
@@ -65,11 +65,11 @@ impl SimulationManager {
     pub fn new(cfg: SimulationManagerCfg) -> Result<Self> {
         cfg.validate()?;
         mj::check_version()?;
-        if cfg.integrator == Integrator::ImplicitFast && mj::TARGET == mj::Target::V2 {
+        if cfg.integrator == Integrator::ImplicitFast && mj::BUILD_VERSION == mj::SupportedVersion::V2 {
             let version = mj::version_string();
-            return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
+            return Err(Error::UnsupportedIntegrator { integrator: cfg.integrator.name(), version });
         }
-        let contents = Contents::default();
+        let contents = EntitySet::default();
         let pool = ThreadPool::new();
         let simulation = compile(&cfg, &contents, &pool)?;
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
@@ -79,15 +79,15 @@ impl SimulationManager {
         Ok(Self {
             serial,
             cfg,
-            contents,
+            entities: contents,
             visuals,
-            ray_assets: RayAssets::default(),
+            ray_assets: RayAssetCache::default(),
             pool,
             diagnostics: Vec::new(),
             simulation,
             sensors,
-            observers: ObserverSlots::default(),
-            draws,
+            observers: ObserverList::default(),
+            randomization_count: draws,
             viewpoint: None,
         })
     }
@@ -122,38 +122,38 @@ impl SimulationManager {
     /// # Errors
     /// The files, names, drives or meshes of the robot are invalid.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
-        self.add_as(cfg, Role::Robot)
+        self.add_with_role(cfg, RobotKind::Robot)
     }
 
     /// Adds a robot or a passive articulation.
-    pub(crate) fn add_as(&mut self, cfg: RobotCfg, role: Role) -> Result<RobotId> {
-        self.contents.check_uid(&cfg.uid)?;
-        if self.contents.robots.len() >= MAX_ROBOTS {
+    pub(crate) fn add_with_role(&mut self, cfg: RobotCfg, role: RobotKind) -> Result<RobotId> {
+        self.entities.check_uid_free(&cfg.uid)?;
+        if self.entities.robots.len() >= MAX_ROBOTS {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
         }
         let mut diagnostics = Vec::new();
-        let (index, mask_id) = (self.contents.robots.len(), self.contents.next_mask_id());
+        let (index, mask_id) = (self.entities.robots.len(), self.entities.next_mask_id());
         let scene = self.simulation.batch.model();
         let robot = RobotData::load(cfg, role, &self.cfg, index, scene, mask_id, &mut diagnostics)?;
-        let robot = robot.with_clearance(&self.cfg, &self.contents, &mut diagnostics)?;
-        let mut contents = self.contents.clone();
+        let robot = robot.with_clearance(&self.cfg, &self.entities, &mut diagnostics)?;
+        let mut contents = self.entities.clone();
         contents.robots.push(Arc::new(robot));
-        self.replace_contents(contents, diagnostics)?;
-        Ok(RobotId { manager: self.serial, index: self.contents.robots.len() - 1 })
+        self.recompile_with(contents, diagnostics)?;
+        Ok(RobotId { manager: self.serial, index: self.entities.robots.len() - 1 })
     }
 
     /// Adds a rigid object to every environment and compiles the model, as [`add_robot`](Self::add_robot) does.
     ///
     /// # Errors
     /// The name is taken, a number is out of range, or a mesh file cannot be used.
-    pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<ObjectId> {
+    pub fn add_rigid_object(&mut self, cfg: RigidObjectCfg) -> Result<RigidObjectId> {
         self.check_world_uid(&cfg.uid)?;
         let mut diagnostics = Vec::new();
-        let object = RigidObjectData::new(cfg, self.contents.next_mask_id(), &mut diagnostics)?;
-        let mut contents = self.contents.clone();
+        let object = RigidObjectData::new(cfg, self.entities.next_mask_id(), &mut diagnostics)?;
+        let mut contents = self.entities.clone();
         contents.objects.push(Arc::new(object));
-        self.replace_contents(contents, diagnostics)?;
-        Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
+        self.recompile_with(contents, diagnostics)?;
+        Ok(RigidObjectId { manager: self.serial, index: self.entities.objects.len() - 1 })
     }
 
     /// Adds a terrain to every environment and compiles the model, as [`add_robot`](Self::add_robot) does. A terrain is
@@ -164,11 +164,11 @@ impl SimulationManager {
     /// range.
     pub fn add_terrain(&mut self, cfg: TerrainCfg) -> Result<TerrainId> {
         self.check_world_uid(&cfg.uid)?;
-        let terrain = Terrain::new(cfg, self.contents.next_mask_id())?;
-        let mut contents = self.contents.clone();
+        let terrain = Terrain::new(cfg, self.entities.next_mask_id())?;
+        let mut contents = self.entities.clone();
         contents.terrains.push(Arc::new(terrain));
-        self.replace_contents(contents, Vec::new())?;
-        Ok(TerrainId { manager: self.serial, index: self.contents.terrains.len() - 1 })
+        self.recompile_with(contents, Vec::new())?;
+        Ok(TerrainId { manager: self.serial, index: self.entities.terrains.len() - 1 })
     }
 
     /// Attaches an MJCF file to every environment and compiles the model, as [`add_robot`](Self::add_robot) does.
@@ -186,26 +186,26 @@ impl SimulationManager {
     /// # Errors
     /// The name is taken, MuJoCo rejects the file (its message names element and line), or the file has something that
     /// cannot be attached, such as flexible bodies and plugins of 4.x.
-    pub fn add_mjcf(&mut self, cfg: MjcfCfg) -> Result<MjcfId> {
+    pub fn add_mjcf(&mut self, cfg: MjcfPartCfg) -> Result<MjcfId> {
         self.check_world_uid(&cfg.uid)?;
         let mut diagnostics = Vec::new();
-        let (index, scene) = (self.contents.parts.len(), self.simulation.batch.model());
-        let part = MjcfData::load(cfg, index, self.contents.next_mask_id(), scene, &mut diagnostics)?;
-        let mut contents = self.contents.clone();
-        contents.parts.push(Arc::new(part));
-        self.replace_contents(contents, diagnostics)?;
+        let (index, scene) = (self.entities.mjcf_models.len(), self.simulation.batch.model());
+        let part = MjcfData::load(cfg, index, self.entities.next_mask_id(), scene, &mut diagnostics)?;
+        let mut contents = self.entities.clone();
+        contents.mjcf_models.push(Arc::new(part));
+        self.recompile_with(contents, diagnostics)?;
         Ok(MjcfId { manager: self.serial, index })
     }
 
     /// Checks that the name `uid` is free, in the scene and in MuJoCo's world.
     pub(crate) fn check_world_uid(&self, uid: &str) -> Result<()> {
-        self.contents.check_uid(uid)?;
+        self.entities.check_uid_free(uid)?;
         // Names of MuJoCo's world body and of the ground geom.
         if matches!(uid, "world" | "ground") { Err(Error::DuplicateUid(uid.into())) } else { Ok(()) }
     }
 
-    /// Compiles `contents` and replaces the simulation. On an error nothing changes.
-    pub(crate) fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
+    /// Compiles `entities` and replaces the simulation. On an error nothing changes.
+    pub(crate) fn recompile_with(&mut self, contents: EntitySet, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents, &self.pool)?;
         // Compiling repeats the earlier diagnostics of the robots: report only the new ones.
         let mut known = self.simulation.diagnostics.clone();
@@ -216,16 +216,16 @@ impl SimulationManager {
             }
         }
         simulation.carry_properties(&self.simulation)?;
-        simulation.carry_over(&self.simulation);
+        simulation.transfer_state_from(&self.simulation);
         self.simulation = simulation;
-        mj::release_freed();
-        self.contents = contents;
+        mj::trim_heap();
+        self.entities = contents;
         self.diagnostics.extend(diagnostics);
         if !self.sensors.is_empty() {
             let context = self.sensor_context(self.sensors.requires());
             self.sensors.rebuild(&mut self.simulation, &context);
         }
-        self.tell_all(&Moment::Compiled);
+        self.notify_all(&SimEvent::Compiled);
         Ok(())
     }
 
@@ -272,10 +272,10 @@ impl SimulationManager {
 
     /// Context for sensors that need the quantities `requires`. Builds the visual scene on the first call that needs
     /// it.
-    fn sensor_context(&mut self, requires: Requires) -> SensorContext {
-        let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
-        let scene = sees.then(|| Arc::clone(self.visible().scene()));
-        let own_scenes = if sees { self.simulation.own_scenes.clone() } else { Vec::new() };
+    fn sensor_context(&mut self, requires: StateFields) -> SensorContext {
+        let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
+        let scene = sees.then(|| Arc::clone(self.visual_scene().scene()));
+        let own_scenes = if sees { self.simulation.env_scenes.clone() } else { Vec::new() };
         SensorContext {
             num_envs: self.cfg.num_envs,
             dt: self.cfg.physics_dt,
@@ -283,11 +283,11 @@ impl SimulationManager {
             name: "".into(),
             seed: self.cfg.seed,
             first_env: self.cfg.first_env(),
-            bodies: self.contents.body_names(),
-            carriers: self.contents.carriers(),
-            joints: self.contents.joint_names(),
-            actuators: self.contents.actuator_names(),
-            engine_sensors: self.contents.engine_sensors(),
+            bodies: self.entities.body_names(),
+            moving_bodies: self.entities.moving_bodies(),
+            joints: self.entities.joint_names(),
+            actuators: self.entities.actuator_names(),
+            engine_sensors: self.entities.engine_sensors(),
             scene,
             own_scenes,
             rebuilt: false,
@@ -299,16 +299,16 @@ impl SimulationManager {
 
     /// Returns the visual scene. The first call builds it and reads the visual meshes; unreadable meshes are left out
     /// with a diagnostic.
-    pub(crate) fn visible(&mut self) -> Arc<Visible> {
-        let visible = self.simulation.make_visible(&self.cfg, &self.contents, &mut self.visuals);
+    pub(crate) fn visual_scene(&mut self) -> Arc<VisualScene> {
+        let visible = self.simulation.build_visual_scene(&self.cfg, &self.entities, &mut self.visuals);
         self.diagnostics.extend(self.visuals.take_diagnostics());
         visible
     }
 
-    /// Render scene of an environment with its own sizes or colors; `OwnScene(None)` for the shared scene.
-    pub(crate) fn own_scene(&self, env: EnvId) -> &OwnScene {
-        static AS_ALL: OwnScene = OwnScene(None);
-        self.simulation.own_scenes.get(env.0).unwrap_or(&AS_ALL)
+    /// Render scene of an environment with its own sizes or colors; `EnvScene(None)` for the shared scene.
+    pub(crate) fn env_scene(&self, env: EnvId) -> &EnvScene {
+        static SHARED_SCENE: EnvScene = EnvScene(None);
+        self.simulation.env_scenes.get(env.0).unwrap_or(&SHARED_SCENE)
     }
 
     /// Returns a robot for reading.
@@ -318,7 +318,7 @@ impl SimulationManager {
     #[track_caller]
     pub fn robot(&self, id: RobotId) -> Robot<'_> {
         let index = self.index_of(id.manager, id.index);
-        Robot::new(&self.contents.robots[index], &self.simulation, index)
+        Robot::new(&self.entities.robots[index], &self.simulation, index)
     }
 
     /// Returns a robot for commands and writes.
@@ -328,7 +328,7 @@ impl SimulationManager {
     #[track_caller]
     pub fn robot_mut(&mut self, id: RobotId) -> RobotMut<'_> {
         let index = self.index_of(id.manager, id.index);
-        RobotMut::new(&self.contents.robots[index], &mut self.simulation, &mut self.sensors, index)
+        RobotMut::new(&self.entities.robots[index], &mut self.simulation, &mut self.sensors, index)
     }
 
     /// Returns a rigid object for reading.
@@ -336,9 +336,9 @@ impl SimulationManager {
     /// # Panics
     /// The handle belongs to another manager.
     #[track_caller]
-    pub fn rigid_object(&self, id: ObjectId) -> RigidObject<'_> {
+    pub fn rigid_object(&self, id: RigidObjectId) -> RigidObject<'_> {
         let index = self.index_of(id.manager, id.index);
-        RigidObject::new(&self.contents.objects[index], &self.simulation, index)
+        RigidObject::new(&self.entities.objects[index], &self.simulation, index)
     }
 
     /// Returns a rigid object for writing.
@@ -346,9 +346,9 @@ impl SimulationManager {
     /// # Panics
     /// The handle belongs to another manager.
     #[track_caller]
-    pub fn rigid_object_mut(&mut self, id: ObjectId) -> RigidObjectMut<'_> {
+    pub fn rigid_object_mut(&mut self, id: RigidObjectId) -> RigidObjectMut<'_> {
         let index = self.index_of(id.manager, id.index);
-        RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
+        RigidObjectMut::new(&self.entities.objects[index], &mut self.simulation, &mut self.sensors, index)
     }
 
     /// Returns an attached MJCF file for reading.
@@ -358,7 +358,7 @@ impl SimulationManager {
     #[track_caller]
     pub fn mjcf_part(&self, id: MjcfId) -> MjcfPart<'_> {
         let index = self.index_of(id.manager, id.index);
-        MjcfPart::new(&self.contents.parts[index], &self.simulation, index)
+        MjcfPart::new(&self.entities.mjcf_models[index], &self.simulation, index)
     }
 
     /// Returns an attached MJCF file for commands and writes.
@@ -368,7 +368,7 @@ impl SimulationManager {
     #[track_caller]
     pub fn mjcf_part_mut(&mut self, id: MjcfId) -> MjcfPartMut<'_> {
         let index = self.index_of(id.manager, id.index);
-        MjcfPartMut::new(&self.contents.parts[index], &mut self.simulation, &mut self.sensors, index)
+        MjcfPartMut::new(&self.entities.mjcf_models[index], &mut self.simulation, &mut self.sensors, index)
     }
 
     /// Reads MuJoCo's model and data of one environment directly, for quantities outside this API. An environment with
@@ -388,7 +388,7 @@ impl SimulationManager {
         what: &'static str,
         wanted: impl Fn(&RobotData) -> bool,
     ) -> Result<RobotId> {
-        let robots = self.contents.robots.iter();
+        let robots = self.entities.robots.iter();
         let among: Vec<(usize, &str)> =
             robots.enumerate().filter(|(_, robot)| wanted(robot)).map(|(index, robot)| (index, robot.uid())).collect();
         let found = among.iter().find(|(_, of)| *of == uid);
@@ -416,7 +416,7 @@ impl SimulationManager {
     pub fn update(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {
-            left -= self.step_observed(left.min(BLOCK), Self::advance);
+            left -= self.step_until_due(left.min(MAX_BLOCK_STEPS), Self::advance);
         }
     }
 
@@ -445,7 +445,7 @@ impl SimulationManager {
             self.sensors.reset(&envs, &mut self.simulation);
         }
         let env_ids = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| EnvId(i)).collect();
-        self.tell_all(&Moment::Reset { env_ids });
+        self.notify_all(&SimEvent::Reset { env_ids });
         Ok(())
     }
 
@@ -458,7 +458,7 @@ impl SimulationManager {
     pub(crate) fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
-        envs.iter().for_each(|&env| self.simulation.batch.write(env, Env::reset_buffers));
+        envs.iter().for_each(|&env| self.simulation.batch.write(env, SimEnv::reset_buffers));
         if !self.sensors.is_empty() {
             self.sensors.reset(&envs, &mut self.simulation);
         }
@@ -498,10 +498,10 @@ impl SimulationManager {
     /// # Errors
     /// A file cannot be written.
     pub fn dump(&self, dir: impl AsRef<std::path::Path>) -> Result<Vec<Diagnostic>> {
-        crate::export::dump(&self.cfg, &self.contents, &self.simulation, &self.diagnostics, dir.as_ref())
+        crate::export::dump(&self.cfg, &self.entities, &self.simulation, &self.diagnostics, dir.as_ref())
     }
 }
 
 /// Largest number of steps in one block: it bounds the response time of the caller (Ctrl+C) and the lead of one
 /// environment over the others.
-const BLOCK: u32 = 1000;
+const MAX_BLOCK_STEPS: u32 = 1000;

@@ -4,42 +4,42 @@ use std::fmt;
 
 /// A robot or passive articulation in error messages: `robot "arm"`, `articulation "drawer"`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Named {
+pub struct EntityLabel {
     /// Type of the entity: `robot` or `articulation`.
-    pub what: &'static str,
+    pub kind: &'static str,
     /// Uid of the entity.
     pub uid: String,
 }
 
-impl fmt::Display for Named {
+impl fmt::Display for EntityLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {:?}", self.what, self.uid)
+        write!(f, "{} {:?}", self.kind, self.uid)
     }
 }
 
 /// Labels a robot.
-impl From<&str> for Named {
+impl From<&str> for EntityLabel {
     fn from(uid: &str) -> Self {
-        Self { what: "robot", uid: uid.into() }
+        Self { kind: "robot", uid: uid.into() }
     }
 }
 
 /// Labels a robot.
-impl From<&String> for Named {
+impl From<&String> for EntityLabel {
     fn from(uid: &String) -> Self {
         uid.as_str().into()
     }
 }
 
 /// Compares the uid.
-impl PartialEq<str> for Named {
+impl PartialEq<str> for EntityLabel {
     fn eq(&self, uid: &str) -> bool {
         self.uid == uid
     }
 }
 
 /// Compares the uid.
-impl PartialEq<&str> for Named {
+impl PartialEq<&str> for EntityLabel {
     fn eq(&self, uid: &&str) -> bool {
         self.uid == *uid
     }

@@ -18,11 +18,11 @@ pub trait Observer: Any + Send {
     fn due_in(&self, sim: &SimulationManager) -> u64;
 
     /// Handles an event. Changes made here, including steps, are reported to the other observers but not to this one.
-    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment);
+    fn on_event(&mut self, sim: &mut SimulationManager, moment: &SimEvent);
 
     /// Handles an event that another crate publishes ([`ObserversMut::publish`](crate::ObserversMut::publish)), such as
     /// a [`StepResult`](crate::StepResult). Events of unknown types must be ignored.
-    fn receive(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
+    fn on_published(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
         let _ = (sim, event);
     }
 
@@ -37,7 +37,7 @@ pub trait Observer: Any + Send {
 /// An event of a simulation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Moment {
+pub enum SimEvent {
     /// Steps were done and the observer is due.
     Stepped,
     /// Environments were reset.
@@ -78,22 +78,22 @@ impl<O> fmt::Debug for ObserverId<O> {
 
 /// The observers of a simulation.
 #[derive(Default)]
-pub(crate) struct ObserverSlots {
-    seats: Vec<Seat>,
-    next: u64,
+pub(crate) struct ObserverList {
+    slots: Vec<ObserverSlot>,
+    next_number: u64,
     /// Number of physics steps since the simulation was created.
     pub(crate) steps: u64,
 }
 
-struct Seat {
+struct ObserverSlot {
     number: u64,
     /// `None` while the observer handles an event.
     observer: Option<Box<dyn Observer>>,
 }
 
-impl fmt::Debug for ObserverSlots {
+impl fmt::Debug for ObserverList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_list().entries(self.seats.iter().map(|seat| seat.number)).finish()
+        f.debug_list().entries(self.slots.iter().map(|seat| seat.number)).finish()
     }
 }
 
@@ -129,30 +129,31 @@ impl<'a> Observers<'a> {
     /// The handle belongs to another manager.
     #[track_caller]
     pub fn get<O: Observer>(&self, id: ObserverId<O>) -> Result<&'a O> {
-        let seat = &self.sim.observers.seats[self.sim.seat_of(id)?];
+        let seat = &self.sim.observers.slots[self.sim.slot_index(id)?];
         let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
-        any.and_then(|any| any.downcast_ref()).ok_or(Error::NoObserver)
+        any.and_then(|any| any.downcast_ref()).ok_or(Error::ObserverUnavailable)
     }
 
     /// Handles of all observers of type `O` in insertion order, without one that is handling an event right now.
     pub fn ids<O: Observer>(&self) -> Vec<ObserverId<O>> {
-        let is = |seat: &&Seat| {
+        let is = |seat: &&ObserverSlot| {
             let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
             any.is_some_and(|any| any.is::<O>())
         };
-        let id = |seat: &Seat| ObserverId { manager: self.sim.serial, number: seat.number, observer: PhantomData };
-        self.sim.observers.seats.iter().filter(is).map(id).collect()
+        let id =
+            |seat: &ObserverSlot| ObserverId { manager: self.sim.serial, number: seat.number, observer: PhantomData };
+        self.sim.observers.slots.iter().filter(is).map(id).collect()
     }
 
     /// True if the observer belongs to this simulation, was not removed, and is not handling an event right now.
     pub fn contains<O: Observer>(&self, id: ObserverId<O>) -> bool {
-        id.manager == self.sim.serial && self.sim.seat_of(id).is_ok()
+        id.manager == self.sim.serial && self.sim.slot_index(id).is_ok()
     }
 
     /// True if an observer announces events of type `E` ([`Observer::publishes`]). Recorders check this when they
     /// start.
     pub fn is_published<E: Any>(&self) -> bool {
-        let mut observers = self.sim.observers.seats.iter().filter_map(|seat| seat.observer.as_ref());
+        let mut observers = self.sim.observers.slots.iter().filter_map(|seat| seat.observer.as_ref());
         observers.any(|observer| observer.publishes(TypeId::of::<E>()))
     }
 
@@ -174,18 +175,18 @@ impl<'a> ObserversMut<'a> {
         Self { sim }
     }
 
-    /// Publishes an event of any type to all observers ([`Observer::receive`]). The simulation does not store it.
+    /// Publishes an event of any type to all observers ([`Observer::on_published`]). The simulation does not store it.
     pub fn publish<E: Any>(self, event: &E) {
-        self.sim.tell_each(|observer, sim| observer.receive(sim, event));
+        self.sim.notify_each_with(|observer, sim| observer.on_published(sim, event));
     }
 
     /// Adds an observer, which receives all events from now on.
     pub fn add<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
         // Earlier writes are reported to the existing observers only.
-        self.sim.tell_written();
-        let number = self.sim.observers.next;
-        self.sim.observers.next += 1;
-        self.sim.observers.seats.push(Seat { number, observer: Some(Box::new(observer)) });
+        self.sim.notify_written();
+        let number = self.sim.observers.next_number;
+        self.sim.observers.next_number += 1;
+        self.sim.observers.slots.push(ObserverSlot { number, observer: Some(Box::new(observer)) });
         ObserverId { manager: self.sim.serial, number, observer: PhantomData }
     }
 
@@ -198,12 +199,12 @@ impl<'a> ObserversMut<'a> {
     /// The handle belongs to another manager.
     #[track_caller]
     pub fn remove<O: Observer>(&mut self, id: ObserverId<O>) -> Result<O> {
-        self.sim.seat_of(id)?;
-        self.sim.tell_written();
-        let index = self.sim.seat_of(id)?;
-        let seat = self.sim.observers.seats.remove(index);
+        self.sim.slot_index(id)?;
+        self.sim.notify_written();
+        let index = self.sim.slot_index(id)?;
+        let seat = self.sim.observers.slots.remove(index);
         let any: Option<Box<dyn Any>> = seat.observer.map(|observer| observer as Box<dyn Any>);
-        any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::NoObserver)
+        any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::ObserverUnavailable)
     }
 
     /// Returns an observer for changes.
@@ -215,33 +216,33 @@ impl<'a> ObserversMut<'a> {
     /// The handle belongs to another manager.
     #[track_caller]
     pub fn get<O: Observer>(self, id: ObserverId<O>) -> Result<&'a mut O> {
-        let index = self.sim.seat_of(id)?;
-        let seat = &mut self.sim.observers.seats[index];
+        let index = self.sim.slot_index(id)?;
+        let seat = &mut self.sim.observers.slots[index];
         let any: Option<&mut dyn Any> = seat.observer.as_deref_mut().map(|observer| observer as &mut dyn Any);
-        any.and_then(|any| any.downcast_mut()).ok_or(Error::NoObserver)
+        any.and_then(|any| any.downcast_mut()).ok_or(Error::ObserverUnavailable)
     }
 }
 
 impl SimulationManager {
     #[track_caller]
-    fn seat_of<O>(&self, id: ObserverId<O>) -> Result<usize> {
+    fn slot_index<O>(&self, id: ObserverId<O>) -> Result<usize> {
         assert!(id.manager == self.serial, "this handle is of another SimulationManager");
-        let place = self.observers.seats.iter().position(|seat| seat.number == id.number);
-        place.filter(|&i| self.observers.seats[i].observer.is_some()).ok_or(Error::NoObserver)
+        let place = self.observers.slots.iter().position(|seat| seat.number == id.number);
+        place.filter(|&i| self.observers.slots[i].observer.is_some()).ok_or(Error::ObserverUnavailable)
     }
 
     /// Does `steps` steps, or fewer until an observer is due, and notifies the due observers. Returns the number of
     /// steps done.
-    pub(crate) fn step_observed(&mut self, steps: u32, mut step: impl FnMut(&mut Self, u32)) -> u32 {
-        if self.observers.seats.is_empty() {
+    pub(crate) fn step_until_due(&mut self, steps: u32, mut step: impl FnMut(&mut Self, u32)) -> u32 {
+        if self.observers.slots.is_empty() {
             step(self, steps);
             self.observers.steps += u64::from(steps);
             return steps;
         }
-        self.tell_written();
+        self.notify_written();
         let waits: Vec<(u64, u64)> = self
             .observers
-            .seats
+            .slots
             .iter()
             .filter_map(|seat| Some((seat.number, seat.observer.as_ref()?.due_in(self).max(1))))
             .collect();
@@ -250,37 +251,37 @@ impl SimulationManager {
         step(self, block);
         self.observers.steps += u64::from(block);
         for (number, _) in waits.iter().filter(|(_, wait)| *wait <= u64::from(block)) {
-            self.tell(*number, |observer, sim| observer.observe(sim, &Moment::Stepped));
+            self.notify(*number, |observer, sim| observer.on_event(sim, &SimEvent::Stepped));
         }
         block
     }
 
-    fn tell_written(&mut self) {
+    fn notify_written(&mut self) {
         let written = self.sensors.take_written();
         if !written.is_empty() {
-            self.tell_all(&Moment::Written { env_ids: written });
+            self.notify_all(&SimEvent::Written { env_ids: written });
         }
     }
 
     /// Notifies all observers of an event.
-    pub(crate) fn tell_all(&mut self, moment: &Moment) {
-        self.tell_each(|observer, sim| observer.observe(sim, moment));
+    pub(crate) fn notify_all(&mut self, moment: &SimEvent) {
+        self.notify_each_with(|observer, sim| observer.on_event(sim, moment));
     }
 
-    fn tell_each(&mut self, tell: impl Fn(&mut dyn Observer, &mut Self)) {
-        let numbers: Vec<u64> = self.observers.seats.iter().map(|seat| seat.number).collect();
+    fn notify_each_with(&mut self, tell: impl Fn(&mut dyn Observer, &mut Self)) {
+        let numbers: Vec<u64> = self.observers.slots.iter().map(|seat| seat.number).collect();
         for number in numbers {
-            self.tell(number, &tell);
+            self.notify(number, &tell);
         }
     }
 
-    fn tell(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) {
+    fn notify(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) {
         // An observer that is handling an event receives no event of its own changes.
-        let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) else { return };
+        let Some(seat) = self.observers.slots.iter_mut().find(|seat| seat.number == number) else { return };
         let Some(mut observer) = seat.observer.take() else { return };
         tell(observer.as_mut(), self);
         // An observer that was removed meanwhile is dropped here.
-        if let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) {
+        if let Some(seat) = self.observers.slots.iter_mut().find(|seat| seat.number == number) {
             seat.observer = Some(observer);
         }
     }

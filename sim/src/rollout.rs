@@ -6,12 +6,12 @@
 //! read.
 
 use crate::drive::table::DriveState;
-use crate::env::{Env, EnvState, EnvStatus};
+use crate::env::{EnvState, EnvStatus, SimEnv};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list};
 use crate::manager::SimulationManager;
 use crate::simulation::Simulation;
-use crate::snapshot::{Entry, Snapshot};
+use crate::snapshot::{EnvEntry, Snapshot};
 use kinetoscope_mujoco as mj;
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,24 +23,24 @@ pub struct Rollout {
     /// [`state_names`](crate::Entities::state_names) has the column names. A diverged row repeats its last valid state.
     pub states: Array3<f64>,
     /// Final states; [`restore`](SimulationManager::restore) copies them to the environments.
-    pub end: Snapshot,
+    pub final_states: Snapshot,
     /// Diverged rows, each with the reason.
     pub diverged: Vec<(usize, String)>,
 }
 
 /// Effect of one column of the controls.
 #[derive(Clone, Copy, Debug)]
-enum Column {
+enum ColumnEffect {
     /// Position target of a drive, clamped to the target range in the row's initial state.
     Target { drive: usize },
     /// No effect: the joint follows another joint or has no drive.
     Ignored,
     /// Control of an actuator of an attached MJCF file.
-    Control { place: usize },
+    Control { ctrl_index: usize },
 }
 
 /// One row of a rollout before its first step.
-struct Row {
+struct RolloutRow {
     env: usize,
     model: mj::Model,
     drives: DriveState,
@@ -48,26 +48,27 @@ struct Row {
 }
 
 /// Effects of all columns: joints of all robots, then actuators of all attached MJCF files.
-fn columns(simulation: &Simulation) -> Vec<Column> {
+fn columns(simulation: &Simulation) -> Vec<ColumnEffect> {
     let joints = simulation.robots.iter().flat_map(|robot| &robot.joints);
-    let target = |drive| Column::Target { drive };
-    let mut columns: Vec<Column> = joints.map(|joint| joint.drive.map_or(Column::Ignored, target)).collect();
-    for part in &simulation.parts {
-        columns.extend(part.controls.iter().map(|&place| Column::Control { place }));
+    let target = |drive| ColumnEffect::Target { drive };
+    let mut columns: Vec<ColumnEffect> =
+        joints.map(|joint| joint.drive.map_or(ColumnEffect::Ignored, target)).collect();
+    for part in &simulation.mjcf_models {
+        columns.extend(part.controls.iter().map(|&place| ColumnEffect::Control { ctrl_index: place }));
     }
     columns
 }
 
-fn control(env: &mut Env, columns: &[Column], values: impl Iterator<Item = f64>) {
+fn apply_controls(env: &mut SimEnv, columns: &[ColumnEffect], values: impl Iterator<Item = f64>) {
     let mut controls = Vec::new();
     for (column, value) in columns.iter().zip(values) {
         match *column {
-            Column::Target { drive } => {
+            ColumnEffect::Target { drive } => {
                 let [low, high] = env.drives.ranges[drive];
                 env.drives.position[drive] = value.clamp(low, high);
             }
-            Column::Ignored => {}
-            Column::Control { place } => controls.push((place, value)),
+            ColumnEffect::Ignored => {}
+            ColumnEffect::Control { ctrl_index: place } => controls.push((place, value)),
         }
     }
     if !controls.is_empty() {
@@ -76,24 +77,24 @@ fn control(env: &mut Env, columns: &[Column], values: impl Iterator<Item = f64>)
 }
 
 /// Model of the environment without attached welds; a row attaches the welds of its own initial state.
-fn without_welds(env: &Env) -> mj::Model {
+fn without_welds(env: &SimEnv) -> mj::Model {
     let model = env.data().model();
     if env.welds().is_empty() { model.clone() } else { model.with_welds(&[]) }
 }
 
 /// Steps one row in `env`, which has the model of the row.
-fn roll(
-    env: &mut Env,
-    row: &Row,
-    columns: &[Column],
+fn step_row(
+    env: &mut SimEnv,
+    row: &RolloutRow,
+    columns: &[ColumnEffect],
     substeps: u32,
     controls: ArrayView2<'_, f64>,
     mut states: ArrayViewMut2<'_, f64>,
-) -> (Entry, Option<String>) {
+) -> (EnvEntry, Option<String>) {
     env.drives = row.drives.clone();
-    env.recall(&row.start);
+    env.load_state(&row.start);
     for (values, mut state) in controls.rows().into_iter().zip(states.rows_mut()) {
-        control(env, columns, values.iter().copied());
+        apply_controls(env, columns, values.iter().copied());
         env.step(substeps);
         let now = env.data().qpos().iter().chain(env.data().qvel());
         state.iter_mut().zip(now).for_each(|(to, from)| *to = *from);
@@ -102,7 +103,7 @@ fn roll(
         EnvStatus::Running => None,
         EnvStatus::Diverged { step, reason } => Some(format!("step {step}: {reason}")),
     };
-    (Entry { env: row.env, state: env.remember(), own: Arc::default() }, reason)
+    (EnvEntry { env: row.env, state: env.save_state(), overrides: Arc::default() }, reason)
 }
 
 impl SimulationManager {
@@ -120,7 +121,7 @@ impl SimulationManager {
     /// A single state in `start` is used for all rows.
     ///
     /// The environments keep their state, bit for bit. To continue from the end of a rollout,
-    /// [`restore`](Self::restore) its [`Rollout::end`].
+    /// [`restore`](Self::restore) its [`Rollout::final_states`].
     ///
     /// # Errors
     /// The shape is wrong, a control is not finite, an environment does not exist, the snapshot belongs to another
@@ -138,22 +139,22 @@ impl SimulationManager {
         let rows = self.rows(&envs, start)?;
         let (steps, substeps, model) = (controls.shape()[1], self.cfg.substeps, self.simulation.batch.model());
         let mut states = Array3::zeros((envs.len(), steps, model.nq() + model.nv()));
-        let mut results: Vec<Option<(Entry, Option<String>)>> = vec![None; envs.len()];
+        let mut results: Vec<Option<(EnvEntry, Option<String>)>> = vec![None; envs.len()];
         let threads = self.threads().clamp(1, envs.len().max(1));
         let work = Mutex::new(rows.iter().zip(states.outer_iter_mut()).zip(&mut results).enumerate());
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
         let run = || -> Result<()> {
             // With the model the copy was made of: a row with welds changes the model of the copy.
-            let mut copy: Option<(&mj::Model, Env)> = None;
+            let mut copy: Option<(&mj::Model, SimEnv)> = None;
             while let Some((k, ((row, states), result))) = next() {
-                let mut env = match copy.take().filter(|(model, _)| model.is(&row.model)) {
+                let mut env = match copy.take().filter(|(model, _)| model.ptr_eq(&row.model)) {
                     Some((_, env)) => env,
-                    None => Env::with_drives(&row.model, row.drives.clone())?,
+                    None => SimEnv::with_drives(&row.model, row.drives.clone())?,
                 };
                 let mine = controls.index_axis(ndarray::Axis(0), if controls.shape()[0] == 1 { 0 } else { k });
-                *result = Some(roll(&mut env, row, &columns, substeps, mine, states));
+                *result = Some(step_row(&mut env, row, &columns, substeps, mine, states));
                 // A row that needed larger buffers drops its copy, so that the next row starts with small ones.
-                copy = (env.growths() == 0).then_some((&row.model, env));
+                copy = (env.buffer_growths() == 0).then_some((&row.model, env));
             }
             Ok(())
         };
@@ -168,11 +169,11 @@ impl SimulationManager {
         })?;
         let (mut entries, mut diverged) = (Vec::with_capacity(envs.len()), Vec::new());
         for (k, (entry, reason)) in results.into_iter().flatten().enumerate() {
-            let own = self.simulation.own_properties(entry.env, self.draws[entry.env]);
-            entries.push(Entry { own, ..entry });
+            let own = self.simulation.own_properties(entry.env, self.randomization_count[entry.env]);
+            entries.push(EnvEntry { overrides: own, ..entry });
             diverged.extend(reason.map(|reason| (k, reason)));
         }
-        Ok(Rollout { states, end: Snapshot::new(&self.simulation, entries), diverged })
+        Ok(Rollout { states, final_states: Snapshot::new(&self.simulation, entries), diverged })
     }
 
     fn check_controls(&self, controls: ArrayView3<'_, f64>, rows: usize, columns: usize) -> Result<()> {
@@ -185,12 +186,12 @@ impl SimulationManager {
             None => Ok(()),
             Some(((row, step, column), &value)) => {
                 let of = format!("control {:?} of step {step}", self.entities().control_names()[column]);
-                Err(Error::NotFinite { argument: "rollout", row, column, of, value })
+                Err(Error::NotFinite { argument: "rollout", row, column, item: of, value })
             }
         }
     }
 
-    fn rows(&self, envs: &[usize], start: Option<&Snapshot>) -> Result<Vec<Row>> {
+    fn rows(&self, envs: &[usize], start: Option<&Snapshot>) -> Result<Vec<RolloutRow>> {
         let states = start.map(|start| start.states_for(envs.len(), &self.simulation)).transpose()?;
         // One model for all rows of an environment, so that they share a copy.
         let mut models: Vec<Option<mj::Model>> = vec![None; self.num_envs()];
@@ -198,10 +199,10 @@ impl SimulationManager {
             self.simulation.batch.read(env, |here| {
                 let start = match (start, &states) {
                     (Some(start), Some(states)) => start.entries()[states[k]].state.clone(),
-                    _ => here.remember(),
+                    _ => here.save_state(),
                 };
                 let model = models[env].get_or_insert_with(|| without_welds(here)).clone();
-                Row { env, model, drives: here.drives.clone(), start }
+                RolloutRow { env, model, drives: here.drives.clone(), start }
             })
         };
         Ok(envs.iter().enumerate().map(row).collect())

@@ -1,22 +1,22 @@
 //! Render scene, visual state and contacts, for viewers and renderers.
 
 use crate::body_pose::BodyFrame;
-use crate::capture::{Capture, body_velocity};
+use crate::capture::{CaptureRequest, body_velocity};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list, env_mask};
-use crate::look::{BodyMotion, JointAxis, Look};
+use crate::look::{BodyMotion, EnvVisualState, JointAxis};
 use crate::manager::SimulationManager;
 use crate::sensor_list::SensorId;
 use crate::viewpoint::Viewpoint;
-use crate::visible::{MaskId, Visible};
+use crate::visible::{MaskId, VisualScene};
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::Contact;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{Marker, PoseF32, RenderScene};
 use kinetoscope_sensors::Sensor;
-use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, Thing};
+use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, SegmentedEntity};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -60,12 +60,12 @@ impl<'a> SceneView<'a> {
     /// # Errors
     /// A pattern is not a regular expression or matches nothing, or two patterns match the same item.
     pub fn segmentation(&self, cfg: &SegmentationCfg) -> Result<Segmentation> {
-        let things = self.mask_ids().iter().map(Thing::from);
-        Segmentation::new(things, cfg).map_err(|error| Error::Labels(Box::new(error)))
+        let things = self.mask_ids().iter().map(SegmentedEntity::from);
+        Segmentation::new(things, cfg).map_err(|error| Error::SegmentationLabels(Box::new(error)))
     }
 
     /// Markers of the last measurements of all sensors with enabled markers, for
-    /// [`Still::overview`](crate::Still::overview). [`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)
+    /// [`OffscreenScene::overview`](crate::OffscreenScene::overview). [`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)
     /// or [`SceneViewMut::set_debug_vis`] enables them.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, None)
@@ -77,7 +77,7 @@ impl<'a> SceneView<'a> {
     /// # Panics
     /// The handle belongs to another manager.
     #[track_caller]
-    pub fn markers_beside<S: Sensor>(&self, id: SensorId<S>) -> Vec<(EnvId, Marker)> {
+    pub fn markers_except<S: Sensor>(&self, id: SensorId<S>) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, Some(self.sim.sensors.index_of(id)))
     }
 
@@ -104,7 +104,7 @@ impl<'a> SceneView<'a> {
     /// The environment or the body does not exist.
     pub fn body_motion(&self, env: EnvId, body: usize) -> Result<BodyMotion> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let frame = frame_of(self.sim, body)?;
+        let frame = body_frame(self.sim, body)?;
         Ok(self.sim.simulation.batch.read(env.0, |env| {
             let (data, pose) = (env.data(), frame.pose(env.data()));
             let [linear, angular] = body_velocity(data, frame.body, &pose.translation.vector);
@@ -147,19 +147,19 @@ impl<'a> SceneViewMut<'a> {
 
     /// Returns the visual scene. The first call builds it and reads the visual meshes; unreadable meshes are left out
     /// with a diagnostic.
-    pub fn visible(&mut self) -> Arc<Visible> {
-        self.sim.visible()
+    pub fn visual_scene(&mut self) -> Arc<VisualScene> {
+        self.sim.visual_scene()
     }
 
-    /// Copies the visual state of an environment to `look`, whose memory is reused.
+    /// Copies the visual state of an environment to `read_visual_state`, whose memory is reused.
     ///
     /// # Errors
     /// The environment does not exist.
-    pub fn look(&mut self, env: EnvId, look: &mut Look) -> Result<()> {
+    pub fn read_visual_state(&mut self, env: EnvId, look: &mut EnvVisualState) -> Result<()> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let visible = self.sim.visible();
-        let own = self.sim.own_scene(env).clone();
-        let plan = &self.sim.simulation.plan;
+        let visible = self.sim.visual_scene();
+        let own = self.sim.env_scene(env).clone();
+        let plan = &self.sim.simulation.body_axis;
         let index = env.0;
         self.sim.simulation.batch.read(index, |env| {
             let data = env.data();
@@ -170,29 +170,29 @@ impl<'a> SceneViewMut<'a> {
             };
             look.instances.resize(visible.scene().instances().len(), PoseF32::IDENTITY);
             look.lights.clone_from(&visible.scene().lights);
-            visible.read(data, &mut look.instances, &mut look.lights);
-            visible.shape(data, index, &own, &mut look.own_scene);
+            visible.read_poses(data, &mut look.instances, &mut look.lights);
+            visible.update_shapes(data, index, &own, &mut look.env_scene);
             look.bodies.clear();
             look.bodies.extend(plan.bodies().iter().map(|frame| frame.pose(data)));
-            look.masses.clear();
+            look.mass_points.clear();
             let masses = data.xipos().as_chunks::<3>().0.iter().zip(data.model().body_mass());
-            look.masses.extend(masses.skip(1).filter(|(_, mass)| **mass > 0.0).map(|(at, mass)| (*at, *mass)));
+            look.mass_points.extend(masses.skip(1).filter(|(_, mass)| **mass > 0.0).map(|(at, mass)| (*at, *mass)));
             look.joints.clear();
-            look.joints.extend(axes(data));
+            look.joints.extend(joint_axes(data));
         });
         Ok(())
     }
 
-    /// Render scene of an environment, in the order of [`Look::instances`]. All environments without own sizes or
-    /// colors share one scene until an entity is added. Shapes that [deform](kinetoscope_scene::Instance::deforms) are
+    /// Render scene of an environment, in the order of [`EnvVisualState::instances`]. All environments without own sizes or
+    /// colors share one scene until an entity is added. Shapes that [deform](kinetoscope_scene::Instance::is_deformable) are
     /// not updated to the current time.
     ///
     /// # Errors
     /// The environment does not exist.
-    pub fn scene_of(&mut self, env: EnvId) -> Result<Arc<RenderScene>> {
+    pub fn env_scene(&mut self, env: EnvId) -> Result<Arc<RenderScene>> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let visible = self.sim.visible();
-        Ok(self.sim.own_scene(env).0.clone().unwrap_or_else(|| Arc::clone(visible.scene())))
+        let visible = self.sim.visual_scene();
+        Ok(self.sim.env_scene(env).0.clone().unwrap_or_else(|| Arc::clone(visible.scene())))
     }
 
     /// Contacts of environments at the current time, with the forces that the engine solves for it: one list for each
@@ -203,11 +203,12 @@ impl<'a> SceneViewMut<'a> {
     /// # Errors
     /// An environment does not exist.
     pub fn contacts(&mut self, env_ids: Option<&[EnvId]>) -> Result<Vec<Vec<Contact>>> {
-        let capture = Capture { plan: Arc::clone(&self.sim.simulation.plan), fields: Requires::CONTACTS };
+        let capture =
+            CaptureRequest { body_axis: Arc::clone(&self.sim.simulation.body_axis), fields: StateFields::CONTACTS };
         let batch = &mut self.sim.simulation.batch;
         let of_env = |env: usize| {
             let mut contacts = Vec::new();
-            batch.write(env, |env| env.present_contacts(&capture, &mut contacts));
+            batch.write(env, |env| env.current_contacts(&capture, &mut contacts));
             contacts
         };
         Ok(env_list(env_ids, self.sim.cfg.num_envs)?.into_iter().map(of_env).collect())
@@ -224,13 +225,13 @@ impl<'a> SceneViewMut<'a> {
     ///
     /// # Errors
     /// The environment or the body does not exist, or a number is not finite; then nothing changes.
-    pub fn pull(&mut self, env: EnvId, body: usize, forces: &[([f64; 3], [f64; 3])]) -> Result<()> {
+    pub fn set_point_forces(&mut self, env: EnvId, body: usize, forces: &[([f64; 3], [f64; 3])]) -> Result<()> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let mujoco_body = frame_of(self.sim, body)?.body;
+        let mujoco_body = body_frame(self.sim, body)?.body;
         for (of, numbers) in forces.iter().flat_map(|(point, force)| [("the point", point), ("the force", force)]) {
             if let Some(column) = numbers.iter().position(|x| !x.is_finite()) {
                 let (of, value) = (of.to_string(), numbers[column]);
-                return Err(Error::NotFinite { argument: "pull", row: env.0, column, of, value });
+                return Err(Error::NotFinite { argument: "pull", row: env.0, column, item: of, value });
             }
         }
         self.sim.simulation.batch.write(env.0, |env| {
@@ -242,7 +243,7 @@ impl<'a> SceneViewMut<'a> {
             };
             let none = [Vector3::zeros(); 2];
             let [force, torque] = forces.iter().map(of).fold(none, |[f, t], [force, torque]| [f + force, t + torque]);
-            env.set_wrenches(|wrenches| wrenches.pull(body, mujoco_body, force, torque));
+            env.set_wrenches(|wrenches| wrenches.set_user_wrench(body, mujoco_body, force, torque));
         });
         Ok(())
     }
@@ -262,8 +263,8 @@ impl<'a> SceneViewMut<'a> {
                 expected: "eye and target must be finite and apart from each other, in metres",
             });
         }
-        let changes = self.sim.viewpoint.map_or(0, |view| view.changes) + 1;
-        self.sim.viewpoint = Some(Viewpoint { eye, target, changes });
+        let changes = self.sim.viewpoint.map_or(0, |view| view.revision) + 1;
+        self.sim.viewpoint = Some(Viewpoint { eye, target, revision: changes });
         Ok(())
     }
 
@@ -281,17 +282,17 @@ impl<'a> SceneViewMut<'a> {
 }
 
 /// Frame of a body on the body axis.
-fn frame_of(sim: &SimulationManager, body: usize) -> Result<&BodyFrame> {
-    let bodies = sim.simulation.plan.bodies();
+fn body_frame(sim: &SimulationManager, body: usize) -> Result<&BodyFrame> {
+    let bodies = sim.simulation.body_axis.bodies();
     bodies.get(body).ok_or(Error::UnknownIndex { what: "body", index: body, count: bodies.len() })
 }
 
 /// Axes of all hinge and slide joints.
-fn axes(data: &Data) -> impl Iterator<Item = JointAxis> {
+fn joint_axes(data: &Data) -> impl Iterator<Item = JointAxis> {
     let anchors = data.xanchor().as_chunks::<3>().0.iter().zip(data.xaxis().as_chunks::<3>().0);
     anchors.zip(data.model().jnt_type()).filter_map(|((anchor, axis), kind)| {
         let kind = *kind as u32;
         let slides = kind == mj::mjJNT_SLIDE;
-        (slides || kind == mj::mjJNT_HINGE).then_some(JointAxis { anchor: *anchor, axis: *axis, slides })
+        (slides || kind == mj::mjJNT_HINGE).then_some(JointAxis { anchor: *anchor, axis: *axis, is_slide: slides })
     })
 }

@@ -1,13 +1,13 @@
 //! The sensors of a simulation: built from configurations, updated after steps, read through typed handles.
 
-use crate::capture::Capture;
-use crate::contents::check_usable;
+use crate::capture::CaptureRequest;
+use crate::contents::check_uid_syntax;
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;
 use crate::ids::EnvId;
 use crate::simulation::Simulation;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use kinetoscope_sensors::{Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot};
 use std::any::Any;
@@ -59,9 +59,9 @@ impl<S> std::fmt::Debug for SensorId<S> {
 
 type Builder = Box<dyn Fn(&SensorContext) -> Result<Box<dyn Sensor>, SensorError> + Send>;
 
-struct Entry {
+struct SensorEntry {
     uid: String,
-    requires: Requires,
+    requires: StateFields,
     /// True if the markers of the sensor are enabled.
     debug_vis: bool,
     lazy: Option<Schedule>,
@@ -70,13 +70,13 @@ struct Entry {
     slot: Result<SensorSlot, SensorError>,
 }
 
-impl Entry {
+impl SensorEntry {
     /// The sensor, unless it is known to have failed.
     fn running(&self) -> Option<&SensorSlot> {
         self.slot.as_ref().ok().filter(|slot| !slot.has_failed())
     }
 
-    fn fault(&self, fault: &SensorError) -> Error {
+    fn fault_error(&self, fault: &SensorError) -> Error {
         Error::SensorFault { sensor: self.uid.clone(), fault: fault.to_string() }
     }
 }
@@ -86,12 +86,12 @@ impl Entry {
 pub(crate) struct SensorList {
     /// Serial number of the manager.
     manager: u64,
-    entries: Vec<Entry>,
+    entries: Vec<SensorEntry>,
     state: SceneState,
     /// Flags of the sensors that are due after the current steps.
     due: Vec<bool>,
     /// Step count of every environment; [`kinetoscope_sensors::Phases::STANDS`] for a diverged environment.
-    clocks: Vec<u64>,
+    step_counts: Vec<u64>,
     /// Environments with a written state since the last [`take_written`](Self::take_written).
     written: BTreeSet<usize>,
     /// MuJoCo steps per physics step.
@@ -115,16 +115,16 @@ impl SensorList {
     }
 
     /// Union of the quantities that all sensors need.
-    pub(crate) fn requires(&self) -> Requires {
-        self.entries.iter().fold(Requires::NONE, |sum, e| sum | e.requires)
+    pub(crate) fn requires(&self) -> StateFields {
+        self.entries.iter().fold(StateFields::NONE, |sum, e| sum | e.requires)
     }
 
     /// Checks that the name `uid` is free and usable, and that the needed quantities are available.
-    pub(crate) fn check(&self, uid: &str, requires: Requires) -> Result<()> {
+    pub(crate) fn check(&self, uid: &str, requires: StateFields) -> Result<()> {
         if self.entries.iter().any(|e| e.uid == uid) {
             return Err(Error::DuplicateUid(uid.into()));
         }
-        check_usable(uid)?;
+        check_uid_syntax(uid)?;
         let missing = requires.without(gather::AVAILABLE);
         if missing.is_empty() {
             Ok(())
@@ -151,16 +151,16 @@ impl SensorList {
         let all = self.requires() | requires;
         let envs: Vec<usize> = (0..context.num_envs).collect();
         let mut state = gather::allocate(simulation, all);
-        solve(simulation, all, &envs);
+        solve_and_capture(simulation, all, &envs);
         gather::gather(simulation, self.substeps, all, &mut state);
-        if requires.contains(Requires::MARKERS) {
-            state.markers = Some(self.markers_beside(simulation, None));
+        if requires.contains(StateFields::MARKERS) {
+            state.markers = Some(self.markers_except(simulation, None));
         }
         let mut slot = SensorSlot::new(sensor, requires, lazy, context.num_envs);
         slot.reset(&envs, &state);
         slot.sensor().map_err(|error| wrong(error.clone()))?;
         self.state = SceneState { markers: None, ..state };
-        self.entries.push(Entry { uid, requires, debug_vis, lazy, build, slot: Ok(slot) });
+        self.entries.push(SensorEntry { uid, requires, debug_vis, lazy, build, slot: Ok(slot) });
         Ok(SensorId { manager: self.manager, index: self.entries.len() - 1, sensor: PhantomData })
     }
 
@@ -169,32 +169,34 @@ impl SensorList {
         let all = self.requires();
         let envs: Vec<usize> = (0..context.num_envs).collect();
         self.state = gather::allocate(simulation, all);
-        solve(simulation, all, &envs);
+        solve_and_capture(simulation, all, &envs);
         gather::gather(simulation, self.substeps, all, &mut self.state);
         for entry in &mut self.entries {
             let context = SensorContext { name: entry.uid.as_str().into(), rebuilt: true, ..context.clone() };
             let sensor = (entry.build)(&context);
             entry.slot = sensor.map(|sensor| SensorSlot::new(sensor, entry.requires, entry.lazy, context.num_envs));
         }
-        self.tell(simulation, |_| true, |slot, state| slot.reset(&envs, state));
+        self.update_slots(simulation, |_| true, |slot, state| slot.reset(&envs, state));
     }
 
     /// Passes the state to the `chosen` sensors: first to those that measure, then to those that render the markers of
     /// the others.
-    fn tell(
+    fn update_slots(
         &mut self,
         simulation: &Simulation,
         chosen: impl Fn(usize) -> bool,
         mut act: impl FnMut(&mut SensorSlot, &SceneState),
     ) {
-        let draws = |entry: &Entry| entry.requires.contains(Requires::MARKERS);
+        let renders_markers = |entry: &SensorEntry| entry.requires.contains(StateFields::MARKERS);
         let Self { entries, state, .. } = self;
-        for (_, entry) in entries.iter_mut().enumerate().filter(|(index, entry)| chosen(*index) && !draws(entry)) {
+        for (_, entry) in
+            entries.iter_mut().enumerate().filter(|(index, entry)| chosen(*index) && !renders_markers(entry))
+        {
             entry.slot.iter_mut().for_each(|slot| act(slot, state));
         }
         for index in (0..self.entries.len()).filter(|&index| chosen(index)) {
-            if draws(&self.entries[index]) {
-                self.state.markers = Some(self.markers_beside(simulation, Some(index)));
+            if renders_markers(&self.entries[index]) {
+                self.state.markers = Some(self.markers_except(simulation, Some(index)));
                 let Self { entries, state, .. } = self;
                 entries[index].slot.iter_mut().for_each(|slot| act(slot, state));
             }
@@ -206,9 +208,9 @@ impl SensorList {
     /// Does `steps` physics steps, or fewer until a sensor is due, at least 1. Updates the due sensors. Returns the
     /// number of steps done.
     pub(crate) fn advance(&mut self, simulation: &mut Simulation, steps: u32) -> u32 {
-        gather::gather_clocks(simulation, self.substeps, &mut self.clocks);
-        let now = &self.clocks;
-        let wait = |e: &Entry| Some(e.running()?.due_in(now).max(1));
+        gather::gather_step_counts(simulation, self.substeps, &mut self.step_counts);
+        let now = &self.step_counts;
+        let wait = |e: &SensorEntry| Some(e.running()?.due_in(now).max(1));
         let block = self
             .entries
             .iter()
@@ -218,8 +220,8 @@ impl SensorList {
         self.due.clear();
         self.due.extend(self.entries.iter().map(|e| wait(e).is_some_and(|wait| wait <= u64::from(block))));
         let due = self.entries.iter().zip(&self.due).filter(|(_, due)| **due);
-        let requires = due.fold(Requires::NONE, |all, (e, _)| all | e.requires);
-        match capture(simulation, requires) {
+        let requires = due.fold(StateFields::NONE, |all, (e, _)| all | e.requires);
+        match capture_request(simulation, requires) {
             None => simulation.batch.step(block * self.substeps),
             Some(capture) => simulation.batch.step_and_capture(block * self.substeps, capture),
         }
@@ -227,20 +229,20 @@ impl SensorList {
             gather::gather(simulation, self.substeps, requires, &mut self.state);
         }
         let due = std::mem::take(&mut self.due);
-        self.tell(simulation, |index| due[index], SensorSlot::update);
+        self.update_slots(simulation, |index| due[index], SensorSlot::update);
         self.due = due;
         block
     }
 
     /// Updates the sensors after a reset of `env_ids`.
     pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
-        self.renew(simulation, env_ids);
-        self.tell(simulation, |_| true, |slot, state| slot.reset(env_ids, state));
+        self.gather_after_write(simulation, env_ids);
+        self.update_slots(simulation, |_| true, |slot, state| slot.reset(env_ids, state));
     }
 
     /// Updates the sensors after a write to the state of `env_ids`.
     pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
-        self.note_written(env_ids);
+        self.mark_written(env_ids);
         // A read runs the deferred forward pass; without sensors it is not needed here.
         if self.entries.is_empty() {
             return;
@@ -251,12 +253,12 @@ impl SensorList {
         if running.is_empty() {
             return;
         }
-        self.renew(simulation, &running);
-        self.tell(simulation, |_| true, |slot, state| slot.refresh(&running, state));
+        self.gather_after_write(simulation, &running);
+        self.update_slots(simulation, |_| true, |slot, state| slot.refresh(&running, state));
     }
 
     /// Marks the state of `env_ids` as written.
-    pub(crate) fn note_written(&mut self, env_ids: &[usize]) {
+    pub(crate) fn mark_written(&mut self, env_ids: &[usize]) {
         self.written.extend(env_ids);
     }
 
@@ -266,20 +268,20 @@ impl SensorList {
     }
 
     /// Gathers the state after a write to `env_ids`.
-    fn renew(&mut self, simulation: &mut Simulation, env_ids: &[usize]) {
+    fn gather_after_write(&mut self, simulation: &mut Simulation, env_ids: &[usize]) {
         let all = self.requires();
-        solve(simulation, all, env_ids);
+        solve_and_capture(simulation, all, env_ids);
         gather::gather(simulation, self.substeps, all, &mut self.state);
     }
 
     /// Markers of the last measurements of all sensors with enabled markers, except the sensor at index `own`.
     pub(crate) fn markers(&self, simulation: &Simulation, own: Option<usize>) -> Vec<(EnvId, Marker)> {
-        let markers = self.markers_beside(simulation, own).into_iter().enumerate();
+        let markers = self.markers_except(simulation, own).into_iter().enumerate();
         markers.flat_map(|(env, markers)| markers.into_iter().map(move |marker| (EnvId(env), marker))).collect()
     }
 
     /// The same markers, grouped by environment.
-    fn markers_beside(&self, simulation: &Simulation, own: Option<usize>) -> Vec<Vec<Marker>> {
+    fn markers_except(&self, simulation: &Simulation, own: Option<usize>) -> Vec<Vec<Marker>> {
         let others = self.entries.iter().enumerate().filter(|(index, entry)| entry.debug_vis && Some(*index) != own);
         let shown: Vec<&dyn Sensor> = others.filter_map(|(_, entry)| entry.slot.as_ref().ok()?.sensor().ok()).collect();
         let mut markers = vec![Vec::new(); simulation.batch.num_envs()];
@@ -288,7 +290,7 @@ impl SensorList {
         }
         simulation.batch.for_each(|i, env| {
             let pose = |body: usize| {
-                let frame = simulation.plan.bodies().get(body);
+                let frame = simulation.body_axis.bodies().get(body);
                 frame.map_or_else(Pose::identity, |frame| frame.pose(env.data()))
             };
             markers[i].extend(shown.iter().flat_map(|sensor| sensor.markers(i, &pose)));
@@ -308,7 +310,7 @@ impl SensorList {
         Ok(())
     }
 
-    fn entry(&self, index: usize) -> Result<&Entry> {
+    fn entry(&self, index: usize) -> Result<&SensorEntry> {
         let count = self.entries.len();
         self.entries.get(index).ok_or(Error::UnknownIndex { what: "sensor", index, count })
     }
@@ -319,20 +321,20 @@ impl SensorList {
     }
 
     /// The sensor `uid` as a trait object.
-    pub(crate) fn called(&self, uid: &str) -> Result<&dyn Sensor> {
-        let entry = self.entry_called(uid)?;
-        entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))
+    pub(crate) fn by_uid(&self, uid: &str) -> Result<&dyn Sensor> {
+        let entry = self.entry_by_uid(uid)?;
+        entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault_error(fault))
     }
 
     /// Physics steps until the sensor `uid` measures next, at least 1; `u64::MAX` for a failed sensor.
     pub(crate) fn due_in(&self, uid: &str, simulation: &Simulation) -> Result<u64> {
-        let entry = self.entry_called(uid)?;
+        let entry = self.entry_by_uid(uid)?;
         let mut clocks = Vec::with_capacity(simulation.batch.num_envs());
-        gather::gather_clocks(simulation, self.substeps, &mut clocks);
+        gather::gather_step_counts(simulation, self.substeps, &mut clocks);
         Ok(entry.running().map_or(u64::MAX, |slot| slot.due_in(&clocks).max(1)))
     }
 
-    fn entry_called(&self, uid: &str) -> Result<&Entry> {
+    fn entry_by_uid(&self, uid: &str) -> Result<&SensorEntry> {
         self.entries.iter().find(|entry| entry.uid == uid).ok_or_else(|| Error::UnknownName {
             what: "sensor",
             name: uid.into(),
@@ -352,7 +354,7 @@ impl SensorList {
 
     /// Uids and handles of all sensors of type `S`.
     pub(crate) fn ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
-        let is = |entry: &Entry| {
+        let is = |entry: &SensorEntry| {
             let sensor = entry.slot.as_ref().ok().and_then(|slot| slot.sensor().ok());
             let any: Option<&dyn Any> = sensor.map(|sensor| sensor as &dyn Any);
             any.is_some_and(|any| any.is::<S>())
@@ -369,7 +371,7 @@ impl SensorList {
     #[track_caller]
     pub(crate) fn get<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
         let entry = self.entry(self.index_of(id))?;
-        let sensor = entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))?;
+        let sensor = entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault_error(fault))?;
         let any: &dyn Any = sensor;
         any.downcast_ref::<S>().ok_or_else(|| Error::UnknownName {
             what: "sensor of this type called",
@@ -397,16 +399,16 @@ impl SensorList {
 }
 
 /// Quantities to capture inside the step for sensors that require `requires`; `None` if no quantity needs a capture.
-fn capture(simulation: &Simulation, requires: Requires) -> Option<Capture> {
-    let fields = requires.intersection(Requires::SOLVED);
-    (!fields.is_empty()).then(|| Capture { plan: Arc::clone(&simulation.plan), fields })
+fn capture_request(simulation: &Simulation, requires: StateFields) -> Option<CaptureRequest> {
+    let fields = requires.intersection(StateFields::FORCE_STAGE);
+    (!fields.is_empty()).then(|| CaptureRequest { body_axis: Arc::clone(&simulation.body_axis), fields })
 }
 
 /// Solves and captures the current state of `envs`, if `requires` contains a solved quantity.
-fn solve(simulation: &mut Simulation, requires: Requires, envs: &[usize]) {
-    let fields = requires.intersection(Requires::SOLVED);
+fn solve_and_capture(simulation: &mut Simulation, requires: StateFields, envs: &[usize]) {
+    let fields = requires.intersection(StateFields::FORCE_STAGE);
     // MuJoCo evaluates its own sensors of solved quantities in the same solve.
-    if !fields.is_empty() || requires.contains(Requires::SENSORDATA) {
-        simulation.batch.capture_present(envs, Capture { plan: Arc::clone(&simulation.plan), fields });
+    if !fields.is_empty() || requires.contains(StateFields::SENSORDATA) {
+        simulation.batch.capture_present(envs, CaptureRequest { body_axis: Arc::clone(&simulation.body_axis), fields });
     }
 }

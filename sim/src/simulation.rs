@@ -1,57 +1,57 @@
 //! Runtime state of a compiled scene.
 
 use crate::batch::Batch;
-use crate::capture::Plan;
-use crate::contents::Contents;
-use crate::env::Env;
-use crate::index::{FreeIndex, PartIndex, RobotIndex, WeldIndex, joint_widths};
-use crate::randomization::{Maker, OwnValues, Tables};
+use crate::capture::BodyAxis;
+use crate::contents::EntitySet;
+use crate::env::SimEnv;
+use crate::index::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
+use crate::randomization::{ModelPatcher, PropertyOverrides, PropertyTables};
 use crate::simulation_cfg::SimulationManagerCfg;
-use crate::snapshot::Layout;
-use crate::visible::{self, Identities, Look, MaskId, Replacements, Visible, VisualCache};
+use crate::snapshot::StateLayout;
+use crate::visible::{self, Lighting, MaskId, MaskIdMap, Replacements, VisualCache, VisualScene};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::ObjectKind;
 use kinetoscope_robot::diagnostic::Diagnostic;
-use kinetoscope_scene::OwnScene;
+use kinetoscope_scene::EnvScene;
 use std::sync::{Arc, OnceLock};
 
 /// A compiled scene and its environments.
 #[derive(Debug)]
 pub(crate) struct Simulation {
     pub(crate) batch: Batch,
-    pub(crate) robots: Vec<RobotIndex>,
-    pub(crate) objects: Vec<FreeIndex>,
-    pub(crate) parts: Vec<PartIndex>,
-    pub(crate) welds: Vec<WeldIndex>,
-    pub(crate) identities: Identities,
+    pub(crate) robots: Vec<RobotIndexing>,
+    pub(crate) objects: Vec<BodyIndexing>,
+    pub(crate) mjcf_models: Vec<MjcfIndexing>,
+    pub(crate) welds: Vec<WeldIndexing>,
+    pub(crate) identities: MaskIdMap,
     /// Body frames and geom owners, for contacts and motion of sensors.
-    pub(crate) plan: Arc<Plan>,
+    pub(crate) body_axis: Arc<BodyAxis>,
     /// The visual scene; `None` until a sensor or viewer needs it.
-    pub(crate) visible: Option<Arc<Visible>>,
+    pub(crate) visual_scene: Option<Arc<VisualScene>>,
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
-    pub(crate) start: Arc<Start>,
+    pub(crate) initial_state: Arc<InitialState>,
     /// Lengths of the arrays of a saved state.
-    pub(crate) layout: Arc<Layout>,
+    pub(crate) layout: Arc<StateLayout>,
     /// Model elements whose properties can differ per environment; filled on first use.
-    pub(crate) tables: OnceLock<Arc<Tables>>,
+    pub(crate) property_tables: OnceLock<Arc<PropertyTables>>,
     /// Builds models with per-environment properties; `None` before the first randomization.
-    pub(crate) maker: Option<Maker>,
+    pub(crate) model_patcher: Option<ModelPatcher>,
     /// Property overrides of each environment; `None` for an environment with the nominal model.
-    pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
+    pub(crate) property_overrides: Vec<Option<Box<PropertyOverrides>>>,
     /// Render scenes of environments with their own sizes or colors; empty without such environments, or before the
     /// visual scene exists.
-    pub(crate) own_scenes: Vec<OwnScene>,
+    pub(crate) env_scenes: Vec<EnvScene>,
     /// True for each geom that stands in for a visual mesh and has only a pose.
-    pub(crate) proxies: Vec<bool>,
+    pub(crate) visual_proxies: Vec<bool>,
     /// Pairs of body names excluded from contact because the bodies overlap in the initial pose.
-    pub(crate) excluded: Vec<(String, String)>,
+    pub(crate) overlap_exclusions: Vec<(String, String)>,
 }
 
 /// Initial state, as differences from the model's `qpos0`.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Start {
+pub(crate) struct InitialState {
     /// (address in `qpos`, position \[rad or m\]).
     pub qpos: Vec<(usize, f64)>,
     /// (drive index, position target \[rad or m\]).
@@ -65,13 +65,13 @@ impl Simulation {
     }
 
     /// Returns the visual scene and builds it on the first call.
-    pub(crate) fn make_visible(
+    pub(crate) fn build_visual_scene(
         &mut self,
         cfg: &SimulationManagerCfg,
-        contents: &Contents,
+        contents: &EntitySet,
         cache: &mut VisualCache,
-    ) -> Arc<Visible> {
-        if let Some(visible) = &self.visible {
+    ) -> Arc<VisualScene> {
+        if let Some(visible) = &self.visual_scene {
             return Arc::clone(visible);
         }
         let mut replacements = Replacements::new();
@@ -95,26 +95,27 @@ impl Simulation {
             }
         }
         let model = self.batch.model();
-        let (surfaces, look) = (contents.surfaces(), Look::of(cfg, contents));
-        let visible = Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces, &look)
-            .with_lamps_of(model, &cfg.lights);
+        let (surfaces, look) = (contents.surfaces(), Lighting::of(cfg, contents));
+        let visible =
+            VisualScene::extract(model, &self.identities, &replacements, self.body_axis.bodies(), &surfaces, &look)
+                .with_light_cfgs(model, &cfg.lights);
         let visible = Arc::new(visible);
-        self.visible = Some(Arc::clone(&visible));
-        for (env, error) in self.look_anew() {
-            cache.say_look(env, &error);
+        self.visual_scene = Some(Arc::clone(&visible));
+        for (env, error) in self.rebuild_env_scenes() {
+            cache.warn_env_scene(env, &error);
         }
         visible
     }
 
     /// Index in MuJoCo's `ctrl` of a drive.
-    pub(crate) fn drive_ctrl(&self, drive: usize) -> usize {
+    pub(crate) fn drive_ctrl_index(&self, drive: usize) -> usize {
         self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
     }
 
     /// Resets the chosen environments to the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
-        let start = &self.start;
-        (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.edit(i, Env::expect_reset));
+        let start = &self.initial_state;
+        (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.with_env(i, SimEnv::expect_reset));
         self.batch.run(|i, env| {
             if chosen[i] {
                 env.reset(|data, drives| {
@@ -132,7 +133,7 @@ impl Simulation {
 
     /// Copies the state of every entity that `old` has too, matched by name: positions, velocities, warm start,
     /// targets, time. Divergence is copied as well: a diverged environment stays frozen until it is reset.
-    pub(crate) fn carry_over(&mut self, old: &Self) {
+    pub(crate) fn transfer_state_from(&mut self, old: &Self) {
         let (old_model, model) = (old.batch.model(), self.batch.model());
         let mut qpos = Vec::new();
         let mut dofs = Vec::new();
@@ -157,7 +158,7 @@ impl Simulation {
         let bodies: Vec<Option<usize>> = (0..old_model.nbody())
             .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
             .collect();
-        let parts = PartTransfer::new(old, self);
+        let parts = StateTransfer::new(old, self);
         // Old and new welds correspond by insertion order.
         let equality = |old_weld: usize| {
             let at = old.welds.iter().position(|weld| weld.equality == old_weld)?;
@@ -167,8 +168,8 @@ impl Simulation {
         for i in 0..self.batch.num_envs() {
             let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =
-                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
-            let wrenches = old.batch.read(i, |env| env.wrenches().moved(|body| bodies[body]));
+                old.batch.read(i, |env| (env.state_arrays(), env.data().time(), env.drives.clone(), env.stats()));
+            let wrenches = old.batch.read(i, |env| env.wrenches().remapped(|body| bodies[body]));
             let held: Vec<mj::Weld> = old.batch.read(i, |env| env.welds().iter().filter_map(moved).collect());
             self.batch.write(i, |env| {
                 for &(from, to) in &drives {
@@ -192,35 +193,35 @@ impl Simulation {
                 if wrenches != Wrenches::default() {
                     env.set_wrenches(|mine| *mine = wrenches);
                 }
-                env.take_history(&history);
+                env.add_stats(&history);
             });
         }
     }
 }
 
 /// Index pairs (old, new) of the states besides joints: those of attached MJCF files and of mocap objects.
-struct PartTransfer {
+struct StateTransfer {
     controls: Vec<(usize, usize)>,
     activations: Vec<(usize, usize)>,
     mocaps: Vec<(usize, usize)>,
 }
 
-/// Values of a [`PartTransfer`] in one environment.
-struct PartState {
+/// Values of a [`StateTransfer`] in one environment.
+struct TransferredState {
     controls: Vec<f64>,
     activations: Vec<f64>,
     mocaps: Vec<([f64; 3], [f64; 4])>,
 }
 
-impl PartTransfer {
+impl StateTransfer {
     fn new(old: &Simulation, new: &Simulation) -> Self {
-        let pairs = |of: fn(&PartIndex) -> &Vec<usize>| {
-            let parts = old.parts.iter().zip(&new.parts);
+        let pairs = |of: fn(&MjcfIndexing) -> &Vec<usize>| {
+            let parts = old.mjcf_models.iter().zip(&new.mjcf_models);
             parts.flat_map(|(old, new)| of(old).iter().copied().zip(of(new).iter().copied())).collect::<Vec<_>>()
         };
         let number = |model: &mj::Model, body: usize| usize::try_from(model.body_mocapid()[body]).unwrap_or(0);
         let objects = old.objects.iter().zip(&new.objects).filter_map(|(old, new)| old.mocap.zip(new.mocap));
-        let mocaps = pairs(|part| &part.mocaps).into_iter();
+        let mocaps = pairs(|part| &part.mocap_bodies).into_iter();
         Self {
             controls: pairs(|part| &part.controls),
             activations: pairs(|part| &part.activations),
@@ -231,16 +232,16 @@ impl PartTransfer {
         }
     }
 
-    fn read(&self, data: &mj::Data) -> PartState {
+    fn read(&self, data: &mj::Data) -> TransferredState {
         let mocap = |k: usize| (data.mocap_pos().as_chunks::<3>().0[k], data.mocap_quat().as_chunks::<4>().0[k]);
-        PartState {
+        TransferredState {
             controls: self.controls.iter().map(|&(from, _)| data.ctrl()[from]).collect(),
             activations: self.activations.iter().map(|&(from, _)| data.act()[from]).collect(),
             mocaps: self.mocaps.iter().map(|&(from, _)| mocap(from)).collect(),
         }
     }
 
-    fn write(&self, state: &PartState, data: &mut mj::Data) {
+    fn write(&self, state: &TransferredState, data: &mut mj::Data) {
         for (&(_, to), value) in self.controls.iter().zip(&state.controls) {
             data.ctrl_mut()[to] = *value;
         }

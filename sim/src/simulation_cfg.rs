@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::light_cfg::LightCfg;
-use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
+use crate::mjcf::document::{FrictionCone, Integrator, PhysicsOption};
 use crate::shard::Shard;
 use crate::surface_cfg::SurfaceCfg;
 use nalgebra::Vector3;
@@ -25,7 +25,7 @@ pub struct SimulationManagerCfg {
     /// Integrator of MuJoCo.
     pub integrator: Integrator,
     /// Friction cone of contacts.
-    pub cone: Cone,
+    pub cone: FrictionCone,
     /// Ratio of frictional to normal contact impedance; larger values slip less.
     pub impratio: f64,
     /// Largest number of solver iterations in a step.
@@ -76,7 +76,7 @@ impl Default for SimulationManagerCfg {
             substeps: 1,
             gravity: Vector3::new(0.0, 0.0, -9.81),
             integrator: Integrator::Euler,
-            cone: Cone::Pyramidal,
+            cone: FrictionCone::Pyramidal,
             impratio: 1.0,
             solver_iterations: 100,
             friction: [1.0, 0.005, 0.0001],
@@ -93,13 +93,13 @@ impl Default for SimulationManagerCfg {
 impl SimulationManagerCfg {
     /// Preset for grasping: elliptic friction cones that do not slip.
     pub fn manipulation() -> Self {
-        Self { cone: Cone::Elliptic, impratio: 10.0, ..Self::default() }
+        Self { cone: FrictionCone::Elliptic, impratio: 10.0, ..Self::default() }
     }
 
     /// Preset for legged robots: 200 Hz, and elliptic friction cones with a tangential stiffness of a hundred times the
     /// default. With the default, loaded feet creep apart until the robot kneels.
     pub fn legged() -> Self {
-        Self { physics_dt: 0.005, cone: Cone::Elliptic, impratio: 100.0, ..Self::default() }
+        Self { physics_dt: 0.005, cone: FrictionCone::Elliptic, impratio: 100.0, ..Self::default() }
     }
 
     /// Origins of the environments in the overview \[m\], shape (N, 3): a grid with `arena_space` between neighbors.

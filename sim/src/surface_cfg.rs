@@ -1,7 +1,7 @@
 //! Surface properties besides color: gloss, metal, glass, emission.
 
 use crate::error::{Error, Result};
-use crate::named::Named;
+use crate::named::EntityLabel;
 use crate::pattern;
 use kinetoscope_scene::Material;
 use serde::{Deserialize, Serialize};
@@ -53,7 +53,7 @@ impl SurfaceCfg {
     }
 
     /// Assigns surfaces to `names` by pattern and returns them with the index of the name. `what` is the type of the
-    /// names, `of` the entity, both for errors.
+    /// names, `entity` the entity, both for errors.
     ///
     /// # Errors
     /// A number is out of range, or a pattern is invalid, matches none of `names`, or matches a name that another
@@ -62,11 +62,11 @@ impl SurfaceCfg {
         patterns: &[(String, Self)],
         names: &[impl AsRef<str>],
         what: &'static str,
-        of: Named,
+        of: EntityLabel,
     ) -> Result<Vec<(usize, Self)>> {
         patterns.iter().try_for_each(|(_, surface)| surface.validate())?;
         let surfaces = pattern::assign(patterns, &BTreeMap::new(), names, what)
-            .map_err(|error| Error::Surfaces { of, error: Box::new(error) })?;
+            .map_err(|error| Error::Surfaces { entity: of, error: Box::new(error) })?;
         Ok(surfaces.into_iter().enumerate().filter_map(|(index, surface)| Some((index, surface?))).collect())
     }
 
@@ -94,7 +94,7 @@ impl SurfaceCfg {
     }
 
     /// Returns `material` with all values that are set here.
-    pub(crate) fn over(&self, mut material: Material) -> Material {
+    pub(crate) fn apply_to(&self, mut material: Material) -> Material {
         let set = |to: &mut f32, value: Option<f64>| {
             if let Some(value) = value {
                 *to = value as f32;

@@ -9,5 +9,5 @@ pub struct Viewpoint {
     pub target: [f64; 3],
     /// Number of calls of [`SceneViewMut::set_camera_view`](crate::SceneViewMut::set_camera_view) so far. Open views
     /// follow when it changes.
-    pub changes: u64,
+    pub revision: u64,
 }

@@ -60,7 +60,7 @@ impl<'a> Warnings<'a> {
     /// Number of times contact and constraint buffers were doubled, over all environments.
     pub fn buffer_growths(&self) -> u64 {
         let mut growths = 0;
-        self.sim.simulation.batch.for_each(|_, env| growths += u64::from(env.growths()));
+        self.sim.simulation.batch.for_each(|_, env| growths += u64::from(env.buffer_growths()));
         growths
     }
 }

@@ -23,7 +23,7 @@ pub enum WrenchFrame {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wrench {
     /// Owner of the wrench: robot and link.
-    pub(crate) of: (usize, usize),
+    pub(crate) owner: (usize, usize),
     /// Index of the MuJoCo body.
     pub(crate) body: usize,
     /// Rotation of the link axes in the body frame; `None` for a wrench in world axes.
@@ -34,15 +34,15 @@ pub(crate) struct Wrench {
     pub(crate) torque: Vector3<f64>,
 }
 
-/// Stands for the robot in [`Wrench::of`] for forces of [`SceneViewMut::pull`](crate::SceneViewMut::pull).
-const PULLED: usize = MAX_ROBOTS;
+/// Stands for the robot in [`Wrench::owner`] for forces of [`SceneViewMut::set_user_wrench`](crate::SceneViewMut::set_user_wrench).
+const USER_FORCE_OWNER: usize = MAX_ROBOTS;
 
 /// All external wrenches and weightless bodies of one environment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wrenches {
     pub(crate) list: Vec<Wrench>,
     /// Bodies with compensated gravity.
-    pub(crate) weightless: Vec<usize>,
+    pub(crate) gravity_compensated: Vec<usize>,
 }
 
 impl Wrench {
@@ -58,60 +58,66 @@ impl Wrench {
 impl Wrenches {
     /// Replaces the wrench of the same owner; a zero wrench removes it.
     pub(crate) fn replace(&mut self, wrench: Wrench) {
-        self.list.retain(|old| old.of != wrench.of);
+        self.list.retain(|old| old.owner != wrench.owner);
         if wrench.force != Vector3::zeros() || wrench.torque != Vector3::zeros() {
             self.list.push(wrench);
         }
     }
 
     /// Sets the wrench of user forces on a body, beside other wrenches; a zero wrench removes it.
-    pub(crate) fn pull(&mut self, body: usize, mujoco_body: usize, force: Vector3<f64>, torque: Vector3<f64>) {
-        self.replace(Wrench { of: (PULLED, body), body: mujoco_body, axes: None, force, torque });
+    pub(crate) fn set_user_wrench(
+        &mut self,
+        body: usize,
+        mujoco_body: usize,
+        force: Vector3<f64>,
+        torque: Vector3<f64>,
+    ) {
+        self.replace(Wrench { owner: (USER_FORCE_OWNER, body), body: mujoco_body, axes: None, force, torque });
     }
 
     /// Enables or disables gravity compensation of bodies.
-    pub(crate) fn set_weightless(&mut self, bodies: &[usize], weightless: bool) {
-        self.weightless.retain(|body| !bodies.contains(body));
+    pub(crate) fn set_gravity_compensation(&mut self, bodies: &[usize], weightless: bool) {
+        self.gravity_compensated.retain(|body| !bodies.contains(body));
         if weightless {
-            self.weightless.extend(bodies);
+            self.gravity_compensated.extend(bodies);
         }
     }
 
-    /// Wrenches for another model; `body` maps old to new body indices. User forces ([`pull`](Self::pull)) are dropped,
+    /// Wrenches for another model; `body` maps old to new body indices. User forces ([`set_user_wrench`](Self::set_user_wrench)) are dropped,
     /// because their owner index is invalid there.
-    pub(crate) fn moved(&self, body: impl Fn(usize) -> Option<usize>) -> Self {
+    pub(crate) fn remapped(&self, body: impl Fn(usize) -> Option<usize>) -> Self {
         let moved = |wrench: &Wrench| Some(Wrench { body: body(wrench.body)?, ..wrench.clone() });
         Self {
-            list: self.list.iter().filter(|wrench| wrench.of.0 != PULLED).filter_map(moved).collect(),
-            weightless: self.weightless.iter().filter_map(|&old| body(old)).collect(),
+            list: self.list.iter().filter(|wrench| wrench.owner.0 != USER_FORCE_OWNER).filter_map(moved).collect(),
+            gravity_compensated: self.gravity_compensated.iter().filter_map(|&old| body(old)).collect(),
         }
     }
 
     /// Flat array: the number of wrenches, 14 numbers per wrench, then the weightless bodies.
-    pub(crate) fn numbers(&self) -> Vec<f64> {
+    pub(crate) fn to_flat(&self) -> Vec<f64> {
         let mut numbers = vec![self.list.len() as f64];
-        for Wrench { of, body, axes, force, torque } in &self.list {
+        for Wrench { owner: of, body, axes, force, torque } in &self.list {
             let q = axes.map_or([0.0; 4], |axes| [axes.w, axes.i, axes.j, axes.k]);
             numbers.extend([of.0 as f64, of.1 as f64, *body as f64, f64::from(axes.is_some())]);
             numbers.extend(q.iter().chain(force).chain(torque));
         }
-        numbers.extend(self.weightless.iter().map(|&body| body as f64));
+        numbers.extend(self.gravity_compensated.iter().map(|&body| body as f64));
         numbers
     }
 
-    /// Inverse of [`numbers`](Self::numbers); `None` for an invalid array.
-    pub(crate) fn from_numbers(numbers: &[f64]) -> Option<Self> {
+    /// Inverse of [`to_flat`](Self::to_flat); `None` for an invalid array.
+    pub(crate) fn from_flat(numbers: &[f64]) -> Option<Self> {
         let (&count, rest) = numbers.split_first()?;
         let (list, weightless) = rest.split_at_checked((count as usize).checked_mul(14)?)?;
         let wrench = |&[robot, link, body, turned, w, i, j, k, fx, fy, fz, tx, ty, tz]: &[f64; 14]| Wrench {
-            of: (robot as usize, link as usize),
+            owner: (robot as usize, link as usize),
             body: body as usize,
             axes: (turned > 0.0).then(|| UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k))),
             force: Vector3::new(fx, fy, fz),
             torque: Vector3::new(tx, ty, tz),
         };
         let list = list.as_chunks::<14>().0.iter().map(wrench).collect();
-        Some(Self { list, weightless: weightless.iter().map(|&body| body as usize).collect() })
+        Some(Self { list, gravity_compensated: weightless.iter().map(|&body| body as usize).collect() })
     }
 
     /// Writes the wrenches to `data`. Bodies that are not listed here keep their `xfrc_applied`.
@@ -122,7 +128,7 @@ impl Wrenches {
             add(data, wrench.body, &force, &torque);
         }
         let gravity = Vector3::from(data.model().gravity());
-        for &body in &self.weightless {
+        for &body in &self.gravity_compensated {
             // 4.x compensates a part of the weight itself; only the rest is added.
             let felt = 1.0 - data.model().body_gravity_compensation(body);
             let weight = felt * data.model().body_mass()[body] * gravity;
@@ -132,7 +138,7 @@ impl Wrenches {
 
     /// Clears `xfrc_applied` of all bodies that are listed here.
     pub(crate) fn clear(&self, data: &mut Data) {
-        for &body in self.list.iter().map(|wrench| &wrench.body).chain(&self.weightless) {
+        for &body in self.list.iter().map(|wrench| &wrench.body).chain(&self.gravity_compensated) {
             data.xfrc_applied_mut()[6 * body..6 * body + 6].fill(0.0);
         }
     }

@@ -84,7 +84,7 @@ impl EnvBuilder {
         self
     }
 
-    /// Checks the terms, builds the environments, and runs the [`When::Startup`](crate::When::Startup) events.
+    /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup) events.
     ///
     /// # Errors
     /// - There is no action or observation column.
@@ -98,7 +98,7 @@ impl EnvBuilder {
             terms.observations.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
         let observations = terms.observations.iter().map(|term| term.name.as_str()).zip(&observation_spaces);
         let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
-        let spaces = [Space::joined(observations), Space::joined(actions)];
+        let spaces = [Space::concatenate(observations), Space::concatenate(actions)];
         Env::new(sim, cfg, terms, spaces)
     }
 }

@@ -3,7 +3,7 @@
 use crate::space::Space;
 use crate::step::Step;
 use crate::vector::VectorEnv;
-use kinetoscope_scene::Random;
+use kinetoscope_scene::KeyedRng;
 use ndarray::{Array1, Array2};
 use std::fmt;
 
@@ -17,14 +17,14 @@ pub enum Finding {
     /// The batch has no environment.
     NoEnvironments,
     /// A valid call returned an error.
-    Refused {
+    UnexpectedError {
         /// The call.
         what: String,
         /// The error message.
         error: String,
     },
     /// An invalid call returned no error.
-    Accepted {
+    MissingError {
         /// The invalid argument.
         what: &'static str,
     },
@@ -38,7 +38,7 @@ pub enum Finding {
         expected: Vec<usize>,
     },
     /// An observation is not finite, or outside the observation space.
-    Outside {
+    OutOfSpace {
         /// The array, and the step.
         when: String,
         /// The environment.
@@ -75,18 +75,18 @@ pub enum Finding {
         env: usize,
     },
     /// Two runs with the same seed and actions differ.
-    Seed(Apart),
+    NotReproducible(RunDifference),
     /// A reset of some environments changed others.
-    Mask(Apart),
+    MaskedReset(RunDifference),
     /// The actions of one environment changed the results of others.
-    Neighbours(Apart),
+    Interference(RunDifference),
     /// Actions beyond their bounds give other results than actions at the bounds.
-    Bounds(Apart),
+    ActionClamping(RunDifference),
 }
 
 /// The first difference between two runs that should be equal.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Apart {
+pub struct RunDifference {
     /// The step.
     pub when: String,
     /// The environment.
@@ -99,7 +99,7 @@ pub struct Apart {
     pub second: f64,
 }
 
-impl fmt::Display for Apart {
+impl fmt::Display for RunDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { when, env, what, first, second } = self;
         write!(f, "{when}, environment {env}: {what} is {first:e} in one run and {second:e} in the other")
@@ -110,12 +110,12 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoEnvironments => f.write_str("there is no environment: there must be at least one"),
-            Self::Refused { what, error } => write!(f, "{what} was refused, which has to work: {error}"),
-            Self::Accepted { what } => write!(f, "{what} was taken, and has to be an error"),
+            Self::UnexpectedError { what, error } => write!(f, "{what} was refused, which has to work: {error}"),
+            Self::MissingError { what } => write!(f, "{what} was taken, and has to be an error"),
             Self::Shape { what, found, expected } => {
                 write!(f, "{what} has shape {found:?}; it must have {expected:?}")
             }
-            Self::Outside { when, env, column, value, bounds: [low, high] } => {
+            Self::OutOfSpace { when, env, column, value, bounds: [low, high] } => {
                 write!(
                     f,
                     "{when}, environment {env}: {column} is {value}, and its space is finite numbers from {low} to {high}"
@@ -132,10 +132,10 @@ impl fmt::Display for Finding {
                 f,
                 "{when}, environment {env}: the episode ended and no other began; observations must be the first ones of the next"
             ),
-            Self::Seed(apart) => write!(f, "the same seed and actions give other numbers: {apart}"),
-            Self::Mask(apart) => write!(f, "a reset of other environments changed this one: {apart}"),
-            Self::Neighbours(apart) => write!(f, "actions of another environment changed this one: {apart}"),
-            Self::Bounds(apart) => write!(f, "actions beyond their bounds are not the bounds: {apart}"),
+            Self::NotReproducible(apart) => write!(f, "the same seed and actions give other numbers: {apart}"),
+            Self::MaskedReset(apart) => write!(f, "a reset of other environments changed this one: {apart}"),
+            Self::Interference(apart) => write!(f, "actions of another environment changed this one: {apart}"),
+            Self::ActionClamping(apart) => write!(f, "actions beyond their bounds are not the bounds: {apart}"),
         }
     }
 }
@@ -171,63 +171,72 @@ pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
         return vec![Finding::NoEnvironments];
     }
     let mut found = Vec::new();
-    let plain = Plan { seed, ..Plan::default() };
-    let Some(first) = run(env, &plain, &mut found) else { return found };
-    let compare = |env: &mut E, plan: &Plan, of: &dyn Fn(usize) -> bool, found: &mut Vec<Finding>, kind: Kind| {
-        let names = env.observation_space().names().to_vec();
-        if let Some(other) = run(env, plan, &mut Vec::new())
-            && let Some(apart) = apart(&first, &other, &names, of)
-        {
-            found.push(kind(apart));
-        }
-    };
-    compare(env, &plain, &|_| true, &mut found, Finding::Seed);
+    let plain = RunVariant { seed, ..RunVariant::default() };
+    let Some(first) = rollout(env, &plain, &mut found) else { return found };
+    let compare =
+        |env: &mut E, plan: &RunVariant, of: &dyn Fn(usize) -> bool, found: &mut Vec<Finding>, kind: FindingFn| {
+            let names = env.observation_space().names().to_vec();
+            if let Some(other) = rollout(env, plan, &mut Vec::new())
+                && let Some(apart) = first_difference(&first, &other, &names, of)
+            {
+                found.push(kind(apart));
+            }
+        };
+    compare(env, &plain, &|_| true, &mut found, Finding::NotReproducible);
     // Without reproducible runs, every comparison below would fail for the same reason.
-    if !found.iter().any(|finding| matches!(finding, Finding::Seed(_))) {
+    if !found.iter().any(|finding| matches!(finding, Finding::NotReproducible(_))) {
         if n > 1 {
             let is_even = |env: usize| env.is_multiple_of(2);
-            compare(env, &Plan { reset_odd: true, ..plain }, &is_even, &mut found, Finding::Mask);
-            compare(env, &Plan { odd_act_otherwise: true, ..plain }, &is_even, &mut found, Finding::Neighbours);
+            compare(env, &RunVariant { reset_odd: true, ..plain }, &is_even, &mut found, Finding::MaskedReset);
+            compare(
+                env,
+                &RunVariant { odd_actions_differ: true, ..plain },
+                &is_even,
+                &mut found,
+                Finding::Interference,
+            );
         }
-        let bounded = Plan { at_bounds: Some(0.0), ..plain };
+        let bounded = RunVariant { beyond_bounds_by: Some(0.0), ..plain };
         let names = env.observation_space().names().to_vec();
-        let (at, beyond) =
-            (run(env, &bounded, &mut Vec::new()), run(env, &Plan { at_bounds: Some(1.0), ..plain }, &mut Vec::new()));
+        let (at, beyond) = (
+            rollout(env, &bounded, &mut Vec::new()),
+            rollout(env, &RunVariant { beyond_bounds_by: Some(1.0), ..plain }, &mut Vec::new()),
+        );
         if let (Some(at), Some(beyond)) = (at, beyond)
-            && let Some(apart) = apart(&at, &beyond, &names, &|_| true)
+            && let Some(apart) = first_difference(&at, &beyond, &names, &|_| true)
         {
-            found.push(Finding::Bounds(apart));
+            found.push(Finding::ActionClamping(apart));
         }
     }
-    refusals(env, seed, &mut found);
+    check_invalid_calls(env, seed, &mut found);
     found
 }
 
 /// Constructor of a finding from a difference between two runs.
-type Kind = fn(Apart) -> Finding;
+type FindingFn = fn(RunDifference) -> Finding;
 
 /// Variations of a run.
 #[derive(Clone, Copy, Debug, Default)]
-struct Plan {
+struct RunVariant {
     seed: u64,
     /// Odd environments are reset in the middle of the run.
     reset_odd: bool,
     /// Odd environments get other actions.
-    odd_act_otherwise: bool,
+    odd_actions_differ: bool,
     /// Bounded actions are at their bounds, or beyond them by this distance.
-    at_bounds: Option<f64>,
+    beyond_bounds_by: Option<f64>,
 }
 
-impl Plan {
+impl RunVariant {
     fn actions(&self, space: &Space, n: usize, step: usize) -> Array2<f64> {
         let mut actions = Array2::zeros((n, space.len()));
         for (env, mut row) in actions.rows_mut().into_iter().enumerate() {
-            let other = self.odd_act_otherwise && env % 2 == 1;
+            let other = self.odd_actions_differ && env % 2 == 1;
             let what = format!("env/check/{step}/{}", if other { "other" } else { "" });
-            let mut random = Random::keyed(self.seed, env as u64, &what);
+            let mut random = KeyedRng::keyed(self.seed, env as u64, &what);
             for (k, action) in row.iter_mut().enumerate() {
                 let (low, high, part) = (space.low()[k], space.high()[k], random.uniform());
-                *action = match (self.at_bounds, low.is_finite(), high.is_finite()) {
+                *action = match (self.beyond_bounds_by, low.is_finite(), high.is_finite()) {
                     (Some(beyond), true, true) if part < 0.5 => low - beyond,
                     (Some(beyond), true, true) => high + beyond,
                     (_, true, true) => low + (high - low) * part,
@@ -242,13 +251,13 @@ impl Plan {
 }
 
 /// Results of a run: observations after the reset, and results of each step.
-struct Run {
-    begin: Array2<f64>,
-    steps: Vec<Seen>,
+struct Rollout {
+    initial_observations: Array2<f64>,
+    steps: Vec<StepOutput>,
 }
 
 /// Results of a step that are compared.
-struct Seen {
+struct StepOutput {
     observations: Array2<f64>,
     rewards: Array1<f64>,
     ends: [Array1<bool>; 2],
@@ -256,21 +265,23 @@ struct Seen {
 
 /// Runs a plan, and adds violations within this run to `found`. Returns `None` if a call fails or an array has the
 /// wrong shape.
-fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>) -> Option<Run> {
+fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Vec<Finding>) -> Option<Rollout> {
     let n = env.num_envs();
     let (seen, acted) = (env.observation_space().clone(), env.action_space().clone());
-    let begin = env.reset(None, Some(plan.seed)).map_err(|error| refused("a reset with a seed", &error, found)).ok()?;
+    let begin =
+        env.reset(None, Some(plan.seed)).map_err(|error| report_error("a reset with a seed", &error, found)).ok()?;
     if !has_shape("what reset gives", begin.shape(), &[n, seen.len()], found) {
         return None;
     }
-    inside(&begin, &seen, "after the reset", found);
-    let mut run = Run { begin, steps: Vec::new() };
-    let mut watch = vec![Watch::default(); n];
+    check_bounds(&begin, &seen, "after the reset", found);
+    let mut run = Rollout { initial_observations: begin, steps: Vec::new() };
+    let mut watch = vec![AutoResetMonitor::default(); n];
     for step in 0..STEPS {
         let when = format!("step {step}");
         if plan.reset_odd && step == STEPS / 2 {
             let mask: Vec<bool> = (0..n).map(|env| env % 2 == 1).collect();
-            let given = env.reset(Some(&mask), None).map_err(|error| refused("a reset by mask", &error, found)).ok()?;
+            let given =
+                env.reset(Some(&mask), None).map_err(|error| report_error("a reset by mask", &error, found)).ok()?;
             if !has_shape("what reset by mask gives", given.shape(), &[n, seen.len()], found) {
                 return None;
             }
@@ -280,7 +291,7 @@ fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>
             }
         }
         let actions = plan.actions(&acted, n, step);
-        let done = env.step(actions.view()).map_err(|error| refused(&when, &error, found)).ok()?;
+        let done = env.step(actions.view()).map_err(|error| report_error(&when, &error, found)).ok()?;
         let Step { observations, final_observations, rewards, terminated, truncated, .. } = done;
         let tables = [("observations", &observations), ("final_observations", &final_observations)];
         let mut right = true;
@@ -295,65 +306,65 @@ fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>
             return None;
         }
         for (what, table) in tables {
-            inside(table, &seen, &format!("{what} of {when}"), found);
+            check_bounds(table, &seen, &format!("{what} of {when}"), found);
         }
         for env in 0..n {
             if !rewards[env].is_finite() {
-                add(found, Finding::Reward { when: when.clone(), env, value: rewards[env] });
+                push_first_of_kind(found, Finding::Reward { when: when.clone(), env, value: rewards[env] });
             }
             let same = same_bits(&observations, &final_observations, env);
             let ended = terminated[env] || truncated[env];
             if !ended && !same {
-                add(found, Finding::FinalObservation { when: when.clone(), env });
+                push_first_of_kind(found, Finding::FinalObservation { when: when.clone(), env });
             }
-            if watch[env].has_stopped(ended, same) {
-                add(found, Finding::NoAutoReset { when: when.clone(), env });
+            if watch[env].update(ended, same) {
+                push_first_of_kind(found, Finding::NoAutoReset { when: when.clone(), env });
             }
         }
-        run.steps.push(Seen { observations, rewards, ends: [terminated, truncated] });
+        run.steps.push(StepOutput { observations, rewards, ends: [terminated, truncated] });
     }
     Some(run)
 }
 
 /// Detects an environment that does not begin a new episode after an end.
 #[derive(Clone, Copy, Debug, Default)]
-struct Watch {
+struct AutoResetMonitor {
     /// Number of steps of the longest episode.
     longest: usize,
     /// Number of steps of the present episode.
     steps: usize,
     /// Consecutive ends with an unchanged observation.
-    stuck: usize,
+    repeated_ends: usize,
 }
 
-impl Watch {
+impl AutoResetMonitor {
     /// Counts a step, and returns true if automatic resets are missing. `same` is true if the observation equals the
     /// final one. Three ends in consecutive steps are no episodes if an earlier episode was longer than one step.
-    fn has_stopped(&mut self, ended: bool, same: bool) -> bool {
+    fn update(&mut self, ended: bool, same: bool) -> bool {
         self.steps += 1;
-        self.stuck = match ended && same && (self.stuck == 0 || self.steps == 1) {
-            true => self.stuck + 1,
+        self.repeated_ends = match ended && same && (self.repeated_ends == 0 || self.steps == 1) {
+            true => self.repeated_ends + 1,
             false => 0,
         };
         self.longest = self.longest.max(self.steps);
         if ended {
             self.steps = 0;
         }
-        self.stuck >= 3 && self.longest > 1
+        self.repeated_ends >= 3 && self.longest > 1
     }
 }
 
 /// Checks that invalid arguments give errors.
-fn refusals<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Finding>) {
+fn check_invalid_calls<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Finding>) {
     let n = env.num_envs();
     let width = env.action_space().len();
     let mut wrong = |what: &'static str, taken: bool| {
         if taken {
-            found.push(Finding::Accepted { what });
+            found.push(Finding::MissingError { what });
         }
     };
     wrong("a mask that is too long", env.reset(Some(&vec![true; n + 1]), None).is_ok());
-    let middle = Plan { seed, ..Plan::default() }.actions(env.action_space(), n, 0);
+    let middle = RunVariant { seed, ..RunVariant::default() }.actions(env.action_space(), n, 0);
     for (what, shape) in [
         ("a table of actions with a row too many", (n + 1, width)),
         ("a table of actions with a column too many", (n, width + 1)),
@@ -373,9 +384,14 @@ fn refusals<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Findi
 }
 
 /// Returns the first difference between two runs in the environments that `of` selects.
-fn apart(first: &Run, second: &Run, names: &[String], of: &dyn Fn(usize) -> bool) -> Option<Apart> {
+fn first_difference(
+    first: &Rollout,
+    second: &Rollout,
+    names: &[String],
+    of: &dyn Fn(usize) -> bool,
+) -> Option<RunDifference> {
     let differ = |when: &str, env, what: &str, one: f64, other: f64| {
-        (one.to_bits() != other.to_bits()).then(|| Apart {
+        (one.to_bits() != other.to_bits()).then(|| RunDifference {
             when: when.into(),
             env,
             what: what.into(),
@@ -387,7 +403,7 @@ fn apart(first: &Run, second: &Run, names: &[String], of: &dyn Fn(usize) -> bool
         let mut numbers = one.indexed_iter().filter(|((env, _), _)| of(*env));
         numbers.find_map(|((env, k), x)| differ(when, env, names.get(k).map_or("", |name| name), *x, other[(env, k)]))
     };
-    tables("after the reset", &first.begin, &second.begin).or_else(|| {
+    tables("after the reset", &first.initial_observations, &second.initial_observations).or_else(|| {
         first.steps.iter().zip(&second.steps).enumerate().find_map(|(step, (one, other))| {
             let when = format!("step {step}");
             let number = |is: bool| f64::from(u8::from(is));
@@ -411,29 +427,29 @@ fn same_bits(one: &Array2<f64>, other: &Array2<f64>, env: usize) -> bool {
 fn has_shape(what: &str, found: &[usize], expected: &[usize], findings: &mut Vec<Finding>) -> bool {
     if found != expected {
         let (found, expected) = (found.to_vec(), expected.to_vec());
-        add(findings, Finding::Shape { what: what.into(), found, expected });
+        push_first_of_kind(findings, Finding::Shape { what: what.into(), found, expected });
         return false;
     }
     true
 }
 
-fn inside(table: &Array2<f64>, space: &Space, when: &str, found: &mut Vec<Finding>) {
+fn check_bounds(table: &Array2<f64>, space: &Space, when: &str, found: &mut Vec<Finding>) {
     for ((env, k), &value) in table.indexed_iter() {
         let bounds = [space.low()[k], space.high()[k]];
         if !(value.is_finite() && bounds[0] <= value && value <= bounds[1]) {
             let column = space.names()[k].clone();
-            add(found, Finding::Outside { when: when.into(), env, column, value, bounds });
+            push_first_of_kind(found, Finding::OutOfSpace { when: when.into(), env, column, value, bounds });
             return;
         }
     }
 }
 
-fn refused(what: &str, error: &dyn fmt::Display, found: &mut Vec<Finding>) {
-    add(found, Finding::Refused { what: what.into(), error: error.to_string() });
+fn report_error(what: &str, error: &dyn fmt::Display, found: &mut Vec<Finding>) {
+    push_first_of_kind(found, Finding::UnexpectedError { what: what.into(), error: error.to_string() });
 }
 
 /// Adds a finding unless there is one of its kind.
-fn add(found: &mut Vec<Finding>, finding: Finding) {
+fn push_first_of_kind(found: &mut Vec<Finding>, finding: Finding) {
     let kind = std::mem::discriminant(&finding);
     if !found.iter().any(|known| std::mem::discriminant(known) == kind) {
         found.push(finding);

@@ -1,29 +1,29 @@
 //! Command terms: goals of an episode.
 
-use crate::dice::Dice;
+use crate::dice::EpisodeRng;
 use crate::error::{EnvError, Result};
 use crate::space::Space;
 use std::fmt;
 
-type Draw = Box<dyn Fn(&mut Dice) -> Vec<f64> + Send>;
+type SampleCommand = Box<dyn Fn(&mut EpisodeRng) -> Vec<f64> + Send>;
 
 /// Numbers that are drawn for an environment when an episode begins and stay until it ends, such as a goal position or
-/// a target velocity. Other terms read them with [`Now::command`](crate::Now::command).
+/// a target velocity. Other terms read them with [`TermContext::command`](crate::TermContext::command).
 pub struct CommandTerm {
     pub(crate) name: String,
     pub(crate) columns: Vec<String>,
-    draw: Draw,
+    sample: SampleCommand,
 }
 
 impl CommandTerm {
-    /// Creates a term with named columns. `draw` returns the values for one episode of one environment.
+    /// Creates a term with named columns. `sample` returns the values for one episode of one environment.
     pub fn new<const K: usize>(
         name: impl Into<String>,
         columns: [&str; K],
-        draw: impl Fn(&mut Dice) -> [f64; K] + Send + 'static,
+        sample: impl Fn(&mut EpisodeRng) -> [f64; K] + Send + 'static,
     ) -> Self {
         let columns = columns.map(String::from).to_vec();
-        Self { name: name.into(), columns, draw: Box::new(move |dice| draw(dice).to_vec()) }
+        Self { name: name.into(), columns, sample: Box::new(move |dice| sample(dice).to_vec()) }
     }
 
     pub(crate) fn check(&self) -> Result<()> {
@@ -31,8 +31,8 @@ impl CommandTerm {
     }
 
     /// Draws the values of an episode.
-    pub(crate) fn values(&self, dice: &mut Dice) -> Result<Vec<f64>> {
-        let values = (self.draw)(dice);
+    pub(crate) fn sample(&self, dice: &mut EpisodeRng) -> Result<Vec<f64>> {
+        let values = (self.sample)(dice);
         match values.iter().position(|value| !value.is_finite()) {
             None => Ok(values),
             Some(k) => {

@@ -2,14 +2,14 @@
 
 use crate::builder::Terms;
 use crate::cfg::EnvCfg;
-use crate::dice::{Dice, Key};
+use crate::dice::{EpisodeKey, EpisodeRng};
 use crate::error::{EnvError, Result, TermKind};
-use crate::event::When;
-use crate::now::{Now, Present};
+use crate::event::EventMode;
+use crate::now::{TaskState, TermContext};
 use crate::space::Space;
-use crate::step::{EndReason, Ended, Info, Step};
-use crate::watch::Watch;
-use kinetoscope_scene::Random;
+use crate::step::{EndReason, EndedEpisode, Step, StepInfo};
+use crate::watch::ResetMonitor;
+use kinetoscope_scene::KeyedRng;
 use kinetoscope_sim::{EnvId, ObserverId, SimulationManager, StepResult};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 
@@ -21,40 +21,40 @@ use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 /// 1. Clamp the actions to their bounds, apply them, and do [`EnvCfg::decimation`] physics steps.
 /// 2. Count the step, and find the episodes that end and the reason of each.
 /// 3. Compute the rewards. Publish rewards and ends to the observers of the simulation ([`StepResult`]).
-/// 4. Run the due [`When::Interval`] events in environments whose episode goes on.
+/// 4. Run the due [`EventMode::Interval`] events in environments whose episode goes on.
 /// 5. Compute the observations, which include the final ones of the episodes that ended.
-/// 6. Reset the environments whose episode ended to the initial state, draw new commands, run the [`When::Reset`]
+/// 6. Reset the environments whose episode ended to the initial state, draw new commands, run the [`EventMode::Reset`]
 ///    events, and observe these environments again.
 ///
 /// An episode thus begins in the step in which the previous one ends (Gymnasium's `AutoresetMode.SAME_STEP`). No step
 /// is spent on a reset alone.
 pub struct Env {
-    present: Present,
+    state: TaskState,
     cfg: EnvCfg,
     terms: Terms,
     observation_space: Space,
     action_space: Space,
-    rows: Vec<Row>,
+    episodes: Vec<EpisodeState>,
     /// Sums of the weighted rewards of each episode, shape (N, reward terms).
     reward_sums: Array2<f64>,
     /// The latest observations, shape (N, observation columns).
     observations: Array2<f64>,
     /// Records which environments were reset, with its id in the simulation.
-    watch: (Watch, ObserverId<Watch>),
+    reset_monitor: (ResetMonitor, ObserverId<ResetMonitor>),
 }
 
 /// State of one environment outside the simulation.
 #[derive(Debug)]
-struct Row {
-    key: Key,
+struct EpisodeState {
+    key: EpisodeKey,
     /// Number of the next episode.
     next_episode: u64,
     /// True while the environment has an episode.
-    runs: bool,
+    is_active: bool,
     /// Noise generator of each observation term.
-    noise: Vec<Random>,
+    noise_rngs: Vec<KeyedRng>,
     /// Episode step at which each event is due next; unused for events without an interval.
-    events: Vec<u64>,
+    next_event_steps: Vec<u64>,
 }
 
 impl std::fmt::Debug for Env {
@@ -67,7 +67,7 @@ impl std::fmt::Debug for Env {
 impl Env {
     /// The simulation.
     pub fn sim(&self) -> &SimulationManager {
-        &self.present.sim
+        &self.state.sim
     }
 
     /// The simulation, to serve, record or change it between steps.
@@ -76,12 +76,12 @@ impl Env {
     /// ends with the next step ([`EndReason::Reset`]) and another one begins. [`reset`](Self::reset) begins an episode
     /// at once.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
-        &mut self.present.sim
+        &mut self.state.sim
     }
 
     /// Returns the simulation in the state after the last step.
     pub fn into_sim(self) -> SimulationManager {
-        let (mut sim, (_, id)) = (self.present.sim, self.watch);
+        let (mut sim, (_, id)) = (self.state.sim, self.reset_monitor);
         // The caller may have swapped the simulation through `sim_mut`. Then it lacks this observer.
         if sim.observers().contains(id) {
             let _ = sim.observers_mut().remove(id);
@@ -90,8 +90,8 @@ impl Env {
     }
 
     /// Returns the context that terms see at present.
-    pub fn now(&self) -> Now<'_> {
-        self.present.now()
+    pub fn context(&self) -> TermContext<'_> {
+        self.state.context()
     }
 
     /// Lengths of steps and episodes.
@@ -101,12 +101,12 @@ impl Env {
 
     /// Number of environments.
     pub fn num_envs(&self) -> usize {
-        self.rows.len()
+        self.episodes.len()
     }
 
     /// Duration of a step of the task \[s\].
     pub fn step_dt(&self) -> f64 {
-        f64::from(self.cfg.decimation) * self.present.sim.cfg().physics_dt
+        f64::from(self.cfg.decimation) * self.state.sim.cfg().physics_dt
     }
 
     /// Columns of the observations, named `term/column`. A term with noise and without a clip is unbounded.
@@ -138,27 +138,33 @@ impl Env {
         let [observation_space, action_space] = spaces;
         let (n, seed, first) = (sim.num_envs(), sim.cfg().seed, sim.cfg().first_env());
         let row = |env: usize| {
-            let key = Key { seed, global: first + env, episode: 0 };
-            Row { key, next_episode: 0, runs: false, noise: Vec::new(), events: vec![0; terms.events.len()] }
+            let key = EpisodeKey { seed, global_env: first + env, episode: 0 };
+            EpisodeState {
+                key,
+                next_episode: 0,
+                is_active: false,
+                noise_rngs: Vec::new(),
+                next_event_steps: vec![0; terms.events.len()],
+            }
         };
         let actions = Array2::zeros((n, action_space.len()));
         let commands = terms.commands.iter();
         let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
         let previous = actions.clone();
-        let watch = Watch::new(n);
+        let watch = ResetMonitor::new(n);
         let mut env = Self {
-            watch: (watch.clone(), sim.observers_mut().add(watch)),
-            rows: (0..n).map(row).collect(),
+            reset_monitor: (watch.clone(), sim.observers_mut().add(watch)),
+            episodes: (0..n).map(row).collect(),
             reward_sums: Array2::zeros((n, terms.rewards.len())),
             observations: Array2::zeros((n, observation_space.len())),
-            present: Present { sim, actions, previous, steps: vec![0; n], commands },
+            state: TaskState { sim, actions, previous_actions: previous, episode_steps: vec![0; n], commands },
             cfg,
             terms,
             observation_space,
             action_space,
         };
         let all: Vec<usize> = (0..n).collect();
-        env.happen(&all, |when| when == When::Startup, |event| format!("event/{event}"))?;
+        env.run_events(&all, |when| when == EventMode::Startup, |event| format!("event/{event}"))?;
         Ok(env)
     }
 
@@ -184,16 +190,16 @@ impl Env {
         }
         let envs: Vec<usize> = (0..n).filter(|&env| mask.is_none_or(|mask| mask[env])).collect();
         for &env in &envs {
-            let row = &mut self.rows[env];
-            row.runs = false;
+            let row = &mut self.episodes[env];
+            row.is_active = false;
             if let Some(seed) = seed {
                 row.key.seed = seed;
                 row.next_episode = 0;
             }
         }
-        self.begin(&envs)?;
+        self.begin_episodes(&envs)?;
         self.observations = self.observe(&envs)?;
-        envs.iter().for_each(|&env| self.rows[env].runs = true);
+        envs.iter().for_each(|&env| self.episodes[env].is_active = true);
         Ok(self.observations.clone())
     }
 
@@ -210,18 +216,18 @@ impl Env {
     /// - A term fails, or returns an array of another shape or with a number that is not finite. The step is then
     ///   incomplete and every environment has to be reset.
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
-        let actions = self.within_bounds(actions.into())?;
-        if let Some(env) = self.rows.iter().position(|row| !row.runs) {
+        let actions = self.clamp_actions(actions.into())?;
+        if let Some(env) = self.episodes.iter().position(|row| !row.is_active) {
             return Err(EnvError::ResetFirst { env });
         }
         let step = self.advance(actions);
         if step.is_err() {
-            self.rows.iter_mut().for_each(|row| row.runs = false);
+            self.episodes.iter_mut().for_each(|row| row.is_active = false);
         }
         step
     }
 
-    fn within_bounds(&self, actions: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+    fn clamp_actions(&self, actions: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         let (found, expected) = (actions.shape().to_vec(), vec![self.num_envs(), self.action_space.len()]);
         if found != expected {
             let what = "the table of actions".into();
@@ -240,32 +246,32 @@ impl Env {
     }
 
     fn advance(&mut self, actions: Array2<f64>) -> Result<Step> {
-        self.present.previous = std::mem::replace(&mut self.present.actions, actions);
-        self.act()?;
-        self.present.steps.iter_mut().for_each(|steps| *steps += 1);
-        let (terminated, truncated, reasons) = self.ends()?;
-        let reward_terms = self.rewards()?;
+        self.state.previous_actions = std::mem::replace(&mut self.state.actions, actions);
+        self.apply_actions()?;
+        self.state.episode_steps.iter_mut().for_each(|steps| *steps += 1);
+        let (terminated, truncated, reasons) = self.check_terminations()?;
+        let reward_terms = self.compute_rewards()?;
         self.reward_sums += &reward_terms;
         // Sums in the order of the terms.
         let rewards = reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward));
         let result =
             StepResult { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
-        result.publish(&mut self.present.sim)?;
+        result.publish(&mut self.state.sim)?;
         let going_on: Vec<usize> = (0..self.num_envs()).filter(|&env| reasons[env].is_none()).collect();
-        self.happen_at_intervals(&going_on)?;
+        self.run_interval_events(&going_on)?;
         let all: Vec<usize> = (0..self.num_envs()).collect();
         let final_observations = self.observe(&all)?;
         self.observations = final_observations.clone();
-        let mut ended: Vec<Ended> = Vec::new();
+        let mut ended: Vec<EndedEpisode> = Vec::new();
         for (env, reason) in reasons.into_iter().enumerate() {
             if let Some(reason) = reason {
-                let (steps, reward_sums) = (self.present.steps[env], self.reward_sums.row(env).to_vec());
-                ended.push(Ended { env: EnvId(env), reason, steps, reward_sums });
+                let (steps, reward_sums) = (self.state.episode_steps[env], self.reward_sums.row(env).to_vec());
+                ended.push(EndedEpisode { env: EnvId(env), reason, steps, reward_sums });
             }
         }
         if !ended.is_empty() {
             let envs: Vec<usize> = ended.iter().map(|ended| ended.env.0).collect();
-            self.begin(&envs)?;
+            self.begin_episodes(&envs)?;
             self.observations = self.observe(&envs)?;
         }
         Ok(Step {
@@ -274,13 +280,13 @@ impl Env {
             rewards,
             terminated,
             truncated,
-            info: Info { reward_terms, ended },
+            info: StepInfo { reward_terms, ended },
         })
     }
 
     /// Applies the actions and does the physics steps.
-    fn act(&mut self) -> Result<()> {
-        let apply = |present: &mut Present, again: bool| -> Result<()> {
+    fn apply_actions(&mut self) -> Result<()> {
+        let apply = |present: &mut TaskState, again: bool| -> Result<()> {
             let mut first = 0;
             for term in &self.terms.actions {
                 let end = first + term.space.len();
@@ -293,7 +299,7 @@ impl Env {
             }
             Ok(())
         };
-        let present = &mut self.present;
+        let present = &mut self.state;
         apply(present, false)?;
         if self.terms.actions.iter().any(|term| term.every_physics_step) {
             present.sim.update(1);
@@ -309,20 +315,20 @@ impl Env {
 
     /// Finds the episodes that end: terminated, truncated, and the first reason of each.
     #[expect(clippy::type_complexity, reason = "three columns of a step")]
-    fn ends(&self) -> Result<(Array1<bool>, Array1<bool>, Vec<Option<EndReason>>)> {
+    fn check_terminations(&self) -> Result<(Array1<bool>, Array1<bool>, Vec<Option<EndReason>>)> {
         let n = self.num_envs();
         let (mut terminated, mut truncated) = (Array1::from_elem(n, false), Array1::from_elem(n, false));
         let mut reasons: Vec<Option<EndReason>> = vec![None; n];
-        for diverged in self.present.sim.diverged() {
+        for diverged in self.state.sim.diverged() {
             terminated[diverged.env.0] = true;
             reasons[diverged.env.0] = Some(EndReason::Diverged(diverged.to_string()));
         }
-        for env in (0..n).filter(|&env| self.watch.0.was_reset(env)) {
+        for env in (0..n).filter(|&env| self.reset_monitor.0.was_reset(env)) {
             truncated[env] = true;
             reasons[env].get_or_insert(EndReason::Reset);
         }
         for term in &self.terms.terminations {
-            for (env, _) in term.ends(&self.now())?.indexed_iter().filter(|(_, ends)| **ends) {
+            for (env, _) in term.evaluate(&self.context())?.indexed_iter().filter(|(_, ends)| **ends) {
                 if term.truncates {
                     truncated[env] = true
                 } else {
@@ -331,7 +337,7 @@ impl Env {
                 reasons[env].get_or_insert_with(|| EndReason::Term(term.name.clone()));
             }
         }
-        for (env, steps) in self.present.steps.iter().enumerate() {
+        for (env, steps) in self.state.episode_steps.iter().enumerate() {
             if self.cfg.episode_steps.is_some_and(|limit| *steps >= limit) {
                 truncated[env] = true;
                 reasons[env].get_or_insert(EndReason::TimeLimit);
@@ -341,10 +347,10 @@ impl Env {
     }
 
     /// Computes the weighted reward terms, shape (N, reward terms).
-    fn rewards(&self) -> Result<Array2<f64>> {
+    fn compute_rewards(&self) -> Result<Array2<f64>> {
         let mut table = Array2::zeros((self.num_envs(), self.terms.rewards.len()));
         for (mut column, term) in table.columns_mut().into_iter().zip(&self.terms.rewards) {
-            column.assign(&term.rewards(&self.now())?);
+            column.assign(&term.rewards(&self.context())?);
         }
         Ok(table)
     }
@@ -354,12 +360,12 @@ impl Env {
         let mut seen = self.observations.clone();
         let mut first = 0;
         for (k, term) in self.terms.observations.iter().enumerate() {
-            let values = term.rows(&self.present.now())?;
+            let values = term.compute(&self.state.context())?;
             for &env in envs {
                 for (column, &value) in values.row(env).iter().enumerate() {
-                    let value = term.seen(value, &mut self.rows[env].noise[k]);
+                    let value = term.process(value, &mut self.episodes[env].noise_rngs[k]);
                     if !value.is_finite() {
-                        let what = TermKind::Observation.gives(&term.name);
+                        let what = TermKind::Observation.result_label(&term.name);
                         let column = term.columns[column].clone();
                         return Err(EnvError::NotFinite { what, env, column, value });
                     }
@@ -372,63 +378,69 @@ impl Env {
     }
 
     /// Begins an episode in each of `envs`.
-    fn begin(&mut self, envs: &[usize]) -> Result<()> {
+    fn begin_episodes(&mut self, envs: &[usize]) -> Result<()> {
         if envs.is_empty() {
             return Ok(());
         }
         let ids: Vec<EnvId> = envs.iter().map(|&env| EnvId(env)).collect();
-        self.present.sim.reset(Some(&ids))?;
+        self.state.sim.reset(Some(&ids))?;
         for &env in envs {
-            let row = &mut self.rows[env];
+            let row = &mut self.episodes[env];
             row.key.episode = row.next_episode;
             row.next_episode += 1;
-            let noise = |name: &String| row.key.random(&format!("observation/{name}"));
-            row.noise = self.terms.observations.iter().map(|term| noise(&term.name)).collect();
-            for (next, event) in row.events.iter_mut().zip(&self.terms.events) {
-                if let When::Interval { steps } = event.when {
-                    *next = wait(row.key, env, &event.name, 0, steps);
+            let noise = |name: &String| row.key.rng(&format!("observation/{name}"));
+            row.noise_rngs = self.terms.observations.iter().map(|term| noise(&term.name)).collect();
+            for (next, event) in row.next_event_steps.iter_mut().zip(&self.terms.events) {
+                if let EventMode::Interval { steps } = event.mode {
+                    *next = draw_interval(row.key, env, &event.name, 0, steps);
                 }
             }
-            for (term, (name, values)) in self.terms.commands.iter().zip(&mut self.present.commands) {
-                let drawn = term.values(&mut row.key.dice(env, &format!("command/{name}")))?;
+            for (term, (name, values)) in self.terms.commands.iter().zip(&mut self.state.commands) {
+                let drawn = term.sample(&mut row.key.episode_rng(env, &format!("command/{name}")))?;
                 values.row_mut(env).iter_mut().zip(drawn).for_each(|(to, from)| *to = from);
             }
-            self.present.steps[env] = 0;
-            self.present.actions.row_mut(env).fill(0.0);
-            self.present.previous.row_mut(env).fill(0.0);
+            self.state.episode_steps[env] = 0;
+            self.state.actions.row_mut(env).fill(0.0);
+            self.state.previous_actions.row_mut(env).fill(0.0);
             self.reward_sums.row_mut(env).fill(0.0);
         }
-        self.happen(envs, |when| when == When::Reset, |event| format!("event/{event}"))?;
+        self.run_events(envs, |when| when == EventMode::Reset, |event| format!("event/{event}"))?;
         // The monitor also saw the resets of this function, which do not end an episode.
-        envs.iter().for_each(|&env| self.watch.0.clear(env));
+        envs.iter().for_each(|&env| self.reset_monitor.0.clear(env));
         Ok(())
     }
 
     /// Runs the events that are `due` in `envs`, each with random numbers keyed by `named(event)`.
-    fn happen(&mut self, envs: &[usize], due: impl Fn(When) -> bool, named: impl Fn(&str) -> String) -> Result<()> {
-        for event in self.terms.events.iter().filter(|event| due(event.when)) {
-            let what = named(&event.name);
-            let mut dice: Vec<Dice> = envs.iter().map(|&env| self.rows[env].key.dice(env, &what)).collect();
-            (event.act)(&mut self.present.sim, &mut dice)
+    fn run_events(
+        &mut self,
+        envs: &[usize],
+        due: impl Fn(EventMode) -> bool,
+        name: impl Fn(&str) -> String,
+    ) -> Result<()> {
+        for event in self.terms.events.iter().filter(|event| due(event.mode)) {
+            let what = name(&event.name);
+            let mut dice: Vec<EpisodeRng> =
+                envs.iter().map(|&env| self.episodes[env].key.episode_rng(env, &what)).collect();
+            (event.apply)(&mut self.state.sim, &mut dice)
                 .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
         }
         Ok(())
     }
 
     /// Runs the interval events that are due at the present step of the episodes in `envs`.
-    fn happen_at_intervals(&mut self, envs: &[usize]) -> Result<()> {
+    fn run_interval_events(&mut self, envs: &[usize]) -> Result<()> {
         for (k, event) in self.terms.events.iter().enumerate() {
-            let When::Interval { steps } = event.when else { continue };
+            let EventMode::Interval { steps } = event.mode else { continue };
             let mut dice = Vec::new();
             for &env in envs {
-                let (row, now) = (&mut self.rows[env], self.present.steps[env]);
-                if row.events[k] == now {
-                    row.events[k] = now.saturating_add(wait(row.key, env, &event.name, now, steps));
-                    dice.push(row.key.dice(env, &format!("event/{}/{now}", event.name)));
+                let (row, now) = (&mut self.episodes[env], self.state.episode_steps[env]);
+                if row.next_event_steps[k] == now {
+                    row.next_event_steps[k] = now.saturating_add(draw_interval(row.key, env, &event.name, now, steps));
+                    dice.push(row.key.episode_rng(env, &format!("event/{}/{now}", event.name)));
                 }
             }
             if !dice.is_empty() {
-                (event.act)(&mut self.present.sim, &mut dice)
+                (event.apply)(&mut self.state.sim, &mut dice)
                     .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
             }
         }
@@ -436,9 +448,9 @@ impl Env {
     }
 }
 
-/// Number of steps from step `now` until an interval event is due again, uniform in `low..=high`.
-fn wait(key: Key, env: usize, event: &str, now: u64, [low, high]: [u64; 2]) -> u64 {
-    let share = key.dice(env, &format!("interval/{event}/{now}")).uniform();
+/// Number of steps from step `context` until an interval event is due again, uniform in `low..=high`.
+fn draw_interval(key: EpisodeKey, env: usize, event: &str, now: u64, [low, high]: [u64; 2]) -> u64 {
+    let share = key.episode_rng(env, &format!("interval/{event}/{now}")).uniform();
     // Rounding may make the product of a share below 1 the whole width.
     low + ((share * (high - low + 1) as f64) as u64).min(high - low)
 }

@@ -31,7 +31,7 @@ pub enum TermKind {
 
 impl TermKind {
     /// Label of the result of a term's function, for error messages.
-    pub(crate) fn gives(self, name: &str) -> String {
+    pub(crate) fn result_label(self, name: &str) -> String {
         format!("what the {self} term {name:?} gives")
     }
 }
@@ -167,7 +167,8 @@ impl EnvError {
 
     /// Creates [`UnknownName`](Self::UnknownName) with the candidates nearest to `name`.
     pub(crate) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Self {
-        let candidates = kinetoscope_scene::pattern::closest(name, names).into_iter().map(str::to_string).collect();
+        let candidates =
+            kinetoscope_scene::pattern::closest_names(name, names).into_iter().map(str::to_string).collect();
         Self::UnknownName { what, name: name.into(), candidates }
     }
 }

@@ -1,16 +1,16 @@
 //! Event terms: random initial states, property changes, pushes.
 
-use crate::dice::Dice;
+use crate::dice::EpisodeRng;
 use crate::error::{EnvError, Result, TermResult};
 use kinetoscope_sim::SimulationManager;
 use std::fmt;
 
-type Act = Box<dyn Fn(&mut SimulationManager, &mut [Dice]) -> TermResult + Send>;
+type ApplyEvent = Box<dyn Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send>;
 
 /// Time at which an event happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum When {
+pub enum EventMode {
     /// Once, when the task is built, in all environments.
     Startup,
     /// When an episode begins, after the simulation went back to the initial state there.
@@ -31,31 +31,31 @@ pub enum When {
 /// which a reset does not restart.
 pub struct EventTerm {
     pub(crate) name: String,
-    pub(crate) when: When,
-    pub(crate) act: Act,
+    pub(crate) mode: EventMode,
+    pub(crate) apply: ApplyEvent,
 }
 
 impl EventTerm {
-    /// Creates an event. `act` gets one random number generator for each environment in which the event happens.
+    /// Creates an event. `apply` gets one random number generator for each environment in which the event happens.
     pub fn new(
         name: impl Into<String>,
-        when: When,
-        act: impl Fn(&mut SimulationManager, &mut [Dice]) -> TermResult + Send + 'static,
+        when: EventMode,
+        act: impl Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send + 'static,
     ) -> Self {
-        Self { name: name.into(), when, act: Box::new(act) }
+        Self { name: name.into(), mode: when, apply: Box::new(act) }
     }
 
     /// Creates an event that happens when an episode begins.
     pub fn on_reset(
         name: impl Into<String>,
-        act: impl Fn(&mut SimulationManager, &mut [Dice]) -> TermResult + Send + 'static,
+        act: impl Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send + 'static,
     ) -> Self {
-        Self::new(name, When::Reset, act)
+        Self::new(name, EventMode::Reset, act)
     }
 
     pub(crate) fn check(&self) -> Result<()> {
-        match self.when {
-            When::Interval { steps: [low, high] } if low == 0 || low > high => {
+        match self.mode {
+            EventMode::Interval { steps: [low, high] } if low == 0 || low > high => {
                 let field = format!("the interval of the event term {:?}", self.name);
                 let (value, expected) = (format!("{low} to {high} steps"), "it must be 1 step or more, in order");
                 Err(EnvError::Config { field, value, expected })
@@ -67,6 +67,6 @@ impl EventTerm {
 
 impl fmt::Debug for EventTerm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("EventTerm").field("name", &self.name).field("when", &self.when).finish_non_exhaustive()
+        f.debug_struct("EventTerm").field("name", &self.name).field("when", &self.mode).finish_non_exhaustive()
     }
 }

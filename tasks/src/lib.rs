@@ -11,10 +11,10 @@
 //! | [`VectorEnv`] | interface for learning code: spaces, `reset`, `step`, as in Gymnasium |
 //! | [`Env`], [`EnvBuilder`], [`EnvCfg`] | the implementation of [`VectorEnv`] with a simulation and terms |
 //! | [`ActionTerm`], [`CommandTerm`], [`EventTerm`] | write to the simulation: actions, goals, resets, pushes |
-//! | [`ObservationTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`Now`] |
+//! | [`ObservationTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`TermContext`] |
 //! | [`mod@terms`] | ready-made terms for robots |
 //! | [`Space`], [`Step`] | named columns with bounds; the result of a step |
-//! | [`Dice`] | random numbers of one environment, episode and term |
+//! | [`EpisodeRng`] | random numbers of one environment, episode and term |
 //! | [`fn@check`] | tests an implementation of [`VectorEnv`] |
 //!
 //! An environment whose episode ends begins the next one in the same step; [`Env`] documents the order of a step.
@@ -88,16 +88,16 @@ mod watch;
 pub use action::ActionTerm;
 pub use builder::EnvBuilder;
 pub use cfg::EnvCfg;
-pub use check::{Apart, Finding, check};
+pub use check::{Finding, RunDifference, check};
 pub use command::CommandTerm;
-pub use dice::{Dice, env_ids};
+pub use dice::{EpisodeRng, env_ids};
 pub use environment::Env;
 pub use error::{EnvError, Result, TermError, TermKind, TermResult};
-pub use event::{EventTerm, When};
-pub use now::Now;
+pub use event::{EventMode, EventTerm};
+pub use now::TermContext;
 pub use observation::{Noise, ObservationTerm};
 pub use reward::RewardTerm;
 pub use space::Space;
-pub use step::{EndReason, Ended, Info, Step};
+pub use step::{EndReason, EndedEpisode, Step, StepInfo};
 pub use termination::TerminationTerm;
 pub use vector::VectorEnv;

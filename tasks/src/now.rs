@@ -6,56 +6,56 @@ use ndarray::{Array1, Array2, ArrayView2};
 
 /// Read access to the simulation and the task state of all environments, for the functions of terms.
 #[derive(Clone, Copy, Debug)]
-pub struct Now<'e> {
-    present: &'e Present,
+pub struct TermContext<'e> {
+    state: &'e TaskState,
 }
 
 /// The simulation and the state of a task outside it.
 #[derive(Debug)]
-pub(crate) struct Present {
+pub(crate) struct TaskState {
     pub(crate) sim: SimulationManager,
     /// The last actions, within their bounds, shape (N, action columns).
     pub(crate) actions: Array2<f64>,
     /// Actions of the step before the last one, shape (N, action columns).
-    pub(crate) previous: Array2<f64>,
+    pub(crate) previous_actions: Array2<f64>,
     /// Number of steps of each episode so far.
-    pub(crate) steps: Vec<u64>,
+    pub(crate) episode_steps: Vec<u64>,
     /// Name and values of each command term.
     pub(crate) commands: Vec<(String, Array2<f64>)>,
 }
 
-impl Present {
-    pub(crate) fn now(&self) -> Now<'_> {
-        Now { present: self }
+impl TaskState {
+    pub(crate) fn context(&self) -> TermContext<'_> {
+        TermContext { state: self }
     }
 }
 
-impl<'e> Now<'e> {
+impl<'e> TermContext<'e> {
     /// The simulation.
     pub fn sim(&self) -> &'e SimulationManager {
-        &self.present.sim
+        &self.state.sim
     }
 
     /// Number of environments.
     pub fn num_envs(&self) -> usize {
-        self.present.sim.num_envs()
+        self.state.sim.num_envs()
     }
 
     /// Actions of the last step, clamped to their bounds, shape (N, columns of
     /// [`Env::action_space`](crate::Env::action_space)); 0 at the start of an episode.
     pub fn actions(&self) -> ArrayView2<'e, f64> {
-        self.present.actions.view()
+        self.state.actions.view()
     }
 
     /// Actions of the step before the last one, shaped as [`actions`](Self::actions); 0 if the episode had no such
     /// step.
     pub fn previous_actions(&self) -> ArrayView2<'e, f64> {
-        self.present.previous.view()
+        self.state.previous_actions.view()
     }
 
     /// Number of steps of each environment's episode so far, including the present one, shape (N,).
     pub fn episode_steps(&self) -> &'e [u64] {
-        &self.present.steps
+        &self.state.episode_steps
     }
 
     /// Values of the command term called `name`, shape (N, columns of the term).
@@ -63,7 +63,7 @@ impl<'e> Now<'e> {
     /// # Errors
     /// There is no command term of this name; the error lists the existing ones, the nearest first.
     pub fn command(&self, name: &str) -> Result<ArrayView2<'e, f64>> {
-        let commands = &self.present.commands;
+        let commands = &self.state.commands;
         let found = commands.iter().find(|(of, _)| of == name);
         found
             .map(|(_, values)| values.view())
@@ -71,7 +71,7 @@ impl<'e> Now<'e> {
     }
 
     /// Checks the result of a term's function, which must have shape (N,).
-    pub(crate) fn for_each_env<T>(
+    pub(crate) fn check_per_env<T>(
         &self,
         kind: TermKind,
         name: &str,
@@ -82,6 +82,6 @@ impl<'e> Now<'e> {
             return Ok(given);
         }
         let (found, expected) = (vec![given.len()], vec![self.num_envs()]);
-        Err(EnvError::Shape { what: kind.gives(name), found, expected, meaning: "environments" })
+        Err(EnvError::Shape { what: kind.result_label(name), found, expected, meaning: "environments" })
     }
 }

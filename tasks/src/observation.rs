@@ -1,13 +1,13 @@
 //! Observation terms.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
-use crate::now::Now;
+use crate::now::TermContext;
 use crate::space::Space;
-use kinetoscope_scene::Random;
+use kinetoscope_scene::KeyedRng;
 use ndarray::Array2;
 use std::fmt;
 
-type Observe = Box<dyn Fn(&Now<'_>) -> TermResult<Array2<f64>> + Send>;
+type Observe = Box<dyn Fn(&TermContext<'_>) -> TermResult<Array2<f64>> + Send>;
 
 /// Noise that is added to every value of an observation term.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,14 +28,14 @@ pub enum Noise {
 }
 
 impl Noise {
-    fn draw(self, random: &mut Random) -> f64 {
+    fn sample(self, random: &mut KeyedRng) -> f64 {
         match self {
             Self::Normal { std } => std * random.normal(),
-            Self::Uniform { low, high } => random.between(low, high),
+            Self::Uniform { low, high } => random.uniform_range(low, high),
         }
     }
 
-    fn is_good(self) -> bool {
+    fn is_valid(self) -> bool {
         match self {
             Self::Normal { std } => std.is_finite() && std >= 0.0,
             Self::Uniform { low, high } => low.is_finite() && high.is_finite() && low <= high,
@@ -61,7 +61,7 @@ impl ObservationTerm {
     pub fn new<N: Into<String>>(
         name: impl Into<String>,
         columns: impl IntoIterator<Item = N>,
-        observe: impl Fn(&Now<'_>) -> TermResult<Array2<f64>> + Send + 'static,
+        observe: impl Fn(&TermContext<'_>) -> TermResult<Array2<f64>> + Send + 'static,
     ) -> Self {
         let columns = columns.into_iter().map(Into::into).collect();
         let clip = [f64::NEG_INFINITY, f64::INFINITY];
@@ -93,7 +93,7 @@ impl ObservationTerm {
             let field = format!("{field} of the observation term {:?}", self.name);
             Err(EnvError::Config { field, value, expected })
         };
-        if let Some(noise) = self.noise.filter(|noise| !noise.is_good()) {
+        if let Some(noise) = self.noise.filter(|noise| !noise.is_valid()) {
             return wrong(
                 "noise",
                 format!("{noise:?}"),
@@ -111,19 +111,19 @@ impl ObservationTerm {
     }
 
     /// Computes the raw values of all environments, shape (N, columns).
-    pub(crate) fn rows(&self, now: &Now<'_>) -> Result<Array2<f64>> {
+    pub(crate) fn compute(&self, now: &TermContext<'_>) -> Result<Array2<f64>> {
         let rows = (self.observe)(now).map_err(|e| EnvError::term(TermKind::Observation, &self.name, e))?;
         let expected = vec![now.num_envs(), self.columns.len()];
         if rows.shape() == expected {
             return Ok(rows);
         }
-        let (what, found) = (TermKind::Observation.gives(&self.name), rows.shape().to_vec());
+        let (what, found) = (TermKind::Observation.result_label(&self.name), rows.shape().to_vec());
         Err(EnvError::Shape { what, found, expected, meaning: "environments, columns of the term" })
     }
 
     /// Applies noise, clip and scale to a raw value.
-    pub(crate) fn seen(&self, value: f64, random: &mut Random) -> f64 {
-        let noisy = self.noise.map_or(value, |noise| value + noise.draw(random));
+    pub(crate) fn process(&self, value: f64, random: &mut KeyedRng) -> f64 {
+        let noisy = self.noise.map_or(value, |noise| value + noise.sample(random));
         self.scale * noisy.clamp(self.clip[0], self.clip[1])
     }
 }

@@ -1,11 +1,11 @@
 //! Reward terms.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
-use crate::now::Now;
+use crate::now::TermContext;
 use ndarray::Array1;
 use std::fmt;
 
-type Reward = Box<dyn Fn(&Now<'_>) -> TermResult<Array1<f64>> + Send>;
+type Reward = Box<dyn Fn(&TermContext<'_>) -> TermResult<Array1<f64>> + Send>;
 
 /// A term of the reward of a step: one number for each environment, times a weight.
 ///
@@ -22,7 +22,7 @@ impl RewardTerm {
     pub fn new(
         name: impl Into<String>,
         weight: f64,
-        reward: impl Fn(&Now<'_>) -> TermResult<Array1<f64>> + Send + 'static,
+        reward: impl Fn(&TermContext<'_>) -> TermResult<Array1<f64>> + Send + 'static,
     ) -> Self {
         Self { name: name.into(), weight, reward: Box::new(reward) }
     }
@@ -36,11 +36,11 @@ impl RewardTerm {
     }
 
     /// Computes the weighted rewards of all environments, shape (N,).
-    pub(crate) fn rewards(&self, now: &Now<'_>) -> Result<Array1<f64>> {
-        let mut rewards = now.for_each_env(TermKind::Reward, &self.name, (self.reward)(now))?;
+    pub(crate) fn rewards(&self, now: &TermContext<'_>) -> Result<Array1<f64>> {
+        let mut rewards = now.check_per_env(TermKind::Reward, &self.name, (self.reward)(now))?;
         rewards.mapv_inplace(|value| self.weight * value);
         if let Some((env, &value)) = rewards.indexed_iter().find(|(_, value)| !value.is_finite()) {
-            let what = TermKind::Reward.gives(&self.name);
+            let what = TermKind::Reward.result_label(&self.name);
             return Err(EnvError::NotFinite { what, env, column: self.name.clone(), value });
         }
         Ok(rewards)

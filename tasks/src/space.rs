@@ -71,7 +71,7 @@ impl Space {
     ///
     /// # Errors
     /// There is no such column; the error lists the nearest names.
-    pub fn column(&self, name: &str) -> Result<usize> {
+    pub fn column_index(&self, name: &str) -> Result<usize> {
         let place = self.names.iter().position(|of| of == name);
         place.ok_or_else(|| EnvError::unknown("column", name, self.names.iter().map(String::as_str)))
     }
@@ -88,9 +88,9 @@ impl Space {
     }
 
     /// Concatenates the columns of several terms, named `term/column`.
-    pub(crate) fn joined<'s>(parts: impl Iterator<Item = (&'s str, &'s Self)>) -> Self {
+    pub(crate) fn concatenate<'s>(spaces: impl Iterator<Item = (&'s str, &'s Self)>) -> Self {
         let mut all = Self { names: Vec::new(), low: Vec::new(), high: Vec::new() };
-        for (term, part) in parts {
+        for (term, part) in spaces {
             all.names.extend(part.names.iter().map(|name| format!("{term}/{name}")));
             all.low.extend(&part.low);
             all.high.extend(&part.high);

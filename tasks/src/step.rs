@@ -6,7 +6,7 @@ use std::fmt;
 
 /// Result of a step of all environments of a [`VectorEnv`](crate::VectorEnv).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Step<I = Info> {
+pub struct Step<I = StepInfo> {
     /// Present observations, shape (N, columns of [`observation_space`](crate::VectorEnv::observation_space)). In an
     /// environment whose episode ended, the first observation of the next episode.
     pub observations: Array2<f64>,
@@ -27,17 +27,17 @@ pub struct Step<I = Info> {
 
 /// Additional results of a step of an [`Env`](crate::Env).
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Info {
+pub struct StepInfo {
     /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)). Their sums are the
     /// rewards.
     pub reward_terms: Array2<f64>,
     /// The episodes that ended, in the order of environments.
-    pub ended: Vec<Ended>,
+    pub ended: Vec<EndedEpisode>,
 }
 
 /// An episode that ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ended {
+pub struct EndedEpisode {
     /// The environment.
     pub env: EnvId,
     /// The reason.
@@ -48,9 +48,9 @@ pub struct Ended {
     pub reward_sums: Vec<f64>,
 }
 
-impl Ended {
+impl EndedEpisode {
     /// Sum of all rewards of the episode.
-    pub fn total(&self) -> f64 {
+    pub fn total_reward(&self) -> f64 {
         self.reward_sums.iter().sum()
     }
 }

@@ -1,11 +1,11 @@
 //! Termination terms: reasons for episodes to end.
 
 use crate::error::{Result, TermKind, TermResult};
-use crate::now::Now;
+use crate::now::TermContext;
 use ndarray::Array1;
 use std::fmt;
 
-type Ends = Box<dyn Fn(&Now<'_>) -> TermResult<Array1<bool>> + Send>;
+type Condition = Box<dyn Fn(&TermContext<'_>) -> TermResult<Array1<bool>> + Send>;
 
 /// A reason for episodes to end.
 ///
@@ -15,14 +15,17 @@ pub struct TerminationTerm {
     pub(crate) name: String,
     /// True if it truncates episodes instead of terminating them.
     pub(crate) truncates: bool,
-    ends: Ends,
+    condition: Condition,
 }
 
 impl TerminationTerm {
     /// Creates a term that terminates the episodes where `ends` returns true, shape (N,). A terminated episode reached
     /// a goal or failed, so that no further reward is possible.
-    pub fn new(name: impl Into<String>, ends: impl Fn(&Now<'_>) -> TermResult<Array1<bool>> + Send + 'static) -> Self {
-        Self { name: name.into(), truncates: false, ends: Box::new(ends) }
+    pub fn new(
+        name: impl Into<String>,
+        ends: impl Fn(&TermContext<'_>) -> TermResult<Array1<bool>> + Send + 'static,
+    ) -> Self {
+        Self { name: name.into(), truncates: false, condition: Box::new(ends) }
     }
 
     /// Truncates episodes instead of terminating them: the task could continue, but its episode is cut off. Learning
@@ -33,8 +36,8 @@ impl TerminationTerm {
     }
 
     /// Evaluates the term for all environments, shape (N,).
-    pub(crate) fn ends(&self, now: &Now<'_>) -> Result<Array1<bool>> {
-        now.for_each_env(TermKind::Termination, &self.name, (self.ends)(now))
+    pub(crate) fn evaluate(&self, now: &TermContext<'_>) -> Result<Array1<bool>> {
+        now.check_per_env(TermKind::Termination, &self.name, (self.condition)(now))
     }
 }
 

@@ -10,11 +10,11 @@ macro_rules! terms {
 
 terms! {
     bad_orientation: bad_orientation;
-    base_below: base_below;
+    base_below: root_height_below_minimum;
     base_motion: base_lin_vel, base_ang_vel, projected_gravity;
     flat_orientation: flat_orientation;
     illegal_contact: illegal_contact;
-    joint_effort_squares: joint_effort_squares;
+    joint_effort_squares: joint_torques_l2;
     joint_out_of_limits: joint_out_of_limits;
     reset_joints_by_offset: reset_joints_by_offset;
     reset_root_uniform: reset_root_uniform, RootRanges;
@@ -24,7 +24,7 @@ terms! {
 
 use crate::action::ActionTerm;
 use crate::error::{Result, TermResult};
-use crate::now::Now;
+use crate::now::TermContext;
 use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;
@@ -32,13 +32,13 @@ use kinetoscope_sim::{JointIndex, Robot, RobotId, SimulationManager};
 use ndarray::{Array1, Array2, Axis};
 
 /// Finds the joints of a robot that match `patterns`, with their names.
-fn joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {
+fn find_joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {
     let robot = sim.robot(robot);
     let joints = robot.find_joints(patterns)?;
     Ok((joints.iter().map(|joint| robot.joint_names()[joint.0].clone()).collect(), joints))
 }
 
-fn columns(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
+fn select_joints(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
     of.select(Axis(1), &joints.iter().map(|joint| joint.0).collect::<Vec<_>>())
 }
 
@@ -50,50 +50,45 @@ fn columns(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
 ///
 /// # Panics
 /// The robot belongs to another manager.
-pub fn joint_positions(
+pub fn joint_pos_rel(
     sim: &SimulationManager,
     name: &str,
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<ObservationTerm> {
-    seen_of_joints(sim, name, robot, patterns, |robot| robot.qpos() - robot.default_qpos())
+    joint_observation(sim, name, robot, patterns, |robot| robot.qpos() - robot.default_qpos())
 }
 
-/// Joint velocities \[rad/s or m/s\]; columns as in [`joint_positions`].
+/// Joint velocities \[rad/s or m/s\]; columns as in [`joint_pos_rel`].
 ///
 /// # Errors
 /// A pattern matches no joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.
-pub fn joint_velocities(
-    sim: &SimulationManager,
-    name: &str,
-    robot: RobotId,
-    patterns: &[&str],
-) -> Result<ObservationTerm> {
-    seen_of_joints(sim, name, robot, patterns, |robot| robot.qvel())
+pub fn joint_vel(sim: &SimulationManager, name: &str, robot: RobotId, patterns: &[&str]) -> Result<ObservationTerm> {
+    joint_observation(sim, name, robot, patterns, |robot| robot.qvel())
 }
 
 /// A term with the columns that `read` returns for the joints that match `patterns`.
-fn seen_of_joints(
+fn joint_observation(
     sim: &SimulationManager,
     name: &str,
     robot: RobotId,
     patterns: &[&str],
     read: impl Fn(&Robot<'_>) -> Array2<f64> + Send + 'static,
 ) -> Result<ObservationTerm> {
-    let (names, joints) = joints(sim, robot, patterns)?;
-    Ok(ObservationTerm::new(name, names, move |now| Ok(columns(&read(&now.sim().robot(robot)), &joints))))
+    let (names, joints) = find_joints(sim, robot, patterns)?;
+    Ok(ObservationTerm::new(name, names, move |now| Ok(select_joints(&read(&now.sim().robot(robot)), &joints))))
 }
 
 /// The last actions; `names` are the names of all columns of the action space.
-pub fn last_actions<N: Into<String>>(name: &str, names: impl IntoIterator<Item = N>) -> ObservationTerm {
+pub fn last_action<N: Into<String>>(name: &str, names: impl IntoIterator<Item = N>) -> ObservationTerm {
     ObservationTerm::new(name, names, |now| Ok(now.actions().to_owned()))
 }
 
 /// Values of a command; `names` are the names of its columns.
-pub fn commanded<N: Into<String>>(
+pub fn generated_commands<N: Into<String>>(
     name: &str,
     command: impl Into<String>,
     names: impl IntoIterator<Item = N>,
@@ -117,7 +112,7 @@ pub fn joint_efforts(
     patterns: &[&str],
     bound: f64,
 ) -> Result<ActionTerm> {
-    let (names, joints) = joints(sim, robot, patterns)?;
+    let (names, joints) = find_joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-bound, bound])?, move |sim, efforts| {
         Ok(sim.robot_mut(robot).set_qf_target(efforts, Some(&joints), None)?)
     }))
@@ -131,28 +126,28 @@ pub fn joint_efforts(
 ///
 /// # Panics
 /// The robot belongs to another manager.
-pub fn target_changes(
+pub fn relative_joint_positions(
     sim: &SimulationManager,
     name: &str,
     robot: RobotId,
     patterns: &[&str],
     step: f64,
 ) -> Result<ActionTerm> {
-    let (names, joints) = joints(sim, robot, patterns)?;
+    let (names, joints) = find_joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-1.0, 1.0])?, move |sim, actions| {
-        let targets = columns(&sim.robot(robot).qpos_target(), &joints) + actions.mapv(|action| step * action);
+        let targets = select_joints(&sim.robot(robot).qpos_target(), &joints) + actions.mapv(|action| step * action);
         Ok(sim.robot_mut(robot).set_qpos_target(&targets, Some(&joints), None)?)
     }))
 }
 
 /// A reward of 1 in every step.
-pub fn alive(name: &str, weight: f64) -> RewardTerm {
+pub fn is_alive(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now| Ok(Array1::ones(now.num_envs())))
 }
 
 /// Sum of the squared changes of the actions since the previous step.
 pub fn action_rate(name: &str, weight: f64) -> RewardTerm {
-    RewardTerm::new(name, weight, |now: &Now<'_>| -> TermResult<Array1<f64>> {
+    RewardTerm::new(name, weight, |now: &TermContext<'_>| -> TermResult<Array1<f64>> {
         let change = &now.actions() - &now.previous_actions();
         Ok(change.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum()))
     })

@@ -3,7 +3,7 @@
 use crate::environment::Env;
 use crate::error::EnvError;
 use crate::space::Space;
-use crate::step::{Info, Step};
+use crate::step::{Step, StepInfo};
 use ndarray::{Array2, ArrayView2};
 
 /// A batch of environments for learning code: Gymnasium's `VectorEnv`.
@@ -73,7 +73,7 @@ pub trait VectorEnv {
 
 impl VectorEnv for Env {
     type Error = EnvError;
-    type Info = Info;
+    type Info = StepInfo;
 
     fn num_envs(&self) -> usize {
         Self::num_envs(self)

@@ -1,16 +1,16 @@
 //! The observer of a task. It records resets that the task did not request, such as those by viewers, and declares that
 //! the task publishes [`StepResult`].
 
-use kinetoscope_sim::{Moment, Observer, SimulationManager, StepResult};
+use kinetoscope_sim::{Observer, SimEvent, SimulationManager, StepResult};
 use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Records which environments were reset.
 #[derive(Clone, Debug)]
-pub(crate) struct Watch(Arc<[AtomicBool]>);
+pub(crate) struct ResetMonitor(Arc<[AtomicBool]>);
 
-impl Watch {
+impl ResetMonitor {
     /// Creates the monitor of `num_envs` environments.
     pub(crate) fn new(num_envs: usize) -> Self {
         Self((0..num_envs).map(|_| AtomicBool::new(false)).collect())
@@ -27,13 +27,13 @@ impl Watch {
     }
 }
 
-impl Observer for Watch {
+impl Observer for ResetMonitor {
     fn due_in(&self, _: &SimulationManager) -> u64 {
         u64::MAX
     }
 
-    fn observe(&mut self, _: &mut SimulationManager, moment: &Moment) {
-        if let Moment::Reset { env_ids } = moment {
+    fn on_event(&mut self, _: &mut SimulationManager, moment: &SimEvent) {
+        if let SimEvent::Reset { env_ids } = moment {
             let known = env_ids.iter().filter_map(|env| self.0.get(env.0));
             known.for_each(|reset| reset.store(true, Ordering::Relaxed));
         }

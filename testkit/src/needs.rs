@@ -8,33 +8,32 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Environment variable with the folder of real robots.
-pub const ROBOTS: &str = "KINETOSCOPE_ROBOTS";
+pub const ROBOTS_VARIABLE: &str = "KINETOSCOPE_ROBOTS";
 /// Environment variable with a Python that has readers of recordings (`mcap`, NumPy, Pillow, PyAV, h5py).
-pub const READERS: &str = "KINETOSCOPE_PYTHON_READERS";
+pub const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 /// Environment variable with a Python that has MuJoCo 4 and OpenGL.
-pub const RENDERER: &str = "KINETOSCOPE_PYTHON4";
+pub const RENDERER_VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 
-/// Folders that may hold real robots: [`ROBOTS`], `shared/robots` beside the repository or above it, and the one that
+/// Folders that may hold real robots: [`ROBOTS_VARIABLE`], `shared/robots` beside the repository or above it, and the one that
 /// `cargo xtask test` fills from PyPI.
 fn robot_folders() -> impl Iterator<Item = PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let above = root.ancestors().skip(1).map(|dir| dir.join("shared/robots"));
-    std::env::var_os(ROBOTS).map(PathBuf::from).into_iter().chain(above).chain([root.join("target/robots")])
+    std::env::var_os(ROBOTS_VARIABLE).map(PathBuf::from).into_iter().chain(above).chain([root.join("target/robots")])
 }
 
 /// Folder with URDF files of real robots.
 pub fn robots_dir() -> PathBuf {
     robot_folders()
         .find(|dir| dir.is_dir())
-        .unwrap_or_else(|| panic!("no folder of real robots: run `cargo xtask test`, or set {ROBOTS}"))
+        .unwrap_or_else(|| panic!("no folder of real robots: run `cargo xtask test`, or set {ROBOTS_VARIABLE}"))
 }
 
 /// File of a real robot; `path` is relative to the folder of robots.
 pub fn robot(path: &str) -> PathBuf {
-    robot_folders()
-        .map(|dir| dir.join(path))
-        .find(|file| file.is_file())
-        .unwrap_or_else(|| panic!("no folder of real robots has {path}: run `cargo xtask test`, or set {ROBOTS}"))
+    robot_folders().map(|dir| dir.join(path)).find(|file| file.is_file()).unwrap_or_else(|| {
+        panic!("no folder of real robots has {path}: run `cargo xtask test`, or set {ROBOTS_VARIABLE}")
+    })
 }
 
 /// A model that comes with MuJoCo, for example `humanoid/humanoid.xml`, or the folder of models for an empty path.
@@ -68,12 +67,12 @@ fn python(variable: &str) -> PathBuf {
 
 /// Python interpreter that reads recordings.
 pub fn python_readers() -> PathBuf {
-    python(READERS)
+    python(READERS_VARIABLE)
 }
 
 /// Python interpreter that renders with MuJoCo's own renderer.
 pub fn python_renderer() -> PathBuf {
-    python(RENDERER)
+    python(RENDERER_VARIABLE)
 }
 
 /// Runs a Python script on a file and parses the JSON that it prints.

@@ -7,11 +7,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 /// Environment variable that is set in child processes only.
-const VARIABLE: &str = "KINETOSCOPE_TEST_CHILD";
+const CHILD_VARIABLE: &str = "KINETOSCOPE_TEST_CHILD";
 
 /// True in a process that [`run`] or [`command`] started.
 pub fn is_child() -> bool {
-    std::env::var_os(VARIABLE).is_some()
+    std::env::var_os(CHILD_VARIABLE).is_some()
 }
 
 /// Command that runs one test of this binary alone. `module` is `module_path!()` of the test, `test` its name.
@@ -19,7 +19,7 @@ pub fn command(module: &str, test: &str) -> Command {
     // Names of tests lack the name of the binary.
     let name = module.split_once("::").map_or_else(|| test.to_string(), |(_, path)| format!("{path}::{test}"));
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", &name, "--include-ignored", "--nocapture", "--test-threads=1"]).env(VARIABLE, "1");
+    command.args(["--exact", &name, "--include-ignored", "--nocapture", "--test-threads=1"]).env(CHILD_VARIABLE, "1");
     command
 }
 

@@ -19,7 +19,7 @@ fn assert_none(findings: &[String]) {
 /// Asserts that every row `(what, result, variant, parts)` is an error whose `Debug` output begins with `variant`, and
 /// whose message contains each of `parts`. Rows may be lazy: they are evaluated in order.
 #[track_caller]
-pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: AsRef<[&'a str]>>(
+pub fn assert_errors<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: AsRef<[&'a str]>>(
     rows: impl IntoIterator<Item = (W, Result<T, E>, V, P)>,
 ) {
     let rows = rows.into_iter().filter_map(|(what, result, variant, parts)| {
@@ -28,10 +28,10 @@ pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: A
     assert_none(&rows.collect::<Vec<_>>());
 }
 
-/// Asserts the errors of rows `(what, mistake, variant, parts)` as [`assert_refused`] does. `make` makes each mistake,
+/// Asserts the errors of rows `(what, mistake, variant, parts)` as [`assert_errors`] does. `make` makes each mistake,
 /// and the value of `fingerprint` must not change.
 #[track_caller]
-pub fn assert_refused_unchanged<'a, S, F, W, M, T, E, V, P>(
+pub fn assert_errors_unchanged<'a, S, F, W, M, T, E, V, P>(
     state: &mut S,
     fingerprint: impl Fn(&S) -> F,
     rows: impl IntoIterator<Item = (W, M, V, P)>,

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 /// Random numbers (xorshift64*) that are identical in every run, from a seed other than 0.
 #[derive(Clone, Debug)]
-pub struct Random(pub u64);
+pub struct TestRng(pub u64);
 
-impl Random {
+impl TestRng {
     fn next(&mut self) -> u64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -45,7 +45,7 @@ impl Random {
 }
 
 /// A scene with two of every shape, each within `reach` of the origin \[m\], and a checkered plane.
-pub fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
+pub fn random_scene(random: &mut TestRng, reach: f64) -> (RenderScene, Vec<PoseF32>) {
     let shapes = every_shape().into_iter().chain(every_shape());
     let mut color = || random.within(0.1, 1.0) as f32;
     let mut instances: Vec<Instance> = shapes
@@ -73,13 +73,13 @@ pub fn checker_plane() -> Instance {
 }
 
 /// A triangle mesh of a bumpy sphere.
-pub fn bumpy(segments: usize) -> Arc<RenderMesh> {
+pub fn bumpy_sphere(segments: usize) -> Arc<RenderMesh> {
     let mut mesh = Shape::from(Sphere { radius: 0.3 }).tessellate(segments);
     for p in &mut mesh.positions {
         let k = 1.0 + 0.15 * (20.0 * p[0]).sin() * (17.0 * p[1]).cos() * (15.0 * p[2]).sin();
         *p = p.map(|x| x * k);
     }
-    Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE))
+    Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE))
 }
 
 /// One of every kind of shape.
@@ -92,13 +92,13 @@ pub fn every_shape() -> Vec<Shape> {
         Ellipsoid { radii: [0.4, 0.2, 0.1] }.into(),
         Cylinder { radius: 0.2, half_length: 0.25 }.into(),
         Box { half: [0.2, 0.3, 0.1] }.into(),
-        Mesh { mesh: bumpy(24) }.into(),
+        Mesh { mesh: bumpy_sphere(24) }.into(),
         HeightField::new([0.5, 0.4, 0.2, 0.1], 9, 12, &elevation).unwrap().into(),
     ]
 }
 
 /// A figure of about 25 primitives in human shape, on a checkered ground.
-pub fn figure() -> (RenderScene, Vec<PoseF32>) {
+pub fn humanoid() -> (RenderScene, Vec<PoseF32>) {
     let skin = Material { rgba: [0.8, 0.6, 0.4, 1.0], ..Material::default() };
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
@@ -152,12 +152,12 @@ pub fn figure() -> (RenderScene, Vec<PoseF32>) {
 }
 
 /// A pose without rotation \[m\].
-pub fn at(x: f32, y: f32, z: f32) -> PoseF32 {
+pub fn translation(x: f32, y: f32, z: f32) -> PoseF32 {
     PoseF32::from_translation([x, y, z])
 }
 
 /// A scene of instances with mask ids from 1 on, and their poses.
-pub fn things(all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32)>) -> (RenderScene, Vec<PoseF32>) {
+pub fn instances(all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32)>) -> (RenderScene, Vec<PoseF32>) {
     let thing =
         |((shape, material, pose), id): ((_, Material, PoseF32), i32)| (Instance::new(shape, material, id), pose);
     let (instances, poses) = all.into_iter().zip(1..).map(thing).unzip();
@@ -173,6 +173,6 @@ pub fn unlit(mut scene: RenderScene) -> RenderScene {
 }
 
 /// A material without highlights.
-pub fn matt([r, g, b]: [f32; 3]) -> Material {
+pub fn matte([r, g, b]: [f32; 3]) -> Material {
     Material { specular: 0.0, ..Material::from_rgba([r, g, b, 1.0]) }
 }

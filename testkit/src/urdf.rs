@@ -43,15 +43,15 @@ pub fn collision(geometry: &str, [x, y, z]: [f64; 3]) -> String {
 
 /// Temporary files that are removed when the value is dropped.
 #[derive(Debug)]
-pub struct Files(tempfile::TempDir);
+pub struct TempFiles(tempfile::TempDir);
 
-impl Default for Files {
+impl Default for TempFiles {
     fn default() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 }
 
-impl Files {
+impl TempFiles {
     /// The temporary folder.
     pub fn folder(&self) -> &Path {
         self.0.path()

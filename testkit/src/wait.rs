@@ -3,17 +3,17 @@
 use std::time::{Duration, Instant};
 
 /// Longest wait. An event that has not occurred by then does not occur, even on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+pub const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Waits until `found` returns a value.
 #[track_caller]
-pub fn some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+pub fn until_some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
     loop {
         if let Some(found) = found() {
             return found;
         }
-        assert!(start.elapsed() < PATIENCE, "waited for {PATIENCE:?}: {what}");
+        assert!(start.elapsed() < TIMEOUT, "waited for {TIMEOUT:?}: {what}");
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -21,7 +21,7 @@ pub fn some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
 /// Waits until a condition holds.
 #[track_caller]
 pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
-    some(what, || holds().then_some(()));
+    until_some(what, || holds().then_some(()));
 }
 
 /// Number of threads and of open files of this process. For tests in their own process ([`crate::process`]).

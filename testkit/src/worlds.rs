@@ -1,12 +1,12 @@
 //! Simulations, robots, objects and cameras for tests. Poses are in the environment frame \[m\].
 
-use crate::urdf::Files;
+use crate::urdf::TempFiles;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::{Imu, JointState, JointStateCfg};
-use kinetoscope::sim::env::Env;
-use kinetoscope::sim::{DriveType, ObjectId};
+use kinetoscope::sim::env::SimEnv;
+use kinetoscope::sim::{DriveType, RigidObjectId};
 
 /// A configuration with this number of environments and threads.
 pub fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
@@ -55,7 +55,7 @@ pub fn urdf_robot(uid: &str, urdf: impl AsRef<std::path::Path>) -> RobotCfg {
 }
 
 /// A robot of URDF text, which is written to `{uid}.urdf`.
-pub fn text_robot(files: &Files, uid: &str, urdf: &str) -> RobotCfg {
+pub fn text_robot(files: &TempFiles, uid: &str, urdf: &str) -> RobotCfg {
     urdf_robot(uid, files.write(&format!("{uid}.urdf"), urdf))
 }
 
@@ -105,7 +105,7 @@ pub fn camera([width, height]: [usize; 2], eye: [f64; 3], target: [f64; 3], chan
 }
 
 /// Bits of the state that determines the next step of an environment, of the efforts, and the number of contacts.
-pub fn bits_of(env: &Env) -> Vec<u64> {
+pub fn bits_of(env: &SimEnv) -> Vec<u64> {
     let data = env.data();
     [&[data.time()], data.qpos(), data.qvel(), data.qacc_warmstart(), &env.drives.position, &env.drives.effort]
         .into_iter()
@@ -130,7 +130,7 @@ pub struct RecordedWorld {
     /// The bundled arm.
     pub arm: RobotId,
     /// A cube of 0.1 m.
-    pub cube: ObjectId,
+    pub cube: RigidObjectId,
     /// A camera of 32x24 pixels with color, depth and mask.
     pub camera: SensorId<Camera>,
     /// An IMU on the cube.
@@ -183,12 +183,12 @@ impl RecordedWorld {
 }
 
 /// Pose in a row of a batch of poses.
-pub fn pose_in(poses: &Array2<f64>, row: usize) -> Pose {
+pub fn pose_of_row(poses: &Array2<f64>, row: usize) -> Pose {
     kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| poses[(row, k)]))
 }
 
 /// Distance \[m\] and angle \[rad\] between two poses.
-pub fn errors(a: &Pose, b: &Pose) -> (f64, f64) {
+pub fn pose_error(a: &Pose, b: &Pose) -> (f64, f64) {
     ((a.translation.vector - b.translation.vector).norm(), a.rotation.angle_to(&b.rotation))
 }
 
@@ -219,6 +219,6 @@ pub fn no_drive() -> DriveCfg {
 
 /// Adds a small ball of the default density at `at`, which compiles the model again.
 #[track_caller]
-pub fn add_ball(sim: &mut SimulationManager, uid: &str, at: [f64; 3]) -> ObjectId {
+pub fn add_ball(sim: &mut SimulationManager, uid: &str, at: [f64; 3]) -> RigidObjectId {
     sim.add_rigid_object(object(uid, ObjectShape::Sphere { radius: 0.1 }, at)).unwrap()
 }

@@ -1,15 +1,15 @@
 //! The record button of viewers writes the same files as the recorder.
 
 use kinetoscope::FileRecording;
-use kinetoscope::record::{RecordError, Recorded, RecorderCfg, Recording, Wanted};
-use kinetoscope::viewer::{Command, RecordButton, Recording as _, Viewer, Viewing, Wants};
+use kinetoscope::record::{FieldSelector, RecordError, RecorderCfg, Recording, RecordingSummary};
+use kinetoscope::viewer::{Command, RecordButton, RecordControl as _, SnapshotRequest, Viewer, ViewerExt};
 use kinetoscope_testkit::worlds::{RecordedWorld, sr5};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 /// A world with a record button, and a viewer that presses the button.
-struct Watched {
+struct WorldWithViewer {
     world: RecordedWorld,
     files: Arc<Mutex<FileRecording>>,
     viewer: Viewer,
@@ -22,12 +22,12 @@ fn nanos(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
 
-impl Watched {
+impl WorldWithViewer {
     fn new(path: &Path) -> Self {
         let mut world = RecordedWorld::new(1, 1);
         let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(path))));
         world.sim.record_button(RecordButton::shared(Arc::clone(&files)));
-        let viewer = world.sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
+        let viewer = world.sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
         Self { world, files, viewer, step: 0, positions: BTreeMap::new() }
     }
 
@@ -43,14 +43,14 @@ impl Watched {
     }
 
     /// Returns the state of the recording in viewers: true while it runs, and its text.
-    fn seen(&self) -> (bool, String) {
+    fn recording_state(&self) -> (bool, String) {
         let state = self.viewer.newest().unwrap().run.recording.clone().unwrap();
         (state.on, state.text)
     }
 
     /// Returns the error message of the rejected command.
     fn refused(&self) -> Option<String> {
-        self.viewer.newest().unwrap().run.refused.clone()
+        self.viewer.newest().unwrap().run.last_refusal.clone()
     }
 
     /// Steps until the condition is true.
@@ -61,31 +61,32 @@ impl Watched {
             }
             self.step();
         }
-        panic!("never: {what}; {:?}, {:?}", self.seen(), self.refused());
+        panic!("never: {what}; {:?}, {:?}", self.recording_state(), self.refused());
     }
 
     fn press(&mut self, on: bool) {
         self.viewer.send(Command::Record(on));
-        self.step_until("the button is obeyed", |own| own.seen().0 == on);
+        self.step_until("the button is obeyed", |own| own.recording_state().0 == on);
     }
 
     /// Ends the recording from the program.
-    fn end(&mut self) -> Vec<Recorded> {
+    fn end(&mut self) -> Vec<RecordingSummary> {
         let mut files = self.files.lock().unwrap();
-        let recorded = files.end(&mut self.world.sim).unwrap();
-        assert!(files.end(&mut self.world.sim).unwrap().is_empty(), "a recording is returned once");
+        let recorded = files.finish(&mut self.world.sim).unwrap();
+        assert!(files.finish(&mut self.world.sim).unwrap().is_empty(), "a recording is returned once");
         recorded
     }
 
     /// Checks that every row of a file is the state of the simulation at its time, and that no row is missing.
-    fn check(&self, path: &Path, recorded: &Recorded) {
+    fn check(&self, path: &Path, recorded: &RecordingSummary) {
         let recording = Recording::open(path).unwrap();
         let topic = recording.topic("/env_0/arm/joint_states", None).unwrap();
         assert_eq!((recorded.path.as_path(), topic.count), (path, recorded.packets));
         assert!(topic.count > 5, "{topic:?}");
         let robot = self.world.sim.robot(self.world.arm);
-        let wanted = robot.joint_names().iter().map(|joint| Wanted::new(&topic.name, format!("position[{joint}]")));
-        for (joint, samples) in recording.samples(&wanted.collect::<Vec<_>>()).unwrap().iter().enumerate() {
+        let wanted =
+            robot.joint_names().iter().map(|joint| FieldSelector::new(&topic.name, format!("position[{joint}]")));
+        for (joint, samples) in recording.time_series(&wanted.collect::<Vec<_>>()).unwrap().iter().enumerate() {
             let times: Vec<u64> = samples.times.iter().map(|time| nanos(*time)).collect();
             // Steps of 10 ms.
             assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 10_000_000), "{times:?}");
@@ -101,18 +102,21 @@ impl Watched {
 fn button() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut watched = Watched::new(&path);
+    let mut watched = WorldWithViewer::new(&path);
     watched.step();
-    assert_eq!(watched.seen(), (false, String::new()));
+    assert_eq!(watched.recording_state(), (false, String::new()));
     for name in ["run.mcap", "run-2.mcap"] {
         watched.press(true);
         assert!(!folder.path().join(name).exists(), "a file has its name when it is whole");
         watched.step_until("rows are counted", |own| {
-            let text = own.seen().1;
+            let text = own.recording_state().1;
             text.strip_prefix(&format!("{name}: ")).and_then(|t| t.strip_suffix(" rows")).is_some_and(|n| n.len() > 1)
         });
         watched.press(false);
-        assert!(watched.seen().1.starts_with(&format!("{name}: ")) && watched.seen().1.ends_with(" MB"));
+        assert!(
+            watched.recording_state().1.starts_with(&format!("{name}: "))
+                && watched.recording_state().1.ends_with(" MB")
+        );
     }
     let recorded = watched.end();
     assert_eq!(recorded.len(), 2);
@@ -122,16 +126,16 @@ fn button() {
 }
 
 #[test]
-fn viewer_that_leaves() {
+fn disconnecting_viewer() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut watched = Watched::new(&path);
+    let mut watched = WorldWithViewer::new(&path);
     watched.press(true);
     (0..20).for_each(|_| watched.step());
     // Another viewer stays and receives the end of the recording.
-    let gone = std::mem::replace(&mut watched.viewer, watched.world.sim.viewer(Wants::default()));
+    let gone = std::mem::replace(&mut watched.viewer, watched.world.sim.viewer(SnapshotRequest::default()));
     drop(gone);
-    watched.step_until("it ends", |own| !own.seen().0);
+    watched.step_until("it ends", |own| !own.recording_state().0);
     let recorded = watched.end();
     watched.check(&path, &recorded[0]);
 }
@@ -143,23 +147,23 @@ fn taken_names() {
     let path = folder.path().join("run.mcap");
     std::fs::write(&path, "precious").unwrap();
     std::fs::write(folder.path().join("run-2.mcap.part"), "left by a killed process").unwrap();
-    let mut watched = Watched::new(&path);
-    let error = watched.files().begin(&mut RecordedWorld::new(1, 1).sim).unwrap_err();
+    let mut watched = WorldWithViewer::new(&path);
+    let error = watched.files().start(&mut RecordedWorld::new(1, 1).sim).unwrap_err();
     assert!(matches!(error, RecordError::Exists { .. }), "{error}");
     watched.press(true);
-    assert!(watched.seen().1.starts_with("run-3.mcap: "), "{:?}", watched.seen());
+    assert!(watched.recording_state().1.starts_with("run-3.mcap: "), "{:?}", watched.recording_state());
     watched.press(false);
     assert!(folder.path().join("run-3.mcap").is_file());
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
     // A missing folder is reported to the viewer.
-    let mut watched = Watched::new(&folder.path().join("missing/run.mcap"));
+    let mut watched = WorldWithViewer::new(&folder.path().join("missing/run.mcap"));
     watched.viewer.send(Command::Record(true));
     watched.step_until("it is refused", |own| own.refused().is_some());
-    assert!(watched.refused().unwrap().contains("missing") && !watched.seen().0);
+    assert!(watched.refused().unwrap().contains("missing") && !watched.recording_state().0);
 }
 
 /// Regression: the error of a recording that was ended by the button was reported to the viewer only. The program's
-/// `end` did not return the error.
+/// `finish` did not return the error.
 #[test]
 fn broken_recording() {
     let folder = tempfile::tempdir().unwrap();
@@ -171,13 +175,13 @@ fn broken_recording() {
     // fit.
     world.sim.add_robot(sr5("other")).unwrap();
     world.step(1);
-    let said = files.set(&mut world.sim, false).unwrap_err();
+    let reported = files.set(&mut world.sim, false).unwrap_err();
     // A second recording, which succeeds.
     files.set(&mut world.sim, true).unwrap();
     world.step(2);
-    let error = files.end(&mut world.sim).unwrap_err();
-    assert!(matches!(error, RecordError::BrokenOff { .. }) && error.to_string() == said, "{error}");
-    let whole = files.end(&mut world.sim).unwrap();
+    let error = files.finish(&mut world.sim).unwrap_err();
+    assert!(matches!(error, RecordError::Aborted { .. }) && error.to_string() == reported, "{error}");
+    let whole = files.finish(&mut world.sim).unwrap();
     assert_eq!(whole.len(), 1, "{whole:?}");
     assert!(whole[0].path.is_file());
 }

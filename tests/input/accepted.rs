@@ -82,7 +82,7 @@ fn strange_robots() {
             let what = format!("{what}, fix_base {fix_base}");
             let init_pose = Pose::translation(0.0, 0.0, 1.0);
             let robot = RobotCfg { fix_base, init_pose, ..robot(dir.path(), "r", &urdf) };
-            match catch_unwind(AssertUnwindSafe(|| use_it(robot, &what))) {
+            match catch_unwind(AssertUnwindSafe(|| exercise(robot, &what))) {
                 Ok(Ok(())) => {}
                 Ok(Err(message)) => wrong.push(format!("{what}: {message}")),
                 Err(panic) => wrong.push(format!("{what}: panicked: {:?}", panic.downcast_ref::<String>())),
@@ -92,7 +92,7 @@ fn strange_robots() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-fn use_it(robot: RobotCfg, what: &str) -> Result<(), String> {
+fn exercise(robot: RobotCfg, what: &str) -> Result<(), String> {
     let text = |error: Error| error.to_string();
     let is = |words: &[&str]| words.iter().any(|word| what.contains(word));
     let mut sim = sim(2);

@@ -3,7 +3,7 @@
 use super::support::{ball, cfg, hinge, robot};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{DriveModel, GroundCfg, Integrator, LightCfg};
-use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::refusal::assert_errors;
 
 type Change = fn(&mut SimulationManagerCfg);
 
@@ -48,7 +48,7 @@ fn out_of_range() {
         change(&mut cfg);
         SimulationManager::new(cfg)
     };
-    assert_refused(REFUSED.iter().map(|(change, parts)| (parts[0], made(change), "", parts)));
+    assert_errors(REFUSED.iter().map(|(change, parts)| (parts[0], made(change), "", parts)));
 }
 
 /// Extreme but valid numbers: the simulation works, and diverged environments are reported.
@@ -70,7 +70,7 @@ const ACCEPTED: &[Change] = &[
     |c| c.lights = vec![LightCfg::default(); 200],
     |c| c.lights[0].direction.fill(1e-100),
     |c| c.arena_space = 1e300,
-    |c| c.cone = kinetoscope::sim::Cone::Elliptic,
+    |c| c.cone = kinetoscope::sim::FrictionCone::Elliptic,
     |c| *c = SimulationManagerCfg { threads: Some(1), ..SimulationManagerCfg::manipulation() },
     |c| *c = SimulationManagerCfg { threads: Some(1), ..SimulationManagerCfg::legged() },
 ];
@@ -102,7 +102,7 @@ fn integrators() {
         sim.add_robot(RobotCfg { drive, ..robot.clone() }).unwrap();
         sim.update(3);
     }
-    if kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2 {
+    if kinetoscope::mujoco::BUILD_VERSION == kinetoscope::mujoco::SupportedVersion::V2 {
         let cfg = SimulationManagerCfg { integrator: Integrator::ImplicitFast, ..cfg(1) };
         let message = SimulationManager::new(cfg).unwrap_err().to_string();
         assert!(message.contains("implicitfast") && message.contains("2.2.2"), "{message}");

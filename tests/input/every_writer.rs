@@ -5,7 +5,7 @@
 use super::support::{LIMIT, bits, chain, robot};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{Error, MjcfId, ObjectId, Result, RobotMut, WrenchFrame};
+use kinetoscope::sim::{Error, MjcfId, Result, RigidObjectId, RobotMut, WrenchFrame};
 
 const ENVS: usize = 3;
 const POSE: &[f64] = &[0.1, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8];
@@ -15,7 +15,7 @@ const STATE: &[f64] = &[0.3, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8, 0.25, 0.5, 0.5, 0.5, 
 #[derive(Clone, Copy)]
 struct Ids {
     robot: RobotId,
-    object: ObjectId,
+    object: RigidObjectId,
     part: MjcfId,
 }
 
@@ -33,31 +33,31 @@ fn world() -> (SimulationManager, Ids) {
     let ids = Ids {
         robot: sim.add_robot(base).unwrap(),
         object: sim.add_rigid_object(cube).unwrap(),
-        part: sim.add_mjcf(MjcfCfg::text("m", PART)).unwrap(),
+        part: sim.add_mjcf(MjcfPartCfg::text("m", PART)).unwrap(),
     };
     (sim, ids)
 }
 
 /// All state that these writers can change, as text.
-fn told(sim: &SimulationManager, ids: Ids) -> String {
+fn written_state(sim: &SimulationManager, ids: Ids) -> String {
     let view = sim.robot(ids.robot);
     let drives = [view.stiffness(), view.damping(), view.qf_limits(), view.qvel_limits()];
     let joints = [view.friction(), view.joint_damping(), view.armature()];
     let targets = [view.qpos_target(), view.qvel_target(), view.qf_target()];
-    let mut told = format!("{:?} {drives:?} {joints:?} {targets:?}", bits(sim));
+    let mut text = format!("{:?} {drives:?} {joints:?} {targets:?}", bits(sim));
     for env in 0..ENVS {
         let properties = sim.properties().of(EnvId(env)).unwrap();
         for property in
             [Property::Mass, Property::Inertia, Property::CenterOfMass, Property::Friction, Property::LinearDamping]
         {
-            told += &format!("{:?}", properties.get(property, "o").unwrap());
+            text += &format!("{:?}", properties.get(property, "o").unwrap());
         }
         sim.batch().read(env, |env| {
             let data = env.data();
-            told += &format!("{:?} {:?} {:?}", data.ctrl(), data.xfrc_applied(), [data.mocap_pos(), data.mocap_quat()]);
+            text += &format!("{:?} {:?} {:?}", data.ctrl(), data.xfrc_applied(), [data.mocap_pos(), data.mocap_quat()]);
         });
     }
-    told
+    text
 }
 
 type Values<'a> = &'a Array2<f64>;
@@ -65,9 +65,9 @@ type Envs<'a> = Option<&'a [EnvId]>;
 type Joints<'a> = Option<&'a [JointIndex]>;
 
 /// A writer of joint values: its name, true if infinity is valid, and its call.
-type OfJoints = (&'static str, bool, fn(&mut RobotMut<'_>, Values<'_>, Joints<'_>, Envs<'_>) -> Result<()>);
+type JointWriter = (&'static str, bool, fn(&mut RobotMut<'_>, Values<'_>, Joints<'_>, Envs<'_>) -> Result<()>);
 
-const OF_JOINTS: &[OfJoints] = &[
+const JOINT_WRITERS: &[JointWriter] = &[
     ("set_qpos_target", false, |r, v, j, e| r.set_qpos_target(v, j, e)),
     ("set_qvel_target", false, |r, v, j, e| r.set_qvel_target(v, j, e)),
     ("set_qf_target", false, |r, v, j, e| r.set_qf_target(v, j, e)),
@@ -85,9 +85,9 @@ const OF_JOINTS: &[OfJoints] = &[
 ];
 
 /// A writer of rows: its name, a valid row, and its call.
-type OfRows = (&'static str, &'static [f64], fn(&mut SimulationManager, Ids, Values<'_>, Envs<'_>) -> Result<()>);
+type RowWriter = (&'static str, &'static [f64], fn(&mut SimulationManager, Ids, Values<'_>, Envs<'_>) -> Result<()>);
 
-const OF_ROWS: &[OfRows] = &[
+const ROW_WRITERS: &[RowWriter] = &[
     ("write_root_pose", POSE, |s, i, v, e| s.robot_mut(i.robot).write_root_pose(v, e)),
     ("write_root_velocity", HALF, |s, i, v, e| s.robot_mut(i.robot).write_root_velocity(v, e)),
     ("write_root_state", STATE, |s, i, v, e| s.robot_mut(i.robot).write_root_state(v, e)),
@@ -123,7 +123,7 @@ fn assert_refused(result: Result<()>, name: &str, kind: Kind) {
     let right = match (&error, kind) {
         (Error::Shape { argument, .. }, Kind::Shape)
         | (Error::NotFinite { argument, .. } | Error::OutOfRange { argument, .. }, Kind::Number)
-        | (Error::Repeated { argument, .. }, Kind::Twice) => argument.starts_with(name),
+        | (Error::RepeatedItem { argument, .. }, Kind::Twice) => argument.starts_with(name),
         (Error::UnknownIndex { what, index, .. }, Kind::Unknown(of, which)) => *what == of && *index == which,
         _ => false,
     };
@@ -167,15 +167,15 @@ fn mistakes(good: &[f64], infinity_is_fine: bool) -> Vec<(Array2<f64>, Option<Ve
 }
 
 #[test]
-fn of_joints() {
+fn joint_writers() {
     let (mut sim, ids) = world();
     sim.update(3);
-    for (name, infinity_is_fine, call) in OF_JOINTS {
-        let before = told(&sim, ids);
+    for (name, infinity_is_fine, call) in JOINT_WRITERS {
+        let before = written_state(&sim, ids);
         let good: &[f64] = &HALF[..3];
         for (values, envs, kind) in mistakes(good, *infinity_is_fine) {
             assert_refused(call(&mut sim.robot_mut(ids.robot), &values, None, envs.as_deref()), name, kind);
-            assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
+            assert_eq!(written_state(&sim, ids), before, "{name}: {kind:?}");
         }
         let twice = [JointIndex(2), JointIndex(0), JointIndex(2)];
         let beyond = [JointIndex(0), JointIndex(3), JointIndex(1)];
@@ -190,39 +190,39 @@ fn of_joints() {
         for (joints, columns, kind) in joints {
             let values = table(&HALF[..columns], ENVS);
             assert_refused(call(&mut sim.robot_mut(ids.robot), &values, Some(joints), None), name, kind);
-            assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
+            assert_eq!(written_state(&sim, ids), before, "{name}: {kind:?}");
         }
         // Empty lists of environments or joints are valid.
         let mut robot = sim.robot_mut(ids.robot);
         call(&mut robot, &table(good, 0), None, Some(&[])).unwrap();
         call(&mut robot, &Array2::zeros((ENVS, 0)), Some(&[]), None).unwrap();
-        assert_eq!(told(&sim, ids), before, "{name}: nothing is asked for");
+        assert_eq!(written_state(&sim, ids), before, "{name}: nothing is asked for");
         call(&mut sim.robot_mut(ids.robot), &table(&good[..1], 1), Some(&[JointIndex(1)]), Some(&[EnvId(2)])).unwrap();
-        assert_ne!(told(&sim, ids), before, "{name}: the control");
+        assert_ne!(written_state(&sim, ids), before, "{name}: the control");
     }
 }
 
 #[test]
-fn of_rows() {
+fn row_writers() {
     let (mut sim, ids) = world();
     sim.update(3);
-    for (name, good, call) in OF_ROWS {
-        let before = told(&sim, ids);
+    for (name, good, call) in ROW_WRITERS {
+        let before = written_state(&sim, ids);
         for (values, envs, kind) in mistakes(good, false) {
             assert_refused(call(&mut sim, ids, &values, envs.as_deref()), name, kind);
-            assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
+            assert_eq!(written_state(&sim, ids), before, "{name}: {kind:?}");
         }
         call(&mut sim, ids, &table(good, 0), Some(&[])).unwrap();
-        assert_eq!(told(&sim, ids), before, "{name}: no environment");
+        assert_eq!(written_state(&sim, ids), before, "{name}: no environment");
         call(&mut sim, ids, &table(good, 1), Some(&[EnvId(2)])).unwrap();
-        assert_ne!(told(&sim, ids), before, "{name}: the control");
+        assert_ne!(written_state(&sim, ids), before, "{name}: the control");
     }
     // A quaternion of length zero is not a rotation.
-    let nowhere = table(&[0.0; 7], 1);
-    for (name, _, call) in OF_ROWS.iter().filter(|(name, ..)| name.ends_with("pose")) {
-        let before = told(&sim, ids);
-        let error = call(&mut sim, ids, &nowhere, None).unwrap_err().to_string();
+    let zero_pose = table(&[0.0; 7], 1);
+    for (name, _, call) in ROW_WRITERS.iter().filter(|(name, ..)| name.ends_with("pose")) {
+        let before = written_state(&sim, ids);
+        let error = call(&mut sim, ids, &zero_pose, None).unwrap_err().to_string();
         assert!(error.contains(name) && error.contains("quaternion"), "{error}");
-        assert_eq!(told(&sim, ids), before);
+        assert_eq!(written_state(&sim, ids), before);
     }
 }

@@ -7,7 +7,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, inspect};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use kinetoscope_testkit::urdf;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::fs;
@@ -38,11 +38,11 @@ fn report(args: &[&str]) -> (u8, Value) {
     (run.code, serde_json::from_str(&run.out).unwrap())
 }
 
-struct Folder(Files);
+struct Folder(TempFiles);
 
 impl Folder {
     fn new() -> Self {
-        Self(Files::default())
+        Self(TempFiles::default())
     }
 
     fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {

@@ -1,24 +1,24 @@
 //! An error of MuJoCo's compiler names the place in the user's file that produced the line of the MJCF.
 
 use super::support::{INERTIAL, TETRAHEDRON, hinge_with, robot, sim};
-use kinetoscope::mujoco::{LoadError, TARGET, compile};
+use kinetoscope::mujoco::{BUILD_VERSION, LoadError, compile};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::source::Source;
+use kinetoscope::scene::source::SourceLocation;
 use kinetoscope::sim::Integrator;
 use kinetoscope::sim::mjcf::document::{
-    Body, Cone, Geom, GeomRole, Inertial, Joint, JointType, Mjcf, PhysicsOption, Shape,
+    Body, FrictionCone, Geom, GeomRole, Inertial, Joint, JointType, Mjcf, PhysicsOption, Shape,
 };
 use kinetoscope::sim::mjcf::write::write;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// A body with a hinge and a sphere; each element has its own source line.
 fn document() -> Mjcf {
-    let at = |line| Some(Source::new("robot.urdf", line));
+    let at = |line| Some(SourceLocation::new("robot.urdf", line));
     let option = PhysicsOption {
         timestep: 0.01,
         gravity: Vector3::zeros(),
         integrator: Integrator::Euler,
-        cone: Cone::Pyramidal,
+        cone: FrictionCone::Pyramidal,
         impratio: 1.0,
         iterations: 10,
         friction: [1.0, 0.0, 0.0],
@@ -81,11 +81,11 @@ const ROWS: &[Row] = &[
 
 #[test]
 fn elements() {
-    assert!(compile(&write(&document(), TARGET).xml, &[]).is_ok());
+    assert!(compile(&write(&document(), BUILD_VERSION).xml, &[]).is_ok());
     for (what, change, line) in ROWS {
         let mut mjcf = document();
         change(&mut mjcf.bodies[1]);
-        let text = write(&mjcf, TARGET);
+        let text = write(&mjcf, BUILD_VERSION);
         let Err(LoadError::Compile(error)) = compile(&text.xml, &[]) else { panic!("{what}: accepted") };
         let message = text.locate(error).to_string();
         let expected = format!("robot.urdf:{line}: MuJoCo refuses the model: ");

@@ -1,6 +1,6 @@
 //! Robots of the input tests.
 
-use kinetoscope::mujoco::{Model, TARGET, Target, compile_file};
+use kinetoscope::mujoco::{BUILD_VERSION, Model, SupportedVersion, compile_file};
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::urdf;
 pub(crate) use kinetoscope_testkit::worlds::all_bits as bits;
@@ -62,9 +62,9 @@ pub(crate) fn chain(links: usize, kind: &str, more: &str) -> String {
 
 /// The exported model of a dump, compiled by plain MuJoCo.
 pub(crate) fn exported(dir: &Path) -> Result<Model, String> {
-    let file = match TARGET {
-        Target::V2 => "robot.mjcf2.xml",
-        Target::V4 => "robot.mjcf4.xml",
+    let file = match BUILD_VERSION {
+        SupportedVersion::V2 => "robot.mjcf2.xml",
+        SupportedVersion::V4 => "robot.mjcf4.xml",
     };
     compile_file(&dir.join(file)).map(|compiled| compiled.into_model()).map_err(|e| format!("the export: {e}"))
 }

@@ -4,7 +4,7 @@
 //! push, `x'' = -b x' - k x`, with `k = ω²`, ω = π/(10 h) and `b = 2 ζ ω`. The integrator is semi-implicit Euler:
 //! acceleration before the step, then velocity, then position. Ten steps are few, so the result depends on the fraction
 //! of a step at which the surfaces meet. [`apex`] gives the height after a fall by the recursion of these steps;
-//! [`off`] and [`apex_off`] give the largest errors over all such fractions.
+//! [`restitution_error`] and [`apex_error`] give the largest errors over all such fractions.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 const STEPS: f64 = 10.0;
 
 /// Number of tested fractions of a step at which the surfaces meet.
-const PLACES: usize = 200;
+const PHASES: usize = 200;
 
 /// MuJoCo's constraint error: its largest impedance d is 0.9999, which loses 1e-4 of the velocity before and after. The
 /// rows of a pyramidal cone with a friction of 1 yield the same again.
@@ -47,9 +47,9 @@ fn steps(e: f64, g: f64, mut x: f64, mut v: f64, done: impl Fn(f64, f64) -> bool
 }
 
 /// Largest error of the restitution `e` in a bounce without gravity.
-pub(crate) fn off(e: f64) -> f64 {
-    let worst = (0..PLACES).map(|place| {
-        let sunk = (place as f64 + 0.5) / PLACES as f64;
+pub(crate) fn restitution_error(e: f64) -> f64 {
+    let worst = (0..PHASES).map(|place| {
+        let sunk = (place as f64 + 0.5) / PHASES as f64;
         let [_, v] = steps(e, 0.0, -sunk, -1.0, |x, v| x >= 0.0 && v > 0.0);
         (v - e).abs()
     });
@@ -67,28 +67,28 @@ pub(crate) fn apex(e: f64, height: f64, h: f64, g: f64) -> f64 {
 }
 
 /// The error of [`apex`] due to MuJoCo's contact impedance \[m\].
-pub(crate) fn apex_rest(e: f64, height: f64) -> f64 {
+pub(crate) fn apex_impedance_error(e: f64, height: f64) -> f64 {
     2.0 * e * e * IMPEDANCE * height
 }
 
 /// Largest error of the height \[m\] after a fall against e² `height`, over all fractions of a step.
-pub(crate) fn apex_off(e: f64, height: f64, h: f64, g: f64) -> f64 {
+pub(crate) fn apex_error(e: f64, height: f64, h: f64, g: f64) -> f64 {
     let way = (2.0 * g * height).sqrt() * h;
-    let worst = (0..PLACES).map(|place| {
-        let height = height + way * place as f64 / PLACES as f64;
+    let worst = (0..PHASES).map(|place| {
+        let height = height + way * place as f64 / PHASES as f64;
         (apex(e, height, h, g) - e * e * height).abs()
     });
-    worst.fold(0.0, f64::max) + apex_rest(e, height)
+    worst.fold(0.0, f64::max) + apex_impedance_error(e, height)
 }
 
 #[test]
 fn restitution() {
     // Undamped steps conserve v² + ω² x² - ω² h x v. The surfaces enter at a fraction p of a step and leave at q, which
     // changes v² by at most 1/4 ω² h² = 2.5 %, that is 1.2 % of v.
-    assert!(off(1.0) < 0.0124 + IMPEDANCE);
+    assert!(restitution_error(1.0) < 0.0124 + IMPEDANCE);
     // The values in the documentation of the restitution.
     for (e, promised) in [(1.0, 0.003), (0.8, 0.03), (0.5, 0.06), (0.3, 0.08), (0.14, 0.08)] {
-        let found = off(e);
+        let found = restitution_error(e);
         assert!((0.5 * promised..promised).contains(&found), "{e}: {found}");
     }
 }

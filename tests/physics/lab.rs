@@ -1,13 +1,13 @@
 //! Test bench of the laws: a simulation with robots from URDF text and rigid objects, and their states as vectors. A
 //! law needs no other module.
 
-pub(crate) use crate::law::{law, worse};
-pub(crate) use crate::urdf::{Joint, Link, POINT, base, urdf};
+pub(crate) use crate::law::{law, max_or_nan};
+pub(crate) use crate::urdf::{Joint, Link, POINT_MOMENT, base, urdf};
 use kinetoscope::ndarray::{Array2, Array3};
 pub(crate) use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
-use kinetoscope::sim::{self, Cone, DriveModel, Integrator, ObjectId, WrenchFrame};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope::sim::{self, DriveModel, FrictionCone, Integrator, RigidObjectId, WrenchFrame};
+use kinetoscope_testkit::urdf::TempFiles;
 /// The default drive, evaluated at the end of the step, and the passive drive, with which joints move freely.
 pub(crate) use kinetoscope_testkit::worlds::{gains as implicit, no_drive as passive};
 use nalgebra::UnitQuaternion;
@@ -41,7 +41,7 @@ pub(crate) fn slope(angle: f64, friction: f64) -> SimulationManagerCfg {
     SimulationManagerCfg {
         gravity: G * Vector3::new(angle.sin(), 0.0, -angle.cos()),
         ground: Some(GroundCfg::default()),
-        cone: Cone::Elliptic,
+        cone: FrictionCone::Elliptic,
         impratio: IMPRATIO,
         friction: [friction, 0.0, 0.0],
         ..earth()
@@ -66,12 +66,12 @@ pub(crate) fn explicit(stiffness: f64, damping: f64) -> DriveCfg {
 #[derive(Debug)]
 pub(crate) struct Lab {
     pub(crate) sim: SimulationManager,
-    files: Files,
+    files: TempFiles,
 }
 
 impl Lab {
     pub(crate) fn new(cfg: SimulationManagerCfg) -> Self {
-        Self { sim: SimulationManager::new(cfg).unwrap(), files: Files::default() }
+        Self { sim: SimulationManager::new(cfg).unwrap(), files: TempFiles::default() }
     }
 
     /// Writes a file into the folder of this lab.
@@ -96,7 +96,7 @@ impl Lab {
         self.robot(text, RobotCfg { drive: passive(), fix_base: false, init_pose, ..RobotCfg::default() })
     }
 
-    pub(crate) fn object(&mut self, cfg: RigidObjectCfg) -> ObjectId {
+    pub(crate) fn object(&mut self, cfg: RigidObjectCfg) -> RigidObjectId {
         self.sim.add_rigid_object(cfg).unwrap()
     }
 
@@ -110,23 +110,23 @@ impl Lab {
         let steps = seconds / self.dt();
         assert!((steps - steps.round()).abs() < 1e-6, "{seconds} s are no whole number of steps");
         self.sim.update(steps.round() as u32);
-        assert_well(&self.sim);
+        assert_healthy(&self.sim);
     }
 
-    /// Takes `steps` steps and calls `look` after each with the time \[s\] since the call.
-    pub(crate) fn watch(&mut self, steps: u32, mut look: impl FnMut(f64, &SimulationManager)) {
+    /// Takes `steps` steps and calls `on_step` after each with the time \[s\] since the call.
+    pub(crate) fn run_with(&mut self, steps: u32, mut on_step: impl FnMut(f64, &SimulationManager)) {
         for step in 1..=steps {
             self.sim.update(1);
-            look(f64::from(step) * self.dt(), &self.sim);
+            on_step(f64::from(step) * self.dt(), &self.sim);
         }
-        assert_well(&self.sim);
+        assert_healthy(&self.sim);
     }
 
     /// Period \[s\] of the only joint of a robot, from its zero crossings: five crossings, two per period, within
     /// `steps` steps. Crossings are linearly interpolated between steps.
     pub(crate) fn period(&mut self, robot: RobotId, steps: u32) -> f64 {
         let (mut before, mut times) = ([0.0, self.q(robot)[0]], Vec::new());
-        self.watch(steps, |t, sim| {
+        self.run_with(steps, |t, sim| {
             let q = sim.robot(robot).qpos()[(0, 0)];
             if q * before[1] < 0.0 {
                 times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
@@ -149,26 +149,26 @@ impl Lab {
         self.sim.robot_mut(robot).write_root_velocity(&row(&v), None).unwrap();
     }
 
-    pub(crate) fn write_velocity(&mut self, object: ObjectId, linear: [f64; 3], angular: [f64; 3]) {
+    pub(crate) fn write_velocity(&mut self, object: RigidObjectId, linear: [f64; 3], angular: [f64; 3]) {
         let v = [linear, angular].concat();
         self.sim.rigid_object_mut(object).write_velocity(&row(&v), None).unwrap();
     }
 
     /// Sets the efforts of all joints from the next step on.
-    pub(crate) fn push_joints(&mut self, robot: RobotId, efforts: &[f64]) {
+    pub(crate) fn set_joint_efforts(&mut self, robot: RobotId, efforts: &[f64]) {
         self.sim.robot_mut(robot).set_qf_target(&row(efforts), None, None).unwrap();
     }
 
     /// Sets a force at the center of mass of a link and a torque, in world axes, from the next step on.
-    pub(crate) fn push_link(&mut self, robot: RobotId, link: &str, force: Vector3<f64>, torque: Vector3<f64>) {
+    pub(crate) fn set_link_wrench(&mut self, robot: RobotId, link: &str, force: Vector3<f64>, torque: Vector3<f64>) {
         let link = self.sim.robot(robot).link_id(link).unwrap();
         let [force, torque] = [force, torque].map(|v| Array3::from_shape_fn((1, 1, 3), |(_, _, k)| v[k]));
         let mut robot = self.sim.robot_mut(robot);
         robot.set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[link]), None).unwrap();
     }
 
-    /// As [`push_link`](Self::push_link), for an object.
-    pub(crate) fn push(&mut self, object: ObjectId, force: Vector3<f64>, torque: Vector3<f64>) {
+    /// As [`set_link_wrench`](Self::set_link_wrench), for an object.
+    pub(crate) fn set_object_wrench(&mut self, object: RigidObjectId, force: Vector3<f64>, torque: Vector3<f64>) {
         let (force, torque) = (row(force.as_slice()), row(torque.as_slice()));
         self.sim.rigid_object_mut(object).set_external_wrench(&force, &torque, WrenchFrame::World, None).unwrap();
     }
@@ -190,14 +190,14 @@ impl Lab {
         root(&self.sim, robot)
     }
 
-    pub(crate) fn body(&self, object: ObjectId) -> Body {
+    pub(crate) fn body(&self, object: RigidObjectId) -> Body {
         body(&self.sim, object)
     }
 }
 
 /// Asserts that no environment diverged, and that MuJoCo gave no warning.
 #[track_caller]
-pub(crate) fn assert_well(sim: &SimulationManager) {
+pub(crate) fn assert_healthy(sim: &SimulationManager) {
     assert!(sim.diverged().is_empty(), "{:?}", sim.diverged());
     let counts = sim.warnings().counts();
     assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
@@ -209,14 +209,14 @@ pub(crate) struct Body {
     pub(crate) position: Vector3<f64>,
     pub(crate) rotation: UnitQuaternion<f64>,
     pub(crate) velocity: Vector3<f64>,
-    pub(crate) spin: Vector3<f64>,
+    pub(crate) angular_velocity: Vector3<f64>,
 }
 
 impl Body {
     fn new(pose: &Array2<f64>, velocity: &Array2<f64>) -> Self {
         let pose = from_row(&std::array::from_fn(|k| pose[(0, k)]));
         let at = |k: usize| Vector3::new(velocity[(0, k)], velocity[(0, k + 1)], velocity[(0, k + 2)]);
-        Self { position: pose.translation.vector, rotation: pose.rotation, velocity: at(0), spin: at(3) }
+        Self { position: pose.translation.vector, rotation: pose.rotation, velocity: at(0), angular_velocity: at(3) }
     }
 }
 
@@ -227,7 +227,7 @@ pub(crate) fn root(sim: &SimulationManager, robot: RobotId) -> Body {
 }
 
 /// A rigid object.
-pub(crate) fn body(sim: &SimulationManager, object: ObjectId) -> Body {
+pub(crate) fn body(sim: &SimulationManager, object: RigidObjectId) -> Body {
     let object = sim.rigid_object(object);
     Body::new(&object.pose(), &object.velocity())
 }

@@ -4,7 +4,7 @@ use crate::rows;
 use serde::Serialize;
 
 /// The larger of two numbers, or NaN if either is NaN; `f64::max` would drop the NaN.
-pub(crate) fn worse(a: f64, b: f64) -> f64 {
+pub(crate) fn max_or_nan(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct Plot {
 
 /// Measurements of a law.
 #[derive(Clone, Debug, Default, Serialize)]
-pub(crate) struct Measured {
+pub(crate) struct Measurements {
     rows: Vec<Row>,
     controls: Vec<Control>,
     plots: Vec<Plot>,
@@ -66,7 +66,7 @@ pub(crate) struct Measured {
     lines_differ: Option<String>,
 }
 
-impl Measured {
+impl Measurements {
     /// Adds a row: `measured` must equal `expected` within `tolerance`, all in `unit`; `why` is the source of the
     /// tolerance.
     pub(crate) fn row(
@@ -97,12 +97,12 @@ impl Measured {
 
     /// Gives the reason why 2.2.2 and 4.x differ by more than a tenth of a tolerance. Without a reason, the law
     /// guarantees that they do not.
-    pub(crate) fn lines_differ(&mut self, why: &str) {
+    pub(crate) fn versions_differ(&mut self, why: &str) {
         self.lines_differ = Some(why.into());
     }
 
-    /// As [`lines_differ`](Self::lines_differ), for one row only.
-    pub(crate) fn lines_differ_in(&mut self, quantity: &str, why: &str) {
+    /// As [`versions_differ`](Self::versions_differ), for one row only.
+    pub(crate) fn versions_differ_in(&mut self, quantity: &str, why: &str) {
         let row = self.rows.iter_mut().find(|row| row.quantity == quantity).expect("a row that exists");
         row.lines_differ = Some(why.into());
     }
@@ -143,10 +143,10 @@ impl Measured {
 ///
 /// `path` is `module_path!()`, the source of the law's name; `statement` is the law as a formula.
 #[track_caller]
-pub(crate) fn law(path: &str, statement: &str, measure: impl FnOnce(&mut Measured)) {
+pub(crate) fn law(path: &str, statement: &str, measure: impl FnOnce(&mut Measurements)) {
     let mut words = path.rsplit("::");
     let (name, group) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
-    let mut measured = Measured::default();
+    let mut measured = Measurements::default();
     measure(&mut measured);
     rows::write(group, name, statement, &measured);
     let failures = measured.failures();
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     fn of(expected: f64, measured: f64, tolerance: f64, control: f64) -> Vec<String> {
-        let mut m = Measured::default();
+        let mut m = Measurements::default();
         m.row("x", "m", expected, measured, (tolerance, "by hand"));
         m.control("x", "without it", control);
         m.failures()
@@ -166,8 +166,8 @@ mod tests {
 
     #[test]
     fn worse_of_nan() {
-        assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, worse), 3.0);
-        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, worse).is_nan());
+        assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, max_or_nan), 3.0);
+        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, max_or_nan).is_nan());
     }
 
     #[test]
@@ -181,8 +181,8 @@ mod tests {
 
     #[test]
     fn missing_rows_and_controls() {
-        assert_eq!(Measured::default().failures(), ["a law needs rows"]);
-        let mut m = Measured::default();
+        assert_eq!(Measurements::default().failures(), ["a law needs rows"]);
+        let mut m = Measurements::default();
         m.row("x", "", 1.0, 1.0, (0.0, "the same number"));
         assert_eq!(m.failures(), ["x has no control, which would show that it can fail"]);
         m.control("x", "without it", 2.0);

@@ -1,6 +1,6 @@
 //! Results of the laws as files for the physics page.
 
-use crate::law::Measured;
+use crate::law::Measurements;
 use kinetoscope::mujoco as mj;
 use serde_json::json;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 const VARIABLE: &str = "KINETOSCOPE_PHYSICS_ROWS";
 
 /// Writes `group.name.json` into the folder of the environment variable, if set.
-pub(crate) fn write(group: &str, name: &str, statement: &str, measured: &Measured) {
+pub(crate) fn write(group: &str, name: &str, statement: &str, measured: &Measurements) {
     let Some(folder) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return };
     std::fs::create_dir_all(&folder).unwrap();
     let law = json!({

@@ -51,7 +51,7 @@ impl Link {
 
     /// A point mass at `com`, with negligible moments.
     pub(crate) fn point(name: &str, mass: f64, com: [f64; 3]) -> Self {
-        Self { com, ..Self::new(name, mass, [POINT; 3]) }
+        Self { com, ..Self::new(name, mass, [POINT_MOMENT; 3]) }
     }
 
     pub(crate) fn at(self, com: [f64; 3]) -> Self {
@@ -59,14 +59,14 @@ impl Link {
     }
 
     /// The same link without a collision shape.
-    pub(crate) fn ghost(self) -> Self {
+    pub(crate) fn without_collision(self) -> Self {
         Self { shape: String::new(), ..self }
     }
 }
 
 /// The moment of a point mass \[kg m²\], because MuJoCo requires a positive one. Its effect is part of the laws that
 /// use it.
-pub(crate) const POINT: f64 = 1e-9;
+pub(crate) const POINT_MOMENT: f64 = 1e-9;
 
 /// A joint; by default at the parent's origin with the parent's axes.
 #[derive(Clone, Debug)]
@@ -81,14 +81,14 @@ pub(crate) struct Joint {
     /// Attributes of `<limit>`.
     pub(crate) limit: String,
     /// Further elements, such as `<dynamics damping="1"/>`.
-    pub(crate) more: String,
+    pub(crate) extra_elements: String,
 }
 
 impl Joint {
     fn new(kind: &'static str, name: &str, [parent, child]: [&str; 2], axis: [f64; 3]) -> Self {
         let [name, parent, child] = [name, parent, child].map(str::to_string);
         let (limit, more) = (String::new(), String::new());
-        Self { name, kind, parent, child, xyz: [0.0; 3], rpy: [0.0; 3], axis, limit, more }
+        Self { name, kind, parent, child, xyz: [0.0; 3], rpy: [0.0; 3], axis, limit, extra_elements: more }
     }
 
     /// A hinge without limits.
@@ -122,11 +122,17 @@ impl Joint {
 
     /// Viscous damping \[N m s/rad or N s/m\] and dry friction \[N m or N\].
     pub(crate) fn dynamics(self, damping: f64, friction: f64) -> Self {
-        Self { more: format!("{}<dynamics damping=\"{damping}\" friction=\"{friction}\"/>", self.more), ..self }
+        Self {
+            extra_elements: format!("{}<dynamics damping=\"{damping}\" friction=\"{friction}\"/>", self.extra_elements),
+            ..self
+        }
     }
 
     pub(crate) fn mimic(self, joint: &str, multiplier: f64) -> Self {
-        Self { more: format!("{}<mimic joint=\"{joint}\" multiplier=\"{multiplier}\"/>", self.more), ..self }
+        Self {
+            extra_elements: format!("{}<mimic joint=\"{joint}\" multiplier=\"{multiplier}\"/>", self.extra_elements),
+            ..self
+        }
     }
 }
 
@@ -184,7 +190,7 @@ pub(crate) fn urdf(links: &[Link], joints: &[Joint]) -> String {
         if !joint.limit.is_empty() {
             let _ = write!(out, "<limit {}/>", joint.limit);
         }
-        let _ = writeln!(out, "{}</joint>", joint.more);
+        let _ = writeln!(out, "{}</joint>", joint.extra_elements);
     }
     out + "</robot>\n"
 }

@@ -12,7 +12,7 @@ use kinetoscope_scene::Pose;
 use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement};
 use kinetoscope_sim::{DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg};
 use kinetoscope_viewer::window::{App, Input, Key, Modifiers};
-use kinetoscope_viewer::{Canvas, Eye, Shown, Viewing, Wants};
+use kinetoscope_viewer::{Canvas, EnvSelection, OrbitCamera, SnapshotRequest, ViewerExt};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -55,27 +55,27 @@ fn arms() -> SimulationManager {
 fn main() {
     let folder = PathBuf::from(std::env::args_os().nth(1).expect("a folder for the images"));
     let mut sim = arms();
-    let viewer = sim.viewer(Wants { contacts: Some(Shown::All), ..Wants::default() });
+    let viewer = sim.viewer(SnapshotRequest { contacts: Some(EnvSelection::All), ..SnapshotRequest::default() });
     let snapshot = viewer.newest().unwrap();
-    let near = Eye::looking([1.5, -1.0, 1.0], [0.2, 0.1, 0.4]).unwrap();
-    let draw_with = |name: &str, keys: &[Key], eye: Option<Eye>, click: Option<[f64; 2]>| {
+    let near = OrbitCamera::look_at([1.5, -1.0, 1.0], [0.2, 0.1, 0.4]).unwrap();
+    let draw_with = |name: &str, keys: &[Key], eye: Option<OrbitCamera>, click: Option<[f64; 2]>| {
         let mut app = App::new(SIZE, 2);
-        app.show(std::sync::Arc::clone(&snapshot));
+        app.set_snapshot(std::sync::Arc::clone(&snapshot));
         keys.iter().for_each(|key| app.handle(Input::Press(*key)));
         if let Some(eye) = eye {
             let origin = snapshot.envs[0].origin;
-            app.look_from(Eye { target: [0, 1, 2].map(|k| eye.target[k] + origin[k]), ..eye });
+            app.set_camera(OrbitCamera { target: [0, 1, 2].map(|k| eye.target[k] + origin[k]), ..eye });
         }
         if let Some(at) = click {
             app.handle(Input::ButtonPress(1, at, Modifiers::default()));
             app.handle(Input::ButtonRelease(1, at));
-            assert!(app.picked().is_some_and(|picked| picked.name.contains("arm")), "{:?}", app.picked());
+            assert!(app.selection().is_some_and(|picked| picked.name.contains("arm")), "{:?}", app.selection());
         }
         let mut canvas = Canvas::default();
         app.draw(&mut canvas, Instant::now());
         std::fs::write(folder.join(name), canvas.to_png().unwrap()).unwrap();
     };
-    let draw = |name: &str, keys: &[Key], eye: Option<Eye>| draw_with(name, keys, eye, None);
+    let draw = |name: &str, keys: &[Key], eye: Option<OrbitCamera>| draw_with(name, keys, eye, None);
     // Page down and page up select the first environment alone.
     let one = [Key::PageDown, Key::PageUp];
     let with = |more: &[Key]| [&one[..], more].concat();

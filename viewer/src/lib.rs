@@ -6,13 +6,13 @@
 //!                      Conductor <- Command   <==  Viewer
 //! ```
 //!
-//! The [`Conductor`] is an observer of the simulation. It copies the scene state into a [`Snapshot`] at the highest
+//! The [`ViewController`] is an observer of the simulation. It copies the scene state into a [`Snapshot`] at the highest
 //! rate that any viewer requests. It renders nothing and never waits for a viewer. Each viewer renders the newest
 //! snapshot on its own thread and sends commands back.
 //!
 //! | Module | Contents |
 //! |---|---|
-//! | `control` | [`Conductor`], [`Viewer`] handles, commands, recording playback |
+//! | `control` | [`ViewController`], [`Viewer`] handles, commands, recording playback |
 //! | `stage` | snapshots, camera model, rendering, overlays, picking |
 //! | [`window`] | native X11 windows |
 //! | `serve` | HTTP and WebSocket server of the browser view |
@@ -43,11 +43,13 @@ mod stage;
 pub mod window;
 
 pub use control::{
-    Command, Conductor, Film, Play, PlayError, RecordButton, Recording, RecordingState, Speed, Viewer, Viewing, Wants,
+    Command, Play, PlayError, PlaybackSource, RecordButton, RecordControl, RecordingState, SnapshotRequest, Speed,
+    ViewController, Viewer, ViewerExt,
 };
 pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
-pub use serve::{Serve, ServeCfg, ServeError, Served};
+pub use serve::{Serve, ServeCfg, ServeError, ServerHandle};
 pub use stage::{
-    CameraView, Canvas, EnvStage, Eye, JointName, Look, Names, Overlays, Painter, Run, Shown, Snapshot, Timeline,
+    CameraView, Canvas, EnvSelection, JointEntry, Names, OrbitCamera, Overlays, RunState, SceneRenderer, Snapshot,
+    SnapshotEnv, Timeline, ViewOptions,
 };
 pub use window::{Closed, ImageWindow, ImageWindowCfg, OpenWindow, Window, WindowCfg, WindowError};

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
 /// Half the edge length of the cube \[m\].
-pub(crate) const HALF: f64 = 0.1;
+pub(crate) const CUBE_HALF_EDGE: f64 = 0.1;
 /// Mass of the cube \[kg\].
 pub(crate) const MASS: f64 = 2.0;
 
@@ -55,9 +55,9 @@ pub(crate) fn sample(num_envs: usize) -> Sample {
     let robot = sim.add_robot(cfg).unwrap();
     sim.add_rigid_object(RigidObjectCfg {
         uid: "cube".into(),
-        shape: ObjectShape::cube(2.0 * HALF),
+        shape: ObjectShape::cube(2.0 * CUBE_HALF_EDGE),
         mass: Some(MASS),
-        init_pose: Pose::translation(0.0, 0.0, HALF),
+        init_pose: Pose::translation(0.0, 0.0, CUBE_HALF_EDGE),
         rgba: [0.8, 0.1, 0.1, 1.0],
         ..Default::default()
     })
@@ -76,18 +76,18 @@ pub(crate) fn sample(num_envs: usize) -> Sample {
 }
 
 /// Counts the pixels that differ between two canvases.
-pub(crate) fn unlike(one: &Canvas, other: &Canvas) -> usize {
+pub(crate) fn differing_pixels(one: &Canvas, other: &Canvas) -> usize {
     one.bytes().chunks(4).zip(other.bytes().chunks(4)).filter(|(a, b)| a != b).count()
 }
 
 /// A simulation stepped by its own thread until [`end`](Self::end).
-pub(crate) struct Running {
+pub(crate) struct SteppingThread {
     steps: Arc<AtomicU64>,
     stop: Arc<AtomicBool>,
     thread: JoinHandle<SimulationManager>,
 }
 
-impl Running {
+impl SteppingThread {
     pub(crate) fn start(mut sim: SimulationManager) -> Self {
         let (steps, stop) = (Arc::new(AtomicU64::new(0)), Arc::new(AtomicBool::new(false)));
         let (count, ends) = (Arc::clone(&steps), Arc::clone(&stop));
@@ -108,7 +108,7 @@ impl Running {
 
     /// Waits until the thread has completed more than `steps` steps.
     #[track_caller]
-    pub(crate) fn goes_on_beyond(&self, steps: u64) {
+    pub(crate) fn wait_for_steps_beyond(&self, steps: u64) {
         kinetoscope_testkit::wait::until("it goes on", || self.steps() > steps);
     }
 

@@ -1,8 +1,10 @@
 //! Screenshots: an image of the scene in one call, without a window or a display.
 
-use crate::control::Wants;
+use crate::control::SnapshotRequest;
 use crate::file_extension;
-use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Pool, Run, Shown, Snapshot};
+use crate::stage::{
+    Canvas, EnvSelection, OrbitCamera, Overlays, RunState, SceneRenderer, Snapshot, SnapshotPool, ViewOptions,
+};
 use kinetoscope_render::{RenderError, View};
 use kinetoscope_scene::AtomicFile;
 use kinetoscope_sim::SimulationManager;
@@ -15,9 +17,9 @@ pub struct ScreenshotCfg {
     /// Image size: pixels per row, rows.
     pub size: [usize; 2],
     /// Camera. `None` frames the shown environments, like the initial view of a window.
-    pub eye: Option<Eye>,
+    pub camera: Option<OrbitCamera>,
     /// Environments in the image.
-    pub shown: Shown,
+    pub envs: EnvSelection,
     /// Overlays drawn on the scene.
     pub overlays: Overlays,
     /// Number of rendering threads. `None` uses every core. The image does not depend on this number.
@@ -26,7 +28,7 @@ pub struct ScreenshotCfg {
 
 impl Default for ScreenshotCfg {
     fn default() -> Self {
-        Self { size: [960, 540], eye: None, shown: Shown::All, overlays: Overlays::default(), threads: None }
+        Self { size: [960, 540], camera: None, envs: EnvSelection::All, overlays: Overlays::default(), threads: None }
     }
 }
 
@@ -113,13 +115,13 @@ pub trait Screenshot {
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError>;
 
     /// Returns a camera from which all environments fill an image of `size` pixels, in their current state.
-    fn overview_eye(&mut self, size: [usize; 2]) -> Eye;
+    fn overview_camera(&mut self, size: [usize; 2]) -> OrbitCamera;
 
     /// Renders the image and returns it as a canvas with four bytes per pixel.
     ///
     /// # Errors
     /// The size or the environment is invalid, or the renderer returned an error.
-    fn picture_of_stage(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError>;
+    fn render_image(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError>;
 }
 
 impl Screenshot for SimulationManager {
@@ -133,47 +135,47 @@ impl Screenshot for SimulationManager {
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
             return Err(ScreenshotError::NoFolder { path: path.into(), folder: folder.into() });
         }
-        let canvas = self.picture_of_stage(cfg)?;
+        let canvas = self.render_image(cfg)?;
         let written = canvas.to_png().and_then(|bytes| AtomicFile::write(path, &bytes));
         written.map_err(|error| ScreenshotError::File { path: path.into(), error: Arc::new(error) })
     }
 
-    fn overview_eye(&mut self, size: [usize; 2]) -> Eye {
-        let snapshot = Pool::default().take(self, 1, &Wants::NOTHING, Run::default());
-        snapshot.map_or_else(Eye::default, |snapshot| Eye::overview(&snapshot, size))
+    fn overview_camera(&mut self, size: [usize; 2]) -> OrbitCamera {
+        let snapshot = SnapshotPool::default().capture(self, 1, &SnapshotRequest::EMPTY, RunState::default());
+        snapshot.map_or_else(OrbitCamera::default, |snapshot| OrbitCamera::overview(&snapshot, size))
     }
 
-    fn picture_of_stage(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError> {
+    fn render_image(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError> {
         let ([width, height], most) = (cfg.size, View::MAX_SIDE);
         if ![width, height].iter().all(|side| (1..=most).contains(side)) {
             return Err(ScreenshotError::Size { width, height, most });
         }
         let count = self.num_envs();
-        if let Shown::One(env) = cfg.shown
+        if let EnvSelection::One(env) = cfg.envs
             && env >= count
         {
             return Err(ScreenshotError::Environment { env, count });
         }
-        let contacts = cfg.overlays.contacts.then_some(cfg.shown);
-        let wants = Wants { contacts, markers: cfg.overlays.sensors, ..Wants::default() };
-        let run = Run { steps: self.observers().steps(), ..Run::default() };
+        let contacts = cfg.overlays.contacts.then_some(cfg.envs);
+        let wants = SnapshotRequest { contacts, markers: cfg.overlays.sensors, ..SnapshotRequest::default() };
+        let run = RunState { steps: self.observers().steps(), ..RunState::default() };
         let mut canvas = Canvas::default();
         // A new pool of size one always has a free snapshot.
-        let Some(snapshot) = Pool::default().take(self, 1, &wants, run) else { return Ok(canvas) };
-        let view = cfg.eye.unwrap_or_else(|| everything(&snapshot, cfg.shown, cfg.size)).view(width, height);
-        let look = Look { shown: cfg.shown, overlays: cfg.overlays, ..Look::default() };
+        let Some(snapshot) = SnapshotPool::default().capture(self, 1, &wants, run) else { return Ok(canvas) };
+        let view = cfg.camera.unwrap_or_else(|| framing_camera(&snapshot, cfg.envs, cfg.size)).view(width, height);
+        let look = ViewOptions { envs: cfg.envs, overlays: cfg.overlays, ..ViewOptions::default() };
         let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-        let mut painter = Painter::new(cfg.threads.unwrap_or_else(cores).max(1));
+        let mut painter = SceneRenderer::new(cfg.threads.unwrap_or_else(cores).max(1));
         painter.draw(&snapshot, &view, &look, &mut canvas).map_err(ScreenshotError::Draw)?;
         Ok(canvas)
     }
 }
 
 /// Returns a camera from which the shown environments fill the image.
-fn everything(snapshot: &Snapshot, shown: Shown, size: [usize; 2]) -> Eye {
+fn framing_camera(snapshot: &Snapshot, shown: EnvSelection, size: [usize; 2]) -> OrbitCamera {
     match shown {
-        Shown::All => Eye::overview(snapshot, size),
-        Shown::One(env) => Eye::overview(&snapshot.only(env), size),
+        EnvSelection::All => OrbitCamera::overview(snapshot, size),
+        EnvSelection::One(env) => OrbitCamera::overview(&snapshot.with_single_env(env), size),
     }
 }
 
@@ -181,7 +183,7 @@ fn everything(snapshot: &Snapshot, shown: Shown, size: [usize; 2]) -> Eye {
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
-    use crate::control::Viewing;
+    use crate::control::ViewerExt;
     use crate::sample::sample;
     use ndarray::array;
 
@@ -205,9 +207,9 @@ mod tests {
         let before = state(&sim);
         let image = written(&mut sim);
         assert_eq!(state(&sim), before);
-        let snapshot = sim.viewer(Wants::default()).newest().unwrap();
-        let (mut canvas, eye) = (Canvas::default(), Eye::overview(&snapshot, [960, 540]));
-        Painter::new(1).draw(&snapshot, &eye.view(960, 540), &Look::default(), &mut canvas).unwrap();
+        let snapshot = sim.viewer(SnapshotRequest::default()).newest().unwrap();
+        let (mut canvas, eye) = (Canvas::default(), OrbitCamera::overview(&snapshot, [960, 540]));
+        SceneRenderer::new(1).draw(&snapshot, &eye.view(960, 540), &ViewOptions::default(), &mut canvas).unwrap();
         assert_eq!((image.dimensions(), image.as_raw().as_slice()), ((960, 540), canvas.bytes()));
         assert!(red(&image) > 100, "the cubes are red: {}", red(&image));
         // Control: without cubes, a different image replaces the file.
@@ -220,15 +222,15 @@ mod tests {
     #[test]
     fn choices() {
         let mut sim = sample(3).sim;
-        let (size, shown) = ([64, 48], Shown::One(1));
-        let cfg = ScreenshotCfg { size, eye: None, shown, threads: Some(1), ..ScreenshotCfg::default() };
-        let mut draw = |cfg: ScreenshotCfg| sim.picture_of_stage(&cfg);
+        let (size, shown) = ([64, 48], EnvSelection::One(1));
+        let cfg = ScreenshotCfg { size, camera: None, envs: shown, threads: Some(1), ..ScreenshotCfg::default() };
+        let mut draw = |cfg: ScreenshotCfg| sim.render_image(&cfg);
         let canvas = draw(cfg).unwrap();
         assert_eq!(canvas.dimensions(), size);
         assert_eq!(canvas, draw(ScreenshotCfg { threads: Some(3), ..cfg }).unwrap());
-        let eye = Eye::looking([0.0, 0.0, 2.0], [0.0, 0.0, 0.0]);
-        assert_ne!(canvas, draw(ScreenshotCfg { eye, ..cfg }).unwrap());
-        let env = draw(ScreenshotCfg { shown: Shown::One(3), ..cfg }).unwrap_err();
+        let camera = OrbitCamera::look_at([0.0, 0.0, 2.0], [0.0, 0.0, 0.0]);
+        assert_ne!(canvas, draw(ScreenshotCfg { camera, ..cfg }).unwrap());
+        let env = draw(ScreenshotCfg { envs: EnvSelection::One(3), ..cfg }).unwrap_err();
         assert!(matches!(env, ScreenshotError::Environment { env: 3, count: 3 }), "{env}");
         for size in [[0, 48], [64, View::MAX_SIDE + 1]] {
             let error = draw(ScreenshotCfg { size, ..cfg }).unwrap_err();
@@ -252,7 +254,7 @@ mod tests {
             ("taken.png", "File", ""),
         ];
         let rows = rows.map(|(name, kind, part)| (name, sim.screenshot(folder.path().join(name)), kind, [part]));
-        kinetoscope_testkit::refusal::assert_refused(rows);
+        kinetoscope_testkit::refusal::assert_errors(rows);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -4,13 +4,13 @@ use std::fs;
 use std::path::Path;
 
 /// Relative tolerance of depths \[m/m\]: single-precision rounding of rays, at the slants of the examples.
-const DEPTH: f32 = 1e-4;
+const DEPTH_TOLERANCE: f32 = 1e-4;
 /// Largest relative depth difference of neighboring pixels on one surface.
-const SURFACE: f32 = 0.1;
+const MAX_DEPTH_STEP: f32 = 0.1;
 
-/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes. If `lit` is true, the renderers
+/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes. If `different_lighting` is true, the renderers
 /// have different lighting, and the color images must differ.
-pub(crate) fn check(ours: &Path, other: &Path, lit: bool) -> Result<(), String> {
+pub(crate) fn check(ours: &Path, other: &Path, different_lighting: bool) -> Result<(), String> {
     let names = |folder: &Path| -> Result<Vec<String>, String> {
         let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let mut names: Vec<String> = entries.flatten().filter_map(|e| e.file_name().into_string().ok()).collect();
@@ -38,7 +38,9 @@ pub(crate) fn check(ours: &Path, other: &Path, lit: bool) -> Result<(), String> 
         }
     }
     let read = |folder: &Path, name: &String| fs::read(folder.join(name)).map_err(|e| format!("{name}: {e}"));
-    for picture in here.iter().filter(|name| lit && (name.starts_with("color") || name.starts_with("sensor_views"))) {
+    for picture in
+        here.iter().filter(|name| different_lighting && (name.starts_with("color") || name.starts_with("sensor_views")))
+    {
         if read(ours, picture)? == read(other, picture)? {
             return Err(format!("{picture} of {} and {} are one picture", ours.display(), other.display()));
         }
@@ -88,13 +90,13 @@ fn compare(ours: &(Array, Array), other: &(Array, Array)) -> Result<(usize, usiz
             let whole = |((_, depth), (_, mask)): &(Array, Array)| {
                 (0..9).all(|n| {
                     let n = at(y + n / 3 - 1, x + n % 3 - 1);
-                    mask[n] == mask[k] && near(f32::from_bits(depth[k]), f32::from_bits(depth[n]), SURFACE)
+                    mask[n] == mask[k] && near(f32::from_bits(depth[k]), f32::from_bits(depth[n]), MAX_DEPTH_STEP)
                 })
             };
             if whole(ours) && whole(other) {
                 let [a, b] = [ours, other].map(|seen| f32::from_bits(seen.0.1[k]));
                 compared += 1;
-                different += usize::from(ours.1.1[k] != other.1.1[k] || !near(a, b, DEPTH));
+                different += usize::from(ours.1.1[k] != other.1.1[k] || !near(a, b, DEPTH_TOLERANCE));
             }
         }
     }

@@ -1,16 +1,16 @@
 //! Compares the dependencies between the workspace's packages with the list in ARCHITECTURE.md.
 
-use crate::run::{Failure, Outcome, Repo, no_findings};
+use crate::run::{Failure, Repo, XtaskResult, no_findings};
 use crate::source_check::workspace_dependencies;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 const PAGE: &str = "ARCHITECTURE.md";
 
-pub(crate) fn run(repo: &Repo) -> Outcome {
+pub(crate) fn run(repo: &Repo) -> XtaskResult {
     let page = repo.read(PAGE)?;
-    let written = written_arrows(&page).map_err(Failure::new)?;
-    let used = used_arrows(&repo.metadata);
+    let written = documented_dependencies(&page).map_err(Failure::new)?;
+    let used = actual_dependencies(&repo.metadata);
     let mut findings = differences(&written, &used);
     findings.extend(cycle(&written));
     findings.extend(unlisted_dependencies(&repo.metadata, &repo.read("Cargo.toml")?));
@@ -23,10 +23,10 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     no_findings("the tree and ARCHITECTURE.md disagree", &findings)
 }
 
-type Arrow = (String, String);
+type Dependency = (String, String);
 
 /// The lines `a -> b` of the page's block ```` ```arrows ````; `#` starts a comment.
-fn written_arrows(page: &str) -> Result<BTreeSet<Arrow>, String> {
+fn documented_dependencies(page: &str) -> Result<BTreeSet<Dependency>, String> {
     let mut arrows = BTreeSet::new();
     let block = page.lines().skip_while(|line| line.trim() != "```arrows").skip(1);
     for line in block.take_while(|line| line.trim() != "```") {
@@ -44,7 +44,7 @@ fn written_arrows(page: &str) -> Result<BTreeSet<Arrow>, String> {
 }
 
 /// Dependencies between workspace members with their kind. Dev-dependencies are left out: tests may use any crate.
-fn used_arrows(metadata: &Value) -> BTreeMap<Arrow, String> {
+fn actual_dependencies(metadata: &Value) -> BTreeMap<Dependency, String> {
     let members: BTreeSet<&str> = packages(metadata).filter_map(|package| package["name"].as_str()).collect();
     let mut arrows = BTreeMap::new();
     for (from, dependency) in dependencies(metadata) {
@@ -69,7 +69,7 @@ fn dependencies(metadata: &Value) -> impl Iterator<Item = (&str, &Value)> {
     })
 }
 
-fn differences(written: &BTreeSet<Arrow>, used: &BTreeMap<Arrow, String>) -> Vec<String> {
+fn differences(written: &BTreeSet<Dependency>, used: &BTreeMap<Dependency, String>) -> Vec<String> {
     let unwritten = used.iter().filter(|(arrow, _)| !written.contains(*arrow)).map(|((from, to), kind)| {
         format!("{from} -> {to} ({kind} dependency in its Cargo.toml) is not among the arrows of {PAGE}")
     });
@@ -82,7 +82,7 @@ fn differences(written: &BTreeSet<Arrow>, used: &BTreeMap<Arrow, String>) -> Vec
 
 /// A dependency cycle, if any. Dependencies without a predecessor or without a successor are removed repeatedly; the
 /// rest forms cycles.
-fn cycle(arrows: &BTreeSet<Arrow>) -> Option<String> {
+fn cycle(arrows: &BTreeSet<Dependency>) -> Option<String> {
     let mut left = arrows.clone();
     loop {
         let before = left.len();
@@ -154,7 +154,7 @@ mod tests {
     }
 
     fn findings(arrows: &str) -> Vec<String> {
-        differences(&written_arrows(&page(arrows)).expect("a block"), &used_arrows(&metadata()))
+        differences(&documented_dependencies(&page(arrows)).expect("a block"), &actual_dependencies(&metadata()))
     }
 
     /// Dependencies missing on either side are reported.
@@ -173,13 +173,13 @@ mod tests {
 
     #[test]
     fn broken_pages() {
-        assert!(written_arrows("# A\n").is_err());
-        assert!(written_arrows(&page("sim => scene")).is_err());
+        assert!(documented_dependencies("# A\n").is_err());
+        assert!(documented_dependencies(&page("sim => scene")).is_err());
     }
 
     #[test]
     fn circle() {
-        let arrows = |text: &str| written_arrows(&page(text)).expect("a block");
+        let arrows = |text: &str| documented_dependencies(&page(text)).expect("a block");
         assert_eq!(cycle(&arrows("a -> b\nb -> c\na -> c")), None);
         assert!(cycle(&arrows("a -> b\nb -> c\nc -> b")).is_some_and(|text| text.contains("c -> b")));
     }

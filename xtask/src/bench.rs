@@ -2,8 +2,8 @@
 
 use crate::progress::Progress;
 use crate::python::{self, Module};
-use crate::run::{Failure, Outcome, Repo};
-use crate::setup::{self, Line, Need, Wanted};
+use crate::run::{Failure, Repo, XtaskResult};
+use crate::setup::{self, MujocoVersion, Requirement, Requirements};
 use crate::wheel;
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -12,15 +12,15 @@ use std::{fs, thread};
 
 const RESULTS: &str = "benches/RESULTS.md";
 /// Benchmarks with baselines for cameras.
-const OF_CAMERAS: [&str; 2] = ["camera", "trace"];
+const CAMERA_BENCHES: [&str; 2] = ["camera", "trace"];
 /// Python packages of the camera baselines. Other versions are untested.
-const CAMERAS: &[Module] = &[
+const CAMERA_BASELINES: &[Module] = &[
     python::OPENGL,
     Module { name: "mujoco_warp", packages: &["mujoco-warp==4.0.0", "warp-lang==1.19.0"] },
     Module { name: "pybullet", packages: &["pybullet==3.2.7"] },
 ];
 
-const EXTRAS: &[Need] = &[Need::Models, Need::Pip, Need::Venv, Need::Xvfb];
+const EXTRAS: &[Requirement] = &[Requirement::Models, Requirement::Pip, Requirement::Venv, Requirement::Xvfb];
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct BenchArgs {
@@ -34,33 +34,33 @@ pub(crate) struct BenchArgs {
     json: Option<PathBuf>,
 }
 
-pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
+pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
     let path = repo.root.join(RESULTS);
     let heading = heading(&machine());
     let old = if args.update {
         let old = fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
         // Checked before the benchmarks run.
-        replaced(&old, &heading, "")?;
+        replace_tables(&old, &heading, "")?;
         Some(old)
     } else {
         None
     };
     let mut rows = Vec::new();
-    let prepare = |line| setup::prepare(repo, Wanted { line: Some(line), extras: EXTRAS });
-    let both = [prepare(Line::Debian)?, prepare(Line::Wheel)?];
+    let prepare = |line| setup::prepare(repo, Requirements { version: Some(line), extras: EXTRAS });
+    let both = [prepare(MujocoVersion::Debian)?, prepare(MujocoVersion::Wheel)?];
     let python = python::with_mujoco(repo);
     if python.is_none() {
         eprintln!("note: rivals in Python are left out");
     }
-    if args.name.as_deref().is_none_or(|name| OF_CAMERAS.contains(&name)) {
-        setup::try_to_have(Need::OsMesa);
-        for module in CAMERAS {
+    if args.name.as_deref().is_none_or(|name| CAMERA_BENCHES.contains(&name)) {
+        setup::try_to_have(Requirement::OsMesa);
+        for module in CAMERA_BASELINES {
             if python.as_ref().is_some_and(|python| !module.install(python)) {
                 eprintln!("note: that rival is left out");
             }
         }
     }
-    let mut progress = Progress::of(both.len());
+    let mut progress = Progress::new(both.len());
     for (ready, line) in both.into_iter().zip(["2.2.2", wheel::VERSION]) {
         progress.begin(&format!("{} on MuJoCo {line}", args.name.as_deref().unwrap_or("all benchmarks")));
         let file = repo.target.join("bench-rows.json");
@@ -88,7 +88,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
         return Ok(());
     }
     let page = match &old {
-        Some(old) => replaced(old, &heading, &tables)?,
+        Some(old) => replace_tables(old, &heading, &tables)?,
         None => format!("{heading}\n{tables}"),
     };
     write(&path, &page)?;
@@ -98,7 +98,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
 
 /// A page with the tables of the same name replaced; new tables come last. The page must be of the same machine,
 /// because the remaining tables must be comparable.
-fn replaced(page: &str, heading: &str, tables: &str) -> Outcome<String> {
+fn replace_tables(page: &str, heading: &str, tables: &str) -> XtaskResult<String> {
     let split = |text: &str| -> Vec<String> {
         let parts = text.split("\n## ").filter(|part| !part.trim().is_empty());
         parts.map(|part| part.trim_start_matches("## ").trim_end().to_string()).collect()
@@ -117,11 +117,11 @@ fn replaced(page: &str, heading: &str, tables: &str) -> Outcome<String> {
     Ok(format!("{heading}\n## {}\n", sections.join("\n\n## ")))
 }
 
-fn write(path: &Path, text: &str) -> Outcome {
+fn write(path: &Path, text: &str) -> XtaskResult {
     fs::write(path, text).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }
 
-fn read_rows(file: &Path) -> Outcome<Vec<Value>> {
+fn read_rows(file: &Path) -> XtaskResult<Vec<Value>> {
     let text = fs::read_to_string(file)
         .map_err(|e| Failure::new(format!("the benchmarks wrote no rows to {}: {e}", file.display())))?;
     match serde_json::from_str(&text) {
@@ -132,7 +132,7 @@ fn read_rows(file: &Path) -> Outcome<Vec<Value>> {
 }
 
 /// One table per benchmark, in the order of the rows.
-fn tables(rows: &[Value]) -> Outcome<String> {
+fn tables(rows: &[Value]) -> XtaskResult<String> {
     let mut benches: Vec<&str> = Vec::new();
     for row in rows {
         let bench = text(row, "bench")?;
@@ -165,7 +165,7 @@ fn tables(rows: &[Value]) -> Outcome<String> {
     Ok(format!("{}\n", out.trim_end()))
 }
 
-fn text<'a>(row: &'a Value, key: &str) -> Outcome<&'a str> {
+fn text<'a>(row: &'a Value, key: &str) -> XtaskResult<&'a str> {
     row[key].as_str().ok_or_else(|| Failure::new(format!("a row without the text `{key}`: {row}")))
 }
 
@@ -189,7 +189,7 @@ fn machine() -> String {
 }
 
 fn heading(machine: &str) -> String {
-    let rivals: Vec<&str> = CAMERAS.iter().flat_map(|module| module.packages).copied().collect();
+    let rivals: Vec<&str> = CAMERA_BASELINES.iter().flat_map(|module| module.packages).copied().collect();
     format!(
         "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}. `cargo xtask bench` measures \
          everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the rival ran in one run, \
@@ -242,13 +242,13 @@ mod tests {
         let old = format!("{heading}\n{}", page(100.0, 200.0));
         let new = tables(&[row("camera", "2.2.2", json!(300.0), json!(2.0))]).expect("complete");
         assert_eq!(
-            replaced(&old, &heading, &new).expect("the same machine"),
+            replace_tables(&old, &heading, &new).expect("the same machine"),
             format!("{heading}\n{}", page(100.0, 300.0))
         );
         let more = tables(&[row("rays", "2.2.2", json!(1.0), json!(2.0))]).expect("complete");
-        let page = replaced(&old, &heading, &more).expect("the same machine");
+        let page = replace_tables(&old, &heading, &more).expect("the same machine");
         assert!(page.starts_with(old.trim_end()) && page.contains("## rays"), "{page}");
-        assert!(replaced(&old, &super::heading("another machine"), &more).is_err());
+        assert!(replace_tables(&old, &super::heading("another machine"), &more).is_err());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `cargo xtask bless`: rewrites the golden files with the current output.
 
-use crate::run::{Cmd, Outcome, Repo};
-use crate::setup::{self, Line, Wanted};
+use crate::run::{Cmd, Repo, XtaskResult};
+use crate::setup::{self, MujocoVersion, Requirements};
 
 /// Environment variable that makes golden tests rewrite their files.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_BLESS";
@@ -13,10 +13,10 @@ pub(crate) struct BlessArgs {
     filter: String,
 }
 
-pub(crate) fn run(repo: &Repo, args: &BlessArgs) -> Outcome {
+pub(crate) fn run(repo: &Repo, args: &BlessArgs) -> XtaskResult {
     // Some golden files belong to one supported MuJoCo version.
-    for line in [Line::Debian, Line::Wheel] {
-        let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
+    for line in [MujocoVersion::Debian, MujocoVersion::Wheel] {
+        let ready = setup::prepare(repo, Requirements { version: Some(line), extras: &[] })?;
         ready.cargo().env(VARIABLE, "1").args(["test", "--workspace", &args.filter]).run()?;
     }
     let status = Cmd::new("git")

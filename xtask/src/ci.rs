@@ -1,10 +1,10 @@
 //! `cargo xtask ci`: all checks of a change, stage by stage, on both supported MuJoCo versions.
 
 use crate::docs_check::TEST_COMMAND;
-use crate::examples::Rows;
+use crate::examples::RowSelection;
 use crate::physics_report::{self, PhysicsReportArgs};
-use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
-use crate::setup::{self, Line, Need, Ready, Wanted};
+use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci, no_findings};
+use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{arrows, circles, docs_check, examples, mutate, own_time, source_check, wheel};
@@ -28,7 +28,7 @@ struct Stage {
     name: &'static str,
     what: &'static str,
     when: When,
-    run: fn(&Context<'_>) -> Outcome,
+    run: fn(&Context<'_>) -> XtaskResult,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,12 +50,12 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
-    fn debian(&self) -> Outcome<Ready> {
-        setup::prepare(self.repo, Wanted { line: Some(Line::Debian), extras: &[] })
+    fn debian(&self) -> XtaskResult<Prepared> {
+        setup::prepare(self.repo, Requirements { version: Some(MujocoVersion::Debian), extras: &[] })
     }
 
-    fn wheel(&self) -> Outcome<Ready> {
-        setup::prepare(self.repo, Wanted { line: Some(Line::Wheel), extras: &[] })
+    fn wheel(&self) -> XtaskResult<Prepared> {
+        setup::prepare(self.repo, Requirements { version: Some(MujocoVersion::Wheel), extras: &[] })
     }
 }
 
@@ -80,13 +80,13 @@ const STAGES: &[Stage] = &[
         name: "examples",
         what: "examples, MuJoCo 2.2.2",
         when: When::Full,
-        run: |c| examples::run(c.repo, &c.debian()?, &["--workspace"], Rows::All),
+        run: |c| examples::run(c.repo, &c.debian()?, &["--workspace"], RowSelection::All),
     },
     Stage {
         name: "clippy-4",
         what: "lints, MuJoCo 4",
         when: When::Wheel,
-        run: |c| clippy(&c.wheel()?, &test::of_mujoco()),
+        run: |c| clippy(&c.wheel()?, &test::version_dependent_packages()),
     },
     Stage { name: "test-4", what: "tests, MuJoCo 4", when: When::Wheel, run: wheel_test },
     Stage { name: "physics", what: "the page of numbers, both lines", when: When::Wheel, run: physics },
@@ -94,14 +94,16 @@ const STAGES: &[Stage] = &[
         name: "examples-4",
         what: "examples, MuJoCo 4",
         when: When::Wheel,
-        run: |c| examples::run(c.repo, &c.wheel()?, &test::of_mujoco(), Rows::OfPhysics),
+        run: |c| {
+            examples::run(c.repo, &c.wheel()?, &test::version_dependent_packages(), RowSelection::VersionDependent)
+        },
     },
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];
 
 /// Wall and CPU time of a stage.
 #[derive(Debug)]
-struct Took {
+struct StageTime {
     stage: &'static str,
     /// "passed", "failed" or "skipped".
     result: &'static str,
@@ -110,10 +112,10 @@ struct Took {
     cpu: Duration,
 }
 
-pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
+pub(crate) fn run(repo: &Repo, args: &CiArgs) -> XtaskResult {
     let context = Context { repo, changed_before: changed_files(repo) };
     // Rows of an earlier run belong to earlier code.
-    physics_report::forget_rows(repo)?;
+    physics_report::clear_rows(repo)?;
     let chosen = chosen(args);
     let start = Instant::now();
     let mut table = Vec::new();
@@ -121,12 +123,12 @@ pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
         println!("\n=== {}/{} {}: {} [{}]", at + 1, chosen.len(), stage.name, stage.what, clock(start.elapsed()));
         if stage.when == When::Wheel && !in_ci() && !wheel::is_available(repo) {
             println!("skipped: MuJoCo {} is downloaded with pip, and pip is missing", wheel::VERSION);
-            table.push(Took { stage: stage.name, result: "skipped", wall: Duration::ZERO, cpu: Duration::ZERO });
+            table.push(StageTime { stage: stage.name, result: "skipped", wall: Duration::ZERO, cpu: Duration::ZERO });
             continue;
         }
         let (wall, cpu) = (Instant::now(), own_time::of_children());
         let result = (stage.run)(&context);
-        table.push(Took {
+        table.push(StageTime {
             stage: stage.name,
             result: if result.is_ok() { "passed" } else { "failed" },
             wall: wall.elapsed(),
@@ -134,19 +136,19 @@ pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
         });
         if let Err(failure) = result {
             report(repo, &table, start.elapsed())?;
-            let again = failure.again.unwrap_or_else(|| format!("cargo xtask ci --only {}", stage.name));
+            let again = failure.repeat_command.unwrap_or_else(|| format!("cargo xtask ci --only {}", stage.name));
             let message = format!("stage `{}` failed: {}", stage.name, failure.message);
-            return Err(Failure { message, again: Some(again), code: 1 });
+            return Err(Failure { message, repeat_command: Some(again), code: 1 });
         }
     }
     report(repo, &table, start.elapsed())
 }
 
 /// Prints the table of stages and writes it to `ci-times.json` in the target folder.
-fn report(repo: &Repo, table: &[Took], total: Duration) -> Outcome {
+fn report(repo: &Repo, table: &[StageTime], total: Duration) -> XtaskResult {
     print!("\n{}", lines(table, total));
     let seconds = |time: Duration| (10.0 * time.as_secs_f64()).round() / 10.0;
-    let stage = |took: &Took| {
+    let stage = |took: &StageTime| {
         json!({
             "stage": took.stage,
             "result": took.result,
@@ -165,9 +167,9 @@ fn report(repo: &Repo, table: &[Took], total: Duration) -> Outcome {
 }
 
 /// The table: wall and CPU time of each stage.
-fn lines(table: &[Took], total: Duration) -> String {
+fn lines(table: &[StageTime], total: Duration) -> String {
     let mut lines = format!("{:<12} {:>7} {:>7}\n", "stage", "wall", "CPU");
-    for Took { stage, result, wall, cpu } in table {
+    for StageTime { stage, result, wall, cpu } in table {
         let note = if *result == "passed" { "" } else { result };
         lines.push_str(format!("{stage:<12} {:>7} {:>7} {note}", clock(*wall), clock(*cpu)).trim_end());
         lines.push('\n');
@@ -191,29 +193,32 @@ fn clock(time: Duration) -> String {
     format!("{}:{:02}", time.as_secs() / 60, time.as_secs() % 60)
 }
 
-fn install(context: &Context<'_>) -> Outcome {
+fn install(context: &Context<'_>) -> XtaskResult {
     setup::prepare(
         context.repo,
-        Wanted { line: Some(Line::Debian), extras: &[Need::Models, Need::Pip, Need::Chromium] },
+        Requirements {
+            version: Some(MujocoVersion::Debian),
+            extras: &[Requirement::Models, Requirement::Pip, Requirement::Chromium],
+        },
     )
     .map(|_| ())
 }
 
-fn rules(context: &Context<'_>) -> Outcome {
+fn rules(context: &Context<'_>) -> XtaskResult {
     source_check::run(context.repo)?;
     mutate::check(&context.repo.root)
 }
 
-fn fmt(context: &Context<'_>) -> Outcome {
+fn fmt(context: &Context<'_>) -> XtaskResult {
     Cmd::new("cargo").args(["fmt", "--all", "--check"]).current_dir(&context.repo.root).run()
 }
 
-fn clippy(ready: &Ready, packages: &[&str]) -> Outcome {
+fn clippy(ready: &Prepared, packages: &[&str]) -> XtaskResult {
     let cargo = ready.cargo().arg("clippy").args(packages).arg("--all-targets").args(test::features(packages));
     cargo.args(["--", "-D", "warnings"]).run()
 }
 
-fn unit_tests(context: &Context<'_>) -> Outcome {
+fn unit_tests(context: &Context<'_>) -> XtaskResult {
     context
         .debian()?
         .cargo()
@@ -222,34 +227,38 @@ fn unit_tests(context: &Context<'_>) -> Outcome {
         .run()
 }
 
-fn rustdoc(context: &Context<'_>) -> Outcome {
+fn rustdoc(context: &Context<'_>) -> XtaskResult {
     let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
     cargo.args(["doc", "--workspace", "--no-deps"]).args(test::features(&["--workspace"])).run()
 }
 
-fn demo(context: &Context<'_>) -> Outcome {
-    let [command, _] = docs_check::PROMISED;
+fn demo(context: &Context<'_>) -> XtaskResult {
+    let [command, _] = docs_check::README_COMMANDS;
     docs_check::parse(command).map_err(|e| Failure::new(e.to_string()))?.run(context.repo)
 }
 
 /// Parses the command line of the README, so that CI runs exactly the documented command.
-fn readme_test(context: &Context<'_>) -> Outcome {
+fn readme_test(context: &Context<'_>) -> XtaskResult {
     let cli = docs_check::parse(TEST_COMMAND).map_err(|e| Failure::new(e.to_string()))?;
     let args = cli.test_args().ok_or_else(|| Failure::new(format!("`{TEST_COMMAND}` is no test command")))?;
     // Without a version in the command, CI tests 2.2.2 here and ignores a MUJOCO_DIR of the caller: another stage tests
     // the other version.
-    test::run(context.repo, &TestArgs { mujoco: Some(args.mujoco.unwrap_or(Line::Debian)), ..args.clone() })
-        .map_err(|failure| Failure { again: Some(TEST_COMMAND.to_string()), ..failure })
+    test::run(context.repo, &TestArgs { mujoco: Some(args.mujoco.unwrap_or(MujocoVersion::Debian)), ..args.clone() })
+        .map_err(|failure| Failure { repeat_command: Some(TEST_COMMAND.to_string()), ..failure })
 }
 
-fn wheel_test(context: &Context<'_>) -> Outcome {
-    test::run_packages(context.repo, &TestArgs { mujoco: Some(Line::Wheel), ..TestArgs::default() }, &test::of_mujoco())
-        .map_err(|failure| Failure { again: Some(format!("{TEST_COMMAND} --mujoco 4")), ..failure })
+fn wheel_test(context: &Context<'_>) -> XtaskResult {
+    test::run_packages(
+        context.repo,
+        &TestArgs { mujoco: Some(MujocoVersion::Wheel), ..TestArgs::default() },
+        &test::version_dependent_packages(),
+    )
+    .map_err(|failure| Failure { repeat_command: Some(format!("{TEST_COMMAND} --mujoco 4")), ..failure })
 }
 
 /// Checks the physics page against the rows that the tests of both versions wrote. If they have not run before this
 /// stage, they run now.
-fn physics(context: &Context<'_>) -> Outcome {
+fn physics(context: &Context<'_>) -> XtaskResult {
     if physics_report::has_rows(context.repo) {
         return physics_report::check_rows(context.repo);
     }
@@ -257,7 +266,7 @@ fn physics(context: &Context<'_>) -> Outcome {
 }
 
 /// Reports MuJoCo's log file, and files that tests or examples wrote into the tree.
-fn leftovers(context: &Context<'_>) -> Outcome {
+fn leftovers(context: &Context<'_>) -> XtaskResult {
     let mut findings: Vec<String> =
         files_below(&context.repo.root).into_iter().filter(|path| path.ends_with("MUJOCO_LOG.TXT")).collect();
     match (&context.changed_before, changed_files(context.repo)) {
@@ -310,7 +319,7 @@ mod tests {
     #[test]
     fn table_of_times() {
         let second = Duration::from_secs(1);
-        let took = |stage, result, wall, cpu| Took { stage, result, wall: wall * second, cpu: cpu * second };
+        let took = |stage, result, wall, cpu| StageTime { stage, result, wall: wall * second, cpu: cpu * second };
         let table = [took("fmt", "passed", 1, 2), took("test", "failed", 61, 119)];
         let lines = lines(&table, 63 * second);
         let words: Vec<Vec<&str>> = lines.lines().map(|line| line.split_whitespace().collect()).collect();

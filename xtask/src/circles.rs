@@ -3,26 +3,26 @@
 //! An edge leads from a file to the file that defines an item named by one of its paths (`use crate::..`, `super::..`,
 //! or a path in code). Re-exports are followed to the definition, and are not edges themselves. Tests are ignored.
 
-use crate::run::{Outcome, Repo, no_findings};
+use crate::run::{Repo, XtaskResult, no_findings};
 use crate::source_check::{TextFile, code_only, text_files};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of files in the largest allowed cycle.
-const LARGEST: usize = 5;
+const MAX_CYCLE_FILES: usize = 5;
 
 type Path = Vec<String>;
 
-pub(crate) fn run(repo: &Repo) -> Outcome {
-    let findings: Vec<String> = circles(&text_files(&repo.root))
+pub(crate) fn run(repo: &Repo) -> XtaskResult {
+    let findings: Vec<String> = import_cycles(&text_files(&repo.root))
         .into_iter()
-        .filter(|circle| circle.len() > LARGEST)
+        .filter(|circle| circle.len() > MAX_CYCLE_FILES)
         .map(|circle| format!("{} files use each other: {}", circle.len(), circle.join(", ")))
         .collect();
     no_findings("circles of more than 5 files; move what both sides need into a file of its own", &findings)
 }
 
 /// All cycles, the largest first.
-fn circles(files: &[TextFile]) -> Vec<Vec<String>> {
+fn import_cycles(files: &[TextFile]) -> Vec<Vec<String>> {
     let mut crates: BTreeMap<&str, Vec<&TextFile>> = BTreeMap::new();
     for file in files.iter().filter(|file| file.path.ends_with(".rs") && !is_test(&file.path)) {
         let Some((name, _)) = file.path.split_once("src/") else { continue };
@@ -30,7 +30,7 @@ fn circles(files: &[TextFile]) -> Vec<Vec<String>> {
             crates.entry(name).or_default().push(file);
         }
     }
-    let mut found: Vec<Vec<String>> = crates.values().flat_map(|files| Crate::new(files).circles()).collect();
+    let mut found: Vec<Vec<String>> = crates.values().flat_map(|files| Crate::new(files).import_cycles()).collect();
     found.sort_by_key(|circle| std::cmp::Reverse(circle.len()));
     found
 }
@@ -91,7 +91,7 @@ impl Crate {
     }
 
     /// The path with re-exports replaced by their targets.
-    fn defined(&self, path: Path, depth: usize) -> Path {
+    fn follow_reexports(&self, path: Path, depth: usize) -> Path {
         for split in 0..path.len() {
             let (module, name) = (path[..split].to_vec(), &path[split]);
             let is_module = self.files.contains_key(&path[..=split]);
@@ -100,7 +100,7 @@ impl Crate {
                 && let Some(mut target) = self.resolve(&module, &import.path)
             {
                 target.extend(path[split + 1..].iter().cloned());
-                return self.defined(target, depth + 1);
+                return self.follow_reexports(target, depth + 1);
             }
         }
         path
@@ -110,19 +110,19 @@ impl Crate {
         (0..=path.len()).rev().find_map(|length| self.files.get(&path[..length]))
     }
 
-    fn circles(&self) -> Vec<Vec<String>> {
-        let mut arrows: BTreeMap<&String, BTreeSet<&String>> = BTreeMap::new();
+    fn import_cycles(&self) -> Vec<Vec<String>> {
+        let mut edges: BTreeMap<&String, BTreeSet<&String>> = BTreeMap::new();
         for (module, file) in &self.files {
             let used = self.uses[module].iter().filter(|import| !import.public).map(|import| &import.path);
             let targets = used.chain(&self.paths[module]).filter_map(|written| {
-                let path = self.defined(self.resolve(module, written)?, 0);
+                let path = self.follow_reexports(self.resolve(module, written)?, 0);
                 self.file_of(&path).filter(|target| *target != file)
             });
-            arrows.entry(file).or_default().extend(targets);
+            edges.entry(file).or_default().extend(targets);
         }
         // Files that reach each other form a cycle.
         let reach: BTreeMap<&String, BTreeSet<&String>> =
-            arrows.keys().map(|file| (*file, reached(file, &arrows))).collect();
+            edges.keys().map(|file| (*file, reached(file, &edges))).collect();
         let mut found: BTreeSet<Vec<String>> = BTreeSet::new();
         for (file, ahead) in &reach {
             let circle: Vec<String> =
@@ -280,10 +280,10 @@ mod tests {
             ("a/src/w.rs", "use crate::z::Z;"),
             ("b/src/lib.rs", "use a::x::X;"),
         ]);
-        assert_eq!(circles(&tree), [["a/src/x.rs", "a/src/y/inner.rs", "a/src/y/mod.rs"]]);
+        assert_eq!(import_cycles(&tree), [["a/src/x.rs", "a/src/y/inner.rs", "a/src/y/mod.rs"]]);
         // Control: without the path in `y` there is no cycle.
         let mut open = tree;
         open[2].text = "mod inner;".into();
-        assert!(circles(&open).is_empty());
+        assert!(import_cycles(&open).is_empty());
     }
 }

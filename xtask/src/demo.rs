@@ -1,7 +1,7 @@
 //! `cargo xtask demo`: the first example, on a machine with nothing installed.
 
-use crate::run::{Outcome, Repo};
-use crate::setup::{self, Wanted};
+use crate::run::{Repo, XtaskResult};
+use crate::setup::{self, Requirements};
 
 /// Default flags; the user's flags replace them.
 const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs", Some("4")), ("--steps", Some("2004"))];
@@ -16,11 +16,11 @@ pub(crate) struct DemoArgs {
     pub(crate) args: Vec<String>,
 }
 
-pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
+pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> XtaskResult {
     if !args.yes {
         setup::ask_before_installing();
     }
-    let ready = setup::prepare(repo, Wanted::default())?;
+    let ready = setup::prepare(repo, Requirements::default())?;
     let pictures = repo.target.join("demo").to_string_lossy().into_owned();
     let mut defaults = DEFAULTS.to_vec();
     defaults.push(("--out", Some(&pictures)));
@@ -31,7 +31,7 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
         .args(["run", "--manifest-path"])
         .arg(repo.root.join("Cargo.toml"))
         .args(["--package", "kinetoscope", "--example", "create_sensor"])
-        .args(rooms(&args.args))
+        .args(feature_args(&args.args))
         .arg("--")
         .args(merged(&defaults, &args.args))
         .inherit_stdin()
@@ -40,7 +40,7 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
 
 /// Feature flags of cargo. The build dominates the time of the first run, so recordings and the browser view are
 /// compiled only if a flag needs them.
-fn rooms(user: &[String]) -> &'static [&'static str] {
+fn feature_args(user: &[String]) -> &'static [&'static str] {
     let asked = |arg: &String| flag_name(arg).is_some_and(|name| ["record", "serve"].contains(&name.as_str()));
     if user.iter().any(asked) { &[] } else { &["--no-default-features"] }
 }
@@ -79,9 +79,9 @@ mod tests {
 
     #[test]
     fn features() {
-        assert_eq!(rooms(&words("--seed 3 --overwrite")), ["--no-default-features"]);
+        assert_eq!(feature_args(&words("--seed 3 --overwrite")), ["--no-default-features"]);
         for flags in ["--serve", "--serve=127.0.0.1:0", "--seed 3 --record run.mcap"] {
-            assert!(rooms(&words(flags)).is_empty(), "{flags}");
+            assert!(feature_args(&words(flags)).is_empty(), "{flags}");
         }
     }
 

@@ -1,17 +1,17 @@
 //! Checks of the documentation pages: their commands parse, and their links have targets.
 
 use crate::Cli;
-use crate::run::{Outcome, Repo, no_findings};
+use crate::run::{Repo, XtaskResult, no_findings};
 use crate::source_check::files_below;
 use clap::Parser;
 
 const README: &str = "README.md";
 /// The two commands for new users; CI runs the second one literally.
-pub(crate) const PROMISED: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
+pub(crate) const README_COMMANDS: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
 pub(crate) const TEST_COMMAND: &str = "cargo xtask test";
 const NEEDED: [&str; 3] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md"];
 
-pub(crate) fn run(repo: &Repo) -> Outcome {
+pub(crate) fn run(repo: &Repo) -> XtaskResult {
     let mut pages: Vec<String> = files_below(&repo.root).into_iter().filter(|path| is_page(path)).collect();
     pages.extend(NEEDED.map(str::to_string));
     pages.sort();
@@ -44,7 +44,11 @@ fn is_page(path: &str) -> bool {
 fn missing_commands(readme: &str) -> Vec<String> {
     let commands: Vec<&str> = code_lines(readme).filter_map(command).collect();
     let has = |promised: &&&str| commands.contains(*promised);
-    PROMISED.iter().filter(|promised| !has(promised)).map(|c| format!("has no line `{c}` in a code block")).collect()
+    README_COMMANDS
+        .iter()
+        .filter(|promised| !has(promised))
+        .map(|c| format!("has no line `{c}` in a code block"))
+        .collect()
 }
 
 fn commands_that_do_not_parse(page: &str) -> Vec<String> {

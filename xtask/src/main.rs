@@ -39,7 +39,7 @@ mod test;
 mod wheel;
 
 use clap::{Parser, Subcommand};
-use run::{Outcome, Repo};
+use run::{Repo, XtaskResult};
 use std::process::ExitCode;
 
 /// Kinetoscope's commands.
@@ -69,7 +69,7 @@ enum Task {
 }
 
 impl Cli {
-    fn run(&self, repo: &Repo) -> Outcome {
+    fn run(&self, repo: &Repo) -> XtaskResult {
         match &self.command {
             Task::Demo(args) => demo::run(repo, args),
             Task::Test(args) => test::run(repo, args),

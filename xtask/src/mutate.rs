@@ -4,8 +4,8 @@
 
 use crate::mutations::{self, Mutation};
 use crate::progress::Progress;
-use crate::run::{Failure, Outcome, Repo, no_findings};
-use crate::setup::{self, Line, Wanted};
+use crate::run::{Failure, Repo, XtaskResult, no_findings};
+use crate::setup::{self, MujocoVersion, Requirements};
 use crate::source_check::files_below;
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,7 +19,7 @@ pub(crate) struct MutateArgs {
 
 /// Test result of a mutation.
 #[derive(Debug, PartialEq, Eq)]
-enum Verdict {
+enum MutationResult {
     /// Names of the failed tests, and expected name parts without a failed test.
     Caught(Vec<String>, Vec<String>),
     Survived,
@@ -27,9 +27,9 @@ enum Verdict {
     NotTried(String),
 }
 
-pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
-    fits(&repo.root)?;
-    let ready = setup::prepare(repo, Wanted { line: Some(Line::Debian), extras: &[] })?;
+pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> XtaskResult {
+    check_search_texts(&repo.root)?;
+    let ready = setup::prepare(repo, Requirements { version: Some(MujocoVersion::Debian), extras: &[] })?;
     let folder = repo.target.join("mutate");
     let tree = folder.join("tree");
     copy(&repo.root, &tree)?;
@@ -43,13 +43,13 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     };
     // A test that fails on the unchanged code would seem to catch every mutation.
     for (binary, words) in binaries(&chosen) {
-        let (passed, said) = test(binary, &words)?;
-        if verdict(passed, &said, &words) != Verdict::Survived {
+        let (passed, output) = test(binary, &words)?;
+        if verdict(passed, &output, &words) != MutationResult::Survived {
             let what = format!("the tests of `{binary}` fail, or do not run, on code that is not mutated");
-            return Err(Failure::new(format!("{what}:\n{said}")));
+            return Err(Failure::new(format!("{what}:\n{output}")));
         }
     }
-    let mut progress = Progress::of(chosen.len());
+    let mut progress = Progress::new(chosen.len());
     for mutation in chosen {
         progress.begin(mutation.name);
         let path = tree.join(mutation.file);
@@ -61,23 +61,23 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
         let (passed, said) = tested?;
         let verdict = verdict(passed, &said, tests);
         let line = match &verdict {
-            Verdict::Caught(by, not_by) if not_by.is_empty() => {
+            MutationResult::Caught(by, not_by) if not_by.is_empty() => {
                 format!("caught   {}: {}", mutation.name, by.join(", "))
             }
-            Verdict::Caught(by, not_by) => {
+            MutationResult::Caught(by, not_by) => {
                 let (by, not_by) = (by.join(", "), not_by.join(", "));
                 format!("caught   {}: {by}; not by {not_by}", mutation.name)
             }
-            Verdict::Survived => format!("SURVIVED {} ({})", mutation.name, mutation.file),
-            Verdict::NotTried(why) => format!("ERROR    {} ({}): {why}", mutation.name, mutation.file),
+            MutationResult::Survived => format!("SURVIVED {} ({})", mutation.name, mutation.file),
+            MutationResult::NotTried(why) => format!("ERROR    {} ({}): {why}", mutation.name, mutation.file),
         };
         println!("{line}");
         table.push_str(&format!("{line}\n"));
-        let by: &[String] = if let Verdict::Caught(by, _) = &verdict { by } else { &[] };
+        let by: &[String] = if let MutationResult::Caught(by, _) = &verdict { by } else { &[] };
         let path = repo.root.join(PAGE);
         write(&path, &page(&read(&path)?, &row(mutation, by)))?;
         // Every named test of a mutation must fail.
-        if !matches!(&verdict, Verdict::Caught(_, not_by) if not_by.is_empty()) {
+        if !matches!(&verdict, MutationResult::Caught(_, not_by) if not_by.is_empty()) {
             findings.push(line);
         }
     }
@@ -120,7 +120,7 @@ fn row(mutation: &Mutation, caught_by: &[String]) -> String {
 }
 
 /// Checks that the search text of every mutation occurs in its file exactly once.
-fn fits(root: &Path) -> Outcome {
+fn check_search_texts(root: &Path) -> XtaskResult {
     let mut findings = Vec::new();
     for Mutation { name, file, search, replacement, .. } in mutations::all() {
         let times = read(&root.join(file))?.matches(search).count();
@@ -132,8 +132,8 @@ fn fits(root: &Path) -> Outcome {
 }
 
 /// Checks that every mutation applies, and that the page matches the list.
-pub(crate) fn check(root: &Path) -> Outcome {
-    fits(root)?;
+pub(crate) fn check(root: &Path) -> XtaskResult {
+    check_search_texts(root)?;
     let page = read(&root.join(PAGE))?;
     let mut findings: Vec<String> =
         mutations::all().filter(|mutation| !page.contains(&beginning(mutation))).map(|m| m.name.to_string()).collect();
@@ -157,37 +157,37 @@ fn target(binary: &str) -> Vec<&str> {
 /// The test binaries of some mutations, each with all of their test name parts.
 fn binaries(mutations: &[&Mutation]) -> BTreeMap<&'static str, Vec<&'static str>> {
     let mut found: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for (binary, words) in mutations.iter().map(|mutation| mutation.tests) {
+    for (binary, name_parts) in mutations.iter().map(|mutation| mutation.tests) {
         let all = found.entry(binary).or_default();
-        all.extend(words);
+        all.extend(name_parts);
         all.sort_unstable();
         all.dedup();
     }
     found
 }
 
-fn verdict(passed: bool, said: &str, words: &[&str]) -> Verdict {
+fn verdict(passed: bool, said: &str, words: &[&str]) -> MutationResult {
     let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_string());
     let caught: Vec<String> = said.lines().filter_map(failed).collect();
     // An aborted test binary reports only the test that was running.
     if !caught.is_empty() {
         let misses = |word: &&&str| !caught.iter().any(|name| name.contains(**word));
         let missing = words.iter().filter(misses).map(|word| (*word).to_string()).collect();
-        return Verdict::Caught(caught, missing);
+        return MutationResult::Caught(caught, missing);
     }
     if !passed {
-        return Verdict::NotTried("no test failed: the change does not compile, or the tests died".into());
+        return MutationResult::NotTried("no test failed: the change does not compile, or the tests died".into());
     }
     if said.lines().any(|line| line.starts_with("running ") && !line.starts_with("running 0 ")) {
-        Verdict::Survived
+        MutationResult::Survived
     } else {
-        Verdict::NotTried("no test has such a name".into())
+        MutationResult::NotTried("no test has such a name".into())
     }
 }
 
 /// Updates `to` with the files below `from`. Unchanged files keep their time stamps, so that cargo builds only changed
 /// code.
-fn copy(from: &Path, to: &Path) -> Outcome {
+fn copy(from: &Path, to: &Path) -> XtaskResult {
     let wanted = files_below(from);
     for file in &wanted {
         let (source, copy): (PathBuf, PathBuf) = (from.join(file), to.join(file));
@@ -208,11 +208,11 @@ fn copy(from: &Path, to: &Path) -> Outcome {
     Ok(())
 }
 
-fn read(path: &Path) -> Outcome<String> {
+fn read(path: &Path) -> XtaskResult<String> {
     fs::read_to_string(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }
 
-fn write(path: &Path, text: &str) -> Outcome {
+fn write(path: &Path, text: &str) -> XtaskResult {
     fs::write(path, text).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }
 
@@ -225,7 +225,7 @@ mod tests {
         let all: Vec<&Mutation> = mutations::all().collect();
         assert!(all.len() >= 80);
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        fits(&root).expect("every text stands once");
+        check_search_texts(&root).expect("every text stands once");
         for (k, mutation) in all.iter().enumerate() {
             assert!(all[..k].iter().all(|other| other.name != mutation.name), "{}", mutation.name);
             assert!(!mutation.tests.1.is_empty(), "{}", mutation.name);
@@ -235,12 +235,12 @@ mod tests {
     #[test]
     fn what_tests_say_is_understood() {
         let failed = "running 2 tests\ntest a::holds ... FAILED\ntest b::holds ... ok\n";
-        assert_eq!(verdict(false, failed, &["a"]), Verdict::Caught(vec!["a::holds".into()], Vec::new()));
-        let partly = Verdict::Caught(vec!["a::holds".into()], vec!["b".into()]);
+        assert_eq!(verdict(false, failed, &["a"]), MutationResult::Caught(vec!["a::holds".into()], Vec::new()));
+        let partly = MutationResult::Caught(vec!["a::holds".into()], vec!["b".into()]);
         assert_eq!(verdict(false, failed, &["a", "b"]), partly);
-        assert_eq!(verdict(true, "running 1 test\ntest a ... ok\n", &["a"]), Verdict::Survived);
-        assert!(matches!(verdict(false, "", &["a"]), Verdict::NotTried(_)));
-        assert!(matches!(verdict(true, "running 0 tests\n", &["a"]), Verdict::NotTried(_)));
+        assert_eq!(verdict(true, "running 1 test\ntest a ... ok\n", &["a"]), MutationResult::Survived);
+        assert!(matches!(verdict(false, "", &["a"]), MutationResult::NotTried(_)));
+        assert!(matches!(verdict(true, "running 0 tests\n", &["a"]), MutationResult::NotTried(_)));
     }
 
     #[test]

@@ -26,7 +26,7 @@ impl OwnTime {
 
     /// Updates the processor time of the process. Call it while the process runs: the kernel discards the counters
     /// afterwards.
-    pub(crate) fn look(&mut self) {
+    pub(crate) fn update(&mut self) {
         let stat = fs::read_to_string(format!("/proc/{}/stat", self.pid)).ok();
         if let Some(own) = stat.and_then(|text| process(&text)) {
             self.own = self.own.max(own);
@@ -39,7 +39,7 @@ impl OwnTime {
         let now = fs::read_to_string("/proc/stat").ok().and_then(|text| machine(&text));
         match (self.machine, now) {
             (Some((before, cores)), Some((after, _))) => {
-                Duration::from_secs_f64(alone(clock.as_secs_f64(), after - before, self.own, cores))
+                Duration::from_secs_f64(time_alone(clock.as_secs_f64(), after - before, self.own, cores))
             }
             _ => clock,
         }
@@ -48,7 +48,7 @@ impl OwnTime {
 
 /// Estimated run time \[s\] of a program alone on the machine. The program ran for `clock` seconds, while the machine's
 /// cores worked for `busy` seconds in total, `own` of them for the program.
-fn alone(clock: f64, busy: f64, own: f64, cores: f64) -> f64 {
+fn time_alone(clock: f64, busy: f64, own: f64, cores: f64) -> f64 {
     // Lower bound: the program's work spread over all cores.
     (clock - (busy - own).max(0.0) / cores).max(own / cores)
 }
@@ -93,13 +93,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn foreign_time() {
+    fn load_of_other_programs() {
         // Alone, on one core of two and on both.
-        assert_eq!([alone(10.0, 10.0, 10.0, 2.0), alone(10.0, 20.0, 20.0, 2.0)], [10.0, 10.0]);
+        assert_eq!([time_alone(10.0, 10.0, 10.0, 2.0), time_alone(10.0, 20.0, 20.0, 2.0)], [10.0, 10.0]);
         // The program waited for others as long as it worked.
-        assert_eq!(alone(20.0, 40.0, 20.0, 2.0), 10.0);
+        assert_eq!(time_alone(20.0, 40.0, 20.0, 2.0), 10.0);
         // Processor times and wall time are sampled at slightly different times.
-        assert_eq!(alone(10.0, 19.0, 20.0, 2.0), 10.0);
+        assert_eq!(time_alone(10.0, 19.0, 20.0, 2.0), 10.0);
     }
 
     #[test]
@@ -121,7 +121,7 @@ mod tests {
         while begun.elapsed() < Duration::from_millis(300) {
             sum = sum.wrapping_add(std::hint::black_box(1));
         }
-        watch.look();
+        watch.update();
         assert!(sum > 0 && watch.elapsed() <= begun.elapsed() + Duration::from_millis(50), "{watch:?}");
         assert!(!cfg!(target_os = "linux") || watch.own > 0.0, "{watch:?}");
     }

@@ -1,6 +1,6 @@
 //! The physics page: tables of the measured laws, and the check of an existing page.
 
-use crate::run::{Failure, Outcome};
+use crate::run::{Failure, XtaskResult};
 use kinetoscope_plot::{Plot, Series};
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ const GROUPS: [(&str, &str); 5] = [
 ];
 /// Share of its tolerance by which a number may differ, without a reason, between two machines or two supported MuJoCo
 /// versions.
-const SAME: f64 = 0.1;
+const MAX_TOLERANCE_SHARE: f64 = 0.1;
 /// Digits after the first digit of the numbers on the page.
 const DIGITS: usize = 8;
 
@@ -34,14 +34,14 @@ pub(crate) struct Row {
     pub(crate) mujoco: String,
     pub(crate) pass: bool,
     /// The law's reason for a difference between MuJoCo versions, if given.
-    pub(crate) lines_differ: Option<String>,
+    pub(crate) version_difference: Option<String>,
     /// True if the reason is for this row alone: the versions must then differ.
     pub(crate) must_differ: bool,
 }
 
 /// Results of one run.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Measured {
+pub(crate) struct PhysicsRun {
     pub(crate) rows: Vec<Row>,
     pub(crate) controls: usize,
     /// The controls that do not miss: law, quantity and removed effect.
@@ -51,7 +51,7 @@ pub(crate) struct Measured {
 }
 
 /// Reads the files that the tests wrote into `folder`, in the order of the page.
-pub(crate) fn read(folder: &Path) -> Outcome<Measured> {
+pub(crate) fn read(folder: &Path) -> XtaskResult<PhysicsRun> {
     let fail = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", folder.display()));
     let mut laws = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| fail(&e))? {
@@ -65,7 +65,7 @@ pub(crate) fn read(folder: &Path) -> Outcome<Measured> {
         return Err(fail(&format!("a law of the unknown group {}", law["group"])));
     }
     laws.sort_by_key(|law| (order(law), law["name"].as_str().map(str::to_string)));
-    let mut measured = Measured::default();
+    let mut measured = PhysicsRun::default();
     for law in &laws {
         add(&mut measured, law).ok_or_else(|| fail(&format!("not what a law writes: {law}")))?;
     }
@@ -75,7 +75,7 @@ pub(crate) fn read(folder: &Path) -> Outcome<Measured> {
     Ok(measured)
 }
 
-fn add(to: &mut Measured, law: &Value) -> Option<()> {
+fn add(to: &mut PhysicsRun, law: &Value) -> Option<()> {
     let text = |value: &Value| value.as_str().map(str::to_string);
     // JSON has no NaN, which is written as null.
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
@@ -92,7 +92,7 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
             tolerance: number(&row["tolerance"]),
             mujoco: mujoco.clone(),
             pass: row["pass"].as_bool()?,
-            lines_differ: text(&row["lines_differ"]).or_else(|| text(&measured["lines_differ"])),
+            version_difference: text(&row["lines_differ"]).or_else(|| text(&measured["lines_differ"])),
             must_differ: row["lines_differ"].is_string(),
         });
     }
@@ -113,7 +113,14 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
         let log = plot["log"].as_bool()?;
         // A series with few points holds measurements, not samples of a curve.
         let marks = series.iter().all(|series: &Series| series.points.len() <= 12);
-        let plot = Plot { title: text(&plot["title"])?, axes, log, marks, series, ..Plot::default() };
+        let plot = Plot {
+            title: text(&plot["title"])?,
+            axis_labels: axes,
+            log_axes: log,
+            markers: marks,
+            series,
+            ..Plot::default()
+        };
         to.plots.push((name.clone(), plot, mujoco.clone()));
     }
     Some(())
@@ -121,7 +128,7 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
 
 /// The plots of all runs, named after their files, which have the names of the laws. Curves that differ between MuJoCo
 /// versions are drawn for each version.
-pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
+pub(crate) fn plots(runs: &[PhysicsRun]) -> Vec<(String, Plot)> {
     let mut found: Vec<(String, Plot, &str)> = Vec::new();
     for (law, plot, mujoco) in runs.iter().flat_map(|run| &run.plots) {
         let labelled = |series: &Series, mujoco: &str| Series {
@@ -137,7 +144,7 @@ pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
             Some((_, other, first)) => {
                 for series in &plot.series {
                     let Some(at) = other.series.iter().position(|old| old.name == series.name) else { continue };
-                    if !looks_as(&other.series[at], series) {
+                    if !looks_like(&other.series[at], series) {
                         other.series[at] = labelled(&other.series[at], first);
                         other.series.push(labelled(series, mujoco));
                     }
@@ -148,7 +155,7 @@ pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
     found.into_iter().map(|(name, plot, _)| (name, plot)).collect()
 }
 
-fn looks_as(a: &Series, b: &Series) -> bool {
+fn looks_like(a: &Series, b: &Series) -> bool {
     let near = |x: f64, y: f64| (x - y).abs() <= 0.02 * x.abs().max(y.abs());
     let pairs = || a.points.iter().zip(&b.points);
     // Rounding errors may differ by any amount.
@@ -162,7 +169,7 @@ fn looks_as(a: &Series, b: &Series) -> bool {
 ///
 /// # Errors
 /// The MuJoCo versions differ and no law gives a reason.
-pub(crate) fn page(runs: &[Measured]) -> Outcome<String> {
+pub(crate) fn page(runs: &[PhysicsRun]) -> XtaskResult<String> {
     let rows: Vec<&Row> = runs.iter().flat_map(|run| &run.rows).collect();
     let mut laws: Vec<(&str, &str)> = rows.iter().map(|row| (row.group.as_str(), row.law.as_str())).collect();
     laws.sort_unstable();
@@ -259,7 +266,7 @@ fn number(x: f64) -> String {
 }
 
 /// The table of the differences between the MuJoCo versions.
-fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
+fn differences(rows: &[&Row], versions: &[&str]) -> XtaskResult<String> {
     let [first, second] = versions else { return Ok(String::new()) };
     let mut out = format!(
         "\n## Where {first} and {second} differ\n\nAll other numbers of both agree within a tenth of their tolerances.\n\n\
@@ -269,11 +276,11 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
     for row in rows.iter().filter(|row| row.mujoco == **first) {
         let Some(other) = rows.iter().find(|other| other.mujoco == **second && is_same(other, row)) else {
             some = true;
-            let why = row.lines_differ.as_deref().unwrap_or("not measured there");
+            let why = row.version_difference.as_deref().unwrap_or("not measured there");
             let _ = writeln!(out, "| {} | {} | {} | - | {why} |", row.law, row.quantity, number(row.measured));
             continue;
         };
-        let most = row.tolerance.min(other.tolerance) * SAME;
+        let most = row.tolerance.min(other.tolerance) * MAX_TOLERANCE_SHARE;
         if (row.measured - other.measured).abs() <= most {
             if row.must_differ {
                 needless.push(format!("{} ({})", row.law, row.quantity));
@@ -281,7 +288,7 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
             continue;
         }
         some = true;
-        match &row.lines_differ {
+        match &row.version_difference {
             None => unexplained.push(format!(
                 "{} ({}): {} and {}, with a tolerance of {:.1e}",
                 row.law,
@@ -300,7 +307,7 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
     for row in rows.iter().filter(|row| row.mujoco == **second) {
         if !rows.iter().any(|other| other.mujoco == **first && is_same(other, row)) {
             some = true;
-            let why = row.lines_differ.as_deref().unwrap_or("not measured there");
+            let why = row.version_difference.as_deref().unwrap_or("not measured there");
             let _ = writeln!(out, "| {} | {} | - | {} | {why} |", row.law, row.quantity, number(row.measured));
         }
     }
@@ -318,7 +325,7 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
 
 /// Statements of a page that were not measured: numbers that changed by more than a tenth of their tolerance, missing
 /// or superfluous rows, and differences in the text around the tables.
-pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
+pub(crate) fn outdated_statements(page: &str, runs: &[PhysicsRun]) -> Vec<String> {
     let mut findings = Vec::new();
     let now = match self::page(runs) {
         Ok(now) => now,
@@ -330,25 +337,25 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
         (page.lines().filter(is_text).collect(), now.lines().filter(is_text).collect());
     findings.extend(is.iter().filter(|line| !was.contains(line)).map(|line| format!("not on the page: {line}")));
     findings.extend(was.iter().filter(|line| !is.contains(line)).map(|line| format!("only on the page: {line}")));
-    findings.extend(untrue_differences(page, &now, runs));
-    let mut said: Vec<Vec<String>> = page.lines().filter_map(cells).filter(|cells| cells.len() == 9).collect();
-    said.retain(|cells| cells[0].starts_with('['));
+    findings.extend(outdated_differences(page, &now, runs));
+    let mut old_rows: Vec<Vec<String>> = page.lines().filter_map(cells).filter(|cells| cells.len() == 9).collect();
+    old_rows.retain(|cells| cells[0].starts_with('['));
     for row in runs.iter().flat_map(|run| &run.rows) {
         // The row as it would be written now; rows with equal text in the key columns correspond.
         let new = cells(&table_row(row)).unwrap_or_default();
         let name = format!("{} ({}, MuJoCo {})", row.law, row.quantity, row.mujoco);
         let key = |cells: &[String]| [0, 2, 7].map(|k| cells[k].clone());
-        let Some(at) = said.iter().position(|old| key(old) == key(&new)) else {
+        let Some(at) = old_rows.iter().position(|old| key(old) == key(&new)) else {
             findings.push(format!("{name} is not on the page"));
             continue;
         };
-        let old = said.swap_remove(at);
+        let old = old_rows.swap_remove(at);
         let parsed = |cell: &str| cell.parse::<f64>().unwrap_or(f64::NAN);
         for (k, what) in [(3, "expected"), (4, "measured"), (5, "error")] {
             let (was, is) = (parsed(&old[k]), parsed(&new[k]));
             // An error is written with two digits.
             let digits = if k == 5 { 1 } else { DIGITS as i32 };
-            let most = SAME * row.tolerance + 10.0_f64.powi(1 - digits) * is.abs();
+            let most = MAX_TOLERANCE_SHARE * row.tolerance + 10.0_f64.powi(1 - digits) * is.abs();
             // Not `>`, so that NaN counts as a difference.
             let agrees = (was - is).abs() <= most;
             if !agrees {
@@ -361,12 +368,12 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
             }
         }
     }
-    findings.extend(said.iter().map(|row| format!("{} ({}, MuJoCo {}) was not measured", row[0], row[2], row[7])));
+    findings.extend(old_rows.iter().map(|row| format!("{} ({}, MuJoCo {}) was not measured", row[0], row[2], row[7])));
     findings
 }
 
 /// Statements in the table of version differences that were not measured.
-fn untrue_differences(page: &str, now: &str, runs: &[Measured]) -> Vec<String> {
+fn outdated_differences(page: &str, now: &str, runs: &[PhysicsRun]) -> Vec<String> {
     let table = |text: &str| -> Vec<Vec<String>> {
         text.lines().filter_map(cells).filter(|cells| cells.len() == 5 && cells[0] != "test").collect()
     };
@@ -377,7 +384,9 @@ fn untrue_differences(page: &str, now: &str, runs: &[Measured]) -> Vec<String> {
         let tolerance =
             runs.iter().flat_map(|run| &run.rows).filter(of_row).map(|row| row.tolerance).fold(0.0, f64::max);
         [2, 3].iter().all(|&k| match (old[k].parse::<f64>(), new[k].parse::<f64>()) {
-            (Ok(was), Ok(is)) => (was - is).abs() <= SAME * tolerance + 10.0_f64.powi(1 - DIGITS as i32) * is.abs(),
+            (Ok(was), Ok(is)) => {
+                (was - is).abs() <= MAX_TOLERANCE_SHARE * tolerance + 10.0_f64.powi(1 - DIGITS as i32) * is.abs()
+            }
             _ => old[k] == new[k],
         })
     };
@@ -419,13 +428,13 @@ mod tests {
             tolerance: 1e-6,
             mujoco: mujoco.into(),
             pass: true,
-            lines_differ: None,
+            version_difference: None,
             must_differ: false,
         }
     }
 
-    fn run(mujoco: &str, measured: f64) -> Measured {
-        Measured { rows: vec![row(mujoco, measured)], controls: 1, ..Measured::default() }
+    fn run(mujoco: &str, measured: f64) -> PhysicsRun {
+        PhysicsRun { rows: vec![row(mujoco, measured)], controls: 1, ..PhysicsRun::default() }
     }
 
     #[test]
@@ -434,36 +443,40 @@ mod tests {
         let page = page(&runs).expect("they agree");
         assert!(page.contains("| [free_fall](../tests/physics/rigid_body/free_fall.rs) | \\|z\\| = g t²/2 | height [m] | 1.095 | 1.095 | 0.0e0 | 1.0e-6 | 2.2.2 | pass |"), "{page}");
         assert_eq!(page.matches("| pass |").count(), 2);
-        assert_eq!(untrue(&page, &runs), Vec::<String>::new());
+        assert_eq!(outdated_statements(&page, &runs), Vec::<String>::new());
         assert!(page.contains("1 laws") && !page.contains("FAIL") && !page.contains("differ\n"), "{page}");
     }
 
     #[test]
     fn what_changed_is_untrue() {
         let page = page(&[run("2.2.2", 1.095)]).expect("one line");
-        assert_eq!(untrue(&page, &[run("2.2.2", 1.095 + 5e-8)]), Vec::<String>::new());
-        let found = untrue(&page, &[run("2.2.2", 1.095 + 3e-7)]);
+        assert_eq!(outdated_statements(&page, &[run("2.2.2", 1.095 + 5e-8)]), Vec::<String>::new());
+        let found = outdated_statements(&page, &[run("2.2.2", 1.095 + 3e-7)]);
         assert!(found.len() == 1 && found[0].contains("1.0950003 now"), "{found:?}");
         // The changed row, the removed row, and the version in the text, old and new.
-        assert_eq!(untrue(&page, &[run("4.0.0", 1.095)]).len(), 4);
+        assert_eq!(outdated_statements(&page, &[run("4.0.0", 1.095)]).len(), 4);
         let mut failed = run("2.2.2", 1.095);
         failed.rows[0].pass = false;
-        assert!(untrue(&page, &[failed]).iter().any(|finding| finding.contains("`pass` on the page, `**FAIL**` now")));
+        assert!(
+            outdated_statements(&page, &[failed])
+                .iter()
+                .any(|finding| finding.contains("`pass` on the page, `**FAIL**` now"))
+        );
         let mut more = run("2.2.2", 1.095);
         more.controls = 2;
-        assert!(untrue(&page, &[more])[0].contains("2 controls"));
+        assert!(outdated_statements(&page, &[more])[0].contains("2 controls"));
         let forged = page.replace("| 0.0e0 |", "| 3.0e-7 |");
-        assert!(untrue(&forged, &[run("2.2.2", 1.095)])[0].contains("error"), "{forged}");
+        assert!(outdated_statements(&forged, &[run("2.2.2", 1.095)])[0].contains("error"), "{forged}");
         let mut other = run("2.2.2", 1.095);
         other.rows[0].statement = "z = 0".into();
-        assert_eq!(untrue(&page, &[other]).len(), 1);
+        assert_eq!(outdated_statements(&page, &[other]).len(), 1);
     }
 
     #[test]
     fn reason_without_difference() {
         let mut runs = [run("2.2.2", 1.095), run("4.0.0", 1.095)];
         for run in &mut runs {
-            run.rows[0].lines_differ = Some("it was mended".into());
+            run.rows[0].version_difference = Some("it was mended".into());
         }
         assert!(page(&runs).is_ok(), "a reason for some of the numbers of a law");
         for run in &mut runs {
@@ -479,15 +492,15 @@ mod tests {
         let failure = page(&runs).expect_err("no reason");
         assert!(failure.message.contains("free_fall"), "{failure}");
         for run in &mut runs {
-            run.rows[0].lines_differ = Some("it was mended".into());
+            run.rows[0].version_difference = Some("it was mended".into());
         }
         let page = page(&runs).expect("a reason");
         assert!(page.contains("| it was mended |"));
-        assert_eq!(untrue(&page, &runs), Vec::<String>::new());
+        assert_eq!(outdated_statements(&page, &runs), Vec::<String>::new());
         let forged = page.replace("| it was mended |", "| it was always so |");
-        assert_eq!(untrue(&forged, &runs).len(), 2);
+        assert_eq!(outdated_statements(&forged, &runs).len(), 2);
         let forged = page.replace("| height | 1.095 | 1.0950005 |", "| height | 1.095 | 1.0960005 |");
-        assert!(untrue(&forged, &runs)[0].contains("1.0960005 on the page"), "{forged}");
+        assert!(outdated_statements(&forged, &runs)[0].contains("1.0960005 on the page"), "{forged}");
     }
 
     #[test]
@@ -499,7 +512,7 @@ mod tests {
             serde_json::json!({ "name": "free_fall", "mujoco": "2.2.2", "measured": measured })
         };
         for (misses, text) in [(true, "2 controls, in which"), (false, "**1 of 2 controls hold as well")] {
-            let mut measured = Measured { rows: vec![row("2.2.2", 1.095)], ..Measured::default() };
+            let mut measured = PhysicsRun { rows: vec![row("2.2.2", 1.095)], ..PhysicsRun::default() };
             add(&mut measured, &law(misses)).expect("a law");
             let page = page(&[measured]).expect("one line");
             assert!(page.contains(text), "{page}");
@@ -521,8 +534,10 @@ mod tests {
             let series = vec![Series { name: "RK4".into(), points: vec![[1.0, y], [2.0, 1.0]] }];
             Plot { title: "t".into(), series, ..Plot::default() }
         };
-        let of =
-            |mujoco: &str, y| Measured { plots: vec![("law".into(), plot(y), mujoco.into())], ..Measured::default() };
+        let of = |mujoco: &str, y| PhysicsRun {
+            plots: vec![("law".into(), plot(y), mujoco.into())],
+            ..PhysicsRun::default()
+        };
         assert_eq!(plots(&[of("2.2.2", 1.0), of("4.0.0", 1.001)])[0].1.series.len(), 1);
         let both = plots(&[of("2.2.2", 1.0), of("4.0.0", 1.5)]);
         let names: Vec<&str> = both[0].1.series.iter().map(|series| series.name.as_str()).collect();

@@ -1,10 +1,10 @@
 //! `cargo xtask physics-report`: measures the laws of physics on both supported MuJoCo versions and writes the page of
 //! results.
 
-use crate::physics_page::{self, Measured};
+use crate::physics_page::{self, PhysicsRun};
 use crate::progress::Progress;
-use crate::run::{Failure, Outcome, Repo, no_findings};
-use crate::setup::{self, Line, Wanted};
+use crate::run::{Failure, Repo, XtaskResult, no_findings};
+use crate::setup::{self, MujocoVersion, Requirements};
 use crate::svg;
 use kinetoscope_plot::Plot;
 use std::fs;
@@ -15,9 +15,9 @@ const PAGE: &str = "docs/physics.md";
 const PLOTS: &str = "docs/physics";
 /// Environment variable with the folder for the results of the laws.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_PHYSICS_ROWS";
-const LINES: [Line; 2] = [Line::Debian, Line::Wheel];
+const VERSIONS: [MujocoVersion; 2] = [MujocoVersion::Debian, MujocoVersion::Wheel];
 /// Largest accepted shift of a curve in an existing plot \[pixels\].
-const PIXELS: f64 = 1.0;
+const MAX_SHIFT_PIXELS: f64 = 1.0;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct PhysicsReportArgs {
@@ -27,16 +27,16 @@ pub(crate) struct PhysicsReportArgs {
 }
 
 /// The folder of a version's rows, below the target folder.
-fn folder(repo: &Repo, line: Line) -> PathBuf {
+fn folder(repo: &Repo, line: MujocoVersion) -> PathBuf {
     let name = match line {
-        Line::Debian => "2",
-        Line::Wheel => "4",
+        MujocoVersion::Debian => "2",
+        MujocoVersion::Wheel => "4",
     };
     repo.target.join("physics-rows").join(name)
 }
 
 /// An empty folder for the rows of a version, without rows of earlier runs.
-pub(crate) fn fresh_folder(repo: &Repo, line: Line) -> Outcome<PathBuf> {
+pub(crate) fn fresh_folder(repo: &Repo, line: MujocoVersion) -> XtaskResult<PathBuf> {
     let folder = folder(repo, line);
     let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", folder.display()));
     if folder.exists() {
@@ -47,16 +47,16 @@ pub(crate) fn fresh_folder(repo: &Repo, line: Line) -> Outcome<PathBuf> {
 }
 
 /// Removes the rows of earlier runs.
-pub(crate) fn forget_rows(repo: &Repo) -> Outcome {
-    LINES.iter().try_for_each(|&line| fresh_folder(repo, line).map(|_| ()))
+pub(crate) fn clear_rows(repo: &Repo) -> XtaskResult {
+    VERSIONS.iter().try_for_each(|&line| fresh_folder(repo, line).map(|_| ()))
 }
 
-pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> Outcome {
+pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> XtaskResult {
     let mut failed = Ok(());
-    let mut progress = Progress::of(LINES.len());
-    for line in LINES {
+    let mut progress = Progress::new(VERSIONS.len());
+    for line in VERSIONS {
         progress.begin(&format!("the laws of physics on the line {line:?} of MuJoCo"));
-        let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
+        let ready = setup::prepare(repo, Requirements { version: Some(line), extras: &[] })?;
         let rows = fresh_folder(repo, line)?;
         let tests = ready.cargo().env(VARIABLE, rows).args(["test", "--package", "kinetoscope", "--test", "physics"]);
         // The page also shows the results of failing laws.
@@ -74,20 +74,20 @@ pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> Outcome {
 }
 
 /// Compares the page with the rows that the tests of both versions have written ([`fresh_folder`]).
-pub(crate) fn check_rows(repo: &Repo) -> Outcome {
+pub(crate) fn check_rows(repo: &Repo) -> XtaskResult {
     compare(repo, &measured(repo)?)
 }
 
 /// True if both versions have written rows.
 pub(crate) fn has_rows(repo: &Repo) -> bool {
-    LINES.iter().all(|&line| fs::read_dir(folder(repo, line)).is_ok_and(|mut files| files.next().is_some()))
+    VERSIONS.iter().all(|&line| fs::read_dir(folder(repo, line)).is_ok_and(|mut files| files.next().is_some()))
 }
 
-fn measured(repo: &Repo) -> Outcome<Vec<Measured>> {
-    LINES.iter().map(|&line| physics_page::read(&folder(repo, line))).collect()
+fn measured(repo: &Repo) -> XtaskResult<Vec<PhysicsRun>> {
+    VERSIONS.iter().map(|&line| physics_page::read(&folder(repo, line))).collect()
 }
 
-fn pictures(runs: &[Measured]) -> Outcome<Vec<(String, String)>> {
+fn plot_files(runs: &[PhysicsRun]) -> XtaskResult<Vec<(String, String)>> {
     let picture = |(law, plot): (String, Plot)| {
         let text = plot.to_svg().map_err(|e| Failure::new(format!("{law}: {e}")))?;
         Ok((format!("{law}.svg"), text))
@@ -95,7 +95,7 @@ fn pictures(runs: &[Measured]) -> Outcome<Vec<(String, String)>> {
     physics_page::plots(runs).into_iter().map(picture).collect()
 }
 
-fn write(repo: &Repo, runs: &[Measured]) -> Outcome {
+fn write(repo: &Repo, runs: &[PhysicsRun]) -> XtaskResult {
     let page = physics_page::page(runs)?;
     let plots = repo.root.join(PLOTS);
     let fail = |e: std::io::Error| Failure::new(format!("{PLOTS}: {e}"));
@@ -103,26 +103,26 @@ fn write(repo: &Repo, runs: &[Measured]) -> Outcome {
         fs::remove_dir_all(&plots).map_err(fail)?;
     }
     fs::create_dir_all(&plots).map_err(fail)?;
-    for (name, text) in pictures(runs)? {
+    for (name, text) in plot_files(runs)? {
         fs::write(plots.join(name), text).map_err(fail)?;
     }
     fs::write(repo.root.join(PAGE), page).map_err(|e| Failure::new(format!("{PAGE}: {e}")))
 }
 
-fn compare(repo: &Repo, runs: &[Measured]) -> Outcome {
+fn compare(repo: &Repo, runs: &[PhysicsRun]) -> XtaskResult {
     // Fails if the versions differ without a reason.
     physics_page::page(runs)?;
-    let mut findings = physics_page::untrue(&repo.read(PAGE)?, runs);
-    findings.extend(untrue_pictures(&repo.root.join(PLOTS), &pictures(runs)?)?);
+    let mut findings = physics_page::outdated_statements(&repo.read(PAGE)?, runs);
+    findings.extend(outdated_plots(&repo.root.join(PLOTS), &plot_files(runs)?)?);
     no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
 }
 
 /// Differences between the folder of the plots and the plots of the report: missing, outdated and superfluous files.
-fn untrue_pictures(folder: &Path, pictures: &[(String, String)]) -> Outcome<Vec<String>> {
+fn outdated_plots(folder: &Path, pictures: &[(String, String)]) -> XtaskResult<Vec<String>> {
     let mut findings = Vec::new();
     for (name, text) in pictures {
         match fs::read_to_string(folder.join(name)) {
-            Ok(old) if svg::agree(&old, text, PIXELS) => {}
+            Ok(old) if svg::agree(&old, text, MAX_SHIFT_PIXELS) => {}
             Ok(_) => findings.push(format!("{PLOTS}/{name} shows other curves, or other numbers at its axes")),
             Err(_) => findings.push(format!("{PLOTS}/{name} is not there")),
         }
@@ -144,14 +144,14 @@ mod tests {
     use kinetoscope_plot::Series;
 
     #[test]
-    fn pictures() {
+    fn plot_files() {
         let of = |name: &str, size: f64| {
             let series = vec![Series { name: "RK4".into(), points: vec![[0.0, 0.0], [1.0, size], [2.0, 0.0]] }];
             let plot = Plot { title: "t".into(), series, ..Plot::default() };
             (format!("{name}.svg"), plot.to_svg().expect("a size that can be drawn"))
         };
         let folder = tempfile::tempdir().expect("a scratch folder");
-        let look = |pictures: &[(String, String)]| untrue_pictures(folder.path(), pictures).expect("readable");
+        let look = |pictures: &[(String, String)]| outdated_plots(folder.path(), pictures).expect("readable");
         let pictures = [of("top", 1.0), of("bounce", 2.0)];
         for (name, text) in &pictures {
             fs::write(folder.path().join(name), text).expect("writable");

@@ -17,7 +17,7 @@ pub(crate) struct Progress {
 
 impl Progress {
     /// Starts work with this number of parts.
-    pub(crate) fn of(parts: usize) -> Self {
+    pub(crate) fn new(parts: usize) -> Self {
         Self { parts, begun: 0, start: Instant::now(), terminal: std::io::stderr().is_terminal() }
     }
 

@@ -1,7 +1,7 @@
 //! Python environments for comparisons with other programs. One has the MuJoCo of the wheel, for the baselines of the
 //! benchmarks and for MuJoCo's own renderer as a reference of our images. Another has readers of our recordings.
 
-use crate::run::{Cmd, Outcome, Repo};
+use crate::run::{Cmd, Repo, XtaskResult};
 use crate::wheel;
 use std::path::{Path, PathBuf};
 
@@ -92,7 +92,7 @@ pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
 }
 
 /// Installs wheels only: building PyBullet takes a compiler and half an hour.
-fn pip_install(python: &Path, packages: &[&str]) -> Outcome {
+fn pip_install(python: &Path, packages: &[&str]) -> XtaskResult {
     Cmd::new(python)
         .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--only-binary=:all:"])
         .args(packages)

@@ -1,7 +1,7 @@
 //! Real robots for the tests: `../shared/robots` if it exists, otherwise the robots of the PyPI package
 //! `example-robot-data`.
 
-use crate::run::{Cmd, Failure, Outcome, Repo};
+use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::wheel;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Environment variable with the folder of robots for the tests.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_ROBOTS";
 /// Robots next to the repository.
-const BESIDE: &str = "../shared/robots";
+const LOCAL_FOLDER: &str = "../shared/robots";
 /// BSD-licensed descriptions of some fifty robots. It is installed without dependencies, because the package brings a
 /// loader for Pinocchio.
 const PACKAGE: &str = "example-robot-data==6.0.0";
@@ -29,8 +29,8 @@ pub(crate) enum Robots {
 ///
 /// # Errors
 /// If no robots are found and the download fails.
-pub(crate) fn obtain(repo: &Repo) -> Outcome<Robots> {
-    if std::env::var_os(VARIABLE).is_some() || repo.root.join(BESIDE).is_dir() {
+pub(crate) fn obtain(repo: &Repo) -> XtaskResult<Robots> {
+    if std::env::var_os(VARIABLE).is_some() || repo.root.join(LOCAL_FOLDER).is_dir() {
         return Ok(Robots::Complete);
     }
     let folder = repo.target.join("robots");
@@ -41,7 +41,7 @@ pub(crate) fn obtain(repo: &Repo) -> Outcome<Robots> {
 }
 
 /// Downloads into a scratch folder and renames it once it is complete.
-fn download(target: &Path, folder: &Path) -> Outcome {
+fn download(target: &Path, folder: &Path) -> XtaskResult {
     let pip = wheel::pip().ok_or_else(|| Failure::new("real robots are downloaded with pip, which is missing"))?;
     let scratch = target.join(format!("robots-{}", std::process::id()));
     let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", scratch.display()));

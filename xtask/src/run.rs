@@ -12,22 +12,22 @@ use std::{env, fmt, thread};
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub(crate) message: String,
-    pub(crate) again: Option<String>,
+    pub(crate) repeat_command: Option<String>,
     pub(crate) code: u8,
 }
 
-pub(crate) type Outcome<T = ()> = Result<T, Failure>;
+pub(crate) type XtaskResult<T = ()> = Result<T, Failure>;
 
 impl Failure {
     pub(crate) fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into(), again: None, code: 1 }
+        Self { message: message.into(), repeat_command: None, code: 1 }
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "error: {}", self.message)?;
-        match &self.again {
+        match &self.repeat_command {
             Some(again) => write!(f, "\nto repeat it: {again}"),
             None => Ok(()),
         }
@@ -41,7 +41,7 @@ impl From<String> for Failure {
 }
 
 /// Combines several findings of one check into one failure; `Ok` without findings.
-pub(crate) fn no_findings(what: &str, findings: &[String]) -> Outcome {
+pub(crate) fn no_findings(what: &str, findings: &[String]) -> XtaskResult {
     if findings.is_empty() {
         return Ok(());
     }
@@ -69,7 +69,7 @@ pub(crate) struct Repo {
 }
 
 impl Repo {
-    pub(crate) fn find() -> Outcome<Self> {
+    pub(crate) fn find() -> XtaskResult<Self> {
         // Cargo sets the variable for `cargo run`; the compiled-in value serves a binary started directly.
         let manifest_dir =
             env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
@@ -85,7 +85,7 @@ impl Repo {
         Ok(Self { root: folder("workspace_root")?, target: folder("target_directory")?, metadata })
     }
 
-    pub(crate) fn read(&self, path: &str) -> Outcome<String> {
+    pub(crate) fn read(&self, path: &str) -> XtaskResult<String> {
         std::fs::read_to_string(self.root.join(path)).map_err(|e| Failure::new(format!("{path}: {e}")))
     }
 }
@@ -148,7 +148,7 @@ impl Cmd {
     }
 
     /// Prints the command line, streams the output, and fails unless the exit code is 0.
-    pub(crate) fn run(mut self) -> Outcome {
+    pub(crate) fn run(mut self) -> XtaskResult {
         eprintln!("$ {self}");
         let status = self.inner.status().map_err(|e| self.not_started(&e))?;
         self.check(status)
@@ -160,7 +160,7 @@ impl Cmd {
     }
 
     /// Standard output of a silent run; standard error goes into the failure's message.
-    pub(crate) fn output(mut self) -> Outcome<Vec<u8>> {
+    pub(crate) fn output(mut self) -> XtaskResult<Vec<u8>> {
         let output = self.inner.output().map_err(|e| self.not_started(&e))?;
         self.check(output.status).map_err(|mut failure| {
             failure.message = format!("{}\n{}", failure.message, String::from_utf8_lossy(&output.stderr).trim_end());
@@ -170,7 +170,7 @@ impl Cmd {
     }
 
     /// Runs the program with visible standard error. Returns true for exit code 0, and the standard output.
-    pub(crate) fn success_and_output(mut self) -> Outcome<(bool, String)> {
+    pub(crate) fn success_and_output(mut self) -> XtaskResult<(bool, String)> {
         eprintln!("$ {self}");
         self.inner.stderr(Stdio::inherit());
         let output = self.inner.output().map_err(|e| self.not_started(&e))?;
@@ -179,13 +179,13 @@ impl Cmd {
 
     /// The exit code, and the estimated run time without the load of other programs. Fails if the program runs longer
     /// than `limit`, after killing it, or if a signal ended it.
-    pub(crate) fn exit_code_within(mut self, limit: Duration) -> Outcome<(i32, Duration)> {
+    pub(crate) fn exit_code_within(mut self, limit: Duration) -> XtaskResult<(i32, Duration)> {
         eprintln!("$ {self}");
         let mut child = self.inner.spawn().map_err(|e| self.not_started(&e))?;
         let start = Instant::now();
         let mut own = OwnTime::of(child.id());
         loop {
-            own.look();
+            own.update();
             if let Some(status) = child.try_wait().map_err(|e| self.not_started(&e))? {
                 return match status.code() {
                     Some(code) => Ok((code, own.elapsed())),
@@ -201,7 +201,7 @@ impl Cmd {
         }
     }
 
-    fn check(&self, status: ExitStatus) -> Outcome {
+    fn check(&self, status: ExitStatus) -> XtaskResult {
         if status.success() {
             return Ok(());
         }
@@ -214,7 +214,7 @@ impl Cmd {
     }
 
     fn failure(&self, message: String, code: u8) -> Failure {
-        Failure { message, again: Some(self.to_string()), code }
+        Failure { message, repeat_command: Some(self.to_string()), code }
     }
 }
 
@@ -252,7 +252,7 @@ mod tests {
     fn exit_code() {
         let failure = Cmd::new("sh").args(["-c", "exit 7"]).run().expect_err("exit code 7");
         assert_eq!(failure.code, 7);
-        assert_eq!(failure.again.as_deref(), Some("sh -c 'exit 7'"));
+        assert_eq!(failure.repeat_command.as_deref(), Some("sh -c 'exit 7'"));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Detects missing software on the machine, installs it with apt-get, and selects the MuJoCo to build against.
 
-use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, which};
+use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci, which};
 use crate::wheel;
 use clap::ValueEnum;
 use std::env;
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The two supported MuJoCo versions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Line {
+pub(crate) enum MujocoVersion {
     /// Debian's package libmujoco-dev (2.2.2)
     #[value(name = "2")]
     Debian,
@@ -21,16 +21,16 @@ pub(crate) enum Line {
 
 /// Requirements of a command besides a compiler and libclang.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Wanted {
+pub(crate) struct Requirements {
     /// The MuJoCo version. `None` selects the MuJoCo of `MUJOCO_DIR` if set, otherwise Debian's.
-    pub(crate) line: Option<Line>,
+    pub(crate) version: Option<MujocoVersion>,
     /// Requirements of comparisons and second runs only: a failed installation is an error in CI and a note elsewhere.
-    pub(crate) extras: &'static [Need],
+    pub(crate) extras: &'static [Requirement],
 }
 
 /// A prepared machine, and the selected MuJoCo.
 #[derive(Debug)]
-pub(crate) struct Ready {
+pub(crate) struct Prepared {
     root: PathBuf,
     target: PathBuf,
     choice: Choice,
@@ -43,7 +43,7 @@ enum Choice {
     Wheel { mujoco_dir: PathBuf },
 }
 
-impl Ready {
+impl Prepared {
     /// Cargo in the repository's root, with the chosen MuJoCo.
     pub(crate) fn cargo(&self) -> Cmd {
         let cmd = Cmd::new("cargo").current_dir(&self.root);
@@ -74,20 +74,20 @@ impl Ready {
 ///
 /// # Errors
 /// A requirement is still missing afterwards; the message suggests a fix.
-pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
+pub(crate) fn prepare(repo: &Repo, wanted: Requirements) -> XtaskResult<Prepared> {
     let mujoco_dir_set = env::var_os("MUJOCO_DIR").is_some();
-    let choice = match wanted.line {
+    let choice = match wanted.version {
         None if mujoco_dir_set => Choice::Environment,
-        None | Some(Line::Debian) => Choice::Debian,
-        Some(Line::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new() },
+        None | Some(MujocoVersion::Debian) => Choice::Debian,
+        Some(MujocoVersion::Wheel) => Choice::Wheel { mujoco_dir: PathBuf::new() },
     };
     let machine = Machine::this();
-    let mut needs = vec![Need::Compiler, Need::Libclang];
+    let mut needs = vec![Requirement::Compiler, Requirement::Libclang];
     if matches!(choice, Choice::Debian) {
-        needs.push(Need::MuJoCo);
+        needs.push(Requirement::MuJoCo);
     }
     if matches!(choice, Choice::Wheel { .. }) && !wheel::is_available(repo) {
-        needs.push(Need::Pip);
+        needs.push(Requirement::Pip);
     }
     install(&machine, &needs)?;
     if let Err(failure) = install(&machine, wanted.extras) {
@@ -100,11 +100,11 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
         Choice::Wheel { .. } => (Choice::Wheel { mujoco_dir: wheel::obtain(repo)? }, target_of_wheel(repo, in_ci())),
         other => (other, repo.target.clone()),
     };
-    Ok(Ready { root: repo.root.clone(), target, choice })
+    Ok(Prepared { root: repo.root.clone(), target, choice })
 }
 
 /// Installs a package that newer distributions no longer have; prints a note if it is unavailable.
-pub(crate) fn try_to_have(need: Need) {
+pub(crate) fn try_to_have(need: Requirement) {
     if let Err(failure) = install(&Machine::this(), &[need]) {
         eprintln!("note: {}", failure.message);
     }
@@ -118,7 +118,7 @@ fn target_of_wheel(repo: &Repo, in_ci: bool) -> PathBuf {
 
 /// A software requirement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Need {
+pub(crate) enum Requirement {
     Compiler,
     Libclang,
     MuJoCo,
@@ -131,7 +131,7 @@ pub(crate) enum Need {
     Readelf,
 }
 
-impl Need {
+impl Requirement {
     fn packages(self) -> &'static [&'static str] {
         match self {
             Self::Compiler => &["gcc", "libc6-dev"],
@@ -174,7 +174,7 @@ struct Machine {
     root: PathBuf,
     search_path: Vec<PathBuf>,
     libclang_path: Option<PathBuf>,
-    python_has: fn(Need) -> bool,
+    python_has: fn(Requirement) -> bool,
 }
 
 impl Machine {
@@ -184,31 +184,31 @@ impl Machine {
             search_path: env::var_os("PATH").map(|path| env::split_paths(&path).collect()).unwrap_or_default(),
             libclang_path: env::var_os("LIBCLANG_PATH").map(PathBuf::from),
             python_has: |need| match need {
-                Need::Venv => Cmd::new("python3").args(["-c", "import venv, ensurepip"]).quiet().succeeds(),
+                Requirement::Venv => Cmd::new("python3").args(["-c", "import venv, ensurepip"]).quiet().succeeds(),
                 _ => wheel::pip().is_some(),
             },
         }
     }
 
-    fn has(&self, need: Need) -> bool {
+    fn has(&self, need: Requirement) -> bool {
         match need {
-            Need::Compiler => {
+            Requirement::Compiler => {
                 self.search_path.iter().any(|dir| dir.join("cc").is_file()) && self.header("stdlib.h").is_some()
             }
-            Need::Libclang => self.has_libclang(),
-            Need::MuJoCo => {
+            Requirement::Libclang => self.has_libclang(),
+            Requirement::MuJoCo => {
                 self.header("mujoco/mujoco.h").is_some()
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
-            Need::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
-            Need::Readelf => self.search_path.iter().any(|dir| dir.join("readelf").is_file()),
-            Need::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
-            Need::Pip | Need::Venv => (self.python_has)(need),
-            Need::OsMesa => {
+            Requirement::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
+            Requirement::Readelf => self.search_path.iter().any(|dir| dir.join("readelf").is_file()),
+            Requirement::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
+            Requirement::Pip | Requirement::Venv => (self.python_has)(need),
+            Requirement::OsMesa => {
                 self.library_folders().iter().flat_map(|dir| entries(dir)).any(|file| is_osmesa(&file_name(&file)))
             }
             // The names that the tests look for.
-            Need::Chromium => {
+            Requirement::Chromium => {
                 let names = ["chromium", "chromium-browser", "google-chrome"];
                 self.search_path.iter().any(|dir| names.iter().any(|name| dir.join(name).is_file()))
             }
@@ -268,19 +268,19 @@ fn file_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-fn missing(machine: &Machine, needs: &[Need]) -> Vec<Need> {
+fn missing(machine: &Machine, needs: &[Requirement]) -> Vec<Requirement> {
     needs.iter().copied().filter(|need| !machine.has(*need)).collect()
 }
 
-fn packages(needs: &[Need]) -> Vec<&'static str> {
+fn packages(needs: &[Requirement]) -> Vec<&'static str> {
     needs.iter().flat_map(|need| need.packages()).copied().collect()
 }
 
-fn descriptions(needs: &[Need]) -> String {
+fn descriptions(needs: &[Requirement]) -> String {
     needs.iter().map(|need| format!("\n  - {}", need.description())).collect()
 }
 
-fn install(machine: &Machine, needs: &[Need]) -> Outcome {
+fn install(machine: &Machine, needs: &[Requirement]) -> XtaskResult {
     let absent = missing(machine, needs);
     if absent.is_empty() {
         return Ok(());
@@ -295,12 +295,12 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
     let Some(root) = as_root() else {
         return Err(Failure::new(format!(
             "packages are missing, and installing them needs root. Please run:\n\n    {}\n",
-            by_hand(&names)
+            manual_command(&names)
         )));
     };
     eprintln!("installing with apt-get: {}", names.join(" "));
-    if asks() && !confirmed()? {
-        return Err(Failure::new(format!("nothing was installed. By hand:\n\n    {}\n", by_hand(&names))));
+    if is_interactive() && !confirmed()? {
+        return Err(Failure::new(format!("nothing was installed. By hand:\n\n    {}\n", manual_command(&names))));
     }
     let known = |name: &&&str| Cmd::new("apt-cache").args(["show", name]).quiet().succeeds();
     let lists_are_complete = names.iter().filter(known).count() == names.len();
@@ -335,12 +335,12 @@ pub(crate) fn ask_before_installing() {
     ASK.store(true, Ordering::Relaxed);
 }
 
-fn asks() -> bool {
+fn is_interactive() -> bool {
     ASK.load(Ordering::Relaxed) && !in_ci() && std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
 }
 
 /// Reads the user's answer; an empty line means yes.
-fn confirmed() -> Outcome<bool> {
+fn confirmed() -> XtaskResult<bool> {
     eprint!("go on? [Y/n] ");
     let mut answer = String::new();
     std::io::stdin().read_line(&mut answer).map_err(|e| Failure::new(format!("the answer: {e}")))?;
@@ -361,7 +361,7 @@ fn as_root() -> Option<Vec<&'static str>> {
     Cmd::new("sudo").args(["-n", "true"]).quiet().succeeds().then(|| vec!["sudo", "-n"])
 }
 
-fn by_hand(names: &[&str]) -> String {
+fn manual_command(names: &[&str]) -> String {
     format!("sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends {}'", names.join(" "))
 }
 
@@ -371,7 +371,7 @@ fn apt(root: &[&str]) -> Cmd {
     Cmd::new(words[0]).args(&words[1..]).args(["-o", "DPkg::Lock::Timeout=300"])
 }
 
-fn apt_install(root: &[&str], names: &[&str]) -> Outcome {
+fn apt_install(root: &[&str], names: &[&str]) -> XtaskResult {
     apt(root).args(["install", "-y", "--no-install-recommends"]).args(names).run()
 }
 
@@ -380,7 +380,7 @@ mod tests {
     use super::*;
 
     /// True if a machine with these files meets the requirement.
-    fn has(need: Need, files: &[&str]) -> bool {
+    fn has(need: Requirement, files: &[&str]) -> bool {
         let dir = tempfile::tempdir().expect("a scratch folder");
         files.iter().for_each(|file| crate::wheel::tests::write(&dir.path().join(file), ""));
         let search_path = vec![dir.path().join("usr/bin")];
@@ -397,28 +397,35 @@ mod tests {
         let (header, clang) = ("usr/include/mujoco/mujoco.h", "usr/lib/llvm-14/lib/libclang-14.so.1");
         let clang_headers = "usr/lib/llvm-14/lib/clang/14/include/stddef.h";
         for (need, files, expected) in [
-            (Need::Compiler, &[][..], false),
-            (Need::Compiler, &["usr/bin/cc"], false),
-            (Need::Compiler, &["usr/bin/cc", "usr/include/stdlib.h"], true),
-            (Need::Libclang, &[clang], false),
-            (Need::Libclang, &[clang_headers], false),
-            (Need::Libclang, &["usr/lib/llvm-14/lib/libclang-cpp.so.14", clang_headers], false),
-            (Need::Libclang, &[clang, clang_headers], true),
-            (Need::MuJoCo, &[header], false),
-            (Need::MuJoCo, &[header, &mujoco], true),
-            (Need::Models, &[], false),
-            (Need::Pip, &[], false),
-            (Need::OsMesa, &["usr/lib/libGL.so.1"], false),
-            (Need::OsMesa, &[&mesa], true),
-            (Need::Chromium, &["usr/bin/firefox"], false),
-            (Need::Chromium, &["usr/bin/chromium"], true),
-            (Need::Chromium, &["usr/bin/google-chrome"], true),
-            (Need::Xvfb, &["usr/share/doc/xvfb/copyright"], false),
-            (Need::Xvfb, &["usr/bin/Xvfb"], true),
+            (Requirement::Compiler, &[][..], false),
+            (Requirement::Compiler, &["usr/bin/cc"], false),
+            (Requirement::Compiler, &["usr/bin/cc", "usr/include/stdlib.h"], true),
+            (Requirement::Libclang, &[clang], false),
+            (Requirement::Libclang, &[clang_headers], false),
+            (Requirement::Libclang, &["usr/lib/llvm-14/lib/libclang-cpp.so.14", clang_headers], false),
+            (Requirement::Libclang, &[clang, clang_headers], true),
+            (Requirement::MuJoCo, &[header], false),
+            (Requirement::MuJoCo, &[header, &mujoco], true),
+            (Requirement::Models, &[], false),
+            (Requirement::Pip, &[], false),
+            (Requirement::OsMesa, &["usr/lib/libGL.so.1"], false),
+            (Requirement::OsMesa, &[&mesa], true),
+            (Requirement::Chromium, &["usr/bin/firefox"], false),
+            (Requirement::Chromium, &["usr/bin/chromium"], true),
+            (Requirement::Chromium, &["usr/bin/google-chrome"], true),
+            (Requirement::Xvfb, &["usr/share/doc/xvfb/copyright"], false),
+            (Requirement::Xvfb, &["usr/bin/Xvfb"], true),
         ] {
             assert_eq!(has(need, files), expected, "{need:?}: {files:?}");
         }
-        let needs = [Need::Compiler, Need::Libclang, Need::MuJoCo, Need::OsMesa, Need::Chromium, Need::Xvfb];
+        let needs = [
+            Requirement::Compiler,
+            Requirement::Libclang,
+            Requirement::MuJoCo,
+            Requirement::OsMesa,
+            Requirement::Chromium,
+            Requirement::Xvfb,
+        ];
         let names = ["gcc", "libc6-dev", "libclang-dev", "libmujoco-dev", "libosmesa6", "chromium", "xvfb"];
         assert_eq!(packages(&needs), names);
     }
@@ -436,7 +443,7 @@ mod tests {
     #[test]
     fn one_command() {
         let line = "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends gcc libmujoco-dev'";
-        assert_eq!(by_hand(&["gcc", "libmujoco-dev"]), line);
+        assert_eq!(manual_command(&["gcc", "libmujoco-dev"]), line);
     }
 
     #[test]

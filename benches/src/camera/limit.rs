@@ -1,14 +1,14 @@
 //! Hardware limits of this machine: loops that only copy memory, and loops that only compute.
 
-use crate::interleave::Side;
-use crate::settings::Outcome;
+use crate::interleave::Contender;
+use crate::settings::BenchResult;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Copies a buffer larger than the caches, on several threads.
-pub(super) struct Copying(Vec<(Vec<u64>, Vec<u64>)>);
+pub(super) struct CopyLoop(Vec<(Vec<u64>, Vec<u64>)>);
 
-impl Copying {
+impl CopyLoop {
     /// Bytes written in a step.
     pub(super) const BYTES: usize = 64 << 20;
 
@@ -18,12 +18,12 @@ impl Copying {
     }
 }
 
-impl Side for Copying {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for CopyLoop {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         std::thread::scope(|scope| {
             for (from, to) in &mut self.0 {
@@ -35,9 +35,9 @@ impl Side for Copying {
 }
 
 /// Computes in registers: a fixed amount of work shared by several threads.
-pub(super) struct Compute(u64);
+pub(super) struct ComputeLoop(u64);
 
-impl Compute {
+impl ComputeLoop {
     const ROUNDS: u64 = 60_000_000;
 
     pub(super) fn new(threads: u64) -> Self {
@@ -45,12 +45,12 @@ impl Compute {
     }
 }
 
-impl Side for Compute {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for ComputeLoop {
+    fn restart(&mut self) -> BenchResult<()> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let rounds = u64::from(steps) * Self::ROUNDS / self.0;
         let compute = move || {
             let mut x = black_box(1_u64);

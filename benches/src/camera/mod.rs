@@ -10,7 +10,7 @@
 //! use one core and are compared with one thread.
 //!
 //! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; reflections are off
-//! on both sides. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings (see `rivals/mujoco_osmesa.py`). "OSMesa
+//! on both sides. "MuJoCo on OSMesa" is `mujoco.BaselineRenderer` at its best settings (see `rivals/mujoco_osmesa.py`). "OSMesa
 //! by hand" calls the library with two passes instead of three, which that class does not offer. Shadow maps have the
 //! default size of each side, 4096 texels in MuJoCo and at most 1024 in ours. Another row reduces MuJoCo's shadow maps
 //! to the size of ours.
@@ -20,30 +20,30 @@ mod limit;
 mod scene;
 mod sides;
 
-pub(crate) use by_rays::by_rays;
+pub(crate) use by_rays::ray_casting;
 pub(crate) use scene::Scene;
 
-use crate::interleave::{Plan, Side, Times, measure};
+use crate::interleave::{Contender, MeasurementCfg, Times, measure};
 use crate::rival::{can_run, python};
 use crate::row::Row;
-use crate::settings::{Outcome, Settings};
-use kinetoscope::render::Renderer as OurRenderer;
-use limit::{Compute, Copying};
+use crate::settings::{BenchResult, Settings};
+use kinetoscope::render::Renderer;
+use limit::{ComputeLoop, CopyLoop};
 use scene::Scenes;
-use sides::{Look, Ours, Renderer, Rival, Work};
+use sides::{Baseline, BaselineRenderer, OurRenderer, Quality, Work};
 use std::ffi::OsString;
 
 /// Steps between restarts: the scenes hardly move.
 const STEPS: u32 = 1_000_000;
 /// Number of environments in the batches, and for large images.
 const BATCH: usize = 64;
-const FEW: usize = 8;
+const SMALL_BATCH: usize = 8;
 /// Physics steps per image, for cases with physics: a camera with 50 Hz and steps of 5 ms.
-const PHYSICS: u32 = 4;
+const PHYSICS_STEPS: u32 = 4;
 const VGA: [usize; 2] = [640, 480];
 
-pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
-    let rivals = Rivals::new();
+pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
+    let baselines = Baselines::new();
     let scenes = Scenes::new()?;
     let mut rows = Vec::new();
     // The benchmark takes minutes, so results are shown as they are measured.
@@ -56,14 +56,14 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     };
     if let Some(humanoid) = &scenes.humanoid {
         for side in [64, 128] {
-            add(per_core(settings, &rivals, humanoid, [side, side], BATCH)?);
+            add(per_core(settings, &baselines, humanoid, [side, side], BATCH)?);
         }
-        add(large(settings, &rivals, humanoid, [10.0, 50.0])?);
+        add(large(settings, &baselines, humanoid, [10.0, 50.0])?);
     }
     if let Some(vendor) = &scenes.vendor {
-        add(large(settings, &rivals, vendor, [10.0, 20.0])?);
+        add(large(settings, &baselines, vendor, [10.0, 20.0])?);
     }
-    add(stepping(settings, &rivals, &scenes.bundled)?);
+    add(stepping(settings, &baselines, &scenes.bundled)?);
     if let Some(humanoid) = &scenes.humanoid {
         add(scaling(settings, humanoid)?);
     }
@@ -71,27 +71,30 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
 }
 
 /// The baselines installed on this machine.
-struct Rivals {
+struct Baselines {
     python: Option<OsString>,
-    missing: Vec<Renderer>,
+    missing: Vec<BaselineRenderer>,
 }
 
-impl Rivals {
+impl Baselines {
     fn new() -> Self {
         let python = python("rivals of the cameras");
-        let all = [Renderer::OsMesa, Renderer::OsMesaByHand, Renderer::Tiny, Renderer::Warp];
+        let all =
+            [BaselineRenderer::OsMesa, BaselineRenderer::OsMesaTwoPass, BaselineRenderer::Tiny, BaselineRenderer::Warp];
         let missing =
             python.iter().flat_map(|python| all.into_iter().filter(|r| !can_run(python, r.probe()))).collect();
         for renderer in &missing {
-            let renderer: &Renderer = renderer;
+            let renderer: &BaselineRenderer = renderer;
             eprintln!("  without {}: `{}` fails", renderer.name(), renderer.probe());
         }
         Self { python, missing }
     }
 
-    fn start(&self, renderer: Renderer, scene: &Scene, work: &Work) -> Outcome<Option<Rival>> {
+    fn start(&self, renderer: BaselineRenderer, scene: &Scene, work: &Work) -> BenchResult<Option<Baseline>> {
         match &self.python {
-            Some(python) if !self.missing.contains(&renderer) => Rival::start(python, renderer, scene, work).map(Some),
+            Some(python) if !self.missing.contains(&renderer) => {
+                Baseline::start(python, renderer, scene, work).map(Some)
+            }
             _ => Ok(None),
         }
     }
@@ -99,38 +102,50 @@ impl Rivals {
 
 /// Sides that take turns, and the number of images that each renders per step.
 #[derive(Default)]
-struct Contest<'s> {
-    sides: Vec<(f64, Box<dyn Side + 's>)>,
+struct Comparison<'s> {
+    sides: Vec<(f64, Box<dyn Contender + 's>)>,
 }
 
-impl<'s> Contest<'s> {
-    fn ours(&mut self, scene: &'s Scene, work: &Work, threads: usize) -> Outcome<usize> {
-        self.ours_by(scene, work, threads, OurRenderer::Raster)
+impl<'s> Comparison<'s> {
+    fn ours(&mut self, scene: &'s Scene, work: &Work, threads: usize) -> BenchResult<usize> {
+        self.ours_with_renderer(scene, work, threads, Renderer::Raster)
     }
 
-    fn ours_by(&mut self, scene: &'s Scene, work: &Work, threads: usize, by: OurRenderer) -> Outcome<usize> {
-        let ours = Ours::new(scene, work, threads, by)?;
+    fn ours_with_renderer(
+        &mut self,
+        scene: &'s Scene,
+        work: &Work,
+        threads: usize,
+        by: Renderer,
+    ) -> BenchResult<usize> {
+        let ours = OurRenderer::new(scene, work, threads, by)?;
         self.sides.push((work.envs as f64, Box::new(ours)));
         Ok(self.sides.len() - 1)
     }
 
     /// Adds a baseline if it is installed; its depth image must agree with our rasterizer's.
-    fn rival(&mut self, rivals: &Rivals, renderer: Renderer, scene: &'s Scene, work: &Work) -> Outcome<Option<usize>> {
-        self.rival_of(rivals, renderer, scene, work, OurRenderer::Raster)
+    fn baseline(
+        &mut self,
+        rivals: &Baselines,
+        renderer: BaselineRenderer,
+        scene: &'s Scene,
+        work: &Work,
+    ) -> BenchResult<Option<usize>> {
+        self.baseline_for_renderer(rivals, renderer, scene, work, Renderer::Raster)
     }
 
     /// Adds a baseline that is compared with one of our renderers.
-    fn rival_of(
+    fn baseline_for_renderer(
         &mut self,
-        rivals: &Rivals,
-        renderer: Renderer,
+        rivals: &Baselines,
+        renderer: BaselineRenderer,
         scene: &'s Scene,
         work: &Work,
-        by: OurRenderer,
-    ) -> Outcome<Option<usize>> {
+        by: Renderer,
+    ) -> BenchResult<Option<usize>> {
         let Some(mut rival) = rivals.start(renderer, scene, work)? else { return Ok(None) };
-        let mut ours = Ours::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1, by)?;
-        rival.must_see(&ours.depth()?, work.size)?;
+        let mut ours = OurRenderer::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1, by)?;
+        rival.check_depth(&ours.depth()?, work.size)?;
         let (ours, theirs) = (scene.triangles(), rival.triangles()?);
         if ours != theirs {
             return Err(format!("{} draws {theirs} triangles, ours {ours}", renderer.name()).into());
@@ -139,12 +154,12 @@ impl<'s> Contest<'s> {
         Ok(Some(self.sides.len() - 1))
     }
 
-    fn run(mut self, seconds: f64) -> Outcome<Rates> {
-        let mut sides: Vec<&mut dyn Side> = Vec::new();
+    fn run(mut self, seconds: f64) -> BenchResult<Rates> {
+        let mut sides: Vec<&mut dyn Contender> = Vec::new();
         for (_, side) in &mut self.sides {
             sides.push(&mut **side);
         }
-        let times = measure(Plan { seconds, restart_after: STEPS }, &mut sides)?;
+        let times = measure(MeasurementCfg { seconds, restart_after: STEPS }, &mut sides)?;
         Ok(Rates { times, images: self.sides.iter().map(|(images, _)| *images).collect() })
     }
 }
@@ -161,7 +176,7 @@ impl Rates {
         self.images[side] / self.times.per_step(side)
     }
 
-    fn row(&self, case: String, threads: usize, ours: usize, rival: (Renderer, Option<usize>)) -> Row {
+    fn row(&self, case: String, threads: usize, ours: usize, rival: (BaselineRenderer, Option<usize>)) -> Row {
         let row = Row::new("camera", case, "images/s", threads, self.rate(ours));
         match rival {
             (renderer, None) => row.without(renderer.name()),
@@ -174,35 +189,35 @@ impl Rates {
 }
 
 /// Large images in both quality settings: two threads against OSMesa, one thread against the other baselines.
-fn large(settings: &Settings, rivals: &Rivals, scene: &Scene, wanted: [f64; 2]) -> Outcome<Vec<Row>> {
+fn large(settings: &Settings, rivals: &Baselines, scene: &Scene, wanted: [f64; 2]) -> BenchResult<Vec<Row>> {
     let [width, height] = VGA;
     let name = |look: &str| format!("{}, {width}x{height}, {look}", scene.name);
     eprintln!("  {}, {width}x{height}: {} triangles", scene.name, scene.triangles());
-    let plain = Work { size: VGA, envs: FEW, physics: 0, look: Look::Plain, shadow_size: None };
-    let full = Work { look: Look::Full, ..plain };
-    let mut contest = Contest::default();
+    let plain = Work { size: VGA, envs: SMALL_BATCH, physics: 0, look: Quality::Plain, shadow_size: None };
+    let full = Work { look: Quality::Full, ..plain };
+    let mut contest = Comparison::default();
     let ours = contest.ours(scene, &plain, 2)?;
     let ours_full = contest.ours(scene, &full, 2)?;
-    let osmesa = contest.rival(rivals, Renderer::OsMesa, scene, &plain)?;
-    let osmesa_full = contest.rival(rivals, Renderer::OsMesa, scene, &full)?;
-    let by_hand = contest.rival(rivals, Renderer::OsMesaByHand, scene, &plain)?;
-    let by_hand_full = contest.rival(rivals, Renderer::OsMesaByHand, scene, &full)?;
+    let osmesa = contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &plain)?;
+    let osmesa_full = contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &full)?;
+    let by_hand = contest.baseline(rivals, BaselineRenderer::OsMesaTwoPass, scene, &plain)?;
+    let by_hand_full = contest.baseline(rivals, BaselineRenderer::OsMesaTwoPass, scene, &full)?;
     let shadows_as_ours = Work { shadow_size: Some(1024), ..full };
-    let by_hand_small = contest.rival(rivals, Renderer::OsMesaByHand, scene, &shadows_as_ours)?;
+    let by_hand_small = contest.baseline(rivals, BaselineRenderer::OsMesaTwoPass, scene, &shadows_as_ours)?;
     let copying = contest.sides.len();
-    contest.sides.push((1.0, Box::new(Copying::new(2))));
+    contest.sides.push((1.0, Box::new(CopyLoop::new(2))));
     let rates = contest.run(3.0 * settings.seconds)?;
     let against = |look: &str, ours, rival| rates.row(name(look), 2, ours, rival);
     let mut rows = vec![
-        against("plain", ours, (Renderer::OsMesa, osmesa)).wanted(wanted[0]),
-        against("full", ours_full, (Renderer::OsMesa, osmesa_full)).wanted(wanted[1]),
-        against("plain", ours, (Renderer::OsMesaByHand, by_hand)),
-        against("full", ours_full, (Renderer::OsMesaByHand, by_hand_full)),
-        against("full, shadow maps of 1024", ours_full, (Renderer::OsMesaByHand, by_hand_small)),
+        against("plain", ours, (BaselineRenderer::OsMesa, osmesa)).with_target_ratio(wanted[0]),
+        against("full", ours_full, (BaselineRenderer::OsMesa, osmesa_full)).with_target_ratio(wanted[1]),
+        against("plain", ours, (BaselineRenderer::OsMesaTwoPass, by_hand)),
+        against("full", ours_full, (BaselineRenderer::OsMesaTwoPass, by_hand_full)),
+        against("full, shadow maps of 1024", ours_full, (BaselineRenderer::OsMesaTwoPass, by_hand_small)),
     ];
     for (look, side) in [("plain", ours), ("full", ours_full)] {
         // Color, depth and mask take 4 bytes per pixel each, a normal 12.
-        let seconds = (width * height * 24) as f64 * rates.times.per_step(copying) / Copying::BYTES as f64;
+        let seconds = (width * height * 24) as f64 * rates.times.per_step(copying) / CopyLoop::BYTES as f64;
         let distance = rates.times.median_of(|t| t[side] / rates.images[side]) / seconds;
         rows.push(Row::new("camera", name(look), "x of bandwidth limit", 2, distance).against(
             "copy loop",
@@ -210,19 +225,20 @@ fn large(settings: &Settings, rivals: &Rivals, scene: &Scene, wanted: [f64; 2]) 
             1.0 / distance,
         ));
     }
-    rows.extend(per_core(settings, rivals, scene, VGA, FEW)?);
+    rows.extend(per_core(settings, rivals, scene, VGA, SMALL_BATCH)?);
     Ok(rows)
 }
 
 /// Stepping and rendering of environments on the whole machine.
-fn stepping(settings: &Settings, rivals: &Rivals, scene: &Scene) -> Outcome<Vec<Row>> {
+fn stepping(settings: &Settings, rivals: &Baselines, scene: &Scene) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for side in [64, 128, 256] {
-        let name = |look: &str| format!("{}, {BATCH} envs, {PHYSICS} steps + {side}x{side}, {look}", scene.name);
+        let name = |look: &str| format!("{}, {BATCH} envs, {PHYSICS_STEPS} steps + {side}x{side}, {look}", scene.name);
         eprintln!("  {}", name("plain and full"));
-        let plain = Work { size: [side, side], envs: BATCH, physics: PHYSICS, look: Look::Plain, shadow_size: None };
-        let full = Work { look: Look::Full, ..plain };
-        let mut contest = Contest::default();
+        let plain =
+            Work { size: [side, side], envs: BATCH, physics: PHYSICS_STEPS, look: Quality::Plain, shadow_size: None };
+        let full = Work { look: Quality::Full, ..plain };
+        let mut contest = Comparison::default();
         let ours = contest.ours(scene, &plain, 2)?;
         let ours_full = contest.ours(scene, &full, 2)?;
         if side != 128 {
@@ -232,61 +248,69 @@ fn stepping(settings: &Settings, rivals: &Rivals, scene: &Scene) -> Outcome<Vec<
             }
             continue;
         }
-        let osmesa = contest.rival(rivals, Renderer::OsMesa, scene, &plain)?;
+        let osmesa = contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &plain)?;
         let osmesa_defaults =
-            contest.rival(rivals, Renderer::OsMesa, scene, &Work { look: Look::Defaults, ..plain })?;
+            contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &Work { look: Quality::Defaults, ..plain })?;
         let rates = contest.run(2.0 * settings.seconds)?;
-        rows.push(rates.row(name("plain"), 2, ours, (Renderer::OsMesa, osmesa)).wanted(10.0));
+        rows.push(rates.row(name("plain"), 2, ours, (BaselineRenderer::OsMesa, osmesa)).with_target_ratio(10.0));
         let defaults =
-            rates.row(name("full, rival at its defaults"), 2, ours_full, (Renderer::OsMesa, osmesa_defaults));
-        rows.push(defaults.wanted(50.0));
+            rates.row(name("full, rival at its defaults"), 2, ours_full, (BaselineRenderer::OsMesa, osmesa_defaults));
+        rows.push(defaults.with_target_ratio(50.0));
     }
     Ok(rows)
 }
 
 /// One thread against the single-threaded baselines.
-fn per_core(settings: &Settings, rivals: &Rivals, scene: &Scene, size: [usize; 2], envs: usize) -> Outcome<Vec<Row>> {
+fn per_core(
+    settings: &Settings,
+    rivals: &Baselines,
+    scene: &Scene,
+    size: [usize; 2],
+    envs: usize,
+) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
-    for look in [Look::Plain, Look::Full] {
+    for look in [Quality::Plain, Quality::Full] {
         let name = format!("{}, {envs} x {}x{}, {}", scene.name, size[0], size[1], look.name());
         eprintln!("  {name}, one core");
         let work = Work { size, envs, physics: 0, look, shadow_size: None };
-        let mut contest = Contest::default();
+        let mut contest = Comparison::default();
         let ours = contest.ours(scene, &work, 1)?;
-        let warp = contest.rival(rivals, Renderer::Warp, scene, &work)?;
+        let warp = contest.baseline(rivals, BaselineRenderer::Warp, scene, &work)?;
         // TinyRenderer has no multisampling.
-        let has_tiny = look == Look::Plain;
-        let tiny = if has_tiny { contest.rival(rivals, Renderer::Tiny, scene, &work)? } else { None };
+        let has_tiny = look == Quality::Plain;
+        let tiny = if has_tiny { contest.baseline(rivals, BaselineRenderer::Tiny, scene, &work)? } else { None };
         let rates = contest.run(settings.seconds)?;
-        let row = rates.row(name.clone(), 1, ours, (Renderer::Warp, warp));
+        let row = rates.row(name.clone(), 1, ours, (BaselineRenderer::Warp, warp));
         // The target applies to batches of small images.
-        rows.push(if has_tiny && envs == BATCH { row.wanted(5.0) } else { row });
+        rows.push(if has_tiny && envs == BATCH { row.with_target_ratio(5.0) } else { row });
         if has_tiny {
-            rows.push(rates.row(name, 1, ours, (Renderer::Tiny, tiny)));
+            rows.push(rates.row(name, 1, ours, (BaselineRenderer::Tiny, tiny)));
         }
     }
     Ok(rows)
 }
 
 /// Speed-up of two threads over one, compared with that of a compute loop on this machine.
-fn scaling(settings: &Settings, scene: &Scene) -> Outcome<Vec<Row>> {
+fn scaling(settings: &Settings, scene: &Scene) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
-    for (size, envs) in [(VGA, FEW), ([128, 128], BATCH)] {
-        for look in [Look::Plain, Look::Full] {
+    for (size, envs) in [(VGA, SMALL_BATCH), ([128, 128], BATCH)] {
+        for look in [Quality::Plain, Quality::Full] {
             let work = Work { size, envs, physics: 0, look, shadow_size: None };
-            let mut contest = Contest::default();
+            let mut contest = Comparison::default();
             contest.ours(scene, &work, 1)?;
             contest.ours(scene, &work, 2)?;
             for threads in [1, 2] {
-                contest.sides.push((1.0, Box::new(Compute::new(threads))));
+                contest.sides.push((1.0, Box::new(ComputeLoop::new(threads))));
             }
             let times = contest.run(settings.seconds)?.times;
             let name = format!("{}, {envs} x {}x{}, {}", scene.name, size[0], size[1], look.name());
-            let [ours, bare] = [times.median_of(|t| t[0] / t[1]), times.median_of(|t| t[2] / t[3])];
+            let [ours, compute_only] = [times.median_of(|t| t[0] / t[1]), times.median_of(|t| t[2] / t[3])];
             let ratio = times.median_of(|t| (t[0] / t[1]) / (t[2] / t[3]));
             // A speed-up of 1.8 where the compute loop has 1.9.
             rows.push(
-                Row::new("camera", name, "speed-up", 2, ours).against("compute loop", bare, ratio).wanted(1.8 / 1.9),
+                Row::new("camera", name, "speed-up", 2, ours)
+                    .against("compute loop", compute_only, ratio)
+                    .with_target_ratio(1.8 / 1.9),
             );
         }
     }

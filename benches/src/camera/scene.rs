@@ -2,17 +2,17 @@
 //! MJCF file that our renderer and the baselines compile.
 
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
-use crate::settings::Outcome;
+use crate::settings::BenchResult;
 use crate::startup::robots;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco::{Data, Model, TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, Data, Model, SupportedVersion};
 use kinetoscope::prelude::*;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
-use kinetoscope::render::{ParallelRasterizer, Shot};
+use kinetoscope::render::{ParallelRenderer, RenderRequest};
 use kinetoscope::scene::shape::Shape;
 use kinetoscope::scene::{Instance, PoseF32, RenderScene};
-use kinetoscope::sim::Visible;
+use kinetoscope::sim::VisualScene;
 use std::path::{Path, PathBuf};
 
 /// Rendered geom groups: all but those of collision shapes.
@@ -29,7 +29,7 @@ pub(crate) struct Scene {
     /// The MJCF with the camera `bench`.
     pub(super) file: PathBuf,
     pub(super) model: Model,
-    pub(super) visible: Visible,
+    pub(super) visible: VisualScene,
     /// Joint positions to render, assigned to the environments in turn.
     states: Vec<Vec<f64>>,
     eye: [f32; 3],
@@ -48,7 +48,7 @@ pub(super) struct Scenes {
 }
 
 impl Scenes {
-    pub(super) fn new() -> Outcome<Self> {
+    pub(super) fn new() -> BenchResult<Self> {
         let humanoid = match Case::humanoid()? {
             None => None,
             Some(case) => {
@@ -75,7 +75,7 @@ fn vendor_arm() -> Option<PathBuf> {
 
 impl Scene {
     /// The vendor's SR5 alone, or the bundled one without the vendor's files.
-    pub(crate) fn arm_alone() -> Outcome<Self> {
+    pub(crate) fn arm_alone() -> BenchResult<Self> {
         let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
         let (name, file) = match vendor_arm() {
             Some(file) => ("vendor SR5", file),
@@ -92,25 +92,25 @@ impl Scene {
         states: Vec<Vec<f64>>,
         eye: [f32; 3],
         target: [f32; 3],
-    ) -> Outcome<Self> {
+    ) -> BenchResult<Self> {
         let view = View::look_at([1, 1], FOVY.to_radians(), eye, target, [0.0, 0.0, 1.0])?;
         let file = folder.path().join("scene.xml");
         std::fs::write(&file, with_camera(mjcf, &view)?)?;
         let model = compile(&file)?;
-        let visible = Visible::of_model(&model);
-        for left_out in visible.left_out() {
+        let visible = VisualScene::of_model(&model);
+        for left_out in visible.omitted() {
             eprintln!("  {name}: {left_out}");
         }
         Ok(Self { name, file, model, visible, states, eye, target, mjcf: mjcf.into(), _folder: folder })
     }
 
     /// A robot as exported for other programs, with a bent arm that differs slightly in every state.
-    fn exported(name: &'static str, sim: &SimulationManager) -> Outcome<Self> {
+    fn exported(name: &'static str, sim: &SimulationManager) -> BenchResult<Self> {
         let folder = tempfile::tempdir()?;
         sim.dump(folder.path())?;
-        let file = match TARGET {
-            Target::V4 => "robot.mjcf4.xml",
-            Target::V2 => "robot.mjcf2.xml",
+        let file = match BUILD_VERSION {
+            SupportedVersion::V4 => "robot.mjcf4.xml",
+            SupportedVersion::V2 => "robot.mjcf2.xml",
         };
         let mjcf = std::fs::read_to_string(folder.path().join(file))?;
         let (bent, nq) = ([0.0, 0.5, 1.5, 0.3, 0.5, 0.0], sim.batch().model().nq());
@@ -122,22 +122,23 @@ impl Scene {
     }
 
     /// The scene seen from the distance at which the robot covers this share of an image.
-    pub(crate) fn covering(mut self, share: f64) -> Outcome<Self> {
+    pub(crate) fn with_coverage(mut self, share: f64) -> BenchResult<Self> {
         let size = [320, 240];
-        let (drawn, poses) = self.drawn(0)?;
-        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
+        let (drawn, poses) = self.rendered(0)?;
+        let mut rasterizer = ParallelRenderer::new(RasterCfg::default(), 1);
         let (far, target) = (self.eye, self.target);
         let (mut nearest, mut farthest, mut covered) = (0.1f32, 4.0f32, 0.0);
         while farthest - nearest > 1e-3 {
-            let part = 0.5 * (nearest + farthest);
-            self.eye = [0, 1, 2].map(|k| target[k] + part * (far[k] - target[k]));
+            let distance_scale = 0.5 * (nearest + farthest);
+            self.eye = [0, 1, 2].map(|k| target[k] + distance_scale * (far[k] - target[k]));
             let mut frame = Frame::new(size[0], size[1], Channels { depth: true, ..Channels::default() });
             let view = self.view(size)?;
-            let shot = Shot { scene: &drawn, poses: &poses, view: &view, lights: None, lens: None, before: None };
+            let shot =
+                RenderRequest { scene: &drawn, poses: &poses, view: &view, lights: None, lens: None, previous: None };
             rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
             let hits = frame.depth.iter().flatten().filter(|depth| depth.is_finite()).count();
             covered = hits as f64 / (size[0] * size[1]) as f64;
-            if covered > share { nearest = part } else { farthest = part }
+            if covered > share { nearest = distance_scale } else { farthest = distance_scale }
         }
         if (covered - share).abs() > 0.01 {
             return Err(format!("{} covers {:.0} % of the picture at best", self.name, 100.0 * covered).into());
@@ -147,13 +148,13 @@ impl Scene {
     }
 
     /// The rendered scene without other geom groups, and its poses in environment `index`.
-    pub(crate) fn drawn(&self, index: usize) -> Outcome<(RenderScene, Vec<PoseF32>)> {
+    pub(crate) fn rendered(&self, index: usize) -> BenchResult<(RenderScene, Vec<PoseF32>)> {
         let mut data = Data::new(&self.model)?;
         data.qpos_mut().copy_from_slice(self.state(index));
         data.step1()?;
         let all = self.visible.scene();
         let mut poses = vec![PoseF32::IDENTITY; all.instances().len()];
-        self.visible.read(&data, &mut poses, &mut all.lights.clone());
+        self.visible.read_poses(&data, &mut poses, &mut all.lights.clone());
         let drawn = all.instances().iter().cloned().zip(poses).filter(|(instance, _)| is_drawn(instance));
         let (instances, poses) = drawn.unzip();
         Ok((all.with_instances(instances)?, poses))
@@ -165,7 +166,7 @@ impl Scene {
     }
 
     /// The camera's view with images of this size.
-    pub(crate) fn view(&self, size: [usize; 2]) -> Outcome<View> {
+    pub(crate) fn view(&self, size: [usize; 2]) -> BenchResult<View> {
         Ok(View::look_at(size, FOVY.to_radians(), self.eye, self.target, [0.0, 0.0, 1.0])?)
     }
 
@@ -182,14 +183,14 @@ fn is_drawn(instance: &Instance) -> bool {
     instance.visible && GROUPS.contains(&instance.group)
 }
 
-fn compile(file: &Path) -> Outcome<Model> {
+fn compile(file: &Path) -> BenchResult<Model> {
     let mut compiled = mj::compile_file(file)?;
     compiled.prepare_for_stepping(false);
     Ok(compiled.into_model())
 }
 
 /// The MJCF with the camera in its world body.
-fn with_camera(mjcf: &str, view: &View) -> Outcome<String> {
+fn with_camera(mjcf: &str, view: &View) -> BenchResult<String> {
     let end = mjcf.rfind("</worldbody>").ok_or("an MJCF without a world")?;
     let pose = &view.world_from_camera;
     // MuJoCo's cameras look along -z, with y up.

@@ -1,13 +1,13 @@
 //! The compared renderers: our rasterizer in this process, baselines in other processes.
 
 use super::scene::{GROUPS, Scene};
-use crate::interleave::Side;
+use crate::interleave::Contender;
 use crate::rival::Process;
-use crate::settings::Outcome;
+use crate::settings::BenchResult;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::{Channels, Frame};
-use kinetoscope::render::{ParallelRasterizer, RasterCfg, Shot};
+use kinetoscope::render::{ParallelRenderer, RasterCfg, RenderRequest};
 use kinetoscope::scene::{Light, PoseF32};
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 /// Rendering quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Look {
+pub(super) enum Quality {
     /// No shadows, one sample per pixel.
     Plain,
     /// Shadows, four samples per pixel.
@@ -27,7 +27,7 @@ pub(super) enum Look {
     Defaults,
 }
 
-impl Look {
+impl Quality {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Plain => "plain",
@@ -44,16 +44,16 @@ pub(super) struct Work {
     pub(super) envs: usize,
     /// Physics steps before an image.
     pub(super) physics: u32,
-    pub(super) look: Look,
+    pub(super) look: Quality,
     /// Width of the baseline's shadow maps \[texels\]; `None` for its default.
     pub(super) shadow_size: Option<u32>,
 }
 
 /// Our renderer: environments, and a frame for each.
-pub(super) struct Ours<'s> {
+pub(super) struct OurRenderer<'s> {
     scene: &'s Scene,
     batch: Batch,
-    rasterizer: ParallelRasterizer,
+    rasterizer: ParallelRenderer,
     view: View,
     physics: u32,
     poses: Vec<PoseF32>,
@@ -61,14 +61,14 @@ pub(super) struct Ours<'s> {
     frames: Vec<Frame>,
 }
 
-impl<'s> Ours<'s> {
+impl<'s> OurRenderer<'s> {
     pub(super) fn new(
         scene: &'s Scene,
         work: &Work,
         threads: usize,
         by: kinetoscope::render::Renderer,
-    ) -> Outcome<Self> {
-        let full = work.look != Look::Plain;
+    ) -> BenchResult<Self> {
+        let full = work.look != Quality::Plain;
         let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
         let cfg = RasterCfg {
             samples: if full { 4 } else { 1 },
@@ -83,7 +83,7 @@ impl<'s> Ours<'s> {
         let mut ours = Self {
             scene,
             batch: Batch::new(&scene.model, &Arc::new(DriveTable::default()), work.envs, threads, ThreadPool::new())?,
-            rasterizer: ParallelRasterizer::new(cfg, threads).with_pool(ThreadPool::new()),
+            rasterizer: ParallelRenderer::new(cfg, threads).with_pool(ThreadPool::new()),
             view: scene.view(work.size)?,
             physics: work.physics,
             poses: vec![PoseF32::IDENTITY; work.envs * seen.instances().len()],
@@ -95,36 +95,36 @@ impl<'s> Ours<'s> {
         Ok(ours)
     }
 
-    fn draw(&mut self) -> Outcome<()> {
+    fn draw(&mut self) -> BenchResult<()> {
         let Self { scene, batch, rasterizer, view, poses, lights, frames, .. } = self;
         let seen = scene.visible.scene();
         let (things, lamps) = (seen.instances().len(), seen.lights.len());
         batch.for_each(|i, env| {
             let lights = &mut lights[i * lamps..(i + 1) * lamps];
-            scene.visible.read(env.data(), &mut poses[i * things..(i + 1) * things], lights);
+            scene.visible.read_poses(env.data(), &mut poses[i * things..(i + 1) * things], lights);
         });
-        let shot = |i: usize| Shot {
+        let shot = |i: usize| RenderRequest {
             scene: seen,
             poses: &poses[i * things..(i + 1) * things],
             view,
             lights: Some(&lights[i * lamps..(i + 1) * lamps]),
             lens: None,
-            before: None,
+            previous: None,
         };
         let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(i, frame)| (shot(i), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).map_err(|(index, error)| format!("image {index}: {error}").into())
     }
 
     /// The depth image of the first environment at its start.
-    pub(super) fn depth(&mut self) -> Outcome<Vec<f32>> {
+    pub(super) fn depth(&mut self) -> BenchResult<Vec<f32>> {
         self.restart()?;
         self.draw()?;
         self.frames.first().and_then(|frame| frame.depth.clone()).ok_or_else(|| "no depth image".into())
     }
 }
 
-impl Side for Ours<'_> {
-    fn restart(&mut self) -> Outcome<()> {
+impl Contender for OurRenderer<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
         for i in 0..self.batch.num_envs() {
             let state = self.scene.state(i);
             self.batch.write(i, |env| env.reset(|data, _| data.qpos_mut().copy_from_slice(state)));
@@ -132,7 +132,7 @@ impl Side for Ours<'_> {
         Ok(())
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
             if self.physics > 0 {
@@ -146,20 +146,20 @@ impl Side for Ours<'_> {
 
 /// Renderers of the baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Renderer {
-    /// `mujoco.Renderer`, MuJoCo's renderer with its public API.
+pub(super) enum BaselineRenderer {
+    /// `mujoco.BaselineRenderer`, MuJoCo's renderer with its public API.
     OsMesa,
     /// The same library, called directly with the minimum number of passes.
-    OsMesaByHand,
+    OsMesaTwoPass,
     Tiny,
     Warp,
 }
 
-impl Renderer {
+impl BaselineRenderer {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::OsMesa => "MuJoCo on OSMesa",
-            Self::OsMesaByHand => "OSMesa by hand",
+            Self::OsMesaTwoPass => "OSMesa by hand",
             Self::Tiny => "PyBullet TinyRenderer",
             Self::Warp => "MuJoCo Warp on the CPU",
         }
@@ -167,7 +167,7 @@ impl Renderer {
 
     fn script(self) -> &'static str {
         match self {
-            Self::OsMesa | Self::OsMesaByHand => "mujoco_osmesa.py",
+            Self::OsMesa | Self::OsMesaTwoPass => "mujoco_osmesa.py",
             Self::Tiny => "pybullet_tiny.py",
             Self::Warp => "warp_rays.py",
         }
@@ -176,7 +176,7 @@ impl Renderer {
     /// Python code that fails if the baseline is not installed.
     pub(super) fn probe(self) -> &'static str {
         match self {
-            Self::OsMesa | Self::OsMesaByHand => {
+            Self::OsMesa | Self::OsMesaTwoPass => {
                 "import os; os.environ['MUJOCO_GL'] = 'osmesa'; import mujoco; mujoco.GLContext(8, 8)"
             }
             Self::Tiny => "import mujoco, pybullet",
@@ -188,21 +188,26 @@ impl Renderer {
     pub(super) fn images(self, work: &Work) -> usize {
         match self {
             Self::Warp => work.envs,
-            Self::OsMesa | Self::OsMesaByHand if work.look != Look::Plain => 1,
-            Self::OsMesa | Self::OsMesaByHand => 4.min(work.envs),
+            Self::OsMesa | Self::OsMesaTwoPass if work.look != Quality::Plain => 1,
+            Self::OsMesa | Self::OsMesaTwoPass => 4.min(work.envs),
             Self::Tiny => work.envs.min(4_000_000_usize.div_ceil(work.size[0] * work.size[1] * 8)),
         }
     }
 }
 
 /// A baseline's process.
-pub(super) struct Rival {
+pub(super) struct Baseline {
     name: &'static str,
     process: Process,
 }
 
-impl Rival {
-    pub(super) fn start(python: &OsString, renderer: Renderer, scene: &Scene, work: &Work) -> Outcome<Self> {
+impl Baseline {
+    pub(super) fn start(
+        python: &OsString,
+        renderer: BaselineRenderer,
+        scene: &Scene,
+        work: &Work,
+    ) -> BenchResult<Self> {
         let starts: Vec<&[f64]> = (0..work.envs).map(|i| scene.state(i)).collect();
         let job = json!({
             "model": scene.file,
@@ -213,7 +218,7 @@ impl Rival {
             "images": renderer.images(work),
             "physics": work.physics,
             "look": work.look.name(),
-            "passes": if renderer == Renderer::OsMesaByHand { "by_hand" } else { "api" },
+            "passes": if renderer == BaselineRenderer::OsMesaTwoPass { "by_hand" } else { "api" },
             "shadow_size": work.shadow_size,
         });
         let process = Process::start(python, renderer.script(), &job, tempfile::tempdir()?)?;
@@ -221,16 +226,16 @@ impl Rival {
     }
 
     /// Number of triangles of the baseline's meshes.
-    pub(super) fn triangles(&mut self) -> Outcome<usize> {
-        Ok(self.process.ask("triangles")?.parse()?)
+    pub(super) fn triangles(&mut self) -> BenchResult<usize> {
+        Ok(self.process.request("triangles")?.parse()?)
     }
 
     /// Checks that the baseline's depth image agrees with ours, so that camera, objects and poses are the same.
-    pub(super) fn must_see(&mut self, ours: &[f32], size: [usize; 2]) -> Outcome<()> {
+    pub(super) fn check_depth(&mut self, ours: &[f32], size: [usize; 2]) -> BenchResult<()> {
         let bytes = self.process.bytes("depth")?;
         let theirs: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|chunk| f32::from_le_bytes(*chunk)).collect();
         let share = agreement(ours, &theirs, size);
-        if theirs.len() == size[0] * size[1] && share > SAME {
+        if theirs.len() == size[0] * size[1] && share > MIN_AGREEMENT {
             return Ok(());
         }
         Err(format!("{} sees something else: {:.1} % of the depths agree", self.name, 100.0 * share).into())
@@ -238,7 +243,7 @@ impl Rival {
 }
 
 /// Required share of agreeing pixels.
-const SAME: f64 = 0.97;
+const MIN_AGREEMENT: f64 = 0.97;
 /// Farther depths count as background, which renderers encode differently \[m\].
 const FAR: f32 = 20.0;
 
@@ -260,12 +265,12 @@ fn agreement(ours: &[f32], theirs: &[f32], [width, height]: [usize; 2]) -> f64 {
     theirs.iter().enumerate().filter(|pixel| agrees(*pixel)).count() as f64 / (width * height) as f64
 }
 
-impl Side for Rival {
-    fn restart(&mut self) -> Outcome<()> {
-        self.process.ask("restart").map(drop)
+impl Contender for Baseline {
+    fn restart(&mut self) -> BenchResult<()> {
+        self.process.request("restart").map(drop)
     }
 
-    fn block(&mut self, steps: u32) -> Outcome<Duration> {
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         self.process.block(steps)
     }
 

@@ -1,6 +1,6 @@
 //! Output and exit codes of `check`, `convert`, `render`, `bench` and the help.
 
-use super::support::{ARM, Shell};
+use super::support::{ARM, CommandFolder};
 use super::view::SCENE;
 
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
@@ -9,8 +9,8 @@ const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
 
 #[test]
 fn check() {
-    let shell = Shell::with_arm();
-    let out = shell.ok("check arm.urdf --qpos hinge=-0.5 --json arm.json");
+    let shell = CommandFolder::with_arm();
+    let out = shell.run_ok("check arm.urdf --qpos hinge=-0.5 --json arm.json");
     assert!(out.contains("total mass 2 kg") && out.contains("hinge"), "{out}");
     let json = std::fs::read_to_string(shell.path("arm.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
@@ -21,7 +21,7 @@ fn check() {
     // Principal moments: `[[a, b], [b, a]]` has the moments `a - b` and `a + b`.
     let turned = "ixx=\"0.1\" iyy=\"0.1\" izz=\"0.05\" ixy=\"0.02\"";
     shell.write("turned.urdf", &ARM.replace("ixx=\"0.1\" iyy=\"0.1\" izz=\"0.1\" ixy=\"0\"", turned));
-    let out = shell.ok("check turned.urdf");
+    let out = shell.run_ok("check turned.urdf");
     let mut after = out.lines().skip_while(|line| !line.contains("Principal moments"));
     assert!(after.next().is_some_and(|line| line.contains("kg m²")), "{out}");
     let row = after.find(|line| line.starts_with("rod")).unwrap();
@@ -32,7 +32,7 @@ fn check() {
 /// Ignored settings are warnings, with exit code 1.
 #[test]
 fn check_warnings() {
-    let shell = Shell::with(&[
+    let shell = CommandFolder::with(&[
         ("unlimited.urdf", &ARM.replace("effort=\"50\"", "effort=\"0\"")),
         // The file has a time step, which does not apply to a robot.
         ("pendulum.xml", PENDULUM),
@@ -53,7 +53,7 @@ fn strict_and_packages() {
     let twice = "<material name=\"\"/><material name=\"\"/></visual>";
     let mesh = |uri: &str| ARM.replace("<box size=\"0.1 0.1 1\"/>", &format!("<mesh filename=\"{uri}\"/>"));
     let collides = |uri: &str| mesh(uri).replace("visual>", "collision>");
-    let shell = Shell::with(&[
+    let shell = CommandFolder::with(&[
         ("arm.urdf", &ARM.replace("</visual>", twice)),
         ("pendulum.xml", PENDULUM),
         ("assets/cube/a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
@@ -73,7 +73,7 @@ fn strict_and_packages() {
         ("check pendulum.xml --asset-root assets", "--asset-root: pendulum.xml is an MJCF file"),
     ]);
     for file in ["root.urdf", "package.urdf"] {
-        shell.ok(&format!("check {file} --asset-root assets"));
+        shell.run_ok(&format!("check {file} --asset-root assets"));
     }
 }
 
@@ -81,7 +81,7 @@ fn strict_and_packages() {
 #[test]
 fn line_of_error() {
     let hinge = "type=\"hinge\" axis=\"0 1 0\" range=\"-90 90\" limited=\"true\"";
-    let shell = Shell::with(&[
+    let shell = CommandFolder::with(&[
         ("unknown.xml", &PENDULUM.replace("size=", "sise=")),
         // A mass that the MuJoCo compiler rejects.
         ("mass.xml", &PENDULUM.replace("mass=\"1\"", "mass=\"-1\"")),
@@ -90,14 +90,14 @@ fn line_of_error() {
         ("arm.urdf", &ARM.replace("xyz=\"0 1 0\"", "xyz=\"0 x 0\"")),
     ]);
     for line in ["check", "view", "bench", "render -o a.png", "convert -o a.png"] {
-        let err = shell.refused(&format!("{line} unknown.xml"));
+        let err = shell.run_refused(&format!("{line} unknown.xml"));
         assert!(err.starts_with("error: ") && err.contains("unknown.xml:3"), "{line}: {err}");
         let lines: Vec<&str> = err.lines().collect();
         let at = lines.iter().position(|line| line.contains("3 |   <geom")).unwrap_or_else(|| panic!("{err}"));
         assert_eq!(lines[at + 1].find('^'), lines[at].find("sise"), "{line}: {err}");
     }
     for (place, text) in [("mass.xml:3", "3 |"), ("ball.xml:2", "2 |"), ("arm.urdf:8", "8 |     <parent")] {
-        let err = shell.refused(&format!("check {}", place.split(':').next().unwrap()));
+        let err = shell.run_refused(&format!("check {}", place.split(':').next().unwrap()));
         assert!(err.starts_with("error: ") && err.contains(place), "{err}");
         assert!(err.contains(text) && err.contains('^'), "{err}");
     }
@@ -105,23 +105,24 @@ fn line_of_error() {
 
 #[test]
 fn convert() {
-    let shell = Shell::with_arm();
-    let out = shell.ok("convert arm.urdf -o out");
+    let shell = CommandFolder::with_arm();
+    let out = shell.run_ok("convert arm.urdf -o out");
     assert!(out.lines().all(|file| shell.path(file).is_file()), "{out}");
     // MuJoCo loads the written file.
-    let version = if kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2 { "2" } else { "4" };
+    let version =
+        if kinetoscope::mujoco::BUILD_VERSION == kinetoscope::mujoco::SupportedVersion::V2 { "2" } else { "4" };
     let mjcf = format!("out/robot.mjcf{version}.xml");
     assert!(out.contains(&mjcf), "{out}");
     let (_, err, code) = shell.run(&format!("render {mjcf} -o a.png --width 64"));
     assert_eq!(code, 0, "{err}");
-    let err = shell.refused("convert arm.urdf -o out");
+    let err = shell.run_refused("convert arm.urdf -o out");
     assert!(err.contains("not empty") && err.contains("--force"), "{err}");
     assert_eq!(shell.run("convert arm.urdf --force -o out").2, 0);
 }
 
 #[test]
 fn render_channels() {
-    let shell = Shell::with_arm();
+    let shell = CommandFolder::with_arm();
     let images = ["color", "depth", "mask", "normal"].map(|channel| {
         let view = "--width 120 --height 80 --eye 3,0,0.5 --target 0,0,0.5";
         let (out, err, code) = shell.run(&format!("render arm.urdf -o arm.png --channel {channel} {view}"));
@@ -139,7 +140,7 @@ fn render_channels() {
 
 #[test]
 fn bench() {
-    let (out, err, code) = Shell::with_arm().run("bench arm.urdf --num-envs 3 --seconds 0.05 --width 64");
+    let (out, err, code) = CommandFolder::with_arm().run("bench arm.urdf --num-envs 3 --seconds 0.05 --width 64");
     assert_eq!(code, 0, "{err}");
     let rate = |words: &str| -> f64 {
         let line = out.lines().find(|line| line.contains(words)).unwrap_or_else(|| panic!("{words}: {out}"));
@@ -153,7 +154,7 @@ fn bench() {
 
 #[test]
 fn refusals() {
-    let shell = Shell::with(&[
+    let shell = CommandFolder::with(&[
         ("arm.urdf", ARM),
         ("pendulum.xml", PENDULUM),
         ("scene.toml", "[entities.arm]\ntype = \"robot\"\nurdf = \"arm.urdf\"\n"),
@@ -198,15 +199,15 @@ fn refusals() {
 /// Every command, including future ones, has examples of its own and explains its exit codes.
 #[test]
 fn help() {
-    let shell = Shell::with(&[]);
-    let out = shell.ok("--help");
+    let shell = CommandFolder::with(&[]);
+    let out = shell.run_ok("--help");
     assert!(out.contains("kinetoscope check") && out.contains("Exit codes: 0"), "{out}");
     let listed = out.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
     let commands: Vec<&str> = listed.filter_map(|line| line.split_whitespace().next()).collect();
     assert!(commands.len() >= 8, "{commands:?}");
     for command in commands.into_iter().filter(|command| *command != "help") {
         for flag in ["-h", "--help"] {
-            let out = shell.ok(&format!("{command} {flag}"));
+            let out = shell.run_ok(&format!("{command} {flag}"));
             let examples = out.lines().filter(|line| line.starts_with(&format!("  kinetoscope {command} "))).count();
             assert!(out.contains("Examples:") && examples >= 2, "{command} {flag}: {out}");
             assert!(out.contains("Exit codes: 0"), "{command} {flag}: {out}");
@@ -229,7 +230,7 @@ const BOX: &str = r#"<robot name="box"><link name="body">
 /// Cause: the root link was placed at height 0 regardless of lower links, so legged robots started inside the ground.
 #[test]
 fn starts_on_the_ground() {
-    let shell = Shell::with(&[("box.urdf", BOX)]);
+    let shell = CommandFolder::with(&[("box.urdf", BOX)]);
     // The leg ends 0.5 m below the root link.
     let start = |flags: &str| -> f64 {
         let line =
@@ -237,8 +238,8 @@ fn starts_on_the_ground() {
         let (out, err, code) = shell.run(&line);
         assert_eq!(code, 0, "{line}: {out}{err}");
         let scene = kinetoscope::record::Recording::open(shell.path("a.mcap")).unwrap();
-        let (mut film, mut sim) = kinetoscope::record::Film::of(&scene, None).unwrap();
-        film.show(&mut sim, 0).unwrap();
+        let (mut film, mut sim) = kinetoscope::record::Playback::open(&scene, None).unwrap();
+        film.seek(&mut sim, 0).unwrap();
         // A recorded scene is a single MJCF entity.
         let part = sim.mjcf_part(sim.entities().mjcf_id("scene").unwrap());
         part.body_pose("robot/body").unwrap()[(0, 2)]
@@ -256,7 +257,7 @@ fn starts_on_the_ground() {
         assert!(err.contains(words), "{words}: {err}");
     }
     for flag in ["--spawn-height 0", "--no-ground", "--floating-base"] {
-        shell.ok(&format!("{bench} {flag}"));
+        shell.run_ok(&format!("{bench} {flag}"));
     }
 }
 
@@ -268,7 +269,7 @@ fn bench_of_a_diverged_simulation() {
     // 1e-9 kg m² under 1e8 N m: MuJoCo reports instability in the first steps.
     let wild = r#"<mujoco><worldbody><body name="a" pos="0 0 1"><joint name="j" axis="0 1 0" stiffness="-1e15"/>
       <geom size="0.01" pos="0.1 0 0" mass="0.001"/></body></worldbody></mujoco>"#;
-    let shell = Shell::with(&[("wild.xml", wild)]);
+    let shell = CommandFolder::with(&[("wild.xml", wild)]);
     let (out, err, code) = shell.run("bench wild.xml --num-envs 2 --seconds 0.2 --width 64");
     assert_eq!((out.as_str(), code), ("", 2), "{err}");
     assert!(err.contains("diverged in all 2 environments") && err.contains("step "), "{err}");
@@ -297,16 +298,16 @@ fn scenes() {
         ("m.xml", &mocap),
         ("n.xml", still),
     ];
-    let shell = Shell::with(&files);
+    let shell = CommandFolder::with(&files);
     for (file, _) in &files[1..] {
-        let out = shell.ok(&format!("bench {file} --seconds 0.01 --width 64"));
+        let out = shell.run_ok(&format!("bench {file} --seconds 0.01 --width 64"));
         let envs = if file.ends_with(".xml") { "64 environments" } else { "3 environments" };
         assert!(out.starts_with(envs), "{file}: {out}");
-        shell.ok(&format!("view {file} --serve 127.0.0.1:0 --speed 1000 --steps 2"));
-        shell.ok(&format!("render {file} -o {file}.png --width 64"));
+        shell.run_ok(&format!("view {file} --serve 127.0.0.1:0 --speed 1000 --steps 2"));
+        shell.run_ok(&format!("render {file} -o {file}.png --width 64"));
         assert_eq!(shell.image(&format!("{file}.png")).width(), 64);
-        shell.ok(&format!("convert {file} -o {file}.d"));
-        let out = shell.ok(&format!("check {file} --json {file}.json"));
+        shell.run_ok(&format!("convert {file} -o {file}.d"));
+        let out = shell.run_ok(&format!("check {file} --json {file}.json"));
         assert!(out.contains("a scene"), "{file}: {out}");
         let report = std::fs::read_to_string(shell.path(&format!("{file}.json"))).unwrap();
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
@@ -330,25 +331,25 @@ fn newer_mjcf() {
     let with = |joint: &str| PENDULUM.replace("<joint ", &format!("<joint {joint} "));
     let included = "<mujocoinclude>\n <default>\n  <joint actuatorfrcrange=\"-1 1\"/></default></mujocoinclude>";
     let main = PENDULUM.replace("<worldbody>", "\n<include file=\"part.xml\"/><worldbody>");
-    let shell = Shell::with(&[
+    let shell = CommandFolder::with(&[
         ("force.xml", &with("actuatorfrcrange=\"-1 1\"")),
         ("main.xml", &main),
         ("part.xml", included),
         ("wrong.xml", &with("actuatorfrcrang=\"-1 1\"")),
     ]);
-    let is_old = kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2;
+    let is_old = kinetoscope::mujoco::BUILD_VERSION == kinetoscope::mujoco::SupportedVersion::V2;
     for (file, place, since) in [("force.xml", "force.xml:2", "2.3.7"), ("main.xml", "part.xml:3", "2.3.7")] {
         if is_old {
-            let err = shell.refused(&format!("render {file} -o a.png"));
+            let err = shell.run_refused(&format!("render {file} -o a.png"));
             for words in [place, "actuatorfrcrange", since, "MUJOCO_DIR"] {
                 assert!(err.contains(words), "{file}: {words}: {err}");
             }
             assert!(!err.contains("; ;"), "{err}");
         } else {
-            shell.ok(&format!("render {file} -o a.png --width 64"));
+            shell.run_ok(&format!("render {file} -o a.png --width 64"));
         }
     }
     // Control: a keyword that no supported MuJoCo version has.
-    let err = shell.refused("render wrong.xml -o a.png");
+    let err = shell.run_refused("render wrong.xml -o a.png");
     assert!(err.contains("wrong.xml:2") && err.contains("If it is no mistake") == is_old, "{err}");
 }

@@ -1,6 +1,6 @@
 //! `kinetoscope plot`, compared with a motion in closed form.
 
-use super::support::Shell;
+use super::support::CommandFolder;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::record::RecorderCfg;
@@ -33,12 +33,12 @@ fn swing(start: f64, time: f64) -> f64 {
 
 #[test]
 fn closed_form() {
-    let shell = Shell::with(&[]);
+    let shell = CommandFolder::with(&[]);
     for name in ["run.mcap", "run.npz"] {
         record(&shell.path(name));
         for (env, start) in STARTS.into_iter().enumerate() {
             let said =
-                shell.ok(&format!("plot {name} --topic /joint_states --env {env} --field position[x] -o plot.svg"));
+                shell.run_ok(&format!("plot {name} --topic /joint_states --env {env} --field position[x] -o plot.svg"));
             assert!(said.contains("1 curves, 301 points"), "{said}");
             let curves = curves(&std::fs::read_to_string(shell.path("plot.svg")).unwrap());
             assert_eq!((curves.len(), curves[0].len()), (1, 301));
@@ -58,9 +58,9 @@ fn closed_form() {
 
 #[test]
 fn lists_and_refusals() {
-    let shell = Shell::with(&[]);
+    let shell = CommandFolder::with(&[]);
     record(&shell.path("run.npz"));
-    let out = shell.ok("plot run.npz");
+    let out = shell.run_ok("plot run.npz");
     for line in
         ["/env_1/cart/joint_states   numbers, 301 times", "    position[x]", "    pose[cart/world, cart/cart].qw"]
     {

@@ -1,12 +1,12 @@
 //! Images, views and verification of `kinetoscope replay`.
 
-use super::support::{Running, Shell, colors, red, window_of};
+use super::support::{CommandFolder, RunningCommand, colors, red, window_of};
 use kinetoscope::ndarray::{Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::record::RecorderCfg;
 use kinetoscope::robot::description::LinkId;
-use kinetoscope::sim::{Still, WrenchFrame};
-use kinetoscope::viewer::{Eye, ScreenshotCfg};
+use kinetoscope::sim::{OffscreenScene, WrenchFrame};
+use kinetoscope::viewer::{OrbitCamera, ScreenshotCfg};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 
@@ -23,12 +23,12 @@ mjcf.text = '''<mujoco><option timestep="0.01"/><worldbody><body name="cart" pos
 "#;
 
 /// Creates a folder with `cart.toml`: a cart on a spring.
-fn shell() -> Shell {
-    Shell::with(&[("cart.toml", SCENE)])
+fn shell() -> CommandFolder {
+    CommandFolder::with(&[("cart.toml", SCENE)])
 }
 
 /// Records the scene, with the cart at `start`, to each of these files.
-fn record(shell: &Shell, start: f64, cfgs: &[RecorderCfg], run: impl FnOnce(&mut SimulationManager, RobotId)) {
+fn record(shell: &CommandFolder, start: f64, cfgs: &[RecorderCfg], run: impl FnOnce(&mut SimulationManager, RobotId)) {
     let mut scene = InteractiveScene::from_file(shell.path("cart.toml")).unwrap();
     let sim = scene.sim_mut();
     let cart = sim.entities().robot_id("cart").unwrap();
@@ -49,22 +49,22 @@ fn images() {
         // The ball is in the image at both times.
         record(&shell, 0.8, &[], |sim, _| {
             for _ in 0..2 {
-                stills.push(Still::overview(sim, None, &[]).unwrap());
+                stills.push(OffscreenScene::overview(sim, None, &[]).unwrap());
                 sim.update(45);
             }
         });
-        let eye = Eye::framing(&stills.iter().map(Still::placed).collect::<Vec<_>>(), size);
+        let eye = OrbitCamera::frame_scenes(&stills.iter().map(OffscreenScene::placed).collect::<Vec<_>>(), size);
         record(&shell, 0.8, &[RecorderCfg::new(shell.path(name))], |sim, _| {
-            let cfg = ScreenshotCfg { size, eye: Some(eye), ..ScreenshotCfg::default() };
+            let cfg = ScreenshotCfg { size, camera: Some(eye), ..ScreenshotCfg::default() };
             for _ in 0..2 {
-                let canvas = sim.picture_of_stage(&cfg).unwrap();
+                let canvas = sim.render_image(&cfg).unwrap();
                 let rgb = canvas.bytes().as_chunks::<4>().0.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
                 expected.push(image::RgbImage::from_raw(320, 200, rgb).unwrap());
                 sim.update(45);
             }
         });
         let out = format!("{name}.images");
-        let said = shell.ok(&format!("replay {name} --out {out} --at 0,0.45 --width 320 --height 200"));
+        let said = shell.run_ok(&format!("replay {name} --out {out} --at 0,0.45 --width 320 --height 200"));
         let found = ["replay_0.000s.png", "replay_0.450s.png"].map(|file| {
             assert!(said.contains(file), "{said}");
             shell.image(&format!("{out}/{file}"))
@@ -99,7 +99,7 @@ fn verification() {
         sim.update(20);
     });
     for file in ["run.npz", "run.mcap"] {
-        let out = shell.ok(&format!("replay {file} --verify --scene cart.toml"));
+        let out = shell.run_ok(&format!("replay {file} --verify --scene cart.toml"));
         assert!(out.contains("the same in 50 steps"), "{out}");
     }
     let (out, err, code) = shell.run("replay pushed.npz --verify --scene cart.toml");
@@ -117,7 +117,7 @@ fn pages_and_refusals() {
     let [path, bare] = ["run.mcap", "bare.mcap"].map(|name| RecorderCfg::new(shell.path(name)));
     record(&shell, 0.0, &[path, RecorderCfg { scene: false, ..bare }], |sim, _| sim.update(20));
     for line in ["replay run.mcap", "replay bare.mcap --scene cart.toml"] {
-        let out = shell.ok(&format!("{line} --serve 127.0.0.1:0 --seconds 0.5"));
+        let out = shell.run_ok(&format!("{line} --serve 127.0.0.1:0 --seconds 0.5"));
         assert!(out.contains("http://127.0.0.1:"), "{out}");
     }
     shell.assert_refused(&[
@@ -130,7 +130,7 @@ fn pages_and_refusals() {
         ("replay no_such.mcap", "no_such.mcap"),
         ("replay run.mcap --scene no_such.toml", "no_such.toml"),
     ]);
-    let mut running = Running::start(&mut shell.command("replay run.mcap --serve 127.0.0.1:0"));
+    let mut running = RunningCommand::start(&mut shell.command("replay run.mcap --serve 127.0.0.1:0"));
     assert!(running.line().contains("Ctrl+C ends it"));
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
@@ -185,9 +185,9 @@ fn window() {
     record(&shell, 0.8, &[RecorderCfg::new(shell.path("swing.mcap"))], |sim, _| sim.update(100));
     let shown = || screenshot(&connection, [0, 0], SIZE);
     let start = || {
-        let mut running = Running::start(shell.command("replay swing.mcap").env("DISPLAY", &display.name));
+        let mut running = RunningCommand::start(shell.command("replay swing.mcap").env("DISPLAY", &display.name));
         assert!(running.line().contains("swing.mcap"));
-        let window = wait::some("a window", || window_of(&connection, "swing.mcap"));
+        let window = wait::until_some("a window", || window_of(&connection, "swing.mcap"));
         wait::until("the recording is drawn", || colors(shown()) > 50);
         (running, window)
     };

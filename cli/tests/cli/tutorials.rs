@@ -1,6 +1,6 @@
 //! Examples after EmbodiChain's tutorials: output and poses, windows, and how they end.
 
-use super::support::{Running, Shell, window_of};
+use super::support::{CommandFolder, RunningCommand, window_of};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use serde_json::Value;
@@ -25,7 +25,7 @@ fn example(name: &str, folder: &Path) -> Command {
 #[test]
 #[ignore = "needs the examples: cargo xtask test"]
 fn create_robot() {
-    let shell = Shell::with(&[]);
+    let shell = CommandFolder::with(&[]);
     let args = ["--headless", "--num_envs", "2", "--steps", "4000", "--gpu_id", "0", "--report", "report.json"];
     let output = example("create_robot", shell.folder()).args(args).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
@@ -66,13 +66,14 @@ fn create_robot() {
 #[test]
 #[ignore = "needs Xvfb and the examples: cargo xtask test"]
 fn closed_window() {
-    let (display, shell) = (Display::start("1280x800"), Shell::with(&[]));
+    let (display, shell) = (Display::start("1280x800"), CommandFolder::with(&[]));
     let connection = display.connect();
     // Without the end of the window, it would run for hours.
     let args = ["--steps", "10000000", "--report", "report.json"];
-    let mut running =
-        Running(example("create_robot", shell.folder()).args(args).env("DISPLAY", &display.name).spawn().unwrap());
-    close(&connection, wait::some("a window", || window_of(&connection, "Kinetoscope")));
+    let mut running = RunningCommand(
+        example("create_robot", shell.folder()).args(args).env("DISPLAY", &display.name).spawn().unwrap(),
+    );
+    close(&connection, wait::until_some("a window", || window_of(&connection, "Kinetoscope")));
     assert_eq!(running.ended().code(), Some(0));
     assert!(shell.path("report.json").is_file());
     assert!(running.rest().ends_with("Stopping simulation...\nCleaning up...\n"));
@@ -83,16 +84,17 @@ fn closed_window() {
 fn sensor_window() {
     let display = Display::start("1920x1200");
     let connection = display.connect();
-    let start = |shell: &Shell, args: &[&str]| {
-        let running =
-            Running(example("create_sensor", shell.folder()).args(args).env("DISPLAY", &display.name).spawn().unwrap());
-        (running, wait::some("the window of images", || window_of(&connection, IMAGES)))
+    let start = |shell: &CommandFolder, args: &[&str]| {
+        let running = RunningCommand(
+            example("create_sensor", shell.folder()).args(args).env("DISPLAY", &display.name).spawn().unwrap(),
+        );
+        (running, wait::until_some("the window of images", || window_of(&connection, IMAGES)))
     };
-    let files = |shell: &Shell| std::fs::read_dir(shell.folder()).unwrap().count();
+    let files = |shell: &CommandFolder| std::fs::read_dir(shell.folder()).unwrap().count();
     // Normals of the ground, at the center of the fourth image: (0, 0, 1) towards the camera is encoded as (128, 128,
     // 255).
     let normals = || screenshot(&connection, [970, 900], [1, 1])[0];
-    let shell = Shell::with(&[]);
+    let shell = CommandFolder::with(&[]);
     let (mut running, window) = start(&shell, &[]);
     wait::until("the images are shown", || normals()[2] > 250);
     assert_eq!(files(&shell), 0, "images are files only where they are not shown");

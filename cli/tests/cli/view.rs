@@ -1,7 +1,7 @@
 //! `kinetoscope view`: a window on Xvfb, a page for browsers, and how the command ends.
 
-use super::serve::visitor::say;
-use super::support::{Running, Shell, colors, window_of};
+use super::serve::visitor::exchange;
+use super::support::{CommandFolder, RunningCommand, colors, window_of};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use std::time::Instant;
@@ -13,7 +13,7 @@ pub(crate) const SCENE: &str = r#"<mujoco><option timestep="0.01"/><worldbody><g
 
 #[test]
 fn no_display() {
-    let err = Shell::with_arm().refused("view arm.urdf");
+    let err = CommandFolder::with_arm().run_refused("view arm.urdf");
     for words in ["DISPLAY is not set", "WAYLAND_DISPLAY", "XWayland", "--serve", "kinetoscope render"] {
         assert!(err.contains(words), "{words}: {err}");
     }
@@ -21,7 +21,7 @@ fn no_display() {
 
 #[test]
 fn real_time() {
-    let shell = Shell::with_arm();
+    let shell = CommandFolder::with_arm();
     let took = |speed: &str| {
         let start = Instant::now();
         let (out, err, code) = shell.run(&format!("view arm.urdf --serve 127.0.0.1:0 --steps 200 --speed {speed}"));
@@ -36,13 +36,13 @@ fn real_time() {
 
 #[test]
 fn page_and_ctrl_c() {
-    let shell = Shell::with_arm();
+    let shell = CommandFolder::with_arm();
     // So slow that the first step takes 10 s.
-    let mut running = Running::start(&mut shell.command("view arm.urdf --serve 127.0.0.1:0 --speed 0.001"));
+    let mut running = RunningCommand::start(&mut shell.command("view arm.urdf --serve 127.0.0.1:0 --speed 0.001"));
     let line = running.line();
     assert!(line.contains("arm.urdf") && line.contains("Ctrl+C"), "{line}");
     let address = line.split("http://").nth(1).and_then(|rest| rest.split('/').next()).unwrap();
-    let page = say(address.parse().unwrap(), b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    let page = exchange(address.parse().unwrap(), b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("<title>Kinetoscope</title>"), "{page}");
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
@@ -51,7 +51,7 @@ fn page_and_ctrl_c() {
 /// A recording is complete at every regular end.
 #[test]
 fn recording() {
-    let shell = Shell::with_arm();
+    let shell = CommandFolder::with_arm();
     // After all steps: one row per step, and one for the initial state.
     let line = "view arm.urdf --serve 127.0.0.1:0 --speed 100 --steps 30 --record steps.npz";
     let (out, err, code) = shell.run(line);
@@ -63,7 +63,8 @@ fn recording() {
     assert!(code == 2 && err.contains("--record") && err.contains("steps.npz"), "{err}");
     // Ctrl+C.
     let file = shell.path("interrupted.mcap");
-    let mut running = Running::start(&mut shell.command("view arm.urdf --serve 127.0.0.1:0 --record interrupted.mcap"));
+    let mut running =
+        RunningCommand::start(&mut shell.command("view arm.urdf --serve 127.0.0.1:0 --record interrupted.mcap"));
     running.line();
     assert!(!file.exists(), "it has its name when it is whole");
     running.interrupt();
@@ -75,7 +76,7 @@ fn recording() {
 #[test]
 fn mjcf_scene() {
     let broken = SCENE.replace("size=\"0.1\"", "size=\"0.1\" no_such=\"1\"");
-    let shell = Shell::with(&[("scene.xml", SCENE), ("broken.xml", &broken)]);
+    let shell = CommandFolder::with(&[("scene.xml", SCENE), ("broken.xml", &broken)]);
     let (out, err, code) = shell.run("view scene.xml --serve 127.0.0.1:0 --steps 20 --speed 100");
     assert_eq!(code, 0, "{out}{err}");
     // Controls: a file that MuJoCo rejects is not a scene either, and robot flags are refused.
@@ -92,13 +93,13 @@ fn mjcf_scene() {
 #[ignore = "needs Xvfb: cargo xtask test"]
 fn window() {
     let mut display = Display::start("1280x800");
-    let (shell, connection) = (Shell::with_arm(), display.connect());
+    let (shell, connection) = (CommandFolder::with_arm(), display.connect());
     let shown = || colors(screenshot(&connection, [0, 0], [960, 540]));
     assert_eq!(shown(), 1, "the screen is empty before");
     let start = |line: &str| {
-        let mut running = Running::start(shell.command(line).env("DISPLAY", &display.name));
+        let mut running = RunningCommand::start(shell.command(line).env("DISPLAY", &display.name));
         let line = running.line();
-        (running, line, wait::some("a window", || window_of(&connection, "arm.urdf")))
+        (running, line, wait::until_some("a window", || window_of(&connection, "arm.urdf")))
     };
     let (mut running, line, window) = start("view arm.urdf --num-envs 4");
     assert!(line.contains("H in it shows its keys"), "{line}");

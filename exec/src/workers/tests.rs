@@ -8,10 +8,10 @@ fn me() -> ThreadId {
 }
 
 /// Completed items: number, slot, thread.
-type Taken = Vec<(usize, usize, ThreadId)>;
+type CompletedItems = Vec<(usize, usize, ThreadId)>;
 
 /// Runs a slow job that takes the numbers below `count`; it panics at the number `fail`.
-fn numbers(threads: &Workers, slots: usize, count: usize, fail: Option<usize>) -> Taken {
+fn numbers(threads: &Workers, slots: usize, count: usize, fail: Option<usize>) -> CompletedItems {
     let (next, taken) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     threads.run(slots, &|slot| {
         loop {

@@ -1,12 +1,12 @@
 //! Animated PNG: frames are chunks of PNG files, as in the third edition of the PNG specification, section 4.9.
 
-use super::{Encoder, Out, duration, sides};
-use crate::picture::Png;
-use crate::writer::{Fault, Written};
+use super::{Encoder, Output, check_sides, duration};
+use crate::picture::PngWriter;
+use crate::writer::{WriteError, WriteResult};
 use std::io::{Seek, SeekFrom, Write};
 
 struct Apng {
-    png: Png,
+    png: PngWriter,
     size: [u32; 2],
     frames: u32,
     sequence: u32,
@@ -18,17 +18,17 @@ struct Apng {
 const SIGNATURE: &[u8; 8] = b"\x89PNG\r\n\x1a\n";
 
 /// Largest side of a PNG file \[pixels\].
-const MOST: usize = (1 << 31) - 1;
+const MAX_SIDE: usize = (1 << 31) - 1;
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    let size = sides(size, MOST)?;
-    Ok(Box::new(Apng { png: Png::default(), size, frames: 0, sequence: 0, count_at: 0, data: Vec::new() }))
+    let size = check_sides(size, MAX_SIDE)?;
+    Ok(Box::new(Apng { png: PngWriter::default(), size, frames: 0, sequence: 0, count_at: 0, data: Vec::new() }))
 }
 
-fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> Written {
+fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> WriteResult {
     let length: usize = data.iter().map(|part| part.len()).sum();
     let length = u32::try_from(length)
-        .map_err(|_| Fault::limit("a frame of a PNG file has at most 4 GiB; make pictures smaller"))?;
+        .map_err(|_| WriteError::limit("a frame of a PNG file has at most 4 GiB; make pictures smaller"))?;
     to.write_all(&length.to_be_bytes())?;
     to.write_all(kind)?;
     let mut crc = crc32fast::Hasher::new();
@@ -55,15 +55,15 @@ fn chunks<'f>(file: &'f [u8], kind: &'static [u8; 4]) -> impl Iterator<Item = &'
 }
 
 impl Apng {
-    fn write_count(out: &mut Out, frames: u32) -> Written {
+    fn write_count(out: &mut Output, frames: u32) -> WriteResult {
         // Endless loop.
         chunk(out, b"acTL", &[&frames.to_be_bytes(), &[0; 4]])
     }
 }
 
 impl Encoder for Apng {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
-        let picture = self.png.rgb(rgba, self.size.map(|side| side as usize))?;
+    fn frame(&mut self, out: &mut Output, rgba: &[u8], shown: [f64; 2]) -> WriteResult {
+        let picture = self.png.encode_rgb(rgba, self.size.map(|side| side as usize))?;
         if self.frames == 0 {
             out.write_all(SIGNATURE)?;
             for header in chunks(picture, b"IHDR") {
@@ -96,7 +96,7 @@ impl Encoder for Apng {
         Ok(())
     }
 
-    fn finish(&mut self, out: &mut Out) -> Written {
+    fn finish(&mut self, out: &mut Output) -> WriteResult {
         chunk(out, b"IEND", &[])?;
         out.seek(SeekFrom::Start(self.count_at))?;
         Self::write_count(out, self.frames)

@@ -1,7 +1,7 @@
 //! Animated GIF: a palette of 256 colors per frame, quantized if necessary, and times in 1/100 s.
 
-use super::{Encoder, Out, duration, rgb_of, sides};
-use crate::writer::Written;
+use super::{Encoder, Output, check_sides, duration, rgb_of};
+use crate::writer::WriteResult;
 use gif::{Frame, Repeat};
 use std::io::{self, Write};
 
@@ -14,14 +14,14 @@ struct Gif {
 
 /// Sampling step of color quantization: 1 uses all pixels, 30 uses few. Larger values are hardly faster and visibly
 /// worse.
-const COARSENESS: i32 = 10;
+const SAMPLING_STEP: i32 = 10;
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    Ok(Box::new(Gif { size: sides(size, usize::from(u16::MAX))?, encoder: None, rgb: Vec::new() }))
+    Ok(Box::new(Gif { size: check_sides(size, usize::from(u16::MAX))?, encoder: None, rgb: Vec::new() }))
 }
 
 impl Encoder for Gif {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
+    fn frame(&mut self, out: &mut Output, rgba: &[u8], shown: [f64; 2]) -> WriteResult {
         let [width, height] = self.size;
         if self.encoder.is_none() {
             let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(io::Error::other)?;
@@ -30,7 +30,7 @@ impl Encoder for Gif {
         }
         let Some(encoder) = &mut self.encoder else { return Ok(()) };
         rgb_of(rgba, &mut self.rgb);
-        let mut frame = Frame::from_rgb_speed(width, height, &self.rgb, COARSENESS);
+        let mut frame = Frame::from_rgb_speed(width, height, &self.rgb, SAMPLING_STEP);
         frame.delay = duration(shown, 100.0, u16::MAX.into())?;
         encoder.write_frame(&frame).map_err(io::Error::other)?;
         let written = encoder.get_mut();
@@ -39,7 +39,7 @@ impl Encoder for Gif {
         Ok(())
     }
 
-    fn finish(&mut self, out: &mut Out) -> Written {
+    fn finish(&mut self, out: &mut Output) -> WriteResult {
         let Some(encoder) = self.encoder.take() else { return Ok(()) };
         Ok(out.write_all(&encoder.into_inner().map_err(io::Error::other)?)?)
     }
@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn palette() {
         let mut file = tempfile::tempfile().unwrap();
-        let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
+        let mut out: Output = BufWriter::new(Box::new(file.try_clone().unwrap()));
         let mut encoder = begin([64, 64]).unwrap();
         // 4096 combinations of red and green, which a fixed palette of all colors represents poorly.
         let rgba: Vec<u8> =

@@ -6,35 +6,35 @@
 //! Intra_16x16 without a residual), or sample by sample (I_PCM). Images of a simulation are mostly static, so that few
 //! macroblocks are of the third kind.
 
-use super::level::{HIGHEST, Level, SIDE};
+use super::level::{H264Level, HIGHEST, MB_SIZE};
 
 /// Number of frames from one IDR frame to the next. A player can begin at an IDR frame.
-const GROUP: u32 = 120;
+const IDR_INTERVAL: u32 = 120;
 
 /// Parameter set NAL units (7.3.1), as in MP4 files: without start codes. The level is known only at the end of the
 /// stream.
-pub(super) struct Headers {
+pub(super) struct ParameterSets {
     pub(super) sequence: Vec<u8>,
     pub(super) picture: Vec<u8>,
 }
 
 /// A coded frame.
-pub(super) struct Coded<'c> {
+pub(super) struct CodedFrame<'c> {
     /// NAL unit.
     pub(super) unit: &'c [u8],
     /// True for an IDR frame, which does not refer to other frames.
-    pub(super) alone: bool,
+    pub(super) is_idr: bool,
 }
 
-pub(super) struct Stream {
+pub(super) struct H264Encoder {
     size: [usize; 2],
-    now: Planes,
-    before: Planes,
+    current: YuvFrame,
+    reference: YuvFrame,
     /// Number of frames since the last IDR frame.
-    since: u32,
+    frames_since_idr: u32,
     /// Number of IDR frames.
-    groups: u32,
-    bits: Bits,
+    idr_count: u32,
+    bits: BitWriter,
     unit: Vec<u8>,
     /// True for each macroblock of the row above that was coded as I_PCM.
     above: Vec<bool>,
@@ -42,31 +42,31 @@ pub(super) struct Stream {
 
 /// A frame in Y'CbCr (BT.709, limited range) with 4:2:0 chroma, sited in the center of four pixels.
 #[derive(Clone)]
-struct Planes {
+struct YuvFrame {
     /// Macroblocks per row and rows of macroblocks.
-    squares: [usize; 2],
+    macroblocks: [usize; 2],
     /// Luma, then both chroma planes.
     planes: [Vec<u8>; 3],
 }
 
-impl Stream {
+impl H264Encoder {
     /// Creates an encoder for frames of a width and height; the error describes the supported sizes.
     pub(super) fn new(size: [usize; 2]) -> Result<Self, String> {
-        let squares = size.map(|side| side.div_ceil(SIDE));
+        let squares = size.map(|side| side.div_ceil(MB_SIZE));
         // Four pixels share a chroma sample.
         let even = size.iter().all(|side| *side > 0 && side % 2 == 0);
-        if !even || !HIGHEST.has(squares) {
-            let [most, all] = HIGHEST.largest();
+        if !even || !HIGHEST.supports_size(squares) {
+            let [most, all] = HIGHEST.max_size();
             return Err(format!("even numbers would do for both, up to {most} pixels and {all} in all"));
         }
-        let planes = Planes::new(squares);
+        let planes = YuvFrame::new(squares);
         Ok(Self {
             size,
-            before: planes.clone(),
-            now: planes,
-            since: 0,
-            groups: 0,
-            bits: Bits::default(),
+            reference: planes.clone(),
+            current: planes,
+            frames_since_idr: 0,
+            idr_count: 0,
+            bits: BitWriter::default(),
             unit: Vec::new(),
             above: vec![false; squares[0]],
         })
@@ -74,31 +74,31 @@ impl Stream {
 
     /// Parameter sets of the complete stream. `frames` are duration (in units of 1 / `per_second` s) and size (in
     /// bytes) of each frame.
-    pub(super) fn headers(&self, per_second: u32, frames: impl Iterator<Item = [u32; 2]> + Clone) -> Headers {
-        let level = Level::of(self.now.squares, per_second, frames);
-        Headers { sequence: sequence(self.size, level.code), picture: picture() }
+    pub(super) fn headers(&self, per_second: u32, frames: impl Iterator<Item = [u32; 2]> + Clone) -> ParameterSets {
+        let level = H264Level::lowest_for(self.current.macroblocks, per_second, frames);
+        ParameterSets { sequence: sequence_parameter_set(self.size, level.code), picture: picture_parameter_set() }
     }
 
     /// Encodes the next frame from RGBA pixels, without their alpha channel.
-    pub(super) fn code(&mut self, rgba: &[u8]) -> Coded<'_> {
-        std::mem::swap(&mut self.now, &mut self.before);
-        self.now.fill(rgba, self.size);
-        let alone = self.since == 0;
+    pub(super) fn encode(&mut self, rgba: &[u8]) -> CodedFrame<'_> {
+        std::mem::swap(&mut self.current, &mut self.reference);
+        self.current.fill(rgba, self.size);
+        let alone = self.frames_since_idr == 0;
         self.slice(alone);
-        self.since = (self.since + 1) % GROUP;
-        Coded { unit: &self.unit, alone }
+        self.frames_since_idr = (self.frames_since_idr + 1) % IDR_INTERVAL;
+        CodedFrame { unit: &self.unit, is_idr: alone }
     }
 
     fn slice(&mut self, alone: bool) {
-        let Self { now, before, bits, above, .. } = self;
+        let Self { current: now, reference: before, bits, above, .. } = self;
         bits.clear();
         bits.ue(0); // first_mb_in_slice
         bits.ue(if alone { 7 } else { 5 }); // slice_type: all I, all P
         bits.ue(0); // pic_parameter_set_id
-        bits.put(self.since % 16, 4); // frame_num
+        bits.put(self.frames_since_idr % 16, 4); // frame_num
         if alone {
-            bits.ue(self.groups % 2); // idr_pic_id: differs from that of the previous IDR frame
-            self.groups += 1;
+            bits.ue(self.idr_count % 2); // idr_pic_id: differs from that of the previous IDR frame
+            self.idr_count += 1;
             bits.put(0, 2); // no_output_of_prior_pics_flag, long_term_reference_flag
         } else {
             bits.put(0, 1); // num_ref_idx_active_override_flag
@@ -110,13 +110,13 @@ impl Stream {
         // In P slices, intra macroblock types follow five others (table 7-13).
         let first_type = if alone { 0 } else { 5 };
         let mut skipped = 0;
-        let [columns, rows] = now.squares;
+        let [columns, rows] = now.macroblocks;
         above.fill(false);
         for row in 0..rows {
             let mut left = false;
             for column in 0..columns {
                 let place = [column, row];
-                if !alone && now.same(before, place) {
+                if !alone && now.equals(before, place) {
                     skipped += 1;
                     (above[column], left) = (false, false);
                     continue;
@@ -125,12 +125,14 @@ impl Stream {
                     bits.ue(skipped); // mb_skip_run
                     skipped = 0;
                 }
-                let goes_on = [Way::Down, Way::Across].into_iter().find(|way| now.goes_on(*way, place));
+                let goes_on = [IntraPrediction::Vertical, IntraPrediction::Horizontal]
+                    .into_iter()
+                    .find(|way| now.is_predicted(*way, place));
                 if let Some(way) = goes_on {
                     // Intra_16x16 without coefficients (table 7-11): luma mode, then chroma mode (table 7-16).
                     let (luma, chroma) = match way {
-                        Way::Down => (0, 2),
-                        Way::Across => (1, 1),
+                        IntraPrediction::Vertical => (0, 2),
+                        IntraPrediction::Horizontal => (1, 1),
                     };
                     bits.ue(first_type + 1 + luma);
                     bits.ue(chroma);
@@ -159,39 +161,39 @@ impl Stream {
         if skipped > 0 {
             bits.ue(skipped);
         }
-        bits.end();
+        bits.rbsp_trailing_bits();
         self.unit.clear();
         // nal_ref_idc 3; nal_unit_type 5 (IDR) or 1.
         self.unit.push(if alone { 0x65 } else { 0x61 });
-        escape(&self.bits.bytes, &mut self.unit);
+        insert_emulation_prevention(&self.bits.bytes, &mut self.unit);
     }
 }
 
 /// Direction in which a macroblock is predicted.
 #[derive(Clone, Copy)]
-enum Way {
+enum IntraPrediction {
     /// Down, from the row above.
-    Down,
+    Vertical,
     /// To the right, from the column to the left.
-    Across,
+    Horizontal,
 }
 
-impl Planes {
+impl YuvFrame {
     fn new(squares: [usize; 2]) -> Self {
-        let luma = squares[0] * squares[1] * SIDE * SIDE;
-        Self { squares, planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
+        let luma = squares[0] * squares[1] * MB_SIZE * MB_SIZE;
+        Self { macroblocks: squares, planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
     }
 
     /// Side of a macroblock in a plane, and length of the plane's rows \[samples\].
     fn shape(&self, plane: usize) -> (usize, usize) {
-        let side = if plane == 0 { SIDE } else { SIDE / 2 };
-        (side, side * self.squares[0])
+        let side = if plane == 0 { MB_SIZE } else { MB_SIZE / 2 };
+        (side, side * self.macroblocks[0])
     }
 
     /// Converts a frame. Padding beyond its edges, which is cropped, repeats the last pixels.
     fn fill(&mut self, rgba: &[u8], [width, height]: [usize; 2]) {
         let pixels = rgba.as_chunks::<4>().0;
-        let [columns, rows] = self.squares.map(|count| count * SIDE / 2);
+        let [columns, rows] = self.macroblocks.map(|count| count * MB_SIZE / 2);
         let (stride, half) = (2 * columns, columns);
         for row in 0..rows {
             for column in 0..columns {
@@ -216,24 +218,24 @@ impl Planes {
         (0..side).map(move |k| &self.planes[plane][(row * side + k) * stride + column * side..][..side])
     }
 
-    fn same(&self, other: &Self, place: [usize; 2]) -> bool {
+    fn equals(&self, other: &Self, place: [usize; 2]) -> bool {
         (0..3).all(|plane| self.rows(plane, place).eq(other.rows(plane, place)))
     }
 
     /// True if a macroblock equals the prediction from its neighbor's edge, in all planes.
-    fn goes_on(&self, way: Way, [column, row]: [usize; 2]) -> bool {
+    fn is_predicted(&self, way: IntraPrediction, [column, row]: [usize; 2]) -> bool {
         let place = [column, row];
         (0..3).all(|plane| {
             let (side, stride) = self.shape(plane);
             let (x, y) = (column * side, row * side);
             match way {
-                Way::Down => {
+                IntraPrediction::Vertical => {
                     y > 0 && {
                         let edge = &self.planes[plane][(y - 1) * stride + x..][..side];
                         self.rows(plane, place).all(|row| row == edge)
                     }
                 }
-                Way::Across => {
+                IntraPrediction::Horizontal => {
                     x > 0 && {
                         let mut rows = self.rows(plane, place).enumerate();
                         rows.all(|(k, row)| row.iter().all(|one| *one == self.planes[plane][(y + k) * stride + x - 1]))
@@ -243,7 +245,7 @@ impl Planes {
         })
     }
 
-    fn put(&self, place: [usize; 2], bits: &mut Bits) {
+    fn put(&self, place: [usize; 2], bits: &mut BitWriter) {
         for plane in 0..3 {
             self.rows(plane, place).for_each(|row| bits.bytes.extend_from_slice(row));
         }
@@ -264,9 +266,9 @@ fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {
 }
 
 /// Sequence parameter set (7.3.2.1.1).
-fn sequence([width, height]: [usize; 2], level: u8) -> Vec<u8> {
-    let squares = [width, height].map(|side| side.div_ceil(SIDE) as u32);
-    let mut bits = Bits::default();
+fn sequence_parameter_set([width, height]: [usize; 2], level: u8) -> Vec<u8> {
+    let squares = [width, height].map(|side| side.div_ceil(MB_SIZE) as u32);
+    let mut bits = BitWriter::default();
     bits.put(66, 8); // profile_idc: baseline
     bits.put(0b1100_0000, 8); // constrained: also decodable as main profile
     bits.put(level.into(), 8);
@@ -280,7 +282,7 @@ fn sequence([width, height]: [usize; 2], level: u8) -> Vec<u8> {
     bits.put(1, 1); // direct_8x8_inference_flag
     bits.put(1, 1); // frame_cropping_flag
     // Left, right, top, bottom, in units of two pixels.
-    let beyond = |count: u32, side: usize| (count * SIDE as u32 - side as u32) / 2;
+    let beyond = |count: u32, side: usize| (count * MB_SIZE as u32 - side as u32) / 2;
     for cut in [0, beyond(squares[0], width), 0, beyond(squares[1], height)] {
         bits.ue(cut);
     }
@@ -300,13 +302,13 @@ fn sequence([width, height]: [usize; 2], level: u8) -> Vec<u8> {
     bits.put(1, 1); // motion_vectors_over_pic_boundaries_flag
     // No limits of bytes and bits, zero motion vectors, no reordering, one reference frame.
     [0, 0, 0, 0, 0, 1].into_iter().for_each(|number| bits.ue(number));
-    bits.end();
+    bits.rbsp_trailing_bits();
     unit(0x67, &bits)
 }
 
 /// Picture parameter set (7.3.2.2).
-fn picture() -> Vec<u8> {
-    let mut bits = Bits::default();
+fn picture_parameter_set() -> Vec<u8> {
+    let mut bits = BitWriter::default();
     bits.ue(0); // pic_parameter_set_id
     bits.ue(0); // seq_parameter_set_id
     bits.put(0, 2); // entropy_coding_mode_flag: CAVLC; bottom_field_pic_order_in_frame_present_flag
@@ -314,18 +316,18 @@ fn picture() -> Vec<u8> {
     bits.put(0, 3); // weighted_pred_flag, weighted_bipred_idc
     (0..3).for_each(|_| bits.se(0)); // quantizers
     bits.put(0b100, 3); // deblocking_filter_control_present_flag; no constrained_intra_pred, no redundant_pic_cnt
-    bits.end();
+    bits.rbsp_trailing_bits();
     unit(0x68, &bits)
 }
 
-fn unit(head: u8, bits: &Bits) -> Vec<u8> {
+fn unit(head: u8, bits: &BitWriter) -> Vec<u8> {
     let mut unit = vec![head];
-    escape(&bits.bytes, &mut unit);
+    insert_emulation_prevention(&bits.bytes, &mut unit);
     unit
 }
 
 /// Inserts emulation prevention bytes (7.4.1).
-fn escape(bytes: &[u8], to: &mut Vec<u8>) {
+fn insert_emulation_prevention(bytes: &[u8], to: &mut Vec<u8>) {
     let mut zeros = 0;
     for &byte in bytes {
         if zeros == 2 && byte <= 3 {
@@ -339,13 +341,13 @@ fn escape(bytes: &[u8], to: &mut Vec<u8>) {
 
 /// Bit writer, most significant bit first.
 #[derive(Default)]
-struct Bits {
+struct BitWriter {
     bytes: Vec<u8>,
     /// Number of free bits in the last byte.
     free: u32,
 }
 
-impl Bits {
+impl BitWriter {
     fn clear(&mut self) {
         self.bytes.clear();
         self.free = 0;
@@ -384,7 +386,7 @@ impl Bits {
     }
 
     /// Writes the stop bit, then pads with zeros to the next byte.
-    fn end(&mut self) {
+    fn rbsp_trailing_bits(&mut self) {
         self.put(1, 1);
         self.align();
     }
@@ -397,11 +399,11 @@ mod tests {
     #[test]
     fn exp_golomb() {
         // Table 9-2: 1, 010, 011, 00100, 00101, ...
-        let mut bits = Bits::default();
+        let mut bits = BitWriter::default();
         [0, 1, 2, 3, 4].into_iter().for_each(|number| bits.ue(number));
         assert_eq!(bits.bytes, [0b1010_0110, 0b0100_0010, 0b1000_0000]);
         // Table 9-3: 0, 1, -1 are the codes of 0, 1, 2.
-        let mut signed = Bits::default();
+        let mut signed = BitWriter::default();
         [0, 1, -1].into_iter().for_each(|number| signed.se(number));
         assert_eq!(signed.bytes, [0b1010_0110]);
     }
@@ -409,7 +411,7 @@ mod tests {
     #[test]
     fn start_codes() {
         let mut unit = Vec::new();
-        escape(&[0, 0, 1, 0, 0, 0, 0, 0, 4], &mut unit);
+        insert_emulation_prevention(&[0, 0, 1, 0, 0, 0, 0, 0, 4], &mut unit);
         assert_eq!(unit, [0, 0, 3, 1, 0, 0, 3, 0, 0, 3, 0, 4]);
     }
 
@@ -427,28 +429,28 @@ mod tests {
     #[test]
     fn still_images() {
         let size = [64, 48];
-        let mut stream = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
+        let mut stream = H264Encoder::new(size).unwrap_or_else(|fits| panic!("{fits}"));
         let noise = |seed: u32| -> Vec<u8> {
             (0..4 * 64 * 48_u32).map(|k| ((k ^ seed).wrapping_mul(2_654_435_761) >> 24) as u8).collect()
         };
-        let first = stream.code(&noise(0)).unit.len();
+        let first = stream.encode(&noise(0)).unit.len();
         assert!(first > 64 * 48 * 3 / 2, "everything is sent: {first}");
-        let again = stream.code(&noise(0));
-        assert!(!again.alone && again.unit.len() < 16, "{}", again.unit.len());
-        assert!(stream.code(&noise(1)).unit.len() > 64 * 48 * 3 / 2);
+        let again = stream.encode(&noise(0));
+        assert!(!again.is_idr && again.unit.len() < 16, "{}", again.unit.len());
+        assert!(stream.encode(&noise(1)).unit.len() > 64 * 48 * 3 / 2);
         // A uniform frame needs one I_PCM macroblock.
-        let mut flat = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
-        let flat = flat.code(&[90; 4 * 64 * 48]).unit.len();
+        let mut flat = H264Encoder::new(size).unwrap_or_else(|fits| panic!("{fits}"));
+        let flat = flat.encode(&[90; 4 * 64 * 48]).unit.len();
         assert!((384..500).contains(&flat), "{flat}");
     }
 
     #[test]
     fn sizes() {
         for size in [[33, 24], [0, 2], [2, 16_882], [16_880, 4_096]] {
-            assert!(Stream::new(size).is_err_and(|fits| fits.contains("even")), "{size:?}");
+            assert!(H264Encoder::new(size).is_err_and(|fits| fits.contains("even")), "{size:?}");
         }
         for size in [[2, 2], [640, 480], [16_880, 16], [4096, 4096]] {
-            assert!(Stream::new(size).is_ok(), "{size:?}");
+            assert!(H264Encoder::new(size).is_ok(), "{size:?}");
         }
     }
 }

@@ -1,29 +1,29 @@
 //! Levels of H.264: requirements on a decoder (ITU-T H.264, table A-1 and clause A.3.1).
 
 /// Side of a macroblock \[pixels\].
-pub(super) const SIDE: usize = 16;
+pub(super) const MB_SIZE: usize = 16;
 
 /// A row of table A-1. Level 1b is omitted because other bits signal it; level 1.1 replaces it.
-pub(super) struct Level {
+pub(super) struct H264Level {
     /// Ten times the level number.
     pub(super) code: u8,
     /// Macroblocks per second (MaxMBPS).
-    per_second: u64,
+    max_mbps: u64,
     /// Macroblocks per frame (MaxFS).
-    squares: usize,
+    max_fs: usize,
     /// Bit rate \[kbit/s\] (MaxBR).
-    rate: u64,
+    max_br: u64,
     /// Size of the coded picture buffer \[kbit\] (MaxCPB).
-    waiting: u64,
+    max_cpb: u64,
     /// Minimum compression ratio of frames that are decoded at the maximum rate (MinCR).
-    fewer: u64,
+    min_cr: u64,
 }
 
-const fn level(code: u8, per_second: u64, squares: usize, rate: u64, waiting: u64, fewer: u64) -> Level {
-    Level { code, per_second, squares, rate, waiting, fewer }
+const fn level(code: u8, per_second: u64, squares: usize, rate: u64, waiting: u64, fewer: u64) -> H264Level {
+    H264Level { code, max_mbps: per_second, max_fs: squares, max_br: rate, max_cpb: waiting, min_cr: fewer }
 }
 
-const LEVELS: [Level; 19] = [
+const LEVELS: [H264Level; 19] = [
     level(10, 1_485, 99, 64, 175, 2),
     level(11, 3_000, 396, 192, 500, 2),
     level(12, 6_000, 396, 384, 1_000, 2),
@@ -46,24 +46,24 @@ const LEVELS: [Level; 19] = [
 ];
 
 /// The highest level. It is also signaled for a stream that exceeds it.
-pub(super) const HIGHEST: &Level = &LEVELS[LEVELS.len() - 1];
+pub(super) const HIGHEST: &H264Level = &LEVELS[LEVELS.len() - 1];
 
-impl Level {
+impl H264Level {
     /// True if the level supports frames of this many macroblocks per row and rows. The side limit is the square root
     /// of 8 MaxFS.
-    pub(super) fn has(&self, [width, height]: [usize; 2]) -> bool {
-        let side = (8 * self.squares).isqrt();
-        width.max(height) <= side && width * height <= self.squares
+    pub(super) fn supports_size(&self, [width, height]: [usize; 2]) -> bool {
+        let side = (8 * self.max_fs).isqrt();
+        width.max(height) <= side && width * height <= self.max_fs
     }
 
     /// Largest frames: side length and area \[pixels\].
-    pub(super) fn largest(&self) -> [usize; 2] {
-        [(8 * self.squares).isqrt() * SIDE, self.squares * SIDE * SIDE]
+    pub(super) fn max_size(&self) -> [usize; 2] {
+        [(8 * self.max_fs).isqrt() * MB_SIZE, self.max_fs * MB_SIZE * MB_SIZE]
     }
 
-    /// The lowest level for a stream. `frames` are duration (in units of 1 / `per_second` s) and size (in bytes) of
+    /// The lowest level for a stream. `frames` are duration (in units of 1 / `max_mbps` s) and size (in bytes) of
     /// each frame.
-    pub(super) fn of(
+    pub(super) fn lowest_for(
         squares: [usize; 2],
         per_second: u32,
         frames: impl Iterator<Item = [u32; 2]> + Clone,
@@ -89,10 +89,10 @@ impl Level {
             let mut pairs = frames.clone().zip(frames.clone().skip(1));
             let in_time = pairs.all(|([shown, _], [_, bytes])| {
                 let shown = u64::from(shown);
-                all * second <= level.per_second * shown
-                    && u64::from(bytes) * level.fewer * second <= 384 * level.per_second * shown
+                all * second <= level.max_mbps * shown
+                    && u64::from(bytes) * level.min_cr * second <= 384 * level.max_mbps * shown
             });
-            level.has(squares) && in_time && most <= 1000 * level.rate && largest <= 1000 * level.waiting
+            level.supports_size(squares) && in_time && most <= 1000 * level.max_br && largest <= 1000 * level.max_cpb
         };
         LEVELS.iter().find(fits).unwrap_or(HIGHEST)
     }
@@ -105,7 +105,8 @@ mod tests {
     /// Level of frames of these sides \[pixels\], at this rate \[Hz\], each of this many bytes.
     fn of(sides: [usize; 2], rate: u32, bytes: u32) -> u8 {
         let shown = 90_000 / rate;
-        Level::of(sides.map(|side| side.div_ceil(SIDE)), 90_000, (0..3 * rate).map(|_| [shown, bytes])).code
+        H264Level::lowest_for(sides.map(|side| side.div_ceil(MB_SIZE)), 90_000, (0..3 * rate).map(|_| [shown, bytes]))
+            .code
     }
 
     /// Reference: frame sizes and their maximum rates by level, as listed in table A-6 of the standard.
@@ -140,7 +141,7 @@ mod tests {
         // 64 000 bits per second are ten times 800 bytes: level 1. One byte more requires level 1.1.
         assert_eq!([800, 801].map(|bytes| of([128, 96], 10, bytes)), [10, 11]);
         // A single frame with the bits per second of levels 1 and 1.1, and one byte more.
-        let alone = |bytes| Level::of([8, 6], 90_000, [[90_000, bytes]].into_iter()).code;
+        let alone = |bytes| H264Level::lowest_for([8, 6], 90_000, [[90_000, bytes]].into_iter()).code;
         assert_eq!([8_000, 8_001, 24_000, 24_001].map(alone), [10, 11, 11, 12]);
         // 1280 x 720 at 30 Hz with uncompressed macroblocks of 384 bytes: 332 Mbit/s.
         assert_eq!(of([1280, 720], 30, 3600 * 384), 61);

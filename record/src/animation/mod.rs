@@ -9,30 +9,30 @@ mod mp4;
 mod webp;
 
 use crate::error::{RecordError, Result};
-use crate::file::{PartFile, Storage};
+use crate::file::{PartialFile, Storage};
 use crate::format::Format;
 use crate::packet::Packet;
-use crate::stream::Stream;
-use crate::writer::{Fault, Sink, Written};
+use crate::stream::StreamSchema;
+use crate::writer::{FormatWriter, WriteError, WriteResult};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Output of encoders.
-type Out = BufWriter<Box<dyn Storage>>;
+type Output = BufWriter<Box<dyn Storage>>;
 
 /// Encoder of a format.
 trait Encoder: Send {
     /// Encodes the next frame: RGBA pixels, and begin and end of its display \[s\], relative to the first frame.
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written;
+    fn frame(&mut self, out: &mut Output, rgba: &[u8], shown: [f64; 2]) -> WriteResult;
 
     /// Writes the end of the file, and the parts of its beginning that are known only now.
-    fn finish(&mut self, out: &mut Out) -> Written;
+    fn finish(&mut self, out: &mut Output) -> WriteResult;
 }
 
 /// Creates an encoder for frames of this width and height; the error describes the supported sizes.
-type Begin = fn([usize; 2]) -> std::result::Result<Box<dyn Encoder>, String>;
+type CreateEncoder = fn([usize; 2]) -> std::result::Result<Box<dyn Encoder>, String>;
 
-fn encoder(format: Format) -> Option<Begin> {
+fn encoder(format: Format) -> Option<CreateEncoder> {
     match format {
         Format::Apng => Some(apng::begin),
         Format::Gif => Some(gif::begin),
@@ -43,80 +43,91 @@ fn encoder(format: Format) -> Option<Begin> {
 }
 
 /// Duration of a frame that is the only one \[s\].
-const ALONE: f64 = 0.04;
+const SINGLE_FRAME_DURATION: f64 = 0.04;
 
 /// Writer of an animation.
 pub(crate) struct Animation {
-    part: PartFile,
-    file: Option<Out>,
+    part: PartialFile,
+    file: Option<Output>,
     encoder: Box<dyn Encoder>,
     /// The last frame, whose duration is not known yet, and its time \[s\].
-    waiting: Option<(Vec<u8>, f64)>,
+    pending: Option<(Vec<u8>, f64)>,
     /// Time of the first frame \[s\].
     first: Option<f64>,
     /// Duration of the previous frame \[s\].
-    last: f64,
+    last_duration: f64,
 }
 
 /// Checks that a format supports frames of this width and height.
-pub(crate) fn check(path: &Path, format: Format, size: [usize; 2]) -> Result<()> {
-    begin(path, format, size).map(|_| ())
+pub(crate) fn check_size(path: &Path, format: Format, size: [usize; 2]) -> Result<()> {
+    create_encoder(path, format, size).map(|_| ())
 }
 
-fn begin(path: &Path, format: Format, size: [usize; 2]) -> Result<Box<dyn Encoder>> {
+fn create_encoder(path: &Path, format: Format, size: [usize; 2]) -> Result<Box<dyn Encoder>> {
     // Callers use animation formats only.
-    let begin = encoder(format).ok_or_else(|| RecordError::Nothing { path: path.into(), format })?;
+    let begin = encoder(format).ok_or_else(|| RecordError::NothingToRecord { path: path.into(), format })?;
     let [width, height] = size;
-    begin(size).map_err(|fits| RecordError::Size { path: path.into(), format, width, height, fits })
+    begin(size).map_err(|fits| RecordError::UnsupportedSize {
+        path: path.into(),
+        format,
+        width,
+        height,
+        supported: fits,
+    })
 }
 
 impl Animation {
-    pub(crate) fn create(part: PartFile, storage: Box<dyn Storage>, format: Format, size: [usize; 2]) -> Result<Self> {
-        let encoder = begin(part.path(), format, size)?;
+    pub(crate) fn create(
+        part: PartialFile,
+        storage: Box<dyn Storage>,
+        format: Format,
+        size: [usize; 2],
+    ) -> Result<Self> {
+        let encoder = create_encoder(part.path(), format, size)?;
         let file = Some(BufWriter::with_capacity(1 << 16, storage));
-        Ok(Self { part, file, encoder, waiting: None, first: None, last: ALONE })
+        Ok(Self { part, file, encoder, pending: None, first: None, last_duration: SINGLE_FRAME_DURATION })
     }
 
     /// Encodes the pending frame, which ends at `next` \[s\]. Without a next frame, it has the duration of the previous
     /// one. Returns the pixel buffer for reuse.
-    fn show(&mut self, next: Option<f64>) -> Written<Vec<u8>> {
-        let (Some((rgba, time)), Some(out)) = (self.waiting.take(), &mut self.file) else { return Ok(Vec::new()) };
-        self.last = next.map_or(self.last, |next| next - time);
+    fn encode_pending(&mut self, next: Option<f64>) -> WriteResult<Vec<u8>> {
+        let (Some((rgba, time)), Some(out)) = (self.pending.take(), &mut self.file) else { return Ok(Vec::new()) };
+        self.last_duration = next.map_or(self.last_duration, |next| next - time);
         let first = *self.first.get_or_insert(time);
-        self.encoder.frame(out, &rgba, [time - first, time + self.last - first])?;
+        self.encoder.frame(out, &rgba, [time - first, time + self.last_duration - first])?;
         Ok(rgba)
     }
 }
 
-impl Sink for Animation {
-    fn write(&mut self, _streams: &[Stream], packet: &Packet) -> Written {
-        let Some(block) = packet.blocks.iter().find(|block| block.used) else { return Ok(()) };
+impl FormatWriter for Animation {
+    fn write(&mut self, _streams: &[StreamSchema], packet: &Packet) -> WriteResult {
+        let Some(block) = packet.streams.iter().find(|block| block.has_content) else { return Ok(()) };
         // The time is on the clock of the recording, which continues over resets.
-        let time = block.stamps.first().copied().unwrap_or(0.0);
-        let mut rgba = self.show(Some(time))?;
+        let time = block.recorded_times.first().copied().unwrap_or(0.0);
+        let mut rgba = self.encode_pending(Some(time))?;
         rgba.clear();
-        rgba.extend_from_slice(block.values.bytes());
-        self.waiting = Some((rgba, time));
+        rgba.extend_from_slice(block.values.as_u8s());
+        self.pending = Some((rgba, time));
         Ok(())
     }
 
-    fn flush(&mut self) -> Written {
+    fn flush(&mut self) -> WriteResult {
         // An animation is not readable before its end.
         Ok(())
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
-        self.show(None)?;
+    fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
+        self.encode_pending(None)?;
         let Some(mut file) = self.file.take().filter(|_| self.first.is_some()) else {
-            return Err(Fault::NoFrame("the camera has measured nothing"));
+            return Err(WriteError::NoFrame("the camera has measured nothing"));
         };
         self.encoder.finish(&mut file)?;
         file.flush()?;
         Ok(self.part.commit()?)
     }
 
-    fn kept(&self) -> Option<PathBuf> {
-        self.part.kept()
+    fn partial_path(&self) -> Option<PathBuf> {
+        self.part.kept_path()
     }
 }
 
@@ -131,12 +142,12 @@ fn units(time: f64, per_second: f64) -> u64 {
 ///
 /// # Errors
 /// The frame is longer than the format supports.
-fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64) -> Written<N> {
+fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64) -> WriteResult<N> {
     let found = units(until, per_second).saturating_sub(units(from, per_second)).max(1);
     let fits = N::try_from(found).ok().filter(|_| found <= most);
     let longest = most as f64 / per_second;
     fits.ok_or_else(|| {
-        Fault::limit(format!("a frame of this format is shown for {longest} s at most: record more often"))
+        WriteError::limit(format!("a frame of this format is shown for {longest} s at most: record more often"))
     })
 }
 
@@ -149,7 +160,7 @@ fn rgb_of(rgba: &[u8], rgb: &mut Vec<u8>) {
 }
 
 /// Width and height, if both are from 1 to `most`.
-fn sides<N: TryFrom<usize>>(size: [usize; 2], most: usize) -> std::result::Result<[N; 2], String> {
+fn check_sides<N: TryFrom<usize>>(size: [usize; 2], most: usize) -> std::result::Result<[N; 2], String> {
     let side = |side: usize| N::try_from(side).ok().filter(|_| (1..=most).contains(&side));
     match size.map(side) {
         [Some(width), Some(height)] => Ok([width, height]),

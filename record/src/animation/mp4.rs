@@ -1,9 +1,9 @@
 //! MP4 files (ISO/IEC 14496-12, video as in 14496-15): the frames in sequence, then the table of their offsets and
 //! durations. The file is not readable without the table, which is written at the end.
 
-use super::h264::{Headers, Stream};
-use super::{Encoder, Out, duration};
-use crate::writer::{Fault, Written};
+use super::h264::{H264Encoder, ParameterSets};
+use super::{Encoder, Output, duration};
+use crate::writer::{WriteError, WriteResult};
 use std::io::{Seek, SeekFrom, Write};
 
 /// Units of time per second: integers for a frame at 24, 25, 30, 50, 60 and 100 Hz.
@@ -11,28 +11,28 @@ const PER_SECOND: u32 = 90_000;
 
 struct Mp4 {
     size: [usize; 2],
-    stream: Stream,
+    stream: H264Encoder,
     frames: Vec<Sample>,
     /// File offset of the data length, which is written at the end.
     length_at: u64,
     /// File offset of the next frame.
-    at: u64,
+    offset: u64,
 }
 
 struct Sample {
-    at: u64,
+    offset: u64,
     bytes: u32,
     duration: u32,
-    alone: bool,
+    is_sync: bool,
 }
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    let stream = Stream::new(size)?;
-    Ok(Box::new(Mp4 { size, stream, frames: Vec::new(), length_at: 0, at: 0 }))
+    let stream = H264Encoder::new(size)?;
+    Ok(Box::new(Mp4 { size, stream, frames: Vec::new(), length_at: 0, offset: 0 }))
 }
 
 /// A box: its length, including the header, its type and its content.
-fn boxed(kind: &[u8; 4], parts: &[&[u8]]) -> Vec<u8> {
+fn make_box(kind: &[u8; 4], parts: &[&[u8]]) -> Vec<u8> {
     let length = 8 + parts.iter().map(|part| part.len()).sum::<usize>();
     // The largest box has some bytes for each frame.
     let mut all = u32::try_from(length).unwrap_or(u32::MAX).to_be_bytes().to_vec();
@@ -42,50 +42,50 @@ fn boxed(kind: &[u8; 4], parts: &[&[u8]]) -> Vec<u8> {
 }
 
 /// A box with a version and flags.
-fn full(kind: &[u8; 4], version: u8, flags: u32, parts: &[&[u8]]) -> Vec<u8> {
+fn full_box(kind: &[u8; 4], version: u8, flags: u32, parts: &[&[u8]]) -> Vec<u8> {
     let mut head = flags.to_be_bytes();
     head[0] = version;
-    boxed(kind, &[&[&head[..]], parts].concat())
+    make_box(kind, &[&[&head[..]], parts].concat())
 }
 
 /// Concatenates big-endian numbers.
-fn words<const B: usize>(numbers: impl IntoIterator<Item = [u8; B]>) -> Vec<u8> {
+fn be_bytes<const B: usize>(numbers: impl IntoIterator<Item = [u8; B]>) -> Vec<u8> {
     numbers.into_iter().flatten().collect()
 }
 
 fn u32s(numbers: &[u32]) -> Vec<u8> {
-    words(numbers.iter().map(|number| number.to_be_bytes()))
+    be_bytes(numbers.iter().map(|number| number.to_be_bytes()))
 }
 
 /// The identity matrix in fixed point: no rotation, no scale.
-const UPRIGHT: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
+const IDENTITY_MATRIX: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
 
 impl Mp4 {
     /// Movie metadata (8.2).
-    fn about(&self) -> Vec<u8> {
+    fn movie_box(&self) -> Vec<u8> {
         let length: u64 = self.frames.iter().map(|frame| u64::from(frame.duration)).sum();
         let length = length.to_be_bytes();
         // Without times of creation and modification, equal recordings give equal files.
         let never = [0; 16];
         let scale = PER_SECOND.to_be_bytes();
-        let [upright, next] = [u32s(&UPRIGHT), u32s(&[2])];
+        let [upright, next] = [u32s(&IDENTITY_MATRIX), u32s(&[2])];
         let loudness = u32s(&[1 << 16, 1 << 24, 0, 0]);
-        let header = full(b"mvhd", 1, 0, &[&never, &scale, &length, &loudness, &upright, &[0; 24], &next]);
+        let header = full_box(b"mvhd", 1, 0, &[&never, &scale, &length, &loudness, &upright, &[0; 24], &next]);
         let sides = u32s(&self.size.map(|side| (side as u32) << 16));
         // Enabled, in the movie, in its preview; track 1.
-        let track = full(b"tkhd", 1, 7, &[&never, &u32s(&[1, 0]), &length, &[0; 16], &upright, &sides]);
+        let track = full_box(b"tkhd", 1, 7, &[&never, &u32s(&[1, 0]), &length, &[0; 16], &upright, &sides]);
         // Language `und` (undetermined), five bits per letter.
-        let media = full(b"mdhd", 1, 0, &[&never, &scale, &length, &[0x55, 0xc4, 0, 0]]);
-        let handler = full(b"hdlr", 0, 0, &[&[0; 4], b"vide", &[0; 12], b"video\0"]);
-        let here = full(b"dref", 0, 0, &[&u32s(&[1]), &full(b"url ", 0, 1, &[])]);
-        let video = full(b"vmhd", 0, 1, &[&[0; 8]]);
-        let info = boxed(b"minf", &[&video, &boxed(b"dinf", &[&here]), &self.table()]);
-        let track = boxed(b"trak", &[&track, &boxed(b"mdia", &[&media, &handler, &info])]);
-        boxed(b"moov", &[&header, &track])
+        let media = full_box(b"mdhd", 1, 0, &[&never, &scale, &length, &[0x55, 0xc4, 0, 0]]);
+        let handler = full_box(b"hdlr", 0, 0, &[&[0; 4], b"vide", &[0; 12], b"video\0"]);
+        let here = full_box(b"dref", 0, 0, &[&u32s(&[1]), &full_box(b"url ", 0, 1, &[])]);
+        let video = full_box(b"vmhd", 0, 1, &[&[0; 8]]);
+        let info = make_box(b"minf", &[&video, &make_box(b"dinf", &[&here]), &self.sample_table()]);
+        let track = make_box(b"trak", &[&track, &make_box(b"mdia", &[&media, &handler, &info])]);
+        make_box(b"moov", &[&header, &track])
     }
 
     /// Sample table (8.5).
-    fn table(&self) -> Vec<u8> {
+    fn sample_table(&self) -> Vec<u8> {
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX).to_be_bytes();
         let mut shown: Vec<[u32; 2]> = Vec::new();
         for frame in &self.frames {
@@ -94,65 +94,65 @@ impl Mp4 {
                 _ => shown.push([1, frame.duration]),
             }
         }
-        let times = words(shown.iter().flatten().map(|number| number.to_be_bytes()));
-        let times = full(b"stts", 0, 0, &[&count(shown.len()), &times]);
-        let alone: Vec<u32> = (1..).zip(&self.frames).filter(|(_, frame)| frame.alone).map(|(k, _)| k).collect();
-        let alone = full(b"stss", 0, 0, &[&count(alone.len()), &u32s(&alone)]);
+        let times = be_bytes(shown.iter().flatten().map(|number| number.to_be_bytes()));
+        let times = full_box(b"stts", 0, 0, &[&count(shown.len()), &times]);
+        let alone: Vec<u32> = (1..).zip(&self.frames).filter(|(_, frame)| frame.is_sync).map(|(k, _)| k).collect();
+        let alone = full_box(b"stss", 0, 0, &[&count(alone.len()), &u32s(&alone)]);
         // Each frame is a chunk.
-        let chunks = full(b"stsc", 0, 0, &[&u32s(&[1, 1, 1, 1])]);
-        let sizes = words(self.frames.iter().map(|frame| frame.bytes.to_be_bytes()));
-        let sizes = full(b"stsz", 0, 0, &[&[0; 4], &count(self.frames.len()), &sizes]);
-        let places = words(self.frames.iter().map(|frame| frame.at.to_be_bytes()));
-        let places = full(b"co64", 0, 0, &[&count(self.frames.len()), &places]);
-        let kinds = full(b"stsd", 0, 0, &[&u32s(&[1]), &self.kind()]);
-        boxed(b"stbl", &[&kinds, &times, &alone, &chunks, &sizes, &places])
+        let chunks = full_box(b"stsc", 0, 0, &[&u32s(&[1, 1, 1, 1])]);
+        let sizes = be_bytes(self.frames.iter().map(|frame| frame.bytes.to_be_bytes()));
+        let sizes = full_box(b"stsz", 0, 0, &[&[0; 4], &count(self.frames.len()), &sizes]);
+        let places = be_bytes(self.frames.iter().map(|frame| frame.offset.to_be_bytes()));
+        let places = full_box(b"co64", 0, 0, &[&count(self.frames.len()), &places]);
+        let kinds = full_box(b"stsd", 0, 0, &[&u32s(&[1]), &self.sample_entry()]);
+        make_box(b"stbl", &[&kinds, &times, &alone, &chunks, &sizes, &places])
     }
 
     /// Sample description.
-    fn kind(&self) -> Vec<u8> {
+    fn sample_entry(&self) -> Vec<u8> {
         let frames = self.frames.iter().map(|frame| [frame.duration, frame.bytes]);
-        let Headers { sequence, picture } = &self.stream.headers(PER_SECOND, frames);
+        let ParameterSets { sequence, picture } = &self.stream.headers(PER_SECOND, frames);
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
         // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the first.
         let profile = sequence.get(1..4).unwrap_or_default();
         let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(picture), picture];
-        let avc = boxed(b"avcC", &avc);
+        let avc = make_box(b"avcC", &avc);
         // Primaries, transfer function and matrix as in the stream, limited range.
-        let color = boxed(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
-        let sides = words(self.size.map(|side| (side as u16).to_be_bytes()));
+        let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
+        let sides = be_bytes(self.size.map(|side| (side as u16).to_be_bytes()));
         let inch = u32s(&[72 << 16, 72 << 16, 0]);
         let head: [&[u8]; 8] = [&[0; 6], &[0, 1], &[0; 16], &sides, &inch, &[0, 1], &[0; 32], &[0, 24, 0xff, 0xff]];
-        boxed(b"avc1", &[&head[..], &[&avc, &color]].concat())
+        make_box(b"avc1", &[&head[..], &[&avc, &color]].concat())
     }
 }
 
 impl Encoder for Mp4 {
-    fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written {
+    fn frame(&mut self, out: &mut Output, rgba: &[u8], shown: [f64; 2]) -> WriteResult {
         if self.frames.is_empty() {
-            let brands = boxed(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
+            let brands = make_box(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
             out.write_all(&brands)?;
             // The length has eight bytes and is not known yet.
             out.write_all(&u32s(&[1]))?;
             out.write_all(b"mdat\0\0\0\0\0\0\0\0")?;
             self.length_at = brands.len() as u64 + 8;
-            self.at = self.length_at + 8;
+            self.offset = self.length_at + 8;
         }
-        let coded = self.stream.code(rgba);
-        let too_large = || Fault::limit("a picture of an MP4 file has less than 4 GiB; make pictures smaller");
+        let coded = self.stream.encode(rgba);
+        let too_large = || WriteError::limit("a picture of an MP4 file has less than 4 GiB; make pictures smaller");
         let length = u32::try_from(coded.unit.len()).map_err(|_| too_large())?;
         out.write_all(&length.to_be_bytes())?;
         out.write_all(coded.unit)?;
         let duration = duration(shown, PER_SECOND.into(), u32::MAX.into())?;
         let bytes = length.checked_add(4).ok_or_else(too_large)?;
-        self.frames.push(Sample { at: self.at, bytes, duration, alone: coded.alone });
-        self.at += u64::from(bytes);
+        self.frames.push(Sample { offset: self.offset, bytes, duration, is_sync: coded.is_idr });
+        self.offset += u64::from(bytes);
         Ok(())
     }
 
-    fn finish(&mut self, out: &mut Out) -> Written {
-        out.write_all(&self.about())?;
+    fn finish(&mut self, out: &mut Output) -> WriteResult {
+        out.write_all(&self.movie_box())?;
         out.seek(SeekFrom::Start(self.length_at))?;
         // The length includes the header of sixteen bytes.
-        Ok(out.write_all(&(self.at - self.length_at + 8).to_be_bytes())?)
+        Ok(out.write_all(&(self.offset - self.length_at + 8).to_be_bytes())?)
     }
 }

@@ -2,23 +2,23 @@
 
 use crate::error::{RecordError, Result};
 use crate::format::Format;
-use crate::stream::{Kind, Stream};
+use crate::stream::{StreamKind, StreamSchema};
 use std::ops::Range;
 use std::path::Path;
 
 /// Content of frames, in the order of the columns.
 pub(crate) struct Features {
     pub(crate) numbers: Vec<Feature>,
-    pub(crate) pictures: Vec<Seen>,
+    pub(crate) images: Vec<ImageFeature>,
     /// Stream whose rows are frames.
-    pub(crate) base: usize,
+    pub(crate) frame_stream: usize,
     /// Stream with the results of task steps.
-    pub(crate) outcome: Option<usize>,
+    pub(crate) result_stream: Option<usize>,
 }
 
 /// A range of values in the rows of a stream.
 #[derive(Clone, Debug, PartialEq)]
-struct StreamPart {
+struct StreamRange {
     stream: usize,
     range: Range<usize>,
 }
@@ -31,11 +31,11 @@ pub(crate) struct Feature {
     /// Name of each number.
     pub(crate) names: Vec<String>,
     /// Sources of the numbers.
-    parts: Vec<StreamPart>,
+    parts: Vec<StreamRange>,
 }
 
 /// A feature of images.
-pub(crate) struct Seen {
+pub(crate) struct ImageFeature {
     pub(crate) stream: usize,
     /// Name in the dataset.
     pub(crate) name: String,
@@ -64,7 +64,7 @@ pub(crate) enum Role {
         channel: String,
     },
     /// Color image of a camera.
-    Picture(String),
+    Image(String),
 }
 
 const STATE: [Role; 3] = [Role::Positions, Role::Velocities, Role::Efforts];
@@ -85,23 +85,23 @@ impl Role {
 }
 
 /// True if datasets support a stream.
-pub(crate) fn holds(stream: &Stream) -> bool {
+pub(crate) fn supports(stream: &StreamSchema) -> bool {
     match &stream.kind {
-        Kind::Joints { .. } | Kind::Imu | Kind::Numbers { .. } | Kind::Outcome => true,
-        Kind::Poses { .. } => is_object(stream),
-        Kind::Picture { channel, .. } => channel == "color",
-        Kind::Lens { .. } | Kind::Points | Kind::EngineState => false,
+        StreamKind::Joints { .. } | StreamKind::Imu | StreamKind::SensorValues { .. } | StreamKind::TaskResult => true,
+        StreamKind::Poses { .. } => is_object(stream),
+        StreamKind::Image { channel, .. } => channel == "color",
+        StreamKind::CameraInfo { .. } | StreamKind::RayHits | StreamKind::EngineState => false,
     }
 }
 
 /// True for poses of objects. Poses of links follow from joints and are not supported.
-fn is_object(stream: &Stream) -> bool {
-    matches!(&stream.kind, Kind::Poses { frames } if stream.name == format!("{}/pose", frames.join("/")))
+fn is_object(stream: &StreamSchema) -> bool {
+    matches!(&stream.kind, StreamKind::Poses { frames } if stream.name == format!("{}/pose", frames.join("/")))
 }
 
-fn is_mjcf(stream: &Stream) -> bool {
+fn is_mjcf(stream: &StreamSchema) -> bool {
     stream.name.ends_with("/state")
-        && stream.parts.iter().map(|part| &*part.name).eq(["positions", "velocities", "controls"])
+        && stream.fields.iter().map(|part| &*part.name).eq(["positions", "velocities", "controls"])
 }
 
 impl Features {
@@ -109,52 +109,54 @@ impl Features {
     ///
     /// # Errors
     /// No stream has rows that can be frames, or two features have the same name.
-    pub(crate) fn of(path: &Path, format: Format, streams: &[Stream], name: fn(&Role) -> String) -> Result<Self> {
-        let mut all = Self { numbers: Vec::new(), pictures: Vec::new(), base: 0, outcome: None };
+    pub(crate) fn of(path: &Path, format: Format, streams: &[StreamSchema], name: fn(&Role) -> String) -> Result<Self> {
+        let mut all = Self { numbers: Vec::new(), images: Vec::new(), frame_stream: 0, result_stream: None };
         let mut base = None;
         for (s, stream) in streams.iter().enumerate() {
             let uid = stream.name.rsplit_once('/').map_or(stream.name.as_str(), |(uid, _)| uid);
             let roles: Option<[Role; 3]> = match &stream.kind {
-                Kind::Joints { .. } if stream.name.ends_with("/targets") => Some(TARGETS),
-                Kind::Joints { .. } => Some(STATE),
+                StreamKind::Joints { .. } if stream.name.ends_with("/targets") => Some(TARGETS),
+                StreamKind::Joints { .. } => Some(STATE),
                 _ if is_mjcf(stream) => Some(CONTROLS),
                 _ => None,
             };
-            if let Kind::Picture { camera, height, width, .. } = &stream.kind {
-                let name = name(&Role::Picture(camera.clone()));
-                all.pictures.push(Seen { stream: s, name, size: [*width, *height] });
+            if let StreamKind::Image { camera, height, width, .. } = &stream.kind {
+                let name = name(&Role::Image(camera.clone()));
+                all.images.push(ImageFeature { stream: s, name, size: [*width, *height] });
                 continue;
             }
-            if stream.kind == Kind::Outcome {
-                all.outcome = Some(s);
+            if stream.kind == StreamKind::TaskResult {
+                all.result_stream = Some(s);
                 continue;
             }
             if roles.is_some() || is_object(stream) {
                 base.get_or_insert(s);
             }
             let mut first = 0;
-            for (k, part) in stream.parts.iter().enumerate() {
+            for (k, part) in stream.fields.iter().enumerate() {
                 let range = first..first + part.width();
                 first = range.end;
                 let names: Vec<String> = match &stream.kind {
-                    Kind::Joints { names } => names.iter().map(|name| format!("{uid}/{name}")).collect(),
-                    Kind::Poses { frames } => ["x", "y", "z", "qw", "qx", "qy", "qz"]
+                    StreamKind::Joints { names } => names.iter().map(|name| format!("{uid}/{name}")).collect(),
+                    StreamKind::Poses { frames } => ["x", "y", "z", "qw", "qx", "qy", "qz"]
                         .map(|number| format!("{}.{number}", frames.join("/")))
                         .into(),
-                    Kind::EngineState => (0..part.width()).map(|number| format!("{}[{number}]", part.name)).collect(),
+                    StreamKind::EngineState => {
+                        (0..part.width()).map(|number| format!("{}[{number}]", part.name)).collect()
+                    }
                     _ => (0..part.width()).map(|number| format!("{}/{}[{number}]", stream.name, part.name)).collect(),
                 };
                 let role = match &roles {
                     Some(roles) => roles[k].clone(),
                     None if is_object(stream) => Role::Objects,
-                    None if stream.kind == Kind::EngineState => Role::EngineState,
+                    None if stream.kind == StreamKind::EngineState => Role::EngineState,
                     None => Role::Sensor { stream: stream.name.clone(), channel: part.name.clone() },
                 };
-                all.append(role, name, names, StreamPart { stream: s, range });
+                all.append(role, name, names, StreamRange { stream: s, range });
             }
         }
         all.numbers.retain(|feature| !feature.names.is_empty());
-        all.base = base.ok_or_else(|| RecordError::NoPlace {
+        all.frame_stream = base.ok_or_else(|| RecordError::UnsupportedTopic {
             path: path.into(),
             format,
             topic: "sensors alone: frames are rows of joints or objects".into(),
@@ -162,13 +164,13 @@ impl Features {
         let mut names: Vec<&str> = all.names().collect();
         names.sort_unstable();
         if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(RecordError::SameName { path: path.into(), name: pair[0].into() });
+            return Err(RecordError::DuplicateName { path: path.into(), name: pair[0].into() });
         }
         Ok(all)
     }
 
     /// Adds values to the feature of a role. The joints of several robots are one feature.
-    fn append(&mut self, role: Role, name: fn(&Role) -> String, names: Vec<String>, part: StreamPart) {
+    fn append(&mut self, role: Role, name: fn(&Role) -> String, names: Vec<String>, part: StreamRange) {
         let joins = !matches!(role, Role::Sensor { .. });
         match self.numbers.iter_mut().find(|feature| joins && feature.role == role) {
             Some(feature) => {
@@ -180,12 +182,12 @@ impl Features {
     }
 
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
-        self.numbers.iter().map(|feature| &*feature.name).chain(self.pictures.iter().map(|picture| &*picture.name))
+        self.numbers.iter().map(|feature| &*feature.name).chain(self.images.iter().map(|picture| &*picture.name))
     }
 
     /// Width and height of the images of a stream, if it has images.
-    pub(crate) fn size_of(&self, stream: usize) -> Option<[usize; 2]> {
-        self.pictures.iter().find(|picture| picture.stream == stream).map(|picture| picture.size)
+    pub(crate) fn image_size(&self, stream: usize) -> Option<[usize; 2]> {
+        self.images.iter().find(|picture| picture.stream == stream).map(|picture| picture.size)
     }
 }
 
@@ -193,7 +195,7 @@ impl Feature {
     /// Values of the feature in the present rows of all streams, if all of them exist.
     pub(crate) fn values(&self, rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
         let mut values = Vec::with_capacity(self.names.len());
-        for StreamPart { stream, range } in &self.parts {
+        for StreamRange { stream, range } in &self.parts {
             values.extend_from_slice(rows.get(*stream)?.as_ref()?.get(range.clone())?);
         }
         Some(values)

@@ -11,24 +11,24 @@
 mod features;
 
 use crate::error::{RecordError, Result};
-use crate::packet::{EventKind, Packet, Values};
-use crate::stream::Stream;
-use crate::writer::{Sink, Written};
+use crate::packet::{EventKind, Packet, ValueBuffer};
+use crate::stream::StreamSchema;
+use crate::writer::{FormatWriter, WriteResult};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub(crate) use features::{Features, Role, holds};
+pub(crate) use features::{Features, Role, supports};
 
 /// Explanation of a recording without any frame.
 pub(crate) const NO_FRAME: &str = "every one needs all that is measured, and the action after it";
 
 /// Writer of a dataset. Its environments are numbered by their index in [`environments`].
-pub(crate) trait Dataset: Send {
+pub(crate) trait DatasetWriter: Send {
     /// An encoded image.
-    type Picture: Send + Sync;
+    type Image: Send + Sync;
 
     /// Encodes RGBA pixels without their alpha channel; `size` is width and height.
-    fn picture(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<Self::Picture>;
+    fn encode_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<Self::Image>;
 
     /// Begins an episode in an environment, unless one is in progress. A frame follows. Episodes are numbered in the
     /// order in which they begin.
@@ -36,23 +36,23 @@ pub(crate) trait Dataset: Send {
 
     /// Adds a frame to the present episode of an environment. `next` contains the observations after the action; its
     /// own actions are outdated.
-    fn add(&mut self, env: usize, frame: &Frame<Self::Picture>, next: &Frame<Self::Picture>) -> Written;
+    fn add(&mut self, env: usize, frame: &EpisodeFrame<Self::Image>, next: &EpisodeFrame<Self::Image>) -> WriteResult;
 
     /// Ends the present episode of an environment, if there is one.
-    fn end(&mut self, env: usize) -> Written;
+    fn end(&mut self, env: usize) -> WriteResult;
 
     /// Completes the dataset after the last episode and gives it its name; returns its size \[bytes\].
-    fn finish(&mut self) -> Written<u64>;
+    fn finish(&mut self) -> WriteResult<u64>;
 
     /// Path of the partial dataset after an error, if it can be read.
-    fn kept(&self) -> Option<PathBuf>;
+    fn partial_path(&self) -> Option<PathBuf>;
 }
 
 /// Content of a frame.
-pub(crate) struct Frame<P> {
+pub(crate) struct EpisodeFrame<P> {
     /// Values of each feature.
     pub(crate) numbers: Vec<Vec<f64>>,
-    pub(crate) pictures: Vec<Arc<P>>,
+    pub(crate) images: Vec<Arc<P>>,
     /// Sum of the rewards of its action so far; 0 without a task.
     pub(crate) reward: f64,
     /// True if the episode ended with its action, according to the task.
@@ -60,105 +60,111 @@ pub(crate) struct Frame<P> {
 }
 
 /// Splits packets into frames and episodes.
-pub(crate) struct Episodes<D: Dataset> {
+pub(crate) struct EpisodeSplitter<D: DatasetWriter> {
     dataset: D,
     features: Arc<Features>,
     /// Steps between two rows.
-    every: u64,
-    envs: Vec<Env<D::Picture>>,
+    period_steps: u64,
+    envs: Vec<EnvFrames<D::Image>>,
 }
 
-struct Env<P> {
+struct EnvFrames<P> {
     env: usize,
     /// Last measured values of each stream.
     numbers: Vec<Option<Vec<f64>>>,
-    pictures: Vec<Option<Arc<P>>>,
+    images: Vec<Option<Arc<P>>>,
     /// The frame that waits for its action.
-    pending: Option<Frame<P>>,
+    pending: Option<EpisodeFrame<P>>,
     /// Step of its row.
-    pending_at: u64,
+    pending_step: u64,
     /// The frame before it, which waits for the result of its action.
-    complete: Option<Frame<P>>,
+    awaiting_result: Option<EpisodeFrame<P>>,
 }
 
 /// Environments of a dataset. Each must have all streams.
 ///
 /// # Errors
 /// A stream is missing in one of them.
-pub(crate) fn environments(path: &Path, streams: &[Stream]) -> Result<Vec<usize>> {
+pub(crate) fn environments(path: &Path, streams: &[StreamSchema]) -> Result<Vec<usize>> {
     let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
     envs.sort_unstable();
     envs.dedup();
     for &env in &envs {
         if let Some(stream) = streams.iter().find(|stream| !stream.env_ids.contains(&env)) {
-            return Err(RecordError::NotEverywhere { path: path.into(), stream: stream.name.clone(), env });
+            return Err(RecordError::MissingStream { path: path.into(), stream: stream.name.clone(), env });
         }
     }
     Ok(envs)
 }
 
-impl<D: Dataset> Episodes<D> {
-    /// Creates the splitter for environments `envs`, with `every` steps between two rows.
-    pub(crate) fn new(dataset: D, features: Arc<Features>, every: u64, envs: &[usize], streams: &[Stream]) -> Self {
+impl<D: DatasetWriter> EpisodeSplitter<D> {
+    /// Creates the splitter for environments `envs`, with `period_steps` steps between two rows.
+    pub(crate) fn new(
+        dataset: D,
+        features: Arc<Features>,
+        every: u64,
+        envs: &[usize],
+        streams: &[StreamSchema],
+    ) -> Self {
         let count = streams.len();
-        let none = |env: &usize| Env {
+        let none = |env: &usize| EnvFrames {
             env: *env,
             numbers: vec![None; count],
-            pictures: vec![None; count],
+            images: vec![None; count],
             pending: None,
-            pending_at: 0,
-            complete: None,
+            pending_step: 0,
+            awaiting_result: None,
         };
-        Self { dataset, features, every, envs: envs.iter().map(none).collect() }
+        Self { dataset, features, period_steps: every, envs: envs.iter().map(none).collect() }
     }
 
     /// True if the row of a step is a frame, regardless of events.
     fn is_due(&self, step: u64) -> bool {
-        step.is_multiple_of(self.every)
+        step.is_multiple_of(self.period_steps)
     }
 
     /// Stores the new values of an environment.
-    fn take(&mut self, k: usize, streams: &[Stream], packet: &Packet) -> Written {
-        let Env { env, numbers, pictures, .. } = &mut self.envs[k];
-        let outcome = self.features.outcome;
-        for (s, (stream, block)) in streams.iter().zip(&packet.blocks).enumerate().filter(|(s, _)| Some(*s) != outcome)
+    fn store_values(&mut self, k: usize, streams: &[StreamSchema], packet: &Packet) -> WriteResult {
+        let EnvFrames { env, numbers, images: pictures, .. } = &mut self.envs[k];
+        let outcome = self.features.result_stream;
+        for (s, (stream, block)) in streams.iter().zip(&packet.streams).enumerate().filter(|(s, _)| Some(*s) != outcome)
         {
             let row = stream.env_ids.iter().position(|of| *of == *env);
-            let Some(row) = row.filter(|row| block.used && block.fresh[*row]) else { continue };
+            let Some(row) = row.filter(|row| block.has_content && block.is_new[*row]) else { continue };
             let range = row * stream.width()..(row + 1) * stream.width();
-            let Some(size) = self.features.size_of(s) else {
+            let Some(size) = self.features.image_size(s) else {
                 numbers[s] = Some(match &block.values {
-                    Values::U8(values) => values[range].iter().map(|x| f64::from(*x)).collect(),
-                    Values::I32(values) => values[range].iter().map(|x| f64::from(*x)).collect(),
-                    Values::F32(values) => values[range].iter().map(|x| f64::from(*x)).collect(),
-                    Values::F64(values) => values[range].to_vec(),
+                    ValueBuffer::U8(values) => values[range].iter().map(|x| f64::from(*x)).collect(),
+                    ValueBuffer::I32(values) => values[range].iter().map(|x| f64::from(*x)).collect(),
+                    ValueBuffer::F32(values) => values[range].iter().map(|x| f64::from(*x)).collect(),
+                    ValueBuffer::F64(values) => values[range].to_vec(),
                 });
                 continue;
             };
-            let rgba = block.values.bytes().get(range).unwrap_or_default();
-            pictures[s] = Some(Arc::new(self.dataset.picture(rgba, size)?));
+            let rgba = block.values.as_u8s().get(range).unwrap_or_default();
+            pictures[s] = Some(Arc::new(self.dataset.encode_image(rgba, size)?));
         }
         Ok(())
     }
 
     /// Frame of the present values, if all streams have a value; actions are filled in later.
-    fn now(&self, k: usize) -> Option<Frame<D::Picture>> {
-        let Env { numbers, pictures, .. } = &self.envs[k];
+    fn present_frame(&self, k: usize) -> Option<EpisodeFrame<D::Image>> {
+        let EnvFrames { numbers, images: pictures, .. } = &self.envs[k];
         let numbers = self.features.numbers.iter().map(|feature| feature.values(numbers));
-        let pictures = self.features.pictures.iter().map(|picture| pictures.get(picture.stream)?.clone());
+        let pictures = self.features.images.iter().map(|picture| pictures.get(picture.stream)?.clone());
         let (numbers, pictures) = (numbers.collect::<Option<_>>()?, pictures.collect::<Option<_>>()?);
-        Some(Frame { numbers, pictures, reward: 0.0, done: false })
+        Some(EpisodeFrame { numbers, images: pictures, reward: 0.0, done: false })
     }
 
     /// Creates the frame of a row, which waits for its action.
-    fn wait(&mut self, k: usize, step: u64) {
-        self.envs[k].pending = self.now(k);
-        self.envs[k].pending_at = step;
+    fn hold_frame(&mut self, k: usize, step: u64) {
+        self.envs[k].pending = self.present_frame(k);
+        self.envs[k].pending_step = step;
     }
 
     /// Adds the frame that waits for results, because no further ones follow.
-    fn settle(&mut self, k: usize) -> Written {
-        let Env { pending, complete, .. } = &mut self.envs[k];
+    fn add_complete_frame(&mut self, k: usize) -> WriteResult {
+        let EnvFrames { pending, awaiting_result: complete, .. } = &mut self.envs[k];
         match (complete.take(), pending) {
             (Some(frame), Some(next)) => self.dataset.add(k, &frame, next),
             _ => Ok(()),
@@ -166,9 +172,9 @@ impl<D: Dataset> Episodes<D> {
     }
 
     /// Adds the result of a task step.
-    fn judged(&mut self, k: usize, values: &[f64], step: u64) {
+    fn add_result(&mut self, k: usize, values: &[f64], step: u64) {
         let [reward, terminated, truncated] = *values else { return };
-        let Env { pending, pending_at, complete, .. } = &mut self.envs[k];
+        let EnvFrames { pending, pending_step: pending_at, awaiting_result: complete, .. } = &mut self.envs[k];
         // A result at the step of the pending row belongs to the action of the frame before it, if there is one.
         let frame = if step == *pending_at { complete } else { pending };
         if let Some(frame) = frame {
@@ -178,27 +184,27 @@ impl<D: Dataset> Episodes<D> {
     }
 
     /// Ends the episode of an environment.
-    fn ended(&mut self, k: usize) -> Written {
+    fn end_episode(&mut self, k: usize) -> WriteResult {
         // Results after the last frame are added to it, because the row after it is no frame.
-        let Env { pending, complete, .. } = &mut self.envs[k];
+        let EnvFrames { pending, awaiting_result: complete, .. } = &mut self.envs[k];
         if let (Some(last), Some(rest)) = (complete, pending) {
             last.reward += rest.reward;
             last.done |= rest.done;
         }
-        self.settle(k)?;
+        self.add_complete_frame(k)?;
         self.envs[k].pending = None;
         self.dataset.end(k)
     }
 
     /// Handles a regular row.
-    fn due(&mut self, k: usize, step: u64, fresh: bool) -> Written {
+    fn handle_row(&mut self, k: usize, step: u64, fresh: bool) -> WriteResult {
         if !fresh {
             // A diverged environment has no new values.
-            return self.ended(k);
+            return self.end_episode(k);
         }
-        self.settle(k)?;
+        self.add_complete_frame(k)?;
         let pending = self.envs[k].pending.take();
-        self.wait(k, step);
+        self.hold_frame(k, step);
         if let (Some(mut frame), Some(now)) = (pending, &self.envs[k].pending) {
             let numbers = frame.numbers.iter_mut().zip(&now.numbers);
             for (feature, (of_frame, of_now)) in self.features.numbers.iter().zip(numbers) {
@@ -206,61 +212,61 @@ impl<D: Dataset> Episodes<D> {
                     of_frame.clone_from(of_now);
                 }
             }
-            self.envs[k].complete = Some(frame);
+            self.envs[k].awaiting_result = Some(frame);
             self.dataset.begin(k);
         }
         Ok(())
     }
 }
 
-impl<D: Dataset> Sink for Episodes<D> {
-    fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written {
+impl<D: DatasetWriter> FormatWriter for EpisodeSplitter<D> {
+    fn write(&mut self, streams: &[StreamSchema], packet: &Packet) -> WriteResult {
         for k in 0..self.envs.len() {
             let env = self.envs[k].env;
             let happened = packet.event.as_ref().filter(|event| event.env_ids.contains(&env)).map(|event| event.kind);
-            let told = self.features.outcome.and_then(|s| Some((streams.get(s)?, packet.blocks.get(s)?)));
-            if let Some((stream, block)) = told.filter(|(_, block)| block.used) {
+            let told = self.features.result_stream.and_then(|s| Some((streams.get(s)?, packet.streams.get(s)?)));
+            if let Some((stream, block)) = told.filter(|(_, block)| block.has_content) {
                 let (row, width) = (stream.env_ids.iter().position(|of| *of == env), stream.width());
-                let values = row.and_then(|row| block.values.states().get(row * width..(row + 1) * width));
-                self.judged(k, values.unwrap_or_default(), packet.step);
+                let values = row.and_then(|row| block.values.as_f64s().get(row * width..(row + 1) * width));
+                self.add_result(k, values.unwrap_or_default(), packet.step);
             }
             if happened == Some(EventKind::Reset) {
-                self.ended(k)?;
+                self.end_episode(k)?;
                 self.envs[k].numbers.fill(None);
-                self.envs[k].pictures.fill(None);
+                self.envs[k].images.fill(None);
             }
-            self.take(k, streams, packet)?;
-            let base = self.features.base;
-            let Some(block) = packet.blocks.get(base).filter(|block| block.used) else { continue };
+            self.store_values(k, streams, packet)?;
+            let base = self.features.frame_stream;
+            let Some(block) = packet.streams.get(base).filter(|block| block.has_content) else { continue };
             let row = streams[base].env_ids.iter().position(|of| *of == env);
-            let fresh = row.is_some_and(|row| block.fresh[row]);
+            let fresh = row.is_some_and(|row| block.is_new[row]);
             match (&packet.event, happened) {
-                (None, _) => self.due(k, packet.step, fresh)?,
+                (None, _) => self.handle_row(k, packet.step, fresh)?,
                 // A write at a regular row replaces the state in which the next action begins.
                 (_, Some(EventKind::Written)) if self.envs[k].pending.is_some() && self.is_due(packet.step) => {
-                    self.settle(k)?;
-                    self.wait(k, packet.step);
+                    self.add_complete_frame(k)?;
+                    self.hold_frame(k, packet.step);
                 }
-                (_, Some(EventKind::Reset)) if self.is_due(packet.step) => self.wait(k, packet.step),
+                (_, Some(EventKind::Reset)) if self.is_due(packet.step) => self.hold_frame(k, packet.step),
                 // The event concerned other environments, before this regular row.
-                (_, None) if fresh => self.due(k, packet.step, true)?,
+                (_, None) if fresh => self.handle_row(k, packet.step, true)?,
                 _ => {}
             }
         }
         Ok(())
     }
 
-    fn flush(&mut self) -> Written {
+    fn flush(&mut self) -> WriteResult {
         // A dataset is not readable before its end.
         Ok(())
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
-        (0..self.envs.len()).try_for_each(|k| self.ended(k))?;
+    fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
+        (0..self.envs.len()).try_for_each(|k| self.end_episode(k))?;
         self.dataset.finish()
     }
 
-    fn kept(&self) -> Option<PathBuf> {
-        self.dataset.kept()
+    fn partial_path(&self) -> Option<PathBuf> {
+        self.dataset.partial_path()
     }
 }

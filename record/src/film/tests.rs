@@ -19,7 +19,7 @@ fn busy() -> SimulationManager {
     let part = r#"<mujoco><worldbody><body name="ball" pos="-1 0 2"><joint name="swing" type="ball"/>
         <geom size="0.1" pos="0.3 0 0"/><body name="tip" pos="0.5 0 0"><joint name="x" type="slide" axis="0 0 1"/>
         <geom size="0.05"/></body></body></worldbody></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("part", part)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("part", part)).unwrap();
     sim
 }
 
@@ -61,7 +61,7 @@ fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
 
 /// Largest difference of displayed and original positions and quaternions, with the body and the step.
 fn largest_difference(
-    film: &mut Film,
+    film: &mut Playback,
     sim: &mut SimulationManager,
     all: &[Vec<(String, Array2<f64>)>],
 ) -> (f64, String) {
@@ -69,7 +69,7 @@ fn largest_difference(
     for (step, expected) in all.iter().enumerate() {
         // The state after a step is the last one recorded at its time. The recording begins at step 3, at 0.03 s.
         let frame = film.frame_at(0.01 * (step + 3) as f64);
-        film.show(sim, frame).unwrap();
+        film.seek(sim, frame).unwrap();
         let part = sim.mjcf_part(film.part);
         let mut compared = 0;
         for (name, expected) in expected.iter().filter(|(name, _)| part.body_names().contains(name)) {
@@ -98,19 +98,19 @@ fn poses_of_a_recording() {
     for name in ["run.mcap", "run.npz"] {
         let path = folder.path().join(name);
         let all = recorded(&path, true);
-        let (mut film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
+        let (mut film, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
         assert_eq!(sim.num_envs(), 2);
-        assert!(film.unmoved().is_empty(), "{:?}", film.unmoved());
+        assert!(film.joints_without_data().is_empty(), "{:?}", film.joints_without_data());
         assert_eq!(film.times().len(), STEPS + 1, "{name}: {:?}", film.times());
         // The same joints and the same engine, with a model that was written with all digits.
         let largest = largest_difference(&mut film, &mut sim, &all);
         assert!(largest.0 < 1e-9, "{name}: {largest:?}");
         // Seeks forward and backward.
-        film.show(&mut sim, STEPS).unwrap();
+        film.seek(&mut sim, STEPS).unwrap();
         let end = sim.mjcf_part(film.part).qpos();
-        film.show(&mut sim, 0).unwrap();
+        film.seek(&mut sim, 0).unwrap();
         assert_ne!(sim.mjcf_part(film.part).qpos(), end);
-        film.show(&mut sim, usize::MAX).unwrap();
+        film.seek(&mut sim, usize::MAX).unwrap();
         assert_eq!(sim.mjcf_part(film.part).qpos(), end);
         // Control: states of the next step differ.
         assert!(largest_difference(&mut film, &mut sim, &all[1..]).0 > 1e-4);
@@ -126,9 +126,9 @@ fn divergence() {
     for name in ["run.mcap", "run.npz"] {
         let path = folder.path().join(name);
         recorded(&path, true);
-        let (mut film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
-        let mut at = |film: &mut Film, frame: usize| {
-            film.show(&mut sim, frame).unwrap();
+        let (mut film, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+        let mut at = |film: &mut Playback, frame: usize| {
+            film.seek(&mut sim, frame).unwrap();
             let part = sim.mjcf_part(film.part);
             (part.qpos(), part.body_pose("hand").unwrap())
         };
@@ -155,13 +155,13 @@ fn without_a_scene() {
     let (_folder, path) = scratch("run.npz");
     let all = recorded(&path, false);
     let recording = Recording::open(&path).unwrap();
-    let error = Film::of(&recording, None).unwrap_err().to_string();
+    let error = Playback::open(&recording, None).unwrap_err().to_string();
     assert!(error.contains("does not hold its scene"), "{error}");
-    let (mut film, mut sim) = Film::of(&recording, Some(&busy())).unwrap();
+    let (mut film, mut sim) = Playback::open(&recording, Some(&busy())).unwrap();
     let largest = largest_difference(&mut film, &mut sim, &all);
     assert!(largest.0 < 1e-9, "{largest:?}");
     // A scene without these names.
-    let error = Film::of(&recording, Some(&falling(2))).unwrap_err().to_string();
+    let error = Playback::open(&recording, Some(&falling(2))).unwrap_err().to_string();
     assert!(error.contains("nothing that moves"), "{error}");
 }
 
@@ -171,8 +171,8 @@ fn unrecorded_joints() {
     let (_folder, path) = scratch("run.mcap");
     let cfg = RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]);
     record(&mut busy(), cfg, |sim| sim.update(3));
-    let (film, _) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
-    let unmoved = film.unmoved();
+    let (film, _) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+    let unmoved = film.joints_without_data();
     assert!(unmoved.iter().any(|joint| joint == "cube/free"), "{unmoved:?}");
     assert!(!unmoved.iter().any(|joint| joint.starts_with("arm/")), "{unmoved:?}");
 }
@@ -185,8 +185,8 @@ fn recovered_recording() {
     sim.update(40);
     drop(sim);
     assert!(recover(&path).unwrap().messages > 0);
-    let (film, sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
-    assert!(film.unmoved().is_empty() && sim.num_envs() == 2);
+    let (film, sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+    assert!(film.joints_without_data().is_empty() && sim.num_envs() == 2);
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn damaged_scenes() {
     }
     // Names that lead out of the folder.
     for name in ["../away.xml", "/away.xml", "a/../../away.xml"] {
-        let mut archive = crate::zip::Archive::new(std::io::Cursor::new(Vec::new()));
+        let mut archive = crate::zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
         archive.add(name, b"", &mut &b"x"[..]).unwrap();
         let bytes = archive.finish().unwrap().into_inner();
         let error = scene_file::unpack(&bytes, path).unwrap_err().to_string();

@@ -4,17 +4,17 @@ mod parquet;
 mod statistics;
 
 use crate::cfg::RecorderCfg;
-use crate::episodes::{self, Dataset, Episodes, Features, Frame, Role};
+use crate::episodes::{self, DatasetWriter, EpisodeFrame, EpisodeSplitter, Features, Role};
 use crate::error::{RecordError, Result};
-use crate::file::{Disk, Storage};
-use crate::folder::PartFolder;
+use crate::file::{Storage, StorageFactory};
+use crate::folder::PartialFolder;
 use crate::format::Format;
-use crate::picture::Png;
-use crate::stream::Stream;
-use crate::writer::{Fault, Sink, Written};
-use parquet::{Kind, Table, put_bytes};
+use crate::picture::PngWriter;
+use crate::stream::StreamSchema;
+use crate::writer::{FormatWriter, WriteError, WriteResult};
+use parquet::{ColumnType, ParquetWriter, put_bytes};
 use serde_json::{Map, Value, json};
-use statistics::{OfPicture, Statistics};
+use statistics::{ImageStatistics, Statistics};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -26,11 +26,11 @@ const INFO: &str = "meta/info.json";
 const MARKER: &str = "meta/.kinetoscope";
 
 /// Number of files in a folder.
-const CHUNK: u64 = 1000;
+const FILES_PER_CHUNK: u64 = 1000;
 
 /// Rows are written at this number of rows or bytes.
-const ROWS: usize = 256;
-const BYTES: usize = 1 << 20;
+const FLUSH_ROWS: usize = 256;
+const FLUSH_BYTES: usize = 1 << 20;
 
 /// Columns of every dataset, after its features.
 const COMMON: [(&str, &str); 5] = [
@@ -46,32 +46,32 @@ const REWARD: &str = "next.reward";
 const DONE: &str = "next.done";
 
 /// Writer of a LeRobot dataset.
-struct LeRobot {
-    folder: PartFolder,
-    disk: Disk,
+struct LeRobotWriter {
+    folder: PartialFolder,
+    disk: StorageFactory,
     /// The marker file, locked.
     _lock: File,
     fps: u64,
     task: String,
     features: Arc<Features>,
     /// Present episode of each environment.
-    running: Vec<Option<Running>>,
+    open_episodes: Vec<Option<OpenEpisode>>,
     /// Length of each episode, and the positions of its `index` column.
     episodes: Vec<Episode>,
     statistics: Vec<Statistics>,
-    png: Png,
+    png: PngWriter,
 }
 
 /// An encoded image, with its statistics.
-struct Picture {
+struct EncodedImage {
     file: Vec<u8>,
-    about: OfPicture,
+    statistics: ImageStatistics,
 }
 
 /// An episode in progress.
-struct Running {
+struct OpenEpisode {
     episode: usize,
-    table: Table,
+    table: ParquetWriter,
     file: PathBuf,
     rows: usize,
     frames: u64,
@@ -90,7 +90,7 @@ struct Episode {
 ///
 /// # Errors
 /// The rate of the recording is not a whole number.
-fn rate(path: &Path, dt: f64, every: u64) -> Result<u64> {
+fn frames_per_second(path: &Path, dt: f64, every: u64) -> Result<u64> {
     let found = 1.0 / (dt * every as f64);
     let whole = found.round();
     // The tolerance is a thousandth of a frame per hour.
@@ -104,7 +104,7 @@ fn rate(path: &Path, dt: f64, every: u64) -> Result<u64> {
     let mut near: Vec<u64> = (1..=1000).filter(fits).collect();
     near.sort_by_key(|other| other.abs_diff(every));
     near.truncate(3);
-    Err(RecordError::Rate { path: path.into(), every, found, near })
+    Err(RecordError::UnsupportedRate { path: path.into(), every, found, candidates: near })
 }
 
 /// Name of a role in a dataset. Feature names must not contain slashes.
@@ -120,88 +120,99 @@ fn name_of(role: &Role) -> String {
         Role::Objects => "observation.environment_state".into(),
         Role::EngineState => "observation.engine_state".into(),
         Role::Sensor { stream, channel } => format!("sensors.{}.{}", dotted(stream), dotted(channel)),
-        Role::Picture(camera) => format!("observation.images.{}", dotted(camera)),
+        Role::Image(camera) => format!("observation.images.{}", dotted(camera)),
     }
 }
 
 /// Creates a dataset; `dt` is the physics time step \[s\].
-pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64, disk: &Disk) -> Result<Box<dyn Sink>> {
-    let RecorderCfg { path, every, overwrite, task, .. } = cfg;
-    let fps = rate(path, dt, *every)?;
+pub(crate) fn create(
+    cfg: &RecorderCfg,
+    streams: &[StreamSchema],
+    dt: f64,
+    disk: &StorageFactory,
+) -> Result<Box<dyn FormatWriter>> {
+    let RecorderCfg { path, period_steps: every, overwrite, task, .. } = cfg;
+    let fps = frames_per_second(path, dt, *every)?;
     let features = Arc::new(Features::of(path, Format::LeRobot, streams, name_of)?);
     let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
-    let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3)));
+    let statistics = statistics.chain(features.images.iter().map(|_| Statistics::new(3)));
     // Statistics of rewards and ends.
-    let of_outcome = features.outcome.iter().flat_map(|_| [1, 1].map(Statistics::new));
+    let of_outcome = features.result_stream.iter().flat_map(|_| [1, 1].map(Statistics::new));
     let statistics = statistics.chain(of_outcome).collect();
     let envs = episodes::environments(path, streams)?;
-    let (folder, lock) = PartFolder::create(path, *overwrite, MARKER)?;
-    let dataset = LeRobot {
+    let (folder, lock) = PartialFolder::create(path, *overwrite, MARKER)?;
+    let dataset = LeRobotWriter {
         folder,
         disk: disk.clone(),
         _lock: lock,
         fps,
         task: task.clone(),
         features: Arc::clone(&features),
-        running: envs.iter().map(|_| None).collect(),
+        open_episodes: envs.iter().map(|_| None).collect(),
         episodes: Vec::new(),
         statistics,
-        png: Png::default(),
+        png: PngWriter::default(),
     };
-    Ok(Box::new(Episodes::new(dataset, features, *every, &envs, streams)))
+    Ok(Box::new(EpisodeSplitter::new(dataset, features, *every, &envs, streams)))
 }
 
 /// Columns of a frame.
-fn columns(features: &Features) -> Vec<(String, Kind)> {
-    let numbers = features.numbers.iter().map(|feature| (feature.name.clone(), Kind::Float32(feature.names.len())));
-    let pictures = features.pictures.iter().map(|picture| (picture.name.clone(), Kind::Picture));
-    let outcome = [(REWARD, Kind::Float32(1)), (DONE, Kind::Bool)];
+fn columns(features: &Features) -> Vec<(String, ColumnType)> {
+    let numbers =
+        features.numbers.iter().map(|feature| (feature.name.clone(), ColumnType::Float32(feature.names.len())));
+    let pictures = features.images.iter().map(|picture| (picture.name.clone(), ColumnType::Image));
+    let outcome = [(REWARD, ColumnType::Float32(1)), (DONE, ColumnType::Bool)];
     let outcome =
-        outcome.into_iter().filter(|_| features.outcome.is_some()).map(|(name, kind)| (name.to_string(), kind));
-    let common = COMMON
-        .iter()
-        .map(|(name, kind)| (name.to_string(), if *kind == "int64" { Kind::Int64 } else { Kind::Float32(1) }));
+        outcome.into_iter().filter(|_| features.result_stream.is_some()).map(|(name, kind)| (name.to_string(), kind));
+    let common = COMMON.iter().map(|(name, kind)| {
+        (name.to_string(), if *kind == "int64" { ColumnType::Int64 } else { ColumnType::Float32(1) })
+    });
     numbers.chain(pictures).chain(outcome).chain(common).collect()
 }
 
 /// Features, as described in `meta/info.json`.
-fn described(features: &Features) -> Map<String, Value> {
+fn feature_info(features: &Features) -> Map<String, Value> {
     let numbers = features.numbers.iter().map(|feature| {
         let names = &feature.names;
         (feature.name.clone(), json!({ "dtype": "float32", "shape": [names.len()], "names": names }))
     });
-    let pictures = features.pictures.iter().map(|picture| {
+    let pictures = features.images.iter().map(|picture| {
         let (names, [width, height]) = (["height", "width", "channels"], picture.size);
         (picture.name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
     });
-    let outcome = [(REWARD, "float32"), (DONE, "bool")].into_iter().filter(|_| features.outcome.is_some());
+    let outcome = [(REWARD, "float32"), (DONE, "bool")].into_iter().filter(|_| features.result_stream.is_some());
     let outcome = outcome.map(|(name, kind)| (name.to_string(), json!({ "dtype": kind, "shape": [1], "names": null })));
     numbers.chain(pictures).chain(outcome).collect()
 }
 
-impl Dataset for LeRobot {
-    type Picture = Picture;
+impl DatasetWriter for LeRobotWriter {
+    type Image = EncodedImage;
 
-    fn picture(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<Picture> {
-        Ok(Picture { file: self.png.rgb(rgba, size)?.to_vec(), about: OfPicture::new(rgba) })
+    fn encode_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<EncodedImage> {
+        Ok(EncodedImage { file: self.png.encode_rgb(rgba, size)?.to_vec(), statistics: ImageStatistics::new(rgba) })
     }
 
     fn begin(&mut self, env: usize) {
-        if self.running[env].is_none() {
+        if self.open_episodes[env].is_none() {
             let episode = self.episodes.len();
-            let file = self.folder.part().join(data_file(episode as u64));
-            let table = Table::new(columns(&self.features));
+            let file = self.folder.partial_path().join(data_file(episode as u64));
+            let table = ParquetWriter::new(columns(&self.features));
             let values = vec![Vec::new(); table.width()];
             self.episodes.push(Episode { file: file.clone(), ..Episode::default() });
-            self.running[env] = Some(Running { episode, table, file, rows: 0, frames: 0, values });
+            self.open_episodes[env] = Some(OpenEpisode { episode, table, file, rows: 0, frames: 0, values });
         }
     }
 
-    fn add(&mut self, env: usize, frame: &Frame<Picture>, _next: &Frame<Picture>) -> Written {
-        let Frame { numbers, pictures, reward, done } = frame;
-        let judged = self.features.outcome.is_some();
+    fn add(
+        &mut self,
+        env: usize,
+        frame: &EpisodeFrame<EncodedImage>,
+        _next: &EpisodeFrame<EncodedImage>,
+    ) -> WriteResult {
+        let EpisodeFrame { numbers, images: pictures, reward, done } = frame;
+        let judged = self.features.result_stream.is_some();
         let numbers: Vec<Vec<f32>> = numbers.iter().map(|of| of.iter().map(|x| *x as f32).collect()).collect();
-        let Some(running) = &mut self.running[env] else { return Ok(()) };
+        let Some(running) = &mut self.open_episodes[env] else { return Ok(()) };
         let mut leaves = running.values.iter_mut();
         for values in &numbers {
             let Some(to) = leaves.next() else { break };
@@ -230,39 +241,39 @@ impl Dataset for LeRobot {
         let all = numbers.len();
         self.statistics.iter_mut().zip(&numbers).for_each(|(statistics, values)| statistics.add(values));
         let of_pictures = self.statistics.iter_mut().skip(all).zip(pictures);
-        of_pictures.for_each(|(statistics, picture)| statistics.add_picture(&picture.about));
+        of_pictures.for_each(|(statistics, picture)| statistics.add_image(&picture.statistics));
         let of_outcome = self.statistics.iter_mut().skip(all + pictures.len());
         let outcome = [*reward as f32, f32::from(u8::from(*done))];
         of_outcome.zip(outcome).for_each(|(statistics, value)| statistics.add(&[value]));
-        if running.rows >= ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= BYTES {
+        if running.rows >= FLUSH_ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= FLUSH_BYTES {
             running.write(&self.disk)?;
         }
         Ok(())
     }
 
     /// Completes the file of the episode.
-    fn end(&mut self, env: usize) -> Written {
-        let Some(mut running) = self.running[env].take() else { return Ok(()) };
+    fn end(&mut self, env: usize) -> WriteResult {
+        let Some(mut running) = self.open_episodes[env].take() else { return Ok(()) };
         running.write(&self.disk)?;
         let mut out = BufWriter::new(running.open(&self.disk)?);
         running.table.finish(&mut out, &[])?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
-        let index = running.table.places("index");
+        let index = running.table.value_offsets("index");
         let episode = &mut self.episodes[running.episode];
         (episode.frames, episode.index) = (running.frames, index);
         Ok(())
     }
 
-    fn finish(&mut self) -> Written<u64> {
+    fn finish(&mut self) -> WriteResult<u64> {
         if self.episodes.is_empty() {
-            return Err(Fault::NoFrame(episodes::NO_FRAME));
+            return Err(WriteError::NoFrame(episodes::NO_FRAME));
         }
-        self.number_frames()?;
+        self.write_frame_indices()?;
         self.write_tasks()?;
         self.write_episodes()?;
         let mut out = self.file("meta/stats.json")?;
         let names = self.features.names().chain([REWARD, DONE]);
-        let of_all = names.zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
+        let of_all = names.zip(&self.statistics).map(|(name, one)| (name.to_string(), one.to_json()));
         out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
         // Written last, because it makes the folder a dataset.
@@ -270,25 +281,25 @@ impl Dataset for LeRobot {
         let mut out = self.file(INFO)?;
         out.write_all(info.as_bytes())?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
-        let bytes = size_of(self.folder.part())?;
+        let bytes = folder_size(self.folder.partial_path())?;
         self.folder.commit()?;
         Ok(bytes)
     }
 
-    fn kept(&self) -> Option<PathBuf> {
-        Some(self.folder.part().into())
+    fn partial_path(&self) -> Option<PathBuf> {
+        Some(self.folder.partial_path().into())
     }
 }
 
-impl LeRobot {
+impl LeRobotWriter {
     fn file(&self, name: &str) -> io::Result<BufWriter<Box<dyn Storage>>> {
-        let path = self.folder.part().join(name);
+        let path = self.folder.partial_path().join(name);
         path.parent().map_or(Ok(()), fs::create_dir_all)?;
         Ok(BufWriter::new(self.disk.storage(File::create(path)?)))
     }
 
     /// Writes the only task, which is the index of its table in pandas.
-    fn write_tasks(&self) -> Written {
+    fn write_tasks(&self) -> WriteResult {
         let index = "__index_level_0__";
         let column = |name: Option<&str>, field, pandas, numpy| json!({ "name": name, "field_name": field, "pandas_type": pandas, "numpy_type": numpy, "metadata": null });
         let about = json!({
@@ -300,7 +311,8 @@ impl LeRobot {
             ],
             "pandas_version": "2.0.0",
         });
-        let mut table = Table::new(vec![("task_index".into(), Kind::Int64), (index.into(), Kind::Text)]);
+        let mut table =
+            ParquetWriter::new(vec![("task_index".into(), ColumnType::Int64), (index.into(), ColumnType::String)]);
         let mut task = Vec::new();
         put_bytes(self.task.as_bytes(), &mut task)?;
         let mut out = self.file("meta/tasks.parquet")?;
@@ -309,7 +321,7 @@ impl LeRobot {
         Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?)
     }
 
-    fn write_episodes(&self) -> Written {
+    fn write_episodes(&self) -> WriteResult {
         let numbers = [
             "episode_index",
             "length",
@@ -320,14 +332,15 @@ impl LeRobot {
             "meta/episodes/chunk_index",
             "meta/episodes/file_index",
         ];
-        let mut columns: Vec<(String, Kind)> = numbers.iter().map(|name| (name.to_string(), Kind::Int64)).collect();
-        columns.push(("tasks".into(), Kind::Texts));
-        let mut table = Table::new(columns);
+        let mut columns: Vec<(String, ColumnType)> =
+            numbers.iter().map(|name| (name.to_string(), ColumnType::Int64)).collect();
+        columns.push(("tasks".into(), ColumnType::StringList));
+        let mut table = ParquetWriter::new(columns);
         let mut values = vec![Vec::new(); table.width()];
         let mut first = 0;
         for (number, episode) in (0_u64..).zip(&self.episodes) {
             let last = first + episode.frames;
-            let row = [number, episode.frames, number / CHUNK, number % CHUNK, first, last, 0, 0];
+            let row = [number, episode.frames, number / FILES_PER_CHUNK, number % FILES_PER_CHUNK, first, last, 0, 0];
             for (to, number) in values.iter_mut().zip(row) {
                 to.extend_from_slice(&number.to_le_bytes());
             }
@@ -344,7 +357,7 @@ impl LeRobot {
 
     fn info(&self) -> Value {
         let (episodes, frames) = (self.episodes.len(), self.episodes.iter().map(|episode| episode.frames).sum::<u64>());
-        let mut features = described(&self.features);
+        let mut features = feature_info(&self.features);
         for (name, kind) in COMMON {
             features.insert(name.into(), json!({ "dtype": kind, "shape": [1], "names": null }));
         }
@@ -354,7 +367,7 @@ impl LeRobot {
             "total_episodes": episodes,
             "total_frames": frames,
             "total_tasks": 1,
-            "chunks_size": CHUNK,
+            "chunks_size": FILES_PER_CHUNK,
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
             "fps": self.fps,
@@ -366,7 +379,7 @@ impl LeRobot {
     }
 
     /// Writes the indices of all frames in the dataset, which are known only now.
-    fn number_frames(&self) -> io::Result<()> {
+    fn write_frame_indices(&self) -> io::Result<()> {
         let mut next = 0_u64;
         for episode in &self.episodes {
             let mut file = self.disk.storage(OpenOptions::new().write(true).open(&episode.file)?);
@@ -383,17 +396,17 @@ impl LeRobot {
 }
 
 fn data_file(episode: u64) -> String {
-    format!("data/chunk-{:03}/file-{:03}.parquet", episode / CHUNK, episode % CHUNK)
+    format!("data/chunk-{:03}/file-{:03}.parquet", episode / FILES_PER_CHUNK, episode % FILES_PER_CHUNK)
 }
 
-impl Running {
+impl OpenEpisode {
     /// Opens the file for appending. Files are open only during writes, because there may be thousands.
-    fn open(&self, disk: &Disk) -> io::Result<Box<dyn Storage>> {
+    fn open(&self, disk: &StorageFactory) -> io::Result<Box<dyn Storage>> {
         self.file.parent().map_or(Ok(()), fs::create_dir_all)?;
         Ok(disk.storage(OpenOptions::new().create(true).append(true).open(&self.file)?))
     }
 
-    fn write(&mut self, disk: &Disk) -> Written {
+    fn write(&mut self, disk: &StorageFactory) -> WriteResult {
         if self.rows > 0 {
             let mut out = BufWriter::new(self.open(disk)?);
             self.table.write(&mut out, self.rows, &self.values)?;
@@ -406,11 +419,11 @@ impl Running {
 }
 
 /// Size of all files of a folder \[bytes\].
-fn size_of(folder: &Path) -> io::Result<u64> {
+fn folder_size(folder: &Path) -> io::Result<u64> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        bytes += if entry.file_type()?.is_dir() { size_of(&entry.path())? } else { entry.metadata()?.len() };
+        bytes += if entry.file_type()?.is_dir() { folder_size(&entry.path())? } else { entry.metadata()?.len() };
     }
     Ok(bytes)
 }

@@ -2,12 +2,12 @@
 //! compression and missing values. The layout follows the Apache Parquet format; metadata are in Thrift's compact
 //! protocol.
 
-use crate::writer::{Fault, Written};
+use crate::writer::{WriteError, WriteResult};
 use std::io::Write;
 
 /// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum ColumnType {
     /// 64-bit integer.
     Int64,
     /// Boolean, passed as one byte, 1 or 0, and packed when written.
@@ -15,11 +15,11 @@ pub(crate) enum Kind {
     /// This number of floats; one alone is no list.
     Float32(usize),
     /// A string.
-    Text,
+    String,
     /// A list of one string.
-    Texts,
+    StringList,
     /// An image file and its name.
-    Picture,
+    Image,
 }
 
 /// A physical column. Images have two.
@@ -32,16 +32,16 @@ struct Leaf {
 }
 
 /// Writer of a file: row groups in sequence, then the metadata.
-pub(crate) struct Table {
-    columns: Vec<(String, Kind)>,
+pub(crate) struct ParquetWriter {
+    columns: Vec<(String, ColumnType)>,
     leaves: Vec<Leaf>,
     /// Bytes written so far.
-    at: u64,
+    offset: u64,
     rows: u64,
-    groups: Vec<Group>,
+    groups: Vec<RowGroup>,
 }
 
-struct Group {
+struct RowGroup {
     rows: u64,
     /// For each leaf: offset of its page, size of the page, offset of the values.
     pages: Vec<(u64, u64, u64)>,
@@ -50,26 +50,26 @@ struct Group {
 const MAGIC: &[u8; 4] = b"PAR1";
 const BOOLEAN: i64 = 0;
 
-impl Table {
-    pub(crate) fn new(columns: Vec<(String, Kind)>) -> Self {
-        let leaf = |(name, kind): &(String, Kind)| {
+impl ParquetWriter {
+    pub(crate) fn new(columns: Vec<(String, ColumnType)>) -> Self {
+        let leaf = |(name, kind): &(String, ColumnType)| {
             let one = |below: &[&str], physical, list| {
                 let path = std::iter::once(&**name).chain(below.iter().copied()).map(String::from).collect();
                 Leaf { path, physical, list }
             };
             let listed = |physical, width| one(&["list", "element"], physical, Some(width));
             match *kind {
-                Kind::Int64 => vec![one(&[], 2, None)],
-                Kind::Bool => vec![one(&[], BOOLEAN, None)],
-                Kind::Float32(1) => vec![one(&[], 4, None)],
-                Kind::Float32(width) => vec![listed(4, width)],
-                Kind::Text => vec![one(&[], 6, None)],
-                Kind::Texts => vec![listed(6, 1)],
-                Kind::Picture => vec![one(&["bytes"], 6, None), one(&["path"], 6, None)],
+                ColumnType::Int64 => vec![one(&[], 2, None)],
+                ColumnType::Bool => vec![one(&[], BOOLEAN, None)],
+                ColumnType::Float32(1) => vec![one(&[], 4, None)],
+                ColumnType::Float32(width) => vec![listed(4, width)],
+                ColumnType::String => vec![one(&[], 6, None)],
+                ColumnType::StringList => vec![listed(6, 1)],
+                ColumnType::Image => vec![one(&["bytes"], 6, None), one(&["path"], 6, None)],
             }
         };
         let leaves = columns.iter().flat_map(leaf).collect();
-        Self { columns, leaves, at: 0, rows: 0, groups: Vec::new() }
+        Self { columns, leaves, offset: 0, rows: 0, groups: Vec::new() }
     }
 
     /// Number of physical columns.
@@ -79,10 +79,10 @@ impl Table {
 
     /// Writes a row group: the little-endian values of each leaf, concatenated. Strings and files are prefixed by their
     /// lengths ([`put_bytes`]).
-    pub(crate) fn write(&mut self, out: &mut impl Write, rows: usize, values: &[Vec<u8>]) -> Written {
-        if self.at == 0 {
+    pub(crate) fn write(&mut self, out: &mut impl Write, rows: usize, values: &[Vec<u8>]) -> WriteResult {
+        if self.offset == 0 {
             out.write_all(MAGIC)?;
-            self.at = MAGIC.len() as u64;
+            self.offset = MAGIC.len() as u64;
         }
         let mut pages = Vec::new();
         for (leaf, values) in self.leaves.iter().zip(values) {
@@ -97,69 +97,69 @@ impl Table {
             let page = page_head(size, count)?;
             [&page, &levels, values].into_iter().try_for_each(|bytes| out.write_all(bytes))?;
             let (head, size) = (page.len() as u64, size as u64);
-            pages.push((self.at, head + size, self.at + head + levels.len() as u64));
-            self.at += head + size;
+            pages.push((self.offset, head + size, self.offset + head + levels.len() as u64));
+            self.offset += head + size;
         }
         self.rows += rows as u64;
-        self.groups.push(Group { rows: rows as u64, pages });
+        self.groups.push(RowGroup { rows: rows as u64, pages });
         Ok(())
     }
 
     /// File offset of the values and number of rows of each row group, for an integer column.
-    pub(crate) fn places(&self, name: &str) -> Vec<(u64, u64)> {
+    pub(crate) fn value_offsets(&self, name: &str) -> Vec<(u64, u64)> {
         let leaf = self.leaves.iter().position(|leaf| leaf.path == [name]);
-        let place = |group: &Group| leaf.and_then(|leaf| group.pages.get(leaf)).map(|page| (page.2, group.rows));
+        let place = |group: &RowGroup| leaf.and_then(|leaf| group.pages.get(leaf)).map(|page| (page.2, group.rows));
         self.groups.iter().filter_map(place).collect()
     }
 
     /// Writes the metadata, which ends the file. `about` are key-value pairs for readers.
-    pub(crate) fn finish(&mut self, out: &mut impl Write, about: &[(&str, &str)]) -> Written {
-        if self.at == 0 {
+    pub(crate) fn finish(&mut self, out: &mut impl Write, about: &[(&str, &str)]) -> WriteResult {
+        if self.offset == 0 {
             out.write_all(MAGIC)?;
         }
         let mut file = Thrift::default();
         file.int(1, 5, 1);
         self.schema(&mut file);
-        file.int(3, 6, number(self.rows)?);
+        file.int(3, 6, checked_int(self.rows)?);
         file.list(4, 12, self.groups.len());
         for group in &self.groups {
-            file.begin();
+            file.begin_struct();
             file.list(1, 12, self.leaves.len());
             for (leaf, (at, bytes, _)) in self.leaves.iter().zip(&group.pages) {
-                file.begin();
-                file.int(2, 6, number(*at)?);
-                file.open(3);
+                file.begin_struct();
+                file.int(2, 6, checked_int(*at)?);
+                file.begin_struct_field(3);
                 file.int(1, 5, leaf.physical);
                 file.list(2, 5, 2); // PLAIN, RLE
                 [0, 3].into_iter().for_each(|encoding| file.zigzag(encoding));
                 file.list(3, 8, leaf.path.len());
                 leaf.path.iter().for_each(|part| file.binary(part.as_bytes()));
                 file.int(4, 5, 0); // uncompressed
-                file.int(5, 6, number(group.rows * leaf.list.unwrap_or(1) as u64)?);
-                file.int(6, 6, number(*bytes)?);
-                file.int(7, 6, number(*bytes)?);
-                file.int(9, 6, number(*at)?);
-                file.close();
-                file.close();
+                file.int(5, 6, checked_int(group.rows * leaf.list.unwrap_or(1) as u64)?);
+                file.int(6, 6, checked_int(*bytes)?);
+                file.int(7, 6, checked_int(*bytes)?);
+                file.int(9, 6, checked_int(*at)?);
+                file.end_struct();
+                file.end_struct();
             }
-            file.int(2, 6, number(group.pages.iter().map(|page| page.1).sum::<u64>())?);
-            file.int(3, 6, number(group.rows)?);
-            file.close();
+            file.int(2, 6, checked_int(group.pages.iter().map(|page| page.1).sum::<u64>())?);
+            file.int(3, 6, checked_int(group.rows)?);
+            file.end_struct();
         }
         if !about.is_empty() {
             file.list(5, 12, about.len());
             for (key, value) in about {
-                file.begin();
+                file.begin_struct();
                 file.text(1, key);
                 file.text(2, value);
-                file.close();
+                file.end_struct();
             }
         }
         file.text(6, "kinetoscope");
-        file.close();
+        file.end_struct();
         out.write_all(&file.bytes)?;
         // Readers treat the length as signed.
-        out.write_all(&number::<i32>(file.bytes.len() as u64)?.to_le_bytes())?;
+        out.write_all(&checked_int::<i32>(file.bytes.len() as u64)?.to_le_bytes())?;
         Ok(out.write_all(MAGIC)?)
     }
 
@@ -175,13 +175,13 @@ impl Table {
                 elements.push((Some(physical), Some(0), "element", None, converted));
             };
             match kind {
-                Kind::Float32(width) if *width != 1 => list(4, None),
-                Kind::Texts => list(6, UTF8),
-                Kind::Float32(_) => elements.push((Some(4), Some(0), name.as_str(), None, None)),
-                Kind::Int64 => elements.push((Some(2), Some(0), name.as_str(), None, None)),
-                Kind::Bool => elements.push((Some(BOOLEAN), Some(0), name.as_str(), None, None)),
-                Kind::Text => elements.push((Some(6), Some(0), name.as_str(), None, UTF8)),
-                Kind::Picture => {
+                ColumnType::Float32(width) if *width != 1 => list(4, None),
+                ColumnType::StringList => list(6, UTF8),
+                ColumnType::Float32(_) => elements.push((Some(4), Some(0), name.as_str(), None, None)),
+                ColumnType::Int64 => elements.push((Some(2), Some(0), name.as_str(), None, None)),
+                ColumnType::Bool => elements.push((Some(BOOLEAN), Some(0), name.as_str(), None, None)),
+                ColumnType::String => elements.push((Some(6), Some(0), name.as_str(), None, UTF8)),
+                ColumnType::Image => {
                     elements.push((None, Some(0), name.as_str(), Some(2), None));
                     elements.push((Some(6), Some(0), "bytes", None, None));
                     elements.push((Some(6), Some(0), "path", None, UTF8));
@@ -190,7 +190,7 @@ impl Table {
         }
         file.list(2, 12, elements.len());
         for (physical, repetition, name, children, converted) in elements {
-            file.begin();
+            file.begin_struct();
             let mut int = |field, value: Option<i64>| value.into_iter().for_each(|value| file.int(field, 5, value));
             int(1, physical);
             int(3, repetition);
@@ -198,39 +198,39 @@ impl Table {
             let mut int = |field, value: Option<i64>| value.into_iter().for_each(|value| file.int(field, 5, value));
             int(5, children.map(|count| count as i64));
             int(6, converted);
-            file.close();
+            file.end_struct();
         }
     }
 }
 
 /// Appends a string or a file as a value.
-pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> Written {
-    to.extend_from_slice(&number::<i32>(bytes.len() as u64)?.to_le_bytes());
+pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> WriteResult {
+    to.extend_from_slice(&checked_int::<i32>(bytes.len() as u64)?.to_le_bytes());
     to.extend_from_slice(bytes);
     Ok(())
 }
 
 /// Converts a size or a count to the signed type of the format: 32 bits in pages, 64 bits elsewhere.
-fn number<N: TryFrom<u64>>(number: u64) -> Written<N> {
+fn checked_int<N: TryFrom<u64>>(number: u64) -> WriteResult<N> {
     let too_large = "bytes or rows are more than a page or a table of a Parquet file may have";
-    let error = |_| Fault::limit(format!("{number} {too_large}; make pictures smaller, or episodes shorter"));
+    let error = |_| WriteError::limit(format!("{number} {too_large}; make pictures smaller, or episodes shorter"));
     N::try_from(number).map_err(error)
 }
 
 /// Page header for `size` bytes, including the levels, and `count` values.
-fn page_head(size: usize, count: usize) -> Written<Vec<u8>> {
-    let (size, count) = (number::<i32>(size as u64)?, number::<i32>(count as u64)?);
+fn page_head(size: usize, count: usize) -> WriteResult<Vec<u8>> {
+    let (size, count) = (checked_int::<i32>(size as u64)?, checked_int::<i32>(count as u64)?);
     let mut page = Thrift::default();
     page.int(1, 5, 0); // data page
     page.int(2, 5, size.into());
     page.int(3, 5, size.into());
-    page.open(5);
+    page.begin_struct_field(5);
     page.int(1, 5, count.into());
     page.int(2, 5, 0); // PLAIN
     page.int(3, 5, 3); // levels: RLE
     page.int(4, 5, 3);
-    page.close();
-    page.close();
+    page.end_struct();
+    page.end_struct();
     Ok(page.bytes)
 }
 
@@ -314,17 +314,17 @@ impl Thrift {
     }
 
     /// Begins a structure in a list.
-    fn begin(&mut self) {
+    fn begin_struct(&mut self) {
         self.last.push(0);
     }
 
     /// Begins a structure in a field.
-    fn open(&mut self, field: u8) {
+    fn begin_struct_field(&mut self, field: u8) {
         self.field(field, 12);
-        self.begin();
+        self.begin_struct();
     }
 
-    fn close(&mut self) {
+    fn end_struct(&mut self) {
         self.bytes.push(0);
         self.last.pop();
     }
@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(page_head(most, 1).unwrap()[2..8], [0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f]);
         for (size, count) in [(most + 1, 1), (1, most + 1)] {
             let error = page_head(size, count).unwrap_err();
-            assert!(matches!(error, Fault::Limit(_)) && error.to_string().contains("2147483648"), "{error}");
+            assert!(matches!(error, WriteError::Limit(_)) && error.to_string().contains("2147483648"), "{error}");
         }
     }
 

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 /// Statistics of a feature: of each of its numbers over all frames.
 pub(super) struct Statistics {
-    of: Vec<Moments>,
+    moments: Vec<Moments>,
     frames: u64,
-    picture: bool,
+    is_image: bool,
 }
 
 /// Moments of a set of numbers: count, mean, sum of squared deviations, minimum and maximum. Sets are merged as in
@@ -18,32 +18,33 @@ pub(super) struct Statistics {
 pub(super) struct Moments {
     count: f64,
     mean: f64,
-    squares: f64,
-    ends: [f64; 2],
+    squared_deviations: f64,
+    range: [f64; 2],
 }
 
 /// Statistics of one image: of red, green and blue, each from 0 to 1.
-pub(super) struct OfPicture([Moments; 3]);
+pub(super) struct ImageStatistics([Moments; 3]);
 
 impl Moments {
-    const NONE: Self = Self { count: 0.0, mean: 0.0, squares: 0.0, ends: [f64::INFINITY, f64::NEG_INFINITY] };
+    const NONE: Self =
+        Self { count: 0.0, mean: 0.0, squared_deviations: 0.0, range: [f64::INFINITY, f64::NEG_INFINITY] };
 
-    fn join(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         let (count, apart) = (self.count + other.count, other.mean - self.mean);
         if other.count > 0.0 {
             self.mean += apart * other.count / count;
-            self.squares += other.squares + apart * apart * self.count * other.count / count;
+            self.squared_deviations += other.squared_deviations + apart * apart * self.count * other.count / count;
             self.count = count;
-            self.ends = [self.ends[0].min(other.ends[0]), self.ends[1].max(other.ends[1])];
+            self.range = [self.range[0].min(other.range[0]), self.range[1].max(other.range[1])];
         }
     }
 
     fn one(number: f64) -> Self {
-        Self { count: 1.0, mean: number, squares: 0.0, ends: [number; 2] }
+        Self { count: 1.0, mean: number, squared_deviations: 0.0, range: [number; 2] }
     }
 }
 
-impl OfPicture {
+impl ImageStatistics {
     pub(super) fn new(rgba: &[u8]) -> Self {
         let mut all = [Moments::NONE; 3];
         for (channel, moments) in all.iter_mut().enumerate() {
@@ -55,7 +56,7 @@ impl OfPicture {
                 let mean = sum as f64 / count;
                 let about = (squares as f64 - mean * sum as f64).max(0.0) / (255.0 * 255.0);
                 let ends = [least, largest].map(|end| end as f64 / 255.0);
-                *moments = Moments { count, mean: mean / 255.0, squares: about, ends };
+                *moments = Moments { count, mean: mean / 255.0, squared_deviations: about, range: ends };
             }
         }
         Self(all)
@@ -64,32 +65,32 @@ impl OfPicture {
 
 impl Statistics {
     pub(super) fn new(width: usize) -> Self {
-        Self { of: vec![Moments::NONE; width], frames: 0, picture: false }
+        Self { moments: vec![Moments::NONE; width], frames: 0, is_image: false }
     }
 
     pub(super) fn add(&mut self, values: &[f32]) {
         self.frames += 1;
-        for (moments, value) in self.of.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
-            moments.join(&Moments::one((*value).into()));
+        for (moments, value) in self.moments.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
+            moments.merge(&Moments::one((*value).into()));
         }
     }
 
-    pub(super) fn add_picture(&mut self, of: &OfPicture) {
-        (self.frames, self.picture) = (self.frames + 1, true);
-        self.of.iter_mut().zip(&of.0).for_each(|(all, moments)| all.join(moments));
+    pub(super) fn add_image(&mut self, of: &ImageStatistics) {
+        (self.frames, self.is_image) = (self.frames + 1, true);
+        self.moments.iter_mut().zip(&of.0).for_each(|(all, moments)| all.merge(moments));
     }
 
     /// Converts to the form in `meta/stats.json`. Statistics of images have shape (3, 1, 1).
-    pub(super) fn told(&self) -> Value {
+    pub(super) fn to_json(&self) -> Value {
         let of = |one: fn(&Moments) -> f64| -> Value {
-            let values = self.of.iter().map(|moments| if moments.count > 0.0 { one(moments) } else { f64::NAN });
-            if self.picture { values.map(|x| json!([[x]])).collect() } else { values.map(|x| json!(x)).collect() }
+            let values = self.moments.iter().map(|moments| if moments.count > 0.0 { one(moments) } else { f64::NAN });
+            if self.is_image { values.map(|x| json!([[x]])).collect() } else { values.map(|x| json!(x)).collect() }
         };
         json!({
-            "min": of(|m| m.ends[0]),
-            "max": of(|m| m.ends[1]),
+            "min": of(|m| m.range[0]),
+            "max": of(|m| m.range[1]),
             "mean": of(|m| m.mean),
-            "std": of(|m| (m.squares / m.count).sqrt()),
+            "std": of(|m| (m.squared_deviations / m.count).sqrt()),
             "count": [self.frames],
         })
     }
@@ -107,7 +108,7 @@ mod tests {
             all.add(&row);
         }
         // By hand: of 1 and 3; of no number; of 5, 7 and 9, whose variance is 8 / 3.
-        let told = all.told();
+        let told = all.to_json();
         assert_eq!(told["min"], json!([1.0, null, 5.0]));
         assert_eq!(told["max"], json!([3.0, null, 9.0]));
         assert_eq!(told["mean"], json!([2.0, null, 7.0]));

@@ -1,8 +1,8 @@
 //! MCAP files of ROS 2 messages, read sequentially by chunks.
 
-use super::{RecordedTopic, Samples, Wanted};
+use super::{FieldSelector, RecordedTopic, TimeSeries};
 use crate::error::{RecordError, Result};
-use crate::ros::{MessageType, SCENE_UPDATE, Step};
+use crate::ros::{MessageType, PathSegment, SCENE_UPDATE};
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError};
@@ -13,36 +13,36 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Upper limit of the uncompressed size of a chunk \[bytes\].
-const LARGEST: usize = 1 << 30;
+const MAX_CHUNK: usize = 1 << 30;
 
 /// A channel with its message type; `None` for types that cannot be read.
-pub(super) struct Channel {
+pub(super) struct McapChannel {
     pub(super) topic: String,
-    kind: String,
-    pub(super) reads: Option<Arc<MessageType>>,
+    type_name: String,
+    pub(super) message_type: Option<Arc<MessageType>>,
 }
 
 /// Record of a file that is passed to the visitor.
-pub(super) enum Told<'r> {
-    Message { channel: &'r Channel, time: u64, data: &'r [u8] },
+pub(super) enum McapItem<'r> {
+    Message { channel: &'r McapChannel, time: u64, data: &'r [u8] },
     Attachment(Attachment<'r>),
 }
 
-/// Reads a whole file and calls `tell` with its messages and attachments.
-pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()> {
+/// Reads a whole file and calls `visit` with its messages and attachments.
+pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Result<()>) -> Result<()> {
     let failed = |error: std::io::Error| RecordError::file(path, error);
     let file = File::open(path).map_err(failed)?;
     let bytes = file.metadata().map_err(failed)?.len();
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
-    let torn = || {
+    let truncated = || {
         malformed("it ends in the middle; `kinetoscope recover` (record::recover) makes a whole file of what a killed recorder left".into())
     };
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(LARGEST));
+        .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(MAX_CHUNK));
     let (mut reader, mut file) = (LinearReader::new_with_options(options), BufReader::with_capacity(1 << 20, file));
     let mut schemas: BTreeMap<u16, (String, Option<Arc<MessageType>>)> = BTreeMap::new();
-    let mut channels: BTreeMap<u16, Channel> = BTreeMap::new();
+    let mut channels: BTreeMap<u16, McapChannel> = BTreeMap::new();
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
@@ -61,7 +61,10 @@ pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) ->
                     Record::Channel(channel) => {
                         let (kind, reads) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
                         let reads = reads.filter(|_| channel.message_encoding == "cdr");
-                        channels.insert(channel.id, Channel { topic: channel.topic, kind, reads });
+                        channels.insert(
+                            channel.id,
+                            McapChannel { topic: channel.topic, type_name: kind, message_type: reads },
+                        );
                     }
                     Record::Message { header, data } => {
                         let Some(channel) = channels.get(&header.channel_id) else {
@@ -70,16 +73,16 @@ pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) ->
                                 header.channel_id
                             )));
                         };
-                        tell(Told::Message { channel, time: header.log_time, data: &data })?;
+                        visit(McapItem::Message { channel, time: header.log_time, data: &data })?;
                     }
                     Record::Attachment { header, data, .. } => {
                         let mcap::records::AttachmentHeader { log_time, create_time, name, media_type } = header;
-                        tell(Told::Attachment(Attachment { log_time, create_time, name, media_type, data }))?;
+                        visit(McapItem::Attachment(Attachment { log_time, create_time, name, media_type, data }))?;
                     }
                     _ => {}
                 }
             }
-            Err(McapError::UnexpectedEof) => return Err(torn()),
+            Err(McapError::UnexpectedEof) => return Err(truncated()),
             Err(McapError::BadMagic) => return Err(malformed("this is no MCAP file, or it is not whole".into())),
             Err(error) => return Err(malformed(error.to_string())),
         }
@@ -91,26 +94,29 @@ pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) ->
 pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     /// A topic while its messages are read; fields are in the order of their first appearance.
     #[derive(Default)]
-    struct Found {
+    struct TopicScan {
         kind: String,
         count: u64,
         fields: Vec<String>,
         known: BTreeSet<String>,
         /// True if later messages may have new fields.
-        looks: bool,
+        scan_fields: bool,
         /// Number of unreadable messages, and index of the first.
         unread: u64,
         first_unread: u64,
     }
-    let mut all: BTreeMap<String, Found> = BTreeMap::new();
-    walk(path, |told| {
-        let Told::Message { channel, data, .. } = told else { return Ok(()) };
+    let mut all: BTreeMap<String, TopicScan> = BTreeMap::new();
+    visit_items(path, |told| {
+        let McapItem::Message { channel, data, .. } = told else { return Ok(()) };
         if !all.contains_key(&channel.topic) {
-            all.insert(channel.topic.clone(), Found { kind: channel.kind.clone(), looks: true, ..Found::default() });
+            all.insert(
+                channel.topic.clone(),
+                TopicScan { kind: channel.type_name.clone(), scan_fields: true, ..TopicScan::default() },
+            );
         }
         let Some(found) = all.get_mut(&channel.topic) else { return Ok(()) };
         found.count += 1;
-        let Some(reads) = &channel.reads else { return Ok(()) };
+        let Some(reads) = &channel.message_type else { return Ok(()) };
         let Some(value) = reads.read(data) else {
             // Other messages of the topic may be readable.
             if found.unread == 0 {
@@ -119,10 +125,10 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
             found.unread += 1;
             return Ok(());
         };
-        if !found.looks {
+        if !found.scan_fields {
             return Ok(());
         }
-        found.looks = value.varies();
+        found.scan_fields = value.has_variable_fields();
         let mut fields = Vec::new();
         value.fields("", &mut fields);
         let known = &mut found.known;
@@ -130,7 +136,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         Ok(())
     })?;
     let mut warnings = Vec::new();
-    let mut topic = |(name, Found { kind, count, fields, unread, first_unread, .. })| {
+    let mut topic = |(name, TopicScan { kind, count, fields, unread, first_unread, .. })| {
         if unread == count {
             warnings.push(format!("{name} is left out: none of its {count} messages is a {kind}"));
         } else if unread > 0 {
@@ -145,15 +151,15 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
 }
 
 /// Reads the selected numbers.
-pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
-    let mut by_topic: BTreeMap<&str, Vec<(usize, Vec<Step>)>> = BTreeMap::new();
-    for (place, Wanted { topic, field }) in wanted.iter().enumerate() {
-        by_topic.entry(topic).or_default().push((place, Step::of(field)));
+pub(super) fn samples(path: &Path, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
+    let mut by_topic: BTreeMap<&str, Vec<(usize, Vec<PathSegment>)>> = BTreeMap::new();
+    for (place, FieldSelector { topic, field }) in wanted.iter().enumerate() {
+        by_topic.entry(topic).or_default().push((place, PathSegment::parse_path(field)));
     }
-    let mut samples = vec![Samples::default(); wanted.len()];
-    walk(path, |told| {
-        let Told::Message { channel, time, data } = told else { return Ok(()) };
-        let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.reads) else {
+    let mut samples = vec![TimeSeries::default(); wanted.len()];
+    visit_items(path, |told| {
+        let McapItem::Message { channel, time, data } = told else { return Ok(()) };
+        let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.message_type) else {
             return Ok(());
         };
         // `topics` has reported unreadable messages.
@@ -172,8 +178,8 @@ pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
 /// Reads an attachment.
 pub(super) fn attachment(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
     let mut found = None;
-    walk(path, |told| {
-        if let Told::Attachment(attachment) = told
+    visit_items(path, |told| {
+        if let McapItem::Attachment(attachment) = told
             && attachment.name == name
         {
             found = Some(attachment.data.into_owned());

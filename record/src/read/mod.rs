@@ -14,12 +14,12 @@ mod mcap;
 mod npz;
 mod rows;
 
-pub(crate) use rows::{Rows, rows};
+pub(crate) use rows::{McapArrays, read_arrays};
 
-use crate::archive::Archive;
+use crate::archive::RecordedArrays;
 use crate::error::{RecordError, Result};
 use crate::format::Format;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::pattern::closest_names;
 use std::path::{Path, PathBuf};
 
 /// An open recording: an MCAP file of ROS 2 messages from any program, or a NumPy archive of a recorder.
@@ -35,7 +35,7 @@ pub struct Recording {
 enum Content {
     /// Read from the file on each request.
     Mcap,
-    Npz(Box<Archive>),
+    Npz(Box<RecordedArrays>),
 }
 
 /// A recorded topic of one environment.
@@ -53,14 +53,14 @@ pub struct RecordedTopic {
 
 /// Selection of a number in every message of a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wanted {
+pub struct FieldSelector {
     /// Full name of the topic.
     pub topic: String,
     /// Name of the number.
     pub field: String,
 }
 
-impl Wanted {
+impl FieldSelector {
     /// Selects a number of a topic.
     pub fn new(topic: impl Into<String>, field: impl Into<String>) -> Self {
         Self { topic: topic.into(), field: field.into() }
@@ -69,7 +69,7 @@ impl Wanted {
 
 /// A number over time.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Samples {
+pub struct TimeSeries {
     /// Times of capture \[s\], on the clock of the recording, which continues over resets.
     pub times: Vec<f64>,
     /// Values at these times.
@@ -88,7 +88,7 @@ impl Recording {
         let (content, (topics, warnings)) = match Format::of_path(path) {
             Ok(Format::Mcap) => (Content::Mcap, mcap::topics(path)?),
             Ok(Format::Npz) => {
-                let archive = Archive::read(path)?;
+                let archive = RecordedArrays::open_npz(path)?;
                 let topics = npz::topics(&archive)?;
                 (Content::Npz(Box::new(archive)), (topics, Vec::new()))
             }
@@ -169,8 +169,8 @@ impl Recording {
     ///
     /// # Errors
     /// A topic or a field is unknown (the error lists the nearest ones), or the file has changed since it was opened.
-    pub fn samples(&self, wanted: &[Wanted]) -> Result<Vec<Samples>> {
-        for Wanted { topic, field } in wanted {
+    pub fn time_series(&self, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
+        for FieldSelector { topic, field } in wanted {
             let topic = match self.topics.iter().find(|known| known.name == *topic) {
                 Some(topic) => topic,
                 None => self.topic(topic, None)?,
@@ -207,7 +207,7 @@ fn env_of(topic: &str) -> Option<usize> {
 }
 
 fn nearest(name: &str, known: &[String]) -> Vec<String> {
-    closest(name, known.iter().map(String::as_str)).into_iter().map(String::from).collect()
+    closest_names(name, known.iter().map(String::as_str)).into_iter().map(String::from).collect()
 }
 
 #[cfg(test)]

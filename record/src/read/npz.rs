@@ -1,7 +1,7 @@
 //! Topics and numbers of NumPy archives, by environment.
 
-use super::{RecordedTopic, Samples, Wanted};
-use crate::archive::Archive;
+use super::{FieldSelector, RecordedTopic, TimeSeries};
+use crate::archive::RecordedArrays;
 use crate::error::Result;
 use serde_json::Value;
 
@@ -9,23 +9,23 @@ use serde_json::Value;
 const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 
 /// A field of a stream.
-struct Part<'a> {
+struct ArrayField<'a> {
     /// Name of the array.
     array: &'a str,
     /// Names of its numbers in an environment, in order.
     fields: Vec<String>,
-    of_forces: bool,
+    at_force_time: bool,
 }
 
 /// A stream, as described in `recording.json`.
-struct Stream<'a> {
+struct RecordedStream<'a> {
     name: &'a str,
     env_ids: Vec<usize>,
-    parts: Vec<Part<'a>>,
+    parts: Vec<ArrayField<'a>>,
 }
 
-fn streams(archive: &Archive) -> Vec<Stream<'_>> {
-    let all = archive.about["streams"].as_array().into_iter().flatten();
+fn streams(archive: &RecordedArrays) -> Vec<RecordedStream<'_>> {
+    let all = archive.metadata["streams"].as_array().into_iter().flatten();
     all.filter_map(|stream| {
         let name = stream["name"].as_str()?;
         let columns = stream["columns"].as_array().into_iter().flatten();
@@ -38,10 +38,10 @@ fn streams(archive: &Archive) -> Vec<Stream<'_>> {
             let shape = archive.shape(array)?.get(2..)?;
             let own = array.strip_prefix(name).unwrap_or(array).trim_start_matches('/');
             let of_forces = part["of_forces"].as_bool().unwrap_or(false);
-            Some(Part { array, fields: fields(own, &columns, shape), of_forces })
+            Some(ArrayField { array, fields: fields(own, &columns, shape), at_force_time: of_forces })
         });
         let env_ids = envs.filter_map(|env| usize::try_from(env).ok()).collect();
-        Some(Stream { name, env_ids, parts: parts.collect() })
+        Some(RecordedStream { name, env_ids, parts: parts.collect() })
     })
     .collect()
 }
@@ -65,7 +65,7 @@ fn fields(own: &str, columns: &[String], shape: &[usize]) -> Vec<String> {
 }
 
 /// Lists the topics of an archive.
-pub(super) fn topics(archive: &Archive) -> Result<Vec<RecordedTopic>> {
+pub(super) fn topics(archive: &RecordedArrays) -> Result<Vec<RecordedTopic>> {
     let mut topics = Vec::new();
     for stream in streams(archive) {
         let count = archive.shape(&format!("{}/step", stream.name)).and_then(|shape| shape.first()).copied();
@@ -83,18 +83,19 @@ pub(super) fn topics(archive: &Archive) -> Result<Vec<RecordedTopic>> {
 
 /// Reads the selected numbers. Skips rows in which an environment repeats its last time, because they have no new
 /// value.
-pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Samples>> {
+pub(super) fn samples(archive: &RecordedArrays, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
     let streams = streams(archive);
     let mut samples = Vec::with_capacity(wanted.len());
-    for Wanted { topic, field } in wanted {
+    for FieldSelector { topic, field } in wanted {
         let missing = || archive.malformed(format!("there is no {field} in {topic}"));
-        let of_env =
-            |stream: &Stream<'_>| stream.env_ids.iter().position(|env| *topic == format!("/env_{env}/{}", stream.name));
+        let of_env = |stream: &RecordedStream<'_>| {
+            stream.env_ids.iter().position(|env| *topic == format!("/env_{env}/{}", stream.name))
+        };
         let (stream, row) = streams.iter().find_map(|stream| Some((stream, of_env(stream)?))).ok_or_else(missing)?;
-        let place = |part: &Part<'_>| part.fields.iter().position(|known| known == field);
+        let place = |part: &ArrayField<'_>| part.fields.iter().position(|known| known == field);
         let (part, column) = stream.parts.iter().find_map(|part| Some((part, place(part)?))).ok_or_else(missing)?;
-        let times = times(archive, stream, row, part.of_forces)?;
-        let mut found = Samples::default();
+        let times = times(archive, stream, row, part.at_force_time)?;
+        let mut found = TimeSeries::default();
         for (k, time) in times.into_iter().enumerate() {
             let Some(time) = time else { continue };
             let number = archive.rows(part.array, k)?.get((row, column)).copied().ok_or_else(missing)?;
@@ -108,11 +109,16 @@ pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Sample
 
 /// Recorded times of the rows of a stream in an environment \[s\], continuing over resets; `None` for a row without a
 /// new value.
-fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) -> Result<Vec<Option<f64>>> {
+fn times(
+    archive: &RecordedArrays,
+    stream: &RecordedStream<'_>,
+    row: usize,
+    of_forces: bool,
+) -> Result<Vec<Option<f64>>> {
     let forces = format!("{}/force_time", stream.name);
     let array = if of_forces && archive.shape(&forces).is_some() { forces } else { format!("{}/time", stream.name) };
     let steps = archive.steps(stream.name)?;
-    let dt = archive.about["physics_dt"].as_f64().filter(|dt| *dt > 0.0);
+    let dt = archive.metadata["physics_dt"].as_f64().filter(|dt| *dt > 0.0);
     let dt = dt.ok_or_else(|| archive.malformed("it does not say its time step".into()))?;
     let env = stream.env_ids.get(row).copied().unwrap_or_default();
     let column = |array: &str| -> Result<Vec<f64>> {
@@ -122,7 +128,7 @@ fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) ->
     let Some((first, step)) = captured.first().zip(steps.first()) else { return Ok(Vec::new()) };
     // State rows begin at step 0, with an exact time. The first row of a sensor comes at a later step.
     let start = if *step == 0.0 { *first } else { first - step * dt };
-    let events = archive.happened(env)?;
+    let events = archive.state_changes(env)?;
     let (mut offset, mut next, mut last) = (0.0, 0, None);
     let mut times = Vec::with_capacity(captured.len());
     for (&time, &step) in captured.iter().zip(steps) {

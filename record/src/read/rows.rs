@@ -1,8 +1,8 @@
 //! Rows of a recorder's MCAP file as arrays of a NumPy archive, for replay.
 
-use super::mcap::{Told, walk};
+use super::mcap::{McapItem, visit_items};
 use crate::error::{RecordError, Result};
-use crate::npz::{ABOUT, START};
+use crate::npz::{INITIAL_STATE, METADATA};
 use crate::packet::EventKind;
 use crate::ros::Value as Message;
 use serde_json::Value;
@@ -13,14 +13,14 @@ use std::path::Path;
 pub(crate) type Arrays = BTreeMap<String, (Vec<usize>, Vec<f64>)>;
 
 /// Content of a file: description of its streams, initial state, arrays.
-pub(crate) struct Rows {
-    pub(crate) about: Value,
+pub(crate) struct McapArrays {
+    pub(crate) metadata: Value,
     pub(crate) start: Vec<u8>,
     pub(crate) arrays: Arrays,
 }
 
 /// A stream while its messages are read.
-struct Stream {
+struct StreamAssembler {
     name: String,
     envs: Vec<usize>,
     /// Names, shapes and widths of its arrays.
@@ -32,8 +32,8 @@ struct Stream {
     /// Rows of each array.
     rows: Vec<Vec<f64>>,
     /// Values of the present row, of each array and environment. Values without a message are those of the row before.
-    now: Vec<Vec<f64>>,
-    told: Vec<bool>,
+    present_row: Vec<Vec<f64>>,
+    has_message: Vec<bool>,
     step: f64,
 }
 
@@ -41,8 +41,8 @@ struct Stream {
 const POSES: [&str; 3] = ["/link_poses", "/body_poses", "/pose"];
 const JOINTS: [&str; 2] = ["/joint_states", "/targets"];
 
-impl Stream {
-    fn is_called(&self, ends: &[&str]) -> bool {
+impl StreamAssembler {
+    fn name_ends_with(&self, ends: &[&str]) -> bool {
         ends.iter().any(|end| self.name.ends_with(end))
     }
 
@@ -62,33 +62,43 @@ impl Stream {
         let (now, rows) = (vec![Vec::new(); parts.len() * envs.len()], vec![Vec::new(); parts.len()]);
         let told = vec![false; parts.len() * envs.len()];
         let (name, frames) = (stream["name"].as_str()?.to_string(), texts(&stream["columns"]));
-        Some(Self { name, envs, parts, frames, steps: Vec::new(), rows, now, told, step: 0.0 })
+        Some(Self {
+            name,
+            envs,
+            parts,
+            frames,
+            steps: Vec::new(),
+            rows,
+            present_row: now,
+            has_message: told,
+            step: 0.0,
+        })
     }
 
     /// Adds the values of an array in an environment at a step; `None` if they do not have the declared width.
-    fn put(&mut self, part: usize, env: usize, step: f64, numbers: Vec<f64>) -> Option<()> {
+    fn add_values(&mut self, part: usize, env: usize, step: f64, numbers: Vec<f64>) -> Option<()> {
         let row = self.envs.iter().position(|of| *of == env)?;
         if self.parts.get(part)?.2 != numbers.len() {
             return None;
         }
         let place = part * self.envs.len() + row;
-        if self.told[place] || (step != self.step && self.told.contains(&true)) {
+        if self.has_message[place] || (step != self.step && self.has_message.contains(&true)) {
             self.end_row()?;
         }
         self.step = step;
-        self.told[place] = true;
-        self.now[place] = numbers;
+        self.has_message[place] = true;
+        self.present_row[place] = numbers;
         Some(())
     }
 
     /// Completes the present row; `None` if an environment has no values yet.
     fn end_row(&mut self) -> Option<()> {
-        if !self.told.contains(&true) {
+        if !self.has_message.contains(&true) {
             return Some(());
         }
         for ((part, (_, _, width)), of_part) in self.parts.iter().enumerate().zip(&mut self.rows) {
             for row in 0..self.envs.len() {
-                let numbers = &self.now[part * self.envs.len() + row];
+                let numbers = &self.present_row[part * self.envs.len() + row];
                 if numbers.len() != *width {
                     return None;
                 }
@@ -96,7 +106,7 @@ impl Stream {
             }
         }
         self.steps.push(self.step);
-        self.told.fill(false);
+        self.has_message.fill(false);
         Some(())
     }
 }
@@ -132,7 +142,7 @@ fn of_env(name: &str) -> Option<(usize, &str)> {
 }
 
 /// Parses the text of an event message: kind and step.
-fn happened(text: &str) -> Option<(EventKind, f64)> {
+fn parse_event(text: &str) -> Option<(EventKind, f64)> {
     let (kind, rest) = text.split_once(" at step ")?;
     let kinds = [EventKind::Reset, EventKind::Written, EventKind::Diverged, EventKind::Note];
     let kind = kinds.into_iter().find(|known| known.name() == kind)?;
@@ -143,31 +153,32 @@ fn happened(text: &str) -> Option<(EventKind, f64)> {
 ///
 /// # Errors
 /// It is not an MCAP file of a recorder, or is incomplete.
-pub(crate) fn rows(path: &Path) -> Result<Rows> {
+pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
     let (mut about, mut start) = (None, None);
-    let mut streams: Vec<Stream> = Vec::new();
-    let mut begun: BTreeMap<usize, u64> = BTreeMap::new();
+    let mut streams: Vec<StreamAssembler> = Vec::new();
+    let mut start_times: BTreeMap<usize, u64> = BTreeMap::new();
     let mut events: [Vec<f64>; 4] = Default::default();
     let mut dt = 0.0;
-    walk(path, |told| {
+    visit_items(path, |told| {
         let (channel, time, data) = match told {
-            Told::Attachment(attachment) => {
-                if attachment.name == START {
+            McapItem::Attachment(attachment) => {
+                if attachment.name == INITIAL_STATE {
                     start = Some(attachment.data.into_owned());
-                } else if attachment.name == ABOUT {
+                } else if attachment.name == METADATA {
                     let json: Option<Value> = serde_json::from_slice(&attachment.data).ok();
-                    let json = json.ok_or_else(|| malformed(format!("{ABOUT} is no JSON")))?;
+                    let json = json.ok_or_else(|| malformed(format!("{METADATA} is no JSON")))?;
                     dt = json["physics_dt"].as_f64().filter(|dt| *dt > 0.0).unwrap_or_default();
-                    streams = json["streams"].as_array().into_iter().flatten().filter_map(Stream::of).collect();
+                    streams =
+                        json["streams"].as_array().into_iter().flatten().filter_map(StreamAssembler::of).collect();
                     about = Some(json);
                 }
                 return Ok(());
             }
-            Told::Message { channel, time, data } => (channel, time, data),
+            McapItem::Message { channel, time, data } => (channel, time, data),
         };
         // Messages before the description are origins of environments, which are no rows.
-        let Some(reads) = channel.reads.as_ref().filter(|_| dt > 0.0) else { return Ok(()) };
+        let Some(reads) = channel.message_type.as_ref().filter(|_| dt > 0.0) else { return Ok(()) };
         if channel.topic == "/events" {
             let message = reads.read(data);
             let text = |field: &str| match message.as_ref().and_then(|message| message.field(field)) {
@@ -175,7 +186,7 @@ pub(crate) fn rows(path: &Path) -> Result<Rows> {
                 _ => String::new(),
             };
             let env = text("name").strip_prefix("env_").and_then(|env| env.parse::<f64>().ok());
-            if let (Some(env), Some((kind, step))) = (env, happened(&text("msg"))) {
+            if let (Some(env), Some((kind, step))) = (env, parse_event(&text("msg"))) {
                 let row = [step, env, f64::from(kind.number()), f64::NAN];
                 events.iter_mut().zip(row).for_each(|(column, number)| column.push(number));
             }
@@ -186,43 +197,47 @@ pub(crate) fn rows(path: &Path) -> Result<Rows> {
             let first = *begun.entry(env).or_insert(time);
             (time.saturating_sub(first) as f64 / 1e9 / dt).round()
         };
-        let broken = || malformed(format!("{} is not what {ABOUT} says of it", channel.topic));
+        let mismatch = || malformed(format!("{} is not what {METADATA} says of it", channel.topic));
         if name == "tf" {
-            let Some(message) = reads.read(data) else { return Err(broken()) };
+            let Some(message) = reads.read(data) else { return Err(mismatch()) };
             let poses = transforms(&message);
             let Some((_, first)) = poses.first().and_then(|(frame, _)| of_env(frame)) else { return Ok(()) };
-            let has_it = |stream: &&mut Stream| {
-                stream.is_called(&POSES)
+            let has_it = |stream: &&mut StreamAssembler| {
+                stream.name_ends_with(&POSES)
                     && stream.parts.len() == 1
                     && stream.frames.first().is_some_and(|frame| frame == first)
             };
             let stream = streams.iter_mut().find(has_it);
             if let Some(stream) = stream {
-                let step = step(&mut begun);
-                stream.put(0, env, step, poses.iter().flat_map(|(_, pose)| *pose).collect()).ok_or_else(broken)?;
+                let step = step(&mut start_times);
+                stream
+                    .add_values(0, env, step, poses.iter().flat_map(|(_, pose)| *pose).collect())
+                    .ok_or_else(mismatch)?;
             }
             return Ok(());
         }
-        let is_it = |stream: &&mut Stream| stream.name == name && stream.is_called(&JOINTS) && stream.parts.len() == 3;
+        let is_it = |stream: &&mut StreamAssembler| {
+            stream.name == name && stream.name_ends_with(&JOINTS) && stream.parts.len() == 3
+        };
         if let Some(stream) = streams.iter_mut().find(is_it) {
-            let Some(message) = reads.read(data) else { return Err(broken()) };
-            let step = step(&mut begun);
+            let Some(message) = reads.read(data) else { return Err(mismatch()) };
+            let step = step(&mut start_times);
             for (part, field) in ["position", "velocity", "effort"].into_iter().enumerate() {
-                stream.put(part, env, step, numbers(&message, field)).ok_or_else(broken)?;
+                stream.add_values(part, env, step, numbers(&message, field)).ok_or_else(mismatch)?;
             }
         } else if let Some((stream, part)) = streams.iter_mut().find_map(|stream| {
             let part = stream.parts.iter().position(|(array, ..)| array == name)?;
             stream.name.ends_with("/state").then_some((stream, part))
         }) {
-            let Some(message) = reads.read(data) else { return Err(broken()) };
-            let step = step(&mut begun);
-            stream.put(part, env, step, numbers(&message, "data")).ok_or_else(broken)?;
+            let Some(message) = reads.read(data) else { return Err(mismatch()) };
+            let step = step(&mut start_times);
+            stream.add_values(part, env, step, numbers(&message, "data")).ok_or_else(mismatch)?;
         }
         Ok(())
     })?;
     let missing =
         |name: &str| malformed(format!("it has no {name}: it was not written by this recorder, or by an older one"));
-    let (about, start) = (about.ok_or_else(|| missing(ABOUT))?, start.ok_or_else(|| missing(START))?);
+    let (about, start) = (about.ok_or_else(|| missing(METADATA))?, start.ok_or_else(|| missing(INITIAL_STATE))?);
     let mut arrays = Arrays::new();
     for mut stream in streams {
         stream.end_row().ok_or_else(|| malformed(format!("{} has not every environment", stream.name)))?;
@@ -238,5 +253,5 @@ pub(crate) fn rows(path: &Path) -> Result<Rows> {
     for (name, numbers) in ["step", "env", "kind", "time"].into_iter().zip(events) {
         arrays.insert(format!("events/{name}"), (vec![numbers.len()], numbers));
     }
-    Ok(Rows { about, start, arrays })
+    Ok(McapArrays { metadata: about, start, arrays })
 }

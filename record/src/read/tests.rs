@@ -50,8 +50,8 @@ fn spring() {
         let [first, second] = [None, Some(1)].map(|env| recording.topic("joint_states", env).unwrap());
         assert_eq!([&first.name, &second.name], ["/env_0/cart/joint_states", "/env_1/cart/joint_states"]);
         assert_eq!(first.count, u64::from(STEPS) + 1);
-        let wanted = [first, second].map(|topic| Wanted::new(&topic.name, "position[x]"));
-        let samples = recording.samples(&wanted).unwrap();
+        let wanted = [first, second].map(|topic| FieldSelector::new(&topic.name, "position[x]"));
+        let samples = recording.time_series(&wanted).unwrap();
         for (samples, start) in samples.iter().zip([0.3, 0.1]) {
             assert_eq!((samples.times.len(), samples.values.len()), (301, 301));
             for (step, (time, x)) in (0..).zip(samples.times.iter().zip(&samples.values)) {
@@ -75,8 +75,8 @@ fn reset() {
         let path = folder.path().join(name);
         recorded(&path, Some(100));
         let recording = Recording::open(&path).unwrap();
-        let wanted = [0, 1].map(|env| Wanted::new(format!("/env_{env}/cart/joint_states"), "position[x]"));
-        recording.samples(&wanted).unwrap()
+        let wanted = [0, 1].map(|env| FieldSelector::new(format!("/env_{env}/cart/joint_states"), "position[x]"));
+        recording.time_series(&wanted).unwrap()
     };
     let [mcap, npz] = ["run.mcap", "run.npz"].map(read);
     for (a, b) in mcap.iter().zip(&npz) {
@@ -105,7 +105,7 @@ fn unknown_names() {
         assert_error(recording.topic("left/joint_state", None), "", &["known are /left/joint_states"]);
         assert_error(recording.topic("left/joint_states", Some(2)), "", &["environment 2"]);
         assert_eq!(recording.topic("/left/joint_states", Some(1)).unwrap().name, "/env_1/left/joint_states");
-        let wanted = |topic: &str, field: &str| recording.samples(&[Wanted::new(topic, field)]);
+        let wanted = |topic: &str, field: &str| recording.time_series(&[FieldSelector::new(topic, field)]);
         assert_error(wanted("/env_0/left/joint_states", "position[y]"), "", &["position[x]"]);
         assert_error(wanted("/env_9/left", "position[x]"), "UnknownName { what: \"topic\"", &[]);
     }
@@ -129,10 +129,12 @@ fn damaged_recordings() {
         std::fs::write(&path, &damaged).unwrap();
         // Archives are read on demand, so that damage is found when the damaged array is read.
         let all = |recording: Recording| {
-            let fields =
-                recording.topics().iter().flat_map(|of| of.fields.iter().map(|field| Wanted::new(&of.name, field)));
-            recording.samples(&fields.collect::<Vec<_>>())?;
-            recording.attachment(crate::scene_file::SCENE)?;
+            let fields = recording
+                .topics()
+                .iter()
+                .flat_map(|of| of.fields.iter().map(|field| FieldSelector::new(&of.name, field)));
+            recording.time_series(&fields.collect::<Vec<_>>())?;
+            recording.attachment(crate::scene_file::SCENE_ARCHIVE)?;
             crate::replay::num_envs(&path)
         };
         assert_eq!(Recording::open(&path).is_err(), name == "run.mcap");
@@ -187,14 +189,14 @@ fn unreadable_messages() {
     assert!(torn.contains("/env_0/torn lacks 2 of its 301 messages") && torn.contains("message 2"), "{torn}");
     assert!(joints.contains("/env_0/torn/joint_states lacks 2 of its 301 messages"), "{joints}");
     assert!(recording.topic("none", None).unwrap().fields.is_empty());
-    let x = |topic: &str| Wanted::new(topic, "position[x]");
+    let x = |topic: &str| FieldSelector::new(topic, "position[x]");
     let [whole, lacking] =
-        &recording.samples(&[x("/env_0/cart/joint_states"), x("/env_0/torn/joint_states")]).unwrap()[..]
+        &recording.time_series(&[x("/env_0/cart/joint_states"), x("/env_0/torn/joint_states")]).unwrap()[..]
     else {
         panic!("two series")
     };
-    let own = Recording::open(&path).unwrap().samples(&[x("/env_0/cart/joint_states")]).unwrap();
+    let own = Recording::open(&path).unwrap().time_series(&[x("/env_0/cart/joint_states")]).unwrap();
     assert_eq!(*whole, own[0]);
     let without = |all: &[f64]| all.iter().enumerate().filter(|(k, _)| ![1, 3].contains(k)).map(|(_, x)| *x).collect();
-    assert_eq!(*lacking, Samples { times: without(&whole.times), values: without(&whole.values) });
+    assert_eq!(*lacking, TimeSeries { times: without(&whole.times), values: without(&whole.values) });
 }

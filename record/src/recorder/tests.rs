@@ -2,21 +2,21 @@ mod events;
 mod pairs;
 
 use super::*;
-use crate::packet::Values;
+use crate::packet::ValueBuffer;
 use crate::recover::recover;
 use crate::tests::{falling, logs, names, numbers_of, record, rows, scratch};
-use crate::writer::Written;
+use crate::writer::WriteResult;
 use kinetoscope_render::Intrinsics;
 use kinetoscope_render::frame::Channels;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{Pose, SceneState};
 use kinetoscope_sensors::camera::{Camera, CameraCfg};
 use kinetoscope_sensors::ray::pattern::Grid;
 use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
 use kinetoscope_sensors::{
-    Channel, ImuCfg, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
+    ImuCfg, SampleChannel, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
 };
-use kinetoscope_sim::{MjcfCfg, SensorId};
+use kinetoscope_sim::{MjcfPartCfg, SensorId};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -27,23 +27,23 @@ fn put(sim: &mut SimulationManager, [x, y, z]: [f64; 3], envs: Option<&[EnvId]>)
 }
 
 /// Calls a function with each packet.
-struct Calls<F>(F);
+struct FnWriter<F>(F);
 
-impl<F: FnMut(&Packet) + Send> Sink for Calls<F> {
-    fn write(&mut self, _streams: &[Stream], packet: &Packet) -> Written {
+impl<F: FnMut(&Packet) + Send> FormatWriter for FnWriter<F> {
+    fn write(&mut self, _streams: &[StreamSchema], packet: &Packet) -> WriteResult {
         (self.0)(packet);
         Ok(())
     }
 
-    fn flush(&mut self) -> Written {
+    fn flush(&mut self) -> WriteResult {
         Ok(())
     }
 
-    fn finish(&mut self, _streams: &[Stream]) -> Written<u64> {
+    fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
         Ok(0)
     }
 
-    fn kept(&self) -> Option<PathBuf> {
+    fn partial_path(&self) -> Option<PathBuf> {
         None
     }
 }
@@ -57,7 +57,8 @@ fn record_to(
     let cfg = RecorderCfg { packets, scene: false, ..RecorderCfg::new("nowhere.mcap") };
     let cfg = cfg.with_topics([Topic::MjcfState("ball".into())]);
     let (sources, left_out) = resolve(sim, &cfg, Format::Mcap).unwrap();
-    let recorder = Recorder::begin(sim, cfg, Format::Mcap, sources, left_out, Box::new(Calls(write))).unwrap();
+    let recorder =
+        Recorder::start_writer(sim, cfg, Format::Mcap, sources, left_out, Box::new(FnWriter(write))).unwrap();
     sim.observers_mut().add(recorder)
 }
 
@@ -70,7 +71,7 @@ fn slow_disk() {
         let seen = Arc::clone(&heights);
         let recorder = record_to(&mut sim, packets, move |packet| {
             std::thread::sleep(pause);
-            let Values::F64(values) = &packet.blocks[0].values else { panic!("states are f64") };
+            let ValueBuffer::F64(values) = &packet.streams[0].values else { panic!("states are f64") };
             seen.lock().unwrap().push(values[2]);
         });
         sim.update(steps);
@@ -83,17 +84,17 @@ fn slow_disk() {
     assert_eq!((heights.len(), slow.packets), (21, 21));
     assert!(heights.windows(2).all(|pair| pair[1] < pair[0]), "the ball falls, in order: {heights:?}");
     // Steps of one ball take microseconds: 21 rows with 2 packets wait 19 times, less where this thread was held up.
-    assert!(slow.waits >= 10 && slow.waited >= pause * 10, "{slow}");
+    assert!(slow.waits >= 10 && slow.wait_time >= pause * 10, "{slow}");
     assert!(slow.to_string().contains("the simulation waited for it"), "{slow}");
     // Control: with a packet for every row there is no wait, and the same data is written.
     let (roomy, same) = recorded(32);
-    assert_eq!((roomy.waits, roomy.waited, &same), (0, Duration::ZERO, &heights));
+    assert_eq!((roomy.waits, roomy.wait_time, &same), (0, Duration::ZERO, &heights));
 }
 
-fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<Recorded> {
+fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<RecordingSummary> {
     // Records no scene, which alone would fill the disk.
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
-    let recorder = Recorder::start(sim, cfg, &Disk::full_after(left))?;
+    let recorder = Recorder::start(sim, cfg, &StorageFactory::full_after(left))?;
     let recorder = sim.observers_mut().add(recorder);
     sim.update(if sim.entities().sensor_uids().is_empty() { 3000 } else { 60 });
     sim.finish_recording(recorder)
@@ -104,7 +105,7 @@ fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) 
 fn assert_too_small(sim: &mut SimulationManager, path: &Path, left: usize, part: Option<&Path>) {
     let error = record_to_a_full_disk(sim, path, left).unwrap_err();
     assert!(error.to_string().contains("no space left"), "{left}: {error}");
-    let RecordError::File { kept, .. } = error else { panic!("{left}: {error:?}") };
+    let RecordError::File { partial_file: kept, .. } = error else { panic!("{left}: {error:?}") };
     assert_eq!((kept.as_deref(), path.exists()), (part, false), "{left}");
 }
 
@@ -131,7 +132,7 @@ fn full_disk_images() {
     }
     for left in [300, 1000, bytes as usize / 2] {
         let path = folder.path().join(format!("left_{left}"));
-        let part = part_of(&path);
+        let part = partial_path_of(&path);
         assert_too_small(&mut simulation(), &path, left, Some(&part));
         let found = images(&part);
         assert_eq!(!found.is_empty(), left >= 1000, "{left}: {found:?}");
@@ -151,7 +152,7 @@ fn full_disk_dataset() {
         let mut sim = crate::tests::simulation(2);
         let text = r#"<mujoco><worldbody><body name="b" pos="0 0 1"><joint name="j" type="slide"/><geom size="0.1"/></body></worldbody>
             <actuator><motor joint="j"/></actuator></mujoco>"#;
-        sim.add_mjcf(MjcfCfg::text("ball", text)).unwrap();
+        sim.add_mjcf(MjcfPartCfg::text("ball", text)).unwrap();
         sim
     };
     let whole = folder.path().join("whole.lerobot");
@@ -160,7 +161,7 @@ fn full_disk_dataset() {
     // No room; full in the rows; in the tables at the end; in the last file. Offsets of frames are written twice.
     for left in [0, 1000, bytes / 2, bytes - 100] {
         let path = folder.path().join(format!("left_{left}.lerobot"));
-        let part = part_of(&path);
+        let part = partial_path_of(&path);
         assert_too_small(&mut actuated(), &path, left, Some(&part));
         assert!(!part.join("meta/info.json").exists(), "{left}");
     }
@@ -183,7 +184,7 @@ fn full_disk_files() {
             sim
         };
         let (folder, path) = scratch(&name);
-        let part = (name == "run.mcap").then(|| part_of(&path));
+        let part = (name == "run.mcap").then(|| partial_path_of(&path));
         assert_too_small(&mut simulation(), &path, left, part.as_deref());
         assert_eq!(names(&folder), if part.is_some() { vec!["run.mcap.part"] } else { vec![] }, "{name}");
         // Control: the same recording on a disk with room.
@@ -201,12 +202,12 @@ struct Own(Sampler);
 impl SensorCfg for OwnCfg {
     type Sensor = Own;
 
-    fn requires(&self) -> Requires {
-        Requires::NONE
+    fn requires(&self) -> StateFields {
+        StateFields::NONE
     }
 
     fn build(&self, context: &SensorContext) -> std::result::Result<Own, SensorError> {
-        let channels = [Channel::new(self.0, 1)];
+        let channels = [SampleChannel::new(self.0, 1)];
         Ok(Own(Sampler::new("own", self.requires(), context, &SamplingCfg::default(), &channels)?))
     }
 }
@@ -243,7 +244,7 @@ fn dropped_recorder() {
         sim.record(RecorderCfg::new(&path)).unwrap();
         sim.update(5);
         drop(sim);
-        assert_eq!((path.exists(), part_of(&path).exists()), (false, stays), "{name}");
+        assert_eq!((path.exists(), partial_path_of(&path).exists()), (false, stays), "{name}");
         if stays {
             assert_eq!(recover(&path).unwrap().messages, 26);
         }
@@ -258,7 +259,7 @@ fn panic_of_the_thread() {
         assert!(packets < 3, "a test of panics");
     });
     sim.update(20);
-    sim.observers_mut().get(recorder).unwrap().catch_up();
+    sim.observers_mut().get(recorder).unwrap().wait_until_written();
     kinetoscope_testkit::refusal::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
 }
 
@@ -345,7 +346,7 @@ fn absurd_numbers() {
     let mut sim = falling(1);
     let refused = sim.record(RecorderCfg { packets: usize::MAX, ..RecorderCfg::new(&path) });
     kinetoscope_testkit::refusal::assert_error(refused, &format!("TooLarge {{ packets: {}", usize::MAX), &[]);
-    let cfg = RecorderCfg { every: u64::MAX, ..RecorderCfg::new(&path) };
+    let cfg = RecorderCfg { period_steps: u64::MAX, ..RecorderCfg::new(&path) };
     assert_eq!(record(&mut sim, cfg, |sim| sim.update(5)).packets, 1);
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0]);
 }
@@ -357,7 +358,8 @@ fn arrays_of_one_name() {
         let mut sim = falling(1);
         sim.add_sensor("own", OwnCfg(channel)).unwrap();
         let result = sim.record(RecorderCfg::new(folder.path().join(format!("{channel}.npz"))));
-        let refused = matches!(&result, Err(RecordError::SameName { name, .. }) if *name == format!("own/{channel}"));
+        let refused =
+            matches!(&result, Err(RecordError::DuplicateName { name, .. }) if *name == format!("own/{channel}"));
         assert_eq!((refused, result.is_err()), (taken, taken), "{result:?}");
     }
 }
@@ -386,7 +388,7 @@ fn damage() {
     sim.record(RecorderCfg::new(&path)).unwrap();
     sim.update(3000);
     drop(sim);
-    let part = part_of(&path);
+    let part = partial_path_of(&path);
     let whole = std::fs::read(&part).unwrap();
     let chunks = chunks(&whole);
     assert!(chunks.len() > 2, "{chunks:?}");
@@ -422,8 +424,8 @@ impl Observer for Resets {
         1
     }
 
-    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
-        if matches!(moment, Moment::Stepped) && self.0.contains(&sim.observers().steps()) {
+    fn on_event(&mut self, sim: &mut SimulationManager, moment: &SimEvent) {
+        if matches!(moment, SimEvent::Stepped) && self.0.contains(&sim.observers().steps()) {
             sim.reset(Some(&[EnvId(0)])).unwrap();
         }
     }

@@ -13,7 +13,7 @@ fn arms() -> SimulationManager {
     sim.add_robot(sr5("arm")).unwrap();
     let pusher = r#"<mujoco><worldbody><body name="slider"><joint name="x" type="slide" axis="1 0 0"/>
         <geom size="0.1" pos="3 0 1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("pusher", pusher)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("pusher", pusher)).unwrap();
     sim
 }
 
@@ -52,12 +52,12 @@ fn same_bits() {
         let mut sim = arms();
         assert_eq!(num_envs(&path).unwrap(), 2);
         let verdict = verify(&mut sim, &path).unwrap();
-        assert!(verdict.is_same(), "{name}: {verdict}");
+        assert!(verdict.is_identical(), "{name}: {verdict}");
         // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's
         // three.
         let arm = sim.robot(sim.entities().robot_id("arm").unwrap());
         let row = 2 * (3 * arm.dof() + 7 * arm.link_names().len() + 3) as u64;
-        assert_eq!((verdict.steps, verdict.numbers), (u64::from(STEPS), row * (u64::from(STEPS) + 2)), "{name}");
+        assert_eq!((verdict.steps, verdict.values), (u64::from(STEPS), row * (u64::from(STEPS) + 2)), "{name}");
     }
 }
 
@@ -72,7 +72,7 @@ fn recovered_recording() {
     drop(sim);
     crate::recover::recover(&path).unwrap();
     let verdict = verify(&mut arms(), &path).unwrap();
-    assert!(verdict.is_same() && verdict.steps == u64::from(STEPS), "{verdict}");
+    assert!(verdict.is_identical() && verdict.steps == u64::from(STEPS), "{verdict}");
     // Control: the file without its attachments.
     let whole = std::fs::read(&path).unwrap();
     let other = folder.path().join("other.mcap");
@@ -103,7 +103,7 @@ fn other_actions() {
         });
         let verdict = verify(&mut arms(), &path).unwrap();
         let difference = verdict.difference.unwrap();
-        assert_eq!((difference.step, difference.env, difference.written), (13, 1, false), "{difference:?}");
+        assert_eq!((difference.step, difference.env, difference.state_written), (13, 1, false), "{difference:?}");
 
         // A joint that was written before step 20.
         let path = folder.path().join(format!("written.{end}"));
@@ -116,14 +116,14 @@ fn other_actions() {
             }
         });
         let difference = verify(&mut arms(), &path).unwrap().difference.unwrap();
-        assert_eq!((difference.step, difference.env, difference.written), (20, 0, true), "{difference:?}");
+        assert_eq!((difference.step, difference.env, difference.state_written), (20, 0, true), "{difference:?}");
     }
 }
 
 /// Copies an archive with changed data of some arrays.
 fn changed(path: &Path, to: &Path, change: impl Fn(&str, &mut Vec<u8>)) {
-    let mut archive = zip::Archive::new(File::create(to).unwrap());
-    for (name, mut data) in zip::parse(&std::fs::read(path).unwrap()).unwrap() {
+    let mut archive = zip::ZipWriter::new(File::create(to).unwrap());
+    for (name, mut data) in zip::read_stored(&std::fs::read(path).unwrap()).unwrap() {
         change(&name, &mut data);
         archive.add(&name, b"", &mut &data[..]).unwrap();
     }

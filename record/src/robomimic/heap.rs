@@ -6,18 +6,18 @@ use std::path::Path;
 
 /// Position of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct BlockPosition {
     at: u64,
     bytes: u64,
 }
 
 /// The buffer file. Blocks may be written and read in any order.
-pub(super) struct Heap {
+pub(super) struct BlockFile {
     file: BufWriter<File>,
     at: u64,
 }
 
-impl Place {
+impl BlockPosition {
     /// Size of a serialized position.
     pub(super) const BYTES: usize = 16;
 
@@ -36,21 +36,21 @@ impl Place {
     }
 }
 
-impl Heap {
+impl BlockFile {
     pub(super) fn create(folder: &Path) -> io::Result<Self> {
         Ok(Self { file: BufWriter::with_capacity(1 << 16, tempfile::tempfile_in(folder)?), at: 0 })
     }
 
     /// Appends a block.
-    pub(super) fn put(&mut self, piece: &[u8]) -> io::Result<Place> {
+    pub(super) fn append(&mut self, piece: &[u8]) -> io::Result<BlockPosition> {
         self.file.write_all(piece)?;
-        let place = Place { at: self.at, bytes: piece.len() as u64 };
+        let place = BlockPosition { at: self.at, bytes: piece.len() as u64 };
         self.at += place.bytes;
         Ok(place)
     }
 
     /// Reads a block into `to`, replacing its content.
-    pub(super) fn take(&mut self, place: Place, to: &mut Vec<u8>) -> io::Result<()> {
+    pub(super) fn read(&mut self, place: BlockPosition, to: &mut Vec<u8>) -> io::Result<()> {
         self.file.flush()?;
         let file = self.file.get_mut();
         file.seek(SeekFrom::Start(place.at))?;
@@ -70,22 +70,22 @@ mod tests {
     #[test]
     fn any_order() {
         let folder = tempfile::tempdir().unwrap();
-        let mut heap = Heap::create(folder.path()).unwrap();
+        let mut heap = BlockFile::create(folder.path()).unwrap();
         let pieces: Vec<Vec<u8>> = (0..50_u8).map(|k| vec![k; 37 * usize::from(k)]).collect();
         let (mut places, mut found) = (Vec::new(), Vec::new());
         for piece in &pieces {
-            places.push(heap.put(piece).unwrap());
+            places.push(heap.append(piece).unwrap());
             let middle = places.len() / 2;
-            heap.take(places[middle], &mut found).unwrap();
+            heap.read(places[middle], &mut found).unwrap();
             assert_eq!(found, pieces[middle]);
         }
         for (place, piece) in places.iter().zip(&pieces).rev() {
-            let place = Place::from_bytes(&place.to_bytes());
-            heap.take(place, &mut found).unwrap();
+            let place = BlockPosition::from_bytes(&place.to_bytes());
+            heap.read(place, &mut found).unwrap();
             assert_eq!(found, *piece);
         }
-        let beyond = Place { at: places[49].at, bytes: places[49].bytes + 1 };
-        assert_eq!(heap.take(beyond, &mut found).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+        let beyond = BlockPosition { at: places[49].at, bytes: places[49].bytes + 1 };
+        assert_eq!(heap.read(beyond, &mut found).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "it has no name");
     }
 }

@@ -16,7 +16,7 @@
 //! | `obs/CAMERA_image` | (T, H, W, 3) | color, u8, one chunk for each image, compressed by deflate |
 //! | `next_obs/...` | | the same observations after the action |
 //!
-//! `env_kwargs` has `task`, `physics_dt`, `every` and `columns`.
+//! `env_kwargs` has `task`, `physics_dt`, `period_steps` and `columns`.
 //!
 //! Until the end, rows and compressed images are in two unnamed files in the same folder, because the number and the
 //! lengths of episodes are not known before. A killed process leaves nothing.
@@ -24,15 +24,15 @@
 mod heap;
 
 use crate::cfg::RecorderCfg;
-use crate::episodes::{self, Dataset, Episodes, Features, Frame, Role};
+use crate::episodes::{self, DatasetWriter, EpisodeFrame, EpisodeSplitter, Features, Role};
 use crate::error::{RecordError, Result};
-use crate::file::{PartFile, folder_of};
+use crate::file::{PartialFile, parent_dir};
 use crate::format::Format;
-use crate::stream::Stream;
-use crate::writer::{Fault, Sink, Written};
+use crate::stream::StreamSchema;
+use crate::writer::{FormatWriter, WriteError, WriteResult};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use heap::{Heap, Place};
+use heap::{BlockFile, BlockPosition};
 use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5FileOptions, H5Group, Hdf5Error};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -41,49 +41,49 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Size at which the buffered rows of an episode are written \[bytes\].
-const BYTES: usize = 1 << 16;
+const FLUSH_BYTES: usize = 1 << 16;
 
 /// robomimic's environment type for Gymnasium, the most general one.
 const GYM: i64 = 2;
 
 /// Writer of a robomimic dataset.
-struct Robomimic {
-    part: PartFile,
+struct RobomimicWriter {
+    part: PartialFile,
     features: Arc<Features>,
-    columns: Vec<Column>,
+    columns: Vec<DatasetColumn>,
     /// Value of the attribute `env_args`.
-    about: Value,
+    env_args: Value,
     envs: Vec<usize>,
     /// Present episode of each environment.
-    running: Vec<Option<Running>>,
+    open_episodes: Vec<Option<OpenEpisode>>,
     episodes: Vec<Episode>,
-    rows: Heap,
-    pictures: Heap,
+    row_file: BlockFile,
+    image_file: BlockFile,
     rgb: Vec<u8>,
 }
 
 /// A dataset of each episode.
-struct Column {
+struct DatasetColumn {
     /// Path below the episode.
     path: String,
     /// Offset in the record of a frame \[bytes\].
-    at: usize,
-    kind: Kind,
+    offset: usize,
+    kind: ColumnKind,
 }
 
-enum Kind {
+enum ColumnKind {
     /// This number of f64.
-    Numbers(usize),
+    Vector(usize),
     /// One f64 as a scalar.
-    Number,
+    Scalar,
     /// One i64 as a scalar.
-    Whole,
+    Integer,
     /// Position of an image of this width and height.
-    Picture([usize; 2]),
+    Image([usize; 2]),
 }
 
 /// An episode in progress, with the records of frames that are not written yet.
-struct Running {
+struct OpenEpisode {
     episode: usize,
     rows: Vec<u8>,
 }
@@ -92,7 +92,7 @@ struct Episode {
     env: usize,
     frames: usize,
     /// Positions of its records.
-    blocks: Vec<Place>,
+    blocks: Vec<BlockPosition>,
 }
 
 /// Name of a role below an episode; for observations, below `obs` and `next_obs`.
@@ -108,51 +108,57 @@ fn name_of(role: &Role) -> String {
         Role::Objects => "object".into(),
         Role::EngineState => "states".into(),
         Role::Sensor { stream, channel } => format!("{}_{}", flat(stream), flat(channel)),
-        Role::Picture(camera) => format!("{}_image", flat(camera)),
+        Role::Image(camera) => format!("{}_image", flat(camera)),
     }
 }
 
 /// Datasets of an episode, and size of the record of a frame \[bytes\].
-fn columns(features: &Features) -> (Vec<Column>, usize) {
+fn columns(features: &Features) -> (Vec<DatasetColumn>, usize) {
     let (mut columns, mut at) = (Vec::new(), 0);
-    let mut add = |path: String, kind: Kind| {
+    let mut add = |path: String, kind: ColumnKind| {
         let bytes = kind.bytes();
-        columns.push(Column { path, at, kind });
+        columns.push(DatasetColumn { path, offset: at, kind });
         at += bytes;
     };
     for of in ["obs", "next_obs"] {
         for feature in &features.numbers {
             let width = feature.names.len();
             match !feature.role.is_observed() {
-                false => add(format!("{of}/{}", feature.name), Kind::Numbers(width)),
-                true if of == "obs" => add(feature.name.clone(), Kind::Numbers(width)),
+                false => add(format!("{of}/{}", feature.name), ColumnKind::Vector(width)),
+                true if of == "obs" => add(feature.name.clone(), ColumnKind::Vector(width)),
                 true => {}
             }
         }
-        for picture in &features.pictures {
-            add(format!("{of}/{}", picture.name), Kind::Picture(picture.size));
+        for picture in &features.images {
+            add(format!("{of}/{}", picture.name), ColumnKind::Image(picture.size));
         }
     }
-    if features.outcome.is_some() {
-        add("rewards".into(), Kind::Number);
-        add("dones".into(), Kind::Whole);
+    if features.result_stream.is_some() {
+        add("rewards".into(), ColumnKind::Scalar);
+        add("dones".into(), ColumnKind::Integer);
     }
     (columns, at)
 }
 
 /// Creates a dataset; `dt` is the physics time step \[s\].
-pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Box<dyn Sink>> {
-    let RecorderCfg { path, every, overwrite, task, .. } = cfg;
+pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Result<Box<dyn FormatWriter>> {
+    let RecorderCfg { path, period_steps: every, overwrite, task, .. } = cfg;
     let features = Arc::new(Features::of(path, Format::Hdf5, streams, name_of)?);
     if !features.numbers.iter().any(|feature| feature.role == Role::Action) {
         let topic = "a run that nobody acts in: record targets of joints, or states with controls".into();
-        return Err(RecordError::NoPlace { path: path.clone(), format: Format::Hdf5, topic });
+        return Err(RecordError::UnsupportedTopic { path: path.clone(), format: Format::Hdf5, topic });
     }
     // Each image is one chunk of the file.
     let too_large = |[width, height]: [usize; 2]| 3 * width as u128 * height as u128 > u128::from(u32::MAX);
-    if let Some([width, height]) = features.pictures.iter().map(|picture| picture.size).find(|size| too_large(*size)) {
+    if let Some([width, height]) = features.images.iter().map(|picture| picture.size).find(|size| too_large(*size)) {
         let fits = "three bytes for each pixel must be less than 4 GiB".into();
-        return Err(RecordError::Size { path: path.clone(), format: Format::Hdf5, width, height, fits });
+        return Err(RecordError::UnsupportedSize {
+            path: path.clone(),
+            format: Format::Hdf5,
+            width,
+            height,
+            supported: fits,
+        });
     }
     let envs = episodes::environments(path, streams)?;
     let (columns, _) = columns(&features);
@@ -164,196 +170,210 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<B
         "type": GYM,
         "env_kwargs": { "task": task, "physics_dt": dt, "every": every, "columns": names },
     });
-    let (part, _) = PartFile::create(path, *overwrite, false)?;
-    let heap = || Heap::create(folder_of(path)).map_err(|error| RecordError::file(path, error));
-    let dataset = Robomimic {
+    let (part, _) = PartialFile::create(path, *overwrite, false)?;
+    let heap = || BlockFile::create(parent_dir(path)).map_err(|error| RecordError::file(path, error));
+    let dataset = RobomimicWriter {
         part,
         features: Arc::clone(&features),
         columns,
-        about,
+        env_args: about,
         envs: envs.clone(),
-        running: envs.iter().map(|_| None).collect(),
+        open_episodes: envs.iter().map(|_| None).collect(),
         episodes: Vec::new(),
-        rows: heap()?,
-        pictures: heap()?,
+        row_file: heap()?,
+        image_file: heap()?,
         rgb: Vec::new(),
     };
-    Ok(Box::new(Episodes::new(dataset, features, *every, &envs, streams)))
+    Ok(Box::new(EpisodeSplitter::new(dataset, features, *every, &envs, streams)))
 }
 
-impl Dataset for Robomimic {
-    type Picture = Place;
+impl DatasetWriter for RobomimicWriter {
+    type Image = BlockPosition;
 
-    fn picture(&mut self, rgba: &[u8], _size: [usize; 2]) -> Written<Place> {
+    fn encode_image(&mut self, rgba: &[u8], _size: [usize; 2]) -> WriteResult<BlockPosition> {
         self.rgb.clear();
         for pixel in rgba.as_chunks::<4>().0 {
             self.rgb.extend_from_slice(&pixel[..3]);
         }
         let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
         packed.write_all(&self.rgb)?;
-        Ok(self.pictures.put(&packed.finish()?)?)
+        Ok(self.image_file.append(&packed.finish()?)?)
     }
 
     fn begin(&mut self, env: usize) {
-        if self.running[env].is_none() {
+        if self.open_episodes[env].is_none() {
             let episode = self.episodes.len();
             self.episodes.push(Episode { env: self.envs[env], frames: 0, blocks: Vec::new() });
-            self.running[env] = Some(Running { episode, rows: Vec::new() });
+            self.open_episodes[env] = Some(OpenEpisode { episode, rows: Vec::new() });
         }
     }
 
-    fn add(&mut self, env: usize, frame: &Frame<Place>, next: &Frame<Place>) -> Written {
-        let Some(Running { episode, rows }) = &mut self.running[env] else { return Ok(()) };
+    fn add(
+        &mut self,
+        env: usize,
+        frame: &EpisodeFrame<BlockPosition>,
+        next: &EpisodeFrame<BlockPosition>,
+    ) -> WriteResult {
+        let Some(OpenEpisode { episode, rows }) = &mut self.open_episodes[env] else { return Ok(()) };
         // The order is that of the columns.
         for (of, actions) in [(frame, true), (next, false)] {
             let features = self.features.numbers.iter().zip(&of.numbers);
             for (_, numbers) in features.filter(|(feature, _)| actions || feature.role.is_observed()) {
                 numbers.iter().for_each(|number| rows.extend_from_slice(&number.to_le_bytes()));
             }
-            of.pictures.iter().for_each(|place| rows.extend_from_slice(&place.to_bytes()));
+            of.images.iter().for_each(|place| rows.extend_from_slice(&place.to_bytes()));
         }
-        if self.features.outcome.is_some() {
+        if self.features.result_stream.is_some() {
             rows.extend_from_slice(&frame.reward.to_le_bytes());
             rows.extend_from_slice(&i64::from(frame.done).to_le_bytes());
         }
         let episode = &mut self.episodes[*episode];
         episode.frames += 1;
-        if rows.len() >= BYTES {
-            episode.blocks.push(self.rows.put(rows)?);
+        if rows.len() >= FLUSH_BYTES {
+            episode.blocks.push(self.row_file.append(rows)?);
             rows.clear();
         }
         Ok(())
     }
 
-    fn end(&mut self, env: usize) -> Written {
-        if let Some(Running { episode, rows }) = self.running[env].take().filter(|running| !running.rows.is_empty()) {
-            self.episodes[episode].blocks.push(self.rows.put(&rows)?);
+    fn end(&mut self, env: usize) -> WriteResult {
+        if let Some(OpenEpisode { episode, rows }) =
+            self.open_episodes[env].take().filter(|running| !running.rows.is_empty())
+        {
+            self.episodes[episode].blocks.push(self.row_file.append(&rows)?);
         }
         Ok(())
     }
 
-    fn finish(&mut self) -> Written<u64> {
+    fn finish(&mut self) -> WriteResult<u64> {
         if self.episodes.is_empty() {
-            return Err(Fault::NoFrame(episodes::NO_FRAME));
+            return Err(WriteError::NoFrame(episodes::NO_FRAME));
         }
         // This process has locked the partial file already.
-        let file = H5FileOptions::new().no_locking().create(self.part.part()).map_err(fault)?;
+        let file = H5FileOptions::new().no_locking().create(self.part.partial_path()).map_err(write_error)?;
         self.write_all(&file)?;
         // `commit` flushes the file to the disk before it renames it.
-        file.close_no_sync().map_err(fault)?;
+        file.close_no_sync().map_err(write_error)?;
         Ok(self.part.commit()?)
     }
 
-    fn kept(&self) -> Option<PathBuf> {
-        self.part.kept()
+    fn partial_path(&self) -> Option<PathBuf> {
+        self.part.kept_path()
     }
 }
 
-impl Robomimic {
-    fn write_all(&mut self, file: &H5File) -> Written {
-        let data = file.create_group("data").map_err(fault)?;
+impl RobomimicWriter {
+    fn write_all(&mut self, file: &H5File) -> WriteResult {
+        let data = file.create_group("data").map_err(write_error)?;
         let total: usize = self.episodes.iter().map(|episode| episode.frames).sum();
-        data.set_attr_numeric("total", &(total as i64)).map_err(fault)?;
-        data.set_attr_string("env_args", &self.about.to_string()).map_err(fault)?;
+        data.set_attr_numeric("total", &(total as i64)).map_err(write_error)?;
+        data.set_attr_string("env_args", &self.env_args.to_string()).map_err(write_error)?;
         for (number, episode) in self.episodes.iter().enumerate() {
-            let demo = data.create_group(&format!("demo_{number}")).map_err(fault)?;
-            demo.set_attr_numeric("num_samples", &(episode.frames as i64)).map_err(fault)?;
-            demo.set_attr_numeric("env_id", &(episode.env as i64)).map_err(fault)?;
-            write(&demo, episode, &self.columns, &mut self.rows, &mut self.pictures)?;
+            let demo = data.create_group(&format!("demo_{number}")).map_err(write_error)?;
+            demo.set_attr_numeric("num_samples", &(episode.frames as i64)).map_err(write_error)?;
+            demo.set_attr_numeric("env_id", &(episode.env as i64)).map_err(write_error)?;
+            write(&demo, episode, &self.columns, &mut self.row_file, &mut self.image_file)?;
         }
         Ok(())
     }
 }
 
 /// Writes the datasets of an episode.
-fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap, pictures: &mut Heap) -> Written {
+fn write(
+    demo: &H5Group,
+    episode: &Episode,
+    columns: &[DatasetColumn],
+    rows: &mut BlockFile,
+    pictures: &mut BlockFile,
+) -> WriteResult {
     let frames = episode.frames;
     let mut groups = BTreeMap::new();
     let mut datasets: Vec<H5Dataset> = Vec::new();
-    for Column { path, kind, .. } in columns {
+    for DatasetColumn { path, kind, .. } in columns {
         let (group, name) = path.split_once('/').unwrap_or(("", path));
         if !group.is_empty() && !groups.contains_key(group) {
-            groups.insert(group, demo.create_group(group).map_err(fault)?);
+            groups.insert(group, demo.create_group(group).map_err(write_error)?);
         }
         let group = groups.get(group).unwrap_or(demo);
         let dataset = match *kind {
-            Kind::Numbers(width) => group.new_dataset::<f64>().shape([frames, width]).create(name),
-            Kind::Number => group.new_dataset::<f64>().shape([frames]).create(name),
-            Kind::Whole => group.new_dataset::<i64>().shape([frames]).create(name),
-            Kind::Picture([width, height]) => group
+            ColumnKind::Vector(width) => group.new_dataset::<f64>().shape([frames, width]).create(name),
+            ColumnKind::Scalar => group.new_dataset::<f64>().shape([frames]).create(name),
+            ColumnKind::Integer => group.new_dataset::<i64>().shape([frames]).create(name),
+            ColumnKind::Image([width, height]) => group
                 .new_dataset::<u8>()
                 .shape([frames, height, width, 3])
                 .chunk(&[1, height, width, 3])
                 .filter_pipeline(FilterPipeline::deflate(Compression::fast().level()))
                 .create(name),
         };
-        datasets.push(dataset.map_err(fault)?);
+        datasets.push(dataset.map_err(write_error)?);
     }
     // Without a task, the last frame is done.
     let ends = !columns.iter().any(|column| column.path == "dones");
-    let dones = ends.then(|| demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(fault)).transpose()?;
-    let record = columns.iter().map(Column::end).max().unwrap_or(0);
+    let dones =
+        ends.then(|| demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(write_error)).transpose()?;
+    let record = columns.iter().map(DatasetColumn::end).max().unwrap_or(0);
     let (mut block, mut picture, mut numbers, mut first) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for place in &episode.blocks {
-        rows.take(*place, &mut block)?;
+        rows.read(*place, &mut block)?;
         let count = block.len() / record.max(1);
         for (column, dataset) in columns.iter().zip(&datasets) {
-            let cells = || block.chunks_exact(record).map(|row| &row[column.at..column.end()]);
+            let cells = || block.chunks_exact(record).map(|row| &row[column.offset..column.end()]);
             match column.kind {
-                Kind::Numbers(width) => {
+                ColumnKind::Vector(width) => {
                     numbers.clear();
                     numbers.extend(cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| f64::from_le_bytes(*x)));
-                    dataset.write_slice(&[first, 0], &[count, width], &numbers).map_err(fault)?;
+                    dataset.write_slice(&[first, 0], &[count, width], &numbers).map_err(write_error)?;
                 }
-                Kind::Number => {
+                ColumnKind::Scalar => {
                     numbers.clear();
                     numbers.extend(cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| f64::from_le_bytes(*x)));
-                    dataset.write_slice(&[first], &[count], &numbers).map_err(fault)?;
+                    dataset.write_slice(&[first], &[count], &numbers).map_err(write_error)?;
                 }
-                Kind::Whole => {
+                ColumnKind::Integer => {
                     let all: Vec<i64> =
                         cells().flat_map(|cell| cell.as_chunks::<8>().0).map(|x| i64::from_le_bytes(*x)).collect();
-                    dataset.write_slice(&[first], &[count], &all).map_err(fault)?;
+                    dataset.write_slice(&[first], &[count], &all).map_err(write_error)?;
                 }
-                Kind::Picture(_) => {
+                ColumnKind::Image(_) => {
                     for (frame, cell) in (first..).zip(cells()) {
-                        pictures.take(Place::from_bytes(cell), &mut picture)?;
+                        pictures.read(BlockPosition::from_bytes(cell), &mut picture)?;
                         // The image is compressed already.
-                        dataset.write_chunk_raw(frame, &picture, 0).map_err(fault)?;
+                        dataset.write_chunk_raw(frame, &picture, 0).map_err(write_error)?;
                     }
                 }
             }
         }
         if let Some(dones) = &dones {
             let done: Vec<i64> = (first..first + count).map(|frame| i64::from(frame + 1 == frames)).collect();
-            dones.write_slice(&[first], &[count], &done).map_err(fault)?;
+            dones.write_slice(&[first], &[count], &done).map_err(write_error)?;
         }
         first += count;
     }
     Ok(())
 }
 
-impl Column {
+impl DatasetColumn {
     /// End offset in the record \[bytes\].
     fn end(&self) -> usize {
-        self.at + self.kind.bytes()
+        self.offset + self.kind.bytes()
     }
 }
 
-impl Kind {
+impl ColumnKind {
     /// Size in the record of a frame \[bytes\].
     fn bytes(&self) -> usize {
         match self {
-            Self::Numbers(width) => 8 * width,
-            Self::Number | Self::Whole => 8,
-            Self::Picture(_) => Place::BYTES,
+            Self::Vector(width) => 8 * width,
+            Self::Scalar | Self::Integer => 8,
+            Self::Image(_) => BlockPosition::BYTES,
         }
     }
 }
 
-fn fault(error: Hdf5Error) -> Fault {
+fn write_error(error: Hdf5Error) -> WriteError {
     match error {
-        Hdf5Error::Io(error) => Fault::Io(error),
-        other => Fault::Io(io::Error::other(other.to_string())),
+        Hdf5Error::Io(error) => WriteError::Io(error),
+        other => WriteError::Io(io::Error::other(other.to_string())),
     }
 }

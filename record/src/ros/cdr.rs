@@ -6,9 +6,9 @@ const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 /// Writer of a message. Every number is aligned to a multiple of its size, counted from the end of the header.
 #[derive(Debug, Default)]
-pub(crate) struct Cdr(Vec<u8>);
+pub(crate) struct CdrWriter(Vec<u8>);
 
-impl Cdr {
+impl CdrWriter {
     /// Begins a message, reusing the memory of the previous one.
     pub(crate) fn begin(&mut self) {
         self.0.clear();
@@ -50,33 +50,33 @@ impl Cdr {
     }
 
     /// Writes a length.
-    pub(crate) fn count(&mut self, count: usize) {
+    pub(crate) fn length(&mut self, count: usize) {
         // No message of a recording exceeds 4 GiB: images and states are far below.
         self.u32(u32::try_from(count).unwrap_or(u32::MAX));
     }
 
     /// Writes a string, with its terminating zero.
-    pub(crate) fn text(&mut self, text: &str) {
-        self.count(text.len() + 1);
+    pub(crate) fn string(&mut self, text: &str) {
+        self.length(text.len() + 1);
         self.0.extend_from_slice(text.as_bytes());
         self.0.push(0);
     }
 
     /// Writes a sequence of numbers.
-    pub(crate) fn list(&mut self, numbers: &[f64]) {
-        self.count(numbers.len());
+    pub(crate) fn f64_sequence(&mut self, numbers: &[f64]) {
+        self.length(numbers.len());
         self.f64s(numbers);
     }
 
     /// Writes a sequence of bytes.
-    pub(crate) fn blob(&mut self, bytes: &[u8]) {
-        self.count(bytes.len());
+    pub(crate) fn octet_sequence(&mut self, bytes: &[u8]) {
+        self.length(bytes.len());
         self.0.extend_from_slice(bytes);
     }
 
-    /// Writes a sequence of `count` bytes, which `put` appends.
-    pub(crate) fn blob_of(&mut self, count: usize, put: impl FnOnce(&mut Vec<u8>)) {
-        self.count(count);
+    /// Writes a sequence of `length` bytes, which `put` appends.
+    pub(crate) fn octet_sequence_with(&mut self, count: usize, put: impl FnOnce(&mut Vec<u8>)) {
+        self.length(count);
         put(&mut self.0);
     }
 }
@@ -87,13 +87,13 @@ mod tests {
 
     #[test]
     fn alignment() {
-        let mut cdr = Cdr::default();
+        let mut cdr = CdrWriter::default();
         cdr.begin();
         cdr.u8(7);
         cdr.u32(1);
         cdr.f64(0.0);
-        cdr.text("a");
-        cdr.list(&[]);
+        cdr.string("a");
+        cdr.f64_sequence(&[]);
         let expected = [&[0, 1, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0][..], &[0; 8], &[2, 0, 0, 0, b'a', 0, 0, 0, 0, 0, 0, 0]];
         assert_eq!(cdr.bytes(), expected.concat());
     }

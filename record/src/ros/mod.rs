@@ -9,10 +9,11 @@ mod read;
 mod scene;
 mod schema;
 
-pub(crate) use cdr::Cdr;
+pub(crate) use cdr::CdrWriter;
 pub(crate) use message::{
-    Hits, Stamp, camera_info, compressed_image, image, imu, joint_state, log, motion, numbers, points, transforms,
+    RayHits, RosHeader, camera_info, compressed_image, float64_multi_array, image, imu, joint_state, log, point_cloud,
+    transforms, twist_or_accel,
 };
-pub(crate) use read::{MessageType, Step, Value};
+pub(crate) use read::{MessageType, PathSegment, Value};
 pub(crate) use scene::scene_update;
 pub(crate) use schema::{SCENE_UPDATE, Schema};

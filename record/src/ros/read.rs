@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Largest depth of nested types. A deeper nesting is a cycle.
-const DEEPEST: usize = 12;
+const MAX_DEPTH: usize = 12;
 
 /// A message type.
 #[derive(Clone, Debug)]
@@ -16,20 +16,20 @@ pub(crate) struct MessageType {
 #[derive(Clone, Debug)]
 struct Field {
     name: Arc<str>,
-    kind: Kind,
-    many: Many,
+    kind: FieldType,
+    many: Multiplicity,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Kind {
-    Number(Number),
+enum FieldType {
+    Number(Primitive),
     Text,
     Other(String),
 }
 
 /// Primitive number types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Number {
+enum Primitive {
     Bool,
     I8,
     U8,
@@ -45,7 +45,7 @@ enum Number {
 
 /// Multiplicity of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Many {
+enum Multiplicity {
     One,
     Fixed(usize),
     List,
@@ -64,7 +64,7 @@ pub(crate) enum Value {
     List(Vec<Value>),
 }
 
-impl Number {
+impl Primitive {
     fn of(word: &str) -> Option<Self> {
         Some(match word {
             "bool" => Self::Bool,
@@ -102,7 +102,7 @@ impl MessageType {
         for line in text.lines() {
             let line = line.split('#').next().unwrap_or_default().trim();
             if let Some(other) = line.strip_prefix("MSG:") {
-                types.insert(std::mem::replace(&mut name, short(other.trim())), std::mem::take(&mut fields));
+                types.insert(std::mem::replace(&mut name, short_type_name(other.trim())), std::mem::take(&mut fields));
             } else if !line.is_empty() && !line.starts_with("==") && !is_constant(line) {
                 fields.push(Field::parse(line)?);
             }
@@ -115,26 +115,26 @@ impl MessageType {
     pub(crate) fn read(&self, message: &[u8]) -> Option<Value> {
         // Encoding and options, as every ROS 2 writes them on present machines.
         let ([0, 1, _, _], rest) = message.split_first_chunk::<4>()? else { return None };
-        let mut bytes = Bytes { all: rest, at: 0 };
-        self.structure(&mut bytes, self.types.get("")?, 0)
+        let mut bytes = CdrReader { all: rest, at: 0 };
+        self.read_struct(&mut bytes, self.types.get("")?, 0)
     }
 
-    fn structure(&self, bytes: &mut Bytes<'_>, fields: &[Field], depth: usize) -> Option<Value> {
-        if depth > DEEPEST {
+    fn read_struct(&self, bytes: &mut CdrReader<'_>, fields: &[Field], depth: usize) -> Option<Value> {
+        if depth > MAX_DEPTH {
             return None;
         }
         let mut values = Vec::with_capacity(fields.len());
         for field in fields {
-            values.push((Arc::clone(&field.name), self.value(bytes, field, depth)?));
+            values.push((Arc::clone(&field.name), self.read_value(bytes, field, depth)?));
         }
         Some(Value::Struct(values))
     }
 
-    fn value(&self, bytes: &mut Bytes<'_>, field: &Field, depth: usize) -> Option<Value> {
+    fn read_value(&self, bytes: &mut CdrReader<'_>, field: &Field, depth: usize) -> Option<Value> {
         let count = match field.many {
-            Many::One => None,
-            Many::Fixed(count) => Some(count),
-            Many::List => Some(bytes.count()?),
+            Multiplicity::One => None,
+            Multiplicity::Fixed(count) => Some(count),
+            Multiplicity::List => Some(bytes.count()?),
         };
         // Each element takes at least one byte, which is checked below for nested types. Thus no message can request
         // more memory than its own size.
@@ -142,22 +142,22 @@ impl MessageType {
             return None;
         }
         match (&field.kind, count) {
-            (Kind::Number(number), None) => bytes.number(*number).map(Value::Number),
-            (Kind::Number(number), Some(count)) if number.size() == 1 => bytes.skip(count).map(|()| Value::Bytes),
-            (Kind::Number(number), Some(count)) => {
+            (FieldType::Number(number), None) => bytes.number(*number).map(Value::Number),
+            (FieldType::Number(number), Some(count)) if number.size() == 1 => bytes.skip(count).map(|()| Value::Bytes),
+            (FieldType::Number(number), Some(count)) => {
                 (0..count).map(|_| bytes.number(*number)).collect::<Option<_>>().map(Value::Numbers)
             }
-            (Kind::Text, None) => bytes.text().map(Value::Text),
-            (Kind::Text, Some(count)) => (0..count).map(|_| bytes.text()).collect::<Option<_>>().map(Value::Texts),
-            (Kind::Other(name), count) => {
+            (FieldType::Text, None) => bytes.text().map(Value::Text),
+            (FieldType::Text, Some(count)) => (0..count).map(|_| bytes.text()).collect::<Option<_>>().map(Value::Texts),
+            (FieldType::Other(name), count) => {
                 let fields = self.fields_of(name)?;
                 match count {
-                    None => self.structure(bytes, fields, depth + 1),
+                    None => self.read_struct(bytes, fields, depth + 1),
                     Some(count) => {
                         // Rejects a type without fields, which could have any count.
                         let each = (0..count).map(|_| {
                             let begin = bytes.at;
-                            self.structure(bytes, fields, depth + 1).filter(|_| bytes.at > begin)
+                            self.read_struct(bytes, fields, depth + 1).filter(|_| bytes.at > begin)
                         });
                         each.collect::<Option<_>>().map(Value::List)
                     }
@@ -168,7 +168,7 @@ impl MessageType {
 
     /// Fields of a type, whose name may lack its package.
     fn fields_of(&self, name: &str) -> Option<&[Field]> {
-        let name = short(name);
+        let name = short_type_name(name);
         let own = self.types.get(&name).or_else(|| {
             let end = format!("/{name}");
             self.types.iter().find(|(known, _)| known.ends_with(&end)).map(|(_, fields)| fields)
@@ -178,7 +178,7 @@ impl MessageType {
 }
 
 /// Shortens `package/msg/Type` to `package/Type`.
-fn short(name: &str) -> String {
+fn short_type_name(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
@@ -193,31 +193,31 @@ impl Field {
         let mut words = line.split_whitespace();
         let (kind, name) = (words.next()?, words.next()?);
         let (kind, many) = match kind.split_once('[') {
-            None => (kind, Many::One),
+            None => (kind, Multiplicity::One),
             Some((kind, count)) => {
                 let count = count.strip_suffix(']')?;
                 let bounded = count.is_empty() || count.starts_with("<=");
-                (kind, if bounded { Many::List } else { Many::Fixed(count.parse().ok()?) })
+                (kind, if bounded { Multiplicity::List } else { Multiplicity::Fixed(count.parse().ok()?) })
             }
         };
         // A string may have a maximum length.
         let word = kind.split("<=").next()?;
-        let kind = match Number::of(word) {
-            Some(number) => Kind::Number(number),
-            None if word == "string" => Kind::Text,
-            None => Kind::Other(word.into()),
+        let kind = match Primitive::of(word) {
+            Some(number) => FieldType::Number(number),
+            None if word == "string" => FieldType::Text,
+            None => FieldType::Other(word.into()),
         };
         Some(Self { name: name.into(), kind, many })
     }
 }
 
 /// The bytes after the header, and the reading position.
-struct Bytes<'b> {
+struct CdrReader<'b> {
     all: &'b [u8],
     at: usize,
 }
 
-impl Bytes<'_> {
+impl CdrReader<'_> {
     fn left(&self) -> usize {
         self.all.len() - self.at.min(self.all.len())
     }
@@ -235,18 +235,18 @@ impl Bytes<'_> {
         Some(array)
     }
 
-    fn number(&mut self, kind: Number) -> Option<f64> {
+    fn number(&mut self, kind: Primitive) -> Option<f64> {
         Some(match kind {
-            Number::Bool | Number::U8 => f64::from(u8::from_le_bytes(self.array()?)),
-            Number::I8 => f64::from(i8::from_le_bytes(self.array()?)),
-            Number::I16 => f64::from(i16::from_le_bytes(self.array()?)),
-            Number::U16 => f64::from(u16::from_le_bytes(self.array()?)),
-            Number::I32 => f64::from(i32::from_le_bytes(self.array()?)),
-            Number::U32 => f64::from(u32::from_le_bytes(self.array()?)),
-            Number::I64 => i64::from_le_bytes(self.array()?) as f64,
-            Number::U64 => u64::from_le_bytes(self.array()?) as f64,
-            Number::F32 => f64::from(f32::from_le_bytes(self.array()?)),
-            Number::F64 => f64::from_le_bytes(self.array()?),
+            Primitive::Bool | Primitive::U8 => f64::from(u8::from_le_bytes(self.array()?)),
+            Primitive::I8 => f64::from(i8::from_le_bytes(self.array()?)),
+            Primitive::I16 => f64::from(i16::from_le_bytes(self.array()?)),
+            Primitive::U16 => f64::from(u16::from_le_bytes(self.array()?)),
+            Primitive::I32 => f64::from(i32::from_le_bytes(self.array()?)),
+            Primitive::U32 => f64::from(u32::from_le_bytes(self.array()?)),
+            Primitive::I64 => i64::from_le_bytes(self.array()?) as f64,
+            Primitive::U64 => u64::from_le_bytes(self.array()?) as f64,
+            Primitive::F32 => f64::from(f32::from_le_bytes(self.array()?)),
+            Primitive::F64 => f64::from_le_bytes(self.array()?),
         })
     }
 
@@ -270,12 +270,12 @@ impl Value {
     }
 
     /// Name of an element in a list of structures: its `child_frame_id` or `name`.
-    fn own_name(&self) -> Option<&str> {
+    fn element_name(&self) -> Option<&str> {
         let named = self.field("child_frame_id").or_else(|| self.field("name"))?;
         if let Self::Text(name) = named { Some(name) } else { None }
     }
 
-    fn names_beside(&self, count: usize) -> Option<&[String]> {
+    fn sibling_names(&self, count: usize) -> Option<&[String]> {
         match self.field("name") {
             Some(Self::Texts(names)) if names.len() == count => Some(names),
             _ => None,
@@ -289,14 +289,14 @@ impl Value {
             let name = if before.is_empty() { name.to_string() } else { format!("{before}.{name}") };
             match value {
                 Self::Number(_) => out.push(name),
-                Self::Numbers(numbers) => match self.names_beside(numbers.len()) {
+                Self::Numbers(numbers) => match self.sibling_names(numbers.len()) {
                     Some(names) => out.extend(names.iter().map(|of| format!("{name}[{of}]"))),
                     None => out.extend((0..numbers.len()).map(|k| format!("{name}[{k}]"))),
                 },
                 Self::Struct(_) => value.fields(&name, out),
                 Self::List(values) => {
                     for (k, value) in values.iter().enumerate() {
-                        let of = value.own_name().map_or_else(|| k.to_string(), String::from);
+                        let of = value.element_name().map_or_else(|| k.to_string(), String::from);
                         value.fields(&format!("{name}[{of}]"), out);
                     }
                 }
@@ -306,13 +306,13 @@ impl Value {
     }
 
     /// True if other messages of the same type may have other fields.
-    pub(crate) fn varies(&self) -> bool {
+    pub(crate) fn has_variable_fields(&self) -> bool {
         let Self::Struct(fields) = self else { return false };
-        fields.iter().any(|(_, value)| matches!(value, Self::List(_)) || value.varies())
+        fields.iter().any(|(_, value)| matches!(value, Self::List(_)) || value.has_variable_fields())
     }
 
     /// The number at a path of [`fields`](Self::fields); `None` if this message does not contain it.
-    pub(crate) fn number(&self, path: &[Step]) -> Option<f64> {
+    pub(crate) fn number(&self, path: &[PathSegment]) -> Option<f64> {
         let (first, rest) = path.split_first()?;
         let value = self.field(&first.name)?;
         let Some(key) = &first.key else {
@@ -324,16 +324,16 @@ impl Value {
         let index = |count: usize| key.parse::<usize>().ok().filter(|index| *index < count);
         match value {
             Self::Numbers(numbers) if rest.is_empty() => {
-                let place = match self.names_beside(numbers.len()) {
+                let place = match self.sibling_names(numbers.len()) {
                     Some(names) => names.iter().position(|name| name == key),
                     None => index(numbers.len()),
                 };
                 numbers.get(place?).copied()
             }
             Self::List(values) => {
-                let named = values.iter().find(|value| value.own_name() == Some(key));
+                let named = values.iter().find(|value| value.element_name() == Some(key));
                 named
-                    .or_else(|| values.get(index(values.len())?).filter(|value| value.own_name().is_none()))?
+                    .or_else(|| values.get(index(values.len())?).filter(|value| value.element_name().is_none()))?
                     .number(rest)
             }
             _ => None,
@@ -343,15 +343,15 @@ impl Value {
 
 /// Component of a field path.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Step {
+pub(crate) struct PathSegment {
     name: String,
     /// Content of the brackets after the name.
     key: Option<String>,
 }
 
-impl Step {
+impl PathSegment {
     /// Splits a path such as `transforms[env_0/arm/link].transform.translation.x`. Brackets may contain dots.
-    pub(crate) fn of(field: &str) -> Vec<Self> {
+    pub(crate) fn parse_path(field: &str) -> Vec<Self> {
         let (mut steps, mut depth, mut from) = (Vec::new(), 0_usize, 0);
         let mut push = |text: &str| {
             let key = text.split_once('[').and_then(|(name, key)| Some((name, key.strip_suffix(']')?)));
@@ -379,20 +379,22 @@ impl Step {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
-    use super::super::{Cdr, Hits, Schema, Stamp, imu, joint_state, numbers, points, transforms};
+    use super::super::{
+        CdrWriter, RayHits, RosHeader, Schema, float64_multi_array, imu, joint_state, point_cloud, transforms,
+    };
     use super::*;
 
-    const STAMP: Stamp<'_> = Stamp { nanos: 1_500_000_000, frame: "env_0" };
+    const STAMP: RosHeader<'_> = RosHeader { nanos: 1_500_000_000, frame: "env_0" };
 
-    fn read(schema: Schema, write: impl FnOnce(&mut Cdr)) -> Value {
-        let mut cdr = Cdr::default();
+    fn read(schema: Schema, write: impl FnOnce(&mut CdrWriter)) -> Value {
+        let mut cdr = CdrWriter::default();
         cdr.begin();
         write(&mut cdr);
         MessageType::parse(&schema.text()).unwrap().read(cdr.bytes()).unwrap()
     }
 
     fn number(value: &Value, field: &str) -> Option<f64> {
-        value.number(&Step::of(field))
+        value.number(&PathSegment::parse_path(field))
     }
 
     #[test]
@@ -417,7 +419,7 @@ mod tests {
         let frames = ["a".to_string(), "b/c".to_string()];
         let poses: Vec<f64> = (0..14).map(f64::from).collect();
         let value = read(Schema::TfMessage, |cdr| transforms(cdr, STAMP, "env_0/", &frames, &poses));
-        assert!(value.varies());
+        assert!(value.has_variable_fields());
         assert_eq!(number(&value, "transforms[env_0/b/c].transform.translation.y"), Some(8.0));
         // ROS has w last.
         assert_eq!(number(&value, "transforms[env_0/a].transform.rotation.w"), Some(3.0));
@@ -430,24 +432,25 @@ mod tests {
         assert_eq!(number(&value, "linear_acceleration.z"), Some(6.0));
         assert_eq!(number(&value, "orientation_covariance[8]"), Some(0.0));
         assert_eq!(number(&value, "orientation_covariance[9]"), None);
-        let value = read(Schema::Float64MultiArray, |cdr| numbers(cdr, "forces", &[2, 2], &[1.0, 2.0, 3.0, 4.0]));
+        let value =
+            read(Schema::Float64MultiArray, |cdr| float64_multi_array(cdr, "forces", &[2, 2], &[1.0, 2.0, 3.0, 4.0]));
         assert_eq!(number(&value, "data[3]"), Some(4.0));
         assert_eq!(number(&value, "layout.dim[1].size"), Some(2.0));
         // One of two rays hit a surface.
-        let hits = Hits {
+        let hits = RayHits {
             points: &[1.0, 2.0, 3.0, f64::INFINITY, f64::INFINITY, f64::INFINITY],
             distances: &[4.0, f64::INFINITY],
             normals: &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             ids: &[7.0, 0.0],
         };
-        let value = read(Schema::PointCloud2, |cdr| points(cdr, STAMP, hits));
+        let value = read(Schema::PointCloud2, |cdr| point_cloud(cdr, STAMP, hits));
         assert_eq!((number(&value, "width"), number(&value, "is_dense")), (Some(1.0), Some(1.0)));
     }
 
     #[test]
     fn damage() {
         let kind = MessageType::parse(&Schema::JointState.text()).unwrap();
-        let mut cdr = Cdr::default();
+        let mut cdr = CdrWriter::default();
         cdr.begin();
         joint_state(&mut cdr, STAMP, &["J".to_string()], &[1.0, 2.0, 3.0]);
         let whole = cdr.bytes().to_vec();

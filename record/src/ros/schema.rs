@@ -21,7 +21,7 @@ const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanose
 const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
 const VECTOR: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
 /// Fields of `Twist` and `Accel`.
-const TWO: &str = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n";
+const LINEAR_ANGULAR: &str = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n";
 const QUATERNION: (&str, &str) = ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
 const TRANSFORM: (&str, &str) =
     ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n");
@@ -125,11 +125,11 @@ impl Schema {
         let (own, others): (&str, &[(&str, &str)]) = match self {
             Self::AccelStamped => (
                 "std_msgs/Header header\ngeometry_msgs/Accel accel\n",
-                &[HEADER, TIME, ("geometry_msgs/Accel", TWO), VECTOR],
+                &[HEADER, TIME, ("geometry_msgs/Accel", LINEAR_ANGULAR), VECTOR],
             ),
             Self::TwistStamped => (
                 "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
-                &[HEADER, TIME, ("geometry_msgs/Twist", TWO), VECTOR],
+                &[HEADER, TIME, ("geometry_msgs/Twist", LINEAR_ANGULAR), VECTOR],
             ),
             Self::CameraInfo => (
                 "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\n\

@@ -1,9 +1,9 @@
 //! Camera sensors as sources: channels, stereo pairs, intrinsics and distortion.
 
-use super::{Number, Source, What, sim_error};
+use super::{BufferElement, SourceKind, StreamSource, sim_error};
 use crate::error::Result;
-use crate::packet::Values;
-use crate::stream::{Distortion, Element, Kind};
+use crate::packet::ValueBuffer;
+use crate::stream::{Distortion, ElementType, StreamKind};
 use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_render::frame::Channel;
 use kinetoscope_render::frame::{self, Depth, Distance, Mask, Normal};
@@ -19,21 +19,21 @@ pub(super) const DISPARITY: &str = "disparity";
 
 /// A camera of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Eye {
+pub(super) enum StereoSide {
     /// The sensor itself.
-    Only,
+    Mono,
     /// Left camera of a stereo pair.
     Left,
     Right,
 }
 
-impl Eye {
+impl StereoSide {
     /// The cameras of a sensor.
     pub(super) fn of(sensor: &dyn Any) -> &'static [Self] {
         if sensor.is::<StereoCamera>() {
             &[Self::Left, Self::Right]
         } else if sensor.is::<Camera>() || sensor.is::<RayCasterCamera>() {
-            &[Self::Only]
+            &[Self::Mono]
         } else {
             &[]
         }
@@ -42,37 +42,37 @@ impl Eye {
     /// Name of the camera, for the sensor `uid`.
     pub(super) fn name(self, uid: &str) -> String {
         match self {
-            Self::Only => uid.into(),
+            Self::Mono => uid.into(),
             Self::Left => format!("{uid}/left"),
             Self::Right => format!("{uid}/right"),
         }
     }
 
     /// Splits a channel name such as `left/depth` into the camera and the channel.
-    pub(super) fn in_front_of(channel: &str) -> (Self, &str) {
+    pub(super) fn split_channel(channel: &str) -> (Self, &str) {
         let of = |prefix| channel.strip_prefix(prefix);
         let left = of("left/").map(|rest| (Self::Left, rest));
-        left.or_else(|| of("right/").map(|rest| (Self::Right, rest))).unwrap_or((Self::Only, channel))
+        left.or_else(|| of("right/").map(|rest| (Self::Right, rest))).unwrap_or((Self::Mono, channel))
     }
 
     /// The camera, if the sensor has it.
     pub(super) fn camera(self, sensor: &dyn Any) -> Option<&Camera> {
         let pair = sensor.downcast_ref::<StereoCamera>();
         match self {
-            Self::Only => sensor.downcast_ref(),
+            Self::Mono => sensor.downcast_ref(),
             Self::Left => pair.map(StereoCamera::left),
             Self::Right => pair.map(StereoCamera::right),
         }
     }
 
     /// Image channels of the camera: name, element type, components per pixel.
-    pub(super) fn channels(self, sensor: &dyn Any) -> Vec<(&'static str, Element, usize)> {
+    pub(super) fn channels(self, sensor: &dyn Any) -> Vec<(&'static str, ElementType, usize)> {
         match self.camera(sensor) {
             Some(camera) => {
                 let wanted = camera.channels().names();
                 CAMERA.iter().copied().filter(|(name, ..)| wanted.contains(name)).collect()
             }
-            None if self == Self::Only && sensor.is::<RayCasterCamera>() => RAY_CAMERA.to_vec(),
+            None if self == Self::Mono && sensor.is::<RayCasterCamera>() => RAY_CASTER_CAMERA_CHANNELS.to_vec(),
             None => Vec::new(),
         }
     }
@@ -95,7 +95,7 @@ impl Eye {
 
     /// Rectification matrices R (3 x 3) and P (3 x 4) of the last arrived images, row-major, 21 numbers per row; see
     /// [`Rectification`]. `None` for single cameras and for pairs that cannot be rectified.
-    pub(super) fn rectified(self, sensor: &dyn Any) -> Option<Array2<f64>> {
+    pub(super) fn rectification(self, sensor: &dyn Any) -> Option<Array2<f64>> {
         let eye = usize::from(self == Self::Right);
         let rows = rectifications(sensor)?.ok()?.into_iter().map(|Rectification { rotations, projections }| {
             // `iter` of the transposed matrix is row-major.
@@ -108,11 +108,14 @@ impl Eye {
     }
 
     /// Intrinsic matrices and poses, with ROS camera axes, of the last arrived images.
-    pub(super) fn lenses(self, sensor: &dyn Any) -> Option<(Array3<f64>, Array2<f64>)> {
+    pub(super) fn intrinsics_and_poses(self, sensor: &dyn Any) -> Option<(Array3<f64>, Array2<f64>)> {
         if let Some(camera) = self.camera(sensor) {
-            return Some((camera.arrived_intrinsic_matrices(), camera.arrived_pose_w(CameraConvention::Ros)));
+            return Some((
+                camera.latest_delivered_intrinsic_matrices(),
+                camera.latest_delivered_pose_w(CameraConvention::Ros),
+            ));
         }
-        let pictures = sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::arrived);
+        let pictures = sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::latest_delivered);
         pictures.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
     }
 }
@@ -120,7 +123,7 @@ impl Eye {
 /// Rectification of the last arrived images of a stereo camera, row by row; `None` for other sensors.
 fn rectifications(sensor: &dyn Any) -> Option<std::result::Result<Vec<Rectification>, CameraError>> {
     let pair = sensor.downcast_ref::<StereoCamera>()?;
-    let matrices = [pair.left(), pair.right()].map(Camera::arrived_intrinsic_matrices);
+    let matrices = [pair.left(), pair.right()].map(Camera::latest_delivered_intrinsic_matrices);
     let rows = 0..matrices[0].len_of(Axis(0));
     let of = |row| {
         let eye = |k: &Array3<f64>| PixelIntrinsics {
@@ -129,31 +132,31 @@ fn rectifications(sensor: &dyn Any) -> Option<std::result::Result<Vec<Rectificat
             cx: k[(row, 0, 2)],
             cy: k[(row, 1, 2)],
         };
-        Rectification::of(&pair.left_from_right(), matrices.each_ref().map(eye))
+        Rectification::new(&pair.left_from_right(), matrices.each_ref().map(eye))
     };
     Some(rows.map(of).collect())
 }
 
 /// The camera whose timing applies to a camera sensor. Both cameras of a stereo pair capture together.
-pub(super) fn timed(sensor: &dyn Any) -> Option<&Camera> {
-    Eye::of(sensor).first().and_then(|eye| eye.camera(sensor))
+pub(super) fn timing_camera(sensor: &dyn Any) -> Option<&Camera> {
+    StereoSide::of(sensor).first().and_then(|eye| eye.camera(sensor))
 }
 
 /// Generates the list of the camera's channels (name, type, components per pixel) and the function that copies them.
 macro_rules! cameras {
     ($($(#[$doc:meta])* $field:ident :: $Channel:ident,)*) => {
-        const CAMERA: &[(&str, Element, usize)] = &[$(
+        const CAMERA: &[(&str, ElementType, usize)] = &[$(
             (
                 frame::$Channel::NAME,
-                <<frame::$Channel as Channel>::Number as Number>::ELEMENT,
+                <<frame::$Channel as Channel>::Element as BufferElement>::ELEMENT,
                 frame::$Channel::COMPONENTS,
             ),
         )*];
 
-        fn copy(source: &Source, camera: &Camera, channel: &str, values: &mut Values) -> Result<()> {
+        fn copy(source: &StreamSource, camera: &Camera, channel: &str, values: &mut ValueBuffer) -> Result<()> {
             match channel {
                 $(_ if channel == frame::$Channel::NAME => {
-                    source.put(values, &camera.arrived::<frame::$Channel>().map_err(sim_error(source))?);
+                    source.append_rows(values, &camera.latest_delivered::<frame::$Channel>().map_err(sim_error(source))?);
                 })*
                 _ => return Err(source.changed()),
             }
@@ -165,43 +168,51 @@ macro_rules! cameras {
 kinetoscope_render::with_channels!(cameras);
 
 /// Channels of ray-caster cameras: name, type, components per pixel.
-const RAY_CAMERA: [(&str, Element, usize); 4] = [
-    (Depth::NAME, Element::F32, 1),
-    (Distance::NAME, Element::F32, 1),
-    (Normal::NAME, Element::F32, 3),
-    (Mask::NAME, Element::I32, 1),
+const RAY_CASTER_CAMERA_CHANNELS: [(&str, ElementType, usize); 4] = [
+    (Depth::NAME, ElementType::F32, 1),
+    (Distance::NAME, ElementType::F32, 1),
+    (Normal::NAME, ElementType::F32, 3),
+    (Mask::NAME, ElementType::I32, 1),
 ];
 
-impl Source {
+impl StreamSource {
     /// Describes what ROS's `CameraInfo` message cannot express for this camera, and the reason.
-    pub(crate) fn unspoken(&self, sim: &SimulationManager) -> Option<String> {
-        let (Kind::Lens { camera, distortion, .. }, What::Lens(uid, _)) = (&self.stream.kind, &self.what) else {
+    pub(crate) fn camera_info_gap(&self, sim: &SimulationManager) -> Option<String> {
+        let (StreamKind::CameraInfo { camera, distortion, .. }, SourceKind::CameraInfo(uid, _)) =
+            (&self.stream.kind, &self.kind)
+        else {
             return None;
         };
         if distortion.is_none() {
             return Some(format!("{camera}/camera_info (ROS has no words for its lens)"));
         }
-        let error = rectifications(sim.entities().sensor_called(uid).ok()?)?.err()?;
+        let error = rectifications(sim.entities().sensor_by_uid(uid).ok()?)?.err()?;
         Some(format!("R and P of {camera}/camera_info ({error})"))
     }
 
-    pub(super) fn copy_picture(&self, sensor: &dyn Any, eye: Eye, channel: &str, values: &mut Values) -> Result<()> {
+    pub(super) fn copy_image(
+        &self,
+        sensor: &dyn Any,
+        eye: StereoSide,
+        channel: &str,
+        values: &mut ValueBuffer,
+    ) -> Result<()> {
         if let Some(pair) = sensor.downcast_ref::<StereoCamera>()
             && channel == DISPARITY
         {
-            self.put(values, &pair.arrived_disparity().map_err(sim_error(self))?);
+            self.append_rows(values, &pair.latest_delivered_disparity().map_err(sim_error(self))?);
             return Ok(());
         }
         if let Some(camera) = eye.camera(sensor) {
             return copy(self, camera, channel, values);
         }
         let camera = sensor.downcast_ref::<RayCasterCamera>().ok_or_else(|| self.changed())?;
-        let taken = camera.arrived();
+        let taken = camera.latest_delivered();
         match channel {
-            _ if channel == Depth::NAME => self.put(values, &taken.depth()),
-            _ if channel == Distance::NAME => self.put(values, &taken.distance()),
-            _ if channel == Normal::NAME => self.put(values, &taken.normal()),
-            _ if channel == Mask::NAME => self.put(values, &taken.mask()),
+            _ if channel == Depth::NAME => self.append_rows(values, &taken.depth()),
+            _ if channel == Distance::NAME => self.append_rows(values, &taken.distance()),
+            _ if channel == Normal::NAME => self.append_rows(values, &taken.normal()),
+            _ if channel == Mask::NAME => self.append_rows(values, &taken.mask()),
             _ => return Err(self.changed()),
         }
         Ok(())

@@ -5,13 +5,13 @@ use super::*;
 pub(crate) fn falling(num_envs: usize) -> SimulationManager {
     let mut sim = simulation(num_envs);
     let ball = r#"<mujoco><worldbody><body name="ball" pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("ball", ball)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("ball", ball)).unwrap();
     sim
 }
 
 /// A member of an archive.
 pub(crate) fn member(path: &Path, name: &str) -> Vec<u8> {
-    let members = zip::parse(&std::fs::read(path).unwrap()).unwrap();
+    let members = zip::read_stored(&std::fs::read(path).unwrap()).unwrap();
     members.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
 }
 

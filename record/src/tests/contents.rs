@@ -34,9 +34,9 @@ fn messages_of_a_run() {
     assert_eq!((recorded.packets, recorded.bytes), (u64::from(STEPS) + 1, path.metadata().unwrap().len()));
     let all = messages(&path);
 
-    let (joints, targets) = (of(&all, "/env_1/arm/joint_states"), of(&all, "/env_1/arm/targets"));
+    let (joints, targets) = (messages_on(&all, "/env_1/arm/joint_states"), messages_on(&all, "/env_1/arm/targets"));
     assert_eq!(joints.len(), states.len());
-    let transforms = of(&all, "/env_1/tf");
+    let transforms = messages_on(&all, "/env_1/tf");
     for (k, (time, state, target, pose)) in states.iter().enumerate() {
         let message = joints[k];
         assert_eq!((message.time, message.schema.as_str()), (nanos(*time), "sensor_msgs/msg/JointState"));
@@ -50,12 +50,12 @@ fn messages_of_a_run() {
         let found = transforms.iter().filter(|m| m.time == nanos(*time) && m.contains(&position));
         assert!(found.count() >= 1, "no transform has the cube at {time} s");
     }
-    let accelerations = of(&all, "/env_1/imu");
+    let accelerations = messages_on(&all, "/env_1/imu");
     assert_eq!(accelerations.len(), imu.len());
     for (message, (time, acceleration)) in accelerations.iter().zip(&imu) {
         assert!(message.time == nanos(*time) && message.contains(&bytes(acceleration)), "{message:?}");
     }
-    let images = of(&all, "/env_1/camera/depth");
+    let images = messages_on(&all, "/env_1/camera/depth");
     assert_eq!(images.len(), depths.len());
     for (message, (time, depth)) in images.iter().zip(&depths) {
         assert_eq!((message.time, message.schema.as_str()), (nanos(*time), "sensor_msgs/msg/Image"));
@@ -63,9 +63,9 @@ fn messages_of_a_run() {
         assert!(message.data.ends_with(&pixels));
     }
     for topic in ["color", "mask", "camera_info"] {
-        assert_eq!(of(&all, &format!("/env_0/camera/{topic}")).len(), depths.len(), "{topic}");
+        assert_eq!(messages_on(&all, &format!("/env_0/camera/{topic}")).len(), depths.len(), "{topic}");
     }
-    let times = |topic: &str| of(&all, topic).iter().map(|message| message.time).collect::<Vec<_>>();
+    let times = |topic: &str| messages_on(&all, topic).iter().map(|message| message.time).collect::<Vec<_>>();
     let (positions, efforts): (Vec<_>, Vec<_>) = joint_stamps.into_iter().unzip();
     // Efforts are those of the beginning of the step.
     assert!(positions.iter().zip(&efforts).all(|(position, effort)| effort < position));
@@ -97,7 +97,7 @@ fn no_side_effect() {
     let (_folder, path) = scratch("run.npz");
     let [recorded, alone] = [true, false].map(|recorded| {
         let mut world = World::new(2, 2);
-        let cfg = RecorderCfg { every: 3, ..RecorderCfg::new(&path) };
+        let cfg = RecorderCfg { period_steps: 3, ..RecorderCfg::new(&path) };
         if recorded {
             // Steps 0, 3, 6... for states, every step for the sensor of joints.
             assert_eq!(record_steps(&mut world, cfg, STEPS).packets, u64::from(STEPS) + 1);
@@ -122,7 +122,10 @@ fn reset() {
     for (every, undisturbed, reset) in [(1, &(0..=10).collect::<Vec<_>>()[..], at_each), (10, &[0, 10], &[0, 6, 10])] {
         let (_folder, path) = scratch("run.mcap");
         let mut world = World::new(2, 2);
-        let cfg = RecorderCfg { every, ..RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]) };
+        let cfg = RecorderCfg {
+            period_steps: every,
+            ..RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())])
+        };
         let recorder = world.sim.record(cfg).unwrap();
         (0..6).for_each(|step| world.step(step));
         world.sim.reset(Some(&[EnvId(1)])).unwrap();
@@ -147,13 +150,13 @@ fn choice() {
     let topics = vec![Topic::Targets("arm".into()), Topic::channel("camera", "rgb")];
     record_steps(
         &mut world,
-        RecorderCfg { envs: Some(vec![EnvId(2)]), every: 4, topics, ..RecorderCfg::new(&path) },
+        RecorderCfg { envs: Some(vec![EnvId(2)]), period_steps: 4, topics, ..RecorderCfg::new(&path) },
         STEPS,
     );
     let all = messages(&path);
     let mut counts = std::collections::BTreeMap::new();
     all.iter().for_each(|message| *counts.entry(message.topic.as_str()).or_insert(0) += 1);
-    assert_eq!(of(&all, "/tf_static")[0].time, start, "known from the beginning, and no earlier");
+    assert_eq!(messages_on(&all, "/tf_static")[0].time, start, "known from the beginning, and no earlier");
     // Every fourth step from 0 to 20; the environment has no events.
     let expected = [("/env_2/arm/targets", 6), ("/env_2/camera/color", 4), ("/env_2/scene", 1), ("/tf_static", 1)];
     assert_eq!(counts.into_iter().collect::<Vec<_>>(), expected);

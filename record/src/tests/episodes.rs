@@ -4,7 +4,7 @@ use super::*;
 
 /// Expected values of a row of an environment.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Row {
+pub(crate) struct ExpectedRow {
     pub(crate) positions: Vec<f64>,
     pub(crate) velocities: Vec<f64>,
     pub(crate) efforts: Vec<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct Row {
     joints: bool,
 }
 
-impl Row {
+impl ExpectedRow {
     /// True if it has everything that a frame needs.
     fn is_whole(&self) -> bool {
         self.image.is_some() && self.acceleration.is_some() && self.joints
@@ -27,8 +27,8 @@ impl Row {
 /// Expected rows of a run.
 pub(crate) struct Expected {
     /// Rows of each environment, from one reset to the next, in the order in which they began.
-    runs: Vec<(usize, Vec<Row>)>,
-    were: Vec<[u64; 3]>,
+    runs: Vec<(usize, Vec<ExpectedRow>)>,
+    last_counts: Vec<[u64; 3]>,
 }
 
 fn counts(world: &World, env: usize) -> [u64; 3] {
@@ -41,11 +41,11 @@ fn counts(world: &World, env: usize) -> [u64; 3] {
 
 impl Expected {
     /// Records a run in which environment 1 is reset after a step, and collects what is expected of it.
-    pub(crate) fn record(path: &Path, steps: u32, reset_after: u32) -> (World, Self, Recorded) {
+    pub(crate) fn record(path: &Path, steps: u32, reset_after: u32) -> (World, Self, RecordingSummary) {
         let mut world = World::new(2, 2);
         let cfg = RecorderCfg { task: "wave at the cube".into(), ..RecorderCfg::new(path) };
         let recorder = world.sim.record(cfg).unwrap();
-        let mut all = Self { runs: Vec::new(), were: vec![[0; 3]; 2] };
+        let mut all = Self { runs: Vec::new(), last_counts: vec![[0; 3]; 2] };
         (0..2).for_each(|env| all.begin(&world, env));
         for step in 0..steps {
             world.step(step);
@@ -66,22 +66,22 @@ impl Expected {
     }
 
     fn begin(&mut self, world: &World, env: usize) {
-        self.were[env] = counts(world, env);
-        let row = self.row(world, env, &Row::default());
+        self.last_counts[env] = counts(world, env);
+        let row = self.row(world, env, &ExpectedRow::default());
         self.runs.push((env, vec![row]));
     }
 
-    fn row(&mut self, world: &World, env: usize, before: &Row) -> Row {
+    fn row(&mut self, world: &World, env: usize, before: &ExpectedRow) -> ExpectedRow {
         let robot = world.sim.robot(world.arm);
-        let (now, were) = (counts(world, env), self.were[env]);
+        let (now, were) = (counts(world, env), self.last_counts[env]);
         let color = || {
             let color = world.sim.sensor(world.camera).unwrap().color().unwrap().index_axis(Axis(0), env).to_owned();
             rgb(&color).iter().map(|byte| format!("{byte:02x}")).collect()
         };
         let imu = world.sim.sensor(world.imu).unwrap();
         let of = |values: Array2<f64>| values.row(env).to_vec();
-        self.were[env] = now;
-        Row {
+        self.last_counts[env] = now;
+        ExpectedRow {
             positions: of(robot.qpos()),
             velocities: of(robot.qvel()),
             efforts: of(robot.qf()),
@@ -98,8 +98,8 @@ impl Expected {
 
     /// Environment and frames of each episode. Each frame is paired with the next row, which has its action. The last
     /// row is no frame.
-    pub(crate) fn episodes(&self) -> Vec<(usize, Vec<[&Row; 2]>)> {
-        let of = |(env, rows): &'_ (usize, Vec<Row>)| -> (usize, Vec<[usize; 2]>) {
+    pub(crate) fn episodes(&self) -> Vec<(usize, Vec<[&ExpectedRow; 2]>)> {
+        let of = |(env, rows): &'_ (usize, Vec<ExpectedRow>)| -> (usize, Vec<[usize; 2]>) {
             let whole = (1..rows.len()).filter(|next| rows[next - 1].is_whole()).map(|next| [next - 1, next]);
             let frames: Vec<[usize; 2]> = whole.collect();
             assert!(frames.len() > 5 && frames.len() + 1 < rows.len(), "frames, and rows before the first");

@@ -1,10 +1,10 @@
 //! HDF5 files for robomimic, read by h5py. robomimic itself requires PyTorch, some gigabytes.
 
-use super::episodes::{Expected, Row};
+use super::episodes::{Expected, ExpectedRow};
 use super::*;
 
 /// Some numbers of a row.
-type Values = fn(&Row) -> Vec<f64>;
+type Values = fn(&ExpectedRow) -> Vec<f64>;
 
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
@@ -13,13 +13,13 @@ fn frames() {
     let (world, expected, recorded) = Expected::record(&path, 40, 15);
     assert_eq!(recorded.bytes, std::fs::metadata(&path).unwrap().len());
     assert_eq!(names(&folder), ["run.hdf5"]);
-    let found = said("read_hdf5.py", &path);
+    let found = script_output("read_hdf5.py", &path);
     let (episodes, wanted) = (list(&found["episodes"]), expected.episodes());
     assert_eq!((episodes.len(), wanted.len()), (3, 3));
     for (episode, (env, frames)) in episodes.iter().zip(wanted) {
         assert_eq!((&episode["env"], &episode["frames"]), (&json!(env), &json!(frames.len())));
         let table = |path: &str| episode["numbers"][path].clone();
-        let all = |of: &dyn Fn(&[&Row; 2]) -> Vec<f64>| bits(frames.iter().map(of).collect());
+        let all = |of: &dyn Fn(&[&ExpectedRow; 2]) -> Vec<f64>| bits(frames.iter().map(of).collect());
         for (at, of) in [(0, "obs"), (1, "next_obs")] {
             let columns: [(&str, Values); 5] = [
                 ("joint_pos", |row| row.positions.clone()),
@@ -73,7 +73,7 @@ fn many_episodes() {
     let cart = r#"<mujoco><worldbody><body name="cart" pos="0 0 1"><joint name="x" type="slide" axis="1 0 0"/>
         <geom size="0.1" mass="1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"#;
     let mut sim = simulation(ENVS);
-    let cart = sim.add_mjcf(MjcfCfg::text("cart", cart)).unwrap();
+    let cart = sim.add_mjcf(MjcfPartCfg::text("cart", cart)).unwrap();
     // All environments are reset every three steps, then no longer.
     let mut positions: Vec<Vec<Vec<f64>>> = Vec::new();
     record(&mut sim, RecorderCfg::new(&path), |sim| {
@@ -92,7 +92,7 @@ fn many_episodes() {
             sim.update(1);
         }
     });
-    let found = said("read_hdf5.py", &path);
+    let found = script_output("read_hdf5.py", &path);
     let episodes = list(&found["episodes"]);
     assert_eq!(episodes.len(), ENVS * RESETS);
     for (k, (episode, rows)) in episodes.iter().zip(&positions).enumerate() {
@@ -123,10 +123,10 @@ fn refusals() {
     let mut world = World::new(1, 1);
     let cfg = RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]);
     let error = world.sim.record(cfg).unwrap_err();
-    assert!(matches!(error, RecordError::NoPlace { .. }) && error.to_string().contains("targets"), "{error}");
+    assert!(matches!(error, RecordError::UnsupportedTopic { .. }) && error.to_string().contains("targets"), "{error}");
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     let error = world.sim.finish_recording(recorder).unwrap_err();
-    let RecordError::BrokenOff { error, kept: None, .. } = error else { panic!("{error}") };
+    let RecordError::Aborted { error, partial_file: None, .. } = error else { panic!("{error}") };
     assert!(matches!(&*error, RecordError::NoFrame { .. }), "{error}");
     assert!(names(&folder).is_empty(), "nothing was left");
 }

@@ -5,7 +5,7 @@ use super::*;
 const STEPS: u32 = 4 * IMAGE_EVERY;
 
 /// Records, and returns color and depth of environment 1.
-fn recorded(cfg: RecorderCfg) -> (Recorded, Vec<Vec<u8>>, Vec<Vec<f32>>) {
+fn recorded(cfg: RecorderCfg) -> (RecordingSummary, Vec<Vec<u8>>, Vec<Vec<f32>>) {
     let mut world = World::new(2, 2);
     let recorder = world.sim.record(cfg).unwrap();
     let (mut colors, mut depths) = (Vec::new(), Vec::new());
@@ -49,16 +49,16 @@ fn folder() {
 fn folder_by_pillow() {
     let (_folder, path) = scratch("images");
     let (_, colors, depths) = recorded(RecorderCfg::new(&path));
-    let found = said("read_pictures.py", &path);
+    let found = script_output("read_pictures.py", &path);
     for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
         let step = u64::from(IMAGE_EVERY) * (k as u64 + 1);
         let of = |channel: &str| &found[format!("camera/{channel}/env_1/{k:06}.png")];
-        assert_eq!(*of("color"), json!(["RGB", [32, 24], weighed(color, |byte| u64::from(*byte)), step]));
+        assert_eq!(*of("color"), json!(["RGB", [32, 24], weighted_sum(color, |byte| u64::from(*byte)), step]));
         // A miss is 0; half a millimeter rounds away from zero.
         let mm = |depth: &f32| if depth.is_finite() { (depth * 1000.0).round() as u64 } else { 0 };
         let [mode, size, sum, at] = &list(of("depth"))[..] else { panic!("{}", of("depth")) };
         assert!(["I;16", "I"].contains(&mode.as_str().unwrap()), "{mode}");
-        assert_eq!((size, at, sum), (&json!([32, 24]), &json!(step), &json!(weighed(depth, mm))));
+        assert_eq!((size, at, sum), (&json!([32, 24]), &json!(step), &json!(weighted_sum(depth, mm))));
     }
 }
 
@@ -76,7 +76,7 @@ fn overwritten_folder() {
     let recorder = world.sim.record(overwriting(cfg.clone())).unwrap();
     assert!(matches!(world.sim.record(overwriting(cfg)), Err(RecordError::Busy { .. })));
     (0..IMAGE_EVERY).for_each(|step| world.step(step));
-    world.sim.observers_mut().get(recorder).unwrap().catch_up();
+    world.sim.observers_mut().get(recorder).unwrap().wait_until_written();
     assert!(path.join("camera/color/env_0/000003.png").exists() && part.join("camera/color/env_0/000000.png").exists());
     let time = world.sim.time()[1];
     let recorded = world.sim.finish_recording(recorder).unwrap();
@@ -139,7 +139,7 @@ fn animation_frames() {
         let (_folder, path) = scratch(&format!("run.{end}"));
         let (recorded, colors, _) = recorded(RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) });
         assert_eq!(recorded.bytes, path.metadata().unwrap().len());
-        let found = said("read_animation.py", &path);
+        let found = script_output("read_animation.py", &path);
         let frames = list(&found["frames"]);
         assert_eq!(frames.len(), colors.len(), "{end}");
         for (k, (frame, color)) in frames.iter().zip(&colors).enumerate() {
@@ -159,7 +159,7 @@ fn animation_streams() {
         let mut world = World::new(2, 1);
         let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
         let error = world.sim.record(cfg).unwrap_err();
-        assert!(matches!(&error, RecordError::TooMany { .. }), "{error}");
+        assert!(matches!(&error, RecordError::NotSingleImage { .. }), "{error}");
         assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
         // Without a topic, the first camera and the first environment are used.
         let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
@@ -186,7 +186,7 @@ fn odd_size() {
     world.sim.add_sensor("odd", CameraCfg { width: 33, height: 24, ..CameraCfg::default() }).unwrap();
     let cfg = |end| RecorderCfg::new(folder.path().join(end)).with_topics([Topic::channel("odd", "color")]);
     let error = world.sim.record(cfg("run.mp4")).unwrap_err();
-    assert!(matches!(error, RecordError::Size { width: 33, height: 24, .. }), "{error}");
+    assert!(matches!(error, RecordError::UnsupportedSize { width: 33, height: 24, .. }), "{error}");
     assert!(error.to_string().contains("run.mp4") && error.to_string().contains("even numbers"), "{error}");
     assert!(names(&folder).is_empty(), "nothing was begun");
     record_steps(&mut world, cfg("run.webp"), IMAGE_EVERY);
@@ -200,15 +200,15 @@ const STAGE: [usize; 2] = [96, 64];
 fn stage_animations() {
     for (_, end) in animations() {
         let (_folder, path) = scratch(&format!("run.{end}"));
-        let stage = StageCfg { size: STAGE, rate: 20.0, ..StageCfg::default() };
-        let cfg = RecorderCfg { stage, topics: vec![Topic::Stage], ..RecorderCfg::new(&path) };
+        let stage = OverviewCfg { size: STAGE, fps: 20.0, ..OverviewCfg::default() };
+        let cfg = RecorderCfg { overview: stage, topics: vec![Topic::Overview], ..RecorderCfg::new(&path) };
         record_steps(&mut World::new(2, 2), cfg, 30);
         if end == "mp4" {
             // The script checks the rate of smaller images.
             assert!(std::fs::metadata(&path).unwrap().len() > 1000);
             continue;
         }
-        let found = said("read_animation.py", &path);
+        let found = script_output("read_animation.py", &path);
         let frames = list(&found["frames"]);
         let times: Vec<u64> = frames.iter().map(|frame| frame["from"].as_u64().unwrap()).collect();
         assert_eq!(times, [0, 50, 100, 150, 200, 250, 300], "{end}");
@@ -236,9 +236,9 @@ fn stage_by_camera() {
         ..CameraCfg::default()
     };
     world.sim.add_sensor("judge", camera).unwrap();
-    let stage = StageCfg { size: STAGE, rate: 20.0, eye: Some(eye), target: Some(target) };
-    let topics = vec![Topic::Stage, Topic::channel("judge", "color")];
-    record_steps(&mut world, RecorderCfg { stage, topics, ..RecorderCfg::new(&path) }, 20);
+    let stage = OverviewCfg { size: STAGE, fps: 20.0, eye: Some(eye), target: Some(target) };
+    let topics = vec![Topic::Overview, Topic::channel("judge", "color")];
+    record_steps(&mut world, RecorderCfg { overview: stage, topics, ..RecorderCfg::new(&path) }, 20);
     let image = |of: &str, k: usize| std::fs::read(path.join(format!("{of}/color/env_0/{k:06}.png"))).unwrap();
     for k in 0..4 {
         // The overview also has an image at the beginning.
@@ -259,11 +259,11 @@ fn stage_alone() {
     }
     assert!(folder.path().join("images/stage/color/env_0/000000.png").is_file());
     for (stage, wrong) in [
-        (StageCfg { rate: 0.0, ..StageCfg::default() }, "rate"),
-        (StageCfg { size: [0, 10], ..StageCfg::default() }, "pixels"),
-        (StageCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..StageCfg::default() }, "from"),
+        (OverviewCfg { fps: 0.0, ..OverviewCfg::default() }, "rate"),
+        (OverviewCfg { size: [0, 10], ..OverviewCfg::default() }, "pixels"),
+        (OverviewCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..OverviewCfg::default() }, "from"),
     ] {
-        let cfg = RecorderCfg { stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
+        let cfg = RecorderCfg { overview: stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
         kinetoscope_testkit::refusal::assert_error(sim.record(cfg), "Stage", &[wrong]);
     }
 }

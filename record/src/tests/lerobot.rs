@@ -10,7 +10,7 @@ fn frames() {
     let (_folder, path) = scratch("run.lerobot");
     let (world, expected, recorded) = Expected::record(&path, 30, 12);
     assert!(recorded.bytes > 0 && recorded.packets > 30, "{recorded}");
-    let found = said("read_lerobot.py", &path);
+    let found = script_output("read_lerobot.py", &path);
     let episodes = list(&found["episodes"]);
     assert_eq!(episodes.len(), 3);
     let single = |values: &[f64]| values.iter().map(|x| *x as f32).collect::<Vec<f32>>();
@@ -50,7 +50,7 @@ fn unfinished() {
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     // Without a measurement, there is no frame.
     let error = world.sim.finish_recording(recorder).unwrap_err();
-    let RecordError::BrokenOff { error, kept, .. } = error else { panic!("{error}") };
+    let RecordError::Aborted { error, partial_file: kept, .. } = error else { panic!("{error}") };
     assert!(matches!(&*error, RecordError::NoFrame { path: of, .. } if *of == path), "{error}");
     assert_eq!(kept.as_deref(), Some(&*part));
     assert!(!path.exists() && part.exists());

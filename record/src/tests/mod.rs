@@ -15,7 +15,8 @@ mod refusals;
 mod scenes;
 
 pub(crate) use crate::{
-    Format, Record, RecordError, Recorded, RecorderCfg, Recording, StageCfg, Topic, Wanted, recover, recover_to,
+    FieldSelector, Format, OverviewCfg, Record, RecordError, RecorderCfg, Recording, RecordingSummary, Topic, recover,
+    recover_to,
 };
 pub(crate) use crate::{npy, zip};
 pub(crate) use kinetoscope_render::frame::Channels;
@@ -25,7 +26,7 @@ pub(crate) use kinetoscope_sensors::camera::{Camera, CameraCfg, CameraConvention
 pub(crate) use kinetoscope_sensors::ray::RayCasterCfg;
 pub(crate) use kinetoscope_sensors::ray::pattern::Grid;
 pub(crate) use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled};
-pub(crate) use kinetoscope_sim::{EnvId, MjcfCfg, ObjectShape, SimulationManager};
+pub(crate) use kinetoscope_sim::{EnvId, MjcfPartCfg, ObjectShape, SimulationManager};
 pub(crate) use kinetoscope_testkit::worlds::{RecordedWorld as World, look_at};
 pub(crate) use ndarray::{Array2, Axis, array};
 pub(crate) use serde_json::{Value, json};
@@ -66,14 +67,14 @@ pub(crate) fn record(
     sim: &mut SimulationManager,
     cfg: RecorderCfg,
     run: impl FnOnce(&mut SimulationManager),
-) -> Recorded {
+) -> RecordingSummary {
     let recorder = sim.record(cfg).unwrap();
     run(sim);
     sim.finish_recording(recorder).unwrap()
 }
 
 /// Records steps of a world.
-pub(crate) fn record_steps(world: &mut World, cfg: RecorderCfg, steps: u32) -> Recorded {
+pub(crate) fn record_steps(world: &mut World, cfg: RecorderCfg, steps: u32) -> RecordingSummary {
     let recorder = world.sim.record(cfg).unwrap();
     (0..steps).for_each(|step| world.step(step));
     world.sim.finish_recording(recorder).unwrap()
@@ -124,19 +125,19 @@ pub(crate) fn messages(path: &Path) -> Vec<Message> {
 }
 
 /// The messages of one topic.
-pub(crate) fn of<'m>(messages: &'m [Message], topic: &str) -> Vec<&'m Message> {
+pub(crate) fn messages_on<'m>(messages: &'m [Message], topic: &str) -> Vec<&'m Message> {
     messages.iter().filter(|message| message.topic == topic).collect()
 }
 
 /// Steps at which a topic has messages.
 pub(crate) fn steps_of(messages: &[Message], topic: &str) -> Vec<u64> {
-    of(messages, topic).iter().map(|message| message.step()).collect()
+    messages_on(messages, topic).iter().map(|message| message.step()).collect()
 }
 
 /// Texts of the events in an MCAP file.
 pub(crate) fn logs(path: &Path) -> Vec<String> {
     let text = |message: &&Message| String::from_utf8_lossy(&message.data).into_owned();
-    of(&messages(path), "/events").iter().map(text).collect()
+    messages_on(&messages(path), "/events").iter().map(text).collect()
 }
 
 /// Little-endian bytes of numbers, as in messages.
@@ -145,7 +146,7 @@ pub(crate) fn bytes(numbers: impl IntoIterator<Item: Borrow<f64>>) -> Vec<u8> {
 }
 
 /// The JSON that a script of this folder prints about a file.
-pub(crate) fn said(script: &str, file: &Path) -> Value {
+pub(crate) fn script_output(script: &str, file: &Path) -> Value {
     read_json(&python_readers(), &Path::new(env!("CARGO_MANIFEST_DIR")).join("src/tests").join(script), file)
 }
 
@@ -175,7 +176,7 @@ pub(crate) fn list(value: &Value) -> &Vec<Value> {
 }
 
 /// The sum of numbers weighted by their positions, so that exchanged numbers change it.
-pub(crate) fn weighed<T>(numbers: impl IntoIterator<Item = T>, number: impl Fn(T) -> u64) -> u64 {
+pub(crate) fn weighted_sum<T>(numbers: impl IntoIterator<Item = T>, number: impl Fn(T) -> u64) -> u64 {
     numbers.into_iter().zip(1..).map(|(x, k)| number(x) * k).sum()
 }
 

@@ -1,7 +1,7 @@
 //! Rewards and ends of a task in datasets and other recordings.
 
 use super::*;
-use kinetoscope_sim::{JointIndex, Moment, Observer, StepResult};
+use kinetoscope_sim::{JointIndex, Observer, SimEvent, StepResult};
 use kinetoscope_tasks::{ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm};
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use ndarray::Array1;
@@ -32,7 +32,7 @@ fn task() -> Env {
         }))
         .event(EventTerm::on_reset("scatter", move |sim, dice| {
             for die in dice {
-                let start = array![[die.between(-0.05, 0.05)]];
+                let start = array![[die.uniform_range(-0.05, 0.05)]];
                 sim.robot_mut(cart).write_qpos(&start, Some(&[JointIndex(0)]), Some(&[die.env()]))?;
             }
             Ok(())
@@ -43,7 +43,7 @@ fn task() -> Env {
 
 /// An episode as reported by the task: the reward of each step, and true if it has ended.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Told {
+struct ExpectedEpisode {
     env: usize,
     /// Physics steps before it.
     begin: u64,
@@ -51,15 +51,16 @@ struct Told {
     ended: bool,
 }
 
-/// Runs the task with recorders (a path and `every`), and returns its episodes in the order in which they begin.
-fn run(recordings: &[(&Path, u64)]) -> Vec<Told> {
+/// Runs the task with recorders (a path and `period_steps`), and returns its episodes in the order in which they begin.
+fn run(recordings: &[(&Path, u64)]) -> Vec<ExpectedEpisode> {
     let mut env = task();
     let begin = |(path, every): &(&Path, u64)| {
-        env.sim_mut().record(RecorderCfg { every: *every, ..RecorderCfg::new(*path) }).unwrap()
+        env.sim_mut().record(RecorderCfg { period_steps: *every, ..RecorderCfg::new(*path) }).unwrap()
     };
     let recorders: Vec<_> = recordings.iter().map(begin).collect();
     env.reset(None, Some(3)).unwrap();
-    let mut all: Vec<Told> = (0..ENVS).map(|env| Told { env, ..Told::default() }).collect();
+    let mut all: Vec<ExpectedEpisode> =
+        (0..ENVS).map(|env| ExpectedEpisode { env, ..ExpectedEpisode::default() }).collect();
     let mut now: Vec<usize> = (0..ENVS).collect();
     for step in 0..STEPS {
         // Each environment has other actions. The last cart is pushed so hard that its episode ends early.
@@ -72,14 +73,14 @@ fn run(recordings: &[(&Path, u64)]) -> Vec<Told> {
             if episode.ended {
                 now[k] = all.len();
                 let begin = u64::from(DECIMATION) * (step as u64 + 1);
-                all.push(Told { env: k, begin, ..Told::default() });
+                all.push(ExpectedEpisode { env: k, begin, ..ExpectedEpisode::default() });
             }
         }
     }
     recorders.into_iter().for_each(|recorder| drop(env.sim_mut().finish_recording(recorder).unwrap()));
     // An episode that has just begun has no frame.
     all.retain(|episode| !episode.rewards.is_empty());
-    let is_long = |episode: &Told| episode.ended && episode.rewards.len() == EPISODE as usize;
+    let is_long = |episode: &ExpectedEpisode| episode.ended && episode.rewards.len() == EPISODE as usize;
     assert!(all.iter().any(is_long) && all.iter().any(|episode| episode.ended && !is_long(episode)), "{all:?}");
     assert!(all.iter().any(|episode| !episode.ended), "one is broken off: {all:?}");
     all
@@ -92,14 +93,14 @@ fn robomimic() {
     let files = [2, 1, 4].map(|every| (folder.path().join(format!("{every}.hdf5")), every));
     let told = run(&files.each_ref().map(|(path, every)| (&**path, *every)));
     for (path, every) in &files {
-        let found = said("read_hdf5.py", path);
+        let found = script_output("read_hdf5.py", path);
         let episodes = list(&found["episodes"]);
-        // The rows of an episode are at multiples of `every`. Each but the last is a frame.
-        let rows_of = |episode: &Told| -> Vec<u64> {
+        // The rows of an episode are at multiples of `period_steps`. Each but the last is a frame.
+        let rows_of = |episode: &ExpectedEpisode| -> Vec<u64> {
             let end = episode.begin + u64::from(DECIMATION) * episode.rewards.len() as u64;
             (episode.begin.next_multiple_of(*every)..=end).step_by(*every as usize).collect()
         };
-        let mut told: Vec<&Told> = told.iter().filter(|episode| rows_of(episode).len() > 1).collect();
+        let mut told: Vec<&ExpectedEpisode> = told.iter().filter(|episode| rows_of(episode).len() > 1).collect();
         // Sorted by their first complete frames, then by environment.
         told.sort_by_key(|episode| (rows_of(episode)[1], episode.env));
         assert_eq!(episodes.len(), told.len(), "every {every}");
@@ -138,7 +139,7 @@ fn robomimic() {
 fn lerobot() {
     let (_folder, path) = scratch("run.lerobot");
     let told = run(&[(&path, u64::from(DECIMATION))]);
-    let found = said("read_lerobot.py", &path);
+    let found = script_output("read_lerobot.py", &path);
     let episodes = list(&found["episodes"]);
     assert_eq!(episodes.len(), told.len());
     for (frames, told) in episodes.iter().map(list).zip(&told) {
@@ -161,8 +162,8 @@ fn archive_and_messages() {
     ] {
         let recording = Recording::open(&path).unwrap();
         for env in 0..ENVS {
-            let wanted = [0, 1, 2].map(|k| Wanted::new(format!("/env_{env}/{}", topics[k]), fields[k]));
-            let samples = recording.samples(&wanted).unwrap();
+            let wanted = [0, 1, 2].map(|k| FieldSelector::new(format!("/env_{env}/{}", topics[k]), fields[k]));
+            let samples = recording.time_series(&wanted).unwrap();
             let rewards: Vec<f64> = told.iter().filter(|e| e.env == env).flat_map(|e| e.rewards.clone()).collect();
             assert_eq!(samples[0].values, rewards, "{}", path.display());
             for (k, time) in samples[0].times.iter().enumerate() {
@@ -182,7 +183,7 @@ impl Observer for OwnTask {
         u64::MAX
     }
 
-    fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
+    fn on_event(&mut self, _: &mut SimulationManager, _: &SimEvent) {}
 
     fn publishes(&self, event: TypeId) -> bool {
         event == TypeId::of::<StepResult>()
@@ -194,7 +195,7 @@ impl Observer for OwnTask {
 fn own_task() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = task().into_sim();
-    let cfg = RecorderCfg::new(&path).with_topics([Topic::Outcomes]);
+    let cfg = RecorderCfg::new(&path).with_topics([Topic::TaskResults]);
     kinetoscope_testkit::refusal::assert_error(sim.record(cfg.clone()), "NoTask", &["Env"]);
     record(&mut sim, RecorderCfg::new(&path), |sim| sim.update(3));
     assert!(Recording::open(&path).unwrap().topic("task", None).is_err());
@@ -217,6 +218,7 @@ fn own_task() {
             assert!(error.contains("rewards"), "{error}");
         }
     });
-    let samples = Recording::open(&path).unwrap().samples(&[Wanted::new("/env_2/task", "reward[0]")]).unwrap();
+    let samples =
+        Recording::open(&path).unwrap().time_series(&[FieldSelector::new("/env_2/task", "reward[0]")]).unwrap();
     assert_eq!(samples[0].values, [2.0, 3.0, 4.0, 5.0]);
 }

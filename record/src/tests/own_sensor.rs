@@ -1,9 +1,9 @@
 //! A sensor of another crate, recorded with its own columns, units and stamps.
 
 use super::*;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
-use kinetoscope_sensors::{Channel, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError, Stamp};
+use kinetoscope_scene::StateFields;
+use kinetoscope_sensors::{SampleChannel, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError, Stamp};
 
 const STEPS: usize = 6;
 
@@ -20,15 +20,15 @@ struct Skin {
 impl SensorCfg for SkinCfg {
     type Sensor = Skin;
 
-    fn requires(&self) -> Requires {
-        Requires::NONE
+    fn requires(&self) -> StateFields {
+        StateFields::NONE
     }
 
     fn build(&self, context: &SensorContext) -> std::result::Result<Skin, SensorError> {
         let channels = [
-            Channel::new("pressures", 2).in_unit("Pa").at(Stamp::Force),
-            Channel::new("temperatures", 2).in_unit("K"),
-            Channel::exact("pad_counts", 1),
+            SampleChannel::new("pressures", 2).with_unit("Pa").with_stamp(Stamp::Force),
+            SampleChannel::new("temperatures", 2).with_unit("K"),
+            SampleChannel::noiseless("pad_counts", 1),
         ];
         let sampler = Sampler::new("skin", self.requires(), context, &SamplingCfg::default(), &channels)?;
         Ok(Skin { pads: ["left", "right"].map(String::from).into(), sampler })
@@ -109,8 +109,8 @@ fn archive() {
     let recording = Recording::open(&path).unwrap();
     for (channel, (stamps, values)) in ["pressures", "temperatures"].into_iter().zip(measured) {
         for (column, pad) in ["left", "right"].into_iter().enumerate() {
-            let wanted = Wanted::new("/env_1/skin", format!("{channel}[{pad}]"));
-            let samples = recording.samples(&[wanted]).unwrap().remove(0);
+            let wanted = FieldSelector::new("/env_1/skin", format!("{channel}[{pad}]"));
+            let samples = recording.time_series(&[wanted]).unwrap().remove(0);
             assert_eq!(samples.values, values.iter().map(|row| row[column]).collect::<Vec<_>>(), "{channel} {pad}");
             assert_eq!(samples.times, stamps, "{channel} {pad}");
         }
@@ -123,7 +123,7 @@ fn messages_and_metadata() {
     let measured = record_skin(&path);
     let all = messages(&path);
     for (channel, (stamps, values)) in ["pressures", "temperatures"].into_iter().zip(measured) {
-        let found = of(&all, &format!("/env_1/skin/{channel}"));
+        let found = messages_on(&all, &format!("/env_1/skin/{channel}"));
         assert_eq!(found.len(), STEPS);
         for (message, (stamp, values)) in found.into_iter().zip(stamps.into_iter().zip(values)) {
             assert!(message.time == nanos(stamp) && message.contains(&bytes(values)), "{channel}: {message:?}");

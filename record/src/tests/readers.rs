@@ -49,8 +49,8 @@ fn recorded(path: &Path, finish: bool) -> Value {
         "depth_shape": depth.shape(),
         "depth_finite": finite.count(),
         "depth_range": range,
-        "mask_sum": weighed(&mask, |x| u64::try_from(*x).unwrap()),
-        "color_sum": weighed(rgb(&color), u64::from),
+        "mask_sum": weighted_sum(&mask, |x| u64::try_from(*x).unwrap()),
+        "color_sum": weighted_sum(rgb(&color), u64::from),
         "rows": STEPS + 1,
         "pictures": STEPS / IMAGE_EVERY,
     });
@@ -66,7 +66,7 @@ fn files() {
     for (name, script) in [("run.mcap", "read_mcap.py"), ("run.npz", "read_npz.py")] {
         let (_folder, path) = scratch(name);
         let expected = recorded(&path, true);
-        assert_eq!(said(script, &path), expected, "{name}");
+        assert_eq!(script_output(script, &path), expected, "{name}");
     }
 }
 
@@ -80,7 +80,7 @@ fn recovered_file() {
     assert!(!path.exists());
     let recovered = recover_to(&path, &out).unwrap();
     assert!(recovered.damage.is_none() && recovered.messages > 0, "{recovered:?}");
-    assert_eq!(said("read_mcap.py", &out), expected);
+    assert_eq!(script_output("read_mcap.py", &out), expected);
     // The partial file is deleted, and there is nothing left to recover.
     let again = recover_to(&path, folder.path().join("other.mcap")).unwrap_err();
     assert!(again.to_string().contains("run.mcap.part"), "{again}");
@@ -90,7 +90,7 @@ fn recovered_file() {
 fn sensed(path: &Path) -> Value {
     let mut sim = simulation(2);
     sim.add_rigid_object(kinetoscope_testkit::worlds::cube("cube", 0.4, 2.0, [0.1, 0.05, 0.2])).unwrap();
-    let touch = sim.add_sensor("touch", ContactSensorCfg::of("cube")).unwrap();
+    let touch = sim.add_sensor("touch", ContactSensorCfg::for_bodies("cube")).unwrap();
     let pattern = Grid { resolution: 0.2, size: [0.6, 0.4], ..Grid::default() };
     let offset = Pose::translation(0.03, 0.0, 2.0);
     // Some rays end before the ground. These misses are no points.
@@ -157,13 +157,13 @@ fn sensed(path: &Path) -> Value {
         "point_time": nanos(sim.time()[1]),
         "forces": forces,
         "normal_shape": normal.shape(),
-        "normal_sum": weighed(&normal, of_f32),
+        "normal_sum": weighted_sum(&normal, of_f32),
         "upward": upward,
         "attached": ["recording.json", "scene.zip", "start.snapshot"],
-        "flow_sum": weighed(&flow, of_f32),
-        "albedo_sum": weighed(rgb(&albedo), u64::from),
-        "disparity_sum": weighed(&disparity, of_f32),
-        "right_sum": weighed(rgb(&right), u64::from),
+        "flow_sum": weighted_sum(&flow, of_f32),
+        "albedo_sum": weighted_sum(rgb(&albedo), u64::from),
+        "disparity_sum": weighted_sum(&disparity, of_f32),
+        "right_sum": weighted_sum(rgb(&right), u64::from),
         "moves": moves.iter().flat_map(|table| table.row(1).to_vec()).collect::<Vec<_>>(),
         "distances": distances.iter().map(|x| x.to_bits().to_string()).collect::<Vec<_>>(),
         "hit_ids": hits.iter().map(|k| ids[*k]).collect::<Vec<i32>>(),
@@ -187,5 +187,5 @@ fn sensed(path: &Path) -> Value {
 fn sensors() {
     let (_folder, path) = scratch("run.mcap");
     let expected = sensed(&path);
-    assert_eq!(said("read_sensors.py", &path), expected);
+    assert_eq!(script_output("read_sensors.py", &path), expected);
 }

@@ -6,7 +6,7 @@ use std::fs;
 
 /// A file name for each format that is a file.
 fn files() -> impl Iterator<Item = String> {
-    let is_file = |format: &Format| format.is_built() && ![Format::Pictures, Format::LeRobot].contains(format);
+    let is_file = |format: &Format| format.is_built() && ![Format::Images, Format::LeRobot].contains(format);
     Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
 }
 
@@ -84,9 +84,9 @@ fn configurations() {
         (with(Topic::channel("camera", "dept")), &["camera/dept", "camera/depth"]),
         (with(Topic::channel("camera", "normal")), &["camera/normal", "camera/depth"]),
         (with(Topic::channel("imu", "depth")), &["imu/depth"]),
-        (RecorderCfg { every: 0, ..run() }, &["every", "at least 1"]),
+        (RecorderCfg { period_steps: 0, ..run() }, &["every", "at least 1"]),
         (RecorderCfg { packets: 1, ..run() }, &["packets", "at least 2"]),
-        (RecorderCfg { every: 3, ..new("run.lerobot") }, &["run.lerobot", "33.333", "2, 4, 1 would do"]),
+        (RecorderCfg { period_steps: 3, ..new("run.lerobot") }, &["run.lerobot", "33.333", "2, 4, 1 would do"]),
         (new("run.lerobot").with_topics([Topic::Sensor("imu".into())]), &["no place", "sensors alone"]),
         (RecorderCfg { envs: Some(vec![EnvId(3)]), ..run() }, &["environment 3"]),
         (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..run() }, &["twice"]),
@@ -140,10 +140,10 @@ fn changed_scene() {
         world.step(2);
         let observer = world.sim.observers_mut().get(recorder).unwrap();
         assert!(observer.has_failed());
-        observer.catch_up();
+        observer.wait_until_written();
         let error = world.sim.finish_recording(recorder).unwrap_err();
-        let RecordError::BrokenOff { error, also, kept } = error else { panic!("{error}") };
-        assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
+        let RecordError::Aborted { error, write_error: also, partial_file: kept } = error else { panic!("{error}") };
+        assert!(matches!(&*error, RecordError::StreamChanged { stream, .. } if stream == "joints"), "{error}");
         assert!(also.is_none() && !path.exists(), "{name}");
         assert_eq!(kept, keeps.then(|| path.with_extension("mcap.part")));
         if keeps {

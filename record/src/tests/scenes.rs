@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_sim::{Look, Property};
+use kinetoscope_sim::{EnvVisualState, Property};
 use kinetoscope_testkit::worlds::{fixed, object};
 
 const STEPS: u32 = 30;
@@ -39,9 +39,9 @@ fn outline(shape: &Shape) -> (&'static str, Vec<[f32; 3]>, usize) {
 
 /// Largest distance between points of entities and their positions in MuJoCo, in an environment \[m\].
 fn farthest(world: &mut World, env: usize, entities: &Value) -> f64 {
-    let scene = world.sim.scene_mut().scene_of(EnvId(env)).unwrap();
-    let mut look = Look::default();
-    world.sim.scene_mut().look(EnvId(env), &mut look).unwrap();
+    let scene = world.sim.scene_mut().env_scene(EnvId(env)).unwrap();
+    let mut look = EnvVisualState::default();
+    world.sim.scene_mut().read_visual_state(EnvId(env), &mut look).unwrap();
     let (mut farthest, mut count): (f64, usize) = (0.0, 0);
     let seen = scene.instances().iter().zip(&look.instances).enumerate();
     for (index, (instance, pose)) in seen.filter(|(_, (one, _))| one.visible && one.group < 3) {
@@ -77,7 +77,7 @@ const NEAR: f64 = 3e-6;
 fn entity_poses() {
     let (_folder, path) = scratch("run.mcap");
     let mut world = World::new(2, 2);
-    world.sim.add_mjcf(MjcfCfg::text("toys", TOYS)).unwrap();
+    world.sim.add_mjcf(MjcfPartCfg::text("toys", TOYS)).unwrap();
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     (0..STEPS).for_each(|step| world.step(step));
     // Changes a color in one environment.
@@ -93,7 +93,7 @@ fn entity_poses() {
     world.step(STEPS + 1);
     let recorded = world.sim.finish_recording(recorder).unwrap();
     assert_eq!(recorded.left_out, [""; 0], "{recorded}");
-    let found = said("read_scenes.py", &path);
+    let found = script_output("read_scenes.py", &path);
     // At the beginning, at the change of the color, and at the addition of the table. The other environment has no
     // second update.
     assert_eq!(found["counts"], json!({ "/env_0/scene": 2, "/env_1/scene": 3 }));
@@ -122,7 +122,7 @@ fn missing_poses() {
     let cfg = |path: &Path| RecorderCfg::new(path).with_topics([Topic::ObjectPose("cube".into())]);
     let recorded = record_steps(&mut world, cfg(&path), 3);
     assert_eq!(recorded.left_out, ["of the scene for viewers: arm (poses that are not recorded)"]);
-    let found = said("read_scenes.py", &path);
+    let found = script_output("read_scenes.py", &path);
     let names: Vec<&str> = entities(&found["updates"][0]).map(|entity| entity["name"].as_str().unwrap()).collect();
     assert!(names.contains(&"cube") && names.contains(&"ground"), "{names:?}");
     // The link that is welded to the world has a fixed pose.

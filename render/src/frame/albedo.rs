@@ -11,7 +11,7 @@ use ndarray::Ix4;
 pub struct Albedo;
 
 impl Channel for Albedo {
-    type Number = u8;
+    type Element = u8;
     type Layout = Ix4;
     const NAME: &'static str = "albedo";
     const ALIASES: &'static [&'static str] = &["diffuse_albedo"];

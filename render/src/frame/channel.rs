@@ -34,10 +34,10 @@ pub enum Stage {
     /// After visibility: the surface at each pixel center is found.
     Geometry,
     /// As [`Geometry`](Self::Geometry), but computed only for cameras with such a channel: few have one.
-    Detail,
-    /// As [`Detail`](Self::Detail), for the base color of surfaces, which reads textures.
+    Surface,
+    /// As [`Surface`](Self::Surface), for the base color of surfaces, which reads textures.
     Albedo,
-    /// As [`Detail`](Self::Detail), for channels that need the previous frame.
+    /// As [`Surface`](Self::Surface), for channels that need the previous frame.
     Flow,
     /// After light, transparency and multisampling.
     Color,
@@ -46,9 +46,9 @@ pub enum Stage {
 /// A quantity that a camera measures at every pixel.
 pub trait Channel {
     /// Scalar type of the channel.
-    type Number: Copy + Default + PartialEq + std::fmt::Debug + Send + Sync + 'static;
+    type Element: Copy + Default + PartialEq + std::fmt::Debug + Send + Sync + 'static;
     /// Axes of a batch of images: view, row, column, and component if a pixel has several.
-    type Layout: Layout;
+    type Layout: ChannelLayout;
     /// Canonical name.
     const NAME: &'static str;
     /// Accepted aliases.
@@ -59,12 +59,12 @@ pub trait Channel {
     const STAGE: Stage;
 
     /// Writes the components of one pixel of a group.
-    fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Number]);
+    fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Element]);
 
     /// Writes up to 8 horizontally adjacent pixels of a group. Channels whose memory already has this order override it
     /// with a copy.
     #[inline(always)]
-    fn write_row(group: &PixelGroup, first: usize, out: &mut [Self::Number]) {
+    fn write_row(group: &PixelGroup, first: usize, out: &mut [Self::Element]) {
         for (column, out) in out.chunks_exact_mut(Self::COMPONENTS).enumerate() {
             Self::write(group, first + column, out);
         }
@@ -72,25 +72,25 @@ pub trait Channel {
 
     /// Replaces the value of pixels that hit no surface by `value`; see `DepthMiss` of cameras. Only channels that
     /// measure depth or distance do so; other channels have their own value for a miss.
-    fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
+    fn replace_misses(_numbers: &mut [Self::Element], _value: f32) {}
 }
 
 /// Axes of a batch of images.
-pub trait Layout: Dimension {
+pub trait ChannelLayout: Dimension {
     /// Shape of `views` images with `height` rows of `width` pixels.
-    fn of(views: usize, height: usize, width: usize, components: usize) -> Self;
+    fn dimension(views: usize, height: usize, width: usize, components: usize) -> Self;
 }
 
 /// One component per pixel: (views, height, width).
-impl Layout for Ix3 {
-    fn of(views: usize, height: usize, width: usize, _components: usize) -> Self {
+impl ChannelLayout for Ix3 {
+    fn dimension(views: usize, height: usize, width: usize, _components: usize) -> Self {
         Ix3(views, height, width)
     }
 }
 
 /// Several components per pixel: (views, height, width, components).
-impl Layout for Ix4 {
-    fn of(views: usize, height: usize, width: usize, components: usize) -> Self {
+impl ChannelLayout for Ix4 {
+    fn dimension(views: usize, height: usize, width: usize, components: usize) -> Self {
         Ix4(views, height, width, components)
     }
 }

@@ -8,7 +8,7 @@ use ndarray::Ix4;
 pub struct Color;
 
 impl Channel for Color {
-    type Number = u8;
+    type Element = u8;
     type Layout = Ix4;
     const NAME: &'static str = "color";
     const ALIASES: &'static [&'static str] = &["rgb", "rgba"];

@@ -8,7 +8,7 @@ use ndarray::Ix3;
 pub struct Depth;
 
 impl Channel for Depth {
-    type Number = f32;
+    type Element = f32;
     type Layout = Ix3;
     const NAME: &'static str = "depth";
     const ALIASES: &'static [&'static str] = &["distance_to_image_plane"];

@@ -8,12 +8,12 @@ use ndarray::Ix3;
 pub struct Distance;
 
 impl Channel for Distance {
-    type Number = f32;
+    type Element = f32;
     type Layout = Ix3;
     const NAME: &'static str = "distance";
     const ALIASES: &'static [&'static str] = &["distance_to_camera"];
     const COMPONENTS: usize = 1;
-    const STAGE: Stage = Stage::Detail;
+    const STAGE: Stage = Stage::Surface;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {

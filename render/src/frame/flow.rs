@@ -18,7 +18,7 @@ use ndarray::Ix4;
 pub struct Flow;
 
 impl Channel for Flow {
-    type Number = f32;
+    type Element = f32;
     type Layout = Ix4;
     const NAME: &'static str = "flow";
     const ALIASES: &'static [&'static str] = &["optical_flow"];

@@ -12,7 +12,7 @@ use ndarray::Ix3;
 pub struct Mask;
 
 impl Channel for Mask {
-    type Number = i32;
+    type Element = i32;
     type Layout = Ix3;
     const NAME: &'static str = "mask";
     const ALIASES: &'static [&'static str] = &["segmentation", "semantic_segmentation", "instance_segmentation", "instance_segmentation_fast", "instance_id_segmentation_fast"];

@@ -5,22 +5,22 @@ mod file_format;
 
 use crate::visibility::RenderError;
 use channel::copy_row;
-pub use channel::{Channel, Layout, PixelGroup, Stage};
-use kinetoscope_scene::pattern::{UnknownName, closest};
+pub use channel::{Channel, ChannelLayout, PixelGroup, Stage};
+use kinetoscope_scene::pattern::{UnknownName, closest_names};
 use ndarray::{Array, ArrayView};
 use std::ops::Range;
 
-/// A channel of the list, with an array in [`Pictures`].
-pub trait Listed: Channel {
+/// A channel of the list, with an array in [`Images`].
+pub trait ListedChannel: Channel {
     /// True if the channel is selected.
-    fn is_in(channels: Channels) -> bool;
+    fn is_selected(channels: Channels) -> bool;
 
     /// Images of the channel; `None` if it was not rendered.
-    fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>>;
+    fn view_in(pictures: &Images) -> Option<ImageView<'_, Self>>;
 }
 
 /// View of the images of one channel, shape (views, height, width) or (views, height, width, components).
-pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channel>::Layout>;
+pub type ImageView<'a, C> = ArrayView<'a, <C as Channel>::Element, <C as Channel>::Layout>;
 
 /// Calls a macro with the list of channels: documentation, module and type of each.
 #[macro_export]
@@ -80,15 +80,15 @@ macro_rules! channels {
                 for name in names.iter().map(AsRef::as_ref) {
                     match name {
                         $(_ if name == $Name::NAME || $Name::ALIASES.contains(&name) => channels.$field = true,)*
-                        _ => return Err(unknown(name, &[$(($Name::NAME, $Name::ALIASES)),*])),
+                        _ => return Err(unknown_channel(name, &[$(($Name::NAME, $Name::ALIASES)),*])),
                     }
                 }
                 Ok(channels)
             }
 
             /// True if a channel is selected.
-            pub fn has<C: Listed>(self) -> bool {
-                C::is_in(self)
+            pub fn has<C: ListedChannel>(self) -> bool {
+                C::is_selected(self)
             }
 
             /// Names of the selected channels.
@@ -98,17 +98,17 @@ macro_rules! channels {
 
             /// Memory per pixel of the selected channels \[bytes\].
             pub fn bytes_per_pixel(self) -> usize {
-                0 $(+ usize::from(self.$field) * size_of::<<$Name as Channel>::Number>() * $Name::COMPONENTS)*
+                0 $(+ usize::from(self.$field) * size_of::<<$Name as Channel>::Element>() * $Name::COMPONENTS)*
             }
         }
 
         /// Images of several views, one array per channel; the first axis is the view.
         #[derive(Clone, Debug, Default, PartialEq)]
-        pub struct Pictures {
-            $($field: Option<Array<<$Name as Channel>::Number, <$Name as Channel>::Layout>>,)*
+        pub struct Images {
+            $($field: Option<Array<<$Name as Channel>::Element, <$Name as Channel>::Layout>>,)*
         }
 
-        impl Pictures {
+        impl Images {
             /// Images of `views` views of `width` by `height` pixels, filled with zeros.
             ///
             /// # Panics
@@ -118,7 +118,7 @@ macro_rules! channels {
             pub fn new(channels: Channels, views: usize, width: usize, height: usize) -> Self {
                 Self {
                     $($field: channels.$field.then(|| {
-                        let shape = <$Name as Channel>::Layout::of(views, height, width, $Name::COMPONENTS);
+                        let shape = <$Name as Channel>::Layout::dimension(views, height, width, $Name::COMPONENTS);
                         Array::from_elem(shape, Default::default())
                     }),)*
                 }
@@ -130,13 +130,13 @@ macro_rules! channels {
             }
 
             /// Images of one channel; `None` if the channel is not stored.
-            pub fn get<C: Listed>(&self) -> Option<PictureView<'_, C>> {
-                C::of(self)
+            pub fn get<C: ListedChannel>(&self) -> Option<ImageView<'_, C>> {
+                C::view_in(self)
             }
 
             /// Moves the images of `views`, a range of `all` views, up by `by` places; the last images of the range are
             /// dropped.
-            pub fn move_up(&mut self, all: usize, views: Range<usize>, by: usize) {
+            pub fn shift_views(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
                     let kept = views.len().saturating_sub(by) * each;
@@ -145,7 +145,7 @@ macro_rules! channels {
             }
 
             /// Fills the images of `views`, a range of `all` views, with zeros.
-            pub fn forget(&mut self, all: usize, views: Range<usize>) {
+            pub fn clear_views(&mut self, all: usize, views: Range<usize>) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
                     numbers[views.start * each..views.end * each].fill(Default::default());
@@ -174,26 +174,26 @@ macro_rules! channels {
             }
         }
 
-        $(impl Listed for $Name {
-            fn is_in(channels: Channels) -> bool {
+        $(impl ListedChannel for $Name {
+            fn is_selected(channels: Channels) -> bool {
                 channels.$field
             }
 
-            fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>> {
-                pictures.$field.as_ref().map(|array| array.view())
+            fn view_in(images: &Images) -> Option<ImageView<'_, Self>> {
+                images.$field.as_ref().map(|array| array.view())
             }
         })*
 
         /// Image of one view per channel, row by row from the top left.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Frame {
-            $($(#[$doc])* pub $field: Option<Vec<<$Name as Channel>::Number>>,)*
+            $($(#[$doc])* pub $field: Option<Vec<<$Name as Channel>::Element>>,)*
         }
 
         /// Mutable buffers of one view; channels without a buffer are not computed.
         #[derive(Debug, Default)]
         pub struct FrameMut<'a> {
-            $($(#[$doc])* pub $field: Option<&'a mut [<$Name as Channel>::Number]>,)*
+            $($(#[$doc])* pub $field: Option<&'a mut [<$Name as Channel>::Element]>,)*
         }
 
         impl Frame {
@@ -262,7 +262,7 @@ macro_rules! channels {
             #[inline(always)]
             pub(crate) fn write(&mut self, stage: Stage, group: &PixelGroup, at: [usize; 2], size: [usize; 2]) {
                 $(if $Name::STAGE == stage && let Some(buffer) = &mut self.$field {
-                    put::<$Name>(buffer, group, at, size);
+                    write_channel::<$Name>(buffer, group, at, size);
                 })*
             }
         }
@@ -270,14 +270,14 @@ macro_rules! channels {
 }
 
 /// The error for an unknown channel name, with the most similar names and aliases.
-fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> UnknownName {
+fn unknown_channel(name: &str, known: &[(&'static str, &[&'static str])]) -> UnknownName {
     let all = known.iter().flat_map(|(own, aliases)| aliases.iter().chain([own]));
-    let candidates = closest(name, all.copied()).into_iter().map(String::from).collect();
+    let candidates = closest_names(name, all.copied()).into_iter().map(String::from).collect();
     UnknownName { what: "channel", name: name.into(), candidates }
 }
 
 /// Splits off the first pixels of one channel.
-fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: usize) -> Option<&'a mut [C::Number]> {
+fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Element]>, pixels: usize) -> Option<&'a mut [C::Element]> {
     let all = buffer.take()?;
     let (first, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));
     *buffer = Some(rest);
@@ -285,7 +285,12 @@ fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: u
 }
 
 #[inline(always)]
-fn put<C: Channel>(buffer: &mut [C::Number], group: &PixelGroup, [x, y]: [usize; 2], [width, height]: [usize; 2]) {
+fn write_channel<C: Channel>(
+    buffer: &mut [C::Element],
+    group: &PixelGroup,
+    [x, y]: [usize; 2],
+    [width, height]: [usize; 2],
+) {
     let columns = 8.min(width - x);
     for row in 0..2.min(height - y) {
         let first = ((y + row) * width + x) * C::COMPONENTS;

@@ -8,7 +8,7 @@ use ndarray::Ix4;
 pub struct Normal;
 
 impl Channel for Normal {
-    type Number = f32;
+    type Element = f32;
     type Layout = Ix4;
     const NAME: &'static str = "normal";
     const ALIASES: &'static [&'static str] = &["normals"];

@@ -8,12 +8,12 @@ use ndarray::Ix4;
 pub struct Position;
 
 impl Channel for Position {
-    type Number = f32;
+    type Element = f32;
     type Layout = Ix4;
     const NAME: &'static str = "position";
     const ALIASES: &'static [&'static str] = &["positions", "position_map"];
     const COMPONENTS: usize = 3;
-    const STAGE: Stage = Stage::Detail;
+    const STAGE: Stage = Stage::Surface;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {

@@ -9,12 +9,12 @@ use ndarray::Ix4;
 pub struct ShadingNormal;
 
 impl Channel for ShadingNormal {
-    type Number = f32;
+    type Element = f32;
     type Layout = Ix4;
     const NAME: &'static str = "shading_normal";
     const ALIASES: &'static [&'static str] = &["shading_normals", "smooth_normals"];
     const COMPONENTS: usize = 3;
-    const STAGE: Stage = Stage::Detail;
+    const STAGE: Stage = Stage::Surface;
 
     #[inline(always)]
     fn write(group: &PixelGroup, lane: usize, out: &mut [f32]) {

@@ -4,11 +4,11 @@ use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::vector::{V3, cross, dot, scale, sub, to_f64};
 
 /// Largest lift of a point, as a fraction of the size of its triangle: that of a ball with eight sides.
-const LIFT: f64 = 0.15;
+const MAX_LIFT: f64 = 0.15;
 
 /// Interpolated attributes at a point of a triangle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Corner {
+pub(crate) struct SurfaceAttributes {
     pub(crate) normal: V3,
     /// Offset from the flat triangle to the smooth surface that it approximates.
     pub(crate) lift: V3,
@@ -17,7 +17,7 @@ pub(crate) struct Corner {
 
 /// The interpolated normal at a point of a triangle seen from a side (1 from outside), its texture coordinates and
 /// their number per meter.
-pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner {
+pub(crate) fn interpolate_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> SurfaceAttributes {
     let corners = mesh.triangles()[triangle].map(|i| i as usize);
     let ends @ [a, b, c] = corners.map(|i| to_f64(mesh.positions()[i]));
     let (ab, ac, w) = (sub(b, a), sub(c, a), sub(at, a));
@@ -31,7 +31,7 @@ pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64)
     // Depth of the point below the tangent plane of each corner.
     let below = [0, 1, 2].map(|n| (side * dot(sub(at, ends[n]), normals[n])).min(0.0));
     let lift: V3 = [0, 1, 2].map(|k| (0..3).map(|n| -side * share[n] * below[n] * normals[n][k]).sum());
-    let (far, most) = (dot(lift, lift).sqrt(), LIFT * area.sqrt().sqrt());
+    let (far, most) = (dot(lift, lift).sqrt(), MAX_LIFT * area.sqrt().sqrt());
     let lift = if far > most { scale(lift, most / far) } else { lift };
     let uv = mesh.uvs().map(|uvs| {
         let t = corners.map(|i| uvs[i].map(f64::from));
@@ -40,5 +40,5 @@ pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64)
         // Square root of the ratio of areas, in the texture and on the surface.
         (uv, ((p[0] * q[1] - q[0] * p[1]).abs() / area.sqrt()).sqrt())
     });
-    Corner { normal, lift, uv }
+    SurfaceAttributes { normal, lift, uv }
 }

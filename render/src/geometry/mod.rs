@@ -20,10 +20,10 @@ pub(crate) mod shape;
 pub(crate) mod triangle;
 pub(crate) mod world;
 
-pub use assets::{Assets, RayAssets};
-pub use world::{FixedWorld, RayHit, RayTargets, RayWorld};
+pub use assets::{AssetCache, RayAssetCache};
+pub use world::{FixedTargets, RayHit, RayTargets, RayWorld};
 
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
-pub(crate) use tests::Dice;
+pub(crate) use tests::TestRng;

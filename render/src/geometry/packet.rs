@@ -23,7 +23,7 @@ impl Packet {
     /// Packs the first rays of a list, with hits up to `max_distance`. A ray with a non-finite number is left out. Its
     /// lane and the lanes beyond the list copy another ray.
     #[inline(always)]
-    pub(crate) fn of(rays: &[Ray], max_distance: f64) -> Self {
+    pub(crate) fn from_rays(rays: &[Ray], max_distance: f64) -> Self {
         let like = rays.iter().find(|ray| ray.is_finite()).copied();
         let like = like.unwrap_or(Ray { origin: [0.0; 3], direction: [0.0; 3] });
         let mut packet = Self { origin: [[0.0; WIDTH]; 3], direction: [[0.0; WIDTH]; 3], limit: [-1.0; WIDTH] };
@@ -51,7 +51,7 @@ impl Packet {
 
     /// One ray alone, copied to all lanes.
     #[inline(always)]
-    pub(super) fn only(&self, k: usize) -> Self {
+    pub(super) fn single(&self, k: usize) -> Self {
         let mut limit = [-1.0; WIDTH];
         limit[k] = self.limit[k];
         Self { origin: self.origin.map(|x| [x[k]; WIDTH]), direction: self.direction.map(|x| [x[k]; WIDTH]), limit }
@@ -64,13 +64,13 @@ impl Packet {
 
     /// Lowers the largest distance of a lane.
     #[inline(always)]
-    pub(crate) fn shorten(&mut self, k: usize, limit: f64) {
+    pub(crate) fn limit_to(&mut self, k: usize, limit: f64) {
         self.limit[k] = self.limit[k].min(limit);
     }
 
     /// True if a lane has a ray.
     #[inline(always)]
-    pub(crate) fn has(&self, k: usize) -> bool {
+    pub(crate) fn is_active(&self, k: usize) -> bool {
         self.limit[k] >= 0.0
     }
 
@@ -92,7 +92,7 @@ impl Packet {
     /// The rays that may meet a sphere before their limits, in the frame that `pose` maps from; `None` if no ray does.
     /// All rays meet a sphere of radius +inf. Each lane equals, to the bit, the transform of its ray alone.
     #[inline(always)]
-    pub(super) fn seen_from<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
+    pub(super) fn in_local_frame<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
         let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));
         let zero = D::splat(s, 0.0);
         let mut met = zero.le(limit);
@@ -118,8 +118,8 @@ impl Packet {
             |k| origin[k] - pose.translation[k],
         );
         Some(Self {
-            origin: turned_back(pose, from),
-            direction: turned_back(pose, direction),
+            origin: rotate_inverse(pose, from),
+            direction: rotate_inverse(pose, direction),
             limit: met.select(limit, D::splat(s, -1.0)).array(),
         })
     }
@@ -127,7 +127,7 @@ impl Packet {
 
 /// The rotation of [`PoseF64::rotate_inverse`], to the bit.
 #[inline(always)]
-fn turned_back<S: Simd>(pose: &PoseF64, v: D3<S>) -> [[f64; WIDTH]; 3] {
+fn rotate_inverse<S: Simd>(pose: &PoseF64, v: D3<S>) -> [[f64; WIDTH]; 3] {
     let r = &pose.rotation;
     axes(
         #[inline(always)]

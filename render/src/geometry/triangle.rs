@@ -3,7 +3,7 @@
 use super::packet::{ALL, Packet, WIDTH};
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::vector::{V3, cross, dot, sub, to_f64, unit};
+use kinetoscope_scene::vector::{V3, cross, dot, normalize, sub, to_f64};
 
 /// Corners of a triangle \[m\].
 pub(crate) type Triangle = [[f32; 3]; 3];
@@ -17,14 +17,14 @@ pub(crate) type Triangle = [[f32; 3]; 3];
 /// if an edge has a sign of 0, a ray is inside only if it is between the corners along both axes. That holds for every
 /// ray inside or on an edge, so it leaves no gap either.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shear {
+pub(crate) struct ShearedRay {
     origin: V3,
     /// Permutation of the axes; the dominant axis of the ray comes last.
     axes: [usize; 3],
-    by: V3,
+    shear: V3,
 }
 
-impl Shear {
+impl ShearedRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction;
@@ -32,7 +32,7 @@ impl Shear {
         let last = if x > y && x > z { 0 } else { 1 + usize::from(z >= y) };
         let axes = [(last + 1) % 3, (last + 2) % 3, last];
         let inverse = 1.0 / d[last];
-        Self { origin: ray.origin, axes, by: [d[axes[0]] * inverse, d[axes[1]] * inverse, inverse] }
+        Self { origin: ray.origin, axes, shear: [d[axes[0]] * inverse, d[axes[1]] * inverse, inverse] }
     }
 
     /// Distance of the triangle's plane, of any sign, if the ray is inside of the triangle; from either side.
@@ -42,7 +42,7 @@ impl Shear {
         let [a, b, c] = triangle.map(|p| {
             let v =
                 [f64::from(p[i]) - self.origin[i], f64::from(p[j]) - self.origin[j], f64::from(p[k]) - self.origin[k]];
-            [v[0] - self.by[0] * v[2], v[1] - self.by[1] * v[2], v[2]]
+            [v[0] - self.shear[0] * v[2], v[1] - self.shear[1] * v[2], v[2]]
         });
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
@@ -60,22 +60,22 @@ impl Shear {
         if (u == 0.0 || v == 0.0 || w == 0.0) && (beside(0) || beside(1)) {
             return None;
         }
-        Some((u * a[2] + v * b[2] + w * c[2]) * self.by[2] / whole)
+        Some((u * a[2] + v * b[2] + w * c[2]) * self.shear[2] / whole)
     }
 }
 
-/// Packet version of [`Shear`] for rays with the same dominant axis: the same operations in the same order, so the same
+/// Packet version of [`ShearedRay`] for rays with the same dominant axis: the same operations in the same order, so the same
 /// bits.
 #[derive(Clone, Copy)]
-pub(crate) struct ShearPacket<S: Simd> {
+pub(crate) struct ShearedPacket<S: Simd> {
     s: S,
     /// In the order of `axes`.
     origin: D3<S>,
     axes: [usize; 3],
-    by: D3<S>,
+    shear: D3<S>,
 }
 
-impl<S: Simd> ShearPacket<S> {
+impl<S: Simd> ShearedPacket<S> {
     /// Shears a packet; `None` if the dominant axes of its rays differ.
     #[inline(always)]
     pub(crate) fn new(s: S, packet: &Packet) -> Option<Self> {
@@ -93,7 +93,7 @@ impl<S: Simd> ShearPacket<S> {
         let origin = packet.origins(s);
         let inverse = D::splat(s, 1.0) / d[last];
         let by = [d[i] * inverse, d[j] * inverse, inverse];
-        Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], by })
+        Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], shear: by })
     }
 
     /// Permutation of the axes; the dominant axis of the rays comes last.
@@ -111,14 +111,14 @@ impl<S: Simd> ShearPacket<S> {
     /// Slopes of the rays along the first and the second axis, per meter along the third.
     #[inline(always)]
     pub(crate) fn slopes(&self) -> [D<S>; 2] {
-        [self.by[0], self.by[1]]
+        [self.shear[0], self.shear[1]]
     }
 
     /// Slopes of the rays along the first and the second axis per meter along the third, and distance along the ray per
     /// meter along the third.
     #[inline(always)]
-    pub(crate) fn by(&self) -> D3<S> {
-        self.by
+    pub(crate) fn shear(&self) -> D3<S> {
+        self.shear
     }
 
     /// Distances of the triangle's plane, and the rays that are inside of the triangle; `None` if no ray is.
@@ -128,7 +128,7 @@ impl<S: Simd> ShearPacket<S> {
         distances(
             s,
             &self.origin,
-            &self.by,
+            &self.shear,
             #[inline(always)]
             |corner, axis| D::splat(s, f64::from(triangle[corner][self.axes[axis]])),
         )
@@ -136,7 +136,7 @@ impl<S: Simd> ShearPacket<S> {
 }
 
 /// Distances of the planes of triangles along rays, a pair of them in each lane, and the lanes that are inside; `None`
-/// if no lane is. All coordinates are in the order of a [`Shear`]'s axes: ray origins, shears, and corners (corner,
+/// if no lane is. All coordinates are in the order of a [`ShearedRay`]'s axes: ray origins, shears, and corners (corner,
 /// axis).
 #[inline(always)]
 pub(crate) fn distances<S: Simd>(
@@ -196,7 +196,7 @@ pub(crate) fn normals<S: Simd>(s: S, corner: impl Fn(usize, usize) -> D<S>) -> (
 
 /// Unit normal; the corners are counter-clockwise seen from its tip. `None` for a triangle without an area.
 pub(crate) fn normal(triangle: &Triangle) -> Option<V3> {
-    unit(across(triangle))
+    normalize(cross_product(triangle))
 }
 
 /// True if a triangle has finite corners and an area, and so a [`normal`].
@@ -204,13 +204,13 @@ pub(crate) fn normal(triangle: &Triangle) -> Option<V3> {
 pub(crate) fn has_area(triangle: &Triangle) -> bool {
     // Squares of products of two single precision numbers, 1e-180 to 1e157, are in the range of doubles; non-finite
     // corners give a non-finite square.
-    let across = across(triangle);
+    let across = cross_product(triangle);
     let square = dot(across, across);
     square > 0.0 && square < f64::INFINITY
 }
 
 #[inline(always)]
-fn across(triangle: &Triangle) -> V3 {
+fn cross_product(triangle: &Triangle) -> V3 {
     let [a, b, c] = triangle.map(to_f64);
     cross(sub(b, a), sub(c, a))
 }

@@ -1,11 +1,11 @@
 //! Ray casting against the targets of one environment.
 
-use super::bvh::{Beam, Bvh, Stack, Walked};
+use super::bvh::{Beam, Bvh, Traversal, TraversalStack};
 use super::packet::{Packet, WIDTH};
-use super::shape::{ForShape, RayShape, Solid};
-use super::triangle::ShearPacket;
-use crate::geometry::assets::RayAssets;
-use crate::simd::{D, Level, Simd, at_level};
+use super::shape::{RayGeometry, RayShape, ShapeVisitor};
+use super::triangle::ShearedPacket;
+use crate::geometry::assets::RayAssetCache;
+use crate::simd::{D, Simd, SimdLevel, at_level};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::vector::{V3, dot};
@@ -14,12 +14,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Up to this many fixed targets are tested one by one; more are put into a BVH.
-const FEW: usize = 4;
+const MAX_LINEAR_TARGETS: usize = 4;
 /// Enlargement of bounding spheres: more than the rounding of the test, for targets down to a billionth of their
 /// distance.
-const LARGER: f64 = 1.0 + 1e-6;
+const BOUNDS_SCALE: f64 = 1.0 + 1e-6;
 /// Targets of the BVH that a packet tests together; beyond that, rays go on one by one.
-const BUDGET: usize = 48;
+const MAX_PACKET_TARGETS: usize = 48;
 
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct RayHit {
     pub distance: f64,
     /// Unit normal of the surface, facing the ray's origin, in the frame of the environment; 0 for a miss.
     pub normal: [f64; 3],
-    /// Index of the instance in the scene; [`RayHit::NOTHING`] for a miss.
+    /// Index of the instance in the scene; [`RayHit::NO_INSTANCE`] for a miss.
     pub instance: u32,
     /// The instance's mask id; 0 for a miss.
     pub mask_id: i32,
@@ -36,13 +36,13 @@ pub struct RayHit {
 
 impl RayHit {
     /// Value of `instance` for a miss.
-    pub const NOTHING: u32 = u32::MAX;
+    pub const NO_INSTANCE: u32 = u32::MAX;
     /// A miss.
-    pub const MISS: Self = Self { distance: f64::INFINITY, normal: [0.0; 3], instance: Self::NOTHING, mask_id: 0 };
+    pub const MISS: Self = Self { distance: f64::INFINITY, normal: [0.0; 3], instance: Self::NO_INSTANCE, mask_id: 0 };
 
     /// True if the ray hit a target.
     pub fn is_hit(&self) -> bool {
-        self.instance != Self::NOTHING
+        self.instance != Self::NO_INSTANCE
     }
 }
 
@@ -63,46 +63,46 @@ struct Target {
     mask_id: i32,
     /// True if rays can hit the target. Invisible targets keep their place: they may be visible in another environment.
     visible: bool,
-    solid: Solid,
+    geometry: RayGeometry,
     /// Center and radius of the bounding sphere \[m\]; `None` for an unbounded shape.
     sphere: Option<(V3, f64)>,
 }
 
 /// A target at its pose in an environment.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
+struct PlacedTarget {
     target: u32,
     world_from_target: PoseF64,
     /// Bounding sphere in the environment; radius +inf for an unbounded shape.
-    middle: V3,
+    center: V3,
     radius: f64,
 }
 
 /// Fixed targets at their poses: shared by all environments with the same fixed poses.
 #[derive(Clone, Debug, Default)]
-pub struct FixedWorld {
-    placed: Vec<Placed>,
+pub struct FixedTargets {
+    placed: Vec<PlacedTarget>,
     /// BVH over some of `placed`, and the indices of those; the others are tested one by one.
-    tree: Option<(Bvh, Vec<u32>)>,
-    one_by_one: Vec<u32>,
+    bvh: Option<(Bvh, Vec<u32>)>,
+    unindexed: Vec<u32>,
 }
 
 /// Ray caster for one environment: targets at their poses. Keeps its scratch memory; use one per thread.
 #[derive(Clone, Debug)]
 pub struct RayWorld {
     targets: Arc<RayTargets>,
-    fixed: Arc<FixedWorld>,
-    moving: Vec<Placed>,
-    level: Level,
+    fixed: Arc<FixedTargets>,
+    moving: Vec<PlacedTarget>,
+    level: SimdLevel,
     packets: Vec<Packet>,
-    outer: Stack,
-    inner: Stack,
+    outer: TraversalStack,
+    inner: TraversalStack,
 }
 
 impl RayTargets {
     /// Prepares the instances of `scene` with the `wanted` indices; repeated indices count once. Invisible instances
     /// are never hit. BVHs over meshes are taken from `assets`, or built.
-    pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssets) -> Self {
+    pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssetCache) -> Self {
         let mut is_wanted = vec![false; scene.instances().len()];
         for index in wanted {
             if let Some(is_wanted) = is_wanted.get_mut(index) {
@@ -112,10 +112,10 @@ impl RayTargets {
         let mut out = Self { targets: vec![], fixed: vec![], moving: vec![], instances: is_wanted.len() };
         assets.with(|assets| {
             for (index, instance) in scene.instances().iter().enumerate().filter(|(index, _)| is_wanted[*index]) {
-                let solid = Solid::of(&instance.shape, assets);
+                let solid = RayGeometry::from_shape(&instance.shape, assets);
                 let sphere = solid.bounds().map(|[lo, hi]| {
                     let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
-                    ([0, 1, 2].map(|k| 0.5 * (hi[k] + lo[k])), dot(half, half).sqrt() * LARGER)
+                    ([0, 1, 2].map(|k| 0.5 * (hi[k] + lo[k])), dot(half, half).sqrt() * BOUNDS_SCALE)
                 });
                 let list = if instance.fixed { &mut out.fixed } else { &mut out.moving };
                 list.push(out.targets.len() as u32);
@@ -123,7 +123,7 @@ impl RayTargets {
                     instance: index as u32,
                     mask_id: instance.mask_id,
                     visible: instance.visible,
-                    solid,
+                    geometry: solid,
                     sphere,
                 });
             }
@@ -166,30 +166,30 @@ impl RayTargets {
     }
 
     /// A target at a pose; `None` if the pose is not finite or the target is invisible.
-    fn place(&self, index: u32, pose: PoseF64) -> Option<Placed> {
+    fn place(&self, index: u32, pose: PoseF64) -> Option<PlacedTarget> {
         let target = &self.targets[index as usize];
         if !pose.is_finite() || !target.visible {
             return None;
         }
         let (middle, radius) = target.sphere.map_or(([0.0; 3], f64::INFINITY), |(m, r)| (pose.apply(m), r));
-        Some(Placed { target: index, world_from_target: pose, middle, radius })
+        Some(PlacedTarget { target: index, world_from_target: pose, center: middle, radius })
     }
 }
 
-impl FixedWorld {
+impl FixedTargets {
     /// Places the fixed targets at their poses (world from target), one pose per instance of the scene.
     pub fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
-        let placed: Vec<Placed> =
+        let placed: Vec<PlacedTarget> =
             targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();
         let (mut in_tree, mut one_by_one): (Vec<u32>, Vec<u32>) =
             (0..placed.len() as u32).partition(|&k| placed[k as usize].radius < f64::from(f32::MAX));
-        if in_tree.len() <= FEW {
+        if in_tree.len() <= MAX_LINEAR_TARGETS {
             one_by_one.append(&mut in_tree);
-            return Self { placed, tree: None, one_by_one };
+            return Self { placed, bvh: None, unindexed: one_by_one };
         }
         let (bvh, order) = Bvh::build(in_tree.iter().map(|&k| targets.world_box(&placed[k as usize])));
         let order = order.into_iter().map(|i| in_tree[i as usize]).collect();
-        Self { placed, tree: Some((bvh, order)), one_by_one }
+        Self { placed, bvh: Some((bvh, order)), unindexed: one_by_one }
     }
 
     /// True if the fixed targets are still at the poses that this was built for.
@@ -207,12 +207,12 @@ impl FixedWorld {
 
 impl RayTargets {
     /// Bounding box of a target in the world, rounded outward.
-    fn world_box(&self, placed: &Placed) -> [[f32; 3]; 2] {
-        let [lo, hi] = self.targets[placed.target as usize].solid.bounds().unwrap_or([[0.0; 3]; 2]);
+    fn world_box(&self, placed: &PlacedTarget) -> [[f32; 3]; 2] {
+        let [lo, hi] = self.targets[placed.target as usize].geometry.bounds().unwrap_or([[0.0; 3]; 2]);
         let (middle, half) = ([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])), [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k])));
         let pose = &placed.world_from_target;
         let at = pose.apply(middle);
-        let reach = pose.rotation.map(|r| LARGER * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
+        let reach = pose.rotation.map(|r| BOUNDS_SCALE * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
         [
             [0, 1, 2].map(|k| ((at[k] - reach[k]) as f32).next_down()),
             [0, 1, 2].map(|k| ((at[k] + reach[k]) as f32).next_up()),
@@ -223,18 +223,18 @@ impl RayTargets {
 impl RayWorld {
     /// Creates a ray caster without placed targets.
     pub fn new(targets: &Arc<RayTargets>) -> Self {
-        Self::with_level(targets, Level::best())
+        Self::with_level(targets, SimdLevel::best())
     }
 
-    pub(crate) fn with_level(targets: &Arc<RayTargets>, level: Level) -> Self {
+    pub(crate) fn with_level(targets: &Arc<RayTargets>, level: SimdLevel) -> Self {
         Self {
             targets: Arc::clone(targets),
-            fixed: Arc::new(FixedWorld::default()),
+            fixed: Arc::new(FixedTargets::default()),
             moving: Vec::with_capacity(targets.moving.len()),
             level,
             packets: Vec::new(),
-            outer: Stack::default(),
-            inner: Stack::default(),
+            outer: TraversalStack::default(),
+            inner: TraversalStack::default(),
         }
     }
 
@@ -253,7 +253,7 @@ impl RayWorld {
     pub fn place(&mut self, poses: &[PoseF64]) {
         assert!(poses.len() >= self.targets.instances, "poses of another scene");
         if !self.fixed.is_at(&self.targets, poses) {
-            self.fixed = Arc::new(FixedWorld::new(&self.targets, poses));
+            self.fixed = Arc::new(FixedTargets::new(&self.targets, poses));
         }
         let targets = Arc::clone(&self.targets);
         self.place_moving(targets.moving_poses(poses));
@@ -261,7 +261,7 @@ impl RayWorld {
 
     /// Places other targets, with the fixed ones already prepared and the poses of the moving ones as in
     /// [`RayTargets::moving_poses`].
-    pub fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedWorld>, moving: &[PoseF64]) {
+    pub fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedTargets>, moving: &[PoseF64]) {
         if !Arc::ptr_eq(&self.targets, targets) {
             self.targets = Arc::clone(targets);
         }
@@ -297,47 +297,47 @@ impl RayWorld {
         let bundle = s.vectorize(
             #[inline(always)]
             || {
-                packets.extend(rays.chunks(WIDTH).map(|rays| Packet::of(rays, max_distance)));
-                Bundle::around(s, packets, max_distance)
+                packets.extend(rays.chunks(WIDTH).map(|rays| Packet::from_rays(rays, max_distance)));
+                RayBounds::enclosing(s, packets, max_distance)
             },
         );
-        let single = fixed.one_by_one.iter().map(|&k| &fixed.placed[k as usize]);
-        for placed in single.chain(moving.iter()).filter(|placed| bundle.may_meet(placed)) {
-            meet(s, targets, placed, packets, hits, inner);
+        let single = fixed.unindexed.iter().map(|&k| &fixed.placed[k as usize]);
+        for placed in single.chain(moving.iter()).filter(|placed| bundle.may_intersect(placed)) {
+            cast_target(s, targets, placed, packets, hits, inner);
         }
         for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
-            fixed.meet_tree(s, targets, packet, hits, [&mut *outer, &mut *inner]);
+            fixed.cast_bvh(s, targets, packet, hits, [&mut *outer, &mut *inner]);
         }
     }
 }
 
-impl FixedWorld {
+impl FixedTargets {
     /// Casts the rays of a packet against the BVH; keeps hits that are nearer than those in `hits`.
-    fn meet_tree<S: Simd>(
+    fn cast_bvh<S: Simd>(
         &self,
         s: S,
         targets: &RayTargets,
         packet: &mut Packet,
         hits: &mut [RayHit],
-        [outer, inner]: [&mut Stack; 2],
+        [outer, inner]: [&mut TraversalStack; 2],
     ) {
-        let Some((bvh, order)) = &self.tree else { return };
+        let Some((bvh, order)) = &self.bvh else { return };
         let mut leaf = |leaf: Range<usize>, packet: &mut Packet| {
             for &k in &order[leaf] {
-                meet(s, targets, &self.placed[k as usize], std::slice::from_mut(packet), hits, inner);
+                cast_target(s, targets, &self.placed[k as usize], std::slice::from_mut(packet), hits, inner);
             }
         };
         s.vectorize(
             #[inline(always)]
             || {
                 let limits = packet.limits(s);
-                if let Some(shear) = ShearPacket::new(s, packet)
-                    && let Some(beam) = Beam::around(s, packet, &shear, bvh)
+                if let Some(shear) = ShearedPacket::new(s, packet)
+                    && let Some(beam) = Beam::enclosing(s, packet, &shear, bvh)
                 {
-                    let walked = bvh.walk_beam(
+                    let walked = bvh.traverse_beam(
                         &beam,
                         limits,
-                        BUDGET,
+                        MAX_PACKET_TARGETS,
                         outer,
                         #[inline(always)]
                         |things| {
@@ -345,13 +345,13 @@ impl FixedWorld {
                             Some(packet.limits(s))
                         },
                     );
-                    if walked == Walked::All {
+                    if walked == Traversal::Complete {
                         return;
                     }
                 }
-                for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-                    let mut one = packet.only(k);
-                    bvh.walk(&packet.ray(k), packet.limit(k), outer, |things, _| {
+                for k in (0..WIDTH).filter(|&k| packet.is_active(k)) {
+                    let mut one = packet.single(k);
+                    bvh.traverse(&packet.ray(k), packet.limit(k), outer, |things, _| {
                         leaf(things, &mut one);
                         one.limit(k)
                     });
@@ -364,30 +364,30 @@ impl FixedWorld {
 /// Casts all packets against one target; keeps hits that are nearer than those in `hits`. Compiled once for each
 /// instruction set.
 #[inline(never)]
-fn meet<S: Simd>(
+fn cast_target<S: Simd>(
     s: S,
     targets: &RayTargets,
-    placed: &Placed,
+    placed: &PlacedTarget,
     packets: &mut [Packet],
     hits: &mut [RayHit],
-    stack: &mut Stack,
+    stack: &mut TraversalStack,
 ) {
     let target = &targets.targets[placed.target as usize];
     s.vectorize(
         #[inline(always)]
-        || target.solid.with(Sweep { s, target, placed, packets, hits, stack }),
+        || target.geometry.with(CastTarget { s, target, placed, packets, hits, stack }),
     );
 }
 
 /// Bounding box of several rays.
-struct Bundle {
+struct RayBounds {
     lo: V3,
     hi: V3,
 }
 
-impl Bundle {
+impl RayBounds {
     #[inline(always)]
-    fn around<S: Simd>(s: S, packets: &[Packet], max_distance: f64) -> Self {
+    fn enclosing<S: Simd>(s: S, packets: &[Packet], max_distance: f64) -> Self {
         // Infinity times zero would be NaN.
         let far = max_distance.min(1e30);
         let (mut lo, mut hi) = ([D::splat(s, f64::INFINITY); 3], [D::splat(s, f64::NEG_INFINITY); 3]);
@@ -399,39 +399,42 @@ impl Bundle {
             }
         }
         let ([x, y, z], [a, b, c]) = (lo, hi);
-        Self { lo: [x.least(), y.least(), z.least()], hi: [a.most(), b.most(), c.most()] }
+        Self {
+            lo: [x.reduce_min(), y.reduce_min(), z.reduce_min()],
+            hi: [a.reduce_max(), b.reduce_max(), c.reduce_max()],
+        }
     }
 
     /// True if the box may meet the bounding sphere of a target.
     #[inline(always)]
-    fn may_meet(&self, placed: &Placed) -> bool {
-        (0..3).all(|k| placed.middle[k] + placed.radius >= self.lo[k] && placed.middle[k] - placed.radius <= self.hi[k])
+    fn may_intersect(&self, placed: &PlacedTarget) -> bool {
+        (0..3).all(|k| placed.center[k] + placed.radius >= self.lo[k] && placed.center[k] - placed.radius <= self.hi[k])
     }
 }
 
 /// Work of casting every ray against one target.
-struct Sweep<'a, S> {
+struct CastTarget<'a, S> {
     s: S,
     target: &'a Target,
-    placed: &'a Placed,
+    placed: &'a PlacedTarget,
     packets: &'a mut [Packet],
     hits: &'a mut [RayHit],
-    stack: &'a mut Stack,
+    stack: &'a mut TraversalStack,
 }
 
-impl<S: Simd> ForShape for Sweep<'_, S> {
+impl<S: Simd> ShapeVisitor for CastTarget<'_, S> {
     #[inline(always)]
     fn run<T: RayShape>(self, shape: &T) {
         let Self { s, target, placed, packets, hits, stack } = self;
         let pose = &placed.world_from_target;
         for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
-            let Some(local) = packet.seen_from(s, pose, placed.middle, placed.radius) else { continue };
+            let Some(local) = packet.in_local_frame(s, pose, placed.center, placed.radius) else { continue };
             let mut touches = [None; WIDTH];
-            shape.touch_packet(s, &local, stack, &mut touches);
+            shape.intersect_packet(s, &local, stack, &mut touches);
             for (k, hit) in hits.iter_mut().enumerate() {
                 if let Some(touch) = touches[k] {
-                    keep(hit, packet.ray(k).direction, target, placed, touch);
-                    packet.shorten(k, hit.distance);
+                    keep_closest(hit, packet.ray(k).direction, target, placed, touch);
+                    packet.limit_to(k, hit.distance);
                 }
             }
         }
@@ -440,7 +443,7 @@ impl<S: Simd> ForShape for Sweep<'_, S> {
 
 /// Keeps a hit that is nearer, or as near and of an earlier instance.
 #[inline(always)]
-fn keep(hit: &mut RayHit, direction: V3, target: &Target, placed: &Placed, touch: Intersection) {
+fn keep_closest(hit: &mut RayHit, direction: V3, target: &Target, placed: &PlacedTarget, touch: Intersection) {
     if touch.t < hit.distance || touch.t == hit.distance && target.instance < hit.instance {
         let normal = placed.world_from_target.rotate(touch.normal);
         let normal = if dot(normal, direction) > 0.0 { normal.map(|x| 0.0 - x) } else { normal };

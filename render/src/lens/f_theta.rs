@@ -1,7 +1,7 @@
 //! NVIDIA's f-theta lens.
 
 use super::polynomial::{derivative, first_sign_change, solve, value};
-use super::{OpticsError, Domain, LensModel, angle_up_to, finite, radial};
+use super::{OpticsError, Domain, LensModel, check_max_angle, check_finite, radial};
 use crate::intrinsics::Intrinsics;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -64,7 +64,7 @@ impl LensModel for FTheta {
 
     fn validate(&self) -> Result<(), OpticsError> {
         let [a, b, c, d, e, f] = self.polynomial;
-        finite(&[("a", a), ("b", b), ("c", c), ("d", d), ("e", e), ("f", f)])?;
+        check_finite(&[("a", a), ("b", b), ("c", c), ("d", d), ("e", e), ("f", f)])?;
         if a != 0.0 {
             return Err(OpticsError::Lens { what: "a", value: a, allowed: "0: the optical axis is at r = 0" });
         }
@@ -76,7 +76,7 @@ impl LensModel for FTheta {
             let allowed = "positive and finite";
             return Err(OpticsError::Lens { what: "focal_length", value: focal_length, allowed });
         }
-        angle_up_to(self.max_angle, PI, "above 0, at most pi")
+        check_max_angle(self.max_angle, PI, "above 0, at most pi")
     }
 
     fn domain(&self) -> Domain {

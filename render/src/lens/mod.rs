@@ -14,13 +14,13 @@ pub mod rays;
 mod rows;
 
 use super::optics_error::OpticsError;
-use kinetoscope_scene::pattern::{UnknownName, closest};
+use kinetoscope_scene::pattern::{UnknownName, closest_names};
 pub use model::{Domain, LensModel};
-use model::{angle_up_to, finite};
+use model::{check_finite, check_max_angle};
 pub use optics::Optics;
 pub use rays::LensRays;
-pub(crate) use rays::Sight;
-pub use rows::RaysOfRows;
+pub(crate) use rays::ViewCone;
+pub use rows::LensRayTables;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
@@ -64,7 +64,7 @@ macro_rules! lenses {
                     return Ok(Self::$Name($Name::default()));
                 })*
                 let all = [$($Name::NAME),*].into_iter().chain([$($Name::ALIASES),*].into_iter().flatten().copied());
-                let candidates = closest(name, all).into_iter().map(String::from).collect();
+                let candidates = closest_names(name, all).into_iter().map(String::from).collect();
                 Err(UnknownName { what: "lens", name: name.into(), candidates })
             }
 
@@ -105,7 +105,7 @@ macro_rules! lenses {
                         lens: self.name(),
                         angle: domain.angle,
                         radius: domain.radius,
-                        wanted: format!("it is to see {:.2} degrees (max_angle)", wanted.to_degrees()),
+                        requirement: format!("it is to see {:.2} degrees (max_angle)", wanted.to_degrees()),
                     }),
                     _ => Ok(domain),
                 }
@@ -128,7 +128,7 @@ macro_rules! lenses {
             }
         }
 
-        impl<'de> Visitor<'de> for InFile {
+        impl<'de> Visitor<'de> for LensVisitor {
             type Value = Lens;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -177,11 +177,11 @@ lenses! {
 }
 
 /// Deserializes a lens from a name or a table.
-struct InFile;
+struct LensVisitor;
 
 impl<'de> Deserialize<'de> for Lens {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(InFile)
+        deserializer.deserialize_any(LensVisitor)
     }
 }
 

@@ -62,7 +62,7 @@ pub trait LensModel: Copy + Default {
 }
 
 /// Checks that numbers are finite.
-pub(super) fn finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError> {
+pub(super) fn check_finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError> {
     match numbers.iter().find(|(_, value)| !value.is_finite()) {
         Some(&(what, value)) => Err(OpticsError::Lens { what, value, allowed: "finite" }),
         None => Ok(()),
@@ -70,7 +70,7 @@ pub(super) fn finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError>
 }
 
 /// Checks the largest angle of a lens.
-pub(super) fn angle_up_to(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
+pub(super) fn check_max_angle(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
     if max_angle > 0.0 && max_angle <= most {
         return Ok(());
     }

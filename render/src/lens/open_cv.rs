@@ -2,17 +2,17 @@
 
 use super::poles::{Fraction, Poles};
 use super::polynomial::bisect;
-use super::{OpticsError, Domain, LensModel, angle_up_to, finite};
+use super::{OpticsError, Domain, LensModel, check_max_angle, check_finite};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Largest visible angle from the optical axis \[rad\] (89.9 degrees) if no smaller angle is set.
-pub(super) const MOST: f64 = 1.569_051;
+pub(super) const MAX_ANGLE: f64 = 1.569_051;
 /// Number of angles and directions at which the distortion is checked for folding back.
 const ANGLES: usize = 1024;
 const DIRECTIONS: usize = 64;
 /// Continuation steps from the optical axis to a point, used if Newton's method fails at once.
-const PARTS: usize = 32;
+const CONTINUATION_STEPS: usize = 32;
 
 /// A pinhole with OpenCV's distortion: with (x, y) = (X / Z, Y / Z) and r² = x² + y² the normalized image has
 ///
@@ -101,7 +101,7 @@ impl OpenCv {
 
     /// Factor g of the radial distortion.
     fn fraction(&self) -> Fraction {
-        Fraction { above: [1.0, self.k1, self.k2, self.k3], below: [1.0, self.k4, self.k5, self.k6] }
+        Fraction { numerator: [1.0, self.k1, self.k2, self.k3], denominator: [1.0, self.k4, self.k5, self.k6] }
     }
 
     fn distort(&self, poles: &Poles, [x, y]: [f64; 2]) -> Distorted {
@@ -130,7 +130,7 @@ impl OpenCv {
     }
 
     /// Angle \[rad\] up to which the mapping is regular in a direction; `None` if that is at least `most`.
-    fn fold(&self, poles: &Poles, [c, s]: [f64; 2], most: f64) -> Option<f64> {
+    fn fold_angle(&self, poles: &Poles, [c, s]: [f64; 2], most: f64) -> Option<f64> {
         let end = poles.end.map(|end| end.angle).filter(|end| *end < most);
         let last = end.unwrap_or(most);
         // An angle that ends at a pole is regular up to there.
@@ -146,7 +146,7 @@ impl OpenCv {
     }
 
     /// True if an undistorted point belongs to the lens: in its domain, or in a direction that folds back later.
-    fn sees(&self, domain: &Domain, [x, y]: [f64; 2]) -> bool {
+    fn contains(&self, domain: &Domain, [x, y]: [f64; 2]) -> bool {
         let r = x.hypot(y);
         if r <= domain.angle.tan() {
             return true;
@@ -155,8 +155,8 @@ impl OpenCv {
         // A rotationally symmetric distortion folds back at the same angle in all directions.
         domain.folds
             && !self.is_radial()
-            && angle <= self.max_angle.unwrap_or(MOST)
-            && self.fold(&domain.poles, [x / r, y / r], angle).is_none()
+            && angle <= self.max_angle.unwrap_or(MAX_ANGLE)
+            && self.fold_angle(&domain.poles, [x / r, y / r], angle).is_none()
     }
 
     /// Finds the point that is distorted to `target` by Newton's method from a nearby start.
@@ -204,11 +204,11 @@ impl OpenCv {
     /// is used.
     fn undistort(&self, domain: &Domain, target: [f64; 2]) -> Option<[f64; 2]> {
         let from = |target: [f64; 2], start: [f64; 2]| {
-            self.undistort_from(&domain.poles, target, start).filter(|point| self.sees(domain, *point))
+            self.undistort_from(&domain.poles, target, start).filter(|point| self.contains(domain, *point))
         };
         from(target, target).or_else(|| {
-            (1..=PARTS).try_fold([0.0; 2], |near, k| {
-                let part = k as f64 / PARTS as f64;
+            (1..=CONTINUATION_STEPS).try_fold([0.0; 2], |near, k| {
+                let part = k as f64 / CONTINUATION_STEPS as f64;
                 from(target.map(|x| x * part), near)
             })
         })
@@ -232,21 +232,21 @@ impl LensModel for OpenCv {
     fn validate(&self) -> Result<(), OpticsError> {
         const NAMES: [&str; 12] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
         let all = self.coefficients();
-        finite(&std::array::from_fn::<_, 12, _>(|k| (NAMES[k], all[k])))?;
-        self.max_angle.map_or(Ok(()), |angle| angle_up_to(angle, MOST, "above 0, at most 1.569 (89.9 degrees)"))
+        check_finite(&std::array::from_fn::<_, 12, _>(|k| (NAMES[k], all[k])))?;
+        self.max_angle.map_or(Ok(()), |angle| check_max_angle(angle, MAX_ANGLE, "above 0, at most 1.569 (89.9 degrees)"))
     }
 
     fn domain(&self) -> Domain {
-        let most = self.max_angle.unwrap_or(MOST);
-        let poles = Poles::of(&self.fraction(), most);
+        let most = self.max_angle.unwrap_or(MAX_ANGLE);
+        let poles = Poles::find(&self.fraction(), most);
         let count = if self.is_radial() { 1 } else { DIRECTIONS };
         let folds = (0..count).filter_map(|k| {
             let (s, c) = (TAU * k as f64 / count as f64).sin_cos();
-            Some((self.fold(&poles, [c, s], most)?, [c, s]))
+            Some((self.fold_angle(&poles, [c, s], most)?, [c, s]))
         });
         let first = folds.min_by(|(a, _), (b, _)| a.total_cmp(b));
         let (angle, [c, s]) = first.unwrap_or((most, [1.0, 0.0]));
-        let endless = poles.end.is_some_and(|end| end.endless && end.angle == angle);
+        let endless = poles.end.is_some_and(|end| end.unbounded && end.angle == angle);
         let [x, y] = self.distort(&poles, [c * angle.tan(), s * angle.tan()]).point;
         let radius = if endless { f64::INFINITY } else { x.hypot(y) };
         Domain { poles, ..Domain::new(angle, radius, first.is_some()) }
@@ -257,7 +257,7 @@ impl LensModel for OpenCv {
             return None;
         }
         let point = [x / z, y / z];
-        self.sees(domain, point).then(|| self.distort(&domain.poles, point).point)
+        self.contains(domain, point).then(|| self.distort(&domain.poles, point).point)
     }
 
     fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]> {

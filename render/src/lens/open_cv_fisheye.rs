@@ -1,7 +1,7 @@
 //! OpenCV's fisheye lens.
 
 use super::polynomial::{first_sign_change, solve, value};
-use super::{OpticsError, Domain, LensModel, angle_up_to, finite, radial};
+use super::{OpticsError, Domain, LensModel, check_max_angle, check_finite, radial};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -48,8 +48,8 @@ impl LensModel for OpenCvFisheye {
     }
 
     fn validate(&self) -> Result<(), OpticsError> {
-        finite(&[("k1", self.k1), ("k2", self.k2), ("k3", self.k3), ("k4", self.k4)])?;
-        self.max_angle.map_or(Ok(()), |angle| angle_up_to(angle, PI, "above 0, at most pi"))
+        check_finite(&[("k1", self.k1), ("k2", self.k2), ("k3", self.k3), ("k4", self.k4)])?;
+        self.max_angle.map_or(Ok(()), |angle| check_max_angle(angle, PI, "above 0, at most pi"))
     }
 
     fn domain(&self) -> Domain {

@@ -99,15 +99,15 @@ impl Optics {
     fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
         const NEAR_THE_AXIS: f64 = 1e-4;
         let [x, y] = self.lens.project(&self.domain, [NEAR_THE_AXIS, 0.0, 1.0])?;
-        let apart = 1e-7 * x.hypot(y) / NEAR_THE_AXIS;
+        let step = 1e-7 * x.hypot(y) / NEAR_THE_AXIS;
         // At the edge of the domain both neighbors of a point may be outside; a point slightly farther in is used.
-        self.solid_angle_by(point, apart).or_else(|| {
-            let inwards = 1.0 - apart / point[0].hypot(point[1]);
-            self.solid_angle_by(point.map(|x| inwards * x), apart)
+        self.solid_angle_with_step(point, step).or_else(|| {
+            let inwards = 1.0 - step / point[0].hypot(point[1]);
+            self.solid_angle_with_step(point.map(|x| inwards * x), step)
         })
     }
 
-    fn solid_angle_by(&self, point: [f64; 2], apart: f64) -> Option<f64> {
+    fn solid_angle_with_step(&self, point: [f64; 2], apart: f64) -> Option<f64> {
         let here = self.unit(point)?;
         let slope = |axis: usize| {
             let beside = |by: f64| {

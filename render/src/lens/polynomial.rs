@@ -1,7 +1,7 @@
 //! Polynomials of one variable, lowest coefficient first.
 
 /// Bisection steps: enough to reach adjacent numbers.
-const HALVINGS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 /// Value at x.
 pub(super) fn value(coefficients: &[f64], x: f64) -> f64 {
@@ -40,7 +40,7 @@ pub(super) fn first_sign_change(coefficients: &[f64], limit: f64) -> Option<f64>
 /// Bisects a predicate that holds at `from` and not at `to`; returns the last number found where it holds.
 pub(super) fn bisect(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut yes, mut no) = (from, to);
-    for _ in 0..HALVINGS {
+    for _ in 0..MAX_STEPS {
         let middle = 0.5 * (yes + no);
         if middle == yes || middle == no {
             break;
@@ -55,7 +55,7 @@ pub(super) fn bisect(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
 pub(super) fn solve(target: f64, from: f64, to: f64, start: f64, at: impl Fn(f64) -> (f64, f64)) -> f64 {
     let (mut low, mut high) = (from, to);
     let mut x = start.clamp(low, high);
-    for _ in 0..HALVINGS {
+    for _ in 0..MAX_STEPS {
         let (value, slope) = at(x);
         let error = value - target;
         if error > 0.0 {

@@ -61,7 +61,7 @@ macro_rules! fisheye {
             }
 
             fn validate(&self) -> Result<(), super::OpticsError> {
-                super::angle_up_to(self.max_angle, $most, $allowed)
+                super::check_max_angle(self.max_angle, $most, $allowed)
             }
 
             fn domain(&self) -> super::Domain {

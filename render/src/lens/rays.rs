@@ -8,11 +8,11 @@ use std::fmt;
 use std::sync::OnceLock;
 
 /// Numbers of a group: x, y, z of two rows of eight pixels.
-const GROUP: usize = 3 * LANES;
+const GROUP_FLOATS: usize = 3 * LANES;
 /// Widening of cones \[rad\]: more than the error of single precision.
-const WIDER: f64 = 1e-5;
+const CONE_MARGIN: f64 = 1e-5;
 
-/// Precomputed rays of an image through a lens, single precision; see [`Shot::lens`](crate::request::Shot::lens).
+/// Precomputed rays of an image through a lens, single precision; see [`RenderRequest::lens`](crate::request::RenderRequest::lens).
 ///
 /// The table takes 12 bytes per pixel, 60 with four color samples, and 4 more with vignetting. It is computed once:
 /// cameras keep one for each combination of lens and intrinsics among their environments.
@@ -28,7 +28,7 @@ pub struct LensRays {
     /// Bounding cone of the rays of each block of 8 x 8 pixels, row by row.
     cones: Vec<Cone>,
     /// Mean distance between the stored directions of neighboring pixels.
-    pixel: f64,
+    pixel_spacing: f64,
     /// Relative illumination of each pixel, row by row, computed on first use; see [`Optics::falloff`].
     falloff: OnceLock<Vec<f32>>,
 }
@@ -44,11 +44,11 @@ struct Cone {
 
 /// Cone of directions in which the camera sees a ball.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Sight {
+pub(crate) enum ViewCone {
     /// All directions: the camera is inside the ball.
-    Everywhere,
+    All,
     /// Directions around an axis.
-    Around {
+    Cone {
         /// Unit direction of the ball's center.
         axis: [f64; 3],
         /// Cosine of half the angle.
@@ -58,15 +58,15 @@ pub(crate) enum Sight {
     },
 }
 
-impl Sight {
+impl ViewCone {
     /// The cone of a ball around a point of the optical frame \[m\].
-    pub(crate) fn of_ball(middle: [f64; 3], radius: f64) -> Self {
+    pub(crate) fn of_sphere(middle: [f64; 3], radius: f64) -> Self {
         let far = dot(middle, middle).sqrt();
-        let sine = radius / far + WIDER;
+        let sine = radius / far + CONE_MARGIN;
         if sine >= 1.0 || sine.is_nan() {
-            return Self::Everywhere;
+            return Self::All;
         }
-        Self::Around { axis: middle.map(|x| x / far), cosine: (1.0 - sine * sine).sqrt(), sine }
+        Self::Cone { axis: middle.map(|x| x / far), cosine: (1.0 - sine * sine).sqrt(), sine }
     }
 }
 
@@ -77,7 +77,7 @@ impl LensRays {
     /// # Errors
     ///
     /// [`OpticsError::LensFolds`] if pixels lie where the mapping of the lens cannot be inverted, and
-    /// [`OpticsError::LensBlind`] if no pixel lies in the lens's domain.
+    /// [`OpticsError::NoVisiblePixel`] if no pixel lies in the lens's domain.
     pub fn new(optics: &Optics, [width, height]: [usize; 2], samples: u8) -> Result<Self, OpticsError> {
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
         let blocks = [width.div_ceil(BLOCK), height.div_ceil(BLOCK)];
@@ -85,9 +85,9 @@ impl LensRays {
             optics: *optics,
             size: [width, height],
             planes,
-            directions: vec![0.0; planes * blocks[0] * blocks[1] * (BLOCK / 2) * GROUP],
+            directions: vec![0.0; planes * blocks[0] * blocks[1] * (BLOCK / 2) * GROUP_FLOATS],
             cones: Vec::with_capacity(blocks[0] * blocks[1]),
-            pixel: 0.0,
+            pixel_spacing: 0.0,
             falloff: OnceLock::new(),
         };
         for (plane, offset) in SAMPLES.iter().enumerate().take(planes) {
@@ -97,7 +97,7 @@ impl LensRays {
                     let at = [x as f64 + dx, y as f64 + dy];
                     match optics.ray(at) {
                         Some(direction) => rays.set(plane, [x, y], direction.map(|c| c as f32)),
-                        None => not_folded(optics, at)?,
+                        None => check_not_folded(optics, at)?,
                     }
                 }
             }
@@ -108,7 +108,8 @@ impl LensRays {
                 rays.cones.push(cone);
             }
         }
-        rays.pixel = rays.spacing().ok_or_else(|| OpticsError::LensBlind { lens: optics.lens().name() })?;
+        rays.pixel_spacing =
+            rays.spacing().ok_or_else(|| OpticsError::NoVisiblePixel { lens: optics.lens().name() })?;
         Ok(rays)
     }
 
@@ -134,10 +135,10 @@ impl LensRays {
     }
 
     /// Memory of the rays of an image \[bytes\], before allocation.
-    pub(crate) fn bytes_of([width, height]: [usize; 2], samples: u8) -> usize {
+    pub(crate) fn table_bytes([width, height]: [usize; 2], samples: u8) -> usize {
         let blocks = width.div_ceil(BLOCK).saturating_mul(height.div_ceil(BLOCK));
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
-        let of_block = planes * BLOCK / 2 * GROUP + BLOCK * BLOCK;
+        let of_block = planes * BLOCK / 2 * GROUP_FLOATS + BLOCK * BLOCK;
         blocks.saturating_mul(size_of::<Cone>() + of_block * size_of::<f32>())
     }
 
@@ -147,20 +148,20 @@ impl LensRays {
     }
 
     /// Mean distance between the stored directions of neighboring pixels.
-    pub(crate) fn pixel(&self) -> f64 {
-        self.pixel
+    pub(crate) fn pixel_spacing(&self) -> f64 {
+        self.pixel_spacing
     }
 
     /// Start of the group of a pixel, and the pixel's lane.
     #[inline(always)]
-    fn place(&self, plane: usize, [x, y]: [usize; 2]) -> (usize, usize) {
+    fn group_index(&self, plane: usize, [x, y]: [usize; 2]) -> (usize, usize) {
         let wide = self.size[0].div_ceil(BLOCK);
         let pairs = self.size[1].div_ceil(BLOCK) * (BLOCK / 2);
-        (((plane * pairs + y / 2) * wide + x / BLOCK) * GROUP, y % 2 * BLOCK + x % BLOCK)
+        (((plane * pairs + y / 2) * wide + x / BLOCK) * GROUP_FLOATS, y % 2 * BLOCK + x % BLOCK)
     }
 
     fn set(&mut self, plane: usize, at: [usize; 2], direction: [f32; 3]) {
-        let (group, lane) = self.place(plane, at);
+        let (group, lane) = self.group_index(plane, at);
         for (axis, x) in direction.into_iter().enumerate() {
             self.directions[group + axis * LANES + lane] = x;
         }
@@ -169,7 +170,7 @@ impl LensRays {
     /// Ray of a sample in the optical frame; 0 if the sample has no ray.
     #[inline(always)]
     pub fn direction(&self, plane: usize, at: [usize; 2]) -> [f32; 3] {
-        let (group, lane) = self.place(plane, at);
+        let (group, lane) = self.group_index(plane, at);
         [0, 1, 2].map(|axis| self.directions[group + axis * LANES + lane])
     }
 
@@ -186,14 +187,14 @@ impl LensRays {
 
     /// Rays through the centers of 8 x 2 pixels, the first of which is given.
     #[inline(always)]
-    pub(crate) fn of_pixels<S: Simd>(&self, s: S, at: [usize; 2]) -> V3<S> {
-        let group = &self.directions[self.place(0, at).0..];
+    pub(crate) fn at_pixels<S: Simd>(&self, s: S, at: [usize; 2]) -> V3<S> {
+        let group = &self.directions[self.group_index(0, at).0..];
         V3 { x: load(s, group), y: load(s, &group[LANES..]), z: load(s, &group[2 * LANES..]) }
     }
 
     /// Rays of sixteen points, each of which is a sample of a pixel.
     #[inline(always)]
-    pub(crate) fn of_points<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
+    pub(crate) fn at_points<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
         let (u, v): ([f32; LANES], [f32; LANES]) = (u.array(), v.array());
         let mut out = [[0.0f32; LANES]; 3];
         for lane in 0..LANES {
@@ -212,12 +213,12 @@ impl LensRays {
 
     /// True if a block of 8 x 8 pixels, given in blocks, may see a ball.
     #[inline(always)]
-    pub(crate) fn may_see(&self, [bx, by]: [usize; 2], sight: &Sight) -> bool {
+    pub(crate) fn may_contain(&self, [bx, by]: [usize; 2], sight: &ViewCone) -> bool {
         let cone = &self.cones[by * self.size[0].div_ceil(BLOCK) + bx];
         if cone.cosine > 1.0 {
             return false;
         }
-        let Sight::Around { axis, cosine, sine } = sight else { return true };
+        let ViewCone::Cone { axis, cosine, sine } = sight else { return true };
         // Compares the angle between the axes with the sum of both angles, which may exceed half a turn.
         let (sum_cosine, sum_sine) = (cone.cosine * cosine - cone.sine * sine, cone.sine * cosine + cone.cosine * sine);
         sum_sine <= 0.0 || dot(cone.axis, *axis) >= sum_cosine
@@ -237,7 +238,7 @@ impl LensRays {
             let chord = [0, 1, 2].map(|k| ray[k] - axis[k]);
             2.0 * (0.5 * dot(chord, chord).sqrt()).min(1.0).asin()
         };
-        let angle = (rays.map(apart).fold(0.0f64, f64::max) + WIDER).min(std::f64::consts::PI);
+        let angle = (rays.map(apart).fold(0.0f64, f64::max) + CONE_MARGIN).min(std::f64::consts::PI);
         Cone { axis, cosine: angle.cos(), sine: angle.sin().max(0.0) }
     }
 
@@ -274,20 +275,25 @@ impl LensRays {
 }
 
 /// Returns an error if the pixel has no ray because the mapping folds back.
-fn not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
+fn check_not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
     let (domain, f) = (optics.domain(), optics.pixels());
     if !domain.folds {
         return Ok(());
     }
     let reach = ((u - f.cx) / f.fx).hypot((v - f.cy) / f.fy);
     let wanted = format!("pixel ({u:.1}, {v:.1}) is at radius {reach:.4}");
-    Err(OpticsError::LensFolds { lens: optics.lens().name(), angle: domain.angle, radius: domain.radius, wanted })
+    Err(OpticsError::LensFolds {
+        lens: optics.lens().name(),
+        angle: domain.angle,
+        radius: domain.radius,
+        requirement: wanted,
+    })
 }
 
 /// All other fields follow from these.
 impl PartialEq for LensRays {
     fn eq(&self, other: &Self) -> bool {
-        let Self { optics, size, planes, directions, cones: _, pixel: _, falloff: _ } = self;
+        let Self { optics, size, planes, directions, cones: _, pixel_spacing: _, falloff: _ } = self;
         (optics, size, planes) == (&other.optics, &other.size, &other.planes) && *directions == other.directions
     }
 }
@@ -314,7 +320,7 @@ mod tests {
     use crate::intrinsics::PixelIntrinsics;
     use crate::lens::Equidistant;
     use crate::raster::tile::SAMPLES;
-    use crate::simd::{at_level, levels, load};
+    use crate::simd::{all_levels, at_level, load};
 
     /// Rays in lanes equal those of the optics, to the bit, at every SIMD level.
     #[test]
@@ -325,9 +331,9 @@ mod tests {
         for offset in SAMPLES {
             let at = [31.5 + offset[0] as f32 / 256.0, 17.5 + offset[1] as f32 / 256.0];
             let expected = optics.ray(at.map(f64::from)).unwrap().map(|x| x as f32);
-            for level in levels() {
+            for level in all_levels() {
                 let found = at_level!(level, s => {
-                    let found = rays.of_points(s, load(s, &[at[0]; 16]), load(s, &[at[1]; 16]));
+                    let found = rays.at_points(s, load(s, &[at[0]; 16]), load(s, &[at[1]; 16]));
                     [found.x, found.y, found.z].map(|x| x.array()[7])
                 });
                 assert_eq!(found, expected);

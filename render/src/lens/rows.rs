@@ -10,16 +10,16 @@ const MAX_BYTES: usize = 16 << 30;
 
 /// Lens and rays of all views (rows) of a camera. A pinhole has no rays.
 #[derive(Clone, Debug)]
-pub struct RaysOfRows {
+pub struct LensRayTables {
     lens: Lens,
     size: [usize; 2],
     samples: u8,
     /// Rays of the configured intrinsics, and of those that were set later.
-    known: Vec<Arc<LensRays>>,
+    tables: Vec<Arc<LensRays>>,
     rows: Vec<Option<Arc<LensRays>>>,
 }
 
-impl RaysOfRows {
+impl LensRayTables {
     /// Computes the rays of a lens with the same intrinsics in every row.
     pub fn new(
         lens: Lens,
@@ -28,9 +28,9 @@ impl RaysOfRows {
         samples: u8,
         rows: usize,
     ) -> Result<Self, OpticsError> {
-        let mut all = Self { lens, size, samples, known: Vec::new(), rows: vec![None; rows] };
-        all.known = all.make(std::slice::from_ref(pixels))?;
-        let first = all.known.first().cloned();
+        let mut all = Self { lens, size, samples, tables: Vec::new(), rows: vec![None; rows] };
+        all.tables = all.compute(std::slice::from_ref(pixels))?;
+        let first = all.tables.first().cloned();
         all.rows.fill(first);
         Ok(all)
     }
@@ -57,7 +57,7 @@ impl RaysOfRows {
     }
 
     /// Computes the rays of several intrinsics, once for equal ones; empty for a pinhole.
-    pub fn make(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
+    pub fn compute(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
         if self.lens.is_pinhole() {
             self.lens.domain()?;
             return Ok(Vec::new());
@@ -67,11 +67,11 @@ impl RaysOfRows {
             if made.iter().any(|rays| rays.optics().pixels() == *pixels) {
                 continue;
             }
-            if let Some(known) = self.known.iter().find(|rays| rays.optics().pixels() == *pixels) {
+            if let Some(known) = self.tables.iter().find(|rays| rays.optics().pixels() == *pixels) {
                 made.push(Arc::clone(known));
                 continue;
             }
-            let bytes = LensRays::bytes_of(self.size, self.samples).saturating_mul(made.len() + 1);
+            let bytes = LensRays::table_bytes(self.size, self.samples).saturating_mul(made.len() + 1);
             let granted = bytes <= MAX_BYTES && Vec::<u8>::new().try_reserve_exact(bytes).is_ok();
             if !granted {
                 return Err(OpticsError::LensMemory { tables: made.len() + 1, bytes, limit: MAX_BYTES });
@@ -88,23 +88,23 @@ impl RaysOfRows {
             return;
         }
         for rays in made {
-            if !self.known.iter().any(|known| Arc::ptr_eq(known, &rays)) {
-                self.known.push(rays);
+            if !self.tables.iter().any(|known| Arc::ptr_eq(known, &rays)) {
+                self.tables.push(rays);
             }
         }
         for &row in rows {
             let pixels = pixels(row);
-            let rays = self.known.iter().find(|rays| rays.optics().pixels() == pixels);
+            let rays = self.tables.iter().find(|rays| rays.optics().pixels() == pixels);
             self.rows[row] = rays.cloned();
         }
-        self.forget();
+        self.drop_unused();
     }
 
     /// Drops the rays without users, except for those of the configured intrinsics.
-    pub fn forget(&mut self) {
+    pub fn drop_unused(&mut self) {
         // Rays in use are referenced by a row or elsewhere too. The first ones are the configured ones.
         let mut number = 0;
-        self.known.retain(|rays| {
+        self.tables.retain(|rays| {
             number += 1;
             number == 1 || Arc::strong_count(rays) > 1
         });
@@ -112,6 +112,6 @@ impl RaysOfRows {
 
     /// Memory held \[bytes\].
     pub fn bytes(&self) -> usize {
-        self.known.iter().map(|rays| rays.bytes()).sum()
+        self.tables.iter().map(|rays| rays.bytes()).sum()
     }
 }

@@ -5,8 +5,8 @@
 //! power heuristic).
 
 use super::brightness;
-use crate::trace::Tracer;
-use crate::trace::motion::NOW;
+use crate::trace::RayTracer;
+use crate::trace::motion::END_TIME;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{AreaSampling, SurfacePoint, TriangleSampling};
 use kinetoscope_scene::vector::{V3, dot, sub, to_f64};
@@ -25,30 +25,30 @@ pub(super) struct Emitters {
 #[derive(Clone, Debug)]
 pub(super) struct Emitter {
     pub(super) instance: u32,
-    surface: Surface,
+    surface: EmitterShape,
     /// Surface area \[m²\].
     area: f64,
     /// Cumulative power of all emitters up to this one, in any unit.
-    until: f64,
+    cumulative_power: f64,
     /// Probability of this emitter.
-    share: f64,
+    probability: f64,
 }
 
 /// A surface whose points can be sampled. Shapes without sampling are only hit by paths.
 #[derive(Clone, Debug)]
-enum Surface {
+enum EmitterShape {
     Closed(Shape),
     Triangles(TriangleSampling),
 }
 
-impl Surface {
-    fn of(shape: &Shape) -> Option<Self> {
+impl EmitterShape {
+    fn from_shape(shape: &Shape) -> Option<Self> {
         let triangles = shape.triangle_sampling().map(Self::Triangles);
         triangles.or_else(|| shape.area_sampling().map(|_| Self::Closed(shape.clone())))
     }
 
     /// True if the surface is that of `shape`: meshes are compared by address.
-    fn is_of(&self, shape: &Shape) -> bool {
+    fn matches(&self, shape: &Shape) -> bool {
         // Other surfaces hold no data worth keeping.
         matches!((self, shape.mesh()), (Self::Triangles(sampling), Some(mesh)) if Arc::ptr_eq(sampling.mesh(), mesh))
     }
@@ -68,18 +68,18 @@ impl Surface {
 impl Emitter {
     /// Samples a point that is visible from `from`, both in the emitter's frame, by three random numbers in 0..1.
     /// Returns the point and the pdf of its direction \[1/sr\], given this emitter.
-    pub(super) fn choose(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, f64)> {
+    pub(super) fn sample(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, f64)> {
         let (point, density) = self.surface.sampling()?.sample_from(from, side, at)?;
-        let density = density.or_else(|| self.density_by_area(from, point.position, point.normal))?;
+        let density = density.or_else(|| self.pdf_by_area(from, point.position, point.normal))?;
         Some((point, density))
     }
 
     /// Pdf of the direction from `from` to a point of the surface \[1/sr\]; `None` if the point is never sampled.
-    pub(super) fn density(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
-        self.surface.sampling()?.density_from(from).or_else(|| self.density_by_area(from, at, normal))
+    pub(super) fn pdf(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
+        self.surface.sampling()?.pdf_from(from).or_else(|| self.pdf_by_area(from, at, normal))
     }
 
-    fn density_by_area(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
+    fn pdf_by_area(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
         let to = sub(at, from);
         let (square, slant) = (dot(to, to), dot(to, normal));
         // A one-sided surface is invisible from behind.
@@ -91,35 +91,35 @@ impl Emitter {
     }
 
     /// Probability of this emitter.
-    pub(super) fn share(&self) -> f64 {
-        self.share
+    pub(super) fn probability(&self) -> f64 {
+        self.probability
     }
 }
 
 impl Emitters {
     pub(super) fn bytes(&self) -> usize {
         let sums = self.list.iter().map(|emitter| match &emitter.surface {
-            Surface::Triangles(sampling) => sampling.bytes(),
-            Surface::Closed(_) => 0,
+            EmitterShape::Triangles(sampling) => sampling.bytes(),
+            EmitterShape::Closed(_) => 0,
         });
         self.list.capacity() * size_of::<Emitter>() + sums.sum::<usize>()
     }
 
     /// Finds the emissive instances among those that rays hit.
-    pub(super) fn prepare(&mut self, scene: &RenderScene, tracer: &Tracer) {
+    pub(super) fn prepare(&mut self, scene: &RenderScene, tracer: &RayTracer) {
         let Self { list, power } = self;
         let (mut count, mut sum) = (0, 0.0);
         for (k, instance) in scene.instances().iter().enumerate() {
             let bright = brightness(to_f64(scene.linear_colors()[k])) * strength(instance);
-            if !(bright > 0.0 && bright.is_finite()) || tracer.pose_of(k as u32, NOW).is_none() {
+            if !(bright > 0.0 && bright.is_finite()) || tracer.pose_of(k as u32, END_TIME).is_none() {
                 continue;
             }
             // The cumulative areas of a mesh are kept from frame to frame.
-            let known = list.get(count).is_some_and(|e| e.instance == k as u32 && e.surface.is_of(&instance.shape));
+            let known = list.get(count).is_some_and(|e| e.instance == k as u32 && e.surface.matches(&instance.shape));
             if !known {
-                let Some(surface) = Surface::of(&instance.shape) else { continue };
+                let Some(surface) = EmitterShape::from_shape(&instance.shape) else { continue };
                 let area = surface.sampling().map_or(0.0, AreaSampling::area);
-                let emitter = Emitter { instance: k as u32, surface, area, until: 0.0, share: 0.0 };
+                let emitter = Emitter { instance: k as u32, surface, area, cumulative_power: 0.0, probability: 0.0 };
                 match list.get_mut(count) {
                     Some(other) => *other = emitter,
                     None => list.push(emitter),
@@ -131,23 +131,23 @@ impl Emitters {
                 continue;
             }
             sum += own;
-            (emitter.until, emitter.share) = (sum, own);
+            (emitter.cumulative_power, emitter.probability) = (sum, own);
             count += 1;
         }
         list.truncate(count);
-        list.iter_mut().for_each(|emitter| emitter.share /= sum);
+        list.iter_mut().for_each(|emitter| emitter.probability /= sum);
         *power = sum;
     }
 
     /// Samples an emitter in proportion to its power, by a number in 0..1; `None` without emitters.
-    pub(super) fn choose(&self, number: f64) -> Option<&Emitter> {
+    pub(super) fn sample(&self, number: f64) -> Option<&Emitter> {
         let place = number * self.power;
-        let k = self.list.partition_point(|emitter| emitter.until <= place);
+        let k = self.list.partition_point(|emitter| emitter.cumulative_power <= place);
         self.list.get(k.min(self.list.len().checked_sub(1)?))
     }
 
     /// The emitter of an instance.
-    pub(super) fn of(&self, instance: u32) -> Option<&Emitter> {
+    pub(super) fn for_instance(&self, instance: u32) -> Option<&Emitter> {
         let k = self.list.binary_search_by_key(&instance, |emitter| emitter.instance).ok()?;
         self.list.get(k)
     }

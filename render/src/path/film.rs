@@ -1,26 +1,26 @@
 //! Accumulator of path-traced images: one row of memory per row of pixels, so that threads share it.
 
-use super::smooth::Guide;
-use super::{Found, Lamps, Paths};
-use crate::geometry::bvh::Stack;
+use super::smooth::DenoiseGuide;
+use super::{PathTracer, PixelEstimate, SceneLights};
+use crate::geometry::bvh::TraversalStack;
 use crate::progress::RenderProgress;
 use crate::shade::tone::{ToneCurve, encode};
-use crate::simd::{LANES, Level, Simd, at_level, load};
+use crate::simd::{LANES, Simd, SimdLevel, at_level, load};
 
 /// Limit of radiance: sums of several dozen of its squares are finite in single precision.
-const BRIGHTEST: f32 = 1e18;
+const MAX_RADIANCE: f32 = 1e18;
 
 /// Accumulator of an image in linear light; keeps its memory.
 #[derive(Clone, Debug, Default)]
-pub struct Film {
+pub struct Accumulator {
     pub(crate) width: usize,
-    pub(crate) lamps: Lamps,
+    pub(crate) lights: SceneLights,
     /// Radiance; with denoising, radiance divided by albedo until it is encoded.
     pub(crate) pixels: Vec<Pixel>,
     /// Pixels of the next denoising pass.
     pub(crate) next: Vec<Pixel>,
     /// Denoising guides; empty without denoising.
-    pub(crate) guides: Vec<Guide>,
+    pub(crate) guides: Vec<DenoiseGuide>,
 }
 
 /// A pixel of the accumulator.
@@ -33,23 +33,23 @@ pub(crate) struct Pixel {
 
 /// Rows of an image that one thread works on.
 #[derive(Debug)]
-pub(crate) struct Rows<'a> {
+pub(crate) struct AccumulatorRows<'a> {
     /// The first row.
     pub(crate) first: usize,
     pub(crate) pixels: &'a mut [Pixel],
-    pub(crate) guides: &'a mut [Guide],
+    pub(crate) guides: &'a mut [DenoiseGuide],
 }
 
-impl Film {
+impl Accumulator {
     /// Memory per pixel of an image \[bytes\], with or without denoising.
     pub const fn bytes_per_pixel(smooth: bool) -> usize {
-        if smooth { 2 * size_of::<Pixel>() + size_of::<Guide>() } else { size_of::<Pixel>() }
+        if smooth { 2 * size_of::<Pixel>() + size_of::<DenoiseGuide>() } else { size_of::<Pixel>() }
     }
 
     pub(crate) fn bytes(&self) -> usize {
         (self.pixels.capacity() + self.next.capacity()) * size_of::<Pixel>()
-            + self.guides.capacity() * size_of::<Guide>()
-            + self.lamps.bytes()
+            + self.guides.capacity() * size_of::<DenoiseGuide>()
+            + self.lights.bytes()
     }
 
     /// Allocates the memory of an image.
@@ -57,61 +57,62 @@ impl Film {
         self.width = width;
         let count = width * height;
         self.pixels.resize(count, Pixel::default());
-        self.guides.resize(if smooth { count } else { 0 }, Guide::default());
+        self.guides.resize(if smooth { count } else { 0 }, DenoiseGuide::default());
         self.next.resize(if smooth { count } else { 0 }, Pixel::default());
     }
 
     /// The image in bands of `rows` rows, and its lights.
-    pub(crate) fn rows(&mut self, rows: usize) -> (&Lamps, impl Iterator<Item = Rows<'_>>) {
+    pub(crate) fn rows(&mut self, rows: usize) -> (&SceneLights, impl Iterator<Item = AccumulatorRows<'_>>) {
         let size = (self.width * rows).max(1);
         let (parts, mut guides) = (self.pixels.chunks_mut(size).enumerate(), self.guides.chunks_mut(size));
-        let part = move |(k, pixels)| Rows { first: k * rows, pixels, guides: guides.next().unwrap_or_default() };
-        (&self.lamps, parts.map(part))
+        let part =
+            move |(k, pixels)| AccumulatorRows { first: k * rows, pixels, guides: guides.next().unwrap_or_default() };
+        (&self.lights, parts.map(part))
     }
 }
 
-impl Rows<'_> {
+impl AccumulatorRows<'_> {
     /// Traces the paths of all pixels; returns false if rendering was canceled. With `smooth`, radiance is divided by
     /// albedo.
-    pub(crate) fn expose(
+    pub(crate) fn path_trace(
         &mut self,
-        level: Level,
-        paths: &Paths<'_>,
+        level: SimdLevel,
+        paths: &PathTracer<'_>,
         smooth: bool,
-        stack: &mut Stack,
+        stack: &mut TraversalStack,
         progress: &RenderProgress,
     ) -> bool {
-        at_level!(level, s => self.expose_lanes(s, paths, smooth, stack, progress))
+        at_level!(level, s => self.path_trace_lanes(s, paths, smooth, stack, progress))
     }
 
-    fn expose_lanes<S: Simd>(
+    fn path_trace_lanes<S: Simd>(
         &mut self,
         s: S,
-        paths: &Paths<'_>,
+        paths: &PathTracer<'_>,
         smooth: bool,
-        stack: &mut Stack,
+        stack: &mut TraversalStack,
         progress: &RenderProgress,
     ) -> bool {
-        let width = paths.eye.projection.width;
+        let width = paths.camera_rays.projection.width;
         for (k, pixel) in self.pixels.iter_mut().enumerate() {
-            if progress.is_cancelled() {
+            if progress.is_canceled() {
                 return false;
             }
             let at = [k % width, self.first + k / width];
-            let found @ Found { color, variance, albedo, rays, .. } = s.vectorize(
+            let found @ PixelEstimate { color, variance, albedo, rays, .. } = s.vectorize(
                 #[inline(always)]
                 || paths.pixel(s, at, stack),
             );
             progress.add(paths.samples.into(), rays);
             let mut by = [1.0; 3];
             if let Some(guide) = self.guides.get_mut(k).filter(|_| smooth) {
-                *guide = Guide::new(&found);
+                *guide = DenoiseGuide::new(&found);
                 by = guide.albedo;
             }
             let mean = super::brightness(by.map(f64::from));
             *pixel = Pixel {
-                color: [0, 1, 2].map(|c| (color[c] as f32 / by[c]).min(BRIGHTEST)),
-                variance: ((variance / (mean * mean)) as f32).min(BRIGHTEST * BRIGHTEST),
+                color: [0, 1, 2].map(|c| (color[c] as f32 / by[c]).min(MAX_RADIANCE)),
+                variance: ((variance / (mean * mean)) as f32).min(MAX_RADIANCE * MAX_RADIANCE),
             };
             debug_assert!(albedo.iter().all(|x| x.is_finite()));
         }
@@ -120,18 +121,25 @@ impl Rows<'_> {
 }
 
 /// Converts radiance to sRGB bytes: multiplies it by `exposure` before the tone curve, and with guides by the albedo.
-pub(crate) fn develop(
-    level: Level,
+pub(crate) fn tonemap(
+    level: SimdLevel,
     exposure: f32,
     curve: ToneCurve,
     pixels: &[Pixel],
-    guides: &[Guide],
+    guides: &[DenoiseGuide],
     out: &mut [u8],
 ) {
-    at_level!(level, s => develop_lanes(s, exposure, curve, pixels, guides, out));
+    at_level!(level, s => tonemap_lanes(s, exposure, curve, pixels, guides, out));
 }
 
-fn develop_lanes<S: Simd>(s: S, exposure: f32, curve: ToneCurve, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
+fn tonemap_lanes<S: Simd>(
+    s: S,
+    exposure: f32,
+    curve: ToneCurve,
+    pixels: &[Pixel],
+    guides: &[DenoiseGuide],
+    out: &mut [u8],
+) {
     for (group, (pixels, out)) in pixels.chunks(LANES).zip(out.chunks_mut(4 * LANES)).enumerate() {
         for c in 0..3 {
             let mut linear = [0.0f32; LANES];

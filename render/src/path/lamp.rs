@@ -1,16 +1,16 @@
 //! Lights, as path tracing samples them.
 
-use kinetoscope_scene::basis::Basis;
+use kinetoscope_scene::basis::OrthonormalBasis;
 
 use crate::shade::light::{cos_deg, whole_exponent};
 use crate::visibility::Projection;
-use kinetoscope_scene::sampling::on_disc;
-use kinetoscope_scene::vector::{V3, along, dot, scale, sub, to_f64, unit};
+use kinetoscope_scene::sampling::sample_disk;
+use kinetoscope_scene::vector::{V3, add_scaled, dot, normalize, scale, sub, to_f64};
 use kinetoscope_scene::{Light, LightKind};
 
 /// A light of a frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lamp {
+pub(super) struct LightSource {
     kind: LightKind,
     position: V3,
     /// Unit vector along which the light shines.
@@ -25,12 +25,12 @@ pub(super) struct Lamp {
     pub(super) cast_shadow: bool,
     /// For a light at a camera: the camera's viewing direction, and its near depth \[m\]. Without a direction, near is
     /// a distance.
-    sight: Option<(Option<V3>, f64)>,
+    camera_near: Option<(Option<V3>, f64)>,
 }
 
 /// Light that arrives at a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Incoming {
+pub(super) struct LightSample {
     /// Unit vector towards the light.
     pub(super) direction: V3,
     /// Distance within which the light may be occluded \[m\].
@@ -39,20 +39,20 @@ pub(super) struct Incoming {
     pub(super) strength: f64,
 }
 
-impl Incoming {
+impl LightSample {
     /// Direction and distance of the same point of the light from another origin. This light was computed for the point
     /// `asked`.
     pub(super) fn seen_from(&self, asked: V3, origin: V3) -> (V3, f64) {
         if !(self.distance.is_finite() && self.distance > 0.0) {
             return (self.direction, self.distance);
         }
-        let to = sub(along(asked, self.distance, self.direction), origin);
+        let to = sub(add_scaled(asked, self.distance, self.direction), origin);
         // If both points coincide, the distance is 0.
-        unit(to).map_or((self.direction, 0.0), |direction| (direction, dot(to, to).sqrt()))
+        normalize(to).map_or((self.direction, 0.0), |direction| (direction, dot(to, to).sqrt()))
     }
 }
 
-impl Lamp {
+impl LightSource {
     pub(super) fn new(light: &Light) -> Self {
         let wide = |v: [f32; 3]| v.map(f64::from);
         let (cutoff_cos, exponent) = match light.kind {
@@ -62,7 +62,7 @@ impl Lamp {
         Self {
             kind: light.kind,
             position: wide(light.position),
-            along: unit(wide(light.direction)).unwrap_or([0.0, 0.0, -1.0]),
+            along: normalize(wide(light.direction)).unwrap_or([0.0, 0.0, -1.0]),
             cutoff_cos,
             exponent,
             attenuation: wide(light.attenuation),
@@ -71,12 +71,12 @@ impl Lamp {
             diffuse: wide(light.diffuse),
             specular: wide(light.specular),
             cast_shadow: light.cast_shadow,
-            sight: None,
+            camera_near: None,
         }
     }
 
     /// A headlight: a light at the camera.
-    pub(super) fn of_camera(headlight: &kinetoscope_scene::Headlight, view: &Projection, along_axis: bool) -> Self {
+    pub(super) fn headlight(headlight: &kinetoscope_scene::Headlight, view: &Projection, along_axis: bool) -> Self {
         let light = Light {
             kind: LightKind::Point,
             ambient: headlight.ambient,
@@ -86,20 +86,20 @@ impl Lamp {
         };
         let (position, forward) = (view.world_from_camera.translation, view.world_from_camera.rotation.map(|r| r[2]));
         let sight = Some((along_axis.then(|| to_f64(forward)), f64::from(view.near)));
-        Self { position: to_f64(position), sight, ..Self::new(&light) }
+        Self { position: to_f64(position), camera_near: sight, ..Self::new(&light) }
     }
 
     /// Light at `point` from a sampled point of the light's disc, by two random numbers in 0..1; `None` if no light
     /// arrives.
-    pub(super) fn at(&self, point: V3, choice: [f64; 2]) -> Option<Incoming> {
+    pub(super) fn sample(&self, point: V3, choice: [f64; 2]) -> Option<LightSample> {
         if self.kind == LightKind::Directional {
             let toward = scale(self.along, -1.0);
-            let direction = self.spread(toward, toward, choice)?;
-            return Some(Incoming { direction: unit(direction)?, distance: f64::INFINITY, strength: 1.0 });
+            let direction = self.disc_point(toward, toward, choice)?;
+            return Some(LightSample { direction: normalize(direction)?, distance: f64::INFINITY, strength: 1.0 });
         }
         let to = sub(self.position, point);
         let distance = dot(to, to).sqrt();
-        let toward = unit(to)?;
+        let toward = normalize(to)?;
         let [constant, linear, quadratic] = self.attenuation;
         let mut strength = 1.0 / (constant + distance * (linear + distance * quadratic)).max(1e-6);
         if matches!(self.kind, LightKind::Spot { .. }) {
@@ -109,25 +109,25 @@ impl Lamp {
             }
             strength *= power(cos.max(0.0), self.exponent);
         }
-        let to = self.spread(to, toward, choice)?;
-        let direction = unit(to)?;
+        let to = self.disc_point(to, toward, choice)?;
+        let direction = normalize(to)?;
         let mut distance = dot(to, to).sqrt();
-        if let Some((forward, near)) = self.sight {
+        if let Some((forward, near)) = self.camera_near {
             // Objects nearer than the near plane, such as the camera's housing, cast no shadow.
             let cos = forward.map_or(1.0, |forward| -dot(direction, forward));
             distance -= if cos > 1e-3 { near / cos } else { 0.0 };
         }
-        Some(Incoming { direction, distance, strength })
+        Some(LightSample { direction, distance, strength })
     }
 
     /// From the center of the disc to a point of it.
-    fn spread(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
+    fn disc_point(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
         if self.radius == 0.0 {
             return Some(to);
         }
-        let [x, y] = on_disc(choice);
-        let on = Basis::of(normal).to_world([self.radius * x, self.radius * y, 0.0]);
-        Some(along(to, 1.0, on))
+        let [x, y] = sample_disk(choice);
+        let on = OrthonormalBasis::from_normal(normal).to_world([self.radius * x, self.radius * y, 0.0]);
+        Some(add_scaled(to, 1.0, on))
     }
 
     pub(super) fn has_size(&self) -> bool {

@@ -22,110 +22,110 @@ mod texel;
 #[cfg(test)]
 mod tests;
 
-use crate::geometry::bvh::Stack;
+use crate::geometry::bvh::TraversalStack;
 use crate::shade::tone;
-use crate::shutter::Clock;
+use crate::shutter::RowClock;
 use crate::simd::Simd;
-use crate::trace::motion::{Motion, NOW, wide};
-use crate::trace::{Hit, Tracer};
+use crate::trace::motion::{END_TIME, Motion, pose_to_f64};
+use crate::trace::{Hit, RayTracer};
 use crate::visibility::Projection;
 use emitter::{Emitters, power_heuristic};
-use eye::Eye;
+use eye::CameraRayGenerator;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::basis::Basis;
-use kinetoscope_scene::vector::{V3, along, dot, scale, to_f64};
-use kinetoscope_scene::{Light, LightSum, PoseF64, RenderScene, Texture};
-use lamp::Lamp;
-use point::Point;
-use sobol::{Sample, Sequence};
+use kinetoscope_scene::basis::OrthonormalBasis;
+use kinetoscope_scene::vector::{V3, add_scaled, dot, scale, to_f64};
+use kinetoscope_scene::{Light, LightingSpace, PoseF64, RenderScene, Texture};
+use lamp::LightSource;
+use point::SurfaceInteraction;
+use sobol::{SobolSample, SobolSequence};
 use std::sync::Arc;
 
 /// Largest number of sampled lights; the headlight is counted separately.
-const MAX_LAMPS: usize = crate::shade::light::MAX_LIGHTS;
+const MAX_LIGHTS: usize = crate::shade::light::MAX_LIGHTS;
 /// Offset of ray origins above a surface, as a fraction of the largest coordinate.
-const ABOVE: f64 = 1e-7;
+const RAY_OFFSET: f64 = 1e-7;
 /// Bounces after which Russian roulette starts.
-const SURE: u32 = 2;
+const RR_START: u32 = 2;
 /// Largest number of transparent surfaces that a path passes.
 const MAX_PASSES: u32 = 64;
 /// Least growth of the pixel footprint after diffuse scattering, per meter.
-const SCATTERED: f64 = 0.1;
+const MIN_FOOTPRINT_GROWTH: f64 = 0.1;
 /// Dimensions (pairs of random numbers): position in the pixel, and per surface the direction, the lobe with Russian
 /// roulette, and transparency.
 const IN_PIXEL: u32 = 0;
-const ONWARD: u32 = 1;
-const CHANCE: u32 = 2;
-const THROUGH: u32 = 3;
+const DIRECTION: u32 = 1;
+const LOBE: u32 = 2;
+const TRANSPARENCY: u32 = 3;
 /// Dimensions per surface: the ones above, and one for each light.
-const PAIRS: u32 = 4 + MAX_LAMPS as u32;
+const DIMENSIONS: u32 = 4 + MAX_LIGHTS as u32;
 /// Far beyond those: the point of the aperture, and the instant.
 const ON_LENS: u32 = 1 << 30;
-const INSTANT: u32 = (1 << 30) + 1;
+const TIME: u32 = (1 << 30) + 1;
 
 /// State that all paths of an image share.
 #[derive(Clone, Debug)]
-pub(crate) struct Paths<'a> {
+pub(crate) struct PathTracer<'a> {
     pub(crate) scene: &'a RenderScene,
-    pub(crate) tracer: &'a Tracer,
-    pub(crate) eye: Eye<'a>,
-    pub(crate) moving: Option<&'a Moving>,
+    pub(crate) tracer: &'a RayTracer,
+    pub(crate) camera_rays: CameraRayGenerator<'a>,
+    pub(crate) motion: Option<&'a ExposureMotion>,
     pub(crate) samples: u32,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u32,
-    pub(crate) lamps: &'a Lamps,
-    pub(crate) ways: Ways,
+    pub(crate) lights: &'a SceneLights,
+    pub(crate) strategy: MisStrategy,
 }
 
 /// Exposure time of the shutter, and motion of the camera.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Moving {
-    pub(crate) clock: Clock,
+pub(crate) struct ExposureMotion {
+    pub(crate) clock: RowClock,
     pub(crate) camera: Option<Motion>,
 }
 
 /// Strategies of multiple importance sampling for emissive surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Ways {
+pub(crate) enum MisStrategy {
     Both,
     /// Direct light only: emitters are sampled.
     #[cfg(test)]
-    Looking,
+    Light,
     /// BSDF sampling only: paths hit emitters.
     #[cfg(test)]
-    Meeting,
+    Bsdf,
 }
 
-impl Ways {
+impl MisStrategy {
     /// Weight of an emitter sample with pdf `own`, where BSDF sampling has the pdf `other`.
-    fn looking(self, own: f64, other: f64) -> f64 {
+    fn light_weight(self, own: f64, other: f64) -> f64 {
         match self {
             Self::Both => power_heuristic(own, other),
             #[cfg(test)]
-            Self::Looking => 1.0,
+            Self::Light => 1.0,
             #[cfg(test)]
-            Self::Meeting => 0.0,
+            Self::Bsdf => 0.0,
         }
     }
 
     /// Weight of a BSDF sample with pdf `own` that hits an emitter, where emitter sampling has the pdf `other`.
-    fn meeting(self, own: f64, other: f64) -> f64 {
+    fn bsdf_weight(self, own: f64, other: f64) -> f64 {
         match self {
             Self::Both => power_heuristic(own, other),
             #[cfg(test)]
-            Self::Looking => 0.0,
+            Self::Light => 0.0,
             #[cfg(test)]
-            Self::Meeting => 1.0,
+            Self::Bsdf => 1.0,
         }
     }
 }
 
 /// All light of a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Lamps {
-    lamps: Vec<Lamp>,
+pub(crate) struct SceneLights {
+    lights: Vec<LightSource>,
     emitters: Emitters,
     /// Radiance of the environment from above and below the horizon.
-    dome: [V3; 2],
+    environment: [V3; 2],
     /// Sky colors for cameras and mirrors: straight up, at the horizon, straight down.
     sky: [V3; 3],
     /// Image that replaces these sky colors.
@@ -133,37 +133,37 @@ pub(crate) struct Lamps {
     haze: Option<(Option<V3>, f64, f64)>,
 }
 
-impl Lamps {
+impl SceneLights {
     /// Prepares the light of a frame. `shadows` enables shadows, `view` is the camera. `forward` is true if its near
     /// plane is measured along the axis.
     pub(crate) fn prepare(
         &mut self,
         scene: &RenderScene,
-        tracer: &Tracer,
+        tracer: &RayTracer,
         lights: &[Light],
         shadows: bool,
         view: &Projection,
         forward: bool,
     ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
-        let Self { lamps, emitters, dome, sky, skybox, haze } = self;
+        let Self { lights: lamps, emitters, environment: dome, sky, skybox, haze } = self;
         skybox.clone_from(&scene.skybox);
         emitters.prepare(scene, tracer);
         *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
         *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
         lamps.clear();
-        lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LAMPS).map(Lamp::new));
+        lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LIGHTS).map(LightSource::new));
         // After the other lights, and not counted in their limit: it is a point, and needs no random numbers.
         if scene.headlight.active {
             let axis = forward.then(|| view.world_from_camera.rotation.map(|row| row[2]));
-            lamps.push(match scene.headlight.along(scene.light_sum, axis) {
-                Some(light) => Lamp::new(&light),
-                None => Lamp::of_camera(&scene.headlight, view, forward),
+            lamps.push(match scene.headlight.as_directional(scene.lighting_space, axis) {
+                Some(light) => LightSource::new(&light),
+                None => LightSource::headlight(&scene.headlight, view, forward),
             });
         }
         for lamp in lamps {
-            if scene.light_sum == LightSum::Display {
+            if scene.lighting_space == LightingSpace::Display {
                 for color in [&mut lamp.ambient, &mut lamp.diffuse, &mut lamp.specular] {
                     *color = linear(color.map(|x| x as f32));
                 }
@@ -173,7 +173,7 @@ impl Lamps {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.lamps.capacity() * size_of::<Lamp>() + self.emitters.bytes()
+        self.lights.capacity() * size_of::<LightSource>() + self.emitters.bytes()
     }
 
     /// Sky color in a direction, for cameras and mirrors.
@@ -191,7 +191,7 @@ impl Lamps {
 
 /// Result of the paths of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Found {
+pub(crate) struct PixelEstimate {
     /// Mean radiance, linear.
     pub(crate) color: V3,
     /// Variance of the mean brightness, estimated as if samples were independent: an upper bound. 0 for one sample.
@@ -208,7 +208,7 @@ pub(crate) struct Found {
 
 /// The first hit of a camera ray.
 #[derive(Clone, Copy, Debug)]
-struct First {
+struct FirstHit {
     albedo: V3,
     gloss: f64,
     normal: V3,
@@ -218,24 +218,24 @@ struct First {
 /// One path: its random numbers, its instant, and its number of rays.
 #[derive(Debug)]
 struct Path<'a> {
-    sample: Sample,
+    sample: SobolSample,
     time: f64,
     rays: u64,
-    stack: &'a mut Stack,
+    stack: &'a mut TraversalStack,
 }
 
-impl Paths<'_> {
+impl PathTracer<'_> {
     /// Traces the paths of a pixel.
     #[inline(always)]
-    pub(crate) fn pixel<S: Simd>(&self, s: S, at: [usize; 2], stack: &mut Stack) -> Found {
-        let sequence = Sequence::new(at, self.seed);
+    pub(crate) fn pixel<S: Simd>(&self, s: S, at: [usize; 2], stack: &mut TraversalStack) -> PixelEstimate {
+        let sequence = SobolSequence::new(at, self.seed);
         let n = f64::from(self.samples);
-        let mut out = Found::default();
+        let mut out = PixelEstimate::default();
         let mut squares = 0.0;
         for index in 0..self.samples {
             let sample = sequence.sample(index);
-            let time = self.moving.map_or(NOW, |moving| moving.clock.at(at[1], sample.pair(INSTANT)[0]));
-            let [dx, dy] = sample.pair(IN_PIXEL);
+            let time = self.motion.map_or(END_TIME, |moving| moving.clock.at(at[1], sample.sample_2d(TIME)[0]));
+            let [dx, dy] = sample.sample_2d(IN_PIXEL);
             let mut path = Path { sample, time, rays: 0, stack: &mut *stack };
             let (color, first) = self.radiance(s, &mut path, [at[0] as f64 + dx, at[1] as f64 + dy]);
             out.rays += path.rays;
@@ -243,10 +243,10 @@ impl Paths<'_> {
             let color = if color.iter().all(|x| x.is_finite()) { color } else { [0.0; 3] };
             let bright = brightness(color);
             squares += bright * bright / n;
-            out.color = along(out.color, 1.0 / n, color);
-            out.albedo = along(out.albedo, 1.0 / n, first.albedo);
+            out.color = add_scaled(out.color, 1.0 / n, color);
+            out.albedo = add_scaled(out.albedo, 1.0 / n, first.albedo);
             out.gloss += first.gloss / n;
-            out.normal = along(out.normal, 1.0 / n, first.normal);
+            out.normal = add_scaled(out.normal, 1.0 / n, first.normal);
             out.distance += first.distance / n;
         }
         let bright = brightness(out.color);
@@ -256,24 +256,29 @@ impl Paths<'_> {
 
     /// Pose of the camera at a time.
     fn camera(&self, time: f64) -> PoseF64 {
-        match self.moving.and_then(|moving| moving.camera.as_ref()) {
+        match self.motion.and_then(|moving| moving.camera.as_ref()) {
             Some(motion) => motion.at(time),
-            None => wide(&self.eye.projection.world_from_camera),
+            None => pose_to_f64(&self.camera_rays.projection.world_from_camera),
         }
     }
 
     /// Radiance at a point of the image, and the first hit.
     #[inline(always)]
-    fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
+    fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, FirstHit) {
         let (sample, time) = (path.sample, path.time);
-        let mut first = First { albedo: [1.0; 3], gloss: 0.0, normal: [0.0; 3], distance: 0.0 };
-        let Some(eye::First { mut ray, travelled: near, mut limit, mut width, mut spread }) =
-            self.eye.look(at, &self.camera(time), || sample.pair(ON_LENS))
+        let mut first = FirstHit { albedo: [1.0; 3], gloss: 0.0, normal: [0.0; 3], distance: 0.0 };
+        let Some(eye::CameraRay {
+            mut ray,
+            near_distance: near,
+            mut limit,
+            footprint: mut width,
+            footprint_growth: mut spread,
+        }) = self.camera_rays.camera_ray(at, &self.camera(time), || sample.sample_2d(ON_LENS))
         else {
             // No light falls outside of the image circle.
             return ([0.0; 3], first);
         };
-        let (mut light, mut kept) = ([0.0; 3], [1.0; 3]);
+        let (mut light, mut throughput) = ([0.0; 3], [1.0; 3]);
         let (mut bounce, mut passes, mut travelled) = (0, 0, near);
         // True as long as only mirrors and glass were hit.
         let mut clear = true;
@@ -281,76 +286,81 @@ impl Paths<'_> {
         let mut chosen: Option<(V3, f64)> = None;
         loop {
             path.rays += 1;
-            let hit = self.tracer.nearest(s, &ray, limit, time, path.stack);
+            let hit = self.tracer.closest_hit(s, &ray, limit, time, path.stack);
             let met = hit.and_then(|hit| {
                 let footprint = width + spread * hit.distance;
-                Some((hit, Point::new(self.scene, &ray, &hit, footprint)?))
+                Some((hit, SurfaceInteraction::new(self.scene, &ray, &hit, footprint)?))
             });
             let Some((hit @ Hit { distance, .. }, point)) = met else {
                 let below = usize::from(ray.direction[2] <= 0.0);
-                let beyond = if clear { self.lamps.sky(ray.direction) } else { self.lamps.dome[below] };
-                light = add(light, times(kept, beyond));
+                let beyond = if clear { self.lights.sky(ray.direction) } else { self.lights.environment[below] };
+                light = add(light, times(throughput, beyond));
                 break;
             };
-            let dims = 1 + bounce * PAIRS;
+            let dims = 1 + bounce * DIMENSIONS;
             travelled += distance;
             width += spread * distance;
             limit -= distance;
             if point.alpha < 1.0 {
-                let chance = sample.pair(dims + THROUGH + 1_000_000 * passes)[0];
-                if !point.front && !point.lobe.is_glass() || chance >= point.alpha {
+                let chance = sample.sample_2d(dims + TRANSPARENCY + 1_000_000 * passes)[0];
+                if !point.front && !point.bsdf.is_glass() || chance >= point.alpha {
                     passes += 1;
                     if passes > MAX_PASSES {
                         break;
                     }
-                    ray.origin = above(&point, -1.0);
+                    ray.origin = offset_origin(&point, -1.0);
                     continue;
                 }
             }
             let o = scale(ray.direction, -1.0);
             if bounce == 0 {
-                let (matt, gloss) = (point.lobe.rest(), point.lobe.gloss(Basis::of(point.normal).to_local(o)));
-                let albedo = point.lobe.albedo.map(|x| matt * x + (1.0 - matt));
-                first = First { albedo, gloss, normal: point.normal, distance: travelled };
-                if let Some((color, start, end)) = self.lamps.haze {
+                let (matt, gloss) = (
+                    point.bsdf.scattered_fraction(),
+                    point.bsdf.gloss(OrthonormalBasis::from_normal(point.shading_normal).to_local(o)),
+                );
+                let albedo = point.bsdf.albedo.map(|x| matt * x + (1.0 - matt));
+                first = FirstHit { albedo, gloss, normal: point.shading_normal, distance: travelled };
+                if let Some((color, start, end)) = self.lights.haze {
                     let k = ((travelled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);
                     let k = k * k * (3.0 - 2.0 * k);
                     let flat = [ray.direction[0], ray.direction[1], ray.direction[2].max(0.0)];
-                    light = along(light, k, color.unwrap_or_else(|| self.lamps.sky(flat)));
-                    kept = scale(kept, 1.0 - k);
+                    light = add_scaled(light, k, color.unwrap_or_else(|| self.lights.sky(flat)));
+                    throughput = scale(throughput, 1.0 - k);
                 }
             }
-            let share = chosen.map_or(1.0, |(from, likely)| self.met(from, likely, &hit, point.position));
-            light = add(light, times(kept, scale(point.emission, share * (1.0 - point.lobe.mirror))));
+            let share = chosen.map_or(1.0, |(from, likely)| self.bsdf_mis_weight(from, likely, &hit, point.position));
+            light = add(light, times(throughput, scale(point.emission, share * (1.0 - point.bsdf.mirror))));
             if bounce > self.max_bounces {
                 break;
             }
-            light = add(light, times(kept, self.lit(s, &point, o, path, dims)));
-            light = add(light, times(kept, self.glow(s, &point, o, path, bounce, width)));
-            let basis = Basis::of(point.normal);
-            let [lobe, chance] = sample.pair(dims + CHANCE);
-            let Some(next) = point.lobe.choose(basis.to_local(o), lobe, sample.pair(dims + ONWARD)) else { break };
+            light = add(light, times(throughput, self.direct_light(s, &point, o, path, dims)));
+            light = add(light, times(throughput, self.sample_emitter_light(s, &point, o, path, bounce, width)));
+            let basis = OrthonormalBasis::from_normal(point.shading_normal);
+            let [lobe, chance] = sample.sample_2d(dims + LOBE);
+            let Some(next) = point.bsdf.sample(basis.to_local(o), lobe, sample.sample_2d(dims + DIRECTION)) else {
+                break;
+            };
             let onward = basis.to_world(next.direction);
             // A direction below the flat surface though above its smooth normal ends the path, and so does a refracted
             // one above the flat surface.
             let through = next.direction[2] < 0.0;
-            if (dot(onward, point.flat) <= 0.0) != through {
+            if (dot(onward, point.geometric_normal) <= 0.0) != through {
                 break;
             }
-            kept = times(kept, next.weight);
-            if bounce >= SURE {
-                let most = kept.iter().fold(0.0f64, |m, &x| m.max(x)).min(1.0);
+            throughput = times(throughput, next.weight);
+            if bounce >= RR_START {
+                let most = throughput.iter().fold(0.0f64, |m, &x| m.max(x)).min(1.0);
                 if chance >= most {
                     break;
                 }
-                kept = scale(kept, 1.0 / most);
+                throughput = scale(throughput, 1.0 / most);
             }
-            if !next.mirrored {
-                (clear, spread) = (false, spread.max(SCATTERED));
+            if !next.is_specular {
+                (clear, spread) = (false, spread.max(MIN_FOOTPRINT_GROWTH));
             }
             bounce += 1;
-            ray = Ray { origin: above(&point, if through { -1.0 } else { 1.0 }), direction: onward };
-            chosen = (!next.mirrored).then_some((ray.origin, next.likely));
+            ray = Ray { origin: offset_origin(&point, if through { -1.0 } else { 1.0 }), direction: onward };
+            chosen = (!next.is_specular).then_some((ray.origin, next.pdf));
             limit = f64::INFINITY;
         }
         (light, first)
@@ -358,9 +368,9 @@ impl Paths<'_> {
 }
 
 /// A point slightly above a surface, or below it.
-fn above(point: &Point, side: f64) -> V3 {
+fn offset_origin(point: &SurfaceInteraction, side: f64) -> V3 {
     let far = point.position.iter().fold(1.0f64, |m, x| m.max(x.abs()));
-    along(point.position, side * ABOVE * far, point.flat)
+    add_scaled(point.position, side * RAY_OFFSET * far, point.geometric_normal)
 }
 
 fn times(a: V3, b: V3) -> V3 {

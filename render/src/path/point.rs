@@ -1,34 +1,34 @@
 //! Surface interaction of a path: the point that a ray hit.
 
-use super::lobe::Lobe;
+use super::lobe::Bsdf;
 use super::texel;
-use crate::geometry::corner::in_triangle;
+use crate::geometry::corner::interpolate_triangle;
 use crate::trace::Hit;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::vector::{V3, along, dot, scale, sub, unit};
+use kinetoscope_scene::vector::{V3, add_scaled, dot, normalize, scale, sub};
 use kinetoscope_scene::{Instance, RenderScene, TextureKind};
 
 /// A point of a surface, with its material.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct SurfaceInteraction {
     pub(super) position: V3,
     /// The point on the smooth surface that the normals describe: for a round object made of triangles, outside of
     /// them. Shadow rays start there, so that the edge of its dark side is not cut triangle by triangle. Source:
     /// Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021.
-    pub(super) lifted: V3,
+    pub(super) smooth_position: V3,
     /// Geometric unit normal, facing the ray's origin.
-    pub(super) flat: V3,
+    pub(super) geometric_normal: V3,
     /// Shading unit normal, on the same side.
-    pub(super) normal: V3,
+    pub(super) shading_normal: V3,
     /// True if the ray came from outside.
     pub(super) front: bool,
-    pub(super) lobe: Lobe,
+    pub(super) bsdf: Bsdf,
     pub(super) emission: V3,
     pub(super) alpha: f64,
 }
 
-impl Point {
+impl SurfaceInteraction {
     /// The point of a hit. `footprint` is the width of the pixel at the surface, if seen straight on \[m\].
     pub(super) fn new(scene: &RenderScene, ray: &Ray, hit: &Hit, footprint: f64) -> Option<Self> {
         let index = hit.instance as usize;
@@ -40,11 +40,11 @@ impl Point {
         let rotation = pose.rotation;
         let from = sub(position, pose.translation);
         let local = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * from[i]).sum::<f64>());
-        let corner = instance.mesh().map(|mesh| in_triangle(mesh, hit.triangle as usize, local, side));
+        let corner = instance.mesh().map(|mesh| interpolate_triangle(mesh, hit.triangle as usize, local, side));
         let normal = corner.and_then(|c| {
             let turned = rotation.map(|row| side * dot(row, c.normal));
             // A smooth normal may face away although the flat surface is visible.
-            unit(turned).filter(|n| dot(*n, ray.direction) < -1e-3 && dot(*n, flat) > 0.0)
+            normalize(turned).filter(|n| dot(*n, ray.direction) < -1e-3 && dot(*n, flat) > 0.0)
         });
         let slant = (-dot(flat, ray.direction)).max(0.02).sqrt();
         let uv = corner.and_then(|c| c.uv);
@@ -55,10 +55,19 @@ impl Point {
         let emission = scale(albedo, f64::from(material.emission.max(0.0)));
         let alpha = f64::from(material.rgba[3].clamp(0.0, 1.0));
         let lift = corner.map_or([0.0; 3], |c| rotation.map(|row| dot(row, c.lift)));
-        let lifted = along(position, 1.0, lift);
+        let lifted = add_scaled(position, 1.0, lift);
         let normal = normal.unwrap_or(flat);
-        let lobe = Lobe::new(material, reflectance, albedo, front);
-        Some(Self { position, lifted, flat, normal, front, lobe, emission, alpha })
+        let lobe = Bsdf::new(material, reflectance, albedo, front);
+        Some(Self {
+            position,
+            smooth_position: lifted,
+            geometric_normal: flat,
+            shading_normal: normal,
+            front,
+            bsdf: lobe,
+            emission,
+            alpha,
+        })
     }
 }
 

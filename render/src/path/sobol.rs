@@ -6,13 +6,13 @@
 
 /// The random sequence of a pixel.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sequence {
+pub(crate) struct SobolSequence {
     seed: u32,
 }
 
 /// One sample of a sequence.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample {
+pub(crate) struct SobolSample {
     seed: u32,
     index: u32,
 }
@@ -44,7 +44,7 @@ fn scramble(x: u32, seed: u32) -> u32 {
 /// The second dimension of the point whose first dimension has these bits: the product with Pascal's triangle modulo 2,
 /// whose halves are triangles again. Source: Ahmed, An implementation algorithm of 2D Sobol sequence fast, elegant, and
 /// compact, EGSR 2024.
-fn second(mut first: u32) -> u32 {
+fn sobol_second(mut first: u32) -> u32 {
     first ^= first << 16;
     first ^= (first & 0x00ff_00ff) << 8;
     first ^= (first & 0x0f0f_0f0f) << 4;
@@ -52,25 +52,25 @@ fn second(mut first: u32) -> u32 {
     first ^ (first & 0x5555_5555) << 1
 }
 
-impl Sequence {
+impl SobolSequence {
     /// The sequence of a pixel, in images of a seed.
     pub(crate) fn new([x, y]: [usize; 2], seed: u32) -> Self {
         Self { seed: combine(combine(mix(seed), x as u32), y as u32) }
     }
 
-    pub(crate) fn sample(self, index: u32) -> Sample {
-        Sample { seed: self.seed, index }
+    pub(crate) fn sample(self, index: u32) -> SobolSample {
+        SobolSample { seed: self.seed, index }
     }
 }
 
-impl Sample {
+impl SobolSample {
     /// Two random numbers in 0..1. Of the first 2^k samples, each of 2^k equal boxes of the square, of any proportions,
     /// has one. Pairs of different dimensions are independent.
-    pub(crate) fn pair(self, dimension: u32) -> [f64; 2] {
+    pub(crate) fn sample_2d(self, dimension: u32) -> [f64; 2] {
         let seed = combine(self.seed, dimension);
         let first = scramble(self.index, seed).reverse_bits();
         let unit = |x: u32| f64::from(x) / 4_294_967_296.0;
-        [unit(scramble(first, mix(seed ^ 0x68bc_21eb))), unit(scramble(second(first), mix(seed ^ 0x02e5_be93)))]
+        [unit(scramble(first, mix(seed ^ 0x68bc_21eb))), unit(scramble(sobol_second(first), mix(seed ^ 0x02e5_be93)))]
     }
 }
 
@@ -89,7 +89,7 @@ mod tests {
                 sum ^= if rest & 1 == 1 { direction } else { 0 };
                 (rest, direction) = (rest >> 1, direction ^ direction >> 1);
             }
-            assert_eq!(second(index.reverse_bits()), sum, "{index}");
+            assert_eq!(sobol_second(index.reverse_bits()), sum, "{index}");
         }
     }
 
@@ -100,7 +100,7 @@ mod tests {
             for k in [1u32, 4, 8] {
                 let count = 1usize << k;
                 let all: Vec<_> =
-                    (0..count).map(|i| Sequence::new(pixel, 5).sample(i as u32).pair(dimension)).collect();
+                    (0..count).map(|i| SobolSequence::new(pixel, 5).sample(i as u32).sample_2d(dimension)).collect();
                 for wide in 0..=k {
                     let (columns, rows) = (1usize << wide, 1usize << (k - wide));
                     let mut seen = vec![0; count];
@@ -127,7 +127,8 @@ mod tests {
     fn independence() {
         let n = 4096usize;
         let five = 5.0 / (12.0 * n as f64).sqrt();
-        let pick = |k: usize, dimension, seed| Sequence::new([k % 64, k / 64], seed).sample(0).pair(dimension);
+        let pick =
+            |k: usize, dimension, seed| SobolSequence::new([k % 64, k / 64], seed).sample(0).sample_2d(dimension);
         let mean = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
         assert!((0..2).all(|axis| (mean(&|k| pick(k, 3, 0)[axis]) - 0.5).abs() < five));
         // Products of two independent numbers: mean 1/4, variance 7/144.

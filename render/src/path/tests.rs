@@ -6,7 +6,7 @@ mod glass;
 mod shadows;
 
 use super::*;
-use crate::geometry::assets::RayAssets;
+use crate::geometry::assets::RayAssetCache;
 use crate::raster::Layer;
 use crate::simd::Scalar;
 use crate::visibility::View;
@@ -39,39 +39,50 @@ fn albedo(linear: f32) -> f64 {
 }
 
 /// A view of one pixel of a millionth of a radian: the light of one ray.
-fn looking(eye: [f32; 3], target: [f32; 3]) -> View {
+fn one_ray_view(eye: [f32; 3], target: [f32; 3]) -> View {
     View { fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, ..View::look_at([1, 1], 0.5, eye, target, [0., 0., 1.]).unwrap() }
 }
 
 /// A scene prepared for rays, with its lights.
-struct Studio<'a> {
+struct TestScene<'a> {
     scene: &'a RenderScene,
-    tracer: Tracer,
-    lamps: Lamps,
+    tracer: RayTracer,
+    lights: SceneLights,
     projection: Projection,
 }
 
-impl<'a> Studio<'a> {
+impl<'a> TestScene<'a> {
     fn new(scene: &'a RenderScene, poses: &[PoseF32], view: &View) -> Self {
-        let mut tracer = Tracer::default();
-        tracer.find_bodies(scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
+        let mut tracer = RayTracer::default();
+        tracer.prepare_geometry(scene, &RayAssetCache::default(), |i| Layer::for_instance(i, u32::MAX));
         tracer.place(scene, poses, None);
-        let (mut lamps, projection) = (Lamps::default(), Projection::from(view));
+        let (mut lamps, projection) = (SceneLights::default(), Projection::from(view));
         lamps.prepare(scene, &tracer, &scene.lights, true, &projection, true);
-        Self { scene, tracer, lamps, projection }
+        Self { scene, tracer, lights: lamps, projection }
     }
 
-    fn paths(&self, samples: u32, max_bounces: u32, seed: u32) -> Paths<'_> {
-        let Self { scene, tracer, lamps, projection } = self;
-        let eye = Eye { projection, lens: None, pupil: None };
-        Paths { scene, tracer, eye, moving: None, samples, max_bounces, seed, lamps, ways: Ways::Both }
+    fn paths(&self, samples: u32, max_bounces: u32, seed: u32) -> PathTracer<'_> {
+        let Self { scene, tracer, lights: lamps, projection } = self;
+        let eye = CameraRayGenerator { projection, lens: None, thin_lens: None };
+        PathTracer {
+            scene,
+            tracer,
+            camera_rays: eye,
+            motion: None,
+            samples,
+            max_bounces,
+            seed,
+            lights: lamps,
+            strategy: MisStrategy::Both,
+        }
     }
 
     /// The light of a pixel in several images with different seeds: the mean and its standard deviation.
-    fn seen(&self, paths: &Paths<'_>, count: u32) -> (f64, f64) {
-        let mut stack = Stack::default();
-        let all: Vec<f64> =
-            (0..count).map(|seed| Paths { seed, ..paths.clone() }.pixel(Scalar, [0, 0], &mut stack).color[1]).collect();
+    fn mean_light(&self, paths: &PathTracer<'_>, count: u32) -> (f64, f64) {
+        let mut stack = TraversalStack::default();
+        let all: Vec<f64> = (0..count)
+            .map(|seed| PathTracer { seed, ..paths.clone() }.pixel(Scalar, [0, 0], &mut stack).color[1])
+            .collect();
         let n = f64::from(count);
         let mean = all.iter().sum::<f64>() / n;
         let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -80,9 +91,9 @@ impl<'a> Studio<'a> {
 }
 
 /// The light of a pixel in sixteen images: the mean and its standard deviation.
-fn seen(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_bounces: u32) -> (f64, f64) {
-    let studio = Studio::new(scene, poses, view);
-    studio.seen(&studio.paths(samples, max_bounces, 0), 16)
+fn mean_light(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_bounces: u32) -> (f64, f64) {
+    let studio = TestScene::new(scene, poses, view);
+    studio.mean_light(&studio.paths(samples, max_bounces, 0), 16)
 }
 
 /// True within five standard deviations, and rounding: colors and lights are single precision.
@@ -106,7 +117,7 @@ fn furnace(shape: impl Into<Shape>, material: Material, light: f32) -> RenderSce
     scene
 }
 
-fn lifted(height: f32) -> [PoseF32; 2] {
+fn floor_and_object(height: f32) -> [PoseF32; 2] {
     [PoseF32::IDENTITY, PoseF32::from_translation([0.0, 0.0, height])]
 }
 
@@ -132,14 +143,14 @@ fn matt_in_furnace() {
     for (shape, a) in shapes.iter().flat_map(|shape| [1.0, 0.5, 0.18].map(|a| (shape, a))) {
         let scene = furnace(shape.clone(), matt(a), 0.8);
         for eye in [[2.0, 0.3, 0.2], [0.1, 0.2, 3.0], [-1.0, -1.0, -1.0]] {
-            let (mean, deviation) = seen(&scene, &ONE, &looking(eye, [0.02, 0.01, 0.03]), 4, 3);
+            let (mean, deviation) = mean_light(&scene, &ONE, &one_ray_view(eye, [0.02, 0.01, 0.03]), 4, 3);
             assert_number(&format!("{} from {eye:?}", shape.name()), mean, f64::from(0.8f32) * albedo(a), TIGHT);
             assert!(deviation < 1e-12);
         }
     }
     // A control: a camera inside, where there is no light.
     let scene = furnace(Sphere { radius: 0.3 }, matt(1.0), 0.8);
-    assert_eq!(seen(&scene, &ONE, &looking([0.0; 3], [1.0, 0.2, 0.1]), 4, 3).0, 0.0);
+    assert_eq!(mean_light(&scene, &ONE, &one_ray_view([0.0; 3], [1.0, 0.2, 0.1]), 4, 3).0, 0.0);
 }
 
 /// A shiny object in a furnace reflects a part of the light, and adds no light.
@@ -154,20 +165,20 @@ fn gloss_in_furnace() {
     let metal = |roughness| Material { metallic: 1.0, roughness: Some(roughness), ..Material::from_rgba([1.0; 4]) };
     let (rough, smooth) = (ball(metal(1.0)), ball(metal(0.0)));
     for beside in [0.0f32, 0.6, 0.95] {
-        let view = looking([3.0, beside, 0.0], [0.0, beside, 0.0]);
+        let view = one_ray_view([3.0, beside, 0.0], [0.0, beside, 0.0]);
         for (specular, shininess) in [(1.0, 1.0), (1.0, 0.1), (0.5, 0.5), (1.0, 0.0)] {
             let scene = ball(Material { specular, shininess, ..matt(1.0) });
-            let (mean, deviation) = seen(&scene, &ONE, &view, 256, 3);
+            let (mean, deviation) = mean_light(&scene, &ONE, &view, 256, 3);
             assert!(mean <= 1.0 + 5.0 * deviation && mean > 0.7, "{specular} {shininess} {beside}: {mean}");
         }
         let cos = (1.0 - f64::from(beside).powi(2)).sqrt();
         let expected = 1.0 - cos * (1.0 / cos).ln_1p();
-        let light = seen(&rough, &ONE, &view, 256, 3);
+        let light = mean_light(&rough, &ONE, &view, 256, 3);
         assert!(agrees(light, expected), "{beside}: {light:?}, not {expected}");
         // The control: a deviation of a fiftieth is detected.
         assert!(!agrees(light, 1.02 * expected) && !agrees(light, 0.98 * expected), "{beside}: {light:?}");
         let limit = Tolerance::absolute(1e-4, "facets of alpha² 1e-6 hide less than that, over the cosine");
-        assert_number(&format!("{beside} aside"), seen(&smooth, &ONE, &view, 256, 3).0, 1.0, limit);
+        assert_number(&format!("{beside} aside"), mean_light(&smooth, &ONE, &view, 256, 3).0, 1.0, limit);
     }
 }
 
@@ -177,7 +188,7 @@ fn bounces() {
     for a in [0.5f32, 0.8] {
         let material = Material { emission: 0.25, ..matt(a) };
         let scene = dark(vec![Instance::new(Sphere { radius: 1.0 }, material, 1)]);
-        let light = |bounces| seen(&scene, &ONE, &looking([0.2, -0.1, 0.3], [1.0, 0.5, -0.2]), 256, bounces);
+        let light = |bounces| mean_light(&scene, &ONE, &one_ray_view([0.2, -0.1, 0.3], [1.0, 0.5, -0.2]), 256, bounces);
         let a = albedo(a);
         let sum = |bounces: u32| 0.25 * a * (0..=bounces + 1).map(|k| a.powi(k as i32)).sum::<f64>();
         for bounces in [0, 1, 2, 5, 10] {
@@ -190,32 +201,32 @@ fn bounces() {
     }
 }
 
-fn lamp(kind: LightKind, position: [f32; 3], direction: [f32; 3]) -> Light {
+fn light(kind: LightKind, position: [f32; 3], direction: [f32; 3]) -> Light {
     Light { kind, position, direction, attenuation: [0., 0., 1.], diffuse: [0.9; 3], ..Light::default() }
 }
 
 fn sun() -> Light {
-    lamp(LightKind::Directional, [0.; 3], [0., 0., -1.])
+    light(LightKind::Directional, [0.; 3], [0., 0., -1.])
 }
 
 /// A matt floor reflects albedo, color, cosine, and 1 / r² of a near light. Invalid lights are left out.
 #[test]
 fn lights() {
     let mut scene = on_floor(matt(0.6), []);
-    let view = looking([3.0, 1.0, 2.0], [0.2, -0.1, 0.0]);
+    let view = one_ray_view([3.0, 1.0, 2.0], [0.2, -0.1, 0.0]);
     let place = [0.9f32, 0.4, 1.5];
     let to = [0, 1, 2].map(|k| f64::from(place[k]) - f64::from([0.2f32, -0.1, 0.0][k]));
     let square = dot(to, to);
     let down = [-0.7, -0.5, -1.5];
     let spot = LightKind::Spot { cutoff_deg: 30.0, exponent: 3.0 };
-    let axis = kinetoscope_scene::vector::unit(down.map(f64::from)).unwrap();
+    let axis = kinetoscope_scene::vector::normalize(down.map(f64::from)).unwrap();
     let inside = -dot(axis, to) / square.sqrt();
     for (light, part) in [
-        (lamp(LightKind::Directional, place, down), -axis[2]),
-        (lamp(LightKind::Point, place, down), to[2] / square.powf(1.5)),
-        (lamp(spot, place, down), to[2] / square.powf(1.5) * inside.powi(3)),
+        (light(LightKind::Directional, place, down), -axis[2]),
+        (light(LightKind::Point, place, down), to[2] / square.powf(1.5)),
+        (light(spot, place, down), to[2] / square.powf(1.5) * inside.powi(3)),
         // Faces away.
-        (lamp(spot, place, [0.7, 0.5, -1.5]), 0.0),
+        (light(spot, place, [0.7, 0.5, -1.5]), 0.0),
     ] {
         scene.lights = vec![light];
         let expected = albedo(0.6) * f64::from(0.9f32) * part;
@@ -224,9 +235,9 @@ fn lights() {
             relative: 1e-5,
             derivation: "pixels of micrometres, lights in single precision",
         };
-        assert_number(&format!("{light:?}"), seen(&scene, &ONE, &view, 4, 3).0, expected, dim);
+        assert_number(&format!("{light:?}"), mean_light(&scene, &ONE, &view, 4, 3).0, expected, dim);
     }
-    let good = lamp(LightKind::Point, [0., 0., 1.], [0., 0., -1.]);
+    let good = light(LightKind::Point, [0., 0., 1.], [0., 0., -1.]);
     for bad in [f32::NAN, f32::INFINITY] {
         for light in [
             Light { diffuse: [bad; 3], ..good },
@@ -235,7 +246,10 @@ fn lights() {
             Light { attenuation: [bad; 3], ..good },
         ] {
             scene.lights = vec![light];
-            assert!(seen(&scene, &ONE, &looking([3.0, 0.0, 4.0], [0.0; 3]), 4, 1).0.is_finite(), "{light:?}");
+            assert!(
+                mean_light(&scene, &ONE, &one_ray_view([3.0, 0.0, 4.0], [0.0; 3]), 4, 1).0.is_finite(),
+                "{light:?}"
+            );
         }
     }
 }
@@ -256,13 +270,15 @@ fn alpha() {
     for (shape, fronts) in [(ball, 1), (bricks(&[0.2]), 1), (bricks(&[0.2, 0.1]), 2), (bricks(&[0.2, 0.15, 0.1]), 3)] {
         let mut scene = on_floor(matt(0.6), [Instance::new(shape.clone(), glass_of(0.3), 2)]);
         scene.lights = vec![sun()];
-        let (mean, _) = seen(&scene, &lifted(1.0), &looking([1.0, 0.0, 0.5], [0.03, 0.01, 0.0]), 4, 0);
+        let (mean, _) =
+            mean_light(&scene, &floor_and_object(1.0), &one_ray_view([1.0, 0.0, 0.5], [0.03, 0.01, 0.0]), 4, 0);
         assert_number(shape.name(), mean, lit * part.powi(fronts), SINGLE);
         if let Shape::Sphere(_) = shape {
-            let (mean, _) = seen(&scene, &lifted(1.0), &looking([1.0, 0.0, 0.5], [0.0; 3]), 4, 0);
+            let (mean, _) = mean_light(&scene, &floor_and_object(1.0), &one_ray_view([1.0, 0.0, 0.5], [0.0; 3]), 4, 0);
             assert_number("below the middle", mean, part * lit, SINGLE);
             // Through the ball at a point that is lit directly.
-            let light = seen(&scene, &lifted(1.0), &looking([-0.5, 0.0, 1.5], [0.5, 0.0, 0.5]), 1024, 0);
+            let light =
+                mean_light(&scene, &floor_and_object(1.0), &one_ray_view([-0.5, 0.0, 1.5], [0.5, 0.0, 0.5]), 1024, 0);
             assert!(agrees(light, part * lit), "{light:?}");
             assert!(!agrees(light, lit) && !agrees(light, part * part * lit));
         }
@@ -276,10 +292,10 @@ fn mirrors() {
     let mut scene = on_floor(mirror, [Instance::new(Sphere { radius: 0.3 }, glow, 2)]);
     scene.sky = Sky { zenith: [0.2; 3], horizon: [0.9; 3], nadir: [0.0; 3] };
     let poses = [PoseF32::IDENTITY, PoseF32::from_translation([-1.0, 0.0, 1.0])];
-    let (mean, _) = seen(&scene, &poses, &looking([1.0, 0.0, 1.0], [0.0; 3]), 4, 2);
+    let (mean, _) = mean_light(&scene, &poses, &one_ray_view([1.0, 0.0, 1.0], [0.0; 3]), 4, 2);
     assert_number("the ball", mean, albedo(0.4), TIGHT);
     // Past the ball: the sky 45 degrees up.
-    let (mean, _) = seen(&scene, &poses, &looking([1.0, 2.0, 1.0], [0.0, 2.0, 0.0]), 4, 2);
+    let (mean, _) = mean_light(&scene, &poses, &one_ray_view([1.0, 2.0, 1.0], [0.0, 2.0, 0.0]), 4, 2);
     let linear = |x: f32| f64::from(kinetoscope_scene::decode_srgb(x));
     assert_number("the sky", mean, linear(0.9) + 0.5f64.sqrt().sqrt() * (linear(0.2) - linear(0.9)), SINGLE);
 }
@@ -290,28 +306,28 @@ fn mirrors() {
 fn headlight() {
     let only = |ambient, active| Headlight { ambient: [ambient; 3], diffuse: [0.4; 3], specular: [0.0; 3], active };
     let (eye, front) = ([3.0f32, 0.0, 4.0], 0.8 * f64::from(0.4f32));
-    let view = looking(eye, [0.0; 3]);
+    let view = one_ray_view(eye, [0.0; 3]);
     let mut scene = on_floor(matt(0.6), []);
     scene.headlight = only(0.1, true);
     scene.ambient = Hemisphere { sky: [0.3; 3], ground: [0.1; 3] };
     let expected = albedo(0.6) * (front + f64::from(0.1f32) + f64::from(0.3f32));
-    assert_number("ambient", seen(&scene, &ONE, &view, 4, 2).0, expected, SINGLE);
+    assert_number("ambient", mean_light(&scene, &ONE, &view, 4, 2).0, expected, SINGLE);
 
     let mut scene = on_floor(matt(0.6), []);
     scene.headlight = only(0.0, true);
     scene.lights = vec![Light { diffuse: [0.03; 3], ..sun() }; 16];
     let expected = albedo(0.6) * (16.0 * f64::from(0.03f32) + front);
     // A missing light of the sixteen would be 0.018.
-    assert_number("sixteen lights", seen(&scene, &ONE, &view, 4, 0).0, expected, SINGLE);
+    assert_number("sixteen lights", mean_light(&scene, &ONE, &view, 4, 0).0, expected, SINGLE);
 
     let mut scene = on_floor(matt(0.6), [Instance::new(Box { half: [0.05; 3] }, matt(0.6), 2)]);
     scene.headlight = only(0.0, true);
     let (view, poses) = (View { near: 0.1, ..view }, [PoseF32::IDENTITY, PoseF32::from_translation(eye)]);
-    assert_number("housing", seen(&scene, &poses, &view, 4, 0).0, albedo(0.6) * front, SINGLE);
+    assert_number("housing", mean_light(&scene, &poses, &view, 4, 0).0, albedo(0.6) * front, SINGLE);
     // A control: a light at the same place is shaded by the housing.
     scene.headlight = only(0.0, false);
-    scene.lights = vec![Light { attenuation: [1., 0., 0.], ..lamp(LightKind::Point, eye, [0., 0., -1.]) }];
-    assert_eq!(seen(&scene, &poses, &view, 4, 0).0, 0.0);
+    scene.lights = vec![Light { attenuation: [1., 0., 0.], ..light(LightKind::Point, eye, [0., 0., -1.]) }];
+    assert_eq!(mean_light(&scene, &poses, &view, 4, 0).0, 0.0);
 }
 
 /// A light reflected by a black glossy floor, seen in the mirror direction and beside it: Walter et al. 2007, Schlick
@@ -325,9 +341,9 @@ fn ggx_highlights() {
         scene.lights = vec![Light { direction: toward_light.map(|x| -x as f32), ..light }];
         // The first is the mirror direction.
         let all = [[-1.6f32, 0.0, 1.2], [-1.5, 0.3, 1.2], [-1.0, 0.5, 2.0], [0.0, 0.0, 2.0]].map(|eye| {
-            let (mean, _) = seen(&scene, &ONE, &looking(eye, [0.0; 3]), 1, 0);
-            let o = kinetoscope_scene::vector::unit(eye.map(f64::from)).unwrap();
-            let h = kinetoscope_scene::vector::unit(add(o, toward_light)).unwrap();
+            let (mean, _) = mean_light(&scene, &ONE, &one_ray_view(eye, [0.0; 3]), 1, 0);
+            let o = kinetoscope_scene::vector::normalize(eye.map(f64::from)).unwrap();
+            let h = kinetoscope_scene::vector::normalize(add(o, toward_light)).unwrap();
             let alpha2 = 2.0 / ((128.0 * f64::from(shininess)).max(1.0) + 2.0);
             let d = alpha2 / (PI * (h[2] * h[2] * (alpha2 - 1.0) + 1.0).powi(2));
             let lambda = |cos: f64| ((1.0 + alpha2 * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0) / 2.0;

@@ -1,12 +1,12 @@
 //! Texture lookup at one point: bilinear within the mip level of the footprint.
 
-use kinetoscope_scene::Level;
+use kinetoscope_scene::MipLevel;
 use kinetoscope_scene::Texture;
 use kinetoscope_scene::vector::V3;
 
 /// Linear color at (u, v), v upward, for a footprint in texture coordinates.
 pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
-    let first = &texture.levels()[0];
+    let first = &texture.mip_levels()[0];
     let level = level(texture, footprint * f64::from(first.width().max(first.height())));
     let part = |x: f64| if x.abs() < 1e6 { x - x.floor() } else { 0.0 };
     let (w, h) = (f64::from(level.width()), f64::from(level.height()));
@@ -16,7 +16,7 @@ pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
 
 /// Linear color in a direction of a cube texture, for a footprint on a cube of half length 1.
 pub(super) fn at_cube(texture: &Texture, d: V3, footprint: f64) -> V3 {
-    let level = level(texture, footprint * 0.5 * f64::from(texture.levels()[0].width()));
+    let level = level(texture, footprint * 0.5 * f64::from(texture.mip_levels()[0].width()));
     let [ax, ay, az] = d.map(f64::abs);
     let (axis, major) = if ax >= ay && ax >= az {
         (0, ax)
@@ -42,8 +42,8 @@ pub(super) fn at_cube(texture: &Texture, d: V3, footprint: f64) -> V3 {
 }
 
 /// The mip level whose texels are as wide as the footprint, or the next finer one.
-fn level(texture: &Texture, texels: f64) -> &Level {
-    let levels = texture.levels();
+fn level(texture: &Texture, texels: f64) -> &MipLevel {
+    let levels = texture.mip_levels();
     let mut k = 0;
     let mut width = 2.0;
     while k + 1 < levels.len() && texels >= width {
@@ -53,7 +53,7 @@ fn level(texture: &Texture, texels: f64) -> &Level {
 }
 
 /// Blends four texels in sRGB, as the rasterizer does.
-fn bilinear(level: &Level, x: f64, y: f64) -> V3 {
+fn bilinear(level: &MipLevel, x: f64, y: f64) -> V3 {
     let (ix, iy) = (x as usize, y as usize);
     let (fx, fy) = (x - ix as f64, y - iy as f64);
     let stride = level.width() as usize + 1;
@@ -75,7 +75,7 @@ fn linear(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{at_level, levels, splat};
+    use crate::simd::{all_levels, at_level, splat};
     use kinetoscope_scene::TextureKind;
 
     /// Within 0.0005 of the standard, and equal to the rasterizer to single precision.
@@ -86,7 +86,7 @@ mod tests {
             let [light, ..] = at(&texture, [0.3, 0.7], 0.0);
             let standard = f64::from(kinetoscope_scene::decode_srgb(f32::from(byte) / 255.0));
             assert!((light - standard).abs() < 5e-4, "{byte}: {light}, not {standard}");
-            for level in levels() {
+            for level in all_levels() {
                 let raster = at_level!(level, s => {
                     crate::shade::tone::decode_bytes(splat(s, f32::from(byte))).array()[0]
                 });

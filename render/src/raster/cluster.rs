@@ -1,14 +1,14 @@
 //! Rasterization of a cluster of triangles: transform, clip, triangle setup.
 
 use super::tile::Tile;
-use super::triangle::{self, GUARD, Gradient, SUB};
+use super::triangle::{self, GUARD_BAND, Gradient, SUBPIXELS};
 use crate::simd::{LANES, Simd, abs, load, select, splat, store, store_i};
 use crate::visibility::Projection;
 use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::RenderMesh;
 
-const MAX_VERTICES: usize = 3 * RenderMesh::CLUSTER;
+const MAX_VERTICES: usize = 3 * RenderMesh::MAX_CLUSTER_TRIANGLES;
 /// Adding and subtracting this rounds to an integer (below 2^22). `round()` would be a library call.
 const ROUND: f32 = 12_582_912.0;
 
@@ -37,7 +37,7 @@ impl Default for Vertices {
 
 /// State that all triangles of an instance share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pass<'a> {
+pub(crate) struct ClusterPass<'a> {
     pub(crate) projection: &'a Projection,
     pub(crate) camera_from_instance: &'a PoseF32,
     /// True if back faces are culled.
@@ -53,7 +53,7 @@ pub(crate) fn draw<S: Simd>(
     v: &mut Vertices,
     mesh: &RenderMesh,
     cluster: &Cluster,
-    pass: &Pass<'_>,
+    pass: &ClusterPass<'_>,
 ) {
     let all_good = transform(s, v, mesh, cluster, pass);
     let nearest = pass.projection.nearest();
@@ -63,7 +63,7 @@ pub(crate) fn draw<S: Simd>(
         let corners = [usize::from(a), usize::from(b), usize::from(c)];
         let id = pass.first_id + k as u32;
         if !all_good && corners.iter().any(|&i| v.clip[i] != 0.0) {
-            clipped(s, tile, v, corners, pass, id);
+            draw_clipped(s, tile, v, corners, pass, id);
             continue;
         }
         let snapped = |i: usize| [v.snapped[0][i], v.snapped[1][i]];
@@ -90,15 +90,15 @@ pub(crate) fn draw<S: Simd>(
 
 /// Transforms the vertices of a cluster; true if no vertex must be clipped.
 #[inline(always)]
-fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Cluster, pass: &Pass<'_>) -> bool {
+fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Cluster, pass: &ClusterPass<'_>) -> bool {
     let (projection, pose) = (pass.projection, pass.camera_from_instance);
     let (r, t) = (&pose.rotation, pose.translation);
     let too_near = splat(s, 0.5 * projection.near);
-    let (guard, zero) = (splat(s, GUARD), splat(s, 0.0));
+    let (guard, zero) = (splat(s, GUARD_BAND), splat(s, 0.0));
     let mut all_good = true;
-    for i in (0..cluster.lane_count as usize).step_by(LANES) {
-        let from = cluster.first_lane as usize + i;
-        let [x, y, z] = mesh.lanes();
+    for i in (0..cluster.vertex_count as usize).step_by(LANES) {
+        let from = cluster.first_vertex as usize + i;
+        let [x, y, z] = mesh.cluster_positions();
         let (x, y, z) = (load(s, &x[from..]), load(s, &y[from..]), load(s, &z[from..]));
         let row = {
             #[inline(always)]
@@ -119,7 +119,7 @@ fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Clust
         for (k, value) in [sx, sy].into_iter().enumerate() {
             let value = select(good, value, zero);
             store(value, &mut v.screen[k][i..]);
-            let snapped = (value * SUB + ROUND) - ROUND;
+            let snapped = (value * SUBPIXELS + ROUND) - ROUND;
             store_i(snapped.to_int(), &mut v.snapped[k][i..]);
         }
         store(select(good, zero, splat(s, 1.0)), &mut v.clip[i..]);
@@ -157,20 +157,20 @@ fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[
 /// Rasterizes a triangle that leaves the guard band or comes too near: clipped to a polygon of at most eight corners,
 /// drawn as a fan. Edges are cut from the inside to the outside, so both neighbors of an edge get the same point.
 #[inline(never)]
-fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pass: &Pass<'_>, id: u32) {
+fn draw_clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pass: &ClusterPass<'_>, id: u32) {
     let projection = pass.projection;
     let original = corners.map(|i| [v.camera[0][i], v.camera[1][i], v.camera[2][i]]);
     let Some((polygon, count)) = clip(projection, original) else { return };
     let polygon = &polygon[..count];
     let screen = |c: [f32; 3]| {
         let inverse = if projection.parallel { 1.0 } else { 1.0 / c[2] };
-        let k = GUARD + 1.0;
+        let k = GUARD_BAND + 1.0;
         [
             (c[0] * inverse * projection.fx + projection.cx).clamp(-k, k),
             (c[1] * inverse * projection.fy + projection.cy).clamp(-k, k),
         ]
     };
-    let snap = |p: [f32; 2]| p.map(|x| ((x * SUB + ROUND) - ROUND) as i32);
+    let snap = |p: [f32; 2]| p.map(|x| ((x * SUBPIXELS + ROUND) - ROUND) as i32);
     let mut nearness = [0.0; 9];
     for (to, corner) in nearness.iter_mut().zip(polygon) {
         *to = projection.nearness(corner[2]);
@@ -186,13 +186,13 @@ fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pa
         if area < 0 {
             p.swap(1, 2);
         }
-        rarely(s, tile, p, &g, projection.nearest(), id);
+        draw_outlined(s, tile, p, &g, projection.nearest(), id);
     }
 }
 
 /// Not inlined: a second copy of [`triangle::draw`] does not pay off.
 #[inline(never)]
-fn rarely<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, nearest: f32, id: u32) {
+fn draw_outlined<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, nearest: f32, id: u32) {
     s.vectorize(
         #[inline(always)]
         || triangle::draw(s, tile, p, || *g, nearest, id),
@@ -209,10 +209,10 @@ fn clip(projection: &Projection, triangle: [[f32; 3]; 3]) -> Option<([[f32; 3]; 
     };
     let planes = [
         [0.0, 0.0, 1.0, -0.5 * p.near],
-        side(-p.fx, 0.0, GUARD - p.cx),
-        side(p.fx, 0.0, GUARD + p.cx),
-        side(0.0, -p.fy, GUARD - p.cy),
-        side(0.0, p.fy, GUARD + p.cy),
+        side(-p.fx, 0.0, GUARD_BAND - p.cx),
+        side(p.fx, 0.0, GUARD_BAND + p.cx),
+        side(0.0, -p.fy, GUARD_BAND - p.cy),
+        side(0.0, p.fy, GUARD_BAND + p.cy),
     ];
     let mut from = ([[0.0f32; 3]; 9], 3);
     from.0[..3].copy_from_slice(&triangle);

@@ -14,7 +14,7 @@ const PIXELS: f32 = 0.5;
 /// projection only.
 ///
 /// Terrain has no levels: cameras stand on it.
-pub(crate) fn level(projection: &Projection, instance: &Instance, camera_from_instance: &PoseF32) -> u8 {
+pub(crate) fn select_level(projection: &Projection, instance: &Instance, camera_from_instance: &PoseF32) -> u8 {
     let Shape::Mesh(shape) = &instance.shape else { return 0 };
     let [lo, hi] = shape.mesh.bounds();
     shape.mesh.level_within(tolerance(projection, camera_from_instance, [lo, hi])) as u8

@@ -11,7 +11,7 @@ use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 
 /// A primitive or a cluster that may be visible.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Item {
+pub(crate) struct DrawItem {
     pub(crate) instance: u32,
     /// `None` for shapes with a closed form.
     pub(crate) cluster: Option<u32>,
@@ -25,7 +25,7 @@ pub(crate) struct Item {
 
 /// An instance in the camera's frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedInstance {
     pub(crate) camera_from_instance: PoseF32,
     pub(crate) local: LocalCamera,
     /// True if the camera is outside of the instance's bounds, by enough that the near plane cuts nothing off.
@@ -36,7 +36,7 @@ pub(crate) struct Placed {
     pub(crate) error: f32,
 }
 
-impl Placed {
+impl PlacedInstance {
     /// The triangles of the instance at the selected level.
     #[inline(always)]
     pub(crate) fn mesh<'a>(&self, instance: &'a Instance) -> Option<&'a RenderMesh> {
@@ -53,26 +53,26 @@ pub enum Layer {
     /// Visible in all channels.
     Opaque,
     /// Blended into the color, and opaque in the other channels.
-    Veil,
+    Blended,
 }
 
 impl Layer {
     /// Layer of an instance, when the geom groups of `groups` are rendered (bit k is group k).
-    pub fn of(instance: &Instance, groups: u32) -> Self {
+    pub fn for_instance(instance: &Instance, groups: u32) -> Self {
         let alpha = instance.material.rgba[3];
         if !instance.visible || alpha <= 0.0 || groups >> instance.group.min(31) & 1 == 0 {
             Self::Hidden
         } else if alpha >= 1.0 {
             Self::Opaque
         } else {
-            Self::Veil
+            Self::Blended
         }
     }
 
     /// True if an instance casts shadows into shadow maps: it is rendered, its alpha is at least 0.5, and it is not a
     /// marker. Markers show measurements and are not part of the scene.
     pub(crate) fn casts_shadows(instance: &Instance, groups: u32) -> bool {
-        Self::of(instance, groups) != Self::Hidden
+        Self::for_instance(instance, groups) != Self::Hidden
             && instance.material.rgba[3] >= 0.5
             && instance.group != Marker::GROUP
     }
@@ -80,43 +80,43 @@ impl Layer {
 
 /// Granularity of a draw list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Parts {
+pub(crate) enum Granularity {
     /// Meshes by cluster, at their level of detail.
-    Levels,
+    LodClusters,
     /// Meshes by cluster, at full detail.
-    Clusters,
+    FullClusters,
     /// Each instance as one item.
-    Whole,
+    Instances,
 }
 
 /// The visible items of a frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DrawList {
-    pub(crate) placed: Vec<Placed>,
+    pub(crate) placed: Vec<PlacedInstance>,
     /// Opaque items, the nearest first.
-    pub(crate) opaque: Vec<Item>,
+    pub(crate) opaque: Vec<DrawItem>,
     /// Transparent items, the farthest instance first.
-    pub(crate) blended: Vec<(Layer, Item)>,
-    /// The largest [`Placed::error`].
+    pub(crate) blended: Vec<(Layer, DrawItem)>,
+    /// The largest [`PlacedInstance::error`].
     pub(crate) error: f32,
 }
 
 impl DrawList {
     pub(crate) fn bytes(&self) -> usize {
-        self.placed.capacity() * size_of::<Placed>()
-            + self.opaque.capacity() * size_of::<Item>()
-            + self.blended.capacity() * size_of::<(Layer, Item)>()
+        self.placed.capacity() * size_of::<PlacedInstance>()
+            + self.opaque.capacity() * size_of::<DrawItem>()
+            + self.blended.capacity() * size_of::<(Layer, DrawItem)>()
     }
 
     /// Empties the list and reserves memory for all instances that may be kept: visibility changes from frame to frame,
     /// and memory must not grow with it.
-    pub(crate) fn reserve(&mut self, scene: &RenderScene, parts: Parts, keep: impl Fn(&Instance) -> Layer) {
+    pub(crate) fn reserve(&mut self, scene: &RenderScene, parts: Granularity, keep: impl Fn(&Instance) -> Layer) {
         self.placed.clear();
         self.opaque.clear();
         self.blended.clear();
         let (mut opaque, mut blended) = (0, 0);
         for instance in scene.instances() {
-            let mesh = instance.mesh().filter(|_| parts != Parts::Whole);
+            let mesh = instance.mesh().filter(|_| parts != Granularity::Instances);
             let items = mesh.map_or(1, |mesh| mesh.clusters().len());
             match keep(instance) {
                 Layer::Hidden => {}
@@ -137,7 +137,7 @@ impl DrawList {
         lens: Option<&LensRays>,
         scene: &RenderScene,
         poses: &[PoseF32],
-        parts: Parts,
+        parts: Granularity,
         keep: impl Fn(&Instance) -> Layer,
     ) {
         self.error = 0.0;
@@ -149,36 +149,36 @@ impl DrawList {
             let margin = if projection.parallel { f32::NEG_INFINITY } else { 2.0 * projection.near };
             let outside = (0..3).any(|k| t[k] < lo[k] - margin || t[k] > hi[k] + margin);
             let camera_from_instance = projection.world_from_camera.inverse_times(pose);
-            let placed = Placed { camera_from_instance, local, outside, level: 0, error: 0.0 };
+            let placed = PlacedInstance { camera_from_instance, local, outside, level: 0, error: 0.0 };
             self.placed.push(placed);
             let layer = keep(instance);
             if layer == Layer::Hidden {
                 continue;
             }
-            let middle = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
+            let center = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
             let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
             let seen = match lens {
-                None => bounds(projection, &placed.camera_from_instance, middle, half),
-                Some(lens) => lens_bounds(projection, lens, placed.camera_from_instance.apply(middle), half),
+                None => bounds(projection, &placed.camera_from_instance, center, half),
+                Some(lens) => lens_bounds(projection, lens, placed.camera_from_instance.apply(center), half),
             };
             let Some((rect, nearness)) = seen else { continue };
             let order = if half.iter().all(|h| h.is_finite()) { nearness } else { f32::MIN };
-            let whole = Item { instance: index as u32, cluster: None, rect, nearness, order };
+            let whole = DrawItem { instance: index as u32, cluster: None, rect, nearness, order };
             let mut push = |item| match layer {
                 Layer::Opaque => self.opaque.push(item),
                 _ => self.blended.push((layer, item)),
             };
-            let Some(mesh) = instance.mesh().filter(|_| parts != Parts::Whole) else {
+            let Some(mesh) = instance.mesh().filter(|_| parts != Granularity::Instances) else {
                 push(whole);
                 continue;
             };
-            let level = if parts == Parts::Levels {
-                detail::level(projection, instance, &placed.camera_from_instance)
+            let level = if parts == Granularity::LodClusters {
+                detail::select_level(projection, instance, &placed.camera_from_instance)
             } else {
                 0
             };
             let error = mesh.level_error(usize::from(level));
-            self.placed[index] = Placed { level, error, ..placed };
+            self.placed[index] = PlacedInstance { level, error, ..placed };
             self.error = self.error.max(error);
             for (k, cluster) in mesh.level(usize::from(level)).clusters().iter().enumerate() {
                 if outside && faces_away(projection, &placed, cluster) {
@@ -186,7 +186,7 @@ impl DrawList {
                 }
                 let c = placed.camera_from_instance.apply(cluster.center);
                 if let Some((rect, nearness)) = ball_bounds(projection, c, cluster.radius) {
-                    push(Item { cluster: Some(k as u32), rect, nearness, order: nearness, ..whole });
+                    push(DrawItem { cluster: Some(k as u32), rect, nearness, order: nearness, ..whole });
                 }
             }
         }
@@ -206,7 +206,7 @@ impl DrawList {
 }
 
 /// True if all triangles of a closed cluster are back-facing.
-fn faces_away(projection: &Projection, placed: &Placed, cluster: &Cluster) -> bool {
+fn faces_away(projection: &Projection, placed: &PlacedInstance, cluster: &Cluster) -> bool {
     if !cluster.closed || cluster.cone_cos <= 0.0 {
         return false;
     }
@@ -228,7 +228,7 @@ fn bounds(
     middle: [f32; 3],
     half: [f32; 3],
 ) -> Option<([u16; 4], f32)> {
-    let everywhere = everywhere(projection);
+    let everywhere = full_rect(projection);
     if !half.iter().all(|h| h.is_finite()) {
         return Some((everywhere, f32::MAX));
     }
@@ -262,7 +262,7 @@ fn bounds(
 /// Bounds of a box around a point of the optical frame, through a lens, and its largest nearness: the whole image if
 /// the depth range allows it. Blocks are tested later.
 fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
-    let everywhere = everywhere(projection);
+    let everywhere = full_rect(projection);
     let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     let radius = 1.0001 * length(half);
     if !radius.is_finite() {
@@ -294,14 +294,14 @@ fn box_bounds(projection: &Projection, c: [f32; 3], r: [f32; 3]) -> Option<([u16
         return Some((blocks(projection, lo, hi)?, projection.nearness(near) + 1e-6));
     }
     if near < projection.near {
-        return Some((everywhere(projection), f32::MAX));
+        return Some((full_rect(projection), f32::MAX));
     }
     let lo = [0, 1].map(|k| (c[k] - r[k]) / if c[k] - r[k] < 0.0 { near } else { far } * f[k] + middle[k]);
     let hi = [0, 1].map(|k| (c[k] + r[k]) / if c[k] + r[k] > 0.0 { near } else { far } * f[k] + middle[k]);
     Some((blocks(projection, lo, hi)?, projection.nearness(near * 0.9999)))
 }
 
-fn everywhere(projection: &Projection) -> [u16; 4] {
+fn full_rect(projection: &Projection) -> [u16; 4] {
     [0, 0, ((projection.width - 1) / BLOCK) as u16, ((projection.height - 1) / BLOCK) as u16]
 }
 

@@ -13,21 +13,21 @@ mod triangle;
 use crate::simd::{COLUMN, F, LANES, M, ROW, Simd, U};
 use crate::simd::{load, load_u, select, select_u, splat, splat_u, store, store_u};
 use crate::visibility::{Projection, primitive};
-use cluster::{Pass, Vertices};
-pub(crate) use detail::level;
+use cluster::{ClusterPass, Vertices};
+pub(crate) use detail::select_level;
 pub use draw_list::Layer;
-pub(crate) use draw_list::{DrawList, Item, Parts, Placed};
+pub(crate) use draw_list::{DrawItem, DrawList, Granularity, PlacedInstance};
 use kinetoscope_scene::RenderScene;
 use kinetoscope_scene::shape::Shape;
-use tile::{BLOCK, NOTHING, SAMPLES, Tile};
+use tile::{BLOCK, NO_ID, SAMPLES, Tile};
 
 /// Rasterizes items into a visibility buffer.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Painter {
+pub(crate) struct VisibilityRasterizer {
     vertices: Vertices,
 }
 
-impl Painter {
+impl VisibilityRasterizer {
     /// Draws one item of a draw list. One copy per instruction set: inlined into every caller, it took minutes to
     /// compile.
     #[inline(never)]
@@ -37,8 +37,8 @@ impl Painter {
         tile: &mut Tile,
         projection: &Projection,
         scene: &RenderScene,
-        placed: &[Placed],
-        item: &Item,
+        placed: &[PlacedInstance],
+        item: &DrawItem,
     ) {
         let Some(area) = tile.overlap(item.rect) else { return };
         let index = item.instance as usize;
@@ -50,7 +50,7 @@ impl Painter {
                 'search: for by in area[1]..=area[3] {
                     for bx in area[0]..=area[2] {
                         let block = tile.block(bx, by);
-                        if !tile.hidden(block, item.nearness) {
+                        if !tile.is_occluded(block, item.nearness) {
                             hidden = false;
                             break 'search;
                         }
@@ -58,7 +58,7 @@ impl Painter {
                 }
                 if !hidden {
                     let cluster = &mesh.clusters()[k as usize];
-                    let pass = Pass {
+                    let pass = ClusterPass {
                         projection,
                         camera_from_instance: &placed.camera_from_instance,
                         cull: cluster.closed && placed.outside,
@@ -71,9 +71,9 @@ impl Painter {
                     );
                 }
             }
-            _ if is_floor(&instance.shape, projection) => s.vectorize(
+            _ if is_infinite_plane(&instance.shape, projection) => s.vectorize(
                 #[inline(always)]
-                || draw_floor(s, tile, projection, placed, first_id, area),
+                || draw_infinite_plane(s, tile, projection, placed, first_id, area),
             ),
             _ => s.vectorize(
                 #[inline(always)]
@@ -85,18 +85,18 @@ impl Painter {
 
 /// True for an infinite plane seen by a perspective camera.
 #[inline(always)]
-fn is_floor(shape: &Shape, projection: &Projection) -> bool {
+fn is_infinite_plane(shape: &Shape, projection: &Projection) -> bool {
     matches!(shape, Shape::Plane(plane) if plane.half == [0.0; 2]) && !projection.parallel
 }
 
 /// Draws an infinite plane, whose nearness is linear in the image: 1/z = -d.z / o.z, where the ray d from the camera o
 /// points down in the plane's frame. Most images are full of one.
 #[inline(always)]
-fn draw_floor<S: Simd>(
+fn draw_infinite_plane<S: Simd>(
     s: S,
     tile: &mut Tile,
     projection: &Projection,
-    placed: &Placed,
+    placed: &PlacedInstance,
     first_id: u32,
     area: [usize; 4],
 ) {
@@ -108,12 +108,12 @@ fn draw_floor<S: Simd>(
         return;
     }
     let (nearest, zero) = (splat(s, projection.nearest()), splat(s, 0.0));
-    let (id, nothing) = (splat_u(s, first_id), splat_u(s, NOTHING));
+    let (id, nothing) = (splat_u(s, first_id), splat_u(s, NO_ID));
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
             // Most of a floor is the first item in its blocks, which then need no comparison.
-            let empty = tile.take_fresh(block);
+            let empty = tile.take_cleared(block);
             let mut drawn = false;
             for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                 let offset = offset.map(|x| x as f32 / 256.0);
@@ -128,7 +128,7 @@ fn draw_floor<S: Simd>(
                     let hit = down.simd_lt(zero) & q.simd_le(nearest);
                     let at = samples + row * LANES;
                     let Some(empty) = empty else {
-                        drawn |= keep(s, tile, at, hit, q, id);
+                        drawn |= depth_test(s, tile, at, hit, q, id);
                         continue;
                     };
                     let empty = splat(s, empty);
@@ -139,7 +139,7 @@ fn draw_floor<S: Simd>(
                 }
             }
             if drawn {
-                tile.touch(block);
+                tile.mark_dirty(block);
             }
         }
     }
@@ -148,7 +148,7 @@ fn draw_floor<S: Simd>(
 /// Keeps the samples that are nearer than the stored ones, or as near and of a later instance. Returns true if any is
 /// kept.
 #[inline(always)]
-fn keep<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
+fn depth_test<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
     let old = load(s, &tile.nearness[at..]);
     let near = hit & nearness.simd_ge(old);
     if !near.any_true() {
@@ -169,18 +169,18 @@ fn draw_primitive<S: Simd>(
     tile: &mut Tile,
     projection: &Projection,
     shape: &Shape,
-    placed: &Placed,
-    item: &Item,
+    placed: &PlacedInstance,
+    item: &DrawItem,
     first_id: u32,
     area: [usize; 4],
 ) {
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
-            if tile.hidden(block, item.nearness) {
+            if tile.is_occluded(block, item.nearness) {
                 continue;
             }
-            tile.open(block);
+            tile.prepare_block(block);
             let mut drawn = false;
             for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                 let offset = offset.map(|x| x as f32 / 256.0);
@@ -200,11 +200,11 @@ fn draw_primitive<S: Simd>(
                         }
                         _ => projection.nearness_lanes(hit.t),
                     };
-                    drawn |= keep(s, tile, samples + row * LANES, hit.hit, q, hit.face + splat_u(s, first_id));
+                    drawn |= depth_test(s, tile, samples + row * LANES, hit.hit, q, hit.face + splat_u(s, first_id));
                 }
             }
             if drawn {
-                tile.touch(block);
+                tile.mark_dirty(block);
             }
         }
     }

@@ -3,15 +3,15 @@
 /// Pixels along the side of a block.
 pub(crate) const BLOCK: usize = 8;
 /// Pixels in a block.
-pub(crate) const AREA: usize = BLOCK * BLOCK;
+pub(crate) const BLOCK_AREA: usize = BLOCK * BLOCK;
 /// Id of an empty sample.
-pub(crate) const NOTHING: u32 = u32::MAX;
+pub(crate) const NO_ID: u32 = u32::MAX;
 
 /// Sample positions in a pixel, from its center, in 1/256 pixel. The first is the center, used by all channels but
 /// color; the other four are the rotated grid of GPUs.
 pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
 /// The largest offset of a sample.
-pub(crate) const REACH: i32 = 96;
+pub(crate) const MAX_SAMPLE_OFFSET: i32 = 96;
 
 /// A rectangle of 8x8 blocks of the image. Within a block, samples of one kind are contiguous: `[block][plane][64]`.
 #[derive(Clone, Debug, Default)]
@@ -28,37 +28,37 @@ pub(crate) struct Tile {
     /// Lower bound of the nearness in each block.
     farthest: Vec<f32>,
     /// True if the block changed since `farthest` was computed.
-    stale: Vec<bool>,
+    dirty: Vec<bool>,
     /// True if the block is empty, whatever its memory holds. It is cleared when it is first drawn into, while it
     /// passes through the cache anyway.
-    fresh: Vec<bool>,
+    cleared: Vec<bool>,
     /// Nearness of an empty sample.
     empty: f32,
     /// The only row of each block that rays are cast for; `None` for all rows.
-    pub(crate) only: Option<usize>,
+    pub(crate) only_row: Option<usize>,
 }
 
 impl Tile {
     /// Reserves memory for tiles of up to `samples` samples.
     pub(crate) fn reserve(&mut self, samples: usize) {
-        let blocks = samples.div_ceil(AREA);
+        let blocks = samples.div_ceil(BLOCK_AREA);
         self.nearness.reserve_exact(samples.saturating_sub(self.nearness.len()));
         self.id.reserve_exact(samples.saturating_sub(self.id.len()));
         self.farthest.reserve_exact(blocks.saturating_sub(self.farthest.len()));
-        self.stale.reserve_exact(blocks.saturating_sub(self.stale.len()));
-        self.fresh.reserve_exact(blocks.saturating_sub(self.fresh.len()));
+        self.dirty.reserve_exact(blocks.saturating_sub(self.dirty.len()));
+        self.cleared.reserve_exact(blocks.saturating_sub(self.cleared.len()));
     }
 
-    /// Moves the tile and empties it. It must be [settled](Self::settle) before it is read.
+    /// Moves the tile and empties it. It must be [settled](Self::finish) before it is read.
     pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
         [self.x0, self.y0] = origin;
         [self.blocks_x, self.blocks_y] = blocks;
         self.planes = planes;
         self.empty = farthest;
         let count = blocks[0] * blocks[1];
-        self.nearness.resize(count * planes * AREA, farthest);
-        self.id.resize(count * planes * AREA, NOTHING);
-        for (flags, value) in [(&mut self.stale, false), (&mut self.fresh, true)] {
+        self.nearness.resize(count * planes * BLOCK_AREA, farthest);
+        self.id.resize(count * planes * BLOCK_AREA, NO_ID);
+        for (flags, value) in [(&mut self.dirty, false), (&mut self.cleared, true)] {
             flags.clear();
             flags.resize(count, value);
         }
@@ -68,8 +68,8 @@ impl Tile {
 
     /// Prepares a block for drawing.
     #[inline(always)]
-    pub(crate) fn open(&mut self, block: usize) {
-        if self.fresh[block] {
+    pub(crate) fn prepare_block(&mut self, block: usize) {
+        if self.cleared[block] {
             self.empty_block(block);
         }
     }
@@ -78,28 +78,28 @@ impl Tile {
     fn empty_block(&mut self, block: usize) {
         let samples = self.samples(block, 0)..self.samples(block + 1, 0);
         self.nearness[samples.clone()].fill(self.empty);
-        self.id[samples].fill(NOTHING);
-        self.fresh[block] = false;
+        self.id[samples].fill(NO_ID);
+        self.cleared[block] = false;
     }
 
     /// Prepares a block of which every sample will be written; returns the value of all samples if the block is still
     /// empty.
     #[inline(always)]
-    pub(crate) fn take_fresh(&mut self, block: usize) -> Option<f32> {
-        std::mem::take(&mut self.fresh[block]).then_some(self.empty)
+    pub(crate) fn take_cleared(&mut self, block: usize) -> Option<f32> {
+        std::mem::take(&mut self.cleared[block]).then_some(self.empty)
     }
 
     /// Clears untouched blocks, so that the tile can be read.
-    pub(crate) fn settle(&mut self) {
-        for block in 0..self.fresh.len() {
-            self.open(block);
+    pub(crate) fn finish(&mut self) {
+        for block in 0..self.cleared.len() {
+            self.prepare_block(block);
         }
     }
 
     /// Copies the depths of another tile, with no ids.
-    pub(crate) fn behind(&mut self, other: &Self) {
+    pub(crate) fn copy_depths(&mut self, other: &Self) {
         self.copy(other);
-        self.id.fill(NOTHING);
+        self.id.fill(NO_ID);
     }
 
     /// Copies another tile.
@@ -109,16 +109,16 @@ impl Tile {
         self.nearness.clone_from(&other.nearness);
         self.id.clone_from(&other.id);
         self.farthest.clone_from(&other.farthest);
-        self.stale.clone_from(&other.stale);
-        self.fresh.clone_from(&other.fresh);
-        (self.empty, self.only) = (other.empty, other.only);
+        self.dirty.clone_from(&other.dirty);
+        self.cleared.clone_from(&other.cleared);
+        (self.empty, self.only_row) = (other.empty, other.only_row);
     }
 
     /// Memory held \[bytes\].
     pub(crate) fn bytes(&self) -> usize {
         4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())
-            + self.stale.capacity()
-            + self.fresh.capacity()
+            + self.dirty.capacity()
+            + self.cleared.capacity()
     }
 
     /// Index of the block with the pixel (8 bx, 8 by) of the image.
@@ -130,7 +130,7 @@ impl Tile {
     /// Index of the first sample of a block and plane.
     #[inline(always)]
     pub(crate) fn samples(&self, block: usize, plane: usize) -> usize {
-        (block * self.planes + plane) * AREA
+        (block * self.planes + plane) * BLOCK_AREA
     }
 
     /// The part of a rectangle of blocks that is in this tile: x0, y0, x1, y1, the last included.
@@ -143,26 +143,26 @@ impl Tile {
     }
 
     #[inline(always)]
-    pub(crate) fn touch(&mut self, block: usize) {
-        self.stale[block] = true;
+    pub(crate) fn mark_dirty(&mut self, block: usize) {
+        self.dirty[block] = true;
     }
 
     /// True if a surface of this nearness is hidden in the whole block.
     #[inline(always)]
-    pub(crate) fn hidden(&mut self, block: usize, nearness: f32) -> bool {
+    pub(crate) fn is_occluded(&mut self, block: usize, nearness: f32) -> bool {
         if nearness <= self.farthest[block] {
             return true;
         }
-        if self.stale[block] {
+        if self.dirty[block] {
             let first = self.samples(block, 0);
             let mut lanes = [f32::MAX; 16];
-            for row in self.nearness[first..first + self.planes * AREA].chunks_exact(16) {
+            for row in self.nearness[first..first + self.planes * BLOCK_AREA].chunks_exact(16) {
                 for (lane, &x) in lanes.iter_mut().zip(row) {
                     *lane = if x < *lane { x } else { *lane };
                 }
             }
             self.farthest[block] = lanes.iter().copied().fold(f32::MAX, f32::min);
-            self.stale[block] = false;
+            self.dirty[block] = false;
         }
         nearness <= self.farthest[block]
     }

@@ -3,19 +3,19 @@
 //! Coverage: vertices are snapped to 1/256 pixel, edge functions are exact integers, and the top-left rule decides on
 //! edges. Two triangles that share an edge never both draw a sample and never both leave it out.
 //!
-//! Overflow: snapped coordinates are below 2^22 ([`GUARD`] pixels of 2^8), so differences are below 2^23 and edge
+//! Overflow: snapped coordinates are below 2^22 ([`GUARD_BAND`] pixels of 2^8), so differences are below 2^23 and edge
 //! functions below 2^47: set up in `i64`. Samples are a whole pixel apart, so the value shifted down by 8 has the same
 //! sign and steps by the edge's differences: within a block it changes by less than 14 * 2^23 < 2^27. The value at a
 //! block's corner is clamped to ±2^30, which keeps every sign in the block, and the rest is done in `i32`.
 
-use super::tile::{BLOCK, REACH, SAMPLES, Tile};
+use super::tile::{BLOCK, MAX_SAMPLE_OFFSET, SAMPLES, Tile};
 use crate::simd::{COLUMN, F, I, ROW, Simd, load, load_i, load_u, max, min, select, select_i, select_u};
 use crate::simd::{splat, splat_i, splat_u, store, store_u};
 
 /// Vertices farther than this from the first pixel are clipped \[pixels\].
-pub(crate) const GUARD: f32 = 16000.0;
+pub(crate) const GUARD_BAND: f32 = 16000.0;
 /// Sub-pixel positions per pixel.
-pub(crate) const SUB: f32 = 256.0;
+pub(crate) const SUBPIXELS: f32 = 256.0;
 
 /// Nearness of a plane over the image, and its range on the triangle.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +41,7 @@ pub(crate) fn draw<S: Simd>(
 ) {
     let min3 = |k: usize| p[0][k].min(p[1][k]).min(p[2][k]);
     let max3 = |k: usize| p[0][k].max(p[1][k]).max(p[2][k]);
-    let reach = if tile.planes > 1 { REACH } else { 0 };
+    let reach = if tile.planes > 1 { MAX_SAMPLE_OFFSET } else { 0 };
     let (tx, ty) = (tile.x0 as i32, tile.y0 as i32);
     let x0 = ((min3(0) - reach + 127) >> 8).max(tx);
     let x1 = ((max3(0) + reach - 128) >> 8).min(tx + (tile.blocks_x * BLOCK) as i32 - 1);
@@ -80,7 +80,7 @@ pub(crate) fn draw<S: Simd>(
         for bx in x0 >> 3..=x1 >> 3 {
             let (x, y) = (bx * 8, by * 8);
             let block = tile.block(bx as usize, by as usize);
-            tile.open(block);
+            tile.prepare_block(block);
             let first_row = ((y0.max(y) - y) >> 1) as usize;
             let last_row = ((y1.min(y + 7) - y) >> 1) as usize;
             let corner = g.at[2] + g.step[0] * (x as f32 + 0.5 - g.at[0]) + g.step[1] * (y as f32 + 0.5 - g.at[1]);
@@ -98,7 +98,8 @@ pub(crate) fn draw<S: Simd>(
                     continue;
                 }
                 let q0 = corner
-                    + (g.step[0] * (offset[0] as f32 * (1.0 / SUB)) + g.step[1] * (offset[1] as f32 * (1.0 / SUB)));
+                    + (g.step[0] * (offset[0] as f32 * (1.0 / SUBPIXELS))
+                        + g.step[1] * (offset[1] as f32 * (1.0 / SUBPIXELS)));
                 let samples = tile.samples(block, plane);
                 for row in first_row..=last_row {
                     let at = {
@@ -122,7 +123,7 @@ pub(crate) fn draw<S: Simd>(
                 }
             }
             if drawn {
-                tile.touch(block);
+                tile.mark_dirty(block);
             }
         }
     }
@@ -145,7 +146,8 @@ fn few_pixels(
         let start: [i64; 3] = std::array::from_fn(|k| {
             (c[k] + i64::from(a[k]) * i64::from(offset[0]) + i64::from(b[k]) * i64::from(offset[1])) >> 8
         });
-        let shift = g.step[0] * (offset[0] as f32 * (1.0 / SUB)) + g.step[1] * (offset[1] as f32 * (1.0 / SUB));
+        let shift =
+            g.step[0] * (offset[0] as f32 * (1.0 / SUBPIXELS)) + g.step[1] * (offset[1] as f32 * (1.0 / SUBPIXELS));
         for y in y0..=y1 {
             for x in x0..=x1 {
                 let at = |k: usize| start[k] + i64::from(a[k]) * i64::from(x) + i64::from(b[k]) * i64::from(y);
@@ -163,12 +165,12 @@ fn few_pixels(
                 let q = if q < g.high { q } else { g.high };
                 let block = tile.block(bx as usize / BLOCK, by as usize / BLOCK);
                 let here = tile.samples(block, plane) + (row * 8 + column) as usize;
-                tile.open(block);
+                tile.prepare_block(block);
                 let old = tile.nearness[here];
                 if (q > old || q == old && id > tile.id[here]) && q <= nearest {
                     tile.nearness[here] = q;
                     tile.id[here] = id;
-                    tile.touch(block);
+                    tile.mark_dirty(block);
                 }
             }
         }

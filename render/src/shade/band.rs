@@ -1,16 +1,16 @@
 //! A band of an image: from the draw list to the pixels of all channels.
 
-use super::group::{At, Colors, resolve};
-use super::multisample::{Edges, blend};
-use super::plan::Plan;
+use super::group::{Colors, SamplePositions, resolve};
+use super::multisample::{EdgeSamples, blend};
+use super::plan::PreparedFrame;
 use super::shadow::ShadowBand;
 use super::tone::encode;
 use crate::frame::{FrameMut, PixelGroup, Stage};
-use crate::geometry::bvh::Stack;
+use crate::geometry::bvh::TraversalStack;
 use crate::raster::tile::{BLOCK, Tile};
-use crate::raster::{Item, Painter};
-use crate::request::Shot;
-use crate::simd::{LANES, Level, Simd, at_level, first, load, splat_i};
+use crate::raster::{DrawItem, VisibilityRasterizer};
+use crate::request::RenderRequest;
+use crate::simd::{LANES, Simd, SimdLevel, as_lanes, at_level, load, splat_i};
 use crate::trace::CameraView;
 use crate::visibility::Projection;
 use kinetoscope_scene::RenderScene;
@@ -19,39 +19,39 @@ use std::ops::Range;
 
 /// Scratch memory of a thread for rendering.
 #[derive(Clone, Debug)]
-pub(crate) struct Brush {
-    pub(crate) level: Level,
+pub(crate) struct RasterScratch {
+    pub(crate) level: SimdLevel,
     tile: Tile,
     layer: Tile,
-    veiled: Tile,
-    painter: Painter,
+    blended_tile: Tile,
+    rasterizer: VisibilityRasterizer,
     /// Stack for visibility rays; `shade_stack` is for rays cast during shading.
-    stack: Stack,
-    shade_stack: Stack,
+    stack: TraversalStack,
+    shade_stack: TraversalStack,
     colors: Vec<Colors>,
-    edges: Edges,
+    edges: EdgeSamples,
 }
 
-impl Brush {
-    pub(crate) fn new(level: Level) -> Self {
+impl RasterScratch {
+    pub(crate) fn new(level: SimdLevel) -> Self {
         Self {
             level,
             tile: Tile::default(),
             layer: Tile::default(),
-            veiled: Tile::default(),
-            painter: Painter::default(),
-            stack: Stack::default(),
-            shade_stack: Stack::default(),
+            blended_tile: Tile::default(),
+            rasterizer: VisibilityRasterizer::default(),
+            stack: TraversalStack::default(),
+            shade_stack: TraversalStack::default(),
             colors: Vec::new(),
-            edges: Edges::default(),
+            edges: EdgeSamples::default(),
         }
     }
 
     pub(crate) fn bytes(&self) -> usize {
         self.tile.bytes()
             + self.layer.bytes()
-            + self.veiled.bytes()
-            + size_of::<Painter>()
+            + self.blended_tile.bytes()
+            + size_of::<VisibilityRasterizer>()
             + self.colors.capacity() * size_of::<Colors>()
             + self.edges.bytes()
             + self.stack.bytes()
@@ -59,23 +59,29 @@ impl Brush {
     }
 
     /// BVH stack, as scratch memory.
-    pub(crate) fn stack(&mut self) -> &mut Stack {
+    pub(crate) fn stack(&mut self) -> &mut TraversalStack {
         &mut self.stack
     }
 
     /// Renders a band of a shadow map.
-    pub(crate) fn shadow(&mut self, scene: &RenderScene, band: ShadowBand<'_>) {
-        band.draw(self.level, scene, &mut self.tile, &mut self.painter);
+    pub(crate) fn render_shadow_band(&mut self, scene: &RenderScene, band: ShadowBand<'_>) {
+        band.draw(self.level, scene, &mut self.tile, &mut self.rasterizer);
     }
 
     /// Renders rows of blocks of a prepared frame, a band at a time. `frame` begins with the first of these rows.
-    pub(crate) fn paint(&mut self, plan: &Plan, shot: &Shot<'_>, frame: &mut FrameMut<'_>, rows: Range<usize>) {
+    pub(crate) fn render_band(
+        &mut self,
+        plan: &PreparedFrame,
+        shot: &RenderRequest<'_>,
+        frame: &mut FrameMut<'_>,
+        rows: Range<usize>,
+    ) {
         let Some(projection) = &plan.projection else { return };
         let wide = projection.width.div_ceil(BLOCK);
-        let (level, step, top) = (self.level, plan.rows(), rows.start * BLOCK);
+        let (level, step, top) = (self.level, plan.band_rows(), rows.start * BLOCK);
         // Shadow maps may be rendered later: memory is reserved once.
-        self.tile.reserve(plan.most_of_shadow_bands());
-        self.tile.only = plan.only;
+        self.tile.reserve(plan.max_shadow_band_samples());
+        self.tile.only_row = plan.only_row;
         for first in rows.clone().step_by(step) {
             let size = [wide, step.min(rows.end - first)];
             self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());
@@ -86,26 +92,27 @@ impl Brush {
             if frame.wants(Stage::Color) && plan.planes > 1 {
                 self.edges.reserve();
             }
-            at_level!(level, s => self.band(s, plan, shot, projection, frame, top));
+            at_level!(level, s => self.render_tile(s, plan, shot, projection, frame, top));
         }
     }
 
     /// Renders the band of the image that the tile covers.
     #[inline(always)]
-    fn band<S: Simd>(
+    fn render_tile<S: Simd>(
         &mut self,
         s: S,
-        plan: &Plan,
-        shot: &Shot<'_>,
+        plan: &PreparedFrame,
+        shot: &RenderRequest<'_>,
         projection: &Projection,
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
-        let Self { tile, layer, veiled, painter, stack, shade_stack, colors, edges, .. } = self;
+        let Self { tile, layer, blended_tile: veiled, rasterizer: painter, stack, shade_stack, colors, edges, .. } =
+            self;
         let list = &plan.list;
         let view = CameraView { projection, lens: shot.lens, placed: &list.placed, first_ids: shot.scene.first_ids() };
-        let mut draw = |tile: &mut Tile, item: &Item| {
-            if plan.sees_by_rays {
+        let mut draw = |tile: &mut Tile, item: &DrawItem| {
+            if plan.traces_visibility {
                 plan.tracer.draw(s, stack, tile, &view, item);
             } else {
                 painter.draw(s, tile, projection, shot.scene, &list.placed, item);
@@ -114,8 +121,8 @@ impl Brush {
         for item in &list.opaque {
             draw(tile, item);
         }
-        tile.settle();
-        let wanted = [Stage::Detail, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
+        tile.finish();
+        let wanted = [Stage::Surface, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
         let [wants_detail, wants_albedo, wants_flow] = wanted;
         // Shading has shared references only, so its stack is in a cell.
         let shade_stack = RefCell::new(shade_stack);
@@ -133,10 +140,10 @@ impl Brush {
         let mut pixels = PixelGroup::default();
         for (block, row, [x, y]) in groups(tile, size) {
             let at = tile.samples(block, 0) + row * LANES;
-            let (ids, points) = (first(&tile.id[at..]), At::Pixels([x, y]));
+            let (ids, points) = (as_lanes(&tile.id[at..]), SamplePositions::Pixels([x, y]));
             let color = if wants_color { Some(&mut colors[block * 4 + row]) } else { None };
             if veils && wants_geometry {
-                resolve(s, &context, first(&veiled.id[at..]), points, Some(&mut pixels), None);
+                resolve(s, &context, as_lanes(&veiled.id[at..]), points, Some(&mut pixels), None);
                 resolve(s, &context, ids, points, None, color);
             } else {
                 resolve(s, &context, ids, points, wants_geometry.then_some(&mut pixels), color);
@@ -144,7 +151,7 @@ impl Brush {
             // Outside of `vectorize`: with the instruction set, normals become scattered writes, which are slower.
             write(frame, Stage::Geometry, &pixels, [x, y], size, top);
             if wants_detail {
-                write(frame, Stage::Detail, &pixels, [x, y], size, top);
+                write(frame, Stage::Surface, &pixels, [x, y], size, top);
             }
             if wants_flow {
                 write(frame, Stage::Flow, &pixels, [x, y], size, top);
@@ -173,7 +180,7 @@ impl Brush {
             edges.resolve(s, &context, colors);
         }
         for items in list.blended.chunk_by(|(_, a), (_, b)| a.instance == b.instance) {
-            layer.behind(tile);
+            layer.copy_depths(tile);
             for (_, item) in items {
                 draw(layer, item);
             }

@@ -2,13 +2,13 @@
 
 use super::light::{ShadeContext, ViewRays, albedo, shade, sky};
 use super::mirror::{MirrorSamples, Mirrors};
-use super::moves::Moves;
-use super::surface::{CameraRays, Ray, Source, surface};
+use super::moves::MotionVectors;
+use super::surface::{CameraRays, InstanceSurface, LensRayLanes, surface};
 use super::tone::to_srgb;
 use crate::frame::PixelGroup;
 use crate::lens::rays::LensRays;
-use crate::raster::Placed;
-use crate::raster::tile::NOTHING;
+use crate::raster::PlacedInstance;
+use crate::raster::tile::NO_ID;
 use crate::simd::{
     COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, max, min, select, select_i, splat, splat_i, splat_u, store,
 };
@@ -17,24 +17,24 @@ use kinetoscope_scene::PoseF32;
 
 /// State that all pixels of a frame share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Context<'a> {
+pub(crate) struct ShadingContext<'a> {
     pub(crate) projection: &'a Projection,
     /// Rays of a lens that bends them.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) poses: &'a [PoseF32],
-    pub(crate) placed: &'a [Placed],
+    pub(crate) placed: &'a [PlacedInstance],
     pub(crate) shade: ShadeContext<'a>,
     /// Mirroring surfaces, if the scene has any.
     pub(crate) mirrors: Option<Mirrors<'a>>,
     /// True if channels of [`Stage::Detail`](crate::frame::Stage::Detail) are rendered.
-    pub(crate) detail: bool,
+    pub(crate) surface: bool,
     /// True if channels of [`Stage::Albedo`](crate::frame::Stage::Albedo) are rendered.
     pub(crate) albedo: bool,
     /// Motion vectors, if channels of [`Stage::Flow`](crate::frame::Stage::Flow) are rendered.
-    pub(crate) moves: Option<&'a Moves>,
+    pub(crate) motion_vectors: Option<&'a MotionVectors>,
 }
 
-impl<'a> Context<'a> {
+impl<'a> ShadingContext<'a> {
     /// Index of the instance that an id belongs to; `last` is tried first.
     #[inline(always)]
     pub(crate) fn instance(&self, id: u32, last: usize) -> usize {
@@ -46,8 +46,8 @@ impl<'a> Context<'a> {
     }
 
     #[inline(always)]
-    pub(crate) fn source(&self, index: usize) -> Source<'a> {
-        Source {
+    pub(crate) fn source(&self, index: usize) -> InstanceSurface<'a> {
+        InstanceSurface {
             instance: &self.shade.scene.instances()[index],
             world_from_instance: &self.poses[index],
             placed: &self.placed[index],
@@ -64,14 +64,14 @@ pub(crate) type Colors = [[f32; LANES]; 3];
 
 /// Positions of sixteen samples in the image.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum At<'a> {
+pub(crate) enum SamplePositions<'a> {
     /// Centers of 8 x 2 pixels, the first of which is given.
     Pixels([usize; 2]),
     /// Points given by u and v \[pixels\].
     Points([&'a [f32; LANES]; 2]),
 }
 
-impl At<'_> {
+impl SamplePositions<'_> {
     #[inline(always)]
     fn uv<S: Simd>(self, s: S) -> [F<S>; 2] {
         match self {
@@ -88,9 +88,9 @@ impl At<'_> {
 #[inline(never)]
 pub(crate) fn resolve<S: Simd>(
     s: S,
-    context: &Context<'_>,
+    context: &ShadingContext<'_>,
     ids: &[u32; LANES],
-    at: At<'_>,
+    at: SamplePositions<'_>,
     pixels: Option<&mut PixelGroup>,
     colors: Option<&mut Colors>,
 ) {
@@ -98,11 +98,11 @@ pub(crate) fn resolve<S: Simd>(
         #[inline(always)]
         || {
             let uv = at.uv(s);
-            let bent = context.lens.map(|lens| match at {
-                At::Pixels(first) => lens.of_pixels(s, first),
-                At::Points(_) => lens.of_points(s, uv[0], uv[1]),
+            let lens_directions = context.lens.map(|lens| match at {
+                SamplePositions::Pixels(first) => lens.at_pixels(s, first),
+                SamplePositions::Points(_) => lens.at_points(s, uv[0], uv[1]),
             });
-            resolve_lanes(s, context, load_u(s, ids), uv, bent, pixels, colors);
+            resolve_lanes(s, context, load_u(s, ids), uv, lens_directions, pixels, colors);
         },
     );
 }
@@ -110,7 +110,7 @@ pub(crate) fn resolve<S: Simd>(
 #[inline(always)]
 fn resolve_lanes<S: Simd>(
     s: S,
-    context: &Context<'_>,
+    context: &ShadingContext<'_>,
     ids: U<S>,
     uv @ [u, v]: [F<S>; 2],
     bent: Option<V3<S>>,
@@ -130,10 +130,10 @@ fn resolve_lanes<S: Simd>(
     }
     // Conversion from distances along a ray to depths.
     let forward = context.lens.is_none_or(LensRays::is_forward);
-    let ray = bent.map(|ray| Ray { direction: ray, forward });
-    let rays = CameraRays { uv, bent: ray, direction };
+    let ray = bent.map(|ray| LensRayLanes { direction: ray, forward });
+    let rays = CameraRays { uv, lens_rays: ray, direction };
     let view = if colors.is_some() || context.albedo { direction.scale(1.0 / length) } else { direction };
-    let nothing = splat_u(s, NOTHING);
+    let nothing = splat_u(s, NO_ID);
     let missed = ids.simd_eq(nothing);
     let mut along = splat(s, f32::INFINITY);
     let none = V3::splat(s, [0.0; 3]);
@@ -150,7 +150,7 @@ fn resolve_lanes<S: Simd>(
     if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
         pixels.albedo = [[0; 4]; LANES];
     }
-    if let Some(pixels) = pixels.as_mut().filter(|_| context.moves.is_some()) {
+    if let Some(pixels) = pixels.as_mut().filter(|_| context.motion_vectors.is_some()) {
         pixels.flow = [[f32::INFINITY; LANES]; 2];
     }
     let list: [u32; LANES] = ids.array();
@@ -166,16 +166,16 @@ fn resolve_lanes<S: Simd>(
         left &= !bits;
         let at = surface(s, projection, &source, ids, here, rays);
         if pixels.is_some() {
-            along = select(here, at.along, along);
+            along = select(here, at.t, along);
             normal = V3::select(here, at.normal, normal);
             mask = select_i(here, splat_i(s, source.instance.mask_id), mask);
-            if context.detail {
-                shading = V3::select(here, at.shading, shading);
+            if context.surface {
+                shading = V3::select(here, at.shading_normal, shading);
                 position = V3::select(here, at.position, position);
             }
         }
-        if let (Some(pixels), Some(moves)) = (&mut pixels, context.moves) {
-            let [right, down] = moves.of(s, last, at.local, uv, here);
+        if let (Some(pixels), Some(moves)) = (&mut pixels, context.motion_vectors) {
+            let [right, down] = moves.flow_at(s, last, at.local_position, uv, here);
             store(select(here, right, load(s, &pixels.flow[0])), &mut pixels.flow[0]);
             store(select(here, down, load(s, &pixels.flow[1])), &mut pixels.flow[1]);
         }
@@ -185,7 +185,7 @@ fn resolve_lanes<S: Simd>(
         }
         if colors.is_some() {
             let ShadeContext { lighting, pixel, .. } = context.shade;
-            let rays = ViewRays { direction: view, distance: at.along * length };
+            let rays = ViewRays { direction: view, distance: at.t * length };
             let mut seen = shade(s, &context.shade, &source, &at, rays, 1.0, here);
             if let Some(mirrors) = context.mirrors.filter(|mirrors| mirrors.has(last, source.instance)) {
                 let samples = MirrorSamples { point: at.point(), view, length, color: seen };
@@ -202,7 +202,7 @@ fn resolve_lanes<S: Simd>(
         store(depth, &mut pixels.depth);
         pixels.mask = mask.array();
         store_v3(normal, &mut pixels.normal);
-        if context.detail {
+        if context.surface {
             store(along * length, &mut pixels.distance);
             store_v3(shading, &mut pixels.shading_normal);
             store_v3(V3::select(missed, none, position), &mut pixels.position);

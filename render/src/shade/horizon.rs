@@ -6,7 +6,7 @@
 //! upper one to clear at (1 + w, 1).
 
 use super::tone::{decode_bytes, to_bytes};
-use crate::simd::{F, M, Simd, V3, max, root, select, splat};
+use crate::simd::{F, M, Simd, V3, max, select, splat, sqrt_or_zero};
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 
@@ -51,7 +51,7 @@ impl Horizon {
         let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
         let down = -view.dot(V3::splat(s, self.up));
         // Below the horizon, by p / q times the slope to the end of the ground.
-        let (p, q) = (max(down, zero) * self.radius, root(s, one - down * down));
+        let (p, q) = (max(down, zero) * self.radius, sqrt_or_zero(s, one - down * down));
         let both = max(q + p * self.width, splat(s, 1e-30));
         let near = max(one - (p - q) / (both * self.width.max(1e-6)), zero);
         let far = p * (1.0 + self.width) / both;

@@ -3,10 +3,10 @@
 use super::horizon::Horizon;
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
-use super::surface::{Source, Surface};
+use super::surface::{InstanceSurface, Surface};
 use super::{texture, tone};
-use crate::simd::{F, M, Simd, V3, abs, max, min, root, select, splat};
-use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene, Texture};
+use crate::simd::{F, M, Simd, V3, abs, max, min, select, splat, sqrt_or_zero};
+use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, RenderScene, Texture};
 use std::sync::Arc;
 
 /// Largest number of lights.
@@ -14,7 +14,7 @@ pub(crate) const MAX_LIGHTS: usize = 16;
 
 /// A light prepared for a frame.
 #[derive(Clone, Copy, Debug)]
-struct Lamp {
+struct PreparedLight {
     light: Light,
     /// Unit vector along which the light shines.
     along: [f32; 3],
@@ -26,7 +26,7 @@ struct Lamp {
 /// Inputs of shading besides the surface, prepared once per frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lighting {
-    lamps: Vec<Lamp>,
+    lights: Vec<PreparedLight>,
     zenith: [f32; 3],
     horizon: [f32; 3],
     nadir: [f32; 3],
@@ -35,7 +35,7 @@ pub(crate) struct Lighting {
     /// Haze at the end of the ground, if the scene has any.
     pub(crate) ground_haze: Option<Horizon>,
     /// True if the headlight is one of the lights: in MuJoCo's light model it is directional.
-    headlight_is_lamp: bool,
+    headlight_is_light: bool,
 }
 
 /// Lighting and settings for shading surfaces.
@@ -75,11 +75,11 @@ pub(crate) fn cos_deg(deg: f32) -> f32 {
     sum as f32
 }
 
-impl Lamp {
+impl PreparedLight {
     /// Direction to the light (unit) and the fraction of its light that reaches points, without shadows; `None` if no
     /// point is lit.
     #[inline(always)]
-    fn reaches<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
+    fn illumination<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
         let (light, zero, one) = (&self.light, splat(s, 0.0), splat(s, 1.0));
         if light.kind == LightKind::Directional {
             let [x, y, z] = self.along;
@@ -128,13 +128,13 @@ impl Lighting {
             (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
         self.skybox.clone_from(&scene.skybox);
         self.haze = scene.haze.and_then(|h| h.color).map(tone::decode);
-        self.lamps.clear();
+        self.lights.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
             let (cutoff_cos, exponent) = match light.kind {
                 LightKind::Spot { cutoff_deg, exponent } => (cos_deg(cutoff_deg), whole_exponent(exponent)),
                 LightKind::Directional | LightKind::Point => (-2.0, 0),
             };
-            self.lamps.push(Lamp {
+            self.lights.push(PreparedLight {
                 light: *light,
                 along: unit(light.direction),
                 cutoff_cos,
@@ -142,9 +142,9 @@ impl Lighting {
                 shadow: shadow(k),
             });
         }
-        let headlight = scene.headlight.along(scene.light_sum, forward);
-        self.headlight_is_lamp = headlight.is_some();
-        self.lamps.extend(headlight.map(|light| Lamp {
+        let headlight = scene.headlight.as_directional(scene.lighting_space, forward);
+        self.headlight_is_light = headlight.is_some();
+        self.lights.extend(headlight.map(|light| PreparedLight {
             light,
             along: unit(light.direction),
             cutoff_cos: -2.0,
@@ -160,9 +160,9 @@ pub(crate) fn whole_exponent(exponent: f32) -> u32 {
 }
 
 /// Highlights weaker than this are black: a third of the weakest light that is not black on a screen.
-const FAINT: f32 = 1e-4;
+const MIN_HIGHLIGHT: f32 = 1e-4;
 
-/// Numbers whose power is [`FAINT`], by exponent: below them, no highlight is computed.
+/// Numbers whose power is [`MIN_HIGHLIGHT`], by exponent: below them, no highlight is computed.
 const FAINT_ROOT: [f32; 129] = {
     let mut roots = [0.0f32; 129];
     let mut exponent = 1;
@@ -177,7 +177,7 @@ const FAINT_ROOT: [f32; 129] = {
                 power *= middle;
                 k += 1;
             }
-            if power < FAINT {
+            if power < MIN_HIGHLIGHT {
                 low = middle
             } else {
                 high = middle
@@ -192,23 +192,23 @@ const FAINT_ROOT: [f32; 129] = {
 
 /// Specular highlight of a surface.
 #[derive(Clone, Copy)]
-struct Gloss {
+struct Highlight {
     strength: f32,
     exponent: u32,
     /// Cosines below this give no highlight.
     faint: f32,
 }
 
-impl Gloss {
+impl Highlight {
     /// A metal mirrors lights as it mirrors everything, whatever the `specular` of its nonmetallic part.
-    fn of(material: &Material, display: bool) -> Self {
+    fn from_material(material: &Material, display: bool) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
         let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };
         Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
     /// True if the highlight is visible in a light of this specular color.
-    fn shows(&self, specular: [f32; 3]) -> bool {
+    fn is_visible(&self, specular: [f32; 3]) -> bool {
         self.strength != 0.0 && specular.iter().any(|&x| x != 0.0)
     }
 }
@@ -233,7 +233,7 @@ pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f
     if let Some(image) = &lighting.skybox {
         return skybox(s, image, direction, pixel);
     }
-    let k = root(s, min(abs(direction.z), splat(s, 1.0)));
+    let k = sqrt_or_zero(s, min(abs(direction.z), splat(s, 1.0)));
     let up = direction.z.simd_gt(splat(s, 0.0));
     let mix = {
         #[inline(always)]
@@ -264,7 +264,7 @@ fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S>
 pub(crate) fn shade<S: Simd>(
     s: S,
     context: &ShadeContext<'_>,
-    source: &Source<'_>,
+    source: &InstanceSurface<'_>,
     at: &Surface<S>,
     rays: ViewRays<S>,
     tint: f32,
@@ -273,7 +273,7 @@ pub(crate) fn shade<S: Simd>(
     let ShadeContext { scene, lighting, shadows, shadow_rays, pixel } = *context;
     let ViewRays { direction: view, distance } = rays;
     let material = &source.instance.material;
-    let display = scene.light_sum == LightSum::Display;
+    let display = scene.lighting_space == LightingSpace::Display;
     let base = if display {
         display_albedo(s, source, at, view, pixel, lanes)
     } else {
@@ -281,7 +281,7 @@ pub(crate) fn shade<S: Simd>(
     };
     let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
     let zero = splat(s, 0.0);
-    let n = at.shading;
+    let n = at.shading_normal;
     // Ambient light: interpolated between ground and sky by the normal's height.
     let up = n.z * 0.5 + 0.5;
     let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
@@ -291,7 +291,7 @@ pub(crate) fn shade<S: Simd>(
     };
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
-        let [above, below] = rays.blocked(s, at.point(), n, lanes);
+        let [above, below] = rays.occlusion(s, at.point(), n, lanes);
         // The occluded fractions are estimates: they are limited to the light that is there.
         let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
@@ -299,42 +299,42 @@ pub(crate) fn shade<S: Simd>(
         }
     }
     let mut gloss = [zero, zero, zero];
-    let shiny = Gloss::of(material, display);
+    let shiny = Highlight::from_material(material, display);
     let headlight = &scene.headlight;
-    if headlight.active && !lighting.headlight_is_lamp {
+    if headlight.active && !lighting.headlight_is_light {
         let facing = max(-n.dot(view), zero);
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
         }
         let seen = lanes & facing.simd_gt(splat(s, shiny.faint));
-        if shiny.shows(headlight.specular) && seen.any_true() {
+        if shiny.is_visible(headlight.specular) && seen.any_true() {
             let shine = select(seen, power(s, facing, shiny.exponent) * shiny.strength, zero);
             for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
                 *gloss += shine * specular;
             }
         }
     }
-    for lamp in &lighting.lamps {
+    for lamp in &lighting.lights {
         let light = &lamp.light;
-        let Some((to, strength)) = lamp.reaches(s, at.position, lanes) else { continue };
+        let Some((to, strength)) = lamp.illumination(s, at.position, lanes) else { continue };
         let facing = max(n.dot(to), zero);
         let mut lit = strength;
         if let Some(map) = lamp.shadow.and_then(|k| shadows.get(k)) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
-                lit = lit * map.light(s, at.position, at.normal, source.placed.error, matters);
+                lit = lit * map.visibility(s, at.position, at.normal, source.placed.error, matters);
             }
         }
         if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
-                lit = lit * rays.light(s, light, lamp.along.map(|x| -x), at.point(), matters);
+                lit = lit * rays.visibility(s, light, lamp.along.map(|x| -x), at.point(), matters);
             }
         }
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
         }
-        if shiny.shows(light.specular) {
+        if shiny.is_visible(light.specular) {
             // The cosine between the normal and the half vector, compared before its root is taken.
             let half = to.sub(view);
             let (along, square) = (n.dot(half), half.dot(half));
@@ -397,7 +397,7 @@ fn display_light<S: Simd>(s: S, x: F<S>) -> F<S> {
 #[inline(always)]
 pub(crate) fn albedo<S: Simd>(
     s: S,
-    source: &Source<'_>,
+    source: &InstanceSurface<'_>,
     at: &Surface<S>,
     view: V3<S>,
     pixel: f32,
@@ -415,7 +415,14 @@ pub(crate) fn albedo<S: Simd>(
 
 /// Base color of a surface in sRGB, 0..=1.
 #[inline(always)]
-fn display_albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
+fn display_albedo<S: Simd>(
+    s: S,
+    source: &InstanceSurface<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    pixel: f32,
+    lanes: M<S>,
+) -> V3<S> {
     let [r, g, b, _] = source.instance.material.rgba;
     let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, [r, g, b]) };
     V3 { x: bytes[0] * (r / 255.0), y: bytes[1] * (g / 255.0), z: bytes[2] * (b / 255.0) }
@@ -425,7 +432,7 @@ fn display_albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<
 #[inline(always)]
 fn texels<S: Simd>(
     s: S,
-    source: &Source<'_>,
+    source: &InstanceSurface<'_>,
     at: &Surface<S>,
     view: V3<S>,
     pixel: f32,
@@ -435,10 +442,14 @@ fn texels<S: Simd>(
     let image = instance.material.texture.as_deref()?;
     // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
-    let width = at.along * pixel / root(s, slant);
+    let width = at.t * pixel / sqrt_or_zero(s, slant);
     let scale = source.texture_scale;
     Some(if texture::is_cube(image) {
-        let direction = V3 { x: at.local.x * scale[0], y: at.local.y * scale[1], z: at.local.z * scale[2] };
+        let direction = V3 {
+            x: at.local_position.x * scale[0],
+            y: at.local_position.y * scale[1],
+            z: at.local_position.z * scale[2],
+        };
         let largest = scale.iter().copied().fold(0.0, f32::max);
         texture::sample_cube(s, image, direction, width * largest, lanes)
     } else {
@@ -447,7 +458,7 @@ fn texels<S: Simd>(
             (at.uv, at.uv_density)
         } else {
             let offset = source.texture_offset;
-            let uv = [at.local.x * scale[0] + offset[0], at.local.y * scale[1] + offset[1]];
+            let uv = [at.local_position.x * scale[0] + offset[0], at.local_position.y * scale[1] + offset[1]];
             (uv, splat(s, scale[0].abs().max(scale[1].abs())))
         };
         texture::sample(s, image, uv[0], uv[1], width * density, lanes)

@@ -1,48 +1,48 @@
 //! Planar mirrors of rasterized images: one ray from each sample on a mirror, shaded by the rasterizer at its hit. A
 //! mirror seen in a mirror shows its own color.
 
-use super::group::{Colors, Context};
+use super::group::{Colors, ShadingContext};
 use super::light::{ViewRays, shade, sky};
-use super::shadow_rays::{Points, arrays, lanes_of};
-use super::surface::{Source, Surface, SurfacePoint};
+use super::shadow_rays::{SurfacePoints, arrays, lanes_of};
+use super::surface::{InstanceSurface, Surface, SurfacePointLanes};
 use super::tone::{decode_bytes, to_bytes};
-use crate::geometry::bvh::Stack;
-use crate::geometry::corner::in_triangle;
+use crate::geometry::bvh::TraversalStack;
+use crate::geometry::corner::interpolate_triangle;
 use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
-use crate::trace::motion::NOW;
-use crate::trace::{Hit, Tracer};
+use crate::trace::motion::END_TIME;
+use crate::trace::{Hit, RayTracer};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
-use kinetoscope_scene::{Instance, LightSum, RenderScene};
+use kinetoscope_scene::vector::{add_scaled, dot, scale, sub, to_f64};
+use kinetoscope_scene::{Instance, LightingSpace, RenderScene};
 use std::cell::RefCell;
 
 /// Largest number of transparent surfaces that a mirrored ray passes.
 const MAX_PASSES: usize = 16;
 /// Offset of rays past a surface, as a fraction of the largest coordinate.
-const PAST: f64 = 1e-7;
+const RAY_OFFSET: f64 = 1e-7;
 /// A ray ends if less than this fraction of the light is left.
-const FAINT: f32 = 1e-3;
+const MIN_THROUGHPUT: f32 = 1e-3;
 
 /// Mirroring surfaces of the scene, and a thread's scratch memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mirrors<'a> {
-    pub(crate) tracer: &'a Tracer,
-    pub(crate) stack: &'a RefCell<&'a mut Stack>,
+    pub(crate) tracer: &'a RayTracer,
+    pub(crate) stack: &'a RefCell<&'a mut TraversalStack>,
     /// Index of the first instance that mirrors.
     pub(crate) first: usize,
     /// True if no other instance mirrors, as in MuJoCo's renderer.
     pub(crate) only_first: bool,
     /// Bounding box of the objects that mirrored rays may hit; `None` if one of them is unbounded.
-    pub(crate) reach: Option<Reach>,
+    pub(crate) bounds: Option<ReflectionBounds>,
 }
 
 /// Bounding box of the objects that mirrored rays may hit, enlarged by the error of single precision. Rays that miss
 /// the box, as from most of a floor, are not traced.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reach([[f32; 3]; 2]);
+pub(crate) struct ReflectionBounds([[f32; 3]; 2]);
 
-impl Reach {
+impl ReflectionBounds {
     /// Enlargement of the box, as a fraction of its size and coordinates.
     const MARGIN: f64 = 1e-3;
 
@@ -53,7 +53,7 @@ impl Reach {
 
     /// Lanes whose rays, from `origin` in a direction of any length, may hit the box.
     #[inline(always)]
-    fn may_meet<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
+    fn may_intersect<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
         let [lo, hi] = &self.0;
         let (mut near, mut far) = (splat(s, 0.0), splat(s, f32::MAX));
         for (o, d, lo, hi) in [
@@ -83,7 +83,7 @@ pub(crate) fn reflectance(instance: &Instance) -> f32 {
 /// Samples on a mirror.
 #[derive(Clone, Copy)]
 pub(crate) struct MirrorSamples<S: Simd> {
-    pub(crate) point: SurfacePoint<S>,
+    pub(crate) point: SurfacePointLanes<S>,
     /// Unit vector of the ray from the camera, world frame.
     pub(crate) view: V3<S>,
     /// Meters along the ray per unit of the point's depth.
@@ -94,16 +94,16 @@ pub(crate) struct MirrorSamples<S: Simd> {
 
 /// A mirrored ray, and the distance \[m\] traced so far.
 #[derive(Clone, Copy, Debug)]
-struct Reflected {
+struct ReflectedRay {
     ray: Ray,
-    travelled: f64,
+    distance: f64,
     /// Fraction of the light that is left.
-    left: f32,
+    throughput: f32,
 }
 
 /// Surfaces in lanes that are set one by one.
 #[derive(Clone, Debug)]
-struct Lanes {
+struct SurfaceLanes {
     positions: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
     shading: [[f32; LANES]; 3],
@@ -113,7 +113,7 @@ struct Lanes {
     distances: [f32; LANES],
 }
 
-impl Lanes {
+impl SurfaceLanes {
     const EMPTY: Self = Self {
         positions: [[0.0; LANES]; 3],
         normals: [[0.0; LANES]; 3],
@@ -125,14 +125,14 @@ impl Lanes {
     };
 
     /// Sets a lane to the hit of a ray.
-    fn set(&mut self, k: usize, scene: &RenderScene, reflected: &Reflected, hit: &Hit) {
+    fn set(&mut self, k: usize, scene: &RenderScene, reflected: &ReflectedRay, hit: &Hit) {
         let (ray, pose) = (&reflected.ray, &hit.world_from_instance);
         let position = ray.at(hit.distance);
         let side = if dot(hit.normal, ray.direction) < 0.0 { 1.0 } else { -1.0 };
         let (rotation, from) = (pose.rotation, sub(position, pose.translation));
         let local = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * from[i]).sum::<f64>());
         let mesh = scene.instances()[hit.instance as usize].mesh();
-        let corner = mesh.map(|mesh| in_triangle(mesh, hit.triangle as usize, local, side));
+        let corner = mesh.map(|mesh| interpolate_triangle(mesh, hit.triangle as usize, local, side));
         let normal = scale(hit.normal, side);
         let shading = corner.map_or(normal, |corner| {
             let turned = rotation.map(|row| side * dot(row, corner.normal));
@@ -149,18 +149,18 @@ impl Lanes {
         }
         let (uv, density) = corner.and_then(|corner| corner.uv).unwrap_or(([0.0; 2], 1.0));
         (self.uv[0][k], self.uv[1][k], self.uv_density[k]) = (uv[0] as f32, uv[1] as f32, density as f32);
-        self.distances[k] = (reflected.travelled + hit.distance) as f32;
+        self.distances[k] = (reflected.distance + hit.distance) as f32;
     }
 
     #[inline(always)]
     fn surface<S: Simd>(&self, s: S, along: F<S>) -> Surface<S> {
         let v3 = |v: &[[f32; LANES]; 3]| V3 { x: load(s, &v[0]), y: load(s, &v[1]), z: load(s, &v[2]) };
         Surface {
-            along,
+            t: along,
             normal: v3(&self.normals),
-            shading: v3(&self.shading),
+            shading_normal: v3(&self.shading),
             position: v3(&self.positions),
-            local: v3(&self.local),
+            local_position: v3(&self.local),
             uv: [load(s, &self.uv[0]), load(s, &self.uv[1])],
             uv_density: load(s, &self.uv_density),
         }
@@ -183,8 +183,8 @@ impl Mirrors<'_> {
     pub(crate) fn reflect<S: Simd>(
         &self,
         s: S,
-        context: &Context<'_>,
-        source: &Source<'_>,
+        context: &ShadingContext<'_>,
+        source: &InstanceSurface<'_>,
         samples: MirrorSamples<S>,
         lanes: M<S>,
     ) -> V3<S> {
@@ -192,37 +192,37 @@ impl Mirrors<'_> {
             #[inline(always)]
             || {
                 let MirrorSamples { point, view, length, color } = samples;
-                let SurfacePoint { normal, depth, .. } = point;
+                let SurfacePointLanes { normal, depth, .. } = point;
                 let up = source.world_from_instance.rotation.map(|row| row[2]);
                 let lanes = lanes & normal.dot(V3::splat(s, up)).simd_gt(splat(s, 0.5));
                 let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
-                let display = context.shade.scene.light_sum == LightSum::Display;
-                let followed = match &self.reach {
-                    Some(reach) => lanes & reach.may_meet(s, point.position, mirrored_view),
+                let display = context.shade.scene.lighting_space == LightingSpace::Display;
+                let followed = match &self.bounds {
+                    Some(reach) => lanes & reach.may_intersect(s, point.position, mirrored_view),
                     None => lanes,
                 };
                 let wanted = followed.to_bitmask();
                 if lanes.to_bitmask() == 0 || display && wanted == 0 {
                     return color;
                 }
-                let points = Points::new(point);
+                let points = SurfacePoints::new(point);
                 let (directions, lengths, depths) = (arrays(view), length.array(), depth.array());
                 let mut rays = [None; LANES];
                 for k in lanes_of(wanted) {
                     let (n, d) = (points.normal(k), to_f64(directions.map(|axis| axis[k])));
-                    let mirrored = along(d, -2.0 * dot(d, n), n);
+                    let mirrored = add_scaled(d, -2.0 * dot(d, n), n);
                     let direction = scale(mirrored, 1.0 / dot(mirrored, mirrored).sqrt());
-                    let ray = Ray { origin: points.above(k), direction };
+                    let ray = Ray { origin: points.offset_origin(k), direction };
                     let travelled = f64::from(depths[k]) * f64::from(lengths[k]);
-                    rays[k] = Some(Reflected { ray, travelled, left: 1.0 });
+                    rays[k] = Some(ReflectedRay { ray, distance: travelled, throughput: 1.0 });
                 }
                 let r = reflectance(source.instance);
                 let tint = if display { r } else { 1.0 };
                 let mut sum: Colors = [[0.0; LANES]; 3];
-                let met = self.follow(s, context, &mut rays, tint, length, &mut sum);
+                let met = self.trace_reflections(s, context, &mut rays, tint, length, &mut sum);
                 let mut left = [0.0f32; LANES];
                 for (left, ray) in left.iter_mut().zip(&rays) {
-                    *left = ray.map_or(1.0, |ray| ray.left);
+                    *left = ray.map_or(1.0, |ray| ray.throughput);
                 }
                 let sum = V3 { x: load(s, &sum[0]), y: load(s, &sum[1]), z: load(s, &sum[2]) };
                 if display {
@@ -244,17 +244,17 @@ impl Mirrors<'_> {
     /// Adds up the colors that mirrored rays hit, as linear light or as sRGB bytes; returns the lanes with a hit.
     /// `tint` is that of [`shade`].
     #[inline(always)]
-    fn follow<S: Simd>(
+    fn trace_reflections<S: Simd>(
         &self,
         s: S,
-        context: &Context<'_>,
-        rays: &mut [Option<Reflected>; LANES],
+        context: &ShadingContext<'_>,
+        rays: &mut [Option<ReflectedRay>; LANES],
         tint: f32,
         length: F<S>,
         sum: &mut Colors,
     ) -> u64 {
-        let (scene, mut at) = (context.shade.scene, Lanes::EMPTY);
-        let display = scene.light_sum == LightSum::Display;
+        let (scene, mut at) = (context.shade.scene, SurfaceLanes::EMPTY);
+        let display = scene.lighting_space == LightingSpace::Display;
         let mut met = 0;
         for _ in 0..MAX_PASSES {
             let mut hits = [None; LANES];
@@ -262,7 +262,9 @@ impl Mirrors<'_> {
             {
                 let mut stack = self.stack.borrow_mut();
                 for (k, reflected) in rays.iter_mut().enumerate() {
-                    let Some(reflected) = reflected.as_mut().filter(|r| r.left > FAINT) else { continue };
+                    let Some(reflected) = reflected.as_mut().filter(|r| r.throughput > MIN_THROUGHPUT) else {
+                        continue;
+                    };
                     hits[k] = self.next(s, scene, reflected, &mut stack);
                     left |= u64::from(hits[k].is_some()) << k;
                 }
@@ -303,9 +305,9 @@ impl Mirrors<'_> {
                 for k in lanes_of(bits) {
                     let (Some(hit), Some(reflected)) = (&hits[k], &mut rays[k]) else { continue };
                     for (sum, seen) in sum.iter_mut().zip(&seen) {
-                        sum[k] += reflected.left * alpha * seen[k];
+                        sum[k] += reflected.throughput * alpha * seen[k];
                     }
-                    reflected.left *= 1.0 - alpha;
+                    reflected.throughput *= 1.0 - alpha;
                     reflected.pass(hit.distance);
                 }
             }
@@ -315,9 +317,15 @@ impl Mirrors<'_> {
 
     /// The next surface along a mirrored ray, without backs of transparent surfaces.
     #[inline(always)]
-    fn next<S: Simd>(&self, s: S, scene: &RenderScene, reflected: &mut Reflected, stack: &mut Stack) -> Option<Hit> {
+    fn next<S: Simd>(
+        &self,
+        s: S,
+        scene: &RenderScene,
+        reflected: &mut ReflectedRay,
+        stack: &mut TraversalStack,
+    ) -> Option<Hit> {
         for _ in 0..MAX_PASSES {
-            let hit = self.tracer.nearest(s, &reflected.ray, f64::INFINITY, NOW, stack)?;
+            let hit = self.tracer.closest_hit(s, &reflected.ray, f64::INFINITY, END_TIME, stack)?;
             let opaque = scene.instances()[hit.instance as usize].material.rgba[3] >= 1.0;
             if opaque || dot(hit.normal, reflected.ray.direction) < 0.0 {
                 return Some(hit);
@@ -328,13 +336,13 @@ impl Mirrors<'_> {
     }
 }
 
-impl Reflected {
+impl ReflectedRay {
     /// Moves the ray past a surface.
     fn pass(&mut self, distance: f64) {
         let far = self.ray.origin.iter().fold(distance.max(1.0), |m, x| m.max(x.abs()));
-        let onward = distance + PAST * far;
+        let onward = distance + RAY_OFFSET * far;
         self.ray.origin = self.ray.at(onward);
-        self.travelled += onward;
+        self.distance += onward;
     }
 }
 

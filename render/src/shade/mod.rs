@@ -18,4 +18,4 @@ pub(crate) mod texture;
 pub(crate) mod tone;
 
 /// Approximate largest number of samples in a band of the image: it stays in a core's own cache (8 bytes each).
-pub(crate) const BAND: usize = 128 * 1024;
+pub(crate) const MAX_BAND_SAMPLES: usize = 128 * 1024;

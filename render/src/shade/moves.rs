@@ -3,23 +3,23 @@
 use crate::intrinsics::PixelIntrinsics;
 use crate::lens::optics::Optics;
 use crate::lens::rays::LensRays;
-use crate::request::{Before, Shot};
+use crate::request::{PreviousState, RenderRequest};
 use crate::simd::{F, LANES, M, Simd, V3, load, select, splat};
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::PoseF32;
 
 /// Motion of instances relative to the camera since the previous frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Moves {
-    list: Vec<Move>,
+pub(crate) struct MotionVectors {
+    list: Vec<InstanceMotion>,
     /// Projection of the previous frame; `None` without one.
-    eye: Option<Eye>,
+    previous: Option<PreviousProjection>,
 }
 
 /// Projection from a camera's optical frame to pixels.
 #[expect(clippy::large_enum_variant, reason = "there is one for a picture; a box would be an allocation for each")]
 #[derive(Clone, Copy, Debug)]
-enum Eye {
+enum PreviousProjection {
     /// fx, fy, cx, cy \[pixels\].
     Pinhole([f32; 4]),
     Lens(Optics),
@@ -27,16 +27,16 @@ enum Eye {
 
 /// Motion of one instance.
 #[derive(Clone, Copy, Debug)]
-struct Move {
+struct InstanceMotion {
     /// True if neither the instance nor the camera moved, and the lens is the same.
-    still: bool,
+    is_static: bool,
     /// Camera of the previous frame, from the instance.
     camera_from_instance: PoseF32,
 }
 
-impl Moves {
+impl MotionVectors {
     pub(crate) fn bytes(&self) -> usize {
-        self.list.capacity() * size_of::<Move>()
+        self.list.capacity() * size_of::<InstanceMotion>()
     }
 
     /// Stores the poses of the previous frame.
@@ -44,10 +44,10 @@ impl Moves {
     /// # Errors
     ///
     /// For a previous frame of another scene, or with an invalid view or pose.
-    pub(crate) fn prepare(&mut self, shot: &Shot<'_>) -> Result<(), RenderError> {
+    pub(crate) fn prepare(&mut self, shot: &RenderRequest<'_>) -> Result<(), RenderError> {
         self.list.clear();
-        self.eye = None;
-        let Some(Before { poses, view }) = shot.before else { return Ok(()) };
+        self.previous = None;
+        let Some(PreviousState { poses, view }) = shot.previous else { return Ok(()) };
         view.validate()?;
         let expected = shot.scene.instances().len();
         if poses.len() != expected {
@@ -59,8 +59,8 @@ impl Moves {
         let numbers = |view: &View| [view.fx, view.fy, view.cx, view.cy];
         let (then, now) = (numbers(view), numbers(shot.view));
         let same = then == now && view.world_from_camera == shot.view.world_from_camera;
-        self.list.extend(poses.iter().zip(shot.poses).map(|(before, now)| Move {
-            still: same && before == now,
+        self.list.extend(poses.iter().zip(shot.poses).map(|(before, now)| InstanceMotion {
+            is_static: same && before == now,
             camera_from_instance: view.world_from_camera.inverse_times(before),
         }));
         let behind = |rays: &LensRays| {
@@ -68,16 +68,26 @@ impl Moves {
             let [fx, fy, cx, cy] = then.map(f64::from);
             if then == now { *rays.optics() } else { rays.optics().with_pixels(PixelIntrinsics { fx, fy, cx, cy }) }
         };
-        self.eye = Some(shot.lens.map_or(Eye::Pinhole(then), |rays| Eye::Lens(behind(rays))));
+        self.previous =
+            Some(shot.lens.map_or(PreviousProjection::Pinhole(then), |rays| PreviousProjection::Lens(behind(rays))));
         Ok(())
     }
 
     /// Motion of points of an instance, seen at (u, v) \[pixels\]; `local` are their positions in its frame. Lanes
     /// outside of `here` are undefined.
     #[inline(always)]
-    pub(crate) fn of<S: Simd>(&self, s: S, instance: usize, local: V3<S>, [u, v]: [F<S>; 2], here: M<S>) -> [F<S>; 2] {
+    pub(crate) fn flow_at<S: Simd>(
+        &self,
+        s: S,
+        instance: usize,
+        local: V3<S>,
+        [u, v]: [F<S>; 2],
+        here: M<S>,
+    ) -> [F<S>; 2] {
         let unknown = splat(s, f32::INFINITY);
-        let (Some(Move { still, camera_from_instance }), Some(eye)) = (self.list.get(instance), self.eye) else {
+        let (Some(InstanceMotion { is_static: still, camera_from_instance }), Some(eye)) =
+            (self.list.get(instance), self.previous)
+        else {
             return [unknown; 2];
         };
         if *still {
@@ -85,14 +95,14 @@ impl Moves {
         }
         let there = local.rotate(&camera_from_instance.rotation).add(V3::splat(s, camera_from_instance.translation));
         match eye {
-            Eye::Pinhole([fx, fy, cx, cy]) => {
+            PreviousProjection::Pinhole([fx, fy, cx, cy]) => {
                 let ahead = there.z.simd_gt(splat(s, 0.0));
                 let nearness = 1.0 / select(ahead, there.z, splat(s, 1.0));
                 let right = u - (there.x * nearness * fx + cx);
                 let down = v - (there.y * nearness * fy + cy);
                 [select(ahead, right, unknown), select(ahead, down, unknown)]
             }
-            Eye::Lens(optics) => {
+            PreviousProjection::Lens(optics) => {
                 let [x, y, z]: [[f32; LANES]; 3] = [there.x, there.y, there.z].map(|axis| axis.array());
                 let [u, v]: [[f32; LANES]; 2] = [u, v].map(|axis| axis.array());
                 let mut flow = [[f32::INFINITY; LANES]; 2];

@@ -1,7 +1,7 @@
 //! Multisampling: color of pixels whose four samples hit different surfaces, the mean of the samples.
 
-use super::group::{At, Colors, Context, resolve};
-use crate::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
+use super::group::{Colors, SamplePositions, ShadingContext, resolve};
+use crate::raster::tile::{BLOCK, NO_ID, SAMPLES, Tile};
 use crate::simd::{LANES, Simd, load, load_u, splat_u, store};
 
 /// Largest number of samples that are shaded together.
@@ -9,7 +9,7 @@ const CAPACITY: usize = 1024;
 
 /// A sample to be shaded: pixel (group and lane), number of samples it stands for (`weight`), id and position.
 #[derive(Clone, Copy, Debug)]
-struct Request {
+struct PendingSample {
     group: u32,
     lane: u8,
     weight: u8,
@@ -21,17 +21,17 @@ struct Request {
 /// Samples that pixels on edges still need. They are collected over many groups: each has few, and sixteen are shaded
 /// at a time.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Edges {
-    requests: Vec<Request>,
+pub(crate) struct EdgeSamples {
+    pending: Vec<PendingSample>,
 }
 
 /// True if two ids of one pixel look different enough to be shaded separately.
 #[inline(always)]
-fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut usize) -> bool {
+fn differ(context: &ShadingContext<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut usize) -> bool {
     if a == b {
         return false;
     }
-    if a == NOTHING || b == NOTHING {
+    if a == NO_ID || b == NO_ID {
         return true;
     }
     *last = context.instance(a, *last);
@@ -47,14 +47,14 @@ fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut us
     cosine < 0.97 || (qa - qb).abs() > 0.02 * qa
 }
 
-impl Edges {
+impl EdgeSamples {
     pub(crate) fn bytes(&self) -> usize {
-        self.requests.capacity() * size_of::<Request>()
+        self.pending.capacity() * size_of::<PendingSample>()
     }
 
     /// Reserves memory for the largest number of samples: later images have more edges.
     pub(crate) fn reserve(&mut self) {
-        self.requests.reserve_exact(CAPACITY - self.requests.len());
+        self.pending.reserve_exact(CAPACITY - self.pending.len());
     }
 
     /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. The center's surface
@@ -63,7 +63,7 @@ impl Edges {
     pub(crate) fn collect<S: Simd>(
         &mut self,
         s: S,
-        context: &Context<'_>,
+        context: &ShadingContext<'_>,
         tile: &Tile,
         [block, row]: [usize; 2],
         corner: [f32; 2],
@@ -79,7 +79,7 @@ impl Edges {
         if left == 0 {
             return;
         }
-        if self.requests.len() + 4 * LANES > CAPACITY {
+        if self.pending.len() + 4 * LANES > CAPACITY {
             self.resolve(s, context, colors);
         }
         let group = block * (BLOCK / 2) + row;
@@ -89,7 +89,7 @@ impl Edges {
             left &= left - 1;
             let sample = |plane: usize| (tile.id[at(plane) + lane], tile.nearness[at(plane) + lane]);
             let (center, nearness) = sample(0);
-            let (mut own, begin) = (0u8, self.requests.len());
+            let (mut own, begin) = (0u8, self.pending.len());
             let mut seen = [0.0f32; SAMPLES.len()];
             for (plane, offset) in SAMPLES.iter().enumerate().skip(1) {
                 let (id, q) = sample(plane);
@@ -97,15 +97,15 @@ impl Edges {
                     own += 1;
                     continue;
                 }
-                let mut others = self.requests[begin..].iter_mut().zip(&seen);
+                let mut others = self.pending[begin..].iter_mut().zip(&seen);
                 if let Some((other, _)) =
                     others.find(|(other, seen)| !differ(context, other.id, id, **seen, q, &mut last))
                 {
                     other.weight += 1;
                     continue;
                 }
-                seen[self.requests.len() - begin] = q;
-                self.requests.push(Request {
+                seen[self.pending.len() - begin] = q;
+                self.pending.push(PendingSample {
                     group: group as u32,
                     lane: lane as u8,
                     weight: 1,
@@ -124,16 +124,16 @@ impl Edges {
 
     /// Shades the collected samples, and adds them to the pixels.
     #[inline(always)]
-    pub(crate) fn resolve<S: Simd>(&mut self, s: S, context: &Context<'_>, colors: &mut [Colors]) {
+    pub(crate) fn resolve<S: Simd>(&mut self, s: S, context: &ShadingContext<'_>, colors: &mut [Colors]) {
         // Sorted by id, so that samples of a surface are together. The other keys make the order unique.
-        self.requests.sort_unstable_by_key(|r| (r.id, r.group, r.lane));
-        for batch in self.requests.chunks(LANES) {
-            let (mut u, mut v, mut id) = ([batch[0].u; LANES], [batch[0].v; LANES], [NOTHING; LANES]);
+        self.pending.sort_unstable_by_key(|r| (r.id, r.group, r.lane));
+        for batch in self.pending.chunks(LANES) {
+            let (mut u, mut v, mut id) = ([batch[0].u; LANES], [batch[0].v; LANES], [NO_ID; LANES]);
             for (k, request) in batch.iter().enumerate() {
                 (u[k], v[k], id[k]) = (request.u, request.v, request.id);
             }
             let mut out: Colors = [[0.0; LANES]; 3];
-            resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut out));
+            resolve(s, context, &id, SamplePositions::Points([&u, &v]), None, Some(&mut out));
             for (k, request) in batch.iter().enumerate() {
                 let weight = f32::from(request.weight) * 0.25;
                 for (to, from) in colors[request.group as usize].iter_mut().zip(&out) {
@@ -141,7 +141,7 @@ impl Edges {
                 }
             }
         }
-        self.requests.clear();
+        self.pending.clear();
     }
 }
 
@@ -150,7 +150,7 @@ impl Edges {
 #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
 pub(crate) fn blend<S: Simd>(
     s: S,
-    context: &Context<'_>,
+    context: &ShadingContext<'_>,
     layer: &Tile,
     block: usize,
     row: usize,
@@ -159,9 +159,9 @@ pub(crate) fn blend<S: Simd>(
     colors: &mut Colors,
 ) {
     let at = |plane: usize| layer.samples(block, plane) + row * LANES;
-    let nothing = splat_u(s, NOTHING);
+    let nothing = splat_u(s, NO_ID);
     let mut share = [0.0f32; LANES];
-    let mut id = [NOTHING; LANES];
+    let mut id = [NO_ID; LANES];
     let (mut u, mut v) = ([0.0f32; LANES], [0.0f32; LANES]);
     let planes = if layer.planes == 1 { 0..1 } else { 1..layer.planes };
     if planes.clone().all(|plane| load_u(s, &layer.id[at(plane)..]).simd_eq(nothing).all_true()) {
@@ -173,9 +173,9 @@ pub(crate) fn blend<S: Simd>(
         id[lane] = layer.id[at(0) + lane];
         for plane in planes.clone() {
             let sample = layer.id[at(plane) + lane];
-            if sample != NOTHING {
+            if sample != NO_ID {
                 share[lane] += each;
-                if id[lane] == NOTHING {
+                if id[lane] == NO_ID {
                     id[lane] = sample;
                     u[lane] += SAMPLES[plane][0] as f32 / 256.0;
                     v[lane] += SAMPLES[plane][1] as f32 / 256.0;
@@ -184,7 +184,7 @@ pub(crate) fn blend<S: Simd>(
         }
     }
     let mut over: Colors = [[0.0; LANES]; 3];
-    resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut over));
+    resolve(s, context, &id, SamplePositions::Points([&u, &v]), None, Some(&mut over));
     let k = load(s, &share) * alpha;
     for (to, from) in colors.iter_mut().zip(&over) {
         let (below, above) = (load(s, to), load(s, from));

@@ -1,11 +1,11 @@
 //! Shadow maps: depth images from a light.
 
-use super::BAND;
-use super::shadow_fit::{Extent, LampView};
-use crate::raster::tile::{AREA, BLOCK, Tile};
-use crate::raster::{DrawList, Layer, Painter, Parts};
+use super::MAX_BAND_SAMPLES;
+use super::shadow_fit::{Extent, LightView};
+use crate::raster::tile::{BLOCK, BLOCK_AREA, Tile};
+use crate::raster::{DrawList, Granularity, Layer, VisibilityRasterizer};
 use crate::request::RasterCfg;
-use crate::simd::{F, Level};
+use crate::simd::{F, SimdLevel};
 use crate::simd::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
@@ -20,7 +20,7 @@ pub(crate) struct ShadowMap {
     /// Texels along a side before cropping.
     side: usize,
     /// Rotation from the world's axes to the light's.
-    lamp_from_world: [[f32; 3]; 3],
+    light_from_world: [[f32; 3]; 3],
     /// Width of a texel on a surface \[m\]: at any depth, or at depth 1 for a spot.
     texel: f32,
     /// Nearness at each texel, row by row: the taps of a point are contiguous in four rows.
@@ -37,7 +37,7 @@ pub(crate) struct ShadowBand<'a> {
     /// Index of the first row of blocks.
     first: usize,
     /// Largest number of texels of a band, for any crop of the map.
-    most: usize,
+    max_texels: usize,
     nearness: &'a mut [f32],
     range: &'a mut [[f32; 2]],
 }
@@ -45,11 +45,11 @@ pub(crate) struct ShadowBand<'a> {
 /// Rows of blocks of a map that are rendered together; a quarter of small maps, so that the scratch memory is smaller
 /// than the map.
 fn rows_of_bands([width, height]: [usize; 2]) -> usize {
-    (BAND / (width * BLOCK)).min(height / BLOCK / 4).max(1)
+    (MAX_BAND_SAMPLES / (width * BLOCK)).min(height / BLOCK / 4).max(1)
 }
 
 /// Largest number of texels of a band, for any crop of a map of `side` by `side` texels.
-fn most_of_bands(side: usize) -> usize {
+fn max_band_texels(side: usize) -> usize {
     if side == 0 { 0 } else { rows_of_bands([side, side]) * BLOCK * side }
 }
 
@@ -72,7 +72,7 @@ impl ShadowMap {
             projection,
             list: DrawList::default(),
             side: 0,
-            lamp_from_world: PoseF32::IDENTITY.rotation,
+            light_from_world: PoseF32::IDENTITY.rotation,
             texel: 1.0,
             nearness: Vec::new(),
             range: Vec::new(),
@@ -87,7 +87,7 @@ impl ShadowMap {
     /// rendering them. Returns false if no caster shades a receiver.
     pub(super) fn prepare(
         &mut self,
-        lamp: &LampView,
+        lamp: &LightView,
         receivers: &Extent,
         scene: &RenderScene,
         poses: &[PoseF32],
@@ -98,7 +98,7 @@ impl ShadowMap {
             Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
         // Reserves the whole map and all casters at once: casters move, and memory must not grow with it.
-        let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
+        let parts = if cfg.lod { Granularity::LodClusters } else { Granularity::FullClusters };
         self.list.reserve(scene, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
         self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
         self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
@@ -107,7 +107,7 @@ impl ShadowMap {
         let rotation = lamp.rotation;
         let casts = |i: &Instance| solid(i) && (planes || !matches!(i.shape, Shape::Plane(_)));
         self.texel = 1.0 / projection.fx;
-        self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
+        self.light_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
         self.list.build(
             &projection,
@@ -128,8 +128,8 @@ impl ShadowMap {
     }
 
     /// Samples of a tile that can hold any band of the map, even if the map is not in use now.
-    pub(crate) fn most_of_bands(&self) -> usize {
-        most_of_bands(self.side)
+    pub(crate) fn max_band_texels(&self) -> usize {
+        max_band_texels(self.side)
     }
 
     /// Crops the map to the visible casters, and one block more on each side for the texels around a point: everything
@@ -162,7 +162,7 @@ impl ShadowMap {
     pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         let Self { projection, list, nearness, range, side, .. } = self;
         let (projection, list) = (&*projection, &*list);
-        let most = most_of_bands(*side);
+        let most = max_band_texels(*side);
         let rows = rows_of_bands([projection.width, projection.height]);
         let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
         let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));
@@ -170,7 +170,7 @@ impl ShadowMap {
             projection,
             list,
             first: k * rows,
-            most,
+            max_texels: most,
             nearness,
             range,
         })
@@ -180,11 +180,11 @@ impl ShadowMap {
     /// points are first moved off the surface by more than a texel, so that a surface does not shadow itself. They are
     /// moved farther if the surface has a level of detail with an error up to `error` \[m\], or the caster has one.
     #[inline(always)]
-    pub(crate) fn light<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
+    pub(crate) fn visibility<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
         let p = &self.projection;
-        let mut c = position.sub(V3::splat(s, p.world_from_camera.translation)).rotate(&self.lamp_from_world);
+        let mut c = position.sub(V3::splat(s, p.world_from_camera.translation)).rotate(&self.light_from_world);
         let width = if p.parallel { splat(s, self.texel) } else { c.z * self.texel };
-        c = c.add(normal.rotate(&self.lamp_from_world).scale(width * 1.8 + (error + self.list.error)));
+        c = c.add(normal.rotate(&self.light_from_world).scale(width * 1.8 + (error + self.list.error)));
         let (x, y, nearness) = if p.parallel {
             (c.x * p.fx, c.y * p.fy, p.nearness_lanes(c.z - width * 0.3))
         } else {
@@ -259,8 +259,14 @@ impl ShadowMap {
 
 impl ShadowBand<'_> {
     /// Renders the band, by way of a tile that stays in the cache.
-    pub(crate) fn draw(self, level: Level, scene: &RenderScene, tile: &mut Tile, painter: &mut Painter) {
-        let Self { projection, list, first, most, nearness, range } = self;
+    pub(crate) fn draw(
+        self,
+        level: SimdLevel,
+        scene: &RenderScene,
+        tile: &mut Tile,
+        painter: &mut VisibilityRasterizer,
+    ) {
+        let Self { projection, list, first, max_texels: most, nearness, range } = self;
         let wide = projection.width / BLOCK;
         let rows = range.len() / wide;
         tile.reserve(most);
@@ -269,7 +275,7 @@ impl ShadowBand<'_> {
             for item in &list.opaque {
                 painter.draw(s, tile, projection, scene, &list.placed, item);
             }
-            tile.settle();
+            tile.finish();
             s.vectorize(
                 #[inline(always)]
                 || unfold(s, tile, nearness, range),
@@ -283,8 +289,8 @@ impl ShadowBand<'_> {
 fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2]]) {
     let side = tile.blocks_x * BLOCK;
     let lines = nearness.chunks_exact_mut(BLOCK * side).zip(range.chunks_exact_mut(tile.blocks_x));
-    for ((lines, range), blocks) in lines.zip(tile.nearness.chunks_exact(AREA * tile.blocks_x)) {
-        for (bx, (block, range)) in blocks.chunks_exact(AREA).zip(range).enumerate() {
+    for ((lines, range), blocks) in lines.zip(tile.nearness.chunks_exact(BLOCK_AREA * tile.blocks_x)) {
+        for (bx, (block, range)) in blocks.chunks_exact(BLOCK_AREA).zip(range).enumerate() {
             let (mut low, mut high) = (load(s, block), load(s, block));
             for two in block.chunks_exact(LANES) {
                 (low, high) = (min(load(s, two), low), max(load(s, two), high));

@@ -6,10 +6,10 @@ use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene};
 
 /// Margin around the covered part, in texels: for the taps around a point and for its offset along the normal.
-const ROOM: f32 = 6.0;
+const MARGIN: f32 = 6.0;
 /// Largest displacement of receivers and casters by their level of detail \[m\] (see
 /// [`RasterCfg::lod`](crate::request::RasterCfg::lod)).
-const DETAIL: f32 = 2e-3;
+const MAX_LOD_ERROR: f32 = 2e-3;
 /// Nearest depth of a spot's map \[m\].
 const SPOT_NEAR: f32 = 0.02;
 /// Largest half angle of a spot's map \[deg\].
@@ -37,19 +37,19 @@ impl Extent {
         }
     }
 
-    fn join(&mut self, other: &Self) {
+    fn union(&mut self, other: &Self) {
         for k in 0..3 {
             (self.lo[k], self.hi[k]) = (self.lo[k].min(other.lo[k]), self.hi[k].max(other.hi[k]));
         }
     }
 
-    fn meet(&self, other: &Self) -> Self {
+    fn intersection(&self, other: &Self) -> Self {
         Self { lo: [0, 1, 2].map(|k| self.lo[k].max(other.lo[k])), hi: [0, 1, 2].map(|k| self.hi[k].min(other.hi[k])) }
     }
 
     /// The part of this caster's extent whose shadow may fall into `other`.
     fn shading(&self, other: &Self) -> Self {
-        let mut out = self.meet(other);
+        let mut out = self.intersection(other);
         // The caster may have any depth in front of the receiver.
         (out.lo[2], out.hi[2]) = (self.lo[2], self.hi[2]);
         if self.lo[2] > other.hi[2] { Self::EMPTY } else { out }
@@ -58,7 +58,7 @@ impl Extent {
 
 /// View of a light that casts shadows, for its map.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LampView {
+pub(super) struct LightView {
     parallel: bool,
     position: [f32; 3],
     /// World from light; the columns are the light's axes, the last one along its direction.
@@ -82,9 +82,9 @@ fn frame_along(z: [f32; 3]) -> [[f32; 3]; 3] {
     [0, 1, 2].map(|k| [x[k], y[k], z[k]])
 }
 
-impl LampView {
+impl LightView {
     /// The view of a light; `None` for lights without shadow maps.
-    pub(super) fn of(light: &Light) -> Option<Self> {
+    pub(super) fn from_light(light: &Light) -> Option<Self> {
         let rotation = frame_along(unit(light.direction));
         match light.kind {
             LightKind::Directional => Some(Self { parallel: true, position: [0.0; 3], rotation, cone: Extent::ALL }),
@@ -142,13 +142,13 @@ impl LampView {
         side: usize,
         casts: impl Fn(&Instance) -> bool,
     ) -> Option<(Projection, bool)> {
-        let receivers = receivers.meet(&self.cone);
+        let receivers = receivers.intersection(&self.cone);
         let mut all = Extent::EMPTY;
         let things = || scene.instances().iter().zip(poses);
         for (instance, pose) in things().filter(|(i, _)| casts(i) && !matches!(i.shape, Shape::Plane(_))) {
-            let one = self.of_box(instance, pose, DETAIL).shading(&receivers);
+            let one = self.of_box(instance, pose, MAX_LOD_ERROR).shading(&receivers);
             if !one.is_empty() {
-                all.join(&one);
+                all.union(&one);
             }
         }
         let extent = |all: &Extent| (all.hi[0] - all.lo[0]).max(all.hi[1] - all.lo[1]).max(1e-3);
@@ -168,12 +168,12 @@ impl LampView {
             let own = self.of_box(plane, plane_pose, 0.0).shading(&receivers);
             for (_, (other, pose)) in things().enumerate().filter(|(i, (other, _))| *i != k && other.visible) {
                 let depth = depth_below(plane_pose, normal, other, pose);
-                let below = self.of_box(other, pose, DETAIL);
+                let below = self.of_box(other, pose, MAX_LOD_ERROR);
                 let least = if self.parallel { 2.0 * texel } else { 2.0 * texel * own.hi[2].abs() };
-                let one = own.meet(&below);
+                let one = own.intersection(&below);
                 if depth > least.max(1e-4) && (0..2).all(|k| one.lo[k] <= one.hi[k]) {
                     let one = Extent { lo: [one.lo[0], one.lo[1], own.lo[2]], hi: [one.hi[0], one.hi[1], own.hi[2]] };
-                    all.join(&one);
+                    all.union(&one);
                     planes = true;
                 }
             }
@@ -181,7 +181,7 @@ impl LampView {
         if all.is_empty() {
             return None;
         }
-        let [scale, middle] = [(side as f32 - 2.0 * ROOM) / extent(&all), 0.5 * side as f32];
+        let [scale, middle] = [(side as f32 - 2.0 * MARGIN) / extent(&all), 0.5 * side as f32];
         let center = [0, 1].map(|k| 0.5 * (all.lo[k] + all.hi[k]));
         if !(scale.is_finite() && center.iter().all(|x| x.is_finite())) {
             return None;
@@ -241,20 +241,20 @@ fn corners(lo: [f32; 3], hi: [f32; 3]) -> [[f32; 3]; 8] {
 /// The corners of each face of a box, in the order of [`corners`].
 const FACES: [[usize; 4]; 6] = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
 /// Largest number of corners of a quadrilateral clipped by six planes.
-const MOST: usize = 10;
+const MAX_CORNERS: usize = 10;
 
 /// Adds the corners of a polygon's part on the positive side of all planes.
 fn clip(polygon: [[f32; 3]; 4], planes: &[[f32; 4]; 6], points: &mut [[f32; 3]], count: &mut usize) {
-    let mut from = ([[0.0f32; 3]; MOST], 4);
+    let mut from = ([[0.0f32; 3]; MAX_CORNERS], 4);
     from.0[..4].copy_from_slice(&polygon);
     for plane in planes {
         let side = |p: [f32; 3]| dot([plane[0], plane[1], plane[2]], p) + plane[3];
-        let mut to = ([[0.0f32; 3]; MOST], 0);
+        let mut to = ([[0.0f32; 3]; MAX_CORNERS], 0);
         for k in 0..from.1 {
             let (a, b) = (from.0[k], from.0[(k + 1) % from.1]);
             let (da, db) = (side(a), side(b));
             let mut push = |p| {
-                if to.1 < MOST {
+                if to.1 < MAX_CORNERS {
                     to.0[to.1] = p;
                     to.1 += 1;
                 }
@@ -278,12 +278,12 @@ fn clip(polygon: [[f32; 3]; 4], planes: &[[f32; 4]; 6], points: &mut [[f32; 3]],
 }
 
 /// Extents, for each light, of all surfaces in the view of a pinhole camera.
-pub(super) fn seen<const N: usize>(
+pub(super) fn visible_extents<const N: usize>(
     projection: &Projection,
     scene: &RenderScene,
     poses: &[PoseF32],
     shown: impl Fn(&Instance) -> bool,
-    lamps: &[Option<LampView>; N],
+    lamps: &[Option<LightView>; N],
 ) -> [Extent; N] {
     let Projection { width, height, fx, fy, cx, cy, near, far, .. } = *projection;
     let (w, h) = (width as f32, height as f32);
@@ -317,7 +317,7 @@ pub(super) fn seen<const N: usize>(
         if frustum.iter().any(|plane| at.iter().all(|p| outside(*p, plane))) {
             continue;
         }
-        let mut points = [[0.0f32; 3]; 12 * MOST];
+        let mut points = [[0.0f32; 3]; 12 * MAX_CORNERS];
         let mut count = 0;
         if frustum.iter().any(|plane| at.iter().any(|p| outside(*p, plane))) {
             let sides: [[f32; 4]; 6] = std::array::from_fn(|face| {
@@ -341,7 +341,7 @@ pub(super) fn seen<const N: usize>(
         }
         for (out, lamp) in out.iter_mut().zip(lamps) {
             if let Some(lamp) = lamp {
-                out.join(&lamp.hull(&points[..count], DETAIL));
+                out.union(&lamp.hull(&points[..count], MAX_LOD_ERROR));
             }
         }
     }
@@ -349,6 +349,6 @@ pub(super) fn seen<const N: usize>(
 }
 
 /// Unbounded extents, for images through a lens.
-pub(super) fn everything<const N: usize>() -> [Extent; N] {
+pub(super) fn unbounded_extents<const N: usize>() -> [Extent; N] {
     [Extent::ALL; N]
 }

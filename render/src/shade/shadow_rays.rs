@@ -1,30 +1,30 @@
 //! Ray-traced shadows and ambient occlusion for rasterized images.
 
-use super::surface::SurfacePoint;
-use crate::geometry::bvh::Stack;
-use crate::path::sobol::Sequence;
+use super::surface::SurfacePointLanes;
+use crate::geometry::bvh::TraversalStack;
+use crate::path::sobol::SobolSequence;
 use crate::simd::{F, LANES, M, Simd, V3, load, splat};
-use crate::trace::Tracer;
-use crate::trace::motion::NOW;
+use crate::trace::RayTracer;
+use crate::trace::motion::END_TIME;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::basis::Basis;
-use kinetoscope_scene::sampling::cosine;
-use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
+use kinetoscope_scene::basis::OrthonormalBasis;
+use kinetoscope_scene::sampling::sample_cosine_hemisphere;
+use kinetoscope_scene::vector::{add_scaled, dot, scale, sub, to_f64};
 use kinetoscope_scene::{Light, LightKind};
 use std::cell::RefCell;
 
 /// Fraction of the way to a light that shadow rays cover: a light on a ceiling is not occluded by it.
-pub(crate) const REACH: f64 = 1.0 - 1e-6;
+pub(crate) const SHADOW_RAY_FRACTION: f64 = 1.0 - 1e-6;
 
 /// Offset of ray origins above the surface, as a fraction of their coordinates and depth: positions are single
 /// precision.
-const ABOVE: f32 = 1e-5;
+const RAY_OFFSET: f32 = 1e-5;
 
 /// Ray tracer for shadows, and a thread's scratch memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowRays<'a> {
-    pub(crate) tracer: &'a Tracer,
-    pub(crate) stack: &'a RefCell<&'a mut Stack>,
+    pub(crate) tracer: &'a RayTracer,
+    pub(crate) stack: &'a RefCell<&'a mut TraversalStack>,
     /// True if lights cast shadows.
     pub(crate) shadows: bool,
     /// Rays per sample for ambient occlusion; 0 disables it.
@@ -32,16 +32,16 @@ pub(crate) struct ShadowRays<'a> {
 }
 
 /// Points in lanes that are read one by one.
-pub(super) struct Points {
+pub(super) struct SurfacePoints {
     positions: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
     depths: [f32; LANES],
 }
 
-impl Points {
+impl SurfacePoints {
     #[inline(always)]
-    pub(super) fn new<S: Simd>(point: SurfacePoint<S>) -> Self {
-        let SurfacePoint { position, normal, depth } = point;
+    pub(super) fn new<S: Simd>(point: SurfacePointLanes<S>) -> Self {
+        let SurfacePointLanes { position, normal, depth } = point;
         Self { positions: arrays(position), normals: arrays(normal), depths: depth.array() }
     }
 
@@ -50,10 +50,10 @@ impl Points {
     }
 
     /// A point slightly above the surface.
-    pub(super) fn above(&self, k: usize) -> [f64; 3] {
+    pub(super) fn offset_origin(&self, k: usize) -> [f64; 3] {
         let at = self.positions.map(|axis| axis[k]);
-        let far = ABOVE * (self.depths[k] + at.iter().map(|x| x.abs()).sum::<f32>());
-        along(to_f64(at), f64::from(far), self.normal(k))
+        let far = RAY_OFFSET * (self.depths[k] + at.iter().map(|x| x.abs()).sum::<f32>());
+        add_scaled(to_f64(at), f64::from(far), self.normal(k))
     }
 }
 
@@ -75,29 +75,29 @@ impl ShadowRays<'_> {
     /// Fraction of a light that reaches each point; 1 in lanes that are not selected. `toward` is the direction to a
     /// directional light.
     #[inline(never)]
-    pub(crate) fn light<S: Simd>(
+    pub(crate) fn visibility<S: Simd>(
         &self,
         s: S,
         light: &Light,
         toward: [f32; 3],
-        point: SurfacePoint<S>,
+        point: SurfacePointLanes<S>,
         lanes: M<S>,
     ) -> F<S> {
-        let points = Points::new(point);
+        let points = SurfacePoints::new(point);
         let mut out = [1.0f32; LANES];
         let mut stack = self.stack.borrow_mut();
         for k in lanes_of(lanes.to_bitmask()) {
-            let origin = points.above(k);
+            let origin = points.offset_origin(k);
             let (direction, limit) = if light.kind == LightKind::Directional {
                 (toward.map(f64::from), f64::INFINITY)
             } else {
                 let to = sub(light.position.map(f64::from), origin);
-                (to, REACH * dot(to, to).sqrt())
+                (to, SHADOW_RAY_FRACTION * dot(to, to).sqrt())
             };
             let length = dot(direction, direction).sqrt();
             if length > 0.0 {
                 let ray = Ray { origin, direction: scale(direction, 1.0 / length) };
-                out[k] = self.tracer.passes(s, &ray, limit, NOW, &mut stack) as f32;
+                out[k] = self.tracer.transmittance(s, &ray, limit, END_TIME, &mut stack) as f32;
             }
         }
         if out == [1.0; LANES] { splat(s, 1.0) } else { load(s, &out) }
@@ -106,24 +106,36 @@ impl ShadowRays<'_> {
     /// Occluded fractions of the ambient light from above and from below the horizon, for a matt surface; 0 in lanes
     /// that are not selected. `smooth` is the shading normal.
     #[inline(never)]
-    pub(crate) fn blocked<S: Simd>(&self, s: S, point: SurfacePoint<S>, smooth: V3<S>, lanes: M<S>) -> [F<S>; 2] {
-        let (points, smooth) = (Points::new(point), arrays(smooth));
+    pub(crate) fn occlusion<S: Simd>(
+        &self,
+        s: S,
+        point: SurfacePointLanes<S>,
+        smooth: V3<S>,
+        lanes: M<S>,
+    ) -> [F<S>; 2] {
+        let (points, smooth) = (SurfacePoints::new(point), arrays(smooth));
         let mut out = [[0.0f32; LANES]; 2];
         let mut stack = self.stack.borrow_mut();
         for k in lanes_of(lanes.to_bitmask()) {
             let at = points.positions.map(|axis| axis[k].to_bits());
-            let sequence = Sequence::new([at[0] as usize, at[1] as usize], at[2]);
-            let (origin, flat) = (points.above(k), points.normal(k));
-            let basis = Basis::of(smooth.map(|axis| f64::from(axis[k])));
+            let sequence = SobolSequence::new([at[0] as usize, at[1] as usize], at[2]);
+            let (origin, flat) = (points.offset_origin(k), points.normal(k));
+            let basis = OrthonormalBasis::from_normal(smooth.map(|axis| f64::from(axis[k])));
             let mut blocked = [0.0f64; 2];
             for index in 0..u32::from(self.occlusion_rays) {
-                let direction = basis.to_world(cosine(sequence.sample(index).pair(0)));
+                let direction = basis.to_world(sample_cosine_hemisphere(sequence.sample(index).sample_2d(0)));
                 let direction = scale(direction, 1.0 / dot(direction, direction).sqrt());
                 // Directions of the smooth normal's hemisphere may point below the flat surface; those rays are
                 // mirrored by it. So a round mesh does not shade itself, and enclosed points are dark.
                 let over = dot(direction, flat);
-                let asked = along(direction, if over < 0.0 { -2.0 * over } else { 0.0 }, flat);
-                let passes = self.tracer.passes(s, &Ray { origin, direction: asked }, f64::INFINITY, NOW, &mut stack);
+                let asked = add_scaled(direction, if over < 0.0 { -2.0 * over } else { 0.0 }, flat);
+                let passes = self.tracer.transmittance(
+                    s,
+                    &Ray { origin, direction: asked },
+                    f64::INFINITY,
+                    END_TIME,
+                    &mut stack,
+                );
                 blocked[usize::from(direction[2] <= 0.0)] += 1.0 - passes;
             }
             for (out, blocked) in out.iter_mut().zip(blocked) {
@@ -137,9 +149,9 @@ impl ShadowRays<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::assets::RayAssets;
+    use crate::geometry::assets::RayAssetCache;
     use crate::raster::Layer;
-    use crate::simd::{Level, at_level};
+    use crate::simd::{SimdLevel, at_level};
     use kinetoscope_scene::shape::Shape;
     use kinetoscope_scene::shape::{Box, Plane, Sphere};
     use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene};
@@ -152,17 +164,17 @@ mod tests {
         let (shapes, poses): (Vec<Shape>, Vec<PoseF32>) = std::iter::once(floor).chain(objects).unzip();
         let instances = shapes.into_iter().map(|shape| Instance::new(shape, Material::default(), 1)).collect();
         let scene = RenderScene::new(instances).unwrap();
-        let mut tracer = Tracer::default();
-        tracer.find_bodies(&scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
+        let mut tracer = RayTracer::default();
+        tracer.prepare_geometry(&scene, &RayAssetCache::default(), |i| Layer::for_instance(i, u32::MAX));
         tracer.place(&scene, &poses, None);
-        let mut stack = Stack::default();
+        let mut stack = TraversalStack::default();
         let stack = RefCell::new(&mut stack);
         let rays = ShadowRays { tracer: &tracer, stack: &stack, shadows: true, occlusion_rays: 1 << 12 };
-        at_level!(Level::best(), s => {
+        at_level!(SimdLevel::best(), s => {
             let [at, normal, smooth] = [at, normals[0], normals[1]].map(|v| V3::splat(s, v));
             let lanes = splat(s, 0.0f32).simd_gt(splat(s, -1.0));
-            let point = SurfacePoint { position: at, normal, depth: splat(s, 1.0) };
-            let parts = rays.blocked(s, point, smooth, lanes);
+            let point = SurfacePointLanes { position: at, normal, depth: splat(s, 1.0) };
+            let parts = rays.occlusion(s, point, smooth, lanes);
             parts.map(|part| f64::from(part.array()[3]))
         })
     }

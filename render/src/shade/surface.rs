@@ -1,7 +1,7 @@
 //! Surface reconstruction at sixteen samples of one instance: exact, from the ray and the shape, not from the
 //! visibility buffer.
 
-use crate::raster::Placed;
+use crate::raster::PlacedInstance;
 use crate::simd::{F, LANES, M, Simd, U, V3, load, max, min, select, splat};
 use crate::visibility::{Projection, primitive};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
@@ -11,15 +11,15 @@ use kinetoscope_scene::{Instance, PoseF32};
 #[derive(Clone, Copy)]
 pub(crate) struct Surface<S: Simd> {
     /// Distance in units of the ray's direction: depth along the optical axis, or distance, \[m\].
-    pub(crate) along: F<S>,
+    pub(crate) t: F<S>,
     /// Geometric normal, facing the camera, world frame.
     pub(crate) normal: V3<S>,
     /// Interpolated normal, world frame.
-    pub(crate) shading: V3<S>,
+    pub(crate) shading_normal: V3<S>,
     /// Position in the world frame \[m\].
     pub(crate) position: V3<S>,
     /// Position in the frame of the instance \[m\].
-    pub(crate) local: V3<S>,
+    pub(crate) local_position: V3<S>,
     /// Texture coordinates, and their number per meter of surface.
     pub(crate) uv: [F<S>; 2],
     pub(crate) uv_density: F<S>,
@@ -27,28 +27,28 @@ pub(crate) struct Surface<S: Simd> {
 
 /// Points on surfaces, as origins of rays.
 #[derive(Clone, Copy)]
-pub(crate) struct SurfacePoint<S: Simd> {
+pub(crate) struct SurfacePointLanes<S: Simd> {
     /// Position in the world frame \[m\].
     pub(crate) position: V3<S>,
     /// Geometric normal, facing the camera, world frame.
     pub(crate) normal: V3<S>,
-    /// Depth, as in [`Surface::along`].
+    /// Depth, as in [`Surface::t`].
     pub(crate) depth: F<S>,
 }
 
 impl<S: Simd> Surface<S> {
     #[inline(always)]
-    pub(crate) fn point(&self) -> SurfacePoint<S> {
-        SurfacePoint { position: self.position, normal: self.normal, depth: self.along }
+    pub(crate) fn point(&self) -> SurfacePointLanes<S> {
+        SurfacePointLanes { position: self.position, normal: self.normal, depth: self.t }
     }
 }
 
 /// State that all samples of an instance share.
 #[derive(Clone, Copy)]
-pub(crate) struct Source<'a> {
+pub(crate) struct InstanceSurface<'a> {
     pub(crate) instance: &'a Instance,
     pub(crate) world_from_instance: &'a PoseF32,
-    pub(crate) placed: &'a Placed,
+    pub(crate) placed: &'a PlacedInstance,
     pub(crate) first_id: u32,
     /// Linear color of the material.
     pub(crate) color: [f32; 3],
@@ -60,7 +60,7 @@ pub(crate) struct Source<'a> {
 
 /// Sixteen rays through a lens that bends them.
 #[derive(Clone, Copy)]
-pub(crate) struct Ray<S: Simd> {
+pub(crate) struct LensRayLanes<S: Simd> {
     /// Directions in the optical frame.
     pub(crate) direction: V3<S>,
     /// True if they have z = 1, else length 1.
@@ -73,7 +73,7 @@ pub(crate) struct CameraRays<S: Simd> {
     /// Points (u, v) of the image \[pixels\].
     pub(crate) uv: [F<S>; 2],
     /// Rays through a lens; `None` for a pinhole.
-    pub(crate) bent: Option<Ray<S>>,
+    pub(crate) lens_rays: Option<LensRayLanes<S>>,
     /// Directions in the world frame.
     pub(crate) direction: V3<S>,
 }
@@ -84,12 +84,12 @@ pub(crate) struct CameraRays<S: Simd> {
 pub(crate) fn surface<S: Simd>(
     s: S,
     projection: &Projection,
-    source: &Source<'_>,
+    source: &InstanceSurface<'_>,
     ids: U<S>,
     lanes: M<S>,
     rays: CameraRays<S>,
 ) -> Surface<S> {
-    let CameraRays { uv: [u, v], bent, direction } = rays;
+    let CameraRays { uv: [u, v], lens_rays: bent, direction } = rays;
     let camera = &source.placed.local.instance_from_camera;
     let (o, d) = match bent {
         None => projection.rays(s, &source.placed.local, u, v),
@@ -100,10 +100,10 @@ pub(crate) fn surface<S: Simd>(
     if let Some(mesh) = source.placed.mesh(source.instance) {
         let [x, y, z] = &camera.rotation;
         let axis = match bent {
-            Some(Ray { forward: false, .. }) => d.scale(1.0 / d.dot(d)),
+            Some(LensRayLanes { forward: false, .. }) => d.scale(1.0 / d.dot(d)),
             _ => V3::splat(s, [x[2], y[2], z[2]]),
         };
-        let hit = triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
+        let hit = intersect_triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
         (along, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
     } else {
         let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
@@ -124,11 +124,11 @@ pub(crate) fn surface<S: Simd>(
     // From the camera outward, as for the depth: both agree to the last digits.
     let position = direction.scale(along).add(V3::splat(s, projection.world_from_camera.translation));
     Surface {
-        along,
+        t: along,
         normal: normal.scale(flip).rotate(&world.rotation),
-        shading: shading.scale(flip).rotate(&world.rotation),
+        shading_normal: shading.scale(flip).rotate(&world.rotation),
         position,
-        local,
+        local_position: local,
         uv,
         uv_density,
     }
@@ -144,7 +144,7 @@ struct TriangleHit<S: Simd> {
 
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
-fn triangles<S: Simd>(
+fn intersect_triangles<S: Simd>(
     s: S,
     mesh: &RenderMesh,
     first_id: u32,

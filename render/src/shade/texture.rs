@@ -4,7 +4,7 @@
 //! averaged in linear light.
 
 use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
-use kinetoscope_scene::Level;
+use kinetoscope_scene::MipLevel;
 use kinetoscope_scene::{Texture, TextureKind};
 
 /// Adding and subtracting this rounds to an integer (below 2^22).
@@ -20,13 +20,13 @@ fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
 /// Colors (bytes, 0..=255) at (u, v), v upward, where one pixel is `footprint` wide in texture coordinates.
 #[inline(always)]
 pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
-    let first = &texture.levels()[0];
+    let first = &texture.mip_levels()[0];
     let (zero, one, limit) = (splat(s, 0.0), splat(s, 1.0), splat(s, 1e6));
     let lanes = lanes & abs(u).simd_lt(limit) & abs(v).simd_lt(limit);
     let (u, v) = (select(lanes, u, zero), select(lanes, v, zero));
     let (u, v) = (u - floor_lanes(s, u), one - (v - floor_lanes(s, v)));
     let texels = footprint * first.width().max(first.height()) as f32;
-    between_levels(
+    sample_levels(
         s,
         texture,
         texels,
@@ -55,17 +55,17 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
     };
     let major = axis(ax, ay, az);
     // Faces +x, -x, +y, -y, +z, -z, from top to bottom of the image.
-    let back = axis(d.x, d.y, d.z).simd_gt(zero);
-    let face = axis(zero, splat(s, 2.0), splat(s, 4.0)) + select(back, zero, splat(s, 1.0));
+    let positive = axis(d.x, d.y, d.z).simd_gt(zero);
+    let face = axis(zero, splat(s, 2.0), splat(s, 4.0)) + select(positive, zero, splat(s, 1.0));
     let turned = {
         #[inline(always)]
-        |x: F<S>| select(back, x, -x)
+        |x: F<S>| select(positive, x, -x)
     };
     let (u, v) = (axis(-turned(d.z), d.x, turned(d.x)), axis(-d.y, turned(d.z), -d.y));
     let k = 0.5 / select(major.simd_gt(zero), major, splat(s, 1.0));
     let (u, v) = (u * k + 0.5, v * k + 0.5);
-    let texels = footprint * (0.5 * texture.levels()[0].width() as f32);
-    between_levels(
+    let texels = footprint * (0.5 * texture.mip_levels()[0].width() as f32);
+    sample_levels(
         s,
         texture,
         texels,
@@ -89,14 +89,14 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
 ///
 /// Neighboring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
 #[inline(always)]
-fn between_levels<S: Simd>(
+fn sample_levels<S: Simd>(
     s: S,
     texture: &Texture,
     texels: F<S>,
     lanes: M<S>,
-    at: impl Fn(&Level, M<S>) -> [F<S>; 3],
+    at: impl Fn(&MipLevel, M<S>) -> [F<S>; 3],
 ) -> [F<S>; 3] {
-    let levels = texture.levels();
+    let levels = texture.mip_levels();
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
     let mut out = [zero, zero, zero];
     // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.75 times 2^k it is used alone: the four texels of a
@@ -140,7 +140,7 @@ fn pair(bytes: &[u8], from: usize) -> u64 {
 
 /// Bilinear interpolation: column and row of the upper left texel, and the fractions to the next ones.
 #[inline(always)]
-fn bilinear<S: Simd>(s: S, level: &Level, [x, y]: [F<S>; 2], [fx, fy]: [F<S>; 2], lanes: M<S>) -> [F<S>; 3] {
+fn bilinear<S: Simd>(s: S, level: &MipLevel, [x, y]: [F<S>; 2], [fx, fy]: [F<S>; 2], lanes: M<S>) -> [F<S>; 3] {
     let stride = level.width() as i32 + 1;
     let at = select_i(lanes, y.to_int() * stride + x.to_int(), splat_i(s, 0));
     let at: [i32; LANES] = at.array();

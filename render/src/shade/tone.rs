@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum ToneCurve {
     /// x up to 0.7; above, it bends smoothly towards 1, so that highlights on white surfaces do not clip: 0.7 + 0.3 k /
-    /// (k + 0.3) with k = x - 0.7. With [`LightSum::Display`](kinetoscope_scene::LightSum::Display), whose sums end at
+    /// (k + 0.3) with k = x - 0.7. With [`LightingSpace::Display`](kinetoscope_scene::LightingSpace::Display), whose sums end at
     /// 1, it is [`Clip`](Self::Clip), except for path-traced frames.
     #[default]
     Soft,
@@ -25,7 +25,7 @@ pub enum ToneCurve {
 /// Start of the bend of the soft curve.
 const KNEE: f32 = 0.7;
 /// Limit of light, so that the results stay finite.
-const BRIGHTEST: f32 = 1e6;
+const MAX_LIGHT: f32 = 1e6;
 
 impl ToneCurve {
     /// All curves.
@@ -37,7 +37,7 @@ impl ToneCurve {
             Self::Soft => {
                 let bright = x.simd_gt(splat(s, KNEE));
                 if bright.any_true() {
-                    let k = min(x, splat(s, BRIGHTEST)) - KNEE;
+                    let k = min(x, splat(s, MAX_LIGHT)) - KNEE;
                     let bent = k * (1.0 - KNEE) / (k + (1.0 - KNEE)) + KNEE;
                     min(select(bright, bent, x), splat(s, 1.0))
                 } else {
@@ -46,7 +46,7 @@ impl ToneCurve {
             }
             Self::Clip => min(x, splat(s, 1.0)),
             Self::Filmic => {
-                let x = min(x, splat(s, BRIGHTEST));
+                let x = min(x, splat(s, MAX_LIGHT));
                 min(x * (x * 2.51 + 0.03) / (x * (x * 2.43 + 0.59) + 0.14), splat(s, 1.0))
             }
         }
@@ -97,7 +97,7 @@ pub(crate) fn decode(c: [f32; 3]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::levels;
+    use crate::simd::all_levels;
 
     /// Compares with the documented curves and the standard's transfer function, in double precision.
     #[test]
@@ -108,7 +108,7 @@ mod tests {
             ToneCurve::Clip => x.min(1.0),
             ToneCurve::Filmic => (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0),
         };
-        for (level, curve) in levels().into_iter().flat_map(|level| ToneCurve::ALL.map(|curve| (level, curve))) {
+        for (level, curve) in all_levels().into_iter().flat_map(|level| ToneCurve::ALL.map(|curve| (level, curve))) {
             let encoded = |x: f32| crate::simd::at_level!(level, s => encode(s, curve, splat(s, x)).array()[3]);
             let mut last = 0.0;
             for k in 0..4000 {

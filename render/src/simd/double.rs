@@ -78,14 +78,14 @@ impl<S: Simd> D<S> {
     }
     /// The smallest lane; no lane may be NaN.
     #[inline(always)]
-    pub(crate) fn least(self) -> f64 {
+    pub(crate) fn reduce_min(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.array();
         let min = |a: f64, b: f64| if a < b { a } else { b };
         min(min(min(a, b), min(c, d)), min(min(e, f), min(g, h)))
     }
     /// The largest lane; no lane may be NaN.
     #[inline(always)]
-    pub(crate) fn most(self) -> f64 {
+    pub(crate) fn reduce_max(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.array();
         let max = |a: f64, b: f64| if a > b { a } else { b };
         max(max(max(a, b), max(c, d)), max(max(e, f), max(g, h)))
@@ -132,7 +132,7 @@ impl<S: Simd> Not for N<S> {
 /// Three coordinates of eight points.
 pub(crate) type D3<S> = [D<S>; 3];
 
-/// Evaluates `of` for each axis. [`array::map`](std::array) is not always inlined, and then compiled without the
+/// Evaluates `of` for each axis. [`std::array`](std::array) is not always inlined, and then compiled without the
 /// instruction set. For the same reason, closures over vectors are `#[inline(always)]`.
 #[inline(always)]
 pub(crate) fn axes<T>(of: impl Fn(usize) -> T) -> [T; 3] {

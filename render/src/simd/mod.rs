@@ -12,23 +12,23 @@ mod scalar;
 mod vector;
 
 pub(crate) use double::{D3, axes, dot_3, load_3};
-pub(crate) use fearless_simd::Level as SimdLevel;
+pub(crate) use fearless_simd::Level as BackendLevel;
 pub(crate) use scalar::Scalar;
 pub(crate) use vector::{D, F, F4, F8, I, M, N, Simd, U};
 
 /// An instruction set of this machine.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Level {
+pub(crate) enum SimdLevel {
     /// Plain loops.
     Scalar,
     /// A level of the SIMD library.
-    Simd(SimdLevel),
+    Simd(BackendLevel),
 }
 
-impl Level {
+impl SimdLevel {
     /// The best level of this machine.
     pub(crate) fn best() -> Self {
-        let level = SimdLevel::new();
+        let level = BackendLevel::new();
         if level.is_fallback() { Self::Scalar } else { Self::Simd(level) }
     }
 }
@@ -39,11 +39,11 @@ impl Level {
 macro_rules! at_level {
     ($level:expr, $s:ident => $body:expr) => {
         match $level {
-            $crate::simd::Level::Scalar => {
+            $crate::simd::SimdLevel::Scalar => {
                 let $s = $crate::simd::Scalar;
                 $body
             }
-            $crate::simd::Level::Simd(level) => $crate::simd::at_simd_level!(level, $s => $body),
+            $crate::simd::SimdLevel::Simd(level) => $crate::simd::at_simd_level!(level, $s => $body),
         }
     };
 }
@@ -89,7 +89,7 @@ pub(crate) const DOUBLES: usize = 8;
 
 /// The first sixteen elements of a slice.
 #[inline(always)]
-pub(crate) fn first<T>(x: &[T]) -> &[T; LANES] {
+pub(crate) fn as_lanes<T>(x: &[T]) -> &[T; LANES] {
     match x.first_chunk() {
         Some(x) => x,
         None => panic!("fewer than sixteen"),
@@ -98,7 +98,7 @@ pub(crate) fn first<T>(x: &[T]) -> &[T; LANES] {
 
 /// The first sixteen elements of a slice.
 #[inline(always)]
-fn first_mut<T>(x: &mut [T]) -> &mut [T; LANES] {
+fn as_lanes_mut<T>(x: &mut [T]) -> &mut [T; LANES] {
     match x.first_chunk_mut() {
         Some(x) => x,
         None => panic!("fewer than sixteen"),
@@ -126,19 +126,19 @@ pub(crate) fn splat_u<S: Simd>(s: S, x: u32) -> U<S> {
 /// Loads sixteen numbers.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(s: S, x: &[f32]) -> F<S> {
-    F::new(s, s.load(first(x)))
+    F::new(s, s.load(as_lanes(x)))
 }
 
 /// Loads sixteen integers.
 #[inline(always)]
 pub(crate) fn load_i<S: Simd>(s: S, x: &[i32]) -> I<S> {
-    I::new(s, s.load_i(first(x)))
+    I::new(s, s.load_i(as_lanes(x)))
 }
 
 /// Loads sixteen ids.
 #[inline(always)]
 pub(crate) fn load_u<S: Simd>(s: S, x: &[u32]) -> U<S> {
-    U::new(s, s.load_u(first(x)))
+    U::new(s, s.load_u(as_lanes(x)))
 }
 
 /// The lower and the upper halves of sixteen pairs.
@@ -151,19 +151,19 @@ pub(crate) fn halves<S: Simd>(s: S, pairs: &[u64; LANES]) -> [I<S>; 2] {
 /// Stores sixteen numbers.
 #[inline(always)]
 pub(crate) fn store<S: Simd>(x: F<S>, to: &mut [f32]) {
-    *first_mut(to) = x.array();
+    *as_lanes_mut(to) = x.array();
 }
 
 /// Stores sixteen ids.
 #[inline(always)]
 pub(crate) fn store_u<S: Simd>(x: U<S>, to: &mut [u32]) {
-    *first_mut(to) = x.array();
+    *as_lanes_mut(to) = x.array();
 }
 
 /// Stores sixteen integers.
 #[inline(always)]
 pub(crate) fn store_i<S: Simd>(x: I<S>, to: &mut [i32]) {
-    *first_mut(to) = x.array();
+    *as_lanes_mut(to) = x.array();
 }
 
 /// `a` where the mask is set, else `b`.
@@ -204,7 +204,7 @@ pub(crate) fn abs<S: Simd>(a: F<S>) -> F<S> {
 
 /// Square root; 0 for negative numbers.
 #[inline(always)]
-pub(crate) fn root<S: Simd>(s: S, a: F<S>) -> F<S> {
+pub(crate) fn sqrt_or_zero<S: Simd>(s: S, a: F<S>) -> F<S> {
     max(a, splat(s, 0.0)).sqrt()
 }
 
@@ -278,14 +278,14 @@ impl<S: Simd> V3<S> {
 
 /// All levels of this machine, the scalar one first: for tests that all levels give the same bits.
 #[cfg(test)]
-pub(crate) fn levels() -> Vec<Level> {
-    let mut levels = vec![Level::Scalar];
-    let best = SimdLevel::new();
+pub(crate) fn all_levels() -> Vec<SimdLevel> {
+    let mut levels = vec![SimdLevel::Scalar];
+    let best = BackendLevel::new();
     #[cfg(target_arch = "x86_64")]
     {
-        levels.extend(best.as_sse2().map(|s| Level::Simd(SimdLevel::Sse2(s))));
-        levels.extend(best.as_avx2().map(|s| Level::Simd(SimdLevel::Avx2(s))));
+        levels.extend(best.as_sse2().map(|s| SimdLevel::Simd(BackendLevel::Sse2(s))));
+        levels.extend(best.as_avx2().map(|s| SimdLevel::Simd(BackendLevel::Avx2(s))));
     }
-    levels.push(Level::Simd(best));
+    levels.push(SimdLevel::Simd(best));
     levels
 }

@@ -1,8 +1,8 @@
 //! Invalid input and degenerate scenes.
 
-use super::harness::{Still, look};
+use super::harness::{TestFrame, look_at_view};
 use crate::frame::FrameMut;
-use crate::rasterizer::Rasterizer;
+use crate::rasterizer::ImageRenderer;
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::visibility::{RenderError, View};
@@ -10,23 +10,23 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, RenderSceneError};
-use kinetoscope_testkit::scenes::{at, every_shape, things};
+use kinetoscope_testkit::scenes::{every_shape, instances, translation};
 use std::sync::Arc;
 
 fn view() -> View {
-    look([32, 24], 1.0, [3., 0., 1.], [0.; 3])
+    look_at_view([32, 24], 1.0, [3., 0., 1.], [0.; 3])
 }
 
-fn of(shape: impl Into<Shape>) -> Still {
-    Still::new(things([(shape, Material::default(), PoseF32::IDENTITY)]), view())
+fn of(shape: impl Into<Shape>) -> TestFrame {
+    TestFrame::new(instances([(shape, Material::default(), PoseF32::IDENTITY)]), view())
 }
 
 #[test]
-fn refused_input() {
+fn invalid_input() {
     let good = of(Sphere { radius: 0.5 });
     good.draw();
     let paths = |samples, max_bounces| Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };
-    type Row = (&'static str, fn(&mut Still), fn(&RenderError) -> bool);
+    type Row = (&'static str, fn(&mut TestFrame), fn(&RenderError) -> bool);
     let rows: [Row; 12] = [
         ("width", |s| s.view.width = 0, |e| matches!(e, RenderError::Size { .. })),
         ("height", |s| s.view.height = 10_000, |e| matches!(e, RenderError::Size { .. })),
@@ -64,13 +64,13 @@ fn refused_input() {
     }
     let mut short = vec![0.0; 5];
     let mut frame = FrameMut { depth: Some(&mut short), ..FrameMut::default() };
-    let error = Rasterizer::default().render_shot(&good.shot(), &mut frame).unwrap_err();
+    let error = ImageRenderer::default().render_request(&good.request(), &mut frame).unwrap_err();
     assert_eq!(error.to_string(), "the depth buffer has 5 numbers; the picture needs 768");
     assert_eq!(View::look_at([8, 8], 1.0, [1.; 3], [1.; 3], [0., 0., 1.]), Err(RenderError::LookAt));
 }
 
 #[test]
-fn refused_scenes() {
+fn invalid_scenes() {
     let with = |shape: Shape, id| RenderScene::new(vec![Instance::new(shape, Material::default(), id)]);
     assert!(matches!(with(Sphere { radius: 1.0 }.into(), 0), Err(RenderSceneError::ZeroMaskId { instance: 0 })));
     let error = with(Box { half: [1., 0., 1.] }.into(), 1).unwrap_err();
@@ -79,20 +79,20 @@ fn refused_scenes() {
 
 #[test]
 fn odd_scenes() {
-    let empty = Still::new((RenderScene::new(vec![]).unwrap(), vec![]), view());
-    let empty = Still { before: Some((vec![], view())), ..empty }.draw();
+    let empty = TestFrame::new((RenderScene::new(vec![]).unwrap(), vec![]), view());
+    let empty = TestFrame { previous: Some((vec![], view())), ..empty }.draw();
     assert!(empty.mask().iter().all(|&m| m == 0) && empty.flow().iter().flatten().all(|&x| x == f32::INFINITY));
     let flat = TriMesh::from_triangles(
         vec![[0.; 3], [1., 0., 0.], [2., 0., 0.], [0., 1e30, 0.]],
         vec![[0, 1, 2], [0, 0, 1], [1, 1, 1], [0, 1, 3]],
     );
     for mesh in [TriMesh::default(), flat] {
-        of(Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) }).draw();
+        of(Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)) }).draw();
     }
     // Straight up and down: a plane is visible from above only.
     for z in [2.0, -2.0] {
-        let view = look([16, 16], 1.0, [0., 0., z], [0.; 3]);
-        assert!(of(Plane::INFINITE).from(view).mask().iter().all(|&m| m == i32::from(z > 0.0)), "{z}");
+        let view = look_at_view([16, 16], 1.0, [0., 0., z], [0.; 3]);
+        assert!(of(Plane::INFINITE).draw_view(view).mask().iter().all(|&m| m == i32::from(z > 0.0)), "{z}");
         assert!(view.world_from_camera.is_rigid());
     }
 }
@@ -103,11 +103,11 @@ fn odd_scenes() {
 fn transparency() {
     let view = View { cx: 16.5, cy: 12.5, ..view() };
     let seen = [0.0, 0.4, 0.6, 1.0].map(|alpha| {
-        let scene = things([
-            (Box { half: [0.05, 0.3, 0.3] }, Material::from_rgba([0.2, 0.9, 0.2, alpha]), at(1., 0., 0.33)),
+        let scene = instances([
+            (Box { half: [0.05, 0.3, 0.3] }, Material::from_rgba([0.2, 0.9, 0.2, alpha]), translation(1., 0., 0.33)),
             (Box { half: [0.1, 2.0, 2.0] }, Material::from_rgba([0.9, 0.1, 0.1, 1.0]), PoseF32::IDENTITY),
         ]);
-        let image = Still::new(scene, view).draw();
+        let image = TestFrame::new(scene, view).draw();
         (image.color()[12 * 32 + 16], image.mask()[12 * 32 + 16])
     });
     assert_eq!(seen.map(|seen| seen.1), [2, 1, 1, 1]);
@@ -121,7 +121,7 @@ fn hidden_groups() {
     instances[1].visible = false;
     instances[0].group = 1;
     let poses = vec![PoseF32::IDENTITY; instances.len()];
-    let still = Still::new((RenderScene::new(instances).unwrap(), poses), view());
-    let image = Still { cfg: RasterCfg { groups: 1 << 2, ..RasterCfg::default() }, ..still }.draw();
+    let still = TestFrame::new((RenderScene::new(instances).unwrap(), poses), view());
+    let image = TestFrame { cfg: RasterCfg { groups: 1 << 2, ..RasterCfg::default() }, ..still }.draw();
     assert!(!image.mask().contains(&1) && !image.mask().contains(&2) && image.mask().iter().any(|&m| m > 2));
 }

@@ -1,26 +1,26 @@
 //! The same image, bit for bit, with every instruction set, on any number of threads, and with any channels.
 
-use super::harness::{EXACT, Image, Still, assert_same_bits, look};
+use super::harness::{EXACT, Image, TestFrame, assert_same_bits, look_at_view};
 use super::shutter::{bar, bar_at};
 use super::{detail, lenses};
 use crate::aperture::Aperture;
 use crate::frame::{Channels, Frame};
-use crate::parallel::ParallelRasterizer;
-use crate::rasterizer::Rasterizer;
+use crate::parallel::ParallelRenderer;
+use crate::rasterizer::ImageRenderer;
 use crate::renderer::Renderer;
-use crate::request::{RasterCfg, Shot};
+use crate::request::{RasterCfg, RenderRequest};
 use crate::shutter::Shutter;
-use crate::simd::levels;
+use crate::simd::all_levels;
 use crate::visibility::View;
 use kinetoscope_scene::{Haze, Light, LightKind, PoseF32, RenderScene};
-use kinetoscope_testkit::scenes::{Random, figure, random};
+use kinetoscope_testkit::scenes::{TestRng, humanoid, random_scene};
 
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
 /// A scene with all inputs of color: transparency, mirrors, all kinds of lights, haze.
-fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
-    let (scene, poses) = random(&mut Random(seed), 1.0);
+fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> TestFrame {
+    let (scene, poses) = random_scene(&mut TestRng(seed), 1.0);
     let mut instances = scene.instances().to_vec();
     (instances[1].material.rgba[3], instances[2].material.rgba[3]) = (0.4, 0.7);
     // An ellipsoid, a box and the ground.
@@ -31,20 +31,20 @@ fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
     scene.lights.push(Light { radius: 0.1, ..spot });
     scene.lights.push(Light { kind: LightKind::Point, position: [0., -2., 1.], ..Light::default() });
     scene.haze = Some(Haze { color: None, start: 2.0, end: 8.0 });
-    let view = look([width, height], 0.9, [2.5, -1.5, 1.5], [0., 0., -0.1]);
-    Still::new((scene, poses), View { fx: zoom * view.fx, fy: zoom * view.fy, ..view })
+    let view = look_at_view([width, height], 0.9, [2.5, -1.5, 1.5], [0., 0., -0.1]);
+    TestFrame::new((scene, poses), View { fx: zoom * view.fx, fy: zoom * view.fy, ..view })
 }
 
 /// Sizes above and below the limit for another thread.
 #[test]
 fn raster() {
-    assert!(levels().len() >= 2, "{:?}", levels());
+    assert!(all_levels().len() >= 2, "{:?}", all_levels());
     let sizes = [[333, 251], [64, 64], [97, 401], [8, 8], [401, 97], [203, 300], [1, 1], [120, 90], [130, 17]];
     for samples in [1, 4] {
         let cfg = RasterCfg { samples, ..RasterCfg::default() };
-        let small = |k| Still { cfg, ..rich(k as u64 + 1, [101, 67], 1.0) };
+        let small = |k| TestFrame { cfg, ..rich(k as u64 + 1, [101, 67], 1.0) };
         assert_same_bits(&format!("{samples} samples"), (3, &small), &[1], &[3]);
-        let large = |k| Still { cfg, ..rich(k as u64 + 1, sizes[k], 3.0) };
+        let large = |k| TestFrame { cfg, ..rich(k as u64 + 1, sizes[k], 3.0) };
         assert_same_bits(&format!("sizes, {samples} samples"), (9, &large), &[1, 2, 3, 8], &[1, 2, 3, 5, 9]);
     }
 }
@@ -55,25 +55,30 @@ fn rays() {
         let occlusion_rays = if *renderer == Renderer::Hybrid { 4 } else { 0 };
         let cfg = RasterCfg { occlusion_rays, ..RasterCfg::default() };
         let sizes = [[61, 47], [8, 8], [33, 70]];
-        let still = |k| Still { renderer: *renderer, cfg, ..rich(k as u64 + 1, sizes[k], 1.0) };
+        let still = |k| TestFrame { renderer: *renderer, cfg, ..rich(k as u64 + 1, sizes[k], 1.0) };
         assert_same_bits(&format!("{renderer:?}"), (3, &still), &[1, 2, 3], &[1, 3]);
     }
     // The control: another seed has other noise.
     let other = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 4 };
     let still = rich(1, [61, 47], 1.0);
-    assert!(still.by(FEW_PATHS).color() != still.by(other).color());
+    assert!(still.with_renderer(FEW_PATHS).color() != still.with_renderer(other).color());
 }
 
 #[test]
 fn lens_images() {
-    let view = look([64, 48], 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
+    let view = look_at_view([64, 48], 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
     // Farther to the side, and with other intrinsics.
-    let old = look([64, 48], 0.8, [1.5, -1.0, 1.1], [0.1, 0., 0.7]);
-    for (lens, rays) in lenses::bent() {
+    let old = look_at_view([64, 48], 0.8, [1.5, -1.0, 1.1], [0.1, 0., 0.7]);
+    for (lens, rays) in lenses::distorting() {
         for renderer in &RENDERERS[1..] {
             let still = |_| {
-                let before = Some((figure().1, old));
-                Still { renderer: *renderer, lens: Some(rays.clone()), before, ..Still::new(figure(), view) }
+                let before = Some((humanoid().1, old));
+                TestFrame {
+                    renderer: *renderer,
+                    lens: Some(rays.clone()),
+                    previous: before,
+                    ..TestFrame::new(humanoid(), view)
+                }
             };
             let images = assert_same_bits(&format!("{}, {renderer:?}", lens.name()), (1, &still), &[2, 3], &[1]);
             assert!(images[0].flow().iter().flatten().any(|x| x.is_finite() && *x != 0.0), "things move");
@@ -89,25 +94,32 @@ fn rolling_shutter() {
     let renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: true, seed: 0 };
     let moved = PoseF32 { translation: [0.01, 0.0, 0.02], ..view.world_from_camera };
     let (before, opened) = (Some((bar_at(-0.3), view)), Some((bar_at(-0.3), moved, 0.2)));
-    let still = Still { shutter, aperture, renderer, before, opened, ..Still::new((scene, bar_at(0.3)), view) };
+    let still = TestFrame {
+        shutter,
+        aperture,
+        renderer,
+        previous: before,
+        shutter_open: opened,
+        ..TestFrame::new((scene, bar_at(0.3)), view)
+    };
     assert_same_bits("rows", (1, &|_| still.clone()), &[1, 2, 3], &[1]);
 }
 
 #[test]
 fn detail_levels() {
-    let still = |_| detail::new_veiled().with(|still| still.cfg = detail::ON);
+    let still = |_| detail::new_transparent().with(|still| still.cfg = detail::ON);
     let images = assert_same_bits("levels of detail", (1, &still), &[2, 3], &[1, 9]);
-    assert!(images[0].bits() != detail::veiled().draw().bits(), "levels are in use");
+    assert!(images[0].bits() != detail::transparent().draw().bits(), "levels are in use");
 }
 
 /// Bands, samples and unselected channels change no bit of the other channels.
 #[test]
 fn channels() {
     // Tall enough for several bands with four samples.
-    let view = look([200, 400], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);
+    let view = look_at_view([200, 400], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);
     let still = |channels, samples| {
         let cfg = RasterCfg { samples, ..RasterCfg::default() };
-        Still { channels, cfg, ..Still::new(figure(), view) }.draw()
+        TestFrame { channels, cfg, ..TestFrame::new(humanoid(), view) }.draw()
     };
     let (all, one) = (still(Channels::ALL, 4), still(Channels::ALL, 1));
     assert!(all.bits_but_color() == one.bits_but_color(), "multisampling is for the colour only");
@@ -115,11 +127,12 @@ fn channels() {
     assert!(still(Channels { depth: true, ..Channels::default() }, 4).depth() == all.depth());
     assert!(still(Channels { color: true, ..Channels::default() }, 4).color() == all.color());
 
-    let still = Still::new(random(&mut Random(9), 1.0), look([90, 70], 1.0, [2.2, 0.4, 0.9], [0.0; 3]));
+    let still =
+        TestFrame::new(random_scene(&mut TestRng(9), 1.0), look_at_view([90, 70], 1.0, [2.2, 0.4, 0.9], [0.0; 3]));
     for renderer in
         RENDERERS.into_iter().chain([Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed: 0 }])
     {
-        let of = |channels| Still { channels, ..still.clone() }.by(renderer);
+        let of = |channels| TestFrame { channels, ..still.clone() }.with_renderer(renderer);
         let all = of(Channels::ALL);
         assert_eq!(of(Channels { albedo: true, mask: true, ..Channels::NONE }).albedo(), all.albedo());
         let without = of(Channels { albedo: false, ..Channels::ALL });
@@ -131,10 +144,10 @@ fn channels() {
 /// Path tracing and the hybrid change no channel but color.
 #[test]
 fn only_color_differs() {
-    let view = look([97, 83], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);
-    for scene in [figure(), random(&mut Random(5), 1.2)] {
-        let still = Still { cfg: EXACT, ..Still::new(scene, view) };
-        let [raster, traced, hybrid, paths] = RENDERERS.map(|renderer| still.by(renderer));
+    let view = look_at_view([97, 83], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);
+    for scene in [humanoid(), random_scene(&mut TestRng(5), 1.2)] {
+        let still = TestFrame { cfg: EXACT, ..TestFrame::new(scene, view) };
+        let [raster, traced, hybrid, paths] = RENDERERS.map(|renderer| still.with_renderer(renderer));
         assert!(traced.bits_but_color() == paths.bits_but_color());
         assert!(raster.bits_but_color() == hybrid.bits_but_color());
         assert!(traced.color() != paths.color() && raster.color() != hybrid.color());
@@ -149,9 +162,9 @@ fn failed_jobs() {
     for (threads, count) in [(1, 3), (2, 3), (4, 3), (2, 5), (2, 9)] {
         let mut frames = vec![still.frame(); count];
         let failed = |k| k == 1 || k == count - 1;
-        let shot = |k| Shot { poses: if failed(k) { &[] } else { &still.poses }, ..still.shot() };
+        let shot = |k| RenderRequest { poses: if failed(k) { &[] } else { &still.poses }, ..still.request() };
         let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(k, frame)| (shot(k), frame.as_mut())).collect();
-        let (index, _) = ParallelRasterizer::new(still.cfg, threads).render(&mut jobs).unwrap_err();
+        let (index, _) = ParallelRenderer::new(still.cfg, threads).render(&mut jobs).unwrap_err();
         assert_eq!(index, 1);
         for (k, frame) in frames.iter().enumerate() {
             let drawn = frame.mask.iter().flatten().any(|&m| m != 0);
@@ -163,6 +176,6 @@ fn failed_jobs() {
 #[test]
 fn thread_safety() {
     fn shared<T: Send + Sync>(_: &T) {}
-    shared(&Rasterizer::default());
-    shared(&ParallelRasterizer::new(EXACT, 2));
+    shared(&ImageRenderer::default());
+    shared(&ParallelRenderer::new(EXACT, 2));
 }

@@ -1,13 +1,13 @@
 //! Small images that were inspected once. `KINETOSCOPE_BLESS=1` rewrites them.
 
-use super::harness::{Image, Still, look};
+use super::harness::{Image, TestFrame, look_at_view};
 use crate::frame::Channels;
 use crate::renderer::Renderer;
 use image::RgbaImage;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Sky};
-use kinetoscope_testkit::scenes::{at, checker_plane, every_shape, figure, matt, things, unlit};
+use kinetoscope_testkit::scenes::{checker_plane, every_shape, humanoid, instances, matte, translation, unlit};
 use std::path::{Path, PathBuf};
 
 fn file(name: &str) -> PathBuf {
@@ -21,7 +21,7 @@ fn color(image: &Image) -> RgbaImage {
 
 /// Compares with a tolerance of two steps of 255 per number. A failure writes expected image, actual image and their
 /// difference.
-fn compare(name: &str, still: &Still) {
+fn compare(name: &str, still: &TestFrame) {
     let (golden, actual) = (file(name), &color(&still.draw()));
     if std::env::var_os("KINETOSCOPE_BLESS").is_some() {
         std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
@@ -48,10 +48,10 @@ fn compare(name: &str, still: &Still) {
 
 #[test]
 fn full_figure() {
-    let (scene, poses) = figure();
-    let still = Still::new((scene, poses), look([96, 96], 0.7, [2.6, 1.6, 1.6], [0.2, 0., 0.8]));
+    let (scene, poses) = humanoid();
+    let still = TestFrame::new((scene, poses), look_at_view([96, 96], 0.7, [2.6, 1.6, 1.6], [0.2, 0., 0.8]));
     compare("figure", &still);
-    let large = still.from(look([640, 480], 0.8, [2.6, -1.6, 1.6], [0.2, 0., 0.8]));
+    let large = still.draw_view(look_at_view([640, 480], 0.8, [2.6, -1.6, 1.6], [0.2, 0., 0.8]));
     let mut ids = (1..still.scene.instances().len() as i32).chain([100, 0]);
     assert!(ids.all(|id| large.mask().contains(&id)), "everything is seen, ground and sky too");
 }
@@ -59,21 +59,21 @@ fn full_figure() {
 #[test]
 fn shapes() {
     let mut instances = vec![checker_plane()];
-    let mut poses = vec![at(0., 0., -0.4)];
+    let mut poses = vec![translation(0., 0., -0.4)];
     for (k, shape) in every_shape().into_iter().enumerate() {
         let [r, g, b] = [[0.9, 0.3, 0.2], [0.2, 0.6, 0.9], [0.9, 0.8, 0.2], [0.4, 0.8, 0.3]][k % 4];
         let material = Material::from_rgba([r, g, b, if k == 4 { 0.5 } else { 1.0 }]);
         instances.push(Instance::new(shape, material, k as i32 + 1));
-        poses.push(at(0.9 * (k / 4) as f32 - 0.4, 0.9 * (k % 4) as f32 - 1.3, 0.0));
+        poses.push(translation(0.9 * (k / 4) as f32 - 0.4, 0.9 * (k % 4) as f32 - 1.3, 0.0));
     }
     let scene = (RenderScene::new(instances).unwrap(), poses);
-    compare("every_shape", &Still::new(scene, look([128, 72], 0.6, [3.5, 0.5, 3.0], [0.1, 0.05, 0.])));
+    compare("every_shape", &TestFrame::new(scene, look_at_view([128, 72], 0.6, [3.5, 0.5, 3.0], [0.1, 0.05, 0.])));
 }
 
 /// A Cornell box: white, a red and a green wall, two blocks, and a light in the ceiling as the only light.
-fn cornell_box() -> Still {
-    let (white, red, green) = (matt([0.87, 0.87, 0.85]), matt([0.8, 0.2, 0.15]), matt([0.3, 0.7, 0.25]));
-    let light = Material { emission: 12.0, ..matt([1.0, 0.93, 0.8]) };
+fn cornell_box() -> TestFrame {
+    let (white, red, green) = (matte([0.87, 0.87, 0.85]), matte([0.8, 0.2, 0.15]), matte([0.3, 0.7, 0.25]));
+    let light = Material { emission: 12.0, ..matte([1.0, 0.93, 0.8]) };
     let wall = |half: f32| Shape::from(Plane { half: [half; 2] });
     let block = |height| Shape::from(Box { half: [0.3, 0.3, height] });
     // The columns are the axes of a plane: its normal faces inward.
@@ -83,7 +83,7 @@ fn cornell_box() -> Still {
         let (sin, cos) = angle.sin_cos();
         facing([[cos, -sin, 0.], [sin, cos, 0.], [0., 0., 1.]], at)
     };
-    let (scene, poses) = things([
+    let (scene, poses) = instances([
         (wall(1.0), white.clone(), facing(up, [0., 0., 0.])),
         (wall(1.0), white.clone(), facing(down, [0., 0., 2.])),
         (wall(1.0), white.clone(), facing([[1., 0., 0.], [0., 0., -1.], [0., 1., 0.]], [0., 1., 1.])),
@@ -96,7 +96,7 @@ fn cornell_box() -> Still {
     let mut scene = unlit(scene);
     scene.sky = Sky::uniform([0.0; 3]);
     let channels = Channels { color: true, ..Channels::default() };
-    Still { channels, ..Still::new((scene, poses), look([64; 2], 0.6, [0., -4.2, 1.], [0., 0., 1.])) }
+    TestFrame { channels, ..TestFrame::new((scene, poses), look_at_view([64; 2], 0.6, [0., -4.2, 1.], [0., 0., 1.])) }
 }
 
 /// The golden image is converged. The mean of an image with few paths equals it, within a noise that two seeds show.
@@ -106,7 +106,7 @@ fn room_of_cornell() {
     const BLOCK: usize = 8;
     let still = cornell_box();
     let draw = |samples, max_bounces, seed| {
-        color(&still.by(Renderer::RayTraced { samples, max_bounces, denoise: false, seed }))
+        color(&still.with_renderer(Renderer::RayTraced { samples, max_bounces, denoise: false, seed }))
     };
     let golden = file("cornell_box");
     if std::env::var_os("KINETOSCOPE_BLESS").is_some() {

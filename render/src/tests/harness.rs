@@ -3,13 +3,13 @@
 use crate::aperture::Aperture;
 use crate::frame::{Channels, Frame};
 use crate::lens::LensRays;
-use crate::parallel::ParallelRasterizer;
-use crate::rasterizer::Rasterizer;
+use crate::parallel::ParallelRenderer;
+use crate::rasterizer::ImageRenderer;
 use crate::renderer::Renderer;
-use crate::request::{Before, RasterCfg, Shot};
+use crate::request::{PreviousState, RasterCfg, RenderRequest};
 use crate::shade::tone::ToneCurve;
-use crate::shutter::{Opened, Shutter, Take};
-use crate::simd::{Level, levels};
+use crate::shutter::{FrameSample, Shutter, ShutterOpenState};
+use crate::simd::{SimdLevel, all_levels};
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::{Pose, PoseF32, RenderScene};
 use kinetoscope_testkit::image_check::ImageCheck;
@@ -29,7 +29,7 @@ pub(super) const EXACT: RasterCfg = RasterCfg {
 
 /// All inputs of an image.
 #[derive(Clone, Debug)]
-pub(super) struct Still {
+pub(super) struct TestFrame {
     pub(super) scene: RenderScene,
     pub(super) poses: Vec<PoseF32>,
     pub(super) view: View,
@@ -39,14 +39,14 @@ pub(super) struct Still {
     pub(super) stops: f64,
     pub(super) lens: Option<LensRays>,
     /// Poses and view of the previous frame, for flow.
-    pub(super) before: Option<(Vec<PoseF32>, View)>,
+    pub(super) previous: Option<(Vec<PoseF32>, View)>,
     pub(super) aperture: Option<Aperture>,
     pub(super) shutter: Shutter,
     /// Poses of instances and camera at shutter opening, and the time since then \[s\].
-    pub(super) opened: Option<(Vec<PoseF32>, PoseF32, f64)>,
+    pub(super) shutter_open: Option<(Vec<PoseF32>, PoseF32, f64)>,
 }
 
-impl Still {
+impl TestFrame {
     /// All channels by the rasterizer with default settings.
     pub(super) fn new((scene, poses): (RenderScene, Vec<PoseF32>), view: View) -> Self {
         Self {
@@ -58,24 +58,24 @@ impl Still {
             renderer: Renderer::Raster,
             stops: 0.0,
             lens: None,
-            before: None,
+            previous: None,
             aperture: None,
             shutter: Shutter::default(),
-            opened: None,
+            shutter_open: None,
         }
     }
 
-    pub(super) fn shot(&self) -> Shot<'_> {
-        let before = self.before.as_ref().map(|(poses, view)| Before { poses, view });
+    pub(super) fn request(&self) -> RenderRequest<'_> {
+        let before = self.previous.as_ref().map(|(poses, view)| PreviousState { poses, view });
         let Self { scene, poses, view, .. } = self;
-        Shot { scene, poses, view, lights: None, lens: self.lens.as_ref(), before }
+        RenderRequest { scene, poses, view, lights: None, lens: self.lens.as_ref(), previous: before }
     }
 
-    pub(super) fn take(&self) -> Take<'_> {
-        let opened = self.opened.as_ref();
+    pub(super) fn sample(&self) -> FrameSample<'_> {
+        let opened = self.shutter_open.as_ref();
         let opened =
-            opened.map(|(poses, camera, before)| Opened { poses, world_from_camera: *camera, before: *before });
-        Take { noise: 0, opened }
+            opened.map(|(poses, camera, before)| ShutterOpenState { poses, world_from_camera: *camera, age: *before });
+        FrameSample { noise: 0, shutter_open: opened }
     }
 
     pub(super) fn frame(&self) -> Frame {
@@ -83,27 +83,27 @@ impl Still {
     }
 
     /// The image rendered with an instruction set.
-    pub(super) fn draw_on(&self, level: Level) -> Result<Image, RenderError> {
+    pub(super) fn draw_on(&self, level: SimdLevel) -> Result<Image, RenderError> {
         self.draw_by(&mut self.rasterizer(level))
     }
 
     /// A rasterizer with the settings of the still.
-    pub(super) fn rasterizer(&self, level: Level) -> Rasterizer {
-        let mut rasterizer = Rasterizer::with_level(self.cfg, level);
-        (rasterizer.renderer, rasterizer.stops) = (self.renderer, self.stops);
+    pub(super) fn rasterizer(&self, level: SimdLevel) -> ImageRenderer {
+        let mut rasterizer = ImageRenderer::with_level(self.cfg, level);
+        (rasterizer.renderer, rasterizer.exposure_compensation) = (self.renderer, self.stops);
         (rasterizer.aperture, rasterizer.shutter) = (self.aperture, self.shutter);
         rasterizer
     }
 
     /// The image rendered by a rasterizer with these settings, which keeps the BVHs of meshes.
-    pub(super) fn draw_by(&self, rasterizer: &mut Rasterizer) -> Result<Image, RenderError> {
+    pub(super) fn draw_by(&self, rasterizer: &mut ImageRenderer) -> Result<Image, RenderError> {
         let mut frame = self.frame();
-        rasterizer.render_take(&self.shot(), &self.take(), &mut frame.as_mut())?;
+        rasterizer.render_sample(&self.request(), &self.sample(), &mut frame.as_mut())?;
         Ok(Image { frame, width: self.view.width })
     }
 
     pub(super) fn try_draw(&self) -> Result<Image, RenderError> {
-        self.draw_on(Level::best())
+        self.draw_on(SimdLevel::best())
     }
 
     #[track_caller]
@@ -113,13 +113,13 @@ impl Still {
 
     /// The image by another renderer.
     #[track_caller]
-    pub(super) fn by(&self, renderer: Renderer) -> Image {
+    pub(super) fn with_renderer(&self, renderer: Renderer) -> Image {
         self.with(|still| still.renderer = renderer).draw()
     }
 
     /// The image from another view.
     #[track_caller]
-    pub(super) fn from(&self, view: View) -> Image {
+    pub(super) fn draw_view(&self, view: View) -> Image {
         self.with(|still| still.view = view).draw()
     }
 
@@ -135,13 +135,13 @@ impl Still {
 /// assets of meshes concurrently. Returns an image of each kind.
 pub(super) fn assert_same_bits(
     what: &str,
-    (kinds, make): (usize, &dyn Fn(usize) -> Still),
+    (kinds, make): (usize, &dyn Fn(usize) -> TestFrame),
     threads: &[usize],
     batches: &[usize],
 ) -> Vec<Image> {
     // The best level is that of the images.
-    let best = format!("{:?}", Level::best());
-    let others: Vec<Level> = levels().into_iter().filter(|level| format!("{level:?}") != best).collect();
+    let best = format!("{:?}", SimdLevel::best());
+    let others: Vec<SimdLevel> = all_levels().into_iter().filter(|level| format!("{level:?}") != best).collect();
     let image = |k| {
         let still = make(k);
         let image = still.draw();
@@ -152,17 +152,17 @@ pub(super) fn assert_same_bits(
     };
     let images: Vec<Image> = (0..kinds).map(image).collect();
     for (&threads, &count) in threads.iter().flat_map(|threads| batches.iter().map(move |count| (threads, count))) {
-        let made: Vec<Still> = (0..kinds.min(count)).map(make).collect();
-        let stills: Vec<&Still> = made.iter().cycle().take(count).collect();
-        let Still { cfg, renderer, aperture, shutter, .. } = *stills[0];
-        let mut parallel = ParallelRasterizer::new(cfg, threads);
+        let made: Vec<TestFrame> = (0..kinds.min(count)).map(make).collect();
+        let stills: Vec<&TestFrame> = made.iter().cycle().take(count).collect();
+        let TestFrame { cfg, renderer, aperture, shutter, .. } = *stills[0];
+        let mut parallel = ParallelRenderer::new(cfg, threads);
         parallel.set_renderer(renderer);
-        parallel.set_light(aperture, shutter);
+        parallel.set_exposure_optics(aperture, shutter);
         let mut frames: Vec<Frame> = stills.iter().map(|still| still.frame()).collect();
         let mut jobs: Vec<_> =
-            stills.iter().map(|still| still.shot()).zip(frames.iter_mut().map(Frame::as_mut)).collect();
-        let takes: Vec<Take<'_>> = stills.iter().map(|still| still.take()).collect();
-        parallel.render_takes(&mut jobs, &takes).unwrap();
+            stills.iter().map(|still| still.request()).zip(frames.iter_mut().map(Frame::as_mut)).collect();
+        let takes: Vec<FrameSample<'_>> = stills.iter().map(|still| still.sample()).collect();
+        parallel.render_samples(&mut jobs, &takes).unwrap();
         for (k, frame) in frames.into_iter().enumerate() {
             let image = Image { width: stills[k].view.width, frame };
             assert!(image.same_bits(&images[k % kinds]), "{what}: still {k} of {count}, {threads} threads");
@@ -269,38 +269,38 @@ impl Image {
     }
 
     /// An inner pixel and its eight neighbors.
-    pub(super) fn around(&self, k: usize) -> impl Iterator<Item = usize> + Clone + use<> {
+    pub(super) fn neighbors(&self, k: usize) -> impl Iterator<Item = usize> + Clone + use<> {
         let width = self.width;
         (0..9).map(move |n| k + (n / 3) * width + n % 3 - width - 1)
     }
 
     /// True if an inner pixel and its neighbors show the same instance.
-    pub(super) fn alone(&self, k: usize) -> bool {
-        self.around(k).all(|n| self.mask()[n] == self.mask()[k])
+    pub(super) fn is_inside_instance(&self, k: usize) -> bool {
+        self.neighbors(k).all(|n| self.mask()[n] == self.mask()[k])
     }
 
     /// True if an inner pixel is off silhouettes: all neighbors show the same instance, at a depth within a tenth.
-    pub(super) fn whole(&self, k: usize) -> bool {
+    pub(super) fn is_off_silhouette(&self, k: usize) -> bool {
         let depth = self.depth();
         let near = |n: usize| depth[n] == depth[k] || (depth[n] - depth[k]).abs() <= 0.1 * depth[k].abs();
-        self.alone(k) && self.around(k).all(near)
+        self.is_inside_instance(k) && self.neighbors(k).all(near)
     }
 }
 
 /// Number of pixels that differ by more than `bytes` in any color.
-pub(super) fn far_apart(a: &Image, b: &Image, bytes: u8) -> usize {
+pub(super) fn count_different(a: &Image, b: &Image, bytes: u8) -> usize {
     let differ = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|c| a[c].abs_diff(b[c]) > bytes);
     a.color().iter().zip(b.color()).filter(differ).count()
 }
 
 /// A camera at `eye` that looks at `target`, z up.
 #[track_caller]
-pub(super) fn look(size: [usize; 2], fovy: f32, eye: [f32; 3], target: [f32; 3]) -> View {
+pub(super) fn look_at_view(size: [usize; 2], fovy: f32, eye: [f32; 3], target: [f32; 3]) -> View {
     View::look_at(size, fovy, eye, target, [0.0, 0.0, 1.0]).unwrap()
 }
 
 /// A pose in double precision.
-pub(super) fn wide(pose: &PoseF32) -> Pose {
+pub(super) fn to_f64_pose(pose: &PoseF32) -> Pose {
     let r = pose.rotation.map(|row| row.map(f64::from));
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, j| r[i][j]));
     let translation = Vector3::from(pose.translation.map(f64::from));

@@ -1,18 +1,18 @@
 //! Images through lenses, compared with closed forms, and with pinhole images of the same rays.
 
-use super::harness::{Still, far_apart, look};
-use super::lenses::{FISHEYE, WARPED, all, bent, rays_of};
+use super::harness::{TestFrame, count_different, look_at_view};
+use super::lenses::{FISHEYE, WARPED, all, distorting, rays_of};
 use super::traced::{Comparison, compare};
 use crate::intrinsics::PixelIntrinsics;
 use crate::lens::{Equidistant, LensRays, OpenCv};
 use crate::raster::tile::SAMPLES;
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
-use crate::simd::Level;
+use crate::simd::SimdLevel;
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Material, PoseF32, Sky};
-use kinetoscope_testkit::scenes::{Random, at, figure, matt, random, things, unlit};
+use kinetoscope_testkit::scenes::{TestRng, humanoid, instances, matte, random_scene, translation, unlit};
 use nalgebra::Vector3;
 
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: false, seed: 3 };
@@ -20,9 +20,9 @@ const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, de
 const SIZE: [usize; 2] = [64, 48];
 
 /// The full figure through a lens.
-fn figure_through(rays: &LensRays) -> Still {
-    let view = look(SIZE, 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
-    Still { lens: Some(rays.clone()), ..Still::new(figure(), view) }
+fn figure_through(rays: &LensRays) -> TestFrame {
+    let view = look_at_view(SIZE, 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
+    TestFrame { lens: Some(rays.clone()), ..TestFrame::new(humanoid(), view) }
 }
 
 /// A pixel equals an image of one pixel of a pinhole camera along its ray: for meshes, boxes and all other shapes.
@@ -30,11 +30,11 @@ fn figure_through(rays: &LensRays) -> Still {
 fn single_pixels() {
     let (mut compared, mut different, mut seen) = (0, 0, 0);
     for (k, (lens, pixels)) in all().into_iter().enumerate() {
-        let scene = if k % 2 == 0 { figure() } else { random(&mut Random(k as u64), 1.5) };
+        let scene = if k % 2 == 0 { humanoid() } else { random_scene(&mut TestRng(k as u64), 1.5) };
         let rays = rays_of(lens, pixels, SIZE);
-        let still = Still::new(scene, look(SIZE, 0.9, [1.3, -0.8, 0.9], [0.1, 0., 0.4]));
-        let mut still = Still { renderer: Renderer::FastRayTraced, lens: Some(rays.clone()), ..still };
-        let mut rasterizer = still.rasterizer(Level::best());
+        let still = TestFrame::new(scene, look_at_view(SIZE, 0.9, [1.3, -0.8, 0.9], [0.1, 0., 0.4]));
+        let mut still = TestFrame { renderer: Renderer::FastRayTraced, lens: Some(rays.clone()), ..still };
+        let mut rasterizer = still.rasterizer(SimdLevel::best());
         let image = still.draw_by(&mut rasterizer).unwrap();
         let view = still.view;
         let camera = view.world_from_camera;
@@ -49,7 +49,7 @@ fn single_pixels() {
             let rotation = [0, 1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
             let world_from_camera = PoseF32 { rotation, ..camera };
             let one = View { width: 1, height: 1, fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, world_from_camera, ..view };
-            let alone = Still { view: one, ..still.clone() }.draw_by(&mut rasterizer).unwrap();
+            let alone = TestFrame { view: one, ..still.clone() }.draw_by(&mut rasterizer).unwrap();
             let (a, b) = (image.distance()[at], alone.depth()[0]);
             let cosine = Vector3::from(image.normal()[at]).dot(&Vector3::from(alone.normal()[0]));
             // Forward lenses measure near and far along their axis: no surface here is near either.
@@ -68,17 +68,20 @@ fn lens_without_distortion() {
     // Rays from a table give the same image as a pinhole, away from silhouettes.
     let (mut compared, mut different) = (0, 0);
     for seed in 0..6 {
-        let view = View { cx: 44.25, fy: 80.5, ..look([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3]) };
+        let view = View { cx: 44.25, fy: 80.5, ..look_at_view([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3]) };
         let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
         let rays = rays_of(OpenCv::default().into(), PixelIntrinsics { fx, fy, cx, cy }, [101, 75]);
-        let still = Still::new(random(&mut Random(seed), 1.2), view);
+        let still = TestFrame::new(random_scene(&mut TestRng(seed), 1.2), view);
         for renderer in [Renderer::FastRayTraced, Renderer::Hybrid] {
             // Shadow maps cover the view of a pinhole, and the whole scene with a lens: the edges of shadows differ.
             let still = still.with(|still| still.cfg.shadows = renderer == Renderer::Hybrid);
-            let (a, b) = (still.by(renderer), Still { lens: Some(rays.clone()), ..still.clone() }.by(renderer));
+            let (a, b) = (
+                still.with_renderer(renderer),
+                TestFrame { lens: Some(rays.clone()), ..still.clone() }.with_renderer(renderer),
+            );
             let Comparison { compared: all, different: other, .. } = compare(&a, &b);
             (compared, different) = (compared + all, different + other);
-            let differ = far_apart(&a, &b, 3);
+            let differ = count_different(&a, &b, 3);
             assert!(differ * 100 < 101 * 75, "{differ} pixels look different by {renderer:?}");
         }
     }
@@ -96,13 +99,13 @@ fn sample_rays() {
         assert_eq!(rays.direction(k, [31, 17]), expected);
     }
     // A white ball in front of a black sky: the brightness of a pixel is the number of samples that hit the ball.
-    let white = Material { emission: 1.0, ..matt([1.0; 3]) };
-    let (scene, poses) = things([(Sphere { radius: 0.4 }, white, PoseF32::IDENTITY)]);
+    let white = Material { emission: 1.0, ..matte([1.0; 3]) };
+    let (scene, poses) = instances([(Sphere { radius: 0.4 }, white, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
     scene.sky = Sky::uniform([0.0; 3]);
-    let view = look(SIZE, 0.9, [1.0, 0.2, 0.3], [0.0; 3]);
-    let still = Still { lens: Some(rays.clone()), ..Still::new((scene, poses), view) };
-    let image = still.by(Renderer::FastRayTraced);
+    let view = look_at_view(SIZE, 0.9, [1.0, 0.2, 0.3], [0.0; 3]);
+    let still = TestFrame { lens: Some(rays.clone()), ..TestFrame::new((scene, poses), view) };
+    let image = still.with_renderer(Renderer::FastRayTraced);
     let shades: std::collections::BTreeSet<u8> = image.color().iter().map(|c| c[0]).collect();
     assert_eq!(shades.len(), 5, "{shades:?}");
     let eye = Vector3::from(view.world_from_camera.translation.map(f64::from));
@@ -130,14 +133,15 @@ fn paths() {
     let pixels = PixelIntrinsics { fx: 16.0, fy: 16.0, cx: 32.0, cy: 24.0 };
     let rays = rays_of(Equidistant { max_angle: 1.2 }.into(), pixels, SIZE);
     let still = figure_through(&rays);
-    let [fast, paths] = [Renderer::FastRayTraced, FEW_PATHS].map(|renderer| still.by(renderer));
+    let [fast, paths] = [Renderer::FastRayTraced, FEW_PATHS].map(|renderer| still.with_renderer(renderer));
     assert!(fast.bits_but_color() == paths.bits_but_color() && fast.color() != paths.color());
-    let (mut scene, poses) = things([(Plane { half: [1e-3; 2] }, Material::default(), at(0.0, 0.0, -50.0))]);
+    let (mut scene, poses) =
+        instances([(Plane { half: [1e-3; 2] }, Material::default(), translation(0.0, 0.0, -50.0))]);
     scene.sky = Sky::uniform([0.25, 0.5, 0.75]);
-    let empty = Still { scene, poses, ..still };
-    let plain = Still { lens: None, ..empty.clone() }.by(FEW_PATHS).color()[0];
+    let empty = TestFrame { scene, poses, ..still };
+    let plain = TestFrame { lens: None, ..empty.clone() }.with_renderer(FEW_PATHS).color()[0];
     for renderer in [Renderer::FastRayTraced, FEW_PATHS] {
-        for (k, color) in empty.by(renderer).color().iter().enumerate() {
+        for (k, color) in empty.with_renderer(renderer).color().iter().enumerate() {
             let at = [(k % SIZE[0]) as f64 + 0.5 - 32.0, (k / SIZE[0]) as f64 + 0.5 - 24.0];
             let radius = at[0].hypot(at[1]) / 16.0;
             // A pixel's corners are 0.71 pixels from its center.
@@ -154,12 +158,12 @@ fn paths() {
 fn hybrid() {
     const BESIDE: usize = 2;
     let mut all_shadowed = 0;
-    for (lens, rays) in bent() {
+    for (lens, rays) in distorting() {
         let still = figure_through(&rays);
-        let [fast, hybrid] = [Renderer::FastRayTraced, Renderer::Hybrid].map(|renderer| still.by(renderer));
+        let [fast, hybrid] = [Renderer::FastRayTraced, Renderer::Hybrid].map(|renderer| still.with_renderer(renderer));
         assert!(fast.bits_but_color() == hybrid.bits_but_color(), "{}", lens.name());
         let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };
-        let lit = Still { cfg, ..still }.by(Renderer::Hybrid);
+        let lit = TestFrame { cfg, ..still }.with_renderer(Renderer::Hybrid);
         let shadow = |k: usize| hybrid.color()[k] != lit.color()[k];
         let kind = |k: usize| (hybrid.mask()[k], shadow(k));
         let (mut judged, mut shadowed, mut other) = (0, 0, 0);
@@ -186,7 +190,7 @@ fn hybrid() {
 /// The rasterizer draws straight lines only; other renderers reject rays of another image size, or with too few
 /// samples.
 #[test]
-fn refused_rays() {
+fn invalid_rays() {
     let pixels = PixelIntrinsics { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0 };
     let expected = RenderError::LensRenderer { lens: "opencv", renderer: "raster" };
     let rays = rays_of(WARPED.into(), pixels, SIZE);
@@ -194,7 +198,7 @@ fn refused_rays() {
     for renderer in [Renderer::FastRayTraced, Renderer::Hybrid] {
         for (found, found_samples) in [(SIZE, 1), ([32, 48], 4)] {
             let other = LensRays::new(rays.optics(), found, found_samples).unwrap();
-            let error = Still { renderer, ..figure_through(&other) }.try_draw().unwrap_err();
+            let error = TestFrame { renderer, ..figure_through(&other) }.try_draw().unwrap_err();
             assert_eq!(error, RenderError::LensRays { expected: SIZE, samples: 4, found, found_samples });
         }
     }

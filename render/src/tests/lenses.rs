@@ -57,7 +57,7 @@ pub(super) fn rays_of(lens: Lens, pixels: PixelIntrinsics, size: [usize; 2]) -> 
 }
 
 /// Lenses of [`all`] other than the pinhole.
-pub(super) fn bent() -> impl Iterator<Item = (Lens, LensRays)> {
+pub(super) fn distorting() -> impl Iterator<Item = (Lens, LensRays)> {
     all()
         .into_iter()
         .filter(|(lens, _)| !lens.is_pinhole())
@@ -210,7 +210,7 @@ fn folds() {
 }
 
 #[test]
-fn refusals() {
+fn invalid_lenses() {
     let mut rows: Vec<(Lens, &str)> = vec![
         (OpenCv { k5: f64::NAN, ..OpenCv::default() }.into(), "k5"),
         (OpenCvFisheye { k2: f64::INFINITY, ..OpenCvFisheye::default() }.into(), "k2"),
@@ -244,5 +244,5 @@ fn refusals() {
     // The whole image is dark: the circle is far outside of it.
     let beside = Intrinsics::Pixels { fx: 1.0, fy: 1.0, cx: -50.0, cy: 0.0 }.to_pixels(8, 8).unwrap();
     let optics = Optics::new(Orthographic::default().into(), beside).unwrap();
-    assert_eq!(LensRays::new(&optics, [8, 8], 1), Err(OpticsError::LensBlind { lens: "orthographic" }));
+    assert_eq!(LensRays::new(&optics, [8, 8], 1), Err(OpticsError::NoVisiblePixel { lens: "orthographic" }));
 }

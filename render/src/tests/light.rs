@@ -1,13 +1,13 @@
 //! Shadows, ambient occlusion, metals, emission and tone curves, compared with closed forms.
 
-use super::harness::{EXACT, Image, Still, look};
+use super::harness::{EXACT, Image, TestFrame, look_at_view};
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::shade::tone::ToneCurve;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
-use kinetoscope_scene::{Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Sky};
-use kinetoscope_testkit::scenes::{at, matt, things, unlit};
+use kinetoscope_scene::{Headlight, Hemisphere, Light, LightKind, LightingSpace, Material, PoseF32, RenderScene, Sky};
+use kinetoscope_testkit::scenes::{instances, matte, translation, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
 use nalgebra::Vector3;
 
@@ -15,13 +15,15 @@ use nalgebra::Vector3;
 const GRAY: f32 = 0.7;
 
 /// A gray floor, and a gray box of these half sizes, by the hybrid.
-fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: crate::visibility::View) -> Still {
-    let gray = matt([GRAY; 3]);
-    let (mut scene, poses) =
-        things([(Shape::from(Plane::INFINITE), gray.clone(), PoseF32::IDENTITY), (Box { half }.into(), gray, place)]);
+fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: crate::visibility::View) -> TestFrame {
+    let gray = matte([GRAY; 3]);
+    let (mut scene, poses) = instances([
+        (Shape::from(Plane::INFINITE), gray.clone(), PoseF32::IDENTITY),
+        (Box { half }.into(), gray, place),
+    ]);
     scene.headlight.active = false;
     scene.ambient = Hemisphere { sky: [ambient; 3], ground: [ambient; 3] };
-    Still { cfg: EXACT, renderer: Renderer::Hybrid, ..Still::new((scene, poses), view) }
+    TestFrame { cfg: EXACT, renderer: Renderer::Hybrid, ..TestFrame::new((scene, poses), view) }
 }
 
 /// The byte of a gray floor in this light, below the bend of the tone curve.
@@ -36,8 +38,8 @@ const ROUNDING: f64 = 0.8;
 #[test]
 fn hybrid_shadows() {
     // From -2 to 0 along x, 0.9 to 1.1 high.
-    let view = look([201, 201], 0.9, [2.2, -0.3, 0.8], [1.0, 0., 0.]);
-    let mut still = floor_and_box([1.0, 2.0, 0.1], at(-1.0, 0.0, 1.0), 0.1, view);
+    let view = look_at_view([201, 201], 0.9, [2.2, -0.3, 0.8], [1.0, 0., 0.]);
+    let mut still = floor_and_box([1.0, 2.0, 0.1], translation(-1.0, 0.0, 1.0), 0.1, view);
     let light = Light { diffuse: [0.7; 3], attenuation: [1., 0., 0.], ..Light::default() };
     let slanted = Light { direction: [1., 0., -1.], ..light };
     let near = Light { kind: LightKind::Point, position: [-1.0, 0.0, 2.3], ..light };
@@ -71,8 +73,8 @@ fn hybrid_shadows() {
 /// Root cause: rays went as far as the light, so the last bit decided whether the ceiling occluded it.
 #[test]
 fn ceiling_light() {
-    let view = look([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
-    let mut still = floor_and_box([3.0, 3.0, 0.5], at(0.0, 0.0, 2.5), 0.0, view);
+    let view = look_at_view([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
+    let mut still = floor_and_box([3.0, 3.0, 0.5], translation(0.0, 0.0, 2.5), 0.0, view);
     let mut wrong = |height: f32| {
         let kind = LightKind::Point;
         let light = Light { kind, position: [0.1, 0.0, height], diffuse: [0.7; 3], ..Light::default() };
@@ -93,8 +95,8 @@ fn ceiling_light() {
 /// A point light at the distance d is attenuated by 1 / (c + l d + q d²).
 #[test]
 fn attenuation() {
-    let view = look([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
-    let mut still = floor_and_box([0.1; 3], at(9.0, 0.0, 0.0), 0.0, view);
+    let view = look_at_view([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
+    let mut still = floor_and_box([0.1; 3], translation(9.0, 0.0, 0.0), 0.0, view);
     for attenuation in [[1.0, 0.0, 0.0], [0.5, 0.3, 0.0], [0.5, 0.0, 0.2], [0.4, 0.1, 0.15]] {
         let light = Light { kind: LightKind::Point, position: [0.1, 0.0, 2.0], diffuse: [0.7; 3], ..Light::default() };
         still.scene.lights = vec![Light { attenuation, ..light }];
@@ -115,8 +117,8 @@ fn attenuation() {
 #[test]
 fn ambient_occlusion() {
     // From x = 0 on, 1 m high.
-    let view = look([48, 16], 0.4, [-1.0, -3.0, 2.5], [-0.8, 0.0, 0.0]);
-    let mut still = floor_and_box([0.5, 300.0, 0.5], at(0.5, 0.0, 0.5), 0.6, view);
+    let view = look_at_view([48, 16], 0.4, [-1.0, -3.0, 2.5], [-0.8, 0.0, 0.0]);
+    let mut still = floor_and_box([0.5, 300.0, 0.5], translation(0.5, 0.0, 0.5), 0.6, view);
     still.scene.lights.clear();
     still.scene.ambient.ground = [0.2; 3];
     let of = |occlusion_rays| still.with(|still| still.cfg.occlusion_rays = occlusion_rays).draw();
@@ -158,14 +160,15 @@ fn shadow_maps() {
     ];
     for (case, kind) in (0..cases.len()).flat_map(|case| [(case, spot), (case, LightKind::Directional)]) {
         let gray = Material::default;
-        let ball = |[x, y, z]: &[f32; 3]| (Shape::from(Sphere { radius: RADIUS }), gray(), at(*x, *y, *z));
+        let ball = |[x, y, z]: &[f32; 3]| (Shape::from(Sphere { radius: RADIUS }), gray(), translation(*x, *y, *z));
         let ground = (Shape::from(Plane::INFINITE), gray(), PoseF32::IDENTITY);
-        let (mut scene, poses) = things([ground].into_iter().chain(cases[case].iter().map(ball)));
+        let (mut scene, poses) = instances([ground].into_iter().chain(cases[case].iter().map(ball)));
         let direction = if kind == spot { [0.0, 0.0, -1.0] } else { [0.3, 0.2, -1.0] };
         scene.lights = vec![Light { kind, position, direction, ..Light::default() }];
         scene.headlight.active = false;
-        let view = look([320, 240], 1.1, [3.5, -2.5, 4.0], [0.; 3]);
-        let still = Still { cfg: RasterCfg { samples: 1, ..RasterCfg::default() }, ..Still::new((scene, poses), view) };
+        let view = look_at_view([320, 240], 1.1, [3.5, -2.5, 4.0], [0.; 3]);
+        let still =
+            TestFrame { cfg: RasterCfg { samples: 1, ..RasterCfg::default() }, ..TestFrame::new((scene, poses), view) };
         let (image, bright) = (still.draw(), still.with(|still| still.cfg.shadows = false).draw());
         let (mut dark, mut lit) = (0, 0);
         for (k, &p) in image.position().iter().enumerate().filter(|(k, _)| image.mask()[*k] == 1) {
@@ -192,18 +195,18 @@ fn shadow_maps() {
 
 /// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, with the default light of a simulation, from a
 /// camera above.
-fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
-    let gray = || matt([GRAY; 3]);
+fn tabletop(ground: f32, view: crate::visibility::View) -> TestFrame {
+    let gray = || matte([GRAY; 3]);
     let cuboid = |half: [f32; 3], pose| (Shape::from(Box { half }), gray(), pose);
     // The cube sinks in by the depth of a contact.
-    let (mut scene, poses) = things([
+    let (mut scene, poses) = instances([
         (Plane { half: [ground; 2] }.into(), gray(), PoseF32::IDENTITY),
-        cuboid([0.025; 3], at(1.0, -0.2, 0.0249)),
-        cuboid([0.08, 0.08, 0.5], at(0.0, 0.0, 0.5)),
-        cuboid([0.4, 0.05, 0.05], at(0.4, 0.0, 0.9)),
+        cuboid([0.025; 3], translation(1.0, -0.2, 0.0249)),
+        cuboid([0.08, 0.08, 0.5], translation(0.0, 0.0, 0.5)),
+        cuboid([0.4, 0.05, 0.05], translation(0.4, 0.0, 0.9)),
     ]);
     scene.lights = vec![Light { direction: [-0.3, 0.4, -1.0], ..Light::default() }];
-    Still::new((scene, poses), view)
+    TestFrame::new((scene, poses), view)
 }
 
 /// Shadow maps compared with shadow rays, on a ground of 100 m as on one of 6 m, near and far, and below a spot.
@@ -213,10 +216,10 @@ fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
 #[test]
 fn shadows_on_wide_ground() {
     let views = [
-        ("above", look([320, 240], 0.3, [1.2, -0.2, 0.8], [1.05, -0.2, 0.0])),
-        ("slanted", look([320, 240], 0.8, [2.2, -1.6, 1.2], [0.6, -0.1, 0.3])),
-        ("close", look([320, 240], 0.5, [0.85, 0.05, 0.25], [0.99, -0.18, 0.0])),
-        ("horizon", look([320, 240], 0.9, [1.8, -1.5, 0.6], [0.5, 0.3, 0.6])),
+        ("above", look_at_view([320, 240], 0.3, [1.2, -0.2, 0.8], [1.05, -0.2, 0.0])),
+        ("slanted", look_at_view([320, 240], 0.8, [2.2, -1.6, 1.2], [0.6, -0.1, 0.3])),
+        ("close", look_at_view([320, 240], 0.5, [0.85, 0.05, 0.25], [0.99, -0.18, 0.0])),
+        ("horizon", look_at_view([320, 240], 0.9, [1.8, -1.5, 0.6], [0.5, 0.3, 0.6])),
     ];
     let spot = LightKind::Spot { cutoff_deg: 60.0, exponent: 0.0 };
     for ((name, view), kind) in views.into_iter().flat_map(|view| [(view, LightKind::Directional), (view, spot)]) {
@@ -226,10 +229,11 @@ fn shadows_on_wide_ground() {
         };
         let (wide, small) = (lit(50.0), lit(3.0));
         let [image, other] = [wide.draw(), small.draw()];
-        let rays = wide.by(Renderer::Hybrid);
+        let rays = wide.with_renderer(Renderer::Hybrid);
         let bright = wide.with(|still| still.cfg.shadows = false).draw();
         // Ground pixels whose neighbors are ground pixels too: elsewhere the coverage differs.
-        let ground: Vec<usize> = image.inner().filter(|k| image.mask()[*k] == 1 && image.alone(*k)).collect();
+        let ground: Vec<usize> =
+            image.inner().filter(|k| image.mask()[*k] == 1 && image.is_inside_instance(*k)).collect();
         let dark = |image: &Image, k: usize| i32::from(image.color()[k][0]) + 20 < i32::from(bright.color()[k][0]);
         let count = |f: &dyn Fn(usize) -> bool| ground.iter().filter(|k| f(**k)).count();
         let [shaded, both] = [count(&|k| dark(&rays, k)), count(&|k| dark(&rays, k) && dark(&image, k))];
@@ -239,7 +243,7 @@ fn shadows_on_wide_ground() {
         assert!(wrong * 8 <= shaded, "{name}, {kind:?}: {wrong} wrong, {both} of {shaded} in shadow");
         // The size of the ground changes no ground pixel.
         let [mut differ, mut same] = [0, 0];
-        for &k in ground.iter().filter(|k| other.mask()[**k] == 1 && other.alone(**k)) {
+        for &k in ground.iter().filter(|k| other.mask()[**k] == 1 && other.is_inside_instance(**k)) {
             let far = (0..3).any(|c| image.color()[k][c].abs_diff(other.color()[k][c]) > 2);
             (differ, same) = (differ + usize::from(far), same + usize::from(!far));
         }
@@ -252,13 +256,13 @@ fn shadows_on_wide_ground() {
 /// A plane shades the objects below it, for lights above it only.
 #[test]
 fn plane_above() {
-    let view = look([160, 120], 0.8, [3.0, 0.0, 1.5], [0.0, 0.0, 0.2]);
-    let gray = || matt([GRAY; 3]);
-    let roof = (Shape::from(Plane { half: [0.5; 2] }), gray(), at(0.0, 0.0, 1.0));
+    let view = look_at_view([160, 120], 0.8, [3.0, 0.0, 1.5], [0.0, 0.0, 0.2]);
+    let gray = || matte([GRAY; 3]);
+    let roof = (Shape::from(Plane { half: [0.5; 2] }), gray(), translation(0.0, 0.0, 1.0));
     let ground = (Shape::from(Plane { half: [50.0; 2] }), gray(), PoseF32::IDENTITY);
-    let (mut scene, poses) = things([ground, roof]);
+    let (mut scene, poses) = instances([ground, roof]);
     scene.lights = vec![Light { direction: [0.0, 0.0, -1.0], ..Light::default() }];
-    let still = Still::new((scene, poses), view);
+    let still = TestFrame::new((scene, poses), view);
     let [image, bright] = [still.draw(), still.with(|still| still.cfg.shadows = false).draw()];
     let (mut dark, mut lit) = (0, 0);
     for k in (0..160 * 120).filter(|k| image.mask()[*k] == 1) {
@@ -278,18 +282,24 @@ const PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denois
 const DARK: Headlight = Headlight { ambient: [0.0; 3], diffuse: [0.0; 3], specular: [0.0; 3], active: false };
 
 /// The color at the center of an image of a plane, from straight above.
-fn middle(material: Material, headlight: Headlight, sky: [f32; 3], tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
-    let (scene, poses) = things([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
+fn center_color(
+    material: Material,
+    headlight: Headlight,
+    sky: [f32; 3],
+    tone: ToneCurve,
+    by: (Renderer, f64),
+) -> [u8; 4] {
+    let (scene, poses) = instances([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
     (scene.headlight, scene.sky) = (headlight, Sky::uniform(sky));
     let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
-    let still = Still { stops: by.1, ..Still::new((scene, poses), view) };
-    still.with(|still| still.cfg.tone = tone).by(by.0).color()[16 * 33 + 16]
+    let still = TestFrame { stops: by.1, ..TestFrame::new((scene, poses), view) };
+    still.with(|still| still.cfg.tone = tone).with_renderer(by.0).color()[16 * 33 + 16]
 }
 
 /// A white plane that glows in the dark.
-fn glowing(emission: f32, tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
-    middle(Material { emission, ..matt([1.0; 3]) }, DARK, [0.0; 3], tone, by)
+fn emissive_plane_color(emission: f32, tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
+    center_color(Material { emission, ..matte([1.0; 3]) }, DARK, [0.0; 3], tone, by)
 }
 
 /// A step of a byte for rounding, and one for the approximation of the power in the transfer function.
@@ -307,7 +317,7 @@ fn metals() {
     for (metallic, specular, emission) in
         [1.0, 0.4].into_iter().flat_map(|m| [(m, 0.0, 0.0), (m, 0.5, 0.0), (m, 0.0, 0.3), (m, 1.0, 0.3)])
     {
-        let material = Material { metallic, specular, emission, ..matt(base) };
+        let material = Material { metallic, specular, emission, ..matte(base) };
         let expected = [0, 1, 2].map(|k| {
             let [color, sky, own, metal] =
                 [linear(base[k]), linear(above[k]), f64::from(emission), f64::from(metallic)];
@@ -315,7 +325,7 @@ fn metals() {
             let plain = color * (scattered + own) + f64::from(specular) * shine;
             metal * color * (sky + shine + own) + (1.0 - metal) * plain
         });
-        let seen = middle(material, headlight, above, ToneCurve::Clip, (Renderer::Raster, 0.0));
+        let seen = center_color(material, headlight, above, ToneCurve::Clip, (Renderer::Raster, 0.0));
         assert!(close(seen, expected), "metallic {metallic}, specular {specular}, {emission}: {seen:?}, {expected:?}");
     }
 }
@@ -335,7 +345,7 @@ fn tone_curves() {
                 ToneCurve::Clip => x.min(1.0),
                 ToneCurve::Filmic => (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0),
             };
-            let seen = glowing(emission, tone, (renderer, 0.0));
+            let seen = emissive_plane_color(emission, tone, (renderer, 0.0));
             assert!(close(seen, [curve; 3]), "{renderer:?}, {tone:?} of {x}: {seen:?}, not {curve}");
             seen[0]
         });
@@ -349,7 +359,7 @@ fn tone_curves() {
 #[test]
 fn stops() {
     for renderer in [Renderer::Raster, PATHS] {
-        let of = |emission, stops| glowing(emission, ToneCurve::Clip, (renderer, stops));
+        let of = |emission, stops| emissive_plane_color(emission, ToneCurve::Clip, (renderer, stops));
         for (emission, stops) in [(0.2_f32, 1.0), (0.2, -1.0), (0.2, 0.5), (3.0, -2.0), (3.9, -2.0), (1e4, -20.0)] {
             let light = (f64::from(emission) * f64::exp2(stops)).min(1.0);
             let seen = of(emission, stops);
@@ -359,9 +369,9 @@ fn stops() {
         assert_eq!([of(3.0, 0.0), of(3.9, 0.0)], [[255; 4]; 2]);
         assert!(of(3.9, -2.0)[0] > of(3.0, -2.0)[0] + 20);
     }
-    let still = Still::new((RenderScene::empty(), vec![]), look([4, 4], 0.5, [0.0, 0.1, 2.0], [0.0; 3]));
+    let still = TestFrame::new((RenderScene::empty(), vec![]), look_at_view([4, 4], 0.5, [0.0, 0.1, 2.0], [0.0; 3]));
     for stops in [f64::NAN, 21.0, f64::NEG_INFINITY] {
-        let error = Still { stops, ..still.clone() }.try_draw().unwrap_err().to_string();
+        let error = TestFrame { stops, ..still.clone() }.try_draw().unwrap_err().to_string();
         assert!(error.contains("stops; it must be -20 to 20"), "{error}");
     }
 }
@@ -374,18 +384,18 @@ fn display_sum() {
     let directions = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.0, -0.6, -0.8], [-0.8, 0.0, -0.6]];
     let cosines: f32 = [1.0, 0.8, 0.8, 0.6].iter().sum();
     for (base, light) in [(0.5f32, 0.2f32), (0.7, 0.1), (1.0, 0.25), (0.9, 0.6)] {
-        let (scene, poses) = things([(Plane::INFINITE, matt([base, 0.5 * base, 0.25 * base]), PoseF32::IDENTITY)]);
+        let (scene, poses) = instances([(Plane::INFINITE, matte([base, 0.5 * base, 0.25 * base]), PoseF32::IDENTITY)]);
         let mut scene = unlit(scene);
-        scene.light_sum = LightSum::Display;
+        scene.lighting_space = LightingSpace::Display;
         let lamp = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
         scene.lights = directions.map(lamp).to_vec();
         let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
-        let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
+        let still = TestFrame::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
         let renderers = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
         // The sum is clamped already: the soft curve changes no value.
         let tones = [ToneCurve::Clip, ToneCurve::Soft];
         for (renderer, tone) in renderers.into_iter().flat_map(|renderer| tones.map(|tone| (renderer, tone))) {
-            let found = still.with(|still| still.cfg.tone = tone).by(renderer).color()[16 * 33 + 16];
+            let found = still.with(|still| still.cfg.tone = tone).with_renderer(renderer).color()[16 * 33 + 16];
             for (c, part) in [1.0, 0.5, 0.25].into_iter().enumerate() {
                 let expected = 255.0 * (part * base * light * cosines).min(1.0);
                 let off = (f32::from(found[c]) - expected).abs();
@@ -393,7 +403,8 @@ fn display_sum() {
             }
         }
         // The control: a linear sum differs.
-        let linear = still.with(|still| still.scene.light_sum = LightSum::Linear).draw().color()[16 * 33 + 16];
+        let linear =
+            still.with(|still| still.scene.lighting_space = LightingSpace::Linear).draw().color()[16 * 33 + 16];
         assert!((f32::from(linear[1]) - 255.0 * 0.5 * base * light * cosines).abs() > 5.0, "{linear:?}");
     }
 }
@@ -403,19 +414,19 @@ fn display_sum() {
 /// Root cause: it shone from the camera's position, and the ground of a model file grew darker with the distance.
 #[test]
 fn display_headlight() {
-    let (scene, poses) = things([(Plane::INFINITE, matt([0.8; 3]), PoseF32::IDENTITY)]);
+    let (scene, poses) = instances([(Plane::INFINITE, matte([0.8; 3]), PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
-    scene.light_sum = LightSum::Display;
+    scene.lighting_space = LightingSpace::Display;
     scene.headlight = Headlight { ambient: [0.1; 3], diffuse: [0.5; 3], specular: [0.0; 3], active: true };
     let view = crate::visibility::View::look_at([33, 33], 1.2, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
-    let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
+    let still = TestFrame::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
     let expected = 255.0 * 0.8 * (0.1 + 0.5);
     let corners = |image: &Image| [0, 32, 16 * 33 + 16].map(|k| f32::from(image.color()[k][0]));
     for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
-        let found = corners(&still.by(renderer));
+        let found = corners(&still.with_renderer(renderer));
         assert!(found.iter().all(|x| (x - expected).abs() <= 1.5), "{renderer:?}: {found:?}, {expected}");
     }
     // The control: from the camera's position the corners are darker.
-    let [corner, _, middle] = corners(&still.with(|still| still.scene.light_sum = LightSum::Linear).draw());
+    let [corner, _, middle] = corners(&still.with(|still| still.scene.lighting_space = LightingSpace::Linear).draw());
     assert!(corner + 10.0 < middle, "{corner} {middle}");
 }

@@ -1,14 +1,14 @@
 //! Planar mirrors compared with closed forms: a mirror shows the scene reflected at its plane.
 
-use super::harness::{EXACT, Image, Still, look};
+use super::harness::{EXACT, Image, TestFrame, look_at_view};
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
-use kinetoscope_scene::{Instance, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Sky};
-use kinetoscope_testkit::scenes::{Random, matt, random, things, unlit};
+use kinetoscope_scene::{Instance, Light, LightKind, LightingSpace, Material, PoseF32, RenderScene, Sky};
+use kinetoscope_testkit::scenes::{TestRng, instances, matte, random_scene, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
 
 const RENDERERS: [Renderer; 3] = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
@@ -30,25 +30,28 @@ fn tilted() -> PoseF32 {
 }
 
 /// A surface that shows its own color in the dark.
-fn glowing(color: f32) -> Material {
-    Material { emission: 1.0, ..matt([color; 3]) }
+fn emissive(color: f32) -> Material {
+    Material { emission: 1.0, ..matte([color; 3]) }
 }
 
 /// A ball over a mirror at the pose `mirror`, with emission as the only light; `sum` is the light model.
-fn over(shape: impl Into<Shape>, mirror: PoseF32, reflectance: f32, sum: LightSum) -> Still {
-    let floor = Material { reflectance, ..glowing(FLOOR) };
+fn over(shape: impl Into<Shape>, mirror: PoseF32, reflectance: f32, sum: LightingSpace) -> TestFrame {
+    let floor = Material { reflectance, ..emissive(FLOOR) };
     let above = PoseF32 { translation: mirror.apply(CENTER), ..PoseF32::IDENTITY };
-    let ball = (Shape::from(Sphere { radius: RADIUS }), glowing(BALL), above);
-    let (scene, poses) = things([(shape.into(), floor, mirror), ball]);
+    let ball = (Shape::from(Sphere { radius: RADIUS }), emissive(BALL), above);
+    let (scene, poses) = instances([(shape.into(), floor, mirror), ball]);
     let mut scene = unlit(scene);
-    (scene.sky, scene.light_sum) = (Sky::uniform([SKY; 3]), sum);
+    (scene.sky, scene.lighting_space) = (Sky::uniform([SKY; 3]), sum);
     let cfg = RasterCfg { tone: ToneCurve::Clip, ..RasterCfg::default() };
-    Still { cfg, ..Still::new((scene, poses), look([160, 120], 0.9, [2.4, -1.2, 1.9], [0.1, 0.0, 0.3])) }
+    TestFrame {
+        cfg,
+        ..TestFrame::new((scene, poses), look_at_view([160, 120], 0.9, [2.4, -1.2, 1.9], [0.1, 0.0, 0.3]))
+    }
 }
 
 /// The byte of a pixel of the mirror, and true if it shows the ball; `None` at the edge of the ball's reflection. `z`
 /// is the height of the mirror in its frame, `sign` is -1 for the reflected center.
-fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Option<(f64, bool)> {
+fn expected(still: &TestFrame, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Option<(f64, bool)> {
     let material = &still.scene.instances()[0].material;
     let eye = still.poses[0].inverse_times(&still.view.world_from_camera).translation;
     let point = still.poses[0].inverse_times(&PoseF32 { translation: image.position()[k], ..PoseF32::IDENTITY });
@@ -64,12 +67,12 @@ fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Opti
     }
     let r = f64::from(material.reflectance);
     let hit = off < 0.0;
-    let byte = match still.scene.light_sum {
-        LightSum::Display => {
+    let byte = match still.scene.lighting_space {
+        LightingSpace::Display => {
             let [own, ball] = [FLOOR, BALL].map(f64::from);
             255.0 * if hit { own + r * ball } else { own }
         }
-        LightSum::Linear => {
+        LightingSpace::Linear => {
             let [own, ball, sky] = [FLOOR, BALL, SKY].map(linear);
             srgb((1.0 - r) * own + r * if hit { ball } else { sky })
         }
@@ -90,17 +93,17 @@ fn mirrored_ball() {
         (Box { half: [1.4, 1.4, 0.1] }.into(), 0.1),
     ];
     for (shape, z) in shapes {
-        for (sum, samples) in [(LightSum::Display, 1), (LightSum::Display, 4), (LightSum::Linear, 4)] {
+        for (sum, samples) in [(LightingSpace::Display, 1), (LightingSpace::Display, 4), (LightingSpace::Linear, 4)] {
             let still = over(shape.clone(), tilted(), REFLECTANCE, sum).with(|still| still.cfg.samples = samples);
             for renderer in RENDERERS {
-                let image = still.by(renderer);
+                let image = still.with_renderer(renderer);
                 let of = |k: usize, sign: f32| expected(&still, &image, k, [z, sign]);
                 let upper = |k: usize| {
                     let up = still.poses[0].rotation.map(|row| row[2]);
                     image.mask()[k] == 1 && (0..3).map(|i| up[i] * image.normal()[k][i]).sum::<f32>() > 0.9
                 };
                 let (mut hits, mut misses, mut wrong) = (0, 0, 0);
-                for k in image.inner().filter(|&k| image.around(k).all(upper)) {
+                for k in image.inner().filter(|&k| image.neighbors(k).all(upper)) {
                     let Some((seen, hit)) = of(k, -1.0) else { continue };
                     let found = f64::from(image.color()[k][1]);
                     assert!((found - seen).abs() <= 1.5, "{renderer:?} {sum:?} {}: {found}, {seen}", shape.name());
@@ -123,29 +126,29 @@ fn only_upper_faces() {
     let size = Box { half: [0.5, 0.5, 1.5] };
     // From below its upper face: only sides are visible.
     let sides = |reflectance| {
-        let still = over(size, PoseF32::IDENTITY, reflectance, LightSum::Linear);
-        still.with(|still| still.view = look([64, 48], 0.9, [4.0, -2.0, 0.4], [0.0; 3]))
+        let still = over(size, PoseF32::IDENTITY, reflectance, LightingSpace::Linear);
+        still.with(|still| still.view = look_at_view([64, 48], 0.9, [4.0, -2.0, 0.4], [0.0; 3]))
     };
     for renderer in [RENDERERS[0], RENDERERS[1], RENDERERS[2], PATHS] {
-        let image = sides(0.8).by(renderer);
+        let image = sides(0.8).with_renderer(renderer);
         assert!(image.mask().iter().filter(|id| **id == 1).count() > 300);
-        assert!(image.same_bits(&sides(0.0).by(renderer)), "{renderer:?}");
+        assert!(image.same_bits(&sides(0.0).with_renderer(renderer)), "{renderer:?}");
         // The control: from above it is a mirror.
         let above = |reflectance| {
-            let view = look([64, 48], 0.9, [2.0, -1.0, 4.4], [0.0, 0.0, 1.0]);
-            sides(reflectance).with(|still| still.view = view).by(renderer)
+            let view = look_at_view([64, 48], 0.9, [2.0, -1.0, 4.4], [0.0, 0.0, 1.0]);
+            sides(reflectance).with(|still| still.view = view).with_renderer(renderer)
         };
         assert!(!above(0.8).same_bits(&above(0.0)), "{renderer:?}");
     }
     let see_through = |reflectance| {
-        let mut still = over(Plane::INFINITE, PoseF32::IDENTITY, reflectance, LightSum::Display);
+        let mut still = over(Plane::INFINITE, PoseF32::IDENTITY, reflectance, LightingSpace::Display);
         let mut instances = still.scene.instances().to_vec();
         instances[0].material.rgba[3] = 0.5;
         still.scene = still.scene.with_instances(instances).unwrap();
         still.draw()
     };
     assert!(see_through(0.8).same_bits(&see_through(0.0)));
-    let ball = |reflectance| over(Sphere { radius: 0.5 }, PoseF32::IDENTITY, reflectance, LightSum::Linear).draw();
+    let ball = |reflectance| over(Sphere { radius: 0.5 }, PoseF32::IDENTITY, reflectance, LightingSpace::Linear).draw();
     assert!(ball(0.8).same_bits(&ball(0.0)));
 }
 
@@ -156,17 +159,17 @@ fn first_mirror() {
     let draw_with = |sum, reflectances: [f32; 2], reflections| {
         let side = |x| (Shape::from(Plane { half: [0.8, 1.5] }), PoseF32::from_translation([x, 0.0, 0.0]));
         let [(a, left), (b, right)] = [side(-0.8), side(0.8)];
-        let [first, second] = reflectances.map(|reflectance| Material { reflectance, ..glowing(FLOOR) });
-        let ball = |x| (Shape::from(Sphere { radius: 0.3 }), glowing(BALL), PoseF32::from_translation([x, 0.0, 0.5]));
-        let (scene, poses) = things([(a, first, left), (b, second, right), ball(-0.7), ball(0.7)]);
+        let [first, second] = reflectances.map(|reflectance| Material { reflectance, ..emissive(FLOOR) });
+        let ball = |x| (Shape::from(Sphere { radius: 0.3 }), emissive(BALL), PoseF32::from_translation([x, 0.0, 0.5]));
+        let (scene, poses) = instances([(a, first, left), (b, second, right), ball(-0.7), ball(0.7)]);
         let mut scene = unlit(scene);
-        scene.light_sum = sum;
-        let still = Still::new((scene, poses), look([96, 72], 0.9, [0.0, -2.4, 1.6], [0.0; 3]));
+        scene.lighting_space = sum;
+        let still = TestFrame::new((scene, poses), look_at_view([96, 72], 0.9, [0.0, -2.4, 1.6], [0.0; 3]));
         still.with(|still| still.cfg.reflections = reflections).draw()
     };
     let draw = |sum, reflectances| draw_with(sum, reflectances, true);
-    let off = draw_with(LightSum::Linear, [0.5; 2], false);
-    assert_eq!(off.color(), draw(LightSum::Linear, [0.0; 2]).color(), "reflections are off");
+    let off = draw_with(LightingSpace::Linear, [0.5; 2], false);
+    assert_eq!(off.color(), draw(LightingSpace::Linear, [0.0; 2]).color(), "reflections are off");
     let changed = |sum, reflectances| {
         let (image, plain) = (draw(sum, reflectances), draw(sum, [0.0; 2]));
         assert_eq!(image.bits_but_color(), plain.bits_but_color(), "only the colour mirrors");
@@ -175,11 +178,11 @@ fn first_mirror() {
             pixels.filter(|&k| image.color()[k] != plain.color()[k]).count()
         })
     };
-    let [left, right] = changed(LightSum::Display, [0.5, 0.5]);
+    let [left, right] = changed(LightingSpace::Display, [0.5, 0.5]);
     assert!(left > 50 && right == 0, "{left} {right}");
-    let [left, right] = changed(LightSum::Display, [0.0, 0.5]);
+    let [left, right] = changed(LightingSpace::Display, [0.0, 0.5]);
     assert!(left == 0 && right > 50, "{left} {right}");
-    let [left, right] = changed(LightSum::Linear, [0.5, 0.5]);
+    let [left, right] = changed(LightingSpace::Linear, [0.5, 0.5]);
     assert!(left > 50 && right > 50, "{left} {right}");
 }
 
@@ -187,22 +190,22 @@ fn first_mirror() {
 /// hits, is part of the box: all rays are traced then, and the mirror looks the same.
 #[test]
 fn rays_that_miss() {
-    for sum in [LightSum::Display, LightSum::Linear] {
+    for sum in [LightingSpace::Display, LightingSpace::Linear] {
         let draw = |below: bool| {
-            let mirror = Material { reflectance: REFLECTANCE, ..glowing(FLOOR) };
+            let mirror = Material { reflectance: REFLECTANCE, ..emissive(FLOOR) };
             let at = |x, y, z| PoseF32::from_translation([x, y, z]);
             let mut all = vec![
                 (Shape::from(Plane { half: [3.0; 2] }), mirror, PoseF32::IDENTITY),
-                (Shape::from(Sphere { radius: RADIUS }), glowing(BALL), at(0.2, -0.1, 0.7)),
-                (Shape::from(Box { half: [0.1, 0.3, 0.2] }), glowing(BALL), at(-0.9, 0.4, 0.2)),
+                (Shape::from(Sphere { radius: RADIUS }), emissive(BALL), at(0.2, -0.1, 0.7)),
+                (Shape::from(Box { half: [0.1, 0.3, 0.2] }), emissive(BALL), at(-0.9, 0.4, 0.2)),
             ];
             if below {
-                all.push((Shape::from(Plane { half: [9.0; 2] }), glowing(FLOOR), at(0.0, 0.0, -50.0)));
+                all.push((Shape::from(Plane { half: [9.0; 2] }), emissive(FLOOR), at(0.0, 0.0, -50.0)));
             }
-            let (scene, poses) = things(all);
+            let (scene, poses) = instances(all);
             let mut scene = unlit(scene);
-            (scene.sky, scene.light_sum) = (Sky::uniform([SKY; 3]), sum);
-            Still::new((scene, poses), look([160, 120], 0.9, [2.4, -1.2, 1.9], [0.1, 0.0, 0.3])).draw()
+            (scene.sky, scene.lighting_space) = (Sky::uniform([SKY; 3]), sum);
+            TestFrame::new((scene, poses), look_at_view([160, 120], 0.9, [2.4, -1.2, 1.9], [0.1, 0.0, 0.3])).draw()
         };
         let (culled, followed) = (draw(false), draw(true));
         let mirror = (0..culled.mask().len()).filter(|&k| culled.mask()[k] == 1);
@@ -219,7 +222,7 @@ fn rays_that_miss() {
 /// meshes, textures, several lights, and transparent objects behind each other.
 #[test]
 fn reflected_eye() {
-    let (scene, mut poses) = random(&mut Random(11), 0.9);
+    let (scene, mut poses) = random_scene(&mut TestRng(11), 0.9);
     let mut instances = scene.instances().to_vec();
     let checker = instances.last().unwrap().material.clone();
     for (k, instance) in instances.iter_mut().enumerate() {
@@ -230,7 +233,7 @@ fn reflected_eye() {
         poses[k].translation[2] = poses[k].translation[2].abs() + 0.6;
     }
     instances[9].material.rgba[3] = 0.5;
-    let mirror = Instance::new(Plane { half: [3.0; 2] }, Material { reflectance: 1.0, ..matt([0.5; 3]) }, 99);
+    let mirror = Instance::new(Plane { half: [3.0; 2] }, Material { reflectance: 1.0, ..matte([0.5; 3]) }, 99);
     let last = instances.len() - 1;
     (instances[last], poses[last]) = (mirror, PoseF32::IDENTITY);
     let kind = LightKind::Point;
@@ -244,17 +247,17 @@ fn reflected_eye() {
     };
     let cfg = RasterCfg { samples: 1, shadows: false, ..EXACT };
     let eye = [2.2f32, -1.9, 1.7];
-    let view = look([120, 90], 0.9, eye, [0.0, 0.0, 0.2]);
-    let seen = Still { cfg, ..Still::new((scene(instances.clone()), poses.clone()), view) }.draw();
+    let view = look_at_view([120, 90], 0.9, eye, [0.0, 0.0, 0.2]);
+    let seen = TestFrame { cfg, ..TestFrame::new((scene(instances.clone()), poses.clone()), view) }.draw();
     instances[last].visible = false;
     let without = scene(instances);
     let (mut compared, mut wrong, mut things) = (0, 0, 0);
-    for k in seen.inner().filter(|&k| seen.alone(k) && seen.mask()[k] == 99).step_by(3) {
+    for k in seen.inner().filter(|&k| seen.is_inside_instance(k) && seen.mask()[k] == 99).step_by(3) {
         let (below, at) = ([eye[0], eye[1], -eye[2]], seen.position()[k]);
         let to = [0, 1, 2].map(|i| at[i] - below[i]);
         // The camera is in the mirror's plane; one pixel of its image is as wide as the mirror's pixel.
-        let view = View { near: 1e-4, ..look([1, 1], 0.01, at, [0, 1, 2].map(|i| at[i] + to[i])) };
-        let there = Still { cfg, ..Still::new((without.clone(), poses.clone()), view) }.draw();
+        let view = View { near: 1e-4, ..look_at_view([1, 1], 0.01, at, [0, 1, 2].map(|i| at[i] + to[i])) };
+        let there = TestFrame { cfg, ..TestFrame::new((without.clone(), poses.clone()), view) }.draw();
         let far = (0..3).any(|c| there.color()[0][c].abs_diff(seen.color()[k][c]) > 3);
         (compared, wrong) = (compared + 1, wrong + usize::from(far));
         things += usize::from(there.mask()[0] != 0);

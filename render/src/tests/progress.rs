@@ -1,22 +1,22 @@
 //! Long renderings report their progress and can be canceled.
 
 use crate::frame::{Channels, Frame};
-use crate::parallel::ParallelRasterizer;
+use crate::parallel::ParallelRenderer;
 use crate::progress::RenderProgress;
-use crate::rasterizer::Rasterizer;
+use crate::rasterizer::ImageRenderer;
 use crate::renderer::Renderer;
-use crate::request::{RasterCfg, Shot};
+use crate::request::{RasterCfg, RenderRequest};
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::PoseF32;
-use kinetoscope_testkit::scenes::figure;
+use kinetoscope_testkit::scenes::humanoid;
 use std::time::{Duration, Instant};
 
 fn paths(samples: u32) -> Renderer {
     Renderer::RayTraced { samples, max_bounces: 2, denoise: true, seed: 0 }
 }
 
-fn rasterizer(samples: u32, threads: usize) -> ParallelRasterizer {
-    let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), threads);
+fn rasterizer(samples: u32, threads: usize) -> ParallelRenderer {
+    let mut rasterizer = ParallelRenderer::new(RasterCfg::default(), threads);
     rasterizer.set_renderer(paths(samples));
     rasterizer
 }
@@ -38,8 +38,8 @@ fn done(samples: u64) -> Numbers {
 
 #[test]
 fn totals() {
-    let ((scene, poses), view) = (figure(), view([33, 21]));
-    let shot = |poses| Shot { scene: &scene, poses, view: &view, lights: None, lens: None, before: None };
+    let ((scene, poses), view) = (humanoid(), view([33, 21]));
+    let shot = |poses| RenderRequest { scene: &scene, poses, view: &view, lights: None, lens: None, previous: None };
     for threads in [1, 3] {
         let mut rasterizer = rasterizer(8, threads);
         let progress = rasterizer.progress().clone();
@@ -70,13 +70,13 @@ fn totals() {
 /// Rendering would take minutes. After cancellation, it ends early and leaves every channel of the frame unchanged.
 #[test]
 fn cancel() {
-    let ((scene, poses), view) = (figure(), view([64, 64]));
+    let ((scene, poses), view) = (humanoid(), view([64, 64]));
     let mut rasterizer = rasterizer(Renderer::MAX_SAMPLES, 2);
     let mut frame = Frame::new(64, 64, Channels::ALL);
     frame.color.as_mut().unwrap().fill(77);
     frame.mask.as_mut().unwrap().fill(5);
     let before = frame.clone();
-    let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
+    let shot = RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
     let progress = rasterizer.progress().clone();
     let canceller = std::thread::spawn({
         let progress = progress.clone();
@@ -92,7 +92,7 @@ fn cancel() {
     });
     let (index, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
     let left = canceller.join().unwrap();
-    let RenderError::Cancelled { samples, total } = error else { panic!("{error}") };
+    let RenderError::Canceled { samples, total } = error else { panic!("{error}") };
     assert_eq!((index, total), (0, 64 * 64 * u64::from(Renderer::MAX_SAMPLES)));
     // A few pixels of each thread.
     assert!(samples > 0 && samples < total / 20, "{samples} of {total}");
@@ -101,7 +101,7 @@ fn cancel() {
     // It stays canceled until it is resumed.
     rasterizer.set_renderer(paths(1));
     let (_, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
-    assert_eq!(error, RenderError::Cancelled { samples: 0, total: 64 * 64 });
+    assert_eq!(error, RenderError::Canceled { samples: 0, total: 64 * 64 });
     assert_eq!(frame, before);
     progress.resume();
     rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap();
@@ -113,8 +113,8 @@ fn cancel() {
     clone.render(&mut [(shot, frame.as_mut())]).unwrap();
     assert_eq!((clone.progress().samples(), progress.samples()), (2 * 64 * 64, 64 * 64));
     assert!(rasterizer.render(&mut [(shot, frame.as_mut())]).is_err());
-    let single = Rasterizer { renderer: paths(4), ..Rasterizer::default() };
+    let single = ImageRenderer { renderer: paths(4), ..ImageRenderer::default() };
     let clone = single.clone();
     single.progress.cancel();
-    assert!(!clone.progress.is_cancelled() && clone.renderer == single.renderer);
+    assert!(!clone.progress.is_canceled() && clone.renderer == single.renderer);
 }

@@ -1,7 +1,7 @@
 //! The rasterizer compared at every pixel with rays in double precision: textbook formulas for shapes, Möller-Trumbore
 //! for triangles; and watertight edges.
 
-use super::harness::{Still, look};
+use super::harness::{TestFrame, look_at_view};
 use crate::frame::Channels;
 use crate::request::RasterCfg;
 use crate::visibility::View;
@@ -9,7 +9,7 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::Mesh;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{Material, PoseF32, RenderScene};
-use kinetoscope_testkit::scenes::{Random, every_shape, random, things};
+use kinetoscope_testkit::scenes::{TestRng, every_shape, instances, random_scene};
 use nalgebra::{Matrix3, Vector3};
 use std::cell::Cell;
 use std::f64::consts::FRAC_PI_8;
@@ -33,7 +33,7 @@ struct Caster<'a> {
 }
 
 impl<'a> Caster<'a> {
-    fn new(Still { scene, poses, view, .. }: &'a Still) -> Self {
+    fn new(TestFrame { scene, poses, view, .. }: &'a TestFrame) -> Self {
         let wide = |p: &PoseF32| {
             let r = p.rotation.map(|r| r.map(f64::from));
             let rows = Matrix3::from_row_slice(&[r[0], r[1], r[2]].concat());
@@ -206,7 +206,7 @@ impl Block {
 /// Compares an image with the caster at all pixels off silhouettes; at a silhouette, a neighbor shows another instance
 /// or is more than a tenth nearer or farther. Returns the number of compared pixels.
 fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize {
-    let still = Still { channels: Channels { color: false, ..Channels::ALL }, ..Still::new(scene, view) };
+    let still = TestFrame { channels: Channels { color: false, ..Channels::ALL }, ..TestFrame::new(scene, view) };
     let (image, caster, w) = (still.draw(), Caster::new(&still), view.width);
     let at = |k: usize, [dx, dy]: [f64; 2]| caster.cast((k % w) as f64 + 0.5 + dx, (k / w) as f64 + 0.5 + dy);
     let hits: Vec<Option<Hit>> = (0..w * view.height).map(|k| at(k, [0.0; 2])).collect();
@@ -216,7 +216,7 @@ fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize 
         _ => false,
     };
     let mut compared = 0;
-    for k in image.inner().filter(|&k| image.around(k).all(|n| same(hits[k], hits[n]))) {
+    for k in image.inner().filter(|&k| image.neighbors(k).all(|n| same(hits[k], hits[n]))) {
         compared += 1;
         let place = format!("{name} at ({}, {})", k % w, k / w);
         let (mask, depth, distance) = (image.mask()[k], image.depth()[k], image.distance()[k]);
@@ -250,13 +250,13 @@ fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize 
 
 #[test]
 fn random_scenes() {
-    let mut numbers = Random(7);
+    let mut numbers = TestRng(7);
     let mut compared = 0;
     for seed in 0..40 {
         let r = &mut numbers;
-        let scene = random(r, 1.2);
+        let scene = random_scene(r, 1.2);
         let camera = r.pose(if seed % 4 == 0 { 0.5 } else { 3.0 });
-        let view = look([96, 72], 1.0, camera.translation, r.vector(-0.5, 0.5).map(|x| x as f32));
+        let view = look_at_view([96, 72], 1.0, camera.translation, r.vector(-0.5, 0.5).map(|x| x as f32));
         let (near, far) = [(0.01, 100.0), (1e-4, 1e5), (1.0, 4.0), (0.3, 2.0)][seed % 4];
         let (fx, fy) = (r.within(40., 120.) as f32, r.within(40., 120.) as f32);
         let (cx, cy) = (r.within(20., 80.) as f32, r.within(10., 60.) as f32);
@@ -268,17 +268,17 @@ fn random_scenes() {
 #[test]
 fn inner_sides() {
     for shape in every_shape().into_iter().filter(|shape| !matches!(shape, Shape::Plane(_))) {
-        let scene = things([(shape.clone(), Material::default(), PoseF32::IDENTITY)]);
+        let scene = instances([(shape.clone(), Material::default(), PoseF32::IDENTITY)]);
         for target in [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [-1., 0.2, 0.], [0.3, -1., 0.1], [0., 0.2, -1.]] {
             let name = format!("inside a {}, {target:?}", shape.name());
-            let compared = compare(scene.clone(), look([64, 48], 1.5, [0.01, 0.02, 0.01], target), &name);
+            let compared = compare(scene.clone(), look_at_view([64, 48], 1.5, [0.01, 0.02, 0.01], target), &name);
             assert!(compared > 1000, "{name}: {compared}");
         }
     }
 }
 
 /// A crumpled grid of triangles over a square of `half` \[m\], at height 0.
-fn grid(cells: usize, half: f32, random: &mut Random) -> TriMesh {
+fn grid(cells: usize, half: f32, random: &mut TestRng) -> TriMesh {
     let step = 2.0 * half / cells as f32;
     let mut positions = Vec::new();
     for (r, c) in (0..=cells).flat_map(|r| (0..=cells).map(move |c| (r, c))) {
@@ -297,7 +297,7 @@ fn grid(cells: usize, half: f32, random: &mut Random) -> TriMesh {
 /// Every pixel of a crumpled grid is covered by exactly one triangle.
 #[test]
 fn watertight_edges() {
-    let mut random = Random(3);
+    let mut random = TestRng(3);
     // The last cameras are so low that triangles leave the guard band and reach behind the camera.
     let eyes = [([0., 0., 2.5], 1.0), ([0.3, 0.2, 0.8], 0.4), ([0.02, 0.01, 0.003], 1.0), ([0.1, -0.1, 0.0004], 30.0)];
     for (k, (eye, half)) in eyes.into_iter().enumerate() {
@@ -305,11 +305,11 @@ fn watertight_edges() {
         let view = View::look_at([120, 90], 1.0, eye, [0.05, 0.02, -0.1], [0., 1., 0.]).unwrap();
         let draw = |triangles: Vec<[u32; 3]>| {
             let mesh = TriMesh::from_triangles(mesh.positions.clone(), triangles);
-            let mesh = Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE));
-            let scene = things([(Mesh { mesh }, Material::default(), PoseF32::IDENTITY)]);
+            let mesh = Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE));
+            let scene = instances([(Mesh { mesh }, Material::default(), PoseF32::IDENTITY)]);
             let cfg = RasterCfg { samples: 1, ..RasterCfg::default() };
             let channels = Channels { mask: true, ..Channels::default() };
-            let still = Still { cfg, channels, ..Still::new(scene, View { near: 1e-5, far: 1000.0, ..view }) };
+            let still = TestFrame { cfg, channels, ..TestFrame::new(scene, View { near: 1e-5, far: 1000.0, ..view }) };
             still.draw().mask().to_vec()
         };
         let whole = draw(mesh.triangles.clone());

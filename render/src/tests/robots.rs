@@ -1,6 +1,6 @@
 //! Vendor robots, rendered from their own meshes.
 
-use super::harness::{Still, look};
+use super::harness::{TestFrame, look_at_view};
 use crate::visibility::View;
 use kinetoscope_scene::mesh::{TextureSource, load};
 use kinetoscope_scene::shape::Mesh;
@@ -27,7 +27,7 @@ static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
         .with_file_name("../meshes/xMateSR5/visual");
     SR5.map(|(name, ..)| {
         let mesh = load(&folder.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
-        Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) }
+        Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)) }
     })
 });
 
@@ -55,14 +55,14 @@ pub(super) fn sr5(copies: usize) -> (RenderScene, Vec<PoseF32>) {
 /// A camera that sees all of one or three copies.
 pub(super) fn sr5_view(copies: usize, size: [usize; 2]) -> View {
     let y = 0.2 * copies as f32 - 0.1;
-    look(size, 0.7, [1.5 * (copies as f32).sqrt(), -1.1, 1.0], [0.3, y, 0.45])
+    look_at_view(size, 0.7, [1.5 * (copies as f32).sqrt(), -1.1, 1.0], [0.3, y, 0.45])
 }
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendor_sr5_links() {
     for copies in [1, 3] {
-        let image = Still::new(sr5(copies), sr5_view(copies, [640, 480])).draw();
+        let image = TestFrame::new(sr5(copies), sr5_view(copies, [640, 480])).draw();
         assert!((1..=7 * copies as i32).all(|id| image.mask().contains(&id)), "every link of {copies} is seen");
     }
 }
@@ -80,7 +80,7 @@ fn textures_of_anymal() {
     let back = (&face, -0.4145, std::f64::consts::PI);
     let parts = [(&base, 0., 0.), (&top, 0., 0.), (&bottom, 0., 0.), (&face, 0.4145, 0.), back];
     for (k, (mesh, x, yaw)) in parts.into_iter().enumerate() {
-        for part in &mesh.parts {
+        for part in &mesh.submeshes {
             let mut material = Material { rgba: [0.7, 0.7, 0.7, 1.0], specular: 0.3, ..Material::default() };
             if let Some(m) = part.material.map(|m| &mesh.materials[m]) {
                 material.rgba = m.rgba;
@@ -91,7 +91,7 @@ fn textures_of_anymal() {
                     material.texture = Some(Arc::new(texture));
                 }
             }
-            let mesh = Arc::new(RenderMesh::of_part(mesh, part, RenderMesh::CREASE));
+            let mesh = Arc::new(RenderMesh::from_submesh(mesh, part, RenderMesh::DEFAULT_CREASE_ANGLE));
             instances.push(Instance::new(Mesh { mesh }, material, k as i32 + 1));
             poses.push(PoseF32::from(&kinetoscope_scene::pose::from_xyz_rpy([x, 0., 0.3], [0., 0., yaw])));
         }
@@ -99,6 +99,6 @@ fn textures_of_anymal() {
     assert!(instances.iter().any(|instance| instance.material.texture.is_some() && instance.mask_id < 100));
     let mut scene = RenderScene::new(instances).unwrap();
     scene.lights[0].direction = [0.1, 0.8, -1.0];
-    let image = Still::new((scene, poses), look([640, 480], 0.6, [1.3, -0.9, 0.9], [0.0, 0., 0.3])).draw();
+    let image = TestFrame::new((scene, poses), look_at_view([640, 480], 0.6, [1.3, -0.9, 0.9], [0.0, 0., 0.3])).draw();
     assert!([1, 2, 4].iter().all(|id| image.mask().contains(id)), "base, shell and face are seen");
 }

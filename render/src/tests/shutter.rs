@@ -1,6 +1,6 @@
 //! Rolling shutter and motion blur compared with closed forms.
 
-use super::harness::{Image, Still};
+use super::harness::{Image, TestFrame};
 use super::lenses::rays_of;
 use crate::aperture::Aperture;
 use crate::frame::Channels;
@@ -12,7 +12,7 @@ use crate::shutter::Shutter;
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::shape::Box;
 use kinetoscope_scene::{Material, PoseF32, RenderScene, Sky};
-use kinetoscope_testkit::scenes::{matt, things, unlit};
+use kinetoscope_testkit::scenes::{instances, matte, unlit};
 use kinetoscope_testkit::srgb::linear;
 
 const HEIGHT: usize = 40;
@@ -33,8 +33,8 @@ const THIN: f32 = 0.0005;
 
 /// A glowing bar across all rows, in the dark; a camera at the origin looks along x, so that the image's right is -y.
 pub(super) fn bar() -> (RenderScene, View) {
-    let glow = Material { emission: 1.0, ..matt([0.6; 3]) };
-    let mut scene = unlit(things([(Box { half: [THIN, HALF, 5.0] }, glow, PoseF32::IDENTITY)]).0);
+    let glow = Material { emission: 1.0, ..matte([0.6; 3]) };
+    let mut scene = unlit(instances([(Box { half: [THIN, HALF, 5.0] }, glow, PoseF32::IDENTITY)]).0);
     scene.sky = Sky::uniform([0.0; 3]);
     let view = View::look_at([WIDTH, HEIGHT], 0.5, [0.; 3], [1., 0., 0.], [0., 0., 1.]).unwrap();
     (scene, View { fx: F, fy: F, ..view })
@@ -49,16 +49,16 @@ pub(super) fn bar_at(right: f64) -> Vec<PoseF32> {
 const SPEED: f64 = 3.0;
 
 /// The bar `right` meters to the right, path traced with one center sample for all other channels; the shutter opened
-/// `before` seconds ago.
-fn tracer(samples: u32, shutter: Shutter, right: f64, before: f64) -> Still {
+/// `age` seconds ago.
+fn tracer(samples: u32, shutter: Shutter, right: f64, before: f64) -> TestFrame {
     let (scene, view) = bar();
-    Still {
+    TestFrame {
         cfg: RasterCfg { samples: 1, lod: false, ..RasterCfg::default() },
         renderer: Renderer::RayTraced { samples, max_bounces: 0, denoise: false, seed: 5 },
         channels: Channels { flow: false, ..Channels::ALL },
         shutter,
-        opened: Some((bar_at(right - SPEED * before), view.world_from_camera, before)),
-        ..Still::new((scene, bar_at(right)), view)
+        shutter_open: Some((bar_at(right - SPEED * before), view.world_from_camera, before)),
+        ..TestFrame::new((scene, bar_at(right)), view)
     }
 }
 
@@ -83,7 +83,8 @@ fn shear() {
     // As if the bar stood still, and the camera moved left.
     let mut camera_moves = moving.clone();
     let left = [0.0, -(SPEED * before) as f32, 0.0];
-    camera_moves.opened = Some((bar_at(0.3), PoseF32 { translation: left, ..moving.view.world_from_camera }, before));
+    camera_moves.shutter_open =
+        Some((bar_at(0.3), PoseF32 { translation: left, ..moving.view.world_from_camera }, before));
     for image in [moving.draw(), camera_moves.draw()] {
         let pixels = f64::from(F) / f64::from(DEPTH);
         let (side, all) = (2.0 * f64::from(HALF) * pixels, rows(&image));
@@ -170,14 +171,16 @@ fn blur() {
     assert!((places.iter().sum::<f64>() / places.len() as f64 - middle).abs() < 0.5);
     // Static objects look as with an instant, to the bit, and so do all objects with an instant.
     let now = Some((still.poses.clone(), still.view.world_from_camera, 0.1));
-    let of = |shutter, opened: &Option<_>| Still { shutter, opened: opened.clone(), ..still.clone() }.draw().bits();
+    let of = |shutter, opened: &Option<_>| {
+        TestFrame { shutter, shutter_open: opened.clone(), ..still.clone() }.draw().bits()
+    };
     let instant = of(Shutter::default(), &None);
-    assert!(of(still.shutter, &now) == instant && of(Shutter::default(), &still.opened) == instant);
-    assert!(of(still.shutter, &still.opened) != instant);
+    assert!(of(still.shutter, &now) == instant && of(Shutter::default(), &still.shutter_open) == instant);
+    assert!(of(still.shutter, &still.shutter_open) != instant);
 }
 
 #[test]
-fn refusals() {
+fn invalid_requests() {
     // Renderers without path tracing name the renderer to use.
     let good = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };
     let slow = Shutter { row_time: 1e-4, exposure_time: 0.0 };
@@ -185,9 +188,9 @@ fn refusals() {
         [(Some(good), Shutter::default(), "an aperture (depth of field)"), (None, slow, "a shutter that takes time")]
     {
         for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
-            let still = Still { renderer, aperture, shutter, opened: None, ..tracer(1, slow, 0.0, 0.0) };
+            let still = TestFrame { renderer, aperture, shutter, shutter_open: None, ..tracer(1, slow, 0.0, 0.0) };
             let error = still.try_draw().unwrap_err();
-            assert!(matches!(&error, RenderError::NeedsPaths { what, .. } if *what == expected), "{error}");
+            assert!(matches!(&error, RenderError::NeedsPathTracing { what, .. } if *what == expected), "{error}");
             assert!(error.to_string().contains("use renderer: RayTraced"), "{error}");
         }
     }
@@ -195,11 +198,11 @@ fn refusals() {
     let shutter = Shutter { row_time: 0.01, exposure_time: 0.0 };
     let with = |before, poses| {
         let mut still = tracer(1, shutter, 0.0, before);
-        still.opened.as_mut().unwrap().0 = poses;
+        still.shutter_open.as_mut().unwrap().0 = poses;
         still.try_draw().map(drop)
     };
     assert_eq!(with(0.4, bar_at(0.0)), Ok(()));
     let span = 0.01 * (HEIGHT - 1) as f64;
-    assert_eq!(with(0.3, bar_at(0.0)), Err(RenderError::Opened { before: 0.3, span }));
+    assert_eq!(with(0.3, bar_at(0.0)), Err(RenderError::ShutterPoses { age: 0.3, span }));
     assert_eq!(with(0.4, vec![]), Err(RenderError::PoseCount { expected: 1, found: 0 }));
 }

@@ -1,13 +1,13 @@
 //! Skyboxes, and haze at the end of the ground.
 
-use super::harness::{EXACT, Still, look};
+use super::harness::{EXACT, TestFrame, look_at_view};
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
 use kinetoscope_scene::shape::Plane;
-use kinetoscope_scene::{HorizonHaze, LightSum, Material, PoseF32, RenderScene, Texture, TextureKind};
-use kinetoscope_testkit::scenes::{matt, things, unlit};
+use kinetoscope_scene::{HorizonHaze, LightingSpace, Material, PoseF32, RenderScene, Texture, TextureKind};
+use kinetoscope_testkit::scenes::{instances, matte, unlit};
 use std::sync::Arc;
 
 const CLIP: RasterCfg = RasterCfg { samples: 1, tone: ToneCurve::Clip, ..EXACT };
@@ -40,10 +40,10 @@ fn skybox_faces() {
     for (forward, up, face, from_right, from_below) in seen {
         let side = SIDE as usize;
         let view = View::look_at([side; 2], std::f32::consts::FRAC_PI_2, [0.0; 3], forward, up).unwrap();
-        let still = Still { cfg: CLIP, ..Still::new((scene.clone(), vec![]), view) };
+        let still = TestFrame { cfg: CLIP, ..TestFrame::new((scene.clone(), vec![]), view) };
         let paths = Renderer::RayTraced { samples: 64, max_bounces: 0, denoise: false, seed: 0 };
         for (renderer, tolerance) in [(Renderer::Raster, 2.0), (Renderer::FastRayTraced, 2.0), (paths, 4.0)] {
-            let image = still.by(renderer);
+            let image = still.with_renderer(renderer);
             let (mut worst, mut mirrored) = (0.0f32, 0);
             for (row, column) in (1..side - 1).flat_map(|row| (1..side - 1).map(move |column| (row, column))) {
                 let turned = |k: usize, turn: bool| if turn { side - 1 - k } else { k };
@@ -108,18 +108,18 @@ fn horizon_haze() {
         (1.0, -1.01669, [184, 71, 0]),
         (1.0, -1.24542, [160, 95, 0]),
     ];
-    let ground = Material { emission: 1.0, ..matt([0.0, 1.0, 0.0]) };
-    let (scene, poses) = things([(Plane::INFINITE, ground, PoseF32::IDENTITY)]);
+    let ground = Material { emission: 1.0, ..matte([0.0, 1.0, 0.0]) };
+    let (scene, poses) = instances([(Plane::INFINITE, ground, PoseF32::IDENTITY)]);
     let blue: Vec<u8> = [0, 0, 255].repeat(6 * 16);
     let mut scene = unlit(scene);
     scene.skybox = Some(Arc::new(Texture::new(TextureKind::Cube, 4, 24, 3, &blue).unwrap()));
-    scene.light_sum = LightSum::Display;
+    scene.lighting_space = LightingSpace::Display;
     let shown = |width: f32, slope: f32, radius: f32| {
         let mut scene = scene.clone();
         scene.horizon = Some(HorizonHaze { color: [1.0, 0.0, 0.0], radius, width });
         // One pixel, whose ray has the slope.
-        let view = View { far: 1e3, ..look([1, 1], 0.1, [0.0, 0.0, 20.0], [1.0, 0.0, 20.0 + slope]) };
-        Still { cfg: CLIP, ..Still::new((scene, poses.clone()), view) }.draw().color()[0]
+        let view = View { far: 1e3, ..look_at_view([1, 1], 0.1, [0.0, 0.0, 20.0], [1.0, 0.0, 20.0 + slope]) };
+        TestFrame { cfg: CLIP, ..TestFrame::new((scene, poses.clone()), view) }.draw().color()[0]
     };
     let radius = 0.99 * 50.0 / 2.0f32.sqrt();
     let mut wrong = 0;
@@ -140,7 +140,8 @@ fn horizon_haze() {
     // The control: a ground that ends 10 % nearer.
     assert!(wrong >= 25, "{wrong}");
     // Without an infinite plane, or from below, no haze is rendered.
-    let mut below = Still::new((scene.clone(), poses.clone()), look([8, 8], 0.1, [0.0, 0.0, -1.0], [1.0, 0.0, -1.0]));
+    let mut below =
+        TestFrame::new((scene.clone(), poses.clone()), look_at_view([8, 8], 0.1, [0.0, 0.0, -1.0], [1.0, 0.0, -1.0]));
     let clear = below.draw();
     below.scene.horizon = Some(HorizonHaze { color: [1.0, 0.0, 0.0], radius, width: 0.3 });
     assert!(below.draw().same_bits(&clear));

@@ -1,6 +1,6 @@
 //! Ray-traced images compared with the rasterizer's, and denoised path tracing compared with many paths.
 
-use super::harness::{EXACT, Image, Still, far_apart, look};
+use super::harness::{EXACT, Image, TestFrame, count_different, look_at_view};
 use crate::frame::Channels;
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
@@ -9,7 +9,7 @@ use crate::visibility::View;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Cylinder, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Sky};
-use kinetoscope_testkit::scenes::{Random, at, matt, random, things, unlit};
+use kinetoscope_testkit::scenes::{TestRng, instances, matte, random_scene, translation, unlit};
 use kinetoscope_testkit::srgb::srgb;
 use nalgebra::Vector3;
 
@@ -36,7 +36,7 @@ pub(super) fn compare(a: &Image, b: &Image) -> Comparison {
     let near = |a: f32, b: f32| a == b || (a - b).abs() <= 1e-4 * a.abs();
     let parallel =
         |a: [f32; 3], b: [f32; 3]| a == b || Vector3::from(a).dot(&Vector3::from(b)) >= 0.5f32.to_radians().cos();
-    for k in a.inner().filter(|&k| a.whole(k) && b.whole(k)) {
+    for k in a.inner().filter(|&k| a.is_off_silhouette(k) && b.is_off_silhouette(k)) {
         let off = (Vector3::from(a.position()[k]) - Vector3::from(b.position()[k])).norm();
         let here = a.mask()[k] == b.mask()[k]
             && near(a.depth()[k], b.depth()[k])
@@ -53,24 +53,25 @@ pub(super) fn compare(a: &Image, b: &Image) -> Comparison {
 
 #[test]
 fn raster() {
-    let mut numbers = Random(11);
+    let mut numbers = TestRng(11);
     let mut sum = Comparison::default();
     for seed in 0..40 {
         let r = &mut numbers;
-        let scene = random(r, 1.2);
+        let scene = random_scene(r, 1.2);
         let camera = r.pose(if seed % 4 == 0 { 0.5 } else { 3.0 });
-        let view = look([101, 75], 1.0, camera.translation, r.vector(-0.5, 0.5).map(|x| x as f32));
+        let view = look_at_view([101, 75], 1.0, camera.translation, r.vector(-0.5, 0.5).map(|x| x as f32));
         let (near, far) = [(0.01, 100.0), (1e-4, 1e5), (1.0, 4.0), (0.3, 2.0)][seed % 4];
         let view = View { near, far, cx: r.within(20., 80.) as f32, fy: r.within(40., 120.) as f32, ..view };
-        let still = Still { cfg: EXACT, ..Still::new(scene, view) };
-        let [raster, traced] = [Renderer::Raster, Renderer::FastRayTraced].map(|renderer| still.by(renderer));
+        let still = TestFrame { cfg: EXACT, ..TestFrame::new(scene, view) };
+        let [raster, traced] =
+            [Renderer::Raster, Renderer::FastRayTraced].map(|renderer| still.with_renderer(renderer));
         let found = compare(&raster, &traced);
         sum.compared += found.compared;
         sum.different += found.different;
         sum.elsewhere += found.elsewhere;
         sum.albedo += found.albedo;
         // Colors come from the same shading: they differ only where samples on edges do.
-        let differ = far_apart(&raster, &traced, 3);
+        let differ = count_different(&raster, &traced, 3);
         assert!(differ * 50 < 101 * 75, "scene {seed}: {differ} pixels look different");
     }
     assert!(sum.compared > 40 * 101 * 75 / 2, "{sum:?}");
@@ -78,9 +79,11 @@ fn raster() {
     // Normals at centers on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
     assert!(sum.different * 1000 <= sum.compared && sum.albedo * 1000 < sum.compared, "{sum:?}");
     // The control: an image from a viewpoint a millimeter aside differs.
-    let still =
-        Still { cfg: EXACT, ..Still::new(random(&mut Random(5), 1.2), look([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3])) };
-    let mut beside = Still { renderer: Renderer::FastRayTraced, ..still.clone() };
+    let still = TestFrame {
+        cfg: EXACT,
+        ..TestFrame::new(random_scene(&mut TestRng(5), 1.2), look_at_view([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3]))
+    };
+    let mut beside = TestFrame { renderer: Renderer::FastRayTraced, ..still.clone() };
     beside.view.world_from_camera.translation[2] += 1e-3;
     let beside = compare(&still.draw(), &beside.draw());
     assert!(beside.elsewhere * 2 > beside.compared, "{beside:?}");
@@ -98,25 +101,25 @@ fn mask_of_paths() {
     // Emission is a hundred times the color, so the light of other objects adds only a hundredth.
     let glowing = |k: usize| {
         let light = |x: u8| 0.01 * f64::from(kinetoscope_scene::decode_srgb(f32::from(x) / 255.0));
-        Material { emission: 100.0, ..matt(color_of(k).map(|x| (srgb(light(x)) / 255.0) as f32)) }
+        Material { emission: 100.0, ..matte(color_of(k).map(|x| (srgb(light(x)) / 255.0) as f32)) }
     };
-    let mut numbers = Random(23);
+    let mut numbers = TestRng(23);
     let (mut compared, mut on_mats) = (0, 0);
     for seed in 0..12 {
-        let (scene, mut poses) = random(&mut numbers, 1.2);
+        let (scene, mut poses) = random_scene(&mut numbers, 1.2);
         let mut instances = scene.instances().to_vec();
         instances.push(Instance::new(Plane { half: [0.7, 0.5] }, Material::default(), 101));
-        poses.push(at(0.3, 0.0, -1.0));
+        poses.push(translation(0.3, 0.0, -1.0));
         for (k, instance) in instances.iter_mut().enumerate() {
             (instance.mask_id, instance.material) = (k as i32 + 1, glowing(k + 1));
         }
         let mat = instances.len() as i32;
         let eye = numbers.vector(-2.0, 2.0).map(|x| x as f32);
-        let view = look([101, 75], 1.0, [eye[0], eye[1], 0.6 + eye[2].abs()], [0., 0., -0.4]);
+        let view = look_at_view([101, 75], 1.0, [eye[0], eye[1], 0.6 + eye[2].abs()], [0., 0., -0.4]);
         let cfg = RasterCfg { tone: ToneCurve::Clip, ..EXACT };
-        let still = Still { cfg, ..Still::new((unlit(RenderScene::new(instances).unwrap()), poses), view) };
-        let image = still.by(Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed });
-        for k in image.inner().filter(|&k| image.mask()[k] != 0 && image.whole(k)) {
+        let still = TestFrame { cfg, ..TestFrame::new((unlit(RenderScene::new(instances).unwrap()), poses), view) };
+        let image = still.with_renderer(Renderer::RayTraced { samples: 1, max_bounces: 0, denoise: false, seed });
+        for k in image.inner().filter(|&k| image.mask()[k] != 0 && image.is_off_silhouette(k)) {
             let (color, expected) = (image.color()[k], color_of(image.mask()[k] as usize));
             let same = (0..3).all(|c| color[c].abs_diff(expected[c]) <= 4);
             assert!(same, "scene {seed}, pixel {k}: {color:?}, not {expected:?}");
@@ -134,23 +137,24 @@ fn mask_of_paths() {
 #[test]
 fn smooth_edges() {
     let plain = Material::from_rgba([0.7, 0.7, 0.7, 1.0]);
-    let (mut scene, poses) = things([
-        (Shape::from(Box { half: [0.3, 0.3, 0.3] }), plain.clone(), at(-0.4, 0.0, 0.0)),
-        (Cylinder { radius: 0.25, half_length: 0.3 }.into(), plain, at(0.4, 0.0, 0.0)),
+    let (mut scene, poses) = instances([
+        (Shape::from(Box { half: [0.3, 0.3, 0.3] }), plain.clone(), translation(-0.4, 0.0, 0.0)),
+        (Cylinder { radius: 0.25, half_length: 0.3 }.into(), plain, translation(0.4, 0.0, 0.0)),
     ]);
     scene.lights[0].direction = [-0.3, -0.9, -0.6];
     let view = View::look_at([161, 121], 0.8, [0.5, 1.6, 1.1], [0., 0., 0.], [0.1, 0., 1.]).unwrap();
-    let still = Still { cfg: RasterCfg { shadows: false, ..EXACT }, ..Still::new((scene, poses), view) };
-    let (raster, traced) = (still.draw(), still.by(Renderer::FastRayTraced));
+    let still = TestFrame { cfg: RasterCfg { shadows: false, ..EXACT }, ..TestFrame::new((scene, poses), view) };
+    let (raster, traced) = (still.draw(), still.with_renderer(Renderer::FastRayTraced));
     let normal = |k: usize| Vector3::from(raster.normal()[k]);
-    let edge = |k: &usize| raster.around(*k).any(|n| normal(n).dot(&normal(*k)) <= 0.5);
-    let edges: Vec<usize> = raster.inner().filter(|&k| raster.mask()[k] != 0 && raster.alone(k)).filter(edge).collect();
+    let edge = |k: &usize| raster.neighbors(*k).any(|n| normal(n).dot(&normal(*k)) <= 0.5);
+    let edges: Vec<usize> =
+        raster.inner().filter(|&k| raster.mask()[k] != 0 && raster.is_inside_instance(k)).filter(edge).collect();
     // A sample at the very edge may belong to either face: a quarter of the difference between them.
     let [found, expected] = [&traced, &raster].map(Image::color);
     let differ = edges.iter().filter(|&&k| (0..3).any(|c| found[k][c].abs_diff(expected[k][c]) > 3)).count();
     assert!(edges.len() > 200 && differ * 50 <= edges.len(), "{differ} of {}", edges.len());
     // The control: one sample looks different at most of them.
-    let rough = still.with(|still| still.cfg.samples = 1).by(Renderer::FastRayTraced);
+    let rough = still.with(|still| still.cfg.samples = 1).with_renderer(Renderer::FastRayTraced);
     let apart = raster.channel(0).iter().zip(rough.channel(0)).filter(|(a, b)| (**a - b).abs() > 3.0).count();
     assert!(apart * 4 > edges.len(), "{apart} of {}", edges.len());
 }
@@ -169,20 +173,20 @@ fn rms(differences: impl Iterator<Item = u8>) -> f64 {
 /// sampled as a light, so that paths hit it by chance.
 #[test]
 fn smoothed_noise() {
-    let red = |red| matt([red, 0.7, 0.7]);
+    let red = |red| matte([red, 0.7, 0.7]);
     let down = PoseF32 { rotation: [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]], translation: [0., 0., 1.5] };
-    let (scene, poses) = things([
+    let (scene, poses) = instances([
         (Shape::from(Plane::INFINITE), red(0.7), PoseF32::IDENTITY),
-        (Sphere { radius: 0.3 }.into(), red(0.2), at(0., 0., 0.3)),
+        (Sphere { radius: 0.3 }.into(), red(0.2), translation(0., 0., 0.3)),
         (Ellipsoid { radii: [0.56, 0.56, 0.01] }.into(), Material { emission: 6.0, ..red(0.7) }, down),
     ]);
     let mut scene = unlit(scene);
     scene.ambient = Hemisphere { sky: [0.02; 3], ground: [0.02; 3] };
-    let view = look([96, 72], 0.7, [2.2, -1.4, 1.0], [0., 0., 0.2]);
-    let still = Still { cfg: EXACT, ..Still::new((scene, poses), view) };
-    let many = still.by(paths(256, 1, false, 9));
+    let view = look_at_view([96, 72], 0.7, [2.2, -1.4, 1.0], [0., 0., 0.2]);
+    let still = TestFrame { cfg: EXACT, ..TestFrame::new((scene, poses), view) };
+    let many = still.with_renderer(paths(256, 1, false, 9));
     let error = |samples, denoise| {
-        let image = still.by(paths(samples, 1, denoise, 1));
+        let image = still.with_renderer(paths(samples, 1, denoise, 1));
         rms(image.color().iter().flatten().zip(many.color().iter().flatten()).map(|(a, b)| a.abs_diff(*b)))
     };
     let (rough, smooth, more) = (error(4, false), error(4, true), error(16, false));
@@ -195,18 +199,19 @@ fn smoothed_noise() {
 }
 
 /// A floor of black and white tiles below a glossy layer, in weak uniform light, with the edge of a shadow on it.
-fn tiles(emission: f32, dim: f32) -> Still {
+fn tiles(emission: f32, dim: f32) -> TestFrame {
     let tile = |k: i32| {
         let rgba = if (k / 6 + k % 6) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] };
         let material = Material { specular: 1.0, shininess: 0.3, ..Material::from_rgba(rgba) };
-        let place = at(0.2 * (k / 6) as f32 - 0.5, 0.2 * (k % 6) as f32 - 0.5, 0.0);
+        let place = translation(0.2 * (k / 6) as f32 - 0.5, 0.2 * (k % 6) as f32 - 0.5, 0.0);
         (Shape::from(Plane { half: [0.1, 0.1] }), material, place)
     };
-    let light = Material { emission: emission * dim, ..matt([1.0; 3]) };
-    let (scene, poses) = things((0..36).map(tile).chain([(Sphere { radius: 0.4 }.into(), light, at(0.4, 0.9, 1.0))]));
+    let light = Material { emission: emission * dim, ..matte([1.0; 3]) };
+    let (scene, poses) =
+        instances((0..36).map(tile).chain([(Sphere { radius: 0.4 }.into(), light, translation(0.4, 0.9, 1.0))]));
     let mut scene = unlit(scene);
     scene.ambient = Hemisphere { sky: [0.05 * dim; 3], ground: [0.05 * dim; 3] };
-    Still { cfg: EXACT, ..Still::new((scene, poses), look([96, 72], 0.6, [-1.2, -0.8, 0.9], [0.; 3])) }
+    TestFrame { cfg: EXACT, ..TestFrame::new((scene, poses), look_at_view([96, 72], 0.6, [-1.2, -0.8, 0.9], [0.; 3])) }
 }
 
 /// Black tiles mirror their surroundings, and adjacent white tiles are as bright: denoising blends neither into the
@@ -216,7 +221,7 @@ fn tiles(emission: f32, dim: f32) -> Still {
 #[test]
 fn smoothed_tiles() {
     let still = tiles(3.0, 1.0);
-    let many = still.by(paths(1024, 1, false, 9));
+    let many = still.with_renderer(paths(1024, 1, false, 9));
     let mask = many.mask();
     // Black tiles, away from their edges.
     let black: Vec<usize> = (2..70)
@@ -225,7 +230,7 @@ fn smoothed_tiles() {
         .filter(|&k| [1, 96, 97, 95].into_iter().all(|n| mask[k - n] == mask[k] && mask[k + n] == mask[k]))
         .collect();
     let error = |denoise| {
-        let few = still.by(paths(2, 1, denoise, 1));
+        let few = still.with_renderer(paths(2, 1, denoise, 1));
         rms(black.iter().map(|&k| many.color()[k][0].abs_diff(few.color()[k][0])))
     };
     let (rough, smooth) = (error(false), error(true));
@@ -243,11 +248,11 @@ fn smoothed_exposure() {
         let mut still = tiles(emission, dim);
         still.scene.sky = Sky::uniform([0.0; 3]);
         (still.stops, still.channels) = (stops, Channels { color: true, ..Channels::NONE });
-        still.by(paths(16, 1, true, 3))
+        still.with_renderer(paths(16, 1, true, 3))
     };
     let (plain, dim) = (of(3.0, 1.0, 0.0), of(3.0, 1.0 / 1024.0, 10.0));
     // Powers of two change no digit; the tiles' colors are the same.
-    assert_eq!(far_apart(&plain, &dim, 1), 0);
+    assert_eq!(count_different(&plain, &dim, 1), 0);
     let blinding = of(1e30, 1.0, 0.0);
     // Pixels of the light and of its mirror image are white; ambient light leaves no pixel black.
     let dark = |image: &Image| image.color().iter().filter(|color| color[..3] == [0; 3]).count();

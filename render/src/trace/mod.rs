@@ -2,7 +2,7 @@
 //!
 //! Two levels of BVHs. The lower level has one BVH per mesh, in the mesh's own frame: built once, shared by all
 //! environments, and the same that ray casters use. The upper level is a BVH over the boxes of a frame's instances,
-//! built for every frame (`tree`). Shapes with a closed form are intersected exactly; height fields as the triangles
+//! built for every frame (`bvh`). Shapes with a closed form are intersected exactly; height fields as the triangles
 //! that the rasterizer draws. Everything is in double precision.
 //!
 //! The rays of an image need no upper BVH: an instance is tested only within the rectangle of the image that it covers.
@@ -12,49 +12,49 @@
 pub(crate) mod motion;
 mod tree;
 
-use super::raster::tile::{AREA, BLOCK, NOTHING, SAMPLES, Tile};
-use super::raster::{Item, Layer, Placed};
-use crate::geometry::assets::{Assets, RayAssets};
-use crate::geometry::bvh::Stack;
+use super::raster::tile::{BLOCK, BLOCK_AREA, NO_ID, SAMPLES, Tile};
+use super::raster::{DrawItem, Layer, PlacedInstance};
+use crate::geometry::assets::{AssetCache, RayAssetCache};
+use crate::geometry::bvh::TraversalStack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::mesh::MeshTree;
-use crate::geometry::triangle::ShearPacket;
-use crate::lens::Sight;
+use crate::geometry::shape::mesh::MeshBvh;
+use crate::geometry::triangle::ShearedPacket;
+use crate::lens::ViewCone;
 use crate::lens::rays::LensRays;
 use crate::simd::Simd;
 use crate::visibility::Projection;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
-use kinetoscope_scene::vector::{V3, along, dot, scale};
+use kinetoscope_scene::vector::{V3, add_scaled, dot, scale};
 use kinetoscope_scene::{Instance, Marker, PoseF32, PoseF64, RenderScene};
-use motion::{Motion, rigid, wide};
+use motion::{Motion, orthonormalized, pose_to_f64};
 use std::sync::Arc;
-use tree::Tree;
+use tree::InstanceBvh;
 
 /// Largest number of surfaces of a transparent instance that a shadow ray passes.
-const MAX_FRONTS: usize = 64;
+const MAX_FRONT_HITS: usize = 64;
 /// Offset of rays past a surface, as a fraction of the largest coordinate.
-const PAST: f64 = 1e-9;
+const RAY_OFFSET: f64 = 1e-9;
 
 /// Offsets of the samples of a packet from the first one \[pixels\].
-type Side = [[usize; 2]; WIDTH];
+type SampleOffsets = [[usize; 2]; WIDTH];
 /// A compact block: fewer triangles are between its rays than between those of a row.
-const TOGETHER: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]];
+const BLOCK_OFFSETS: SampleOffsets = [[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]];
 /// A row, for images whose rows show different instants.
-const IN_A_ROW: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [5, 0], [6, 0], [7, 0]];
+const ROW_OFFSETS: SampleOffsets = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [5, 0], [6, 0], [7, 0]];
 
 /// Geometry of an instance that rays hit, in its own frame.
 #[derive(Clone, Debug)]
-enum Body {
+enum InstanceGeometry {
     /// Triangles: the mesh, and its BVH.
-    Mesh(Arc<RenderMesh>, Arc<MeshTree>),
+    Mesh(Arc<RenderMesh>, Arc<MeshBvh>),
     /// A shape with a closed form.
     Closed(Shape),
 }
 
 /// An instance placed in the world.
 #[derive(Clone, Copy, Debug)]
-struct Thing {
+struct TracedInstance {
     instance: u32,
     world_from_instance: PoseF64,
     /// Motion during the exposure; `None` for a static instance.
@@ -85,24 +85,24 @@ pub(crate) struct CameraView<'a> {
     pub(crate) projection: &'a Projection,
     /// Rays of a lens that bends them.
     pub(crate) lens: Option<&'a LensRays>,
-    pub(crate) placed: &'a [Placed],
+    pub(crate) placed: &'a [PlacedInstance],
     /// First id of each instance in the visibility buffer.
     pub(crate) first_ids: &'a [u32],
 }
 
 /// Ray tracer of a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tracer {
+pub(crate) struct RayTracer {
     /// Geometry of each instance; `None` for hidden instances.
-    bodies: Vec<Option<Body>>,
-    things: Vec<Thing>,
+    geometries: Vec<Option<InstanceGeometry>>,
+    instances: Vec<TracedInstance>,
     /// Unbounded instances, which are outside of the BVH.
-    endless: Vec<u32>,
-    tree: Tree,
+    unbounded: Vec<u32>,
+    bvh: InstanceBvh,
 }
 
-impl Body {
-    fn of(instance: &Instance, known: Option<Self>, assets: &mut Assets) -> Self {
+impl InstanceGeometry {
+    fn of(instance: &Instance, known: Option<Self>, assets: &mut AssetCache) -> Self {
         let Some(mesh) = instance.shape.mesh() else { return Self::Closed(instance.shape.clone()) };
         match known {
             Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
@@ -119,7 +119,7 @@ impl Body {
     }
 }
 
-impl Thing {
+impl TracedInstance {
     /// Pose at a time.
     #[inline(always)]
     fn at(&self, time: f64) -> PoseF64 {
@@ -127,44 +127,49 @@ impl Thing {
     }
 }
 
-impl Tracer {
+impl RayTracer {
     pub(crate) fn bytes(&self) -> usize {
-        self.bodies.capacity() * size_of::<Option<Body>>()
-            + self.things.capacity() * size_of::<Thing>()
-            + self.endless.capacity() * size_of::<u32>()
-            + self.tree.bytes()
+        self.geometries.capacity() * size_of::<Option<InstanceGeometry>>()
+            + self.instances.capacity() * size_of::<TracedInstance>()
+            + self.unbounded.capacity() * size_of::<u32>()
+            + self.bvh.bytes()
     }
 
     /// Finds the BVHs of all instances that `keep` does not hide, and builds the missing ones.
-    pub(crate) fn find_bodies(&mut self, scene: &RenderScene, assets: &RayAssets, keep: impl Fn(&Instance) -> Layer) {
+    pub(crate) fn prepare_geometry(
+        &mut self,
+        scene: &RenderScene,
+        assets: &RayAssetCache,
+        keep: impl Fn(&Instance) -> Layer,
+    ) {
         let instances = scene.instances();
-        self.bodies.resize_with(instances.len(), || None);
+        self.geometries.resize_with(instances.len(), || None);
         // All under one lock: scratch memory is kept from one mesh to the next.
         assets.with(|assets| {
-            for (body, instance) in self.bodies.iter_mut().zip(instances) {
+            for (body, instance) in self.geometries.iter_mut().zip(instances) {
                 *body = match keep(instance) {
                     Layer::Hidden => None,
-                    _ => Some(Body::of(instance, body.take(), assets)),
+                    _ => Some(InstanceGeometry::of(instance, body.take(), assets)),
                 };
             }
         });
     }
 
     /// Places all instances, for rays in any direction at any time. `before` holds the poses at time 0; without it, all
-    /// instances are static. [`find_bodies`](Self::find_bodies) must be called before.
+    /// instances are static. [`prepare_geometry`](Self::prepare_geometry) must be called before.
     pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32], before: Option<&[PoseF32]>) {
-        let Self { bodies, things, endless, tree } = self;
+        let Self { geometries: bodies, instances: things, unbounded: endless, bvh: tree } = self;
         things.clear();
         endless.clear();
         tree.clear();
         for (k, body) in bodies.iter().enumerate() {
             let Some(body) = body else { continue };
-            let world_from_instance = rigid(&poses[k]);
+            let world_from_instance = orthonormalized(&poses[k]);
             let thing = things.len() as u32;
             let alpha = f64::from(scene.instances()[k].material.rgba[3].min(1.0));
             let motion = before.and_then(|before| Motion::between(before.get(k)?, &poses[k]));
             let casts_shadow = scene.instances()[k].group != Marker::GROUP;
-            things.push(Thing { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
+            things.push(TracedInstance { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
             match (body.bounds(), motion) {
                 (Some(bounds), None) => tree.add(thing, &world_from_instance, bounds),
                 (Some(bounds), Some(motion)) => tree.add_moving(thing, &motion, bounds),
@@ -175,40 +180,47 @@ impl Tracer {
     }
 
     /// Bounding box of all instances but the unbounded `instance`; `None` if another instance is unbounded.
-    pub(crate) fn bounds_beside(&self, instance: u32) -> Option<[V3; 2]> {
-        let alone = self.endless.iter().all(|&thing| self.things[thing as usize].instance == instance);
-        alone.then(|| self.tree.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
+    pub(crate) fn bounds_without(&self, instance: u32) -> Option<[V3; 2]> {
+        let alone = self.unbounded.iter().all(|&thing| self.instances[thing as usize].instance == instance);
+        alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
     }
 
     /// Pose of a visible instance at a time.
     pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
-        let thing = self.things.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
-        Some(self.things[thing].at(time))
+        let thing = self.instances.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
+        Some(self.instances[thing].at(time))
     }
 
     /// Finds the nearest surface at a distance from 0 to `limit` \[m\], at a time. One copy per instruction set.
     #[inline(never)]
-    pub(crate) fn nearest<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Hit> {
+    pub(crate) fn closest_hit<S: Simd>(
+        &self,
+        s: S,
+        ray: &Ray,
+        limit: f64,
+        time: f64,
+        stack: &mut TraversalStack,
+    ) -> Option<Hit> {
         s.vectorize(
             #[inline(always)]
             || {
-                let (mut best, mut limit): (Option<Found>, f64) = (None, limit);
+                let (mut best, mut limit): (Option<HitCandidate>, f64) = (None, limit);
                 let mut meet = {
                     #[inline(always)]
                     |thing: u32, limit: f64| {
-                        let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
+                        let Some(found) = self.intersect(thing, ray, limit, time, stack) else { return limit };
                         if best.is_none_or(|b| {
-                            found.distance < b.distance || found.distance == b.distance && thing > b.thing
+                            found.distance < b.distance || found.distance == b.distance && thing > b.instance_index
                         }) {
                             best = Some(found);
                         }
                         limit.min(found.distance)
                     }
                 };
-                for &thing in &self.endless {
+                for &thing in &self.unbounded {
                     limit = meet(thing, limit);
                 }
-                self.tree.visit(ray, limit, meet);
+                self.bvh.traverse(ray, limit, meet);
                 self.hit(best?, time)
             },
         )
@@ -217,7 +229,14 @@ impl Tracer {
     /// Fraction of light that passes along a ray from distance 0 to `limit` \[m\], at a time: 0 past an opaque surface,
     /// and `1 - alpha` past each front of a transparent one. One copy per instruction set.
     #[inline(never)]
-    pub(crate) fn passes<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> f64 {
+    pub(crate) fn transmittance<S: Simd>(
+        &self,
+        s: S,
+        ray: &Ray,
+        limit: f64,
+        time: f64,
+        stack: &mut TraversalStack,
+    ) -> f64 {
         s.vectorize(
             #[inline(always)]
             || {
@@ -225,18 +244,19 @@ impl Tracer {
                 let mut meet = {
                     #[inline(always)]
                     |thing: u32, limit: f64| {
-                        let placed @ Thing { instance, alpha, casts_shadow, .. } = &self.things[thing as usize];
+                        let placed @ TracedInstance { instance, alpha, casts_shadow, .. } =
+                            &self.instances[thing as usize];
                         if !casts_shadow {
                             return limit;
                         }
                         if *alpha < 1.0 {
-                            left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
+                            left *= (1.0 - alpha).powi(self.front_hits(thing, ray, limit, time, stack));
                             return limit;
                         }
-                        let local = ray.seen_from(&placed.at(time));
-                        let blocked = match &self.bodies[*instance as usize] {
-                            Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
-                            Some(Body::Closed(shape)) => shape.intersect(&local, limit).is_some(),
+                        let local = ray.inverse_transformed_by(&placed.at(time));
+                        let blocked = match &self.geometries[*instance as usize] {
+                            Some(InstanceGeometry::Mesh(_, tree)) => tree.any_hit(&local, limit, stack),
+                            Some(InstanceGeometry::Closed(shape)) => shape.intersect(&local, limit).is_some(),
                             None => false,
                         };
                         if !blocked {
@@ -248,28 +268,29 @@ impl Tracer {
                     }
                 };
                 let mut limit = limit;
-                for &thing in &self.endless {
+                for &thing in &self.unbounded {
                     limit = meet(thing, limit);
                 }
-                self.tree.visit(ray, limit, meet);
+                self.bvh.traverse(ray, limit, meet);
                 left
             },
         )
     }
 
-    /// Number of front surfaces of an instance that a ray passes, at most [`MAX_FRONTS`].
+    /// Number of front surfaces of an instance that a ray passes, at most [`MAX_FRONT_HITS`].
     #[inline(never)]
-    fn fronts(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> i32 {
+    fn front_hits(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut TraversalStack) -> i32 {
         // Closed forms are convex: all surfaces after the first are backs.
-        let body = &self.bodies[self.things[thing as usize].instance as usize];
-        let most = if matches!(body, Some(Body::Closed(_))) { 1 } else { MAX_FRONTS };
+        let body = &self.geometries[self.instances[thing as usize].instance as usize];
+        let most = if matches!(body, Some(InstanceGeometry::Closed(_))) { 1 } else { MAX_FRONT_HITS };
         let (mut from, mut left, mut count) = (*ray, limit, 0);
         for _ in 0..most {
-            let met = self.meet(thing, &from, left, time, stack);
+            let met = self.intersect(thing, &from, left, time, stack);
             let Some(hit) = met.and_then(|found| self.hit(found, time)) else { break };
             count += i32::from(dot(hit.normal, ray.direction) < 0.0);
-            let onward = hit.distance + PAST * from.origin.iter().fold(hit.distance.max(1.0), |m, x| m.max(x.abs()));
-            from.origin = along(from.origin, onward, from.direction);
+            let onward =
+                hit.distance + RAY_OFFSET * from.origin.iter().fold(hit.distance.max(1.0), |m, x| m.max(x.abs()));
+            from.origin = add_scaled(from.origin, onward, from.direction);
             left -= onward;
         }
         count
@@ -277,31 +298,38 @@ impl Tracer {
 
     /// Intersects a ray with one instance.
     #[inline(always)]
-    fn meet(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Found> {
-        let placed @ Thing { instance, .. } = &self.things[thing as usize];
-        let local = ray.seen_from(&placed.at(time));
-        match self.bodies[*instance as usize].as_ref()? {
-            Body::Mesh(_, tree) => {
-                let (distance, index) = tree.nearest(&local, limit, None, stack)?;
-                Some(Found { thing, distance, index, normal: [0.0; 3] })
+    fn intersect(
+        &self,
+        thing: u32,
+        ray: &Ray,
+        limit: f64,
+        time: f64,
+        stack: &mut TraversalStack,
+    ) -> Option<HitCandidate> {
+        let placed @ TracedInstance { instance, .. } = &self.instances[thing as usize];
+        let local = ray.inverse_transformed_by(&placed.at(time));
+        match self.geometries[*instance as usize].as_ref()? {
+            InstanceGeometry::Mesh(_, tree) => {
+                let (distance, index) = tree.closest_hit(&local, limit, None, stack)?;
+                Some(HitCandidate { instance_index: thing, distance, index, normal: [0.0; 3] })
             }
-            Body::Closed(shape) => {
+            InstanceGeometry::Closed(shape) => {
                 let at = shape.intersect(&local, limit)?;
                 // These shapes are convex around their origin: the position of a surface point is its outward
                 // direction. Points of a plane have no height, so planes are excluded.
                 let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
                 let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
-                Some(Found { thing, distance: at.t, index: 0, normal })
+                Some(HitCandidate { instance_index: thing, distance: at.t, index: 0, normal })
             }
         }
     }
 
-    fn hit(&self, found: Found, time: f64) -> Option<Hit> {
-        let placed @ Thing { instance, .. } = &self.things[found.thing as usize];
+    fn hit(&self, found: HitCandidate, time: f64) -> Option<Hit> {
+        let placed @ TracedInstance { instance, .. } = &self.instances[found.instance_index as usize];
         let world_from_instance = placed.at(time);
-        let (triangle, normal) = match self.bodies[*instance as usize].as_ref()? {
-            Body::Mesh(_, tree) => (tree.number(found.index), tree.normal(found.index)?),
-            Body::Closed(_) => (0, found.normal),
+        let (triangle, normal) = match self.geometries[*instance as usize].as_ref()? {
+            InstanceGeometry::Mesh(_, tree) => (tree.mesh_index(found.index), tree.normal(found.index)?),
+            InstanceGeometry::Closed(_) => (0, found.normal),
         };
         let normal = world_from_instance.rotate(normal);
         Some(Hit { distance: found.distance, instance: *instance, triangle, normal, world_from_instance })
@@ -310,39 +338,49 @@ impl Tracer {
     /// Casts the rays of all samples where an instance may be visible, into a visibility buffer. One copy per
     /// instruction set.
     #[inline(never)]
-    pub(crate) fn draw<S: Simd>(&self, s: S, stack: &mut Stack, tile: &mut Tile, view: &CameraView<'_>, item: &Item) {
+    pub(crate) fn draw<S: Simd>(
+        &self,
+        s: S,
+        stack: &mut TraversalStack,
+        tile: &mut Tile,
+        view: &CameraView<'_>,
+        item: &DrawItem,
+    ) {
         let Some(area) = tile.overlap(item.rect) else { return };
         let index = item.instance as usize;
-        let Some(body) = &self.bodies[index] else { return };
+        let Some(body) = &self.geometries[index] else { return };
         let &CameraView { projection, lens: lens_rays, placed, first_ids } = view;
-        let lens = Lens::new(projection, &placed[index]);
-        let sight = lens_rays.zip(body.bounds()).map_or(Sight::Everywhere, |(_, bounds)| sight(&placed[index], bounds));
+        let lens = LocalCameraRays::new(projection, &placed[index]);
+        let sight = lens_rays.zip(body.bounds()).map_or(ViewCone::All, |(_, bounds)| view_cone(&placed[index], bounds));
         s.vectorize(
             #[inline(always)]
             || {
                 for by in area[1]..=area[3] {
                     for bx in area[0]..=area[2] {
-                        if lens_rays.is_some_and(|rays| !rays.may_see([bx, by], &sight)) {
+                        if lens_rays.is_some_and(|rays| !rays.may_contain([bx, by], &sight)) {
                             continue;
                         }
                         let block = tile.block(bx, by);
-                        if tile.hidden(block, item.nearness) {
+                        if tile.is_occluded(block, item.nearness) {
                             continue;
                         }
-                        tile.open(block);
+                        tile.prepare_block(block);
                         let mut drawn = false;
                         for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
                             let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
                             let samples = tile.samples(block, plane);
-                            let (side, parts) =
-                                if tile.only.is_some() { (&IN_A_ROW, 1) } else { (&TOGETHER, AREA / WIDTH) };
+                            let (side, parts) = if tile.only_row.is_some() {
+                                (&ROW_OFFSETS, 1)
+                            } else {
+                                (&BLOCK_OFFSETS, BLOCK_AREA / WIDTH)
+                            };
                             for part in 0..parts {
-                                let [x, y] = tile.only.map_or([4 * (part % 2), part & !1], |row| [0, row]);
+                                let [x, y] = tile.only_row.map_or([4 * (part % 2), part & !1], |row| [0, row]);
                                 let first = [bx * BLOCK + x, by * BLOCK + y];
                                 let at = side.map(|[i, j]| samples + (y + j) * BLOCK + x + i);
                                 let rays = match lens_rays {
                                     None => lens.pinhole([first[0] as f64 + dx, first[1] as f64 + dy], side),
-                                    Some(rays) => lens.bent(rays, plane, first, side),
+                                    Some(rays) => lens.lens_directions(rays, plane, first, side),
                                 };
                                 let (nearness, ids) = (&mut *tile.nearness, &mut *tile.id);
                                 let samples = TileSamples { nearness, ids, at };
@@ -350,7 +388,7 @@ impl Tracer {
                             }
                         }
                         if drawn {
-                            tile.touch(block);
+                            tile.mark_dirty(block);
                         }
                     }
                 }
@@ -361,8 +399,8 @@ impl Tracer {
 
 /// The nearest hit so far, as far as needed for comparisons.
 #[derive(Clone, Copy, Debug)]
-struct Found {
-    thing: u32,
+struct HitCandidate {
+    instance_index: u32,
     distance: f64,
     /// Position of the triangle in its BVH.
     index: usize,
@@ -371,12 +409,12 @@ struct Found {
 }
 
 /// Bounding cone of an instance, from bounds in its own frame.
-fn sight(placed: &Placed, [lo, hi]: [V3; 2]) -> Sight {
+fn view_cone(placed: &PlacedInstance, [lo, hi]: [V3; 2]) -> ViewCone {
     let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
-    let pose = wide(&placed.camera_from_instance);
+    let pose = pose_to_f64(&placed.camera_from_instance);
     // A margin, because poses are single precision.
     let size = lo.iter().chain(&hi).chain(&pose.translation).fold(0.0f64, |m, x| m.max(x.abs()));
-    Sight::of_ball(pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]))), dot(half, half).sqrt() + 1e-6 * size)
+    ViewCone::of_sphere(pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]))), dot(half, half).sqrt() + 1e-6 * size)
 }
 
 /// Eight samples of a tile.
@@ -390,7 +428,7 @@ struct TileSamples<'a> {
 }
 
 /// Camera rays in the frame of an instance.
-struct Lens {
+struct LocalCameraRays {
     rotation: [V3; 3],
     origin: V3,
     c: [f64; 2],
@@ -398,9 +436,9 @@ struct Lens {
     near: f64,
 }
 
-impl Lens {
-    fn new(projection: &Projection, placed: &Placed) -> Self {
-        let pose = wide(&placed.local.instance_from_camera);
+impl LocalCameraRays {
+    fn new(projection: &Projection, placed: &PlacedInstance) -> Self {
+        let pose = pose_to_f64(&placed.local.instance_from_camera);
         Self {
             rotation: pose.rotation,
             origin: pose.translation,
@@ -412,7 +450,7 @@ impl Lens {
 
     /// Rays of eight samples of a pinhole camera, in the optical frame; the first one is at (u, v).
     #[inline(always)]
-    fn pinhole(&self, [u, v]: [f64; 2], side: &Side) -> [V3; WIDTH] {
+    fn pinhole(&self, [u, v]: [f64; 2], side: &SampleOffsets) -> [V3; WIDTH] {
         let mut rays = [[0.0, 0.0, 1.0]; WIDTH];
         for (ray, [i, j]) in rays.iter_mut().zip(side) {
             *ray = [(u + *i as f64 - self.c[0]) / self.f[0], (v + *j as f64 - self.c[1]) / self.f[1], 1.0];
@@ -422,7 +460,7 @@ impl Lens {
 
     /// Rays of one sample plane of eight pixels through a lens; 0 for samples without a ray.
     #[inline(always)]
-    fn bent(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2], side: &Side) -> [V3; WIDTH] {
+    fn lens_directions(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2], side: &SampleOffsets) -> [V3; WIDTH] {
         let mut out = [[0.0; 3]; WIDTH];
         for (ray, [i, j]) in out.iter_mut().zip(side) {
             *ray = rays.direction(plane, [x + i, y + j]).map(f64::from);
@@ -436,9 +474,9 @@ impl Lens {
     fn cast<S: Simd>(
         &self,
         s: S,
-        body: &Body,
+        body: &InstanceGeometry,
         directions: [V3; WIDTH],
-        stack: &mut Stack,
+        stack: &mut TraversalStack,
         samples: TileSamples<'_>,
         first_id: u32,
     ) -> bool {
@@ -453,24 +491,24 @@ impl Lens {
             let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2] * c[2]);
             *length = dot(d, d).sqrt();
             // Rays start at the near plane.
-            *ray = Ray { origin: along(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };
+            *ray = Ray { origin: add_scaled(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };
         }
-        let mut packet = Packet::of(&rays, f64::INFINITY);
+        let mut packet = Packet::from_rays(&rays, f64::INFINITY);
         for k in 0..WIDTH {
             // Stored nearness is single precision.
             let limit = (1.000_001 / f64::from(nearness[at[k]]) - self.near) * length[k];
-            packet.shorten(k, if none[k] { -1.0 } else { limit });
+            packet.limit_to(k, if none[k] { -1.0 } else { limit });
         }
         let mut found = [None; WIDTH];
         match body {
-            Body::Mesh(_, tree) => {
-                tree.nearest_of_packet(s, &packet, ShearPacket::new(s, &packet).as_ref(), stack, &mut found);
+            InstanceGeometry::Mesh(_, tree) => {
+                tree.closest_hits(s, &packet, ShearedPacket::new(s, &packet).as_ref(), stack, &mut found);
                 for (_, index) in found.iter_mut().flatten() {
-                    *index = tree.number(*index) as usize;
+                    *index = tree.mesh_index(*index) as usize;
                 }
             }
-            Body::Closed(shape) => {
-                for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+            InstanceGeometry::Closed(shape) => {
+                for k in (0..WIDTH).filter(|&k| packet.is_active(k)) {
                     let at = shape.intersect(&rays[k], packet.limit(k));
                     found[k] = at.map(|at| (at.t, shape.face(&at, &rays[k])));
                 }
@@ -486,7 +524,7 @@ impl Lens {
                 drawn = true;
             }
         }
-        debug_assert!(first_id != NOTHING);
+        debug_assert!(first_id != NO_ID);
         drawn
     }
 }

@@ -1,10 +1,10 @@
 //! Interpolation between two poses.
 
-use kinetoscope_scene::vector::{V3, along, sub};
+use kinetoscope_scene::vector::{V3, add_scaled, sub};
 use kinetoscope_scene::{PoseF32, PoseF64};
 
 /// The time of the second pose; the first pose has the time 0.
-pub(crate) const NOW: f64 = 1.0;
+pub(crate) const END_TIME: f64 = 1.0;
 
 /// Motion between two poses. The origin moves straight at constant speed. The axes rotate the shorter way, by a
 /// normalized blend of unit quaternions (nlerp). Between poses 0.5 rad apart, that differs from a steady rotation by at
@@ -14,19 +14,19 @@ pub(crate) struct Motion {
     to: PoseF64,
     origins: [V3; 2],
     /// Quaternions w, x, y, z; `None` without rotation.
-    turn: Option<[[f64; 4]; 2]>,
+    rotation: Option<[[f64; 4]; 2]>,
 }
 
 /// Converts a pose to double precision.
-pub(crate) fn wide(pose: &PoseF32) -> PoseF64 {
+pub(crate) fn pose_to_f64(pose: &PoseF32) -> PoseF64 {
     PoseF64 { rotation: pose.rotation.map(|r| r.map(f64::from)), translation: pose.translation.map(f64::from) }
 }
 
 /// Converts a pose to double precision and orthonormalizes its rotation to the last digits. With a rotation in single
 /// precision, a transform and its inverse move a point by 1e-7 of its coordinates, so a surface would not contain its
 /// own points.
-pub(crate) fn rigid(pose: &PoseF32) -> PoseF64 {
-    let PoseF64 { mut rotation, translation } = wide(pose);
+pub(crate) fn orthonormalized(pose: &PoseF32) -> PoseF64 {
+    let PoseF64 { mut rotation, translation } = pose_to_f64(pose);
     // The nearest rotation, by Newton's iteration R (3 - R'R) / 2: an error of e becomes one of e². Axis-aligned
     // rotations keep their bits. Source: Higham, Computing the polar decomposition, 1986.
     for _ in 0..3 {
@@ -44,21 +44,21 @@ impl Motion {
         if from == to {
             return None;
         }
-        let (a, b) = (rigid(from), rigid(to));
+        let (a, b) = (orthonormalized(from), orthonormalized(to));
         let turn = (from.rotation != to.rotation).then(|| {
             let (p, q) = (quaternion(&a.rotation), quaternion(&b.rotation));
             // The nearer one of the two quaternions of a rotation.
             let sign = if p.iter().zip(q).map(|(x, y)| x * y).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
             [p, q.map(|x| sign * x)]
         });
-        Some(Self { to: b, origins: [a.translation, b.translation], turn })
+        Some(Self { to: b, origins: [a.translation, b.translation], rotation: turn })
     }
 
-    /// Pose at a time from 0 to [`NOW`].
+    /// Pose at a time from 0 to [`END_TIME`].
     pub(crate) fn at(&self, time: f64) -> PoseF64 {
         let [from, to] = self.origins;
-        let translation = along(from, time, sub(to, from));
-        let rotation = self.turn.map_or(self.to.rotation, |[p, q]| {
+        let translation = add_scaled(from, time, sub(to, from));
+        let rotation = self.rotation.map_or(self.to.rotation, |[p, q]| {
             let blend = [0, 1, 2, 3].map(|k| p[k] + time * (q[k] - p[k]));
             matrix(blend)
         });
@@ -68,7 +68,7 @@ impl Motion {
     /// A box that contains, at every time, a box given in the moving frame.
     pub(super) fn bounds(&self, [lo, hi]: [V3; 2], larger: f64) -> [V3; 2] {
         let [a, b] = self.origins;
-        let reach = match self.turn {
+        let reach = match self.rotation {
             None => self.to.rotation.map(|r| {
                 let middle = (0..3).map(|k| 0.5 * r[k] * (lo[k] + hi[k])).sum::<f64>();
                 let half = (0..3).map(|k| 0.5 * r[k].abs() * (hi[k] - lo[k])).sum::<f64>();

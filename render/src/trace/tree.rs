@@ -9,36 +9,36 @@ use kinetoscope_scene::Ray;
 use kinetoscope_scene::vector::{V3, scale};
 
 /// Enlargement of boxes: more than the rounding of the test.
-const LARGER: f64 = 1.0 + 1e-6;
+const BOUNDS_SCALE: f64 = 1.0 + 1e-6;
 /// Depth of splits by the heuristic.
-const UNEVEN: usize = 8;
+const MAX_SAH_DEPTH: usize = 8;
 /// More than the depth of any BVH: below, nodes of fewer than 2^32 instances are split in half.
-const DEPTH: usize = UNEVEN + 32;
+const MAX_DEPTH: usize = MAX_SAH_DEPTH + 32;
 /// Larger nodes are not split by the heuristic: that takes as long as several thousand rays.
-const FEW: usize = 64;
+const MAX_SAH_SPLIT: usize = 64;
 
 /// A box that contains two boxes, or an instance.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: [V3; 2],
     /// Index of the second child; the first child follows this node. 0 for a leaf.
-    second: u32,
-    thing: u32,
+    second_child: u32,
+    instance: u32,
 }
 
 /// A box, its center (doubled), and its instance.
-type Boxed = ([V3; 2], V3, u32);
+type InstanceItem = ([V3; 2], V3, u32);
 
 /// A BVH over boxes; keeps its memory.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tree {
-    boxes: Vec<Boxed>,
+pub(super) struct InstanceBvh {
+    boxes: Vec<InstanceItem>,
     nodes: Vec<Node>,
 }
 
-impl Tree {
+impl InstanceBvh {
     pub(super) fn bytes(&self) -> usize {
-        self.boxes.capacity() * size_of::<Boxed>() + self.nodes.capacity() * size_of::<Node>()
+        self.boxes.capacity() * size_of::<InstanceItem>() + self.nodes.capacity() * size_of::<Node>()
     }
 
     pub(super) fn clear(&mut self) {
@@ -50,7 +50,7 @@ impl Tree {
     pub(super) fn add(&mut self, thing: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) {
         let at = pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
         let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
-        let reach = pose.rotation.map(|r| LARGER * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
+        let reach = pose.rotation.map(|r| BOUNDS_SCALE * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
         let pad = [0, 1, 2].map(|k| reach[k] + 1e-9 * (at[k].abs() + reach[k]));
         let bounds = [[0, 1, 2].map(|k| at[k] - pad[k]), [0, 1, 2].map(|k| at[k] + pad[k])];
         self.boxes.push((bounds, scale(at, 2.0), thing));
@@ -58,7 +58,7 @@ impl Tree {
 
     /// Adds a moving instance.
     pub(super) fn add_moving(&mut self, thing: u32, motion: &Motion, bounds: [V3; 2]) {
-        let [lo, hi] = motion.bounds(bounds, LARGER);
+        let [lo, hi] = motion.bounds(bounds, BOUNDS_SCALE);
         self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
     }
 
@@ -79,7 +79,7 @@ impl Tree {
     /// Visits the instances whose boxes a ray meets at distances from 0 to `limit`, near boxes first. `act` receives an
     /// instance and the limit, and returns a new limit.
     #[inline(always)]
-    pub(super) fn visit(&self, ray: &Ray, mut limit: f64, mut act: impl FnMut(u32, f64) -> f64) {
+    pub(super) fn traverse(&self, ray: &Ray, mut limit: f64, mut act: impl FnMut(u32, f64) -> f64) {
         // A component close to 0 would have an infinite inverse, and infinity times zero is NaN.
         let inverse = ray.direction.map(|d| 1.0 / if d.abs() < 1e-200 { 1e-200f64.copysign(d) } else { d });
         // Plain comparisons, because those of the library check for NaN.
@@ -94,10 +94,10 @@ impl Tree {
                     let (a, b) = ((lo[k] - ray.origin[k]) * inverse[k], (hi[k] - ray.origin[k]) * inverse[k]);
                     (near, far) = (larger(near, smaller(a, b)), smaller(far, larger(a, b)));
                 }
-                (near <= far * LARGER).then_some(near)
+                (near <= far * BOUNDS_SCALE).then_some(near)
             }
         };
-        let mut waiting = [(0.0, 0u32); DEPTH];
+        let mut waiting = [(0.0, 0u32); MAX_DEPTH];
         let mut count = 0usize;
         let mut next = if self.nodes.is_empty() { None } else { enter(0, limit).map(|_| 0) };
         loop {
@@ -109,7 +109,7 @@ impl Tree {
                 next = (near <= limit).then_some(node);
                 continue;
             };
-            let Node { second, thing, .. } = self.nodes[node as usize];
+            let Node { second_child: second, instance: thing, .. } = self.nodes[node as usize];
             next = None;
             if second == 0 {
                 limit = act(thing, limit);
@@ -131,19 +131,19 @@ impl Tree {
     }
 }
 
-const NOTHING: [V3; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+const EMPTY: [V3; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
 fn union(all: [V3; 2], b: &[V3; 2]) -> [V3; 2] {
     [[0, 1, 2].map(|k| all[0][k].min(b[0][k])), [0, 1, 2].map(|k| all[1][k].max(b[1][k]))]
 }
 
 /// Order by the centers along an axis; of equal centers the first instance comes first.
-fn order(axis: usize, a: &Boxed, b: &Boxed) -> std::cmp::Ordering {
+fn order(axis: usize, a: &InstanceItem, b: &InstanceItem) -> std::cmp::Ordering {
     a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2))
 }
 
 /// Sorts a few boxes for the best split; returns its position.
-fn best_cut(boxes: &mut [Boxed]) -> usize {
+fn best_split(boxes: &mut [InstanceItem]) -> usize {
     let area = |b: [V3; 2]| {
         let [x, y, z] = [0, 1, 2].map(|k| b[1][k] - b[0][k]);
         x * y + y * z + z * x
@@ -151,13 +151,13 @@ fn best_cut(boxes: &mut [Boxed]) -> usize {
     let mut best = (f64::INFINITY, 0, boxes.len() / 2);
     for axis in 0..3 {
         boxes.sort_unstable_by(|a, b| order(axis, a, b));
-        let mut costs = [0.0f64; FEW];
-        let mut sum = NOTHING;
+        let mut costs = [0.0f64; MAX_SAH_SPLIT];
+        let mut sum = EMPTY;
         for (k, (b, ..)) in boxes.iter().enumerate().skip(1).rev() {
             sum = union(sum, b);
             costs[k] = (boxes.len() - k) as f64 * area(sum);
         }
-        sum = NOTHING;
+        sum = EMPTY;
         for (k, (b, ..)) in (1..).zip(&boxes[..boxes.len() - 1]) {
             sum = union(sum, b);
             let cost = k as f64 * area(sum) + costs[k];
@@ -173,22 +173,23 @@ fn best_cut(boxes: &mut [Boxed]) -> usize {
 }
 
 /// Adds the node of some boxes, and all nodes below.
-fn split(boxes: &mut [Boxed], nodes: &mut Vec<Node>, depth: usize) {
-    let around = boxes.iter().fold(NOTHING, |all, (b, ..)| union(all, b));
+fn split(boxes: &mut [InstanceItem], nodes: &mut Vec<Node>, depth: usize) {
+    let around = boxes.iter().fold(EMPTY, |all, (b, ..)| union(all, b));
     let index = nodes.len();
-    nodes.push(Node { bounds: around, second: 0, thing: boxes[0].2 });
+    nodes.push(Node { bounds: around, second_child: 0, instance: boxes[0].2 });
     if boxes.len() == 1 {
         return;
     }
-    let at = if depth < UNEVEN && boxes.len() <= FEW { best_cut(boxes) } else { halve(boxes) };
+    let at =
+        if depth < MAX_SAH_DEPTH && boxes.len() <= MAX_SAH_SPLIT { best_split(boxes) } else { median_split(boxes) };
     let (low, high) = boxes.split_at_mut(at);
     split(low, nodes, depth + 1);
-    nodes[index].second = nodes.len() as u32;
+    nodes[index].second_child = nodes.len() as u32;
     split(high, nodes, depth + 1);
 }
 
 /// Splits boxes into halves of equal number, along the longest side.
-fn halve(boxes: &mut [Boxed]) -> usize {
+fn median_split(boxes: &mut [InstanceItem]) -> usize {
     let spread = |axis: usize| {
         let ends = boxes
             .iter()
@@ -213,7 +214,7 @@ mod tests {
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         for count in [0usize, 1, 2, 3, 7, 64, 65, 300] {
-            let mut tree = Tree::default();
+            let mut tree = InstanceBvh::default();
             let boxes: Vec<[V3; 2]> = (0..count)
                 .map(|_| {
                     let lo = [0, 1, 2].map(|_| 4.0 * number() - 2.0);
@@ -240,7 +241,7 @@ mod tests {
                     near <= far
                 };
                 let mut visited = vec![false; count];
-                tree.visit(&ray, limit, |thing, limit| {
+                tree.traverse(&ray, limit, |thing, limit| {
                     assert!(!std::mem::replace(&mut visited[thing as usize], true), "visited twice");
                     limit
                 });

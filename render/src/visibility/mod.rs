@@ -109,7 +109,7 @@ pub enum RenderError {
     #[error(
         "{what}: colours come from paths all over the lens and the exposure, and {renderer} follows none; use renderer: RayTraced"
     )]
-    NeedsPaths {
+    NeedsPathTracing {
         /// Name of the feature.
         what: &'static str,
         /// Name of the renderer.
@@ -143,17 +143,17 @@ pub enum RenderError {
     },
     /// The poses at shutter opening are more recent than the opening.
     #[error(
-        "the shutter opens {span} s before the picture's instant, but where things were is known from {before} s before"
+        "the shutter opens {span} s before the picture's instant, but where things were is known from {age} s before"
     )]
-    Opened {
+    ShutterPoses {
         /// Age of the poses at the time stamp of the image \[s\].
-        before: f64,
+        age: f64,
         /// Time from shutter opening to the time stamp \[s\].
         span: f64,
     },
     /// Rendering was canceled by [`RenderProgress::cancel`](crate::progress::RenderProgress::cancel).
     #[error("the picture was broken off after {samples} of {total} paths")]
-    Cancelled {
+    Canceled {
         /// Number of traced paths.
         samples: u64,
         /// Number of paths of the batch.
@@ -176,7 +176,7 @@ pub enum RenderError {
     },
     /// The exposure compensation is out of range.
     #[error("an exposure of {stops} stops; it must be -20 to 20")]
-    Stops {
+    ExposureCompensation {
         /// Exposure compensation in stops.
         stops: f32,
     },

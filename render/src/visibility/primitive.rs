@@ -9,7 +9,7 @@
 use crate::simd::{F, LANES, M, Simd, U, V3, abs, load, load_u, max, min, select, select_u, splat, splat_u};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::vector::{along, dot, scale};
+use kinetoscope_scene::vector::{add_scaled, dot, scale};
 
 /// Hits of sixteen rays with a shape.
 #[derive(Clone, Copy)]
@@ -32,7 +32,7 @@ struct Interval<S: Simd> {
 
 /// The first surface at or behind `near`. An interval that leaves before it enters is empty.
 #[inline(always)]
-fn first<S: Simd>(s: S, i: Interval<S>, near: f32) -> (M<S>, F<S>, M<S>) {
+fn first_surface<S: Simd>(s: S, i: Interval<S>, near: f32) -> (M<S>, F<S>, M<S>) {
     let near = splat(s, near);
     let outside = i.enter.simd_ge(near);
     let t = select(outside, i.enter, i.leave);
@@ -52,7 +52,7 @@ const EMPTY: f32 = f32::INFINITY;
 /// the ray's closest point; the discriminant would cancel for small balls far away. Source: Haines et al., Precision
 /// improvements for ray/sphere intersection, Ray Tracing Gems, 2019.
 #[inline(always)]
-fn ball<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
+fn intersect_sphere<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
     let dd = d.dot(d);
     let middle = -(o.dot(d) / dd);
     let p = o.add(d.scale(middle));
@@ -67,7 +67,7 @@ fn ball<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
 
 /// An infinite cylinder about z.
 #[inline(always)]
-fn tube<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
+fn infinite_cylinder<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
     let dd = d.x * d.x + d.y * d.y;
     let along = dd.simd_lt(splat(s, 1e-18));
     let dd = select(along, splat(s, 1.0), dd);
@@ -123,7 +123,7 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             PrimitiveHit { hit, t, normal: V3::splat(s, [0., 0., 1.]), face: splat_u(s, 0) }
         }
         Shape::Sphere(sphere) => {
-            let (hit, t, _) = first(s, ball(s, o, d, sphere.radius), near);
+            let (hit, t, _) = first_surface(s, intersect_sphere(s, o, d, sphere.radius), near);
             PrimitiveHit { hit, t, normal: o.add(d.scale(t)), face: splat_u(s, 0) }
         }
         Shape::Ellipsoid(ellipsoid) => {
@@ -133,7 +133,7 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
                 |v: V3<S>| V3 { x: v.x * k[0], y: v.y * k[1], z: v.z * k[2] }
             };
             let (o, d) = (by(o), by(d));
-            let (hit, t, _) = first(s, ball(s, o, d, 1.0), near);
+            let (hit, t, _) = first_surface(s, intersect_sphere(s, o, d, 1.0), near);
             // The gradient of x²/a² + ...: the unit ball's normal, scaled once more; of about unit length.
             let small = ellipsoid.radii.iter().copied().fold(f32::MAX, f32::min);
             let p = o.add(d.scale(t));
@@ -142,7 +142,7 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
         }
         Shape::Capsule(capsule) => {
             let (r, h) = (capsule.radius, capsule.half_length);
-            let side = tube(s, o, d, r);
+            let side = infinite_cylinder(s, o, d, r);
             // The balls at the ends are inside of the tube.
             let near_axis = side.enter.simd_le(side.leave);
             if !near_axis.any_true() {
@@ -154,22 +154,22 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             all.enter = select(empty, splat(s, EMPTY), all.enter);
             all.leave = select(empty, splat(s, -EMPTY), all.leave);
             for end in [h, -h] {
-                let one = ball(s, V3 { z: o.z - end, ..o }, d, r);
+                let one = intersect_sphere(s, V3 { z: o.z - end, ..o }, d, r);
                 all = Interval { enter: min(all.enter, one.enter), leave: max(all.leave, one.leave) };
             }
-            let (hit, t, _) = first(s, all, near);
+            let (hit, t, _) = first_surface(s, all, near);
             let p = o.add(d.scale(t));
             let z = p.z - max(min(p.z, splat(s, h)), splat(s, -h));
             PrimitiveHit { hit: hit & near_axis, t, normal: V3 { x: p.x, y: p.y, z }, face: splat_u(s, 0) }
         }
         Shape::Cylinder(cylinder) => {
-            let side = tube(s, o, d, cylinder.radius);
+            let side = infinite_cylinder(s, o, d, cylinder.radius);
             if !side.enter.simd_le(side.leave).any_true() {
                 return none();
             }
             let caps = slab(s, o.z, d.z, cylinder.half_length);
             let all = Interval { enter: max(side.enter, caps.enter), leave: min(side.leave, caps.leave) };
-            let (hit, t, outside) = first(s, all, near);
+            let (hit, t, outside) = first_surface(s, all, near);
             let p = o.add(d.scale(t));
             let cap = t.simd_eq(select(outside, caps.enter, caps.leave));
             let flat = V3 { x: zero, y: zero, z: sign(s, p.z) };
@@ -183,7 +183,7 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             let z = slab(s, o.z, d.z, b.half[2]);
             let all =
                 Interval { enter: max(max(x.enter, y.enter), z.enter), leave: min(min(x.leave, y.leave), z.leave) };
-            let (hit, t, outside) = first(s, all, near);
+            let (hit, t, outside) = first_surface(s, all, near);
             let p = o.add(d.scale(t));
             let by_x = t.simd_eq(select(outside, x.enter, x.leave));
             let by_y = t.simd_eq(select(outside, y.enter, y.leave));
@@ -217,7 +217,7 @@ fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> 
                 let [o, d] = [&origins, &directions].map(|v| [0, 1, 2].map(|axis| f64::from(v[axis][k])));
                 let length = dot(d, d).sqrt();
                 // Rays start at the near plane.
-                let ray = Ray { origin: along(o, near.into(), d), direction: scale(d, 1.0 / length) };
+                let ray = Ray { origin: add_scaled(o, near.into(), d), direction: scale(d, 1.0 / length) };
                 let found = if ray.is_finite() { shape.intersect(&ray, f64::INFINITY) } else { None };
                 let Some(found) = found else { continue };
                 let inward = dot(found.normal, ray.at(found.t)) < 0.0 && !shape.is_one_sided();
@@ -237,7 +237,7 @@ fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd::{at_level, levels};
+    use crate::simd::{all_levels, at_level};
     use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 
     /// The ray-by-ray version agrees with the SIMD code.
@@ -252,7 +252,7 @@ mod tests {
             Cylinder { radius: 0.25, half_length: 0.4 }.into(),
             Box { half: [0.2, 0.3, 0.4] }.into(),
         ];
-        let mut dice = crate::geometry::Dice(41);
+        let mut dice = crate::geometry::TestRng(41);
         for shape in &shapes {
             let (mut hits, mut differ) = (0, 0);
             for packet in 0..300 {
@@ -261,7 +261,7 @@ mod tests {
                 let to: [[f64; 3]; LANES] = std::array::from_fn(|_| dice.point(0.5));
                 let directions: [[f32; LANES]; 3] =
                     std::array::from_fn(|axis| to.map(|to| to[axis] as f32 - from[axis]));
-                for level in levels() {
+                for level in all_levels() {
                     at_level!(level, s => {
                         let [x, y, z] = directions.each_ref().map(|d| load(s, d));
                         let (o, d) = (V3::splat(s, from), V3 { x, y, z });
@@ -295,7 +295,7 @@ mod tests {
     fn triangles() {
         let ball = kinetoscope_scene::shape::RenderMesh::new(&Shape::from(Sphere { radius: 0.5 }).tessellate(8), 0.5);
         let shape = Shape::from(kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(ball) });
-        for level in levels() {
+        for level in all_levels() {
             at_level!(level, s => {
                 let (o, d) = (V3::splat(s, [0.0, 0.0, 2.0]), V3::splat(s, [0.0, 0.0, -1.0]));
                 assert!(!intersect(s, &shape, o, d, 0.01).hit.any_true());

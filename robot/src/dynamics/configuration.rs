@@ -41,7 +41,10 @@ impl Configuration {
             floating_base: false,
             joint_positions: vec![0.0; description.drivable_joints().count()],
             mimic: MimicPositions::FollowDriver,
-            free_joint_poses: vec![Pose::identity(); description.joints.iter().filter(|j| is_free(j.kind)).count()],
+            free_joint_poses: vec![
+                Pose::identity();
+                description.joints.iter().filter(|j| has_multiple_dofs(j.kind)).count()
+            ],
         }
     }
 
@@ -72,14 +75,14 @@ impl Configuration {
     }
 
     /// Returns the configuration after motion at the constant generalized velocity `velocity` for `duration` \[s\]. The
-    /// layout of the velocity is that of [`Kinematics`](super::Kinematics).
+    /// layout of the velocity is that of [`Dynamics`](super::Dynamics).
     ///
     /// # Panics
     ///
-    /// If the length of `velocity` is not [`Kinematics::dof_count`](super::Kinematics::dof_count).
+    /// If the length of `velocity` is not [`Dynamics::dof_count`](super::Dynamics::dof_count).
     #[must_use]
     #[track_caller]
-    pub fn integrated(&self, description: &RobotDescription, velocity: &DVector<f64>, duration: f64) -> Self {
+    pub fn integrate(&self, description: &RobotDescription, velocity: &DVector<f64>, duration: f64) -> Self {
         let step = velocity * duration;
         let mut next = self.clone();
         let mut at = 0;
@@ -88,12 +91,12 @@ impl Configuration {
             step.rows(at - n, n).into_owned()
         };
         if self.floating_base {
-            next.root_pose = moved_free(&self.root_pose, take(6).as_slice());
+            next.root_pose = integrate_free_pose(&self.root_pose, take(6).as_slice());
         }
         for q in &mut next.joint_positions {
             *q += take(1)[0];
         }
-        let free = description.joints.iter().filter(|j| is_free(j.kind));
+        let free = description.joints.iter().filter(|j| has_multiple_dofs(j.kind));
         for (pose, joint) in next.free_joint_poses.iter_mut().zip(free) {
             *pose = match joint.kind {
                 JointKind::Planar => {
@@ -105,7 +108,7 @@ impl Configuration {
                         UnitQuaternion::from_axis_angle(&joint.axis, s[2]) * pose.rotation,
                     )
                 }
-                _ => moved_free(pose, take(6).as_slice()),
+                _ => integrate_free_pose(pose, take(6).as_slice()),
             };
         }
         assert_eq!(at, step.len(), "one velocity per degree of freedom");
@@ -124,7 +127,7 @@ pub fn planar_axes(axis: &Unit<Vector3<f64>>) -> [Unit<Vector3<f64>>; 2] {
 }
 
 /// True for joint types with several degrees of freedom.
-pub(super) fn is_free(kind: JointKind) -> bool {
+pub(super) fn has_multiple_dofs(kind: JointKind) -> bool {
     matches!(kind, JointKind::Floating | JointKind::Planar)
 }
 
@@ -133,7 +136,7 @@ pub(super) fn check_length(what: &'static str, expected: usize, found: usize) ->
 }
 
 /// Moves a pose by `step`: translation in the axes of the parent, then rotation in the axes of the child.
-fn moved_free(pose: &Pose, step: &[f64]) -> Pose {
+fn integrate_free_pose(pose: &Pose, step: &[f64]) -> Pose {
     Pose::from_parts(
         Translation3::from(pose.translation.vector + Vector3::new(step[0], step[1], step[2])),
         pose.rotation * UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5])),

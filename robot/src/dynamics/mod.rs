@@ -27,10 +27,10 @@ pub use configuration::{Configuration, MimicPositions, planar_axes};
 
 use crate::description::{JointId, JointKind, LinkId, RobotDescription};
 use crate::inertia::RigidInertia;
-use configuration::{check_length, is_free};
+use configuration::{check_length, has_multiple_dofs};
 use kinetoscope_scene::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
-use spatial::{Force, Inertia, Motion};
+use spatial::{SpatialForce, SpatialInertia, SpatialMotion};
 use std::ops::Range;
 
 /// Error of a dynamics computation.
@@ -81,7 +81,7 @@ pub struct Momentum {
 
 /// Kinematics and dynamics of a robot in one configuration.
 #[derive(Clone, Debug)]
-pub struct Kinematics<'a> {
+pub struct Dynamics<'a> {
     description: &'a RobotDescription,
     /// Links in topological order, parents first.
     order: Vec<LinkId>,
@@ -89,12 +89,12 @@ pub struct Kinematics<'a> {
     parent: Vec<Option<LinkId>>,
     world_from_link: Vec<Pose>,
     /// Inertia of each link, in world axes about `origin`.
-    inertia: Vec<Inertia>,
+    inertia: Vec<SpatialInertia>,
     dofs: Vec<Dof>,
     /// Range of `dofs` that moves each link relative to its parent.
     link_dofs: Vec<Range<usize>>,
     /// Range of generalized velocities of each joint.
-    joint_columns: Vec<Range<usize>>,
+    joint_dofs: Vec<Range<usize>>,
     /// Reference point of all spatial quantities in the world \[m\]: the origin of the root. A robot far from the world
     /// origin then loses no precision. The point is fixed in the world and does not move with the root.
     origin: Vector3<f64>,
@@ -104,14 +104,14 @@ pub struct Kinematics<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Dof {
     /// Index of its generalized velocity.
-    column: usize,
-    axis: Motion,
+    dof_index: usize,
+    axis: SpatialMotion,
     /// True if the axis is fixed in the parent, false if it is fixed in the child. For a joint with one degree of
     /// freedom both give the same result.
     fixed_in_parent: bool,
 }
 
-impl<'a> Kinematics<'a> {
+impl<'a> Dynamics<'a> {
     /// Computes the kinematics of the robot in `configuration`.
     ///
     /// # Errors
@@ -119,7 +119,7 @@ impl<'a> Kinematics<'a> {
     /// The description is not a tree, or the configuration has the wrong length or numbers that are not finite.
     pub fn new(description: &'a RobotDescription, configuration: &Configuration) -> Result<Self, DynamicsError> {
         let positions = configuration.resolved_positions(description)?;
-        let free_count = description.joints.iter().filter(|j| is_free(j.kind)).count();
+        let free_count = description.joints.iter().filter(|j| has_multiple_dofs(j.kind)).count();
         check_length("free_joint_poses", free_count, configuration.free_joint_poses.len())?;
         if !positions.iter().all(|q| q.is_finite()) {
             return Err(DynamicsError::NotFinite { what: "joint_positions" });
@@ -138,10 +138,10 @@ impl<'a> Kinematics<'a> {
             order,
             parent,
             world_from_link: vec![Pose::identity(); n],
-            inertia: vec![Inertia::zero(); n],
+            inertia: vec![SpatialInertia::zero(); n],
             dofs: Vec::new(),
             link_dofs: vec![0..0; n],
-            joint_columns: joint_columns(description, configuration.floating_base),
+            joint_dofs: joint_columns(description, configuration.floating_base),
             origin: configuration.root_pose.translation.vector,
         };
         this.place_links(configuration, &positions);
@@ -152,7 +152,8 @@ impl<'a> Kinematics<'a> {
                     Translation3::from(world_from_link.translation.vector - this.origin),
                     world_from_link.rotation,
                 );
-                this.inertia[i] = Inertia::new(&RigidInertia::from_inertial(inertial).transformed(&origin_from_link));
+                this.inertia[i] =
+                    SpatialInertia::new(&RigidInertia::from_inertial(inertial).transformed(&origin_from_link));
             }
         }
         Ok(this)
@@ -170,7 +171,7 @@ impl<'a> Kinematics<'a> {
             position_of[id.0] = *q;
         }
         let mut pose_of = vec![None; self.description.joints.len()];
-        let free = (0..pose_of.len()).filter(|&i| is_free(self.description.joints[i].kind));
+        let free = (0..pose_of.len()).filter(|&i| has_multiple_dofs(self.description.joints[i].kind));
         for (i, pose) in free.zip(&configuration.free_joint_poses) {
             pose_of[i] = Some(*pose);
         }
@@ -201,20 +202,20 @@ impl<'a> Kinematics<'a> {
             self.world_from_link[child.0] = world_from_child;
 
             let first = self.dofs.len();
-            let column = self.joint_columns[id.0].start;
+            let column = self.joint_dofs[id.0].start;
             let axis = world_from_joint.rotation * joint.axis.into_inner();
-            let through_child = Motion::rotation(axis, world_from_child.translation.vector - self.origin);
-            let mut push = |offset: usize, axis: Motion, fixed_in_parent: bool| {
-                self.dofs.push(Dof { column: column + offset, axis, fixed_in_parent });
+            let through_child = SpatialMotion::rotation(axis, world_from_child.translation.vector - self.origin);
+            let mut push = |offset: usize, axis: SpatialMotion, fixed_in_parent: bool| {
+                self.dofs.push(Dof { dof_index: column + offset, axis, fixed_in_parent });
             };
             match joint.kind {
                 JointKind::Fixed => {}
                 JointKind::Revolute | JointKind::Continuous => push(0, through_child, false),
-                JointKind::Prismatic => push(0, Motion::translation(axis), false),
+                JointKind::Prismatic => push(0, SpatialMotion::translation(axis), false),
                 JointKind::Planar => {
                     let [x, y] = planar_axes(&joint.axis);
-                    push(0, Motion::translation(world_from_joint.rotation * x.into_inner()), true);
-                    push(1, Motion::translation(world_from_joint.rotation * y.into_inner()), true);
+                    push(0, SpatialMotion::translation(world_from_joint.rotation * x.into_inner()), true);
+                    push(1, SpatialMotion::translation(world_from_joint.rotation * y.into_inner()), true);
                     push(2, through_child, false);
                 }
                 JointKind::Floating => self.push_free_dofs(column, &world_from_joint.rotation, &world_from_child),
@@ -227,12 +228,12 @@ impl<'a> Kinematics<'a> {
     fn push_free_dofs(&mut self, column: usize, world_from_parent: &UnitQuaternion<f64>, world_from_child: &Pose) {
         let point = world_from_child.translation.vector - self.origin;
         for (k, e) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
-            let axis = Motion::translation(world_from_parent * e);
-            self.dofs.push(Dof { column: column + k, axis, fixed_in_parent: true });
+            let axis = SpatialMotion::translation(world_from_parent * e);
+            self.dofs.push(Dof { dof_index: column + k, axis, fixed_in_parent: true });
         }
         for (k, e) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
-            let axis = Motion::rotation(world_from_child.rotation * e, point);
-            self.dofs.push(Dof { column: column + 3 + k, axis, fixed_in_parent: false });
+            let axis = SpatialMotion::rotation(world_from_child.rotation * e, point);
+            self.dofs.push(Dof { dof_index: column + 3 + k, axis, fixed_in_parent: false });
         }
     }
 
@@ -242,8 +243,8 @@ impl<'a> Kinematics<'a> {
     }
 
     /// Range of generalized velocities of a joint; empty for a fixed joint.
-    pub fn columns(&self, joint: JointId) -> Range<usize> {
-        self.joint_columns[joint.0].clone()
+    pub fn dof_range(&self, joint: JointId) -> Range<usize> {
+        self.joint_dofs[joint.0].clone()
     }
 
     /// Pose `world_from_link` of every link, indexed by [`LinkId`].
@@ -263,13 +264,13 @@ impl<'a> Kinematics<'a> {
 
     /// Center of mass of the robot in the world \[m\]; `None` if the robot has no mass.
     pub fn center_of_mass(&self) -> Option<Vector3<f64>> {
-        let whole = self.whole();
+        let whole = self.total_inertia();
         (whole.mass != 0.0).then(|| self.origin + whole.first_moment / whole.mass)
     }
 
     /// Potential energy \[J\] under `gravity` \[m/s²\] (z = -9.81 on earth), zero at the origin of the world.
     pub fn potential_energy(&self, gravity: &Vector3<f64>) -> f64 {
-        let whole = self.whole();
+        let whole = self.total_inertia();
         -gravity.dot(&(whole.first_moment + self.origin * whole.mass))
     }
 
@@ -291,7 +292,7 @@ impl<'a> Kinematics<'a> {
     /// If `velocity` is not [`dof_count`](Self::dof_count) long.
     #[track_caller]
     pub fn link_velocities(&self, velocity: &DVector<f64>) -> Vec<LinkVelocity> {
-        let at_link = |(v, pose): (&Motion, &Pose)| LinkVelocity {
+        let at_link = |(v, pose): (&SpatialMotion, &Pose)| LinkVelocity {
             linear: v.at(&(pose.translation.vector - self.origin)),
             angular: v.angular,
         };
@@ -306,7 +307,7 @@ impl<'a> Kinematics<'a> {
     #[track_caller]
     pub fn momentum(&self, velocity: &DVector<f64>) -> Momentum {
         let velocities = self.spatial_velocities(velocity);
-        let mut sum = Force::zero();
+        let mut sum = SpatialForce::zero();
         for (v, i) in velocities.iter().zip(&self.inertia) {
             sum += *i * *v;
         }
@@ -334,8 +335,8 @@ impl<'a> Kinematics<'a> {
                 while let Some(at) = carrier {
                     for other in &self.dofs[self.link_dofs[at.0].clone()] {
                         let value = other.axis.dot(&force);
-                        m[(dof.column, other.column)] = value;
-                        m[(other.column, dof.column)] = value;
+                        m[(dof.dof_index, other.dof_index)] = value;
+                        m[(other.dof_index, dof.dof_index)] = value;
                     }
                     carrier = self.parent[at.0];
                 }
@@ -380,19 +381,19 @@ impl<'a> Kinematics<'a> {
         assert_eq!(acceleration.len(), self.dof_count(), "one acceleration per degree of freedom");
         let velocities = self.spatial_velocities(velocity);
         // Gravity enters as an upward acceleration of the ground.
-        let ground = Motion { angular: Vector3::zeros(), linear: -gravity };
+        let ground = SpatialMotion { angular: Vector3::zeros(), linear: -gravity };
         let mut accelerations = vec![ground; self.order.len()];
-        let mut forces = vec![Force::zero(); self.order.len()];
+        let mut forces = vec![SpatialForce::zero(); self.order.len()];
         for &link in &self.order {
             let parent = self.parent[link.0];
             let mut a = parent.map_or(ground, |p| accelerations[p.0]);
             for dof in &self.dofs[self.link_dofs[link.0].clone()] {
                 let carrier = if dof.fixed_in_parent {
-                    parent.map_or_else(Motion::zero, |p| velocities[p.0])
+                    parent.map_or_else(SpatialMotion::zero, |p| velocities[p.0])
                 } else {
                     velocities[link.0]
                 };
-                a += dof.axis * acceleration[dof.column] + carrier.cross(&dof.axis) * velocity[dof.column];
+                a += dof.axis * acceleration[dof.dof_index] + carrier.cross(&dof.axis) * velocity[dof.dof_index];
             }
             accelerations[link.0] = a;
             let (inertia, v) = (self.inertia[link.0], velocities[link.0]);
@@ -402,7 +403,7 @@ impl<'a> Kinematics<'a> {
         for &link in self.order.iter().rev() {
             let force = forces[link.0];
             for dof in &self.dofs[self.link_dofs[link.0].clone()] {
-                tau[dof.column] = dof.axis.dot(&force);
+                tau[dof.dof_index] = dof.axis.dot(&force);
             }
             if let Some(parent) = self.parent[link.0] {
                 forces[parent.0] += force;
@@ -412,21 +413,21 @@ impl<'a> Kinematics<'a> {
     }
 
     #[track_caller]
-    fn spatial_velocities(&self, velocity: &DVector<f64>) -> Vec<Motion> {
+    fn spatial_velocities(&self, velocity: &DVector<f64>) -> Vec<SpatialMotion> {
         assert_eq!(velocity.len(), self.dof_count(), "one velocity per degree of freedom");
-        let mut velocities = vec![Motion::zero(); self.order.len()];
+        let mut velocities = vec![SpatialMotion::zero(); self.order.len()];
         for &link in &self.order {
-            let mut v = self.parent[link.0].map_or_else(Motion::zero, |p| velocities[p.0]);
+            let mut v = self.parent[link.0].map_or_else(SpatialMotion::zero, |p| velocities[p.0]);
             for dof in &self.dofs[self.link_dofs[link.0].clone()] {
-                v += dof.axis * velocity[dof.column];
+                v += dof.axis * velocity[dof.dof_index];
             }
             velocities[link.0] = v;
         }
         velocities
     }
 
-    fn whole(&self) -> Inertia {
-        let mut sum = Inertia::zero();
+    fn total_inertia(&self) -> SpatialInertia {
+        let mut sum = SpatialInertia::zero();
         for i in &self.inertia {
             sum += *i;
         }

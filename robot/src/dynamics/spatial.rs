@@ -9,7 +9,7 @@ use std::ops::{Add, AddAssign, Mul};
 
 /// Motion vector: a velocity, an acceleration, or an axis of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Motion {
+pub(super) struct SpatialMotion {
     pub(super) angular: Vector3<f64>,
     /// Velocity of the body point that coincides with the origin.
     pub(super) linear: Vector3<f64>,
@@ -17,7 +17,7 @@ pub(super) struct Motion {
 
 /// Force vector: a force or a momentum.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Force {
+pub(super) struct SpatialForce {
     /// Moment about the origin.
     pub(super) moment: Vector3<f64>,
     pub(super) force: Vector3<f64>,
@@ -25,7 +25,7 @@ pub(super) struct Force {
 
 /// Spatial inertia of one or several bodies about the origin. Source: equation 2.63.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inertia {
+pub(super) struct SpatialInertia {
     pub(super) mass: f64,
     /// Mass times center of mass \[kg m\].
     pub(super) first_moment: Vector3<f64>,
@@ -33,7 +33,7 @@ pub(super) struct Inertia {
     pub(super) inertia: Matrix3<f64>,
 }
 
-impl Motion {
+impl SpatialMotion {
     pub(super) fn zero() -> Self {
         Self { angular: Vector3::zeros(), linear: Vector3::zeros() }
     }
@@ -59,15 +59,15 @@ impl Motion {
 
     /// `self ×* other`: rate of change of the force vector `other` when it moves with velocity `self`. Source: equation
     /// 2.32.
-    pub(super) fn cross_force(&self, other: &Force) -> Force {
-        Force {
+    pub(super) fn cross_force(&self, other: &SpatialForce) -> SpatialForce {
+        SpatialForce {
             moment: self.angular.cross(&other.moment) + self.linear.cross(&other.force),
             force: self.angular.cross(&other.force),
         }
     }
 
     /// Scalar product: power, or the component of a force along an axis of motion.
-    pub(super) fn dot(&self, other: &Force) -> f64 {
+    pub(super) fn dot(&self, other: &SpatialForce) -> f64 {
         self.angular.dot(&other.moment) + self.linear.dot(&other.force)
     }
 
@@ -77,13 +77,13 @@ impl Motion {
     }
 }
 
-impl Force {
+impl SpatialForce {
     pub(super) fn zero() -> Self {
         Self { moment: Vector3::zeros(), force: Vector3::zeros() }
     }
 }
 
-impl Inertia {
+impl SpatialInertia {
     pub(super) fn zero() -> Self {
         Self { mass: 0.0, first_moment: Vector3::zeros(), inertia: Matrix3::zeros() }
     }
@@ -96,7 +96,7 @@ impl Inertia {
     }
 }
 
-impl Add for Motion {
+impl Add for SpatialMotion {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -104,13 +104,13 @@ impl Add for Motion {
     }
 }
 
-impl AddAssign for Motion {
+impl AddAssign for SpatialMotion {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl Mul<f64> for Motion {
+impl Mul<f64> for SpatialMotion {
     type Output = Self;
 
     fn mul(self, factor: f64) -> Self {
@@ -118,7 +118,7 @@ impl Mul<f64> for Motion {
     }
 }
 
-impl Add for Force {
+impl Add for SpatialForce {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -126,13 +126,13 @@ impl Add for Force {
     }
 }
 
-impl AddAssign for Force {
+impl AddAssign for SpatialForce {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl AddAssign for Inertia {
+impl AddAssign for SpatialInertia {
     fn add_assign(&mut self, other: Self) {
         self.mass += other.mass;
         self.first_moment += other.first_moment;
@@ -140,11 +140,11 @@ impl AddAssign for Inertia {
     }
 }
 
-impl Mul<Motion> for Inertia {
-    type Output = Force;
+impl Mul<SpatialMotion> for SpatialInertia {
+    type Output = SpatialForce;
 
-    fn mul(self, v: Motion) -> Force {
-        Force {
+    fn mul(self, v: SpatialMotion) -> SpatialForce {
+        SpatialForce {
             moment: self.inertia * v.angular + self.first_moment.cross(&v.linear),
             force: v.linear * self.mass - self.first_moment.cross(&v.angular),
         }

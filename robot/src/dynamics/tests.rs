@@ -4,7 +4,7 @@
 use super::*;
 use crate::description::{Inertial, Joint, Link, Mimic};
 use kinetoscope_scene::pose::from_xyz_rpy;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_vector};
 use nalgebra::{Matrix3, Unit};
 use std::f64::consts::FRAC_PI_2;
@@ -13,15 +13,15 @@ const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 const NO_GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 
 /// Random numbers, vectors and poses from one seed.
-struct Random(kinetoscope_scene::Random);
+struct Random(kinetoscope_scene::KeyedRng);
 
 impl Random {
     fn new(seed: u64) -> Self {
-        Self(kinetoscope_scene::Random::keyed(seed, 0, "robots"))
+        Self(kinetoscope_scene::KeyedRng::keyed(seed, 0, "robots"))
     }
 
     fn range(&mut self, low: f64, high: f64) -> f64 {
-        self.0.between(low, high)
+        self.0.uniform_range(low, high)
     }
 
     fn below(&mut self, n: usize) -> usize {
@@ -80,8 +80,8 @@ impl Builder {
     }
 }
 
-fn source() -> Source {
-    Source::new("test.urdf", 1)
+fn source() -> SourceLocation {
+    SourceLocation::new("test.urdf", 1)
 }
 
 fn link(name: String, inertial: Option<Inertial>, parent_joint: Option<JointId>) -> Link {
@@ -95,7 +95,7 @@ fn link(name: String, inertial: Option<Inertial>, parent_joint: Option<JointId>)
         collisions: Vec::new(),
         parent_joint,
         child_joints: Vec::new(),
-        between_joints: false,
+        is_auxiliary_frame: false,
     }
 }
 
@@ -140,7 +140,7 @@ fn random_robot(seed: u64, floating_base: bool, free: bool) -> (RobotDescription
     configuration.root_pose.translation.vector *= 50.0;
     // Integrating any velocity gives a valid configuration, planar joints included.
     let reach = random.velocities(dof_count(&description, &configuration));
-    (description.clone(), configuration.integrated(&description, &reach, 1.0))
+    (description.clone(), configuration.integrate(&description, &reach, 1.0))
 }
 
 fn shuffle_joints(description: &mut RobotDescription, random: &mut Random) {
@@ -158,7 +158,7 @@ fn shuffle_joints(description: &mut RobotDescription, random: &mut Random) {
 }
 
 fn dof_count(description: &RobotDescription, configuration: &Configuration) -> usize {
-    Kinematics::new(description, configuration).unwrap().dof_count()
+    Dynamics::new(description, configuration).unwrap().dof_count()
 }
 
 /// Robots of every combination of base and joint kinds, each with random velocities.
@@ -175,7 +175,7 @@ type Body = (Pose, f64, Matrix3<f64>);
 /// Pose, mass and tensor of each body, from `link_poses` and the numbers of the file only. The pose has its origin at
 /// the center of mass and the axes of the tensor.
 fn bodies(description: &RobotDescription, at: &Configuration) -> Vec<Body> {
-    let kinematics = Kinematics::new(description, at).unwrap();
+    let kinematics = Dynamics::new(description, at).unwrap();
     let of = |(link, pose): (&Link, &Pose)| link.inertial.as_ref().map(|i| (pose * i.link_from_com, i.mass, i.inertia));
     description.links.iter().zip(kinematics.link_poses()).filter_map(of).collect()
 }
@@ -192,8 +192,8 @@ fn body_velocities(
     velocity: &DVector<f64>,
 ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     const H: f64 = 1e-5;
-    let before = bodies(description, &at.integrated(description, velocity, -H));
-    let after = bodies(description, &at.integrated(description, velocity, H));
+    let before = bodies(description, &at.integrate(description, velocity, -H));
+    let after = bodies(description, &at.integrate(description, velocity, H));
     let difference = |((a, ..), (b, ..)): (&Body, &Body)| {
         ((b.translation.vector - a.translation.vector) / (2.0 * H), turn(a, b) / (2.0 * H))
     };
@@ -221,7 +221,7 @@ fn dalembert(
     let n = velocity.len();
     let moved = |sign: f64| {
         let mean = velocity + acceleration * (0.5 * sign * H);
-        bodies(description, &at.integrated(description, &mean, sign * H))
+        bodies(description, &at.integrate(description, &mean, sign * H))
     };
     let (before, now, after) = (moved(-1.0), bodies(description, at), moved(1.0));
     let mut loads = Vec::new();
@@ -260,7 +260,7 @@ fn two_link_arm() {
     let arm = two_links(m, l, c, i);
     for (q1, q2, v1, v2) in [(0.0, 0.0, 1.0, 1.0), (0.4, -1.1, 0.7, 2.0), (-2.0, FRAC_PI_2, -1.5, 0.3)] {
         let at = Configuration { joint_positions: vec![q1, q2], ..Configuration::zero(&arm) };
-        let k = Kinematics::new(&arm, &at).unwrap();
+        let k = Dynamics::new(&arm, &at).unwrap();
         let m22 = m[1] * c[1] * c[1] + i[1];
         let m12 = m22 + m[1] * l * c[1] * f64::cos(q2);
         let m11 = m[0] * c[0] * c[0] + i[0] + m22 + m[1] * (l * l + 2.0 * l * c[1] * f64::cos(q2));
@@ -290,7 +290,7 @@ fn pendulum() {
     b.add(LinkId(0), JointKind::Continuous, Vector3::y(), joint, bob);
     for q in [-1.0, 0.0, 0.3, 3.0] {
         let at = Configuration { joint_positions: vec![q], ..Configuration::zero(&b.0) };
-        let k = Kinematics::new(&b.0, &at).unwrap();
+        let k = Dynamics::new(&b.0, &at).unwrap();
         assert!((k.gravity_torque(&EARTH)[0] - 2.0 * 9.81 * 0.5 * f64::sin(q)).abs() < 1e-14);
         assert!((k.mass_matrix()[(0, 0)] - 2.0 * 0.25).abs() < 1e-15);
         let height = 2.0 * (1.0 - 0.5 * f64::cos(q));
@@ -305,7 +305,7 @@ fn lift() {
     let tilted = from_xyz_rpy([0.0, 0.0, 0.2], [0.0, FRAC_PI_2, 0.0]);
     b.add(cart, JointKind::Prismatic, Vector3::z(), tilted, point_mass(1.0, 0.0, 0.0, 0.0));
     let at = Configuration { joint_positions: vec![0.5, 0.25], ..Configuration::zero(&b.0) };
-    let k = Kinematics::new(&b.0, &at).unwrap();
+    let k = Dynamics::new(&b.0, &at).unwrap();
     let limit = Tolerance::mixed(1e-15, "a handful of operations");
     assert_vector("gravity torque", &k.gravity_torque(&EARTH), &DVector::from_row_slice(&[4.0 * 9.81, 0.0]), limit);
     let expected = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 1.0]);
@@ -317,7 +317,7 @@ fn lift() {
 fn gravity() {
     const H: f64 = 1e-5;
     for (robot, at, _) in random_robots(0) {
-        let k = Kinematics::new(&robot, &at).unwrap();
+        let k = Dynamics::new(&robot, &at).unwrap();
         let gravity = Vector3::new(1.0, -2.0, -9.81);
         // From the poses and the file's masses alone, relative to the root, so that 50 m do not cost digits.
         let energy = |at: &Configuration| -> f64 {
@@ -327,7 +327,7 @@ fn gravity() {
         let n = k.dof_count();
         let gradient = DVector::from_fn(n, |j, _| {
             let unit = unit(n, j);
-            (energy(&at.integrated(&robot, &unit, H)) - energy(&at.integrated(&robot, &unit, -H))) / (2.0 * H)
+            (energy(&at.integrate(&robot, &unit, H)) - energy(&at.integrate(&robot, &unit, -H))) / (2.0 * H)
         });
         let limit = Tolerance::mixed(
             1e-7,
@@ -340,7 +340,7 @@ fn gravity() {
 #[test]
 fn mass_matrix() {
     for (robot, at, v) in random_robots(100) {
-        let k = Kinematics::new(&robot, &at).unwrap();
+        let k = Dynamics::new(&robot, &at).unwrap();
         let (n, m) = (k.dof_count(), k.mass_matrix());
         assert_eq!(m, m.transpose());
         // Columns by the Newton-Euler algorithm.
@@ -364,7 +364,7 @@ fn mass_matrix() {
 #[test]
 fn inverse_dynamics() {
     for (seed, (robot, at, v)) in random_robots(200).enumerate() {
-        let k = Kinematics::new(&robot, &at).unwrap();
+        let k = Dynamics::new(&robot, &at).unwrap();
         let a = Random::new(seed as u64 + 700).velocities(v.len());
         let expected = dalembert(&robot, &at, &v, &a, &EARTH);
         let limit = Tolerance::mixed(
@@ -384,13 +384,13 @@ fn velocity_terms() {
     const H: f64 = 1e-5;
     for seed in 0..8 {
         let (robot, at) = random_robot(2 * seed, false, false);
-        let k = Kinematics::new(&robot, &at).unwrap();
+        let k = Dynamics::new(&robot, &at).unwrap();
         let n = k.dof_count();
-        let mass = |at: &Configuration| Kinematics::new(&robot, at).unwrap().mass_matrix();
+        let mass = |at: &Configuration| Dynamics::new(&robot, at).unwrap().mass_matrix();
         let derivative: Vec<DMatrix<f64>> = (0..n)
             .map(|j| {
                 let unit = unit(n, j);
-                (mass(&at.integrated(&robot, &unit, H)) - mass(&at.integrated(&robot, &unit, -H))) / (2.0 * H)
+                (mass(&at.integrate(&robot, &unit, H)) - mass(&at.integrate(&robot, &unit, -H))) / (2.0 * H)
             })
             .collect();
         let v = Random::new(seed + 300).velocities(n);
@@ -409,8 +409,8 @@ fn velocity_terms() {
 fn energy_balance() {
     const H: f64 = 1e-5;
     for (robot, at, v) in random_robots(400) {
-        let k = Kinematics::new(&robot, &at).unwrap();
-        let energy = |t: f64| Kinematics::new(&robot, &at.integrated(&robot, &v, t)).unwrap().kinetic_energy(&v);
+        let k = Dynamics::new(&robot, &at).unwrap();
+        let energy = |t: f64| Dynamics::new(&robot, &at.integrate(&robot, &v, t)).unwrap().kinetic_energy(&v);
         let power = v.dot(&k.bias_force(&v, &NO_GRAVITY));
         let rate = (energy(H) - energy(-H)) / (2.0 * H);
         assert!((power - rate).abs() < 1e-6 * (1.0 + rate.abs()), "{power} {rate}");
@@ -422,7 +422,7 @@ fn floating_base() {
     const H: f64 = 1e-5;
     for seed in [1, 3, 5, 7] {
         let (robot, at) = random_robot(seed, true, seed > 3);
-        let k = Kinematics::new(&robot, &at).unwrap();
+        let k = Dynamics::new(&robot, &at).unwrap();
         let m = k.mass_matrix();
         let total = robot.total_mass();
         assert!((m.view((0, 0), (3, 3)).into_owned() - DMatrix::identity(3, 3) * total).amax() < 1e-13 * total);
@@ -430,7 +430,7 @@ fn floating_base() {
         let v = Random::new(seed + 500).velocities(k.dof_count());
         let momentum = k.momentum(&v);
         let com = |t: f64| {
-            let moved = Kinematics::new(&robot, &at.integrated(&robot, &v, t)).unwrap();
+            let moved = Dynamics::new(&robot, &at.integrate(&robot, &v, t)).unwrap();
             moved.center_of_mass().unwrap()
         };
         assert!((momentum.linear - (com(H) - com(-H)) * (total / (2.0 * H))).amax() < 1e-6 * momentum.linear.amax());
@@ -456,8 +456,8 @@ fn floating_base() {
 fn link_velocities() {
     const H: f64 = 1e-5;
     for (robot, at, v) in random_robots(600) {
-        let k = Kinematics::new(&robot, &at).unwrap();
-        let poses = |t: f64| Kinematics::new(&robot, &at.integrated(&robot, &v, t)).unwrap().link_poses().to_vec();
+        let k = Dynamics::new(&robot, &at).unwrap();
+        let poses = |t: f64| Dynamics::new(&robot, &at.integrate(&robot, &v, t)).unwrap().link_poses().to_vec();
         let (before, after) = (poses(-H), poses(H));
         for ((a, b), found) in before.iter().zip(&after).zip(k.link_velocities(&v)) {
             let linear = (b.translation.vector - a.translation.vector) / (2.0 * H);
@@ -488,7 +488,7 @@ fn fixed_joints() {
 
     let mut at = Configuration::zero(&apart.0);
     at.free_joint_poses = vec![random.pose()];
-    let (apart, fused) = (Kinematics::new(&apart.0, &at).unwrap(), Kinematics::new(&fused.0, &at).unwrap());
+    let (apart, fused) = (Dynamics::new(&apart.0, &at).unwrap(), Dynamics::new(&fused.0, &at).unwrap());
     assert!((apart.mass_matrix() - fused.mass_matrix()).amax() < 1e-14);
     let (v, w) = (random.velocities(6), random.velocities(6));
     let limit = Tolerance::mixed(1e-13, "rounding of two orders of the same sums");
@@ -500,9 +500,9 @@ fn fixed_joints() {
 fn far_away() {
     let (robot, mut at) = random_robot(4, false, false);
     at.root_pose.translation = Translation3::identity();
-    let near = Kinematics::new(&robot, &at).unwrap().mass_matrix();
+    let near = Dynamics::new(&robot, &at).unwrap().mass_matrix();
     at.root_pose.translation = Translation3::new(1e6, -1e6, 0.0);
-    let far = Kinematics::new(&robot, &at).unwrap().mass_matrix();
+    let far = Dynamics::new(&robot, &at).unwrap().mass_matrix();
     // The remaining difference is the rounding of the poses themselves, 1e6 * 2^-53.
     assert!((near - &far).amax() < 1e-8 * far.amax());
 }
@@ -513,11 +513,11 @@ fn mimic_joints() {
     robot.joints[1].mimic = Some(Mimic { source: source(), joint: JointId(0), multiplier: -2.0, offset: 0.1 });
     let mut at = Configuration { joint_positions: vec![0.3, 99.0], ..Configuration::zero(&robot) };
     assert_eq!(at.resolved_positions(&robot).unwrap(), [0.3, -0.5]);
-    let follow = Kinematics::new(&robot, &at).unwrap().mass_matrix();
+    let follow = Dynamics::new(&robot, &at).unwrap().mass_matrix();
     assert_eq!(follow.nrows(), 2, "a mimic joint is a coordinate");
     at.mimic = MimicPositions::AsGiven;
     at.joint_positions[1] = -0.5;
-    assert_eq!(Kinematics::new(&robot, &at).unwrap().mass_matrix(), follow);
+    assert_eq!(Dynamics::new(&robot, &at).unwrap().mass_matrix(), follow);
     at.joint_positions[1] = 1.5;
     assert_eq!(at.resolved_positions(&robot).unwrap(), [0.3, 1.5]);
 }
@@ -526,16 +526,18 @@ fn mimic_joints() {
 fn columns() {
     let (robot, mut at) = random_robot(2, false, true);
     at.floating_base = true;
-    let k = Kinematics::new(&robot, &at).unwrap();
+    let k = Dynamics::new(&robot, &at).unwrap();
     let mut next = 6;
     for (id, _) in robot.drivable_joints() {
-        assert_eq!(k.columns(id), next..next + 1);
+        assert_eq!(k.dof_range(id), next..next + 1);
         next += 1;
     }
-    let free: usize =
-        (0..robot.joints.len()).filter(|&i| is_free(robot.joints[i].kind)).map(|i| k.columns(JointId(i)).len()).sum();
+    let free: usize = (0..robot.joints.len())
+        .filter(|&i| has_multiple_dofs(robot.joints[i].kind))
+        .map(|i| k.dof_range(JointId(i)).len())
+        .sum();
     assert_eq!(next + free, k.dof_count());
-    let mut columns: Vec<_> = k.dofs.iter().map(|d| d.column).collect();
+    let mut columns: Vec<_> = k.dofs.iter().map(|d| d.dof_index).collect();
     columns.sort_unstable();
     assert!(columns.into_iter().eq(0..k.dof_count()));
 }
@@ -560,7 +562,7 @@ fn long_chain() {
         let next = Pose::translation(1e-3, 0.0, 0.0);
         tip = b.add(tip, JointKind::Revolute, Vector3::y(), next, point_mass(1e-3, 0.0, 0.0, 0.0));
     }
-    let k = Kinematics::new(&b.0, &Configuration::zero(&b.0)).unwrap();
+    let k = Dynamics::new(&b.0, &Configuration::zero(&b.0)).unwrap();
     assert!((k.link_pose(tip).translation.x - 200.0).abs() < 1e-6);
     // Hinges along x every millimeter: the first one holds Σ m g d k for k = 0..N, turning x towards -z.
     let expected = -1e-3 * 9.81 * 1e-3 * (N * (N - 1) / 2) as f64;
@@ -579,14 +581,14 @@ fn refusals() {
         (positions(vec![0.0, f64::NAN]), DynamicsError::NotFinite { what: "joint_positions" }),
         (extra, wrong("free_joint_poses", 0, 1)),
     ] {
-        assert_eq!(Kinematics::new(&arm, &at).unwrap_err(), error);
+        assert_eq!(Dynamics::new(&arm, &at).unwrap_err(), error);
     }
     let mut cyclic = arm.clone();
     cyclic.joints[1].parent = LinkId(2);
-    assert!(matches!(Kinematics::new(&cyclic, &zero), Err(DynamicsError::NotATree { .. })));
+    assert!(matches!(Dynamics::new(&cyclic, &zero), Err(DynamicsError::NotATree { .. })));
     let mut loose = arm.clone();
     loose.links[1].child_joints.clear();
-    assert_eq!(Kinematics::new(&loose, &zero).unwrap_err(), DynamicsError::NotATree { link: "link2".to_owned() });
+    assert_eq!(Dynamics::new(&loose, &zero).unwrap_err(), DynamicsError::NotATree { link: "link2".to_owned() });
     let massless = Builder::new(None).0;
-    assert_eq!(Kinematics::new(&massless, &Configuration::zero(&massless)).unwrap().center_of_mass(), None);
+    assert_eq!(Dynamics::new(&massless, &Configuration::zero(&massless)).unwrap().center_of_mass(), None);
 }

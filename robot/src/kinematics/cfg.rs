@@ -17,38 +17,38 @@ use serde::{Deserialize, Serialize};
 /// # let _ = tip;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tip<'n> {
+pub struct TipFrame<'n> {
     /// Control part or link that the frame belongs to.
-    pub name: TipName<'n>,
+    pub name: TipSelector<'n>,
     /// Link to use instead of the last link of the part.
     pub link: Option<&'n str>,
     /// Pose of the tool center point in the frame of the link \[m\].
     pub tcp: Pose,
 }
 
-/// Name that selects the link and the joints of a [`Tip`].
+/// Name that selects the link and the joints of a [`TipFrame`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TipName<'n> {
+pub enum TipSelector<'n> {
     /// Control part: selects its last link.
     Part(&'n str),
     /// Link.
     Link(&'n str),
     /// Control part or, if no part has this name, link.
-    Either(&'n str),
+    PartOrLink(&'n str),
 }
 
-impl<'n> Tip<'n> {
+impl<'n> TipFrame<'n> {
     /// Selects the end of a control part, moved by the joints of the part.
     ///
     /// The link is the child of the last joint of the part. Fixed joints below that child are followed while there is
     /// exactly one of them, within one component of the URDF.
     pub fn of_part(part: &'n str) -> Self {
-        Self { name: TipName::Part(part), link: None, tcp: Pose::identity() }
+        Self { name: TipSelector::Part(part), link: None, tcp: Pose::identity() }
     }
 
     /// Selects a link, moved by all joints of the robot. Links that are fused into their parent are allowed.
     pub fn of_link(link: &'n str) -> Self {
-        Self { name: TipName::Link(link), link: None, tcp: Pose::identity() }
+        Self { name: TipSelector::Link(link), link: None, tcp: Pose::identity() }
     }
 
     /// Selects another link for the same joints. Links that are fused into their parent are allowed.
@@ -64,9 +64,9 @@ impl<'n> Tip<'n> {
     }
 }
 
-impl<'n> From<&'n str> for Tip<'n> {
+impl<'n> From<&'n str> for TipFrame<'n> {
     fn from(name: &'n str) -> Self {
-        Self { name: TipName::Either(name), link: None, tcp: Pose::identity() }
+        Self { name: TipSelector::PartOrLink(name), link: None, tcp: Pose::identity() }
     }
 }
 
@@ -84,23 +84,23 @@ pub enum IkTask {
 /// Preferred joint positions, for joints that the target leaves free (null-space posture).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Posture {
+pub struct NullSpacePosture {
     /// Preferred positions \[rad or m\], one for each column of the joints in question. Entries of mimic joints are
     /// ignored.
     pub rest: Vec<f64>,
     /// Fraction of the remaining way to go in one step, above 0 and at most 1.
-    #[serde(default = "whole")]
+    #[serde(default = "default_gain")]
     pub gain: f64,
 }
 
-fn whole() -> f64 {
+fn default_gain() -> f64 {
     1.0
 }
 
-impl Posture {
+impl NullSpacePosture {
     /// Creates a posture with gain 1.
     pub fn at(rest: impl Into<Vec<f64>>) -> Self {
-        Self { rest: rest.into(), gain: whole() }
+        Self { rest: rest.into(), gain: default_gain() }
     }
 }
 
@@ -124,7 +124,7 @@ pub struct IkCfg {
     /// Seed of the random starts. The same target and initial positions give bit-identical results in any batch.
     pub seed: u64,
     /// Preferred posture of joints that the target leaves free.
-    pub posture: Option<Posture>,
+    pub posture: Option<NullSpacePosture>,
 }
 
 impl Default for IkCfg {
@@ -143,7 +143,7 @@ impl Default for IkCfg {
 }
 
 /// Upper bound of `num_seeds`: memory for all random starts is allocated at once.
-const MOST_SEEDS: u32 = 100_000;
+const MAX_SEEDS: u32 = 100_000;
 
 impl IkCfg {
     /// Checks every number. `joints` is the number of columns.
@@ -164,9 +164,9 @@ impl IkCfg {
         check(positive(self.rotation_tolerance), "rotation_tolerance", &self.rotation_tolerance, above_zero)?;
         check(positive(self.damping), "damping", &self.damping, above_zero)?;
         check(self.max_iterations > 0, "max_iterations", &self.max_iterations, "there must be at least 1")?;
-        let seeds = (1..=MOST_SEEDS).contains(&self.num_seeds);
+        let seeds = (1..=MAX_SEEDS).contains(&self.num_seeds);
         check(seeds, "num_seeds", &self.num_seeds, "it must be from 1 to 100000")?;
-        let Some(Posture { rest, gain }) = &self.posture else { return Ok(()) };
+        let Some(NullSpacePosture { rest, gain }) = &self.posture else { return Ok(()) };
         if rest.len() != joints {
             return Err(KinematicsError::WrongLength { what: "posture.rest", expected: joints, found: rest.len() });
         }

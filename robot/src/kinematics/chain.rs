@@ -15,18 +15,18 @@ pub struct Chain {
     pub(super) base: LinkId,
     pub(super) joints: Vec<ChainJoint>,
     /// Pose of the frame relative to the child of the last joint; relative to the base in a chain without joints.
-    pub(super) end: Pose,
+    pub(super) last_from_frame: Pose,
 }
 
 /// Joint of a chain, which moves everything behind it by one variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChainJoint {
     /// Pose of the joint relative to the child of the previous joint; relative to the base for the first joint.
-    pub(super) before: Pose,
+    pub(super) parent_from_joint: Pose,
     /// Axis in the joint's frame.
     pub(super) axis: Unit<Vector3<f64>>,
     /// True for a translation along the axis, false for a rotation about it.
-    pub(super) slides: bool,
+    pub(super) is_prismatic: bool,
     /// Index of the variable.
     pub(super) variable: usize,
     /// Position of the joint = ratio * variable + offset.
@@ -36,13 +36,13 @@ pub(super) struct ChainJoint {
 
 impl ChainJoint {
     /// Pose of the child in the frame of the joint.
-    pub(super) fn moved(&self, positions: &[f64]) -> Pose {
-        moved(self.slides, &self.axis, self.ratio * positions[self.variable] + self.offset)
+    pub(super) fn transform(&self, positions: &[f64]) -> Pose {
+        joint_transform(self.is_prismatic, &self.axis, self.ratio * positions[self.variable] + self.offset)
     }
 }
 
 /// Pose of a child in the frame of its joint at `position` \[rad or m\].
-pub(super) fn moved(slides: bool, axis: &Unit<Vector3<f64>>, position: f64) -> Pose {
+pub(super) fn joint_transform(slides: bool, axis: &Unit<Vector3<f64>>, position: f64) -> Pose {
     if slides {
         Pose::from_parts(Translation3::from(axis.into_inner() * position), UnitQuaternion::identity())
     } else {
@@ -53,7 +53,7 @@ pub(super) fn moved(slides: bool, axis: &Unit<Vector3<f64>>, position: f64) -> P
 /// Joint position as a linear function of a column: `ratio * positions[column] + offset`; `offset` alone without a
 /// column.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Follows {
+pub(super) struct MimicRelation {
     pub(super) column: Option<usize>,
     pub(super) ratio: f64,
     pub(super) offset: f64,
@@ -61,7 +61,7 @@ pub(super) struct Follows {
 
 /// Finds for every joint the column that determines its position: its own column, or that of its driver. Columns are
 /// those of [`RobotDescription::drivable_joints`].
-pub(super) fn follows(description: &RobotDescription) -> Vec<Follows> {
+pub(super) fn mimic_relations(description: &RobotDescription) -> Vec<MimicRelation> {
     let mut column = vec![None; description.joints.len()];
     for (k, (id, _)) in description.drivable_joints().enumerate() {
         column[id.0] = Some(k);
@@ -69,7 +69,7 @@ pub(super) fn follows(description: &RobotDescription) -> Vec<Follows> {
     let of = |index: usize| {
         let (driver, ratio, offset) = description.mimic_driver(JointId(index));
         // A driver that cannot move stays at zero and has no column.
-        Follows { column: column[driver.0], ratio, offset }
+        MimicRelation { column: column[driver.0], ratio, offset }
     };
     (0..description.joints.len()).map(of).collect()
 }
@@ -100,7 +100,7 @@ impl Chain {
             path.push(id);
             base = joint.parent;
         }
-        let follows = follows(description);
+        let follows = mimic_relations(description);
         let (mut joints, mut before) = (Vec::new(), Pose::identity());
         for &id in path.iter().rev() {
             let joint = description.joint(id);
@@ -109,16 +109,23 @@ impl Chain {
                 continue;
             }
             let (slides, axis) = (joint.kind == JointKind::Prismatic, joint.axis);
-            let Follows { column, ratio, offset } = follows[id.0];
+            let MimicRelation { column, ratio, offset } = follows[id.0];
             match column {
                 Some(variable) => {
-                    joints.push(ChainJoint { before, axis, slides, variable, ratio, offset });
+                    joints.push(ChainJoint {
+                        parent_from_joint: before,
+                        axis,
+                        is_prismatic: slides,
+                        variable,
+                        ratio,
+                        offset,
+                    });
                     before = Pose::identity();
                 }
-                None => before *= moved(slides, &axis, offset),
+                None => before *= joint_transform(slides, &axis, offset),
             }
         }
-        Ok(Self { base, joints, end: before * link_from_frame })
+        Ok(Self { base, joints, last_from_frame: before * link_from_frame })
     }
 
     /// Base link, in whose frame the poses of the chain are given.
@@ -139,13 +146,13 @@ impl Chain {
     /// Sum of the distances between its joints \[m\]: with slides at zero, the frame is never farther from the base.
     pub fn reach(&self) -> f64 {
         let between = |pose: &Pose| pose.translation.vector.norm();
-        self.joints.iter().map(|joint| between(&joint.before)).sum::<f64>() + between(&self.end)
+        self.joints.iter().map(|joint| between(&joint.parent_from_joint)).sum::<f64>() + between(&self.last_from_frame)
     }
 
     /// True if a full turn of the variable leaves the frame unchanged: the variable rotates joints only, and the ratios
     /// of its followers are integers.
-    pub(super) fn has_whole_turns(&self, variable: usize) -> bool {
-        self.joints.iter().filter(|joint| joint.variable == variable).all(|j| !j.slides && j.ratio.fract() == 0.0)
+    pub(super) fn is_full_turn_periodic(&self, variable: usize) -> bool {
+        self.joints.iter().filter(|joint| joint.variable == variable).all(|j| !j.is_prismatic && j.ratio.fract() == 0.0)
     }
 
     /// Returns the chain with the variables `free` only, in that order. All other variables are fixed at `positions`
@@ -155,35 +162,35 @@ impl Chain {
     /// If `positions` has fewer numbers than the chain has [`variables`](Self::variables).
     #[must_use]
     #[track_caller]
-    pub fn held(&self, free: &[usize], positions: &[f64]) -> Self {
+    pub fn reduced(&self, free: &[usize], positions: &[f64]) -> Self {
         let mut variable_of = vec![None; positions.len()];
         for (k, &variable) in free.iter().enumerate() {
             if let Some(entry) = variable_of.get_mut(variable) {
                 *entry = Some(k);
             }
         }
-        let mut held = Self { base: self.base, joints: Vec::new(), end: Pose::identity() };
-        self.hold_into(&variable_of, positions, &mut held);
+        let mut held = Self { base: self.base, joints: Vec::new(), last_from_frame: Pose::identity() };
+        self.reduce_into(&variable_of, positions, &mut held);
         held
     }
 
-    /// Writes the chain that [`held`](Self::held) returns into an existing chain, without allocating. `variable_of`
+    /// Writes the chain that [`reduced`](Self::reduced) returns into an existing chain, without allocating. `variable_of`
     /// gives the new index of each variable that stays free.
     #[track_caller]
-    pub fn hold_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
+    pub fn reduce_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
         held.base = self.base;
         held.joints.clear();
         let mut before = Pose::identity();
         for joint in &self.joints {
-            before *= joint.before;
+            before *= joint.parent_from_joint;
             match variable_of[joint.variable] {
                 Some(variable) => {
-                    held.joints.push(ChainJoint { before, variable, ..*joint });
+                    held.joints.push(ChainJoint { parent_from_joint: before, variable, ..*joint });
                     before = Pose::identity();
                 }
-                None => before *= joint.moved(positions),
+                None => before *= joint.transform(positions),
             }
         }
-        held.end = before * self.end;
+        held.last_from_frame = before * self.last_from_frame;
     }
 }

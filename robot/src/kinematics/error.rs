@@ -20,28 +20,28 @@ pub enum KinematicsError {
     },
     /// A control part ends in several links.
     #[error("control part {part:?} ends in several links: {}; say which with Tip::at", quoted(.links))]
-    SeveralTips {
+    AmbiguousTip {
         /// Name of the part.
         part: String,
         /// Last links of its branches.
         links: Vec<String>,
     },
     /// The joints that may move do not move the link.
-    #[error("no joint of {of} moves link {link:?}; {}", movers_sentence(.movers))]
-    NothingMoves {
+    #[error("no joint of {of} moves link {link:?}; {}", movers_sentence(.moving_joints))]
+    NoMovingJoint {
         /// Owner of the joints: `control part "arm"`, `the robot`.
         of: String,
         /// Name of the link.
         link: String,
         /// Joints of the robot that move the link; drivers in place of their followers.
-        movers: Vec<String>,
+        moving_joints: Vec<String>,
     },
     /// A joint that moves the link follows a polynomial coupling, which inverse kinematics does not support.
     #[error(
         "joint {joint:?}, which moves link {link:?}, is held on a curve by an equality of its MJCF file; inverse kinematics \
          knows followers by a line only: name a link that it does not move, or a part whose joints it does not follow"
     )]
-    CurveFollower {
+    PolynomialCoupling {
         /// Name of the following joint.
         joint: String,
         /// Name of the link.

@@ -1,6 +1,6 @@
 //! Forward kinematics: poses of frames and of links.
 
-use super::chain::{Chain, Follows, follows, moved};
+use super::chain::{Chain, MimicRelation, joint_transform, mimic_relations};
 use crate::description::{JointKind, LinkId, RobotDescription};
 use kinetoscope_scene::Pose;
 
@@ -15,9 +15,9 @@ impl Chain {
     pub fn pose(&self, positions: &[f64]) -> Pose {
         let mut pose = Pose::identity();
         for joint in &self.joints {
-            pose = pose * joint.before * joint.moved(positions);
+            pose = pose * joint.parent_from_joint * joint.transform(positions);
         }
-        pose *= self.end;
+        pose *= self.last_from_frame;
         // Without this, rounding errors would add up along very long chains.
         pose.rotation.renormalize();
         pose
@@ -29,20 +29,22 @@ impl Chain {
 /// `standing` returns the pose of the root link and of the children of floating and planar joints. All poses are in the
 /// frame of those poses.
 pub fn link_poses(description: &RobotDescription, positions: &[f64], standing: impl Fn(LinkId) -> Pose) -> Vec<Pose> {
-    let follows = follows(description);
+    let follows = mimic_relations(description);
     let mut poses = vec![Pose::identity(); description.links.len()];
     poses[description.root.0] = standing(description.root);
     let mut open = vec![description.root];
     while let Some(parent) = open.pop() {
         for &id in &description.link(parent).child_joints {
             let joint = description.joint(id);
-            let Follows { column, ratio, offset } = follows[id.0];
+            let MimicRelation { column, ratio, offset } = follows[id.0];
             let position = || column.map_or(0.0, |c| ratio * positions[c]) + offset;
             let world_from_joint = poses[parent.0] * joint.parent_from_joint;
             let mut pose = match joint.kind {
                 JointKind::Fixed => world_from_joint,
-                JointKind::Revolute | JointKind::Continuous => world_from_joint * moved(false, &joint.axis, position()),
-                JointKind::Prismatic => world_from_joint * moved(true, &joint.axis, position()),
+                JointKind::Revolute | JointKind::Continuous => {
+                    world_from_joint * joint_transform(false, &joint.axis, position())
+                }
+                JointKind::Prismatic => world_from_joint * joint_transform(true, &joint.axis, position()),
                 JointKind::Floating | JointKind::Planar => standing(joint.child),
             };
             pose.rotation.renormalize();

@@ -3,8 +3,8 @@
 use super::cfg::IkCfg;
 use super::chain::Chain;
 use super::error::KinematicsError;
-use super::least_squares::{Descent, Point, Problem, Stop};
-use kinetoscope_scene::{Pose, Random};
+use super::least_squares::{Iterate, LevenbergMarquardt, Problem, StopCriteria};
+use kinetoscope_scene::{KeyedRng, Pose};
 use std::f64::consts::{PI, TAU};
 
 /// Inverse-kinematics solver of a [`Chain`]. Solves can be repeated and allocate no memory.
@@ -24,8 +24,8 @@ pub struct IkSolver {
     cfg: IkCfg,
     /// Random numbers, uniform in 0..1, one for each joint, start by start.
     random: Vec<f64>,
-    descent: Descent,
-    best: Point,
+    least_squares: LevenbergMarquardt,
+    best: Iterate,
 }
 
 /// Result of [`IkSolver::solve`].
@@ -70,10 +70,17 @@ impl IkSolver {
             let expected = "the lower limit must not be above the upper one";
             return Err(KinematicsError::OutOfRange { field: "limits", value: format!("{limit:?}"), expected });
         }
-        let mut random = Random::keyed(cfg.seed, 0, "inverse kinematics");
+        let mut random = KeyedRng::keyed(cfg.seed, 0, "inverse kinematics");
         let count = (cfg.num_seeds as usize - 1) * joints;
         let random = (0..count).map(|_| random.uniform()).collect();
-        Ok(Self { chain, limits, cfg, random, descent: Descent::new(joints), best: Point::new(joints) })
+        Ok(Self {
+            chain,
+            limits,
+            cfg,
+            random,
+            least_squares: LevenbergMarquardt::new(joints),
+            best: Iterate::new(joints),
+        })
     }
 
     /// Chain of the solver.
@@ -112,46 +119,47 @@ impl IkSolver {
     }
 
     fn search(&mut self, target: &Pose, initial: &[f64]) -> IkSolution<'_> {
-        let Self { chain, limits, cfg, random, descent, best } = self;
+        let Self { chain, limits, cfg, random, least_squares: descent, best } = self;
         let reach = Some(chain.reach()).filter(|&reach| reach > 0.0).unwrap_or(1.0);
         let problem = Problem { chain, limits, target: *target, task: cfg.task, scale: 2.0 / reach };
         let (position, rotation) = (cfg.position_tolerance, cfg.rotation_tolerance);
-        let near = Stop { position, rotation, iterations: cfg.max_iterations, impatient: true };
+        let near = StopCriteria { position, rotation, iterations: cfg.max_iterations, stop_on_slow_progress: true };
 
         let (mut seed, mut iterations, mut reached) = (0, 0, false);
         for start in 0..cfg.num_seeds {
             let random = (start as usize).checked_sub(1).map(|row| &random[row * limits.len()..]);
-            place(&problem, initial, random, reach, &mut descent.at.positions);
-            descent.at.evaluate(&problem);
+            set_start(&problem, initial, random, reach, &mut descent.current.positions);
+            descent.current.evaluate(&problem);
             iterations += descent.descend(&problem, &near, cfg.damping);
-            reached = descent.at.is_within(&near, cfg.task);
-            if reached || start == 0 || descent.at.cost < best.cost {
-                best.copy_from(&descent.at);
+            reached = descent.current.is_within(&near, cfg.task);
+            if reached || start == 0 || descent.current.cost < best.cost {
+                best.copy_from(&descent.current);
                 seed = start;
             }
             if reached {
                 break;
             }
         }
-        descent.at.copy_from(best);
+        descent.current.copy_from(best);
         if reached {
             // Convergence is fast near the target: a few more steps remove most of the remaining error.
-            let finish = Stop { position: 0.01 * position, rotation: 0.01 * rotation, iterations: 4, ..near };
+            let finish = StopCriteria { position: 0.01 * position, rotation: 0.01 * rotation, iterations: 4, ..near };
             iterations += descent.descend(&problem, &finish, cfg.damping);
-            if !descent.at.is_within(&near, cfg.task) {
-                descent.at.copy_from(best);
+            if !descent.current.is_within(&near, cfg.task) {
+                descent.current.copy_from(best);
             }
         } else {
-            let finish = Stop { iterations: cfg.max_iterations.saturating_mul(8), impatient: false, ..near };
+            let finish =
+                StopCriteria { iterations: cfg.max_iterations.saturating_mul(8), stop_on_slow_progress: false, ..near };
             iterations += descent.descend(&problem, &finish, cfg.damping);
         }
         let posture = cfg.posture.as_ref();
-        turn_back(&problem, posture.map_or(initial, |p| &p.rest), &mut descent.at.positions);
-        descent.at.evaluate(&problem);
-        if let Some(posture) = posture.filter(|_| descent.at.is_within(&near, cfg.task)) {
-            iterations += descent.relax(&problem, &near, &posture.rest, posture.gain);
+        remove_full_turns(&problem, posture.map_or(initial, |p| &p.rest), &mut descent.current.positions);
+        descent.current.evaluate(&problem);
+        if let Some(posture) = posture.filter(|_| descent.current.is_within(&near, cfg.task)) {
+            iterations += descent.approach_posture(&problem, &near, &posture.rest, posture.gain);
         }
-        let at = &descent.at;
+        let at = &descent.current;
         IkSolution {
             positions: &at.positions,
             success: at.is_within(&near, cfg.task),
@@ -164,13 +172,13 @@ impl IkSolver {
 }
 
 /// Sets the positions of a start: the initial ones, or those of `random` (uniform in 0..1).
-fn place(problem: &Problem<'_>, initial: &[f64], random: Option<&[f64]>, reach: f64, positions: &mut [f64]) {
+fn set_start(problem: &Problem<'_>, initial: &[f64], random: Option<&[f64]>, reach: f64, positions: &mut [f64]) {
     for (i, position) in positions.iter_mut().enumerate() {
         let [low, high] = problem.limits[i];
         let chosen = match random {
             None => initial[i],
             Some(random) => {
-                let turns = problem.chain.has_whole_turns(i);
+                let turns = problem.chain.is_full_turn_periodic(i);
                 let (middle, half) = match (high - low).is_finite() {
                     true if turns => (0.5 * (low + high), (0.5 * (high - low)).min(PI)),
                     true => (0.5 * (low + high), 0.5 * (high - low)),
@@ -184,8 +192,8 @@ fn place(problem: &Problem<'_>, initial: &[f64], random: Option<&[f64]>, reach: 
 }
 
 /// Removes full turns where a position then is nearer to `reference` and stays within the limits.
-fn turn_back(problem: &Problem<'_>, reference: &[f64], positions: &mut [f64]) {
-    for (i, position) in positions.iter_mut().enumerate().filter(|(i, _)| problem.chain.has_whole_turns(*i)) {
+fn remove_full_turns(problem: &Problem<'_>, reference: &[f64], positions: &mut [f64]) {
+    for (i, position) in positions.iter_mut().enumerate().filter(|(i, _)| problem.chain.is_full_turn_periodic(*i)) {
         let [low, high] = problem.limits[i];
         let (fewest, most) = (((low - *position) / TAU).ceil(), ((high - *position) / TAU).floor());
         let turns = ((reference[i] - *position) / TAU).round();

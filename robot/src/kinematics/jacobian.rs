@@ -21,19 +21,19 @@ impl Chain {
         columns.fill(Vector6::zeros());
         let mut pose = Pose::identity();
         for joint in &self.joints {
-            pose *= joint.before;
+            pose *= joint.parent_from_joint;
             let axis = pose.rotation * joint.axis.into_inner() * joint.ratio;
             let column = &mut columns[joint.variable];
-            if joint.slides {
+            if joint.is_prismatic {
                 add(column, 0, &axis);
             } else {
                 // Velocity of the point that coincides with the base; it is moved to the frame below.
                 add(column, 0, &pose.translation.vector.cross(&axis));
                 add(column, 3, &axis);
             }
-            pose *= joint.moved(positions);
+            pose *= joint.transform(positions);
         }
-        pose *= self.end;
+        pose *= self.last_from_frame;
         pose.rotation.renormalize();
         for column in columns {
             let turned = Vector3::new(column[3], column[4], column[5]).cross(&pose.translation.vector);

@@ -42,10 +42,10 @@ mod inverse;
 mod jacobian;
 mod least_squares;
 
-pub use cfg::{IkCfg, IkTask, Posture, Tip};
+pub use cfg::{IkCfg, IkTask, NullSpacePosture, TipFrame};
 pub use chain::Chain;
 pub use error::KinematicsError;
 pub use inverse::{IkSolution, IkSolver};
 
-pub use cfg::TipName;
+pub use cfg::TipSelector;
 pub use forward::link_poses;

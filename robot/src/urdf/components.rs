@@ -3,7 +3,7 @@
 use super::config::{ComponentCfg, UrdfCfg};
 use super::error::UrdfError;
 use super::tree::owned;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::pattern::closest_names;
 use std::collections::HashMap;
 
 /// Default parents of a component, best first.
@@ -22,21 +22,21 @@ fn usual_parents(name: &str, present: impl Fn(&str) -> bool) -> &'static [&'stat
 }
 
 /// Component names with a default place: without their default parent they are roots.
-const KNOWN: [&str; 10] =
+const DEFAULT_NAMES: [&str; 10] =
     ["chassis", "legs", "torso", "head", "left_arm", "right_arm", "left_hand", "right_hand", "arm", "hand"];
 
 /// Parent of each component, and an order in which parents come first.
 #[derive(Debug)]
-pub(super) struct Components {
+pub(super) struct ComponentTree {
     /// Index of the parent of each component; `None` for a root.
     pub(super) parents: Vec<Option<usize>>,
     /// All components, parents first, otherwise in the order of the configuration.
     pub(super) order: Vec<usize>,
 }
 
-impl Components {
+impl ComponentTree {
     /// Checks the configuration and arranges its components.
-    pub(super) fn arrange(cfg: &UrdfCfg) -> Result<Self, UrdfError> {
+    pub(super) fn new(cfg: &UrdfCfg) -> Result<Self, UrdfError> {
         if cfg.components.is_empty() {
             return Err(UrdfError::NoComponents);
         }
@@ -82,7 +82,7 @@ fn check(component: &ComponentCfg) -> Result<(), UrdfError> {
 fn parent(cfg: &UrdfCfg, id: usize, ids: &HashMap<&str, usize>) -> Result<Option<usize>, UrdfError> {
     let component = &cfg.components[id];
     let others = |name: &str| {
-        owned(closest(name, cfg.components.iter().map(|c| c.name.as_str()).filter(|n| *n != component.name)))
+        owned(closest_names(name, cfg.components.iter().map(|c| c.name.as_str()).filter(|n| *n != component.name)))
     };
     if let Some(parent) = &component.parent {
         return match ids.get(parent.as_str()) {
@@ -97,7 +97,7 @@ fn parent(cfg: &UrdfCfg, id: usize, ids: &HashMap<&str, usize>) -> Result<Option
     let usual = usual_parents(&component.name, |name| ids.contains_key(name));
     let found = usual.iter().find_map(|name| ids.get(name).copied());
     // A custom name without a parent is a root only as the first component.
-    if found.is_none() && id != 0 && !KNOWN.contains(&component.name.as_str()) {
+    if found.is_none() && id != 0 && !DEFAULT_NAMES.contains(&component.name.as_str()) {
         return Err(UrdfError::ComponentParentRequired {
             component: component.name.clone(),
             candidates: others(&component.name),
@@ -111,14 +111,14 @@ fn parents_first(cfg: &UrdfCfg, parents: &[Option<usize>]) -> Result<Vec<usize>,
     let mut placed = vec![false; parents.len()];
     while order.len() < parents.len() {
         let next = (0..parents.len()).find(|&c| !placed[c] && parents[c].is_none_or(|p| placed[p]));
-        let Some(next) = next else { return Err(circle(cfg, parents, &placed)) };
+        let Some(next) = next else { return Err(cycle_error(cfg, parents, &placed)) };
         placed[next] = true;
         order.push(next);
     }
     Ok(order)
 }
 
-fn circle(cfg: &UrdfCfg, parents: &[Option<usize>], placed: &[bool]) -> UrdfError {
+fn cycle_error(cfg: &UrdfCfg, parents: &[Option<usize>], placed: &[bool]) -> UrdfError {
     let mut walk: Vec<usize> = Vec::new();
     let mut next = placed.iter().position(|p| !p);
     while let Some(component) = next {

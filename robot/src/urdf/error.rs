@@ -1,7 +1,7 @@
 //! Errors of URDF files, of their meshes and of their assembly.
 
-use kinetoscope_scene::pattern::list;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::pattern::format_candidates;
+use kinetoscope_scene::source::SourceLocation;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -49,7 +49,7 @@ pub enum UrdfError {
     #[error("{at}: {problem}; save the file as UTF-8")]
     Encoding {
         /// Location of the first invalid byte.
-        at: Source,
+        at: SourceLocation,
         /// Description of the problem.
         problem: String,
     },
@@ -57,7 +57,7 @@ pub enum UrdfError {
     #[error("{at}: column {column}: not well-formed XML: {source}")]
     Xml {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// Column, counted from 1 in characters.
         column: u32,
         /// Error of the XML parser.
@@ -67,13 +67,13 @@ pub enum UrdfError {
     #[error("{at}: <!DOCTYPE> and entities are refused: no robot needs them and they can exhaust memory; delete it")]
     Doctype {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
     },
     /// The file is a xacro, not a URDF.
     #[error("{at}: {found} is xacro, not URDF; expand it first: xacro file.xacro > file.urdf")]
     Xacro {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// The xacro element or expression.
         found: String,
     },
@@ -81,7 +81,7 @@ pub enum UrdfError {
     #[error("{at}: the root element is <{found}>, a URDF starts with <robot name=\"...\">; {advice}")]
     WrongRoot {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// Name of the root element.
         found: String,
         /// Suggested remedy.
@@ -91,7 +91,7 @@ pub enum UrdfError {
     #[error("{at}: {element}: {problem}")]
     Number {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// Element and attribute as written.
         element: String,
         /// Problem and accepted values.
@@ -101,7 +101,7 @@ pub enum UrdfError {
     #[error("{at}: {owner}: {element}: {problem}")]
     Value {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// Owner of the element, such as `link "base"`.
         owner: String,
         /// Element and attribute as written.
@@ -113,7 +113,7 @@ pub enum UrdfError {
     #[error("{at}: {owner}: <{element}> has no {attribute}; write {example}")]
     AttributeMissing {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// Owner of the element, such as `link "base"`.
         owner: String,
         /// Name of the incomplete element.
@@ -127,7 +127,7 @@ pub enum UrdfError {
     #[error("{at}: {owner}: <{element}> has no <{child}>; {fix}")]
     ElementMissing {
         /// Location in the file.
-        at: Source,
+        at: SourceLocation,
         /// Owner of the element, such as `link "base"`.
         owner: String,
         /// Name of the incomplete element.
@@ -141,13 +141,13 @@ pub enum UrdfError {
     #[error("{at}: {owner}: a second <{element}>, the first is at {first}; keep one")]
     ElementRepeated {
         /// Location of the second element.
-        at: Source,
+        at: SourceLocation,
         /// Owner of the element, such as `link "base"`.
         owner: String,
         /// Name of the element.
         element: String,
         /// Location of the first element.
-        first: Source,
+        first: SourceLocation,
     },
     /// A `<geometry>` has more than one element.
     #[error(
@@ -155,13 +155,13 @@ pub enum UrdfError {
     )]
     GeometryRepeated {
         /// Location of the second element.
-        at: Source,
+        at: SourceLocation,
         /// Link that owns the geometry, such as `link "base"`.
         owner: String,
         /// Name of the second element.
         found: String,
         /// Location of the first element.
-        first: Source,
+        first: SourceLocation,
     },
     /// A revolute or prismatic joint has no `<limit>`.
     #[error(
@@ -170,17 +170,17 @@ pub enum UrdfError {
     )]
     LimitMissing {
         /// Location of the joint element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Type of the joint.
         kind: &'static str,
     },
     /// A joint type does not exist in URDF.
-    #[error("{at}: joint \"{joint}\": there is no type \"{found}\"; {}", list(.candidates, .candidates.len()))]
+    #[error("{at}: joint \"{joint}\": there is no type \"{found}\"; {}", format_candidates(.candidates, .candidates.len()))]
     JointTypeUnknown {
         /// Location of the joint element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Type as written.
@@ -189,10 +189,10 @@ pub enum UrdfError {
         candidates: Vec<String>,
     },
     /// A shape does not exist in URDF.
-    #[error("{at}: {owner}: there is no shape <{found}>; {}", list(.candidates, .candidates.len()))]
+    #[error("{at}: {owner}: there is no shape <{found}>; {}", format_candidates(.candidates, .candidates.len()))]
     ShapeUnknown {
         /// Location of the shape element.
-        at: Source,
+        at: SourceLocation,
         /// Link that owns the shape, such as `link "base"`.
         owner: String,
         /// Name of the element.
@@ -208,32 +208,32 @@ pub enum UrdfError {
         /// Repeated name.
         name: String,
         /// Location of the first element.
-        first: Source,
+        first: SourceLocation,
         /// Location of the second element.
-        second: Source,
+        second: SourceLocation,
     },
     /// A link is the child of two joints.
     #[error(
         "{second}: joint \"{second_joint}\" has child \"{link}\", which is already the child of joint \
          \"{first_joint}\" at {first}; a link hangs from one joint"
     )]
-    TwoParents {
+    MultipleParents {
         /// Name of the link.
         link: String,
         /// Name of the first joint.
         first_joint: String,
         /// Location of the first joint.
-        first: Source,
+        first: SourceLocation,
         /// Name of the second joint.
         second_joint: String,
         /// Location of the second joint.
-        second: Source,
+        second: SourceLocation,
     },
     /// A joint names a link that does not exist.
-    #[error("{at}: joint \"{joint}\": {role} link \"{link}\" does not exist; {}", list(.candidates, *.total))]
+    #[error("{at}: joint \"{joint}\": {role} link \"{link}\" does not exist; {}", format_candidates(.candidates, *.total))]
     LinkUnknown {
         /// Location of the parent or child element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Role of the link: `parent` or `child`.
@@ -249,7 +249,7 @@ pub enum UrdfError {
     #[error("{at}: joint \"{joint}\" closes a circle of links: {}; a URDF is a tree", chain(.links))]
     Cycle {
         /// Location of the joint of the cycle that comes first in the file.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Links of the cycle, the child of the joint first.
@@ -257,25 +257,25 @@ pub enum UrdfError {
     },
     /// Several links have no parent.
     #[error("{}: {} links have no parent joint, only one may: {}; join them with fixed joints", .roots[0].1, .roots.len(), places(.roots))]
-    SeveralRoots {
+    MultipleRoots {
         /// Names and locations of these links.
-        roots: Vec<(String, Source)>,
+        roots: Vec<(String, SourceLocation)>,
     },
     /// The robot has no link.
     #[error("{at}: the robot has no <link>; a robot has at least one")]
     NoLinks {
         /// Location of the robot element.
-        at: Source,
+        at: SourceLocation,
     },
     /// A mimic names a joint that does not exist.
-    #[error("{at}: joint \"{joint}\" mimics \"{followed}\", which does not exist; {}", list(.candidates, *.total))]
+    #[error("{at}: joint \"{joint}\" mimics \"{mimicked_joint}\", which does not exist; {}", format_candidates(.candidates, *.total))]
     MimicUnknown {
         /// Location of the mimic element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Name of the missing joint.
-        followed: String,
+        mimicked_joint: String,
         /// Existing joints, the closest match first.
         candidates: Vec<String>,
         /// Number of existing joints.
@@ -285,7 +285,7 @@ pub enum UrdfError {
     #[error("{at}: joint \"{joint}\" mimics itself: {}; one joint of the circle must be free", chain(.joints))]
     MimicCycle {
         /// Location of the mimic element of the joint.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Joints of the cycle.
@@ -295,9 +295,9 @@ pub enum UrdfError {
     #[error(
         "{at}: joint \"{joint}\" mimics \"{followed}\", which is {kind}; only revolute, continuous and prismatic joints can be followed"
     )]
-    MimicUnmovable {
+    MimicNotDrivable {
         /// Location of the mimic element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Name of the followed joint.
@@ -309,7 +309,7 @@ pub enum UrdfError {
     #[error("{at}: link \"{link}\": <mesh> has an empty filename; write filename=\"meshes/part.stl\"")]
     MeshUnnamed {
         /// Location of the mesh element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the link.
         link: String,
     },
@@ -317,7 +317,7 @@ pub enum UrdfError {
     #[error("{at}: link \"{link}\": collision mesh \"{uri}\" does not exist{}; looked at:{}", remark(.hint), lines(.tried))]
     MeshMissing {
         /// Location of the collision element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the link.
         link: String,
         /// URI as written.
@@ -334,7 +334,7 @@ pub enum UrdfError {
     )]
     PackageUnknown {
         /// Location of the collision element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the link.
         link: String,
         /// URI as written.
@@ -348,7 +348,7 @@ pub enum UrdfError {
     #[error("{at}: link \"{link}\": \"{uri}\" cannot be read: {problem}")]
     UriUnsupported {
         /// Location of the collision element.
-        at: Source,
+        at: SourceLocation,
         /// Name of the link.
         link: String,
         /// URI as written.
@@ -374,7 +374,7 @@ pub enum UrdfError {
         component: String,
     },
     /// A component names a parent component that does not exist.
-    #[error("component \"{component}\": parent component \"{parent}\" does not exist; {}", list(.candidates, .candidates.len()))]
+    #[error("component \"{component}\": parent component \"{parent}\" does not exist; {}", format_candidates(.candidates, .candidates.len()))]
     ComponentUnknown {
         /// Name of the component.
         component: String,
@@ -386,7 +386,7 @@ pub enum UrdfError {
     /// A component without a default parent sets no parent.
     #[error(
         "component \"{component}\" has no default parent; set its parent to another component. {}",
-        list(.candidates, .candidates.len())
+        format_candidates(.candidates, .candidates.len())
     )]
     ComponentParentRequired {
         /// Name of the component.
@@ -402,7 +402,7 @@ pub enum UrdfError {
     },
     /// `parent_link` or `child_link` names a link that its component does not have.
     #[error(
-        "component \"{component}\": {field} \"{link}\" is not a link of \"{of}\"; {}", list(.candidates, *.total)
+        "component \"{component}\": {field} \"{link}\" is not a link of \"{of}\"; {}", format_candidates(.candidates, *.total)
     )]
     AttachLinkUnknown {
         /// Component with this setting.
@@ -444,7 +444,7 @@ pub enum UrdfError {
     /// The parent component has several tips.
     #[error(
         "component \"{component}\": its parent \"{parent}\" has {} tips at the same depth, set parent_link to the \
-         right one; {}", .total, list(.candidates, *.total)
+         right one; {}", .total, format_candidates(.candidates, *.total)
     )]
     TipAmbiguous {
         /// Component to attach.
@@ -487,7 +487,7 @@ fn chain(names: &[String]) -> String {
     text.join(" -> ")
 }
 
-fn places(roots: &[(String, Source)]) -> String {
+fn places(roots: &[(String, SourceLocation)]) -> String {
     let mut text: Vec<String> = roots.iter().take(8).map(|(n, s)| format!("\"{n}\" ({s})")).collect();
     if roots.len() > 8 {
         text.push(format!("... ({} more)", roots.len() - 8));

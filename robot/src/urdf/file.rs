@@ -3,7 +3,7 @@
 use super::tree::Tree;
 use crate::description::PartialInertial;
 use crate::diagnostic::Diagnostic;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,9 +18,9 @@ pub struct UrdfFile {
     /// Typed model. Values that the file does not give have defaults.
     pub robot: urdf_rs::Robot,
     /// Metadata of each link of `robot`.
-    pub links: Vec<LinkNotes>,
+    pub links: Vec<LinkMetadata>,
     /// Metadata of each joint of `robot`.
-    pub joints: Vec<JointNotes>,
+    pub joints: Vec<JointMetadata>,
     /// Tree of links.
     pub tree: Tree,
     /// `meshdir` of `<mujoco><compiler>`, where MuJoCo users keep meshes.
@@ -31,48 +31,48 @@ pub struct UrdfFile {
 
 /// Metadata of a link that the model cannot express.
 #[derive(Clone, Debug)]
-pub struct LinkNotes {
+pub struct LinkMetadata {
     /// Location of the link element.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Location of a complete inertial element; otherwise `None`, and the model has mass 0.
-    pub inertial: Option<Source>,
+    pub inertial: Option<SourceLocation>,
     /// Values of an incomplete inertial element; `inertial` is then `None`.
     pub partial_inertial: Option<PartialInertial>,
     /// Metadata of each visual.
-    pub visuals: Vec<VisualNotes>,
+    pub visuals: Vec<VisualMetadata>,
     /// Location of each collision element.
-    pub collisions: Vec<Source>,
+    pub collisions: Vec<SourceLocation>,
 }
 
 /// Metadata of a visual that the model cannot express.
 #[derive(Clone, Debug)]
-pub struct VisualNotes {
+pub struct VisualMetadata {
     /// Location of the visual element.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Location of the material element, if any.
-    pub material: Option<Source>,
+    pub material: Option<SourceLocation>,
 }
 
 /// Metadata of a joint that the model cannot express.
 #[derive(Clone, Debug)]
-pub struct JointNotes {
+pub struct JointMetadata {
     /// Location of the joint element.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Metadata of the limit element; `None` for a joint without one, whose limits are 0 in the model.
-    pub limit: Option<LimitNotes>,
+    pub limit: Option<LimitMetadata>,
     /// True if the dynamics element gives damping.
     pub damping: bool,
     /// True if the dynamics element gives friction.
     pub friction: bool,
     /// Location of the mimic element; `None` without a mimic, or where a mimic has no meaning (a fixed joint).
-    pub mimic: Option<Source>,
+    pub mimic: Option<SourceLocation>,
 }
 
 /// Location of a limit element, and which values it gives.
 #[derive(Clone, Debug)]
-pub struct LimitNotes {
+pub struct LimitMetadata {
     /// Location of the limit element.
-    pub source: Source,
+    pub source: SourceLocation,
     /// True if `lower` is given and usable.
     pub lower: bool,
     /// True if `upper` is given and usable.

@@ -2,7 +2,7 @@
 
 use super::error::UrdfError;
 use super::link::{read_origin, read_pose};
-use super::number::{Reader, attribute, shortest};
+use super::number::{Reader, format_number, write_attribute};
 use crate::description::PartialInertial;
 use crate::diagnostic::DiagnosticKind;
 use kinetoscope_scene::pose::from_xyz_rpy;
@@ -20,14 +20,14 @@ pub(super) fn read_inertial(
     xml: &mut String,
 ) -> Result<Option<PartialInertial>, UrdfError> {
     let mut missing = None;
-    let mass = match part(reader.required_child(node, "mass", owner, EXAMPLE), &mut missing)? {
+    let mass = match optional_element(reader.required_child(node, "mass", owner, EXAMPLE), &mut missing)? {
         Some(mass) => Some(reader.required_number(mass, "value", owner, "<mass value=\"1\"/>").and_then(|value| {
             let negative = || reader.value(mass, "value", owner, "is negative, a mass is at least 0");
             if value < 0.0 { Err(negative()) } else { Ok(value) }
         })?),
         None => None,
     };
-    let moments = match part(reader.required_child(node, "inertia", owner, EXAMPLE), &mut missing)? {
+    let moments = match optional_element(reader.required_child(node, "inertia", owner, EXAMPLE), &mut missing)? {
         Some(inertia) => Some(read_moments(reader, inertia, owner)?),
         None => None,
     };
@@ -39,24 +39,24 @@ pub(super) fn read_inertial(
             (None, None) => "mass and inertia are those of the link's shapes",
         };
         if let Some(error) = missing {
-            reader.tolerate(DiagnosticKind::InertialIncomplete, at, error, done)?;
+            reader.warn_or_fail(DiagnosticKind::InertialIncomplete, at, error, done)?;
         }
         return read_partial(reader, node, owner, mass, moments).map(Some);
     };
     xml.push_str("<inertial>");
     read_origin(reader, node, owner, xml)?;
     xml.push_str("<mass");
-    attribute(xml, "value", &shortest(mass));
+    write_attribute(xml, "value", &format_number(mass));
     xml.push_str("/><inertia");
     for (name, value) in MOMENTS.into_iter().zip(moments) {
-        attribute(xml, name, &shortest(value));
+        write_attribute(xml, name, &format_number(value));
     }
     xml.push_str("/></inertial>");
     Ok(None)
 }
 
 /// Makes a required element optional. `missing` keeps the first error about a missing element.
-fn part<T>(found: Result<T, UrdfError>, missing: &mut Option<UrdfError>) -> Result<Option<T>, UrdfError> {
+fn optional_element<T>(found: Result<T, UrdfError>, missing: &mut Option<UrdfError>) -> Result<Option<T>, UrdfError> {
     match found {
         Ok(element) => Ok(Some(element)),
         Err(error @ UrdfError::ElementMissing { .. }) => {

@@ -1,19 +1,19 @@
 //! Reader of `<joint>` elements.
 
 use super::error::UrdfError;
-use super::file::{JointNotes, LimitNotes};
+use super::file::{JointMetadata, LimitMetadata};
 use super::link::read_origin;
-use super::number::{Reader, attribute, row, shortest};
-use super::tree::{Edge, Named, owned};
+use super::number::{Reader, format_number, format_numbers, write_attribute};
+use super::tree::{JointEdge, NamedElement, owned};
 use crate::description::JointKind;
 use crate::diagnostic::DiagnosticKind;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::pattern::closest_names;
 use roxmltree::Node;
 
 /// Deviation of the length of an axis from 1 that is reported. A smaller deviation is rounding in the file.
 const AXIS_TOLERANCE: f64 = 1e-3;
 /// An axis shorter than this has no direction.
-const AXIS_SHORTEST: f64 = 1e-9;
+const MIN_AXIS_LENGTH: f64 = 1e-9;
 
 const KINDS: [JointKind; 6] = [
     JointKind::Fixed,
@@ -25,7 +25,7 @@ const KINDS: [JointKind; 6] = [
 ];
 
 /// Child elements of a joint that are read, or that are ignored on purpose.
-const KNOWN: [&str; 12] = [
+const KNOWN_ELEMENTS: [&str; 12] = [
     "origin",
     "parent",
     "child",
@@ -46,18 +46,18 @@ pub(super) fn read_joint(
     node: Node<'_, '_>,
     name: &str,
     xml: &mut String,
-) -> Result<(JointNotes, Edge), UrdfError> {
+) -> Result<(JointMetadata, JointEdge), UrdfError> {
     let owner = format!("joint \"{name}\"");
     let kind = read_kind(reader, node, name, &owner)?;
-    super::link::warn_unknown(reader, node, &owner, &KNOWN);
+    super::link::warn_unknown(reader, node, &owner, &KNOWN_ELEMENTS);
 
     xml.push_str("<joint");
-    attribute(xml, "name", name);
-    attribute(xml, "type", kind.name());
+    write_attribute(xml, "name", name);
+    write_attribute(xml, "type", kind.name());
     xml.push('>');
     read_origin(reader, node, &owner, xml)?;
-    let parent = read_end(reader, node, "parent", &owner, xml)?;
-    let child = read_end(reader, node, "child", &owner, xml)?;
+    let parent = read_link_reference(reader, node, "parent", &owner, xml)?;
+    let child = read_link_reference(reader, node, "child", &owner, xml)?;
     read_axis(reader, node, kind, &owner, xml)?;
     let limit = read_limit(reader, node, kind, name, &owner, xml)?;
     let (damping, friction) = read_dynamics(reader, node, &owner, xml)?;
@@ -69,15 +69,15 @@ pub(super) fn read_joint(
         warn_unlimited(reader, node, &owner)?;
     }
     let source = reader.source(node);
-    let notes = JointNotes {
+    let notes = JointMetadata {
         source: source.clone(),
         limit,
         damping,
         friction,
         mimic: mimic.as_ref().map(|m| m.source.clone()),
     };
-    let joint = Named { name: name.to_owned(), source };
-    Ok((notes, Edge { joint, parent, child, mimic, kind: kind.name(), movable: kind.is_drivable() }))
+    let joint = NamedElement { name: name.to_owned(), source };
+    Ok((notes, JointEdge { joint, parent, child, mimic, kind: kind.name(), is_drivable: kind.is_drivable() }))
 }
 
 fn read_kind(reader: &Reader<'_>, node: Node<'_, '_>, name: &str, owner: &str) -> Result<JointKind, UrdfError> {
@@ -86,26 +86,26 @@ fn read_kind(reader: &Reader<'_>, node: Node<'_, '_>, name: &str, owner: &str) -
         at: reader.attribute_source(node, "type"),
         joint: name.to_owned(),
         found: found.to_owned(),
-        candidates: owned(closest(found, KINDS.map(JointKind::name))),
+        candidates: owned(closest_names(found, KINDS.map(JointKind::name))),
     })
 }
 
 /// Reads the parent or child link.
-fn read_end(
+fn read_link_reference(
     reader: &Reader<'_>,
     node: Node<'_, '_>,
     role: &'static str,
     owner: &str,
     xml: &mut String,
-) -> Result<Named, UrdfError> {
+) -> Result<NamedElement, UrdfError> {
     let fix = "a joint connects <parent link=\"...\"/> and <child link=\"...\"/>";
     let end = reader.required_child(node, role, owner, fix)?;
     let name = reader.required_text(end, "link", owner, "link=\"name_of_a_link\"")?;
     xml.push('<');
     xml.push_str(role);
-    attribute(xml, "link", name);
+    write_attribute(xml, "link", name);
     xml.push_str("/>");
-    Ok(Named { name: name.to_owned(), source: reader.source(end) })
+    Ok(NamedElement { name: name.to_owned(), source: reader.source(end) })
 }
 
 /// Reads the axis as a unit vector. Joint types without an axis may have any value: exporters write `0 0 0` for fixed
@@ -132,7 +132,7 @@ fn read_axis(
             return Err(error);
         }
         let done = format!("a {} joint needs no axis, so it was ignored", kind.name());
-        return reader.tolerate(DiagnosticKind::ElementIgnored, at, error, &done);
+        return reader.warn_or_fail(DiagnosticKind::ElementIgnored, at, error, &done);
     };
     if !has_axis {
         return Ok(());
@@ -141,17 +141,17 @@ fn read_axis(
     let largest = xyz.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
     let norm =
         if largest > 0.0 { largest * xyz.map(|c| (c / largest).powi(2)).iter().sum::<f64>().sqrt() } else { 0.0 };
-    if norm < AXIS_SHORTEST {
+    if norm < MIN_AXIS_LENGTH {
         return Err(reader.value(axis, "xyz", owner, "is zero, the axis needs a direction, such as \"0 0 1\""));
     }
     if (norm - 1.0).abs() > AXIS_TOLERANCE {
         let at = reader.attribute_source(axis, "xyz");
-        let message = format!("{owner}: the axis {} has length {norm:.6}; it was normalised", row(&xyz));
+        let message = format!("{owner}: the axis {} has length {norm:.6}; it was normalised", format_numbers(&xyz));
         reader.warn(DiagnosticKind::AxisNormalized, at, message);
     }
     let length = xyz.map(|c| (c / largest).powi(2)).iter().sum::<f64>().sqrt();
     xml.push_str("<axis");
-    attribute(xml, "xyz", &row(&xyz.map(|c| c / largest / length)));
+    write_attribute(xml, "xyz", &format_numbers(&xyz.map(|c| c / largest / length)));
     xml.push_str("/>");
     Ok(())
 }
@@ -163,7 +163,7 @@ fn read_limit(
     name: &str,
     owner: &str,
     xml: &mut String,
-) -> Result<Option<LimitNotes>, UrdfError> {
+) -> Result<Option<LimitMetadata>, UrdfError> {
     let Some(limit) = reader.child(node, "limit", owner)? else {
         return match kind {
             JointKind::Revolute | JointKind::Prismatic => {
@@ -185,10 +185,10 @@ fn read_limit(
     }
     xml.push_str("<limit");
     for (attribute_name, value) in [("lower", lower), ("upper", upper), ("effort", effort), ("velocity", velocity)] {
-        attribute(xml, attribute_name, &shortest(value.unwrap_or(0.0)));
+        write_attribute(xml, attribute_name, &format_number(value.unwrap_or(0.0)));
     }
     xml.push_str("/>");
-    Ok(Some(LimitNotes {
+    Ok(Some(LimitMetadata {
         source: reader.source(limit),
         lower: lower.is_some(),
         upper: upper.is_some(),
@@ -208,8 +208,8 @@ fn read_dynamics(
     let damping = reader.non_negative(dynamics, "damping", owner)?;
     let friction = reader.non_negative(dynamics, "friction", owner)?;
     xml.push_str("<dynamics");
-    attribute(xml, "damping", &shortest(damping.unwrap_or(0.0)));
-    attribute(xml, "friction", &shortest(friction.unwrap_or(0.0)));
+    write_attribute(xml, "damping", &format_number(damping.unwrap_or(0.0)));
+    write_attribute(xml, "friction", &format_number(friction.unwrap_or(0.0)));
     xml.push_str("/>");
     Ok((damping.is_some(), friction.is_some()))
 }
@@ -220,7 +220,7 @@ fn read_calibration(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &
         xml.push_str("<calibration");
         for name in ["rising", "falling"] {
             if let Some(value) = reader.number(calibration, name)? {
-                attribute(xml, name, &shortest(value));
+                write_attribute(xml, name, &format_number(value));
             }
         }
         xml.push_str("/>");
@@ -228,7 +228,7 @@ fn read_calibration(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &
     if let Some(safety) = reader.child(node, "safety_controller", owner)? {
         xml.push_str("<safety_controller");
         for name in ["soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"] {
-            attribute(xml, name, &shortest(reader.number(safety, name)?.unwrap_or(0.0)));
+            write_attribute(xml, name, &format_number(reader.number(safety, name)?.unwrap_or(0.0)));
         }
         xml.push_str("/>");
     }
@@ -242,7 +242,7 @@ fn read_mimic(
     kind: JointKind,
     owner: &str,
     xml: &mut String,
-) -> Result<Option<Named>, UrdfError> {
+) -> Result<Option<NamedElement>, UrdfError> {
     let Some(mimic) = reader.child(node, "mimic", owner)? else { return Ok(None) };
     let joint = reader.required_text(mimic, "joint", owner, "joint=\"name_of_a_joint\"")?;
     let multiplier = reader.number(mimic, "multiplier")?.unwrap_or(1.0);
@@ -254,11 +254,11 @@ fn read_mimic(
         return Ok(None);
     }
     xml.push_str("<mimic");
-    attribute(xml, "joint", joint);
-    attribute(xml, "multiplier", &shortest(multiplier));
-    attribute(xml, "offset", &shortest(offset));
+    write_attribute(xml, "joint", joint);
+    write_attribute(xml, "multiplier", &format_number(multiplier));
+    write_attribute(xml, "offset", &format_number(offset));
     xml.push_str("/>");
-    Ok(Some(Named { name: joint.to_owned(), source }))
+    Ok(Some(NamedElement { name: joint.to_owned(), source }))
 }
 
 fn warn_unlimited(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result<(), UrdfError> {

@@ -1,19 +1,19 @@
 //! Reader of `<link>` elements: mass properties, shapes and materials.
 
 use super::error::UrdfError;
-use super::file::{LinkNotes, VisualNotes};
+use super::file::{LinkMetadata, VisualMetadata};
 use super::inertial::read_inertial;
-use super::number::{Reader, attribute, element, row, shortest};
+use super::number::{Reader, format_element, format_number, format_numbers, write_attribute};
 use super::rotation::rpy_of;
 use super::tree::owned;
 use crate::diagnostic::DiagnosticKind;
-use kinetoscope_scene::pattern::closest;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::pattern::closest_names;
+use kinetoscope_scene::source::SourceLocation;
 use roxmltree::Node;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Child elements of a link that are read, or that are ignored on purpose.
-const KNOWN: [&str; 12] = [
+const KNOWN_ELEMENTS: [&str; 12] = [
     "inertial",
     "visual",
     "collision",
@@ -32,7 +32,7 @@ const SHAPES: [&str; 5] = ["box", "cylinder", "capsule", "sphere", "mesh"];
 
 /// Color and texture of a material.
 #[derive(Clone, Debug, PartialEq)]
-struct Look {
+struct MaterialValues {
     rgba: Option<[f64; 4]>,
     texture: Option<String>,
 }
@@ -41,11 +41,11 @@ struct Look {
 #[derive(Debug, Default)]
 pub(super) struct Materials {
     /// Materials with values, defined at the top of the file or inside a visual.
-    defined: HashMap<String, (Look, Source)>,
+    defined: HashMap<String, (MaterialValues, SourceLocation)>,
     /// Names defined at the top of the file.
-    top: HashSet<String>,
+    top_level: HashSet<String>,
     /// Names used without values, with the location of their first use.
-    referenced: BTreeMap<String, Source>,
+    referenced: BTreeMap<String, SourceLocation>,
     /// Top-level materials in normalized form.
     pub(super) xml: String,
 }
@@ -55,7 +55,7 @@ impl Materials {
     pub(super) fn define(&mut self, reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> {
         for node in reader.named(root, "material") {
             let name = reader.required_text(node, "name", "robot", "<material name=\"grey\">")?;
-            let look = read_look(reader, node, &format!("material \"{name}\""))?;
+            let look = read_material_values(reader, node, &format!("material \"{name}\""))?;
             let source = reader.source(node);
             match self.defined.get(name) {
                 Some((first, _)) if *first == look => continue,
@@ -71,7 +71,7 @@ impl Materials {
             }
             write_material(&mut self.xml, name, &look);
             if look.rgba.is_some() || look.texture.is_some() {
-                self.top.insert(name.to_owned());
+                self.top_level.insert(name.to_owned());
                 self.defined.insert(name.to_owned(), (look, source));
             }
         }
@@ -79,9 +79,14 @@ impl Materials {
     }
 
     /// Reads the material of a visual.
-    fn read_visual(&mut self, reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result<Look, UrdfError> {
+    fn read_visual(
+        &mut self,
+        reader: &mut Reader<'_>,
+        node: Node<'_, '_>,
+        owner: &str,
+    ) -> Result<MaterialValues, UrdfError> {
         let name = reader.text(node, "name")?.unwrap_or_default();
-        let look = read_look(reader, node, owner)?;
+        let look = read_material_values(reader, node, owner)?;
         if look.rgba.is_some() || look.texture.is_some() {
             if !name.is_empty() {
                 self.defined.entry(name.to_owned()).or_insert_with(|| (look.clone(), reader.source(node)));
@@ -101,7 +106,7 @@ impl Materials {
                 reader.warn(DiagnosticKind::MaterialUndefined, source.clone(), message);
             }
         }
-        for name in self.referenced.keys().filter(|n| !self.top.contains(*n)) {
+        for name in self.referenced.keys().filter(|n| !self.top_level.contains(*n)) {
             if let Some((look, _)) = self.defined.get(name) {
                 write_material(&mut self.xml, name, look);
             }
@@ -109,7 +114,7 @@ impl Materials {
     }
 }
 
-fn read_look(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result<Look, UrdfError> {
+fn read_material_values(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result<MaterialValues, UrdfError> {
     let mut rgba = None;
     if let Some(color) = reader.child(node, "color", owner)? {
         rgba = reader.numbers::<4>(color, "rgba")?;
@@ -117,7 +122,7 @@ fn read_look(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result
             && found.iter().any(|c| !(0.0..=1.0).contains(c))
         {
             let at = reader.attribute_source(color, "rgba");
-            let message = format!("{owner}: the color {} leaves 0..1; it was clamped", row(&found));
+            let message = format!("{owner}: the color {} leaves 0..1; it was clamped", format_numbers(&found));
             reader.warn(DiagnosticKind::ColorClamped, at, message);
             rgba = Some(found.map(|c| c.clamp(0.0, 1.0)));
         }
@@ -127,21 +132,21 @@ fn read_look(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result
         Some(texture) => reader.text(texture, "filename")?.map(str::trim).filter(|f| !f.is_empty()).map(str::to_owned),
         None => None,
     };
-    Ok(Look { rgba, texture })
+    Ok(MaterialValues { rgba, texture })
 }
 
-fn write_material(xml: &mut String, name: &str, look: &Look) {
+fn write_material(xml: &mut String, name: &str, look: &MaterialValues) {
     xml.push_str("<material");
-    attribute(xml, "name", name);
+    write_attribute(xml, "name", name);
     xml.push('>');
     if let Some(rgba) = &look.rgba {
         xml.push_str("<color");
-        attribute(xml, "rgba", &row(rgba));
+        write_attribute(xml, "rgba", &format_numbers(rgba));
         xml.push_str("/>");
     }
     if let Some(texture) = &look.texture {
         xml.push_str("<texture");
-        attribute(xml, "filename", texture);
+        write_attribute(xml, "filename", texture);
         xml.push_str("/>");
     }
     xml.push_str("</material>");
@@ -154,11 +159,11 @@ pub(super) fn read_link(
     name: &str,
     materials: &mut Materials,
     xml: &mut String,
-) -> Result<LinkNotes, UrdfError> {
+) -> Result<LinkMetadata, UrdfError> {
     let owner = format!("link \"{name}\"");
-    warn_unknown(reader, node, &owner, &KNOWN);
+    warn_unknown(reader, node, &owner, &KNOWN_ELEMENTS);
     xml.push_str("<link");
-    attribute(xml, "name", name);
+    write_attribute(xml, "name", name);
     xml.push('>');
     let (mut inertial, mut partial_inertial) = (None, None);
     if let Some(element) = reader.first_child(node, "inertial", &owner)? {
@@ -181,7 +186,7 @@ pub(super) fn read_link(
             xml.truncate(before);
             continue;
         }
-        visuals.push(VisualNotes {
+        visuals.push(VisualMetadata {
             source: reader.source(visual),
             material: material.map(|material| reader.source(material)),
         });
@@ -198,7 +203,7 @@ pub(super) fn read_link(
         collisions.push(reader.source(collision));
     }
     xml.push_str("</link>");
-    Ok(LinkNotes { source: reader.source(node), inertial, partial_inertial, visuals, collisions })
+    Ok(LinkMetadata { source: reader.source(node), inertial, partial_inertial, visuals, collisions })
 }
 
 /// Warns about child elements that are not read: most are typing errors, such as `<colision>`.
@@ -206,7 +211,7 @@ pub(super) fn warn_unknown(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &
     let unknown = reader.elements(node).filter(|n| !known.contains(&n.tag_name().name()));
     for child in unknown.collect::<Vec<_>>() {
         let name = child.tag_name().name();
-        let like = closest(name, known.iter().copied()).first().copied().unwrap_or_default();
+        let like = closest_names(name, known.iter().copied()).first().copied().unwrap_or_default();
         let message = format!("{owner}: <{name}> is not read and was ignored (<{like}>?)");
         let at = reader.source(child);
         reader.warn(DiagnosticKind::ElementIgnored, at, message);
@@ -222,8 +227,8 @@ pub(super) fn read_origin(
 ) -> Result<(), UrdfError> {
     if let Some([xyz, rpy]) = read_pose(reader, node, owner)? {
         xml.push_str("<origin");
-        attribute(xml, "xyz", &row(&xyz));
-        attribute(xml, "rpy", &row(&rpy));
+        write_attribute(xml, "xyz", &format_numbers(&xyz));
+        write_attribute(xml, "rpy", &format_numbers(&rpy));
         xml.push_str("/>");
     }
     Ok(())
@@ -277,7 +282,7 @@ fn read_geometry(
         let found = second.tag_name().name().to_owned();
         let error =
             UrdfError::GeometryRepeated { at: at.clone(), owner: owner.to_owned(), found, first: reader.source(shape) };
-        reader.tolerate(DiagnosticKind::ElementRepeated, at, error, "the first is used")?;
+        reader.warn_or_fail(DiagnosticKind::ElementRepeated, at, error, "the first is used")?;
     }
     let name = shape.tag_name().name();
     if !SHAPES.contains(&name) {
@@ -285,7 +290,7 @@ fn read_geometry(
             at: reader.source(shape),
             owner: owner.to_owned(),
             found: name.to_owned(),
-            candidates: owned(closest(name, SHAPES)),
+            candidates: owned(closest_names(name, SHAPES)),
         });
     }
     xml.push_str("<geometry><");
@@ -309,7 +314,7 @@ fn read_box(reader: &mut Reader<'_>, shape: Node<'_, '_>, owner: &str, xml: &mut
     let Some(size) = reader.numbers::<3>(shape, "size")? else {
         return Err(missing(reader, shape, owner, "size", "size=\"0.1 0.1 0.1\""));
     };
-    attribute(xml, "size", &row(&size));
+    write_attribute(xml, "size", &format_numbers(&size));
     check_size(reader, shape, owner, "size", &size, "must be positive, full edge lengths in metres")
 }
 
@@ -326,12 +331,12 @@ fn read_mesh(
     if uri.trim().is_empty() {
         return Err(UrdfError::MeshUnnamed { at: reader.source(mesh), link: link.to_owned() });
     }
-    attribute(xml, "filename", uri.trim());
+    write_attribute(xml, "filename", uri.trim());
     if let Some(scale) = read_scale(reader, mesh)? {
         if scale.contains(&0.0) {
             return Err(reader.value(mesh, "scale", owner, "must not be zero along any axis; negative values mirror"));
         }
-        attribute(xml, "scale", &row(&scale));
+        write_attribute(xml, "scale", &format_numbers(&scale));
     }
     Ok(())
 }
@@ -344,7 +349,7 @@ fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64
     };
     let Ok(Some(scale)) = reader.number(mesh, "scale") else { return Err(error) };
     let at = reader.attribute_source(mesh, "scale");
-    reader.tolerate(DiagnosticKind::ScaleUniform, at, error, "it holds for all three axes")?;
+    reader.warn_or_fail(DiagnosticKind::ScaleUniform, at, error, "it holds for all three axes")?;
     Ok(Some([scale; 3]))
 }
 
@@ -359,7 +364,7 @@ fn read_size(
     let Some(size) = reader.number(shape, name)? else {
         return Err(missing(reader, shape, owner, name, "a positive number of metres, such as \"0.1\""));
     };
-    attribute(xml, name, &shortest(size));
+    write_attribute(xml, name, &format_number(size));
     check_size(reader, shape, owner, name, &[size], "must be positive, in metres")
 }
 
@@ -380,7 +385,7 @@ fn check_size(
         return Err(error);
     }
     let at = reader.attribute_source(shape, name);
-    reader.tolerate(DiagnosticKind::ShapeEmpty, at, error, "the shape is left out")?;
+    reader.warn_or_fail(DiagnosticKind::ShapeEmpty, at, error, "the shape is left out")?;
     Ok(false)
 }
 
@@ -393,7 +398,7 @@ fn missing(
 ) -> UrdfError {
     UrdfError::AttributeMissing {
         at: reader.source(node),
-        owner: format!("{owner}: {}", element(node, None)),
+        owner: format!("{owner}: {}", format_element(node, None)),
         element: node.tag_name().name().to_owned(),
         attribute,
         example,

@@ -6,25 +6,25 @@
 //! transform, stand on an added massless link (`base_link`), from which the connectors `BASE_TO_<child>_CONNECTOR`
 //! start.
 
-use super::components::Components;
+use super::components::ComponentTree;
 use super::config::{ComponentCfg, UrdfCfg};
 use super::error::UrdfError;
 use super::file::UrdfFile;
-use super::names::Names;
+use super::names::NameRegistry;
 use super::parse::parse_file_with;
-use super::shapes::Shapes;
+use super::shapes::ShapeConverter;
 use super::tree::owned;
 use crate::description::{Inertial, Joint, JointId, JointKind, JointLimit, Link, LinkId, Mimic, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest};
+use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest_names};
 use kinetoscope_scene::pose::from_xyz_rpy;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::{Matrix3, Unit, Vector3};
 
 /// Merged robot with the warnings about its files.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Assembly {
+pub struct MergedRobot {
     /// Merged robot.
     pub description: RobotDescription,
     /// Warnings, file by file in the order of merging.
@@ -41,8 +41,8 @@ pub struct Assembly {
 ///
 /// # Errors
 /// A file or the configuration is invalid, or a collision mesh does not exist.
-pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
-    let components = Components::arrange(cfg)?;
+pub fn assemble(cfg: &UrdfCfg) -> Result<MergedRobot, UrdfError> {
+    let components = ComponentTree::new(cfg)?;
     let mut files = Vec::with_capacity(cfg.components.len());
     for component in &cfg.components {
         files.push(parse_file_with(&component.urdf, cfg.strictness)?);
@@ -53,8 +53,8 @@ pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
         components: &components,
         links: Vec::new(),
         joints: Vec::new(),
-        link_names: Names::new("link", cfg.name_case.link),
-        joint_names: Names::new("joint", cfg.name_case.joint),
+        link_names: NameRegistry::new("link", cfg.name_case.link),
+        joint_names: NameRegistry::new("joint", cfg.name_case.joint),
         first_link: vec![0; files.len()],
         diagnostics: Vec::new(),
     };
@@ -75,11 +75,11 @@ pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
     let root = if needs_base { 0 } else { files[root].tree.root };
     let name = cfg.name.clone().unwrap_or_else(|| name_of(&components, &files));
     let description = RobotDescription { name, links: merge.links, joints: merge.joints, root: LinkId(root) };
-    Ok(Assembly { description, diagnostics: merge.diagnostics })
+    Ok(MergedRobot { description, diagnostics: merge.diagnostics })
 }
 
 /// Joins the names of the files' robots.
-fn name_of(components: &Components, files: &[UrdfFile]) -> String {
+fn name_of(components: &ComponentTree, files: &[UrdfFile]) -> String {
     let names = components.order.iter().map(|&c| files[c].robot.name.trim()).filter(|n| !n.is_empty());
     let name = names.collect::<Vec<_>>().join("_");
     if name.is_empty() { "robot".to_owned() } else { name }
@@ -87,11 +87,11 @@ fn name_of(components: &Components, files: &[UrdfFile]) -> String {
 
 struct Merge<'c> {
     cfg: &'c UrdfCfg,
-    components: &'c Components,
+    components: &'c ComponentTree,
     links: Vec<Link>,
     joints: Vec<Joint>,
-    link_names: Names,
-    joint_names: Names,
+    link_names: NameRegistry,
+    joint_names: NameRegistry,
     /// Index of the first link of each component.
     first_link: Vec<usize>,
     diagnostics: Vec<Diagnostic>,
@@ -157,7 +157,7 @@ impl Merge<'_> {
     }
 
     fn add_links(&mut self, component: &ComponentCfg, file: &UrdfFile, prefix: &str) -> Result<(), UrdfError> {
-        let mut shapes = Shapes::new(file, self.cfg);
+        let mut shapes = ShapeConverter::new(file, self.cfg);
         for (model, notes) in file.robot.links.iter().zip(&file.links) {
             let names = &mut self.link_names;
             let name = names.claim(&model.name, prefix, &component.name, &notes.source, &mut self.diagnostics);
@@ -271,12 +271,12 @@ fn link_unknown(
         field,
         link: wanted.to_owned(),
         of: of.name.clone(),
-        candidates: owned(closest(wanted, file.robot.links.iter().map(|l| l.name.as_str()))),
+        candidates: owned(closest_names(wanted, file.robot.links.iter().map(|l| l.name.as_str()))),
         total: file.robot.links.len(),
     }
 }
 
-fn inertial(model: &urdf_rs::Inertial, source: Source) -> Inertial {
+fn inertial(model: &urdf_rs::Inertial, source: SourceLocation) -> Inertial {
     let i = &model.inertia;
     Inertial {
         source,

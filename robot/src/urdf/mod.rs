@@ -24,8 +24,8 @@ mod xml;
 
 pub use config::{ComponentCfg, MissingInertia, NameCase, NameCaseCfg, Strictness, UrdfCfg};
 pub use error::UrdfError;
-pub use file::{JointNotes, LimitNotes, LinkNotes, UrdfFile, VisualNotes};
-pub use merge::{Assembly, assemble};
+pub use file::{JointMetadata, LimitMetadata, LinkMetadata, UrdfFile, VisualMetadata};
+pub use merge::{MergedRobot, assemble};
 pub use parse::{parse_file, parse_file_with, parse_str, parse_str_with};
 pub use tree::Tree;
 pub use write::{write_urdf, write_urdf_with};

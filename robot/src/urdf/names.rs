@@ -2,24 +2,24 @@
 
 use super::config::NameCase;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::collections::HashMap;
 
 /// Registry that gives out each name once. Links and joints have separate registries.
 #[derive(Debug)]
-pub(super) struct Names {
+pub(super) struct NameRegistry {
     /// Kind of the named elements: `link` or `joint`.
     what: &'static str,
     case: NameCase,
     /// Component and location of each name in use.
-    taken: HashMap<String, (String, Source)>,
+    used: HashMap<String, (String, SourceLocation)>,
     /// Next number to append to each name, so that a thousand clashes stay cheap.
     next: HashMap<String, usize>,
 }
 
-impl Names {
+impl NameRegistry {
     pub(super) fn new(what: &'static str, case: NameCase) -> Self {
-        Self { what, case, taken: HashMap::new(), next: HashMap::new() }
+        Self { what, case, used: HashMap::new(), next: HashMap::new() }
     }
 
     /// Returns a unique name: with the prefix and in the right case, then with the component's name in front, then with
@@ -29,23 +29,23 @@ impl Names {
         name: &str,
         prefix: &str,
         component: &str,
-        source: &Source,
+        source: &SourceLocation,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> String {
         let prefixed = self.case.apply(&with_prefix(name, prefix));
         let mut unique = prefixed.clone();
-        if self.taken.contains_key(&unique) && !component.is_empty() {
+        if self.used.contains_key(&unique) && !component.is_empty() {
             unique = self.case.apply(&format!("{component}_{name}"));
         }
-        if self.taken.contains_key(&unique) {
+        if self.used.contains_key(&unique) {
             let stem = unique.clone();
             let next = self.next.entry(stem.clone()).or_insert(2);
-            while self.taken.contains_key(&unique) {
+            while self.used.contains_key(&unique) {
                 unique = format!("{stem}_{next}");
                 *next += 1;
             }
         }
-        if let Some((of, first)) = self.taken.get(&prefixed) {
+        if let Some((of, first)) = self.used.get(&prefixed) {
             let what = self.what;
             let owner = if component.is_empty() { "the added base".to_owned() } else { format!("\"{component}\"") };
             let message = format!(
@@ -53,7 +53,7 @@ impl Names {
             );
             diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, source.clone(), message));
         }
-        self.taken.insert(unique.clone(), (component.to_owned(), source.clone()));
+        self.used.insert(unique.clone(), (component.to_owned(), source.clone()));
         unique
     }
 }

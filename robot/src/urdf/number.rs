@@ -3,7 +3,7 @@
 use super::error::UrdfError;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::urdf::config::Strictness;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use roxmltree::Node;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -32,31 +32,31 @@ impl<'i> Reader<'i> {
     }
 
     /// Location of a byte of the text.
-    pub(super) fn source_at(&self, position: usize) -> Source {
+    pub(super) fn source_at(&self, position: usize) -> SourceLocation {
         let line = self.line_starts.partition_point(|&start| start <= position);
-        Source { file: self.file.clone(), line: u32::try_from(line).unwrap_or(u32::MAX) }
+        SourceLocation { file: self.file.clone(), line: u32::try_from(line).unwrap_or(u32::MAX) }
     }
 
     /// Location of an element.
-    pub(super) fn source(&self, node: Node<'_, '_>) -> Source {
+    pub(super) fn source(&self, node: Node<'_, '_>) -> SourceLocation {
         self.source_at(node.range().start)
     }
 
     /// Location of an attribute, or of its element if the attribute is missing.
-    pub(super) fn attribute_source(&self, node: Node<'_, '_>, attribute: &str) -> Source {
+    pub(super) fn attribute_source(&self, node: Node<'_, '_>, attribute: &str) -> SourceLocation {
         self.source_at(node.attribute_node(attribute).map_or(node.range().start, |a| a.range().start))
     }
 
-    pub(super) fn warn(&mut self, kind: DiagnosticKind, at: Source, message: String) {
+    pub(super) fn warn(&mut self, kind: DiagnosticKind, at: SourceLocation, message: String) {
         self.diagnostics.push(Diagnostic::new(kind, at, message));
     }
 
     /// Handles a deviation from URDF with a clear meaning. Lenient reading adds a warning with the text of `error` and
     /// the remedy `done`; strict reading returns the error.
-    pub(super) fn tolerate(
+    pub(super) fn warn_or_fail(
         &mut self,
         kind: DiagnosticKind,
-        at: Source,
+        at: SourceLocation,
         error: UrdfError,
         done: &str,
     ) -> Result<(), UrdfError> {
@@ -81,7 +81,7 @@ impl<'i> Reader<'i> {
         let Some(first) = found.next() else { return Ok(None) };
         for further in found {
             let error = self.repeated(further, first, name, owner);
-            self.tolerate(DiagnosticKind::ElementRepeated, self.source(further), error, "the first is used")?;
+            self.warn_or_fail(DiagnosticKind::ElementRepeated, self.source(further), error, "the first is used")?;
         }
         Ok(Some(first))
     }
@@ -149,14 +149,14 @@ impl<'i> Reader<'i> {
     pub(super) fn text<'a>(&self, node: Node<'a, '_>, attribute: &str) -> Result<Option<&'a str>, UrdfError> {
         let Some(text) = node.attribute(attribute) else { return Ok(None) };
         if text.contains("${") || text.contains("$(") {
-            let found = element(node, Some((attribute, text)));
+            let found = format_element(node, Some((attribute, text)));
             return Err(UrdfError::Xacro { at: self.attribute_source(node, attribute), found });
         }
         if text.chars().any(|c| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')) {
             return Err(UrdfError::Value {
                 at: self.attribute_source(node, attribute),
                 owner: "robot".to_owned(),
-                element: element(node, Some((attribute, text))),
+                element: format_element(node, Some((attribute, text))),
                 problem: format!("{attribute} has a control character; use visible characters only"),
             });
         }
@@ -197,7 +197,7 @@ impl<'i> Reader<'i> {
         };
         let wrong = |problem: String| UrdfError::Number {
             at: self.attribute_source(node, attribute),
-            element: element(node, Some((attribute, text))),
+            element: format_element(node, Some((attribute, text))),
             problem,
         };
         let mut numbers = [0.0; N];
@@ -205,10 +205,10 @@ impl<'i> Reader<'i> {
         for word in text.split_whitespace() {
             let Ok(number) = word.parse::<f64>() else {
                 let comma = if word.contains(',') { " (use a decimal point and spaces)" } else { "" };
-                return Err(wrong(format!("\"{}\" is not a number{comma}; {}", cut(word), needs())));
+                return Err(wrong(format!("\"{}\" is not a number{comma}; {}", truncate(word), needs())));
             };
             if !number.is_finite() {
-                return Err(wrong(format!("\"{}\" is not finite; {}", cut(word), needs())));
+                return Err(wrong(format!("\"{}\" is not finite; {}", truncate(word), needs())));
             }
             if let Some(slot) = numbers.get_mut(count) {
                 *slot = number;
@@ -263,7 +263,7 @@ impl<'i> Reader<'i> {
         UrdfError::Value {
             at: self.attribute_source(node, attribute),
             owner: owner.to_owned(),
-            element: element(node, node.attribute(attribute).map(|text| (attribute, text))),
+            element: format_element(node, node.attribute(attribute).map(|text| (attribute, text))),
             problem: format!("{attribute} {rule}"),
         }
     }
@@ -275,15 +275,15 @@ fn is_urdf(node: Node<'_, '_>, namespace: Option<&str>) -> bool {
 }
 
 /// Formats an element for messages: `<origin xyz="1 x 2">`.
-pub(super) fn element(node: Node<'_, '_>, attribute: Option<(&str, &str)>) -> String {
+pub(super) fn format_element(node: Node<'_, '_>, attribute: Option<(&str, &str)>) -> String {
     match attribute {
-        Some((name, text)) => format!("<{} {name}=\"{}\">", node.tag_name().name(), cut(text)),
+        Some((name, text)) => format!("<{} {name}=\"{}\">", node.tag_name().name(), truncate(text)),
         None => format!("<{}>", node.tag_name().name()),
     }
 }
 
 /// Shortens a text to at most 60 characters on one line.
-fn cut(text: &str) -> String {
+fn truncate(text: &str) -> String {
     let mut short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if text.chars().nth(60).is_some() {
         short.push_str("...");
@@ -292,18 +292,18 @@ fn cut(text: &str) -> String {
 }
 
 /// Formats a number with the fewest digits that read back to the same value.
-pub(super) fn shortest(number: f64) -> String {
+pub(super) fn format_number(number: f64) -> String {
     let text = format!("{number:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
 /// Formats numbers with the fewest digits, separated by spaces.
-pub(super) fn row(numbers: &[f64]) -> String {
-    numbers.iter().map(|&n| shortest(n)).collect::<Vec<_>>().join(" ")
+pub(super) fn format_numbers(numbers: &[f64]) -> String {
+    numbers.iter().map(|&n| format_number(n)).collect::<Vec<_>>().join(" ")
 }
 
 /// Appends ` name="text"` with the special characters of XML escaped.
-pub(super) fn attribute(out: &mut String, name: &str, text: &str) {
+pub(super) fn write_attribute(out: &mut String, name: &str, text: &str) {
     let _ = write!(out, " {name}=\"");
     for c in text.chars() {
         match c {

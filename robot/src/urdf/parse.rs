@@ -6,14 +6,14 @@
 
 use super::config::Strictness;
 use super::error::UrdfError;
-use super::file::{JointNotes, LinkNotes, UrdfFile};
+use super::file::{JointMetadata, LinkMetadata, UrdfFile};
 use super::joint::read_joint;
 use super::link::{Materials, read_link};
-use super::number::{Reader, attribute, element};
-use super::tree::{Edge, Named, Tree};
+use super::number::{Reader, format_element, write_attribute};
+use super::tree::{JointEdge, NamedElement, Tree};
 use super::xml::repair;
 use crate::diagnostic::DiagnosticKind;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
 use std::io::Read;
@@ -21,10 +21,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Size limit of a file \[bytes\]. A URDF holds no meshes; a larger file is a wrong file or an endless device.
-const LARGEST_FILE: u64 = 256 << 20;
+const MAX_FILE_SIZE: u64 = 256 << 20;
 
 /// Top-level elements without meaning for the simulation, common enough to be skipped without a warning.
-const SKIPPED: [&str; 8] =
+const IGNORED_ELEMENTS: [&str; 8] =
     ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
 
 /// Reads a URDF file with the default [`Strictness`].
@@ -49,10 +49,10 @@ pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, 
         _ => UrdfError::FileUnreadable { path: owned(), source },
     })?;
     let mut bytes = Vec::new();
-    let read = file.take(LARGEST_FILE + 1).read_to_end(&mut bytes);
+    let read = file.take(MAX_FILE_SIZE + 1).read_to_end(&mut bytes);
     read.map_err(|source| UrdfError::FileUnreadable { path: owned(), source })?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(UrdfError::FileTooLarge { path: owned(), limit: LARGEST_FILE });
+    if bytes.len() as u64 > MAX_FILE_SIZE {
+        return Err(UrdfError::FileTooLarge { path: owned(), limit: MAX_FILE_SIZE });
     }
     match std::str::from_utf8(&bytes) {
         Ok(text) => parse_str_with(text, path, strictness),
@@ -75,7 +75,7 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "the file is UTF-16".to_owned(),
         _ => format!("byte 0x{:02x} is not UTF-8", bytes[wrong]),
     };
-    UrdfError::Encoding { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)), problem }
+    UrdfError::Encoding { at: SourceLocation::new(path, u32::try_from(line).unwrap_or(u32::MAX)), problem }
 }
 
 /// Reads a URDF from memory with the default [`Strictness`]. `path` names the file in messages, and relative mesh paths
@@ -114,14 +114,14 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
 
     let mut materials = Materials::default();
     materials.define(&mut reader, root)?;
-    let mut pass = Pass::default();
+    let mut pass = DocumentPass::default();
     for node in reader.elements(root) {
         match node.tag_name().name() {
             "link" => pass.link(&mut reader, node, &mut materials)?,
             "joint" => pass.joint(&mut reader, node)?,
             "material" | "transmission" => {}
             "mujoco" => pass.meshdir = pass.meshdir.take().or(meshdir(&reader, node)?),
-            skipped if SKIPPED.contains(&skipped) => {}
+            skipped if IGNORED_ELEMENTS.contains(&skipped) => {}
             other => {
                 let message = format!("<{other}> is no element of URDF and was ignored");
                 let at = reader.source(node);
@@ -136,14 +136,14 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
     let name = reader.text(root, "name")?.unwrap_or_default();
     let mut normalised = String::with_capacity(pass.xml.len() + materials.xml.len() + 64);
     normalised.push_str("<robot");
-    attribute(&mut normalised, "name", name);
+    write_attribute(&mut normalised, "name", name);
     normalised.push('>');
     normalised.push_str(&pass.xml);
     normalised.push_str(&materials.xml);
     normalised.push_str("</robot>");
     let refused = |source| UrdfError::Model { path: path.to_path_buf(), source };
     let robot = urdf_rs::read_from_string(&normalised).map_err(|e| refused(e.into()))?;
-    if !pass.agrees_with(&robot) {
+    if !pass.matches_model(&robot) {
         return Err(refused("its model has other links or joints than the file".into()));
     }
     Ok(UrdfFile {
@@ -159,17 +159,17 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
 
 /// Results of the pass over the document.
 #[derive(Default)]
-struct Pass {
-    links: Vec<LinkNotes>,
-    joints: Vec<JointNotes>,
-    link_names: Vec<Named>,
-    edges: Vec<Edge>,
+struct DocumentPass {
+    links: Vec<LinkMetadata>,
+    joints: Vec<JointMetadata>,
+    link_names: Vec<NamedElement>,
+    edges: Vec<JointEdge>,
     meshdir: Option<String>,
     /// Normalized links and joints.
     xml: String,
 }
 
-impl Pass {
+impl DocumentPass {
     fn link(
         &mut self,
         reader: &mut Reader<'_>,
@@ -178,7 +178,7 @@ impl Pass {
     ) -> Result<(), UrdfError> {
         let name = reader.required_text(node, "name", "robot", "<link name=\"base\">")?;
         self.links.push(read_link(reader, node, name, materials, &mut self.xml)?);
-        self.link_names.push(Named { name: name.to_owned(), source: reader.source(node) });
+        self.link_names.push(NamedElement { name: name.to_owned(), source: reader.source(node) });
         Ok(())
     }
 
@@ -191,7 +191,7 @@ impl Pass {
     }
 
     /// True if the model has the names and the numbers of shapes that the pass found.
-    fn agrees_with(&self, robot: &urdf_rs::Robot) -> bool {
+    fn matches_model(&self, robot: &urdf_rs::Robot) -> bool {
         robot.links.len() == self.links.len()
             && robot.joints.len() == self.joints.len()
             && robot.links.iter().zip(&self.link_names).all(|(a, b)| a.name == b.name)
@@ -206,12 +206,12 @@ impl Pass {
 
 fn malformed(error: roxmltree::Error, text: &str, path: &Path) -> UrdfError {
     let position = error.pos();
-    let at = Source::new(path, position.row);
+    let at = SourceLocation::new(path, position.row);
     match &error {
         roxmltree::Error::DtdDetected => {
             let before = text.split("<!DOCTYPE").next().unwrap_or_default();
             let line = 1 + before.bytes().filter(|&b| b == b'\n').count();
-            UrdfError::Doctype { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)) }
+            UrdfError::Doctype { at: SourceLocation::new(path, u32::try_from(line).unwrap_or(u32::MAX)) }
         }
         roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
             UrdfError::Xacro { at, found: "an element with prefix xacro:".to_owned() }
@@ -220,7 +220,7 @@ fn malformed(error: roxmltree::Error, text: &str, path: &Path) -> UrdfError {
         roxmltree::Error::UnclosedRootNode => {
             let line = text.lines().count();
             let column = text.lines().last().map_or(1, |l| l.chars().count() + 1);
-            let at = Source::new(path, u32::try_from(line).unwrap_or(u32::MAX));
+            let at = SourceLocation::new(path, u32::try_from(line).unwrap_or(u32::MAX));
             UrdfError::Xml { at, column: u32::try_from(column).unwrap_or(u32::MAX), source: error.into() }
         }
         _ => UrdfError::Xml { at, column: position.col, source: error.into() },
@@ -254,7 +254,7 @@ fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfErr
             return Err(error);
         }
         let done = format!("here it is inside <{}> and was ignored", parent.tag_name().name());
-        reader.tolerate(DiagnosticKind::XacroLeftover, at, error, &done)?;
+        reader.warn_or_fail(DiagnosticKind::XacroLeftover, at, error, &done)?;
     }
     Ok(())
 }
@@ -271,13 +271,13 @@ fn meshdir(reader: &Reader<'_>, node: Node<'_, '_>) -> Result<Option<String>, Ur
 
 /// Warns about transmissions of unknown joints. Transmissions have no meaning for the simulation, but an unknown joint
 /// indicates a broken file.
-fn check_transmissions(reader: &mut Reader<'_>, root: Node<'_, '_>, edges: &[Edge]) -> Result<(), UrdfError> {
+fn check_transmissions(reader: &mut Reader<'_>, root: Node<'_, '_>, edges: &[JointEdge]) -> Result<(), UrdfError> {
     let joints: HashSet<&str> = edges.iter().map(|e| e.joint.name.as_str()).collect();
     for transmission in reader.named(root, "transmission") {
         for joint in reader.named(transmission, "joint") {
             let name = reader.text(joint, "name")?.unwrap_or_default();
             if !joints.contains(name) {
-                let transmission = element(transmission, transmission.attribute("name").map(|n| ("name", n)));
+                let transmission = format_element(transmission, transmission.attribute("name").map(|n| ("name", n)));
                 let message = format!("{transmission} names joint \"{name}\", which does not exist; it was ignored");
                 let at = reader.source(joint);
                 reader.warn(DiagnosticKind::ReferenceUnknown, at, message);

@@ -36,7 +36,7 @@ pub(super) enum Resolved {
     /// The location is known, but the file does not exist.
     Missing {
         /// Most likely path.
-        guess: PathBuf,
+        most_likely: PathBuf,
         /// Every path that was tried.
         tried: Vec<String>,
         /// Additional hint, such as a file whose name differs only in case.
@@ -73,12 +73,12 @@ pub(super) struct Resolver<'c> {
     /// Entries of `AMENT_PREFIX_PATH`.
     ament_prefix_path: Vec<PathBuf>,
     resolved: HashMap<String, Resolved>,
-    searched: HashMap<String, Search>,
+    searched: HashMap<String, PackageSearch>,
 }
 
 /// Folders that match a package, and all folders that were searched.
 #[derive(Clone, Debug, Default)]
-struct Search {
+struct PackageSearch {
     found: Vec<PathBuf>,
     tried: Vec<String>,
 }
@@ -145,15 +145,15 @@ impl<'c> Resolver<'c> {
         if uri.is_empty() {
             return Resolved::Empty;
         }
-        let Some((scheme, rest)) = uri.split_once("://") else { return self.plain(uri) };
+        let Some((scheme, rest)) = uri.split_once("://") else { return self.resolve_path(uri) };
         match scheme.to_ascii_lowercase().as_str() {
             "package" | "model" => {
                 let rest = decode(rest);
                 match rest.strip_prefix('/').filter(|_| self.strictness == Strictness::Lenient) {
                     Some(_) if Path::new(&rest).is_file() => Resolved::Found(PathBuf::from(rest)),
                     Some(package) => match self.package(package) {
-                        Resolved::Missing { guess, tried, hint } => {
-                            Resolved::Missing { guess, tried: [vec![rest], tried].concat(), hint }
+                        Resolved::Missing { most_likely: guess, tried, hint } => {
+                            Resolved::Missing { most_likely: guess, tried: [vec![rest], tried].concat(), hint }
                         }
                         Resolved::PackageUnknown { package, guess, tried } => {
                             Resolved::PackageUnknown { package, guess, tried: [vec![rest], tried].concat() }
@@ -163,7 +163,9 @@ impl<'c> Resolver<'c> {
                     None => self.package(&rest),
                 }
             }
-            "file" => self.plain(&decode(rest.strip_prefix("localhost/").map_or(rest, |_| &rest["localhost".len()..]))),
+            "file" => {
+                self.resolve_path(&decode(rest.strip_prefix("localhost/").map_or(rest, |_| &rest["localhost".len()..])))
+            }
             _ => Resolved::Unsupported {
                 problem: format!("{scheme}:// is not supported; use package://, file:// or a path"),
             },
@@ -171,7 +173,7 @@ impl<'c> Resolver<'c> {
     }
 
     /// Resolves a path that is absolute, or relative to the folder of the URDF or to the asset root.
-    fn plain(&self, path: &str) -> Resolved {
+    fn resolve_path(&self, path: &str) -> Resolved {
         let decoded = decode(path);
         let folders = [Some(&self.folder), self.asset_root.as_ref()];
         let candidates = folders.into_iter().flatten().flat_map(|f| [f.join(path), f.join(&decoded)]).collect();
@@ -187,7 +189,7 @@ impl<'c> Resolver<'c> {
         let file = file.trim_start_matches('/');
         let search = match self.packages.get(package) {
             // A configured package is searched in its folder only: a file from another folder would be a surprise.
-            Some(folder) => Search { found: vec![folder.clone()], tried: Vec::new() },
+            Some(folder) => PackageSearch { found: vec![folder.clone()], tried: Vec::new() },
             None => self.search(package),
         };
         if !search.found.is_empty() {
@@ -210,13 +212,13 @@ impl<'c> Resolver<'c> {
         }
         let in_meshdir = self.meshdir_candidates(path);
         let mut tried: Vec<String> = Vec::new();
-        for place in candidates.iter().chain(&in_meshdir).map(|c| work_out(c).display().to_string()) {
+        for place in candidates.iter().chain(&in_meshdir).map(|c| normalize_path(c).display().to_string()) {
             if !tried.contains(&place) {
                 tried.push(place);
             }
         }
         let guess = candidates.into_iter().next().unwrap_or_default();
-        Resolved::Missing { hint: remark(&guess), guess, tried }
+        Resolved::Missing { hint: missing_file_hint(&guess), most_likely: guess, tried }
     }
 
     fn in_meshdir(&self, path: &str) -> Option<PathBuf> {
@@ -236,25 +238,25 @@ impl<'c> Resolver<'c> {
     }
 
     /// Finds folders that match a package, best first.
-    fn search(&mut self, package: &str) -> Search {
+    fn search(&mut self, package: &str) -> PackageSearch {
         if let Some(known) = self.searched.get(package) {
             return known.clone();
         }
-        let mut search = Search::default();
+        let mut search = PackageSearch::default();
         // A package is one folder: `..` or an absolute path is not a name, and joining it would leave the search path.
         let plain_name = matches!(Path::new(package).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
         if plain_name {
             for folder in self.ros_package_path.clone() {
-                search.around(&folder, package, "ROS_PACKAGE_PATH");
+                search.search_folder(&folder, package, "ROS_PACKAGE_PATH");
             }
             for prefix in &self.ament_prefix_path {
                 search.check(prefix.join("share").join(package), "AMENT_PREFIX_PATH");
             }
             for folder in self.folder.ancestors() {
-                search.around(folder, package, "above the URDF");
+                search.search_folder(folder, package, "above the URDF");
             }
             if let Some(folder) = &self.asset_root {
-                search.around(folder, package, "asset root");
+                search.search_folder(folder, package, "asset root");
             }
         }
         self.searched.insert(package.to_owned(), search.clone());
@@ -262,9 +264,9 @@ impl<'c> Resolver<'c> {
     }
 }
 
-impl Search {
+impl PackageSearch {
     /// Checks the folder itself, its child of that name, and its children whose `package.xml` has that name.
-    fn around(&mut self, folder: &Path, package: &str, why: &str) {
+    fn search_folder(&mut self, folder: &Path, package: &str, why: &str) {
         if folder.file_name().is_some_and(|n| n == package) || declared_name(folder).as_deref() == Some(package) {
             self.check(folder.to_path_buf(), why);
         }
@@ -324,7 +326,7 @@ fn decode(text: &str) -> String {
 }
 
 /// Resolves `.` and `..` in the text of a path, for messages.
-fn work_out(path: &Path) -> PathBuf {
+fn normalize_path(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
         match component {
@@ -339,7 +341,7 @@ fn work_out(path: &Path) -> PathBuf {
 }
 
 /// Explains why a path is not a file, if the folder shows a reason.
-fn remark(path: &Path) -> Option<String> {
+fn missing_file_hint(path: &Path) -> Option<String> {
     if path.is_dir() {
         return Some("it is a folder".to_owned());
     }
@@ -356,12 +358,12 @@ fn remark(path: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinetoscope_testkit::urdf::Files;
+    use kinetoscope_testkit::urdf::TempFiles;
 
     /// Creates the test files `ws/robot_description/{package.xml,urdf/robot.urdf,meshes/part one.stl}`, `ws/other
     /// folder` with the package `meshes_pkg`, `ws/install/share/installed`, and `ws/ros/rospkg`.
-    fn workspace() -> Files {
-        let files = Files::default();
+    fn workspace() -> TempFiles {
+        let files = TempFiles::default();
         for (path, text) in [
             ("robot_description/urdf/robot.urdf", ""),
             ("robot_description/urdf/local.stl", ""),

@@ -2,27 +2,27 @@
 
 use super::config::UrdfCfg;
 use super::error::UrdfError;
-use super::file::{UrdfFile, VisualNotes};
+use super::file::{UrdfFile, VisualMetadata};
 use super::merge::pose_of;
 use super::resolve::{Resolved, Resolver};
 use crate::description::{Collision, Geometry, Material, Visual};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// Converter of the shapes of one file to those of the description.
 #[derive(Debug)]
-pub(super) struct Shapes<'f> {
+pub(super) struct ShapeConverter<'f> {
     resolver: Resolver<'f>,
     /// Materials of this file. A name never refers to a material of another component.
     materials: HashMap<&'f str, &'f urdf_rs::Material>,
     /// True after the first warning about `package:///`; the file gets only one.
-    warned_of_slash: bool,
+    warned_about_empty_package: bool,
 }
 
-impl<'f> Shapes<'f> {
+impl<'f> ShapeConverter<'f> {
     pub(super) fn new(file: &'f UrdfFile, cfg: &'f UrdfCfg) -> Self {
         let mut materials = HashMap::new();
         for material in &file.robot.materials {
@@ -31,15 +31,15 @@ impl<'f> Shapes<'f> {
         let resolver = Resolver::new(&file.path, &cfg.packages, file.meshdir.as_deref())
             .with_asset_root(cfg.asset_root.as_deref())
             .with_strictness(cfg.strictness);
-        Self { resolver, materials, warned_of_slash: false }
+        Self { resolver, materials, warned_about_empty_package: false }
     }
 
     /// Resolves a URI, with a warning about the first `package:///` of the file.
-    fn resolve(&mut self, uri: &str, at: &Source, diagnostics: &mut Vec<Diagnostic>) -> Resolved {
+    fn resolve(&mut self, uri: &str, at: &SourceLocation, diagnostics: &mut Vec<Diagnostic>) -> Resolved {
         let resolved = self.resolver.resolve(uri);
         if let Resolved::Found(path) = &resolved
             && ["package:///", "model:///"].iter().any(|start| uri.trim().starts_with(start))
-            && !std::mem::replace(&mut self.warned_of_slash, true)
+            && !std::mem::replace(&mut self.warned_about_empty_package, true)
         {
             let message = format!(
                 "\"{uri}\" has no package, it was read as {}; write package://name_of_package/.. or file:///path (further \
@@ -55,7 +55,7 @@ impl<'f> Shapes<'f> {
     pub(super) fn visual(
         &mut self,
         model: &urdf_rs::Visual,
-        notes: &VisualNotes,
+        notes: &VisualMetadata,
         link: &str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Visual, UrdfError> {
@@ -90,7 +90,7 @@ impl<'f> Shapes<'f> {
     pub(super) fn collision(
         &mut self,
         model: &urdf_rs::Collision,
-        source: &Source,
+        source: &SourceLocation,
         link: &str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Collision, UrdfError> {
@@ -121,7 +121,7 @@ impl<'f> Shapes<'f> {
     fn material(
         &mut self,
         model: &urdf_rs::Material,
-        source: &Source,
+        source: &SourceLocation,
         link: &str,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Material {
@@ -151,12 +151,12 @@ impl<'f> Shapes<'f> {
 fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
     match resolved {
         Resolved::Found(path) => (path, "exists".to_owned()),
-        Resolved::Missing { guess, tried, hint } => {
+        Resolved::Missing { most_likely: guess, tried, hint } => {
             let hint = hint.map(|h| format!(" ({h})")).unwrap_or_default();
-            (guess, format!("does not exist{hint}, looked at {}", shortened(&tried)))
+            (guess, format!("does not exist{hint}, looked at {}", format_first(&tried)))
         }
         Resolved::PackageUnknown { package, guess, tried } => {
-            (guess, format!("is in package \"{package}\", which was found nowhere, looked at {}", shortened(&tried)))
+            (guess, format!("is in package \"{package}\", which was found nowhere, looked at {}", format_first(&tried)))
         }
         Resolved::Empty => (PathBuf::new(), "is empty".to_owned()),
         Resolved::Unsupported { problem } => (PathBuf::from(uri), format!("cannot be read: {problem}")),
@@ -164,7 +164,7 @@ fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
 }
 
 /// Lists the first paths only: a warning need not be complete.
-fn shortened(tried: &[String]) -> String {
+fn format_first(tried: &[String]) -> String {
     let first = tried.iter().take(3).map(String::as_str).collect::<Vec<_>>().join(", ");
     if tried.len() > 3 { format!("{first} and {} more", tried.len() - 3) } else { first }
 }

@@ -4,8 +4,8 @@
 //! Traversals do not recurse: a chain of a million links is as safe as one of ten.
 
 use super::error::UrdfError;
-use kinetoscope_scene::pattern::closest;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::pattern::closest_names;
+use kinetoscope_scene::source::SourceLocation;
 use std::collections::HashMap;
 
 /// Tree of the links and joints of one file, as indices.
@@ -27,41 +27,45 @@ pub struct Tree {
 
 /// Named element and its location.
 #[derive(Clone, Debug)]
-pub(super) struct Named {
+pub(super) struct NamedElement {
     pub(super) name: String,
-    pub(super) source: Source,
+    pub(super) source: SourceLocation,
 }
 
 /// Joint as an edge of the graph.
 #[derive(Clone, Debug)]
-pub(super) struct Edge {
-    pub(super) joint: Named,
+pub(super) struct JointEdge {
+    pub(super) joint: NamedElement,
     /// Name of the parent link, with the location of the element that names it.
-    pub(super) parent: Named,
-    pub(super) child: Named,
+    pub(super) parent: NamedElement,
+    pub(super) child: NamedElement,
     /// Name of the followed joint, with the location of the element that names it.
-    pub(super) mimic: Option<Named>,
+    pub(super) mimic: Option<NamedElement>,
     /// Name of the joint type.
     pub(super) kind: &'static str,
     /// True if other joints can follow this joint.
-    pub(super) movable: bool,
+    pub(super) is_drivable: bool,
 }
 
 impl Tree {
     /// Builds the tree. Checks names, the tree and the mimic chains.
-    pub(super) fn build(robot: &Source, links: &[Named], edges: &[Edge]) -> Result<Self, UrdfError> {
+    pub(super) fn build(
+        robot: &SourceLocation,
+        links: &[NamedElement],
+        edges: &[JointEdge],
+    ) -> Result<Self, UrdfError> {
         if links.is_empty() {
             return Err(UrdfError::NoLinks { at: robot.clone() });
         }
         let link_ids = index("link", links.iter())?;
         let joint_ids = index("joint", edges.iter().map(|e| &e.joint))?;
-        let find = |edge: &Edge, end: &Named, role: &'static str| {
+        let find = |edge: &JointEdge, end: &NamedElement, role: &'static str| {
             link_ids.get(end.name.as_str()).copied().ok_or_else(|| UrdfError::LinkUnknown {
                 at: end.source.clone(),
                 joint: edge.joint.name.clone(),
                 role,
                 link: end.name.clone(),
-                candidates: owned(closest(&end.name, links.iter().map(|l| l.name.as_str()))),
+                candidates: owned(closest_names(&end.name, links.iter().map(|l| l.name.as_str()))),
                 total: links.len(),
             })
         };
@@ -73,7 +77,7 @@ impl Tree {
         for (id, edge) in edges.iter().enumerate() {
             let (parent, child) = (find(edge, &edge.parent, "parent")?, find(edge, &edge.child, "child")?);
             if let Some(first) = tree.parent_joint[child].replace(id) {
-                return Err(UrdfError::TwoParents {
+                return Err(UrdfError::MultipleParents {
                     link: edge.child.name.clone(),
                     first_joint: edges[first].joint.name.clone(),
                     first: edges[first].joint.source.clone(),
@@ -85,17 +89,17 @@ impl Tree {
             tree.joint_links.push((parent, child));
         }
         tree.find_root(links, edges)?;
-        tree.follow_mimics(edges, &joint_ids)?;
+        tree.resolve_mimics(edges, &joint_ids)?;
         Ok(tree)
     }
 
     /// Finds the root and the depths. Every link has at most one parent here, so links that the only root does not
     /// reach contain a cycle.
-    fn find_root(&mut self, links: &[Named], edges: &[Edge]) -> Result<(), UrdfError> {
+    fn find_root(&mut self, links: &[NamedElement], edges: &[JointEdge]) -> Result<(), UrdfError> {
         let roots: Vec<usize> = (0..links.len()).filter(|&l| self.parent_joint[l].is_none()).collect();
         if roots.len() > 1 {
             let roots = roots.iter().map(|&l| (links[l].name.clone(), links[l].source.clone())).collect();
-            return Err(UrdfError::SeveralRoots { roots });
+            return Err(UrdfError::MultipleRoots { roots });
         }
         const UNSEEN: usize = usize::MAX;
         self.depth = vec![UNSEEN; links.len()];
@@ -112,11 +116,11 @@ impl Tree {
             }
         }
         let Some(lost) = (0..links.len()).find(|&l| self.depth[l] == UNSEEN) else { return Ok(()) };
-        Err(self.circle(lost, links, edges))
+        Err(self.cycle_error(lost, links, edges))
     }
 
     /// Describes the cycle above `lost`, a link that the root does not reach.
-    fn circle(&self, lost: usize, links: &[Named], edges: &[Edge]) -> UrdfError {
+    fn cycle_error(&self, lost: usize, links: &[NamedElement], edges: &[JointEdge]) -> UrdfError {
         let mut seen = vec![false; links.len()];
         let mut link = lost;
         let mut joints = Vec::new();
@@ -141,7 +145,7 @@ impl Tree {
         }
     }
 
-    fn follow_mimics(&mut self, edges: &[Edge], joint_ids: &HashMap<&str, usize>) -> Result<(), UrdfError> {
+    fn resolve_mimics(&mut self, edges: &[JointEdge], joint_ids: &HashMap<&str, usize>) -> Result<(), UrdfError> {
         self.mimics = vec![None; edges.len()];
         for (id, edge) in edges.iter().enumerate() {
             let Some(mimic) = &edge.mimic else { continue };
@@ -149,13 +153,13 @@ impl Tree {
                 return Err(UrdfError::MimicUnknown {
                     at: mimic.source.clone(),
                     joint: edge.joint.name.clone(),
-                    followed: mimic.name.clone(),
-                    candidates: owned(closest(&mimic.name, edges.iter().map(|e| e.joint.name.as_str()))),
+                    mimicked_joint: mimic.name.clone(),
+                    candidates: owned(closest_names(&mimic.name, edges.iter().map(|e| e.joint.name.as_str()))),
                     total: edges.len(),
                 });
             };
-            if !edges[followed].movable {
-                return Err(UrdfError::MimicUnmovable {
+            if !edges[followed].is_drivable {
+                return Err(UrdfError::MimicNotDrivable {
                     at: mimic.source.clone(),
                     joint: edge.joint.name.clone(),
                     followed: mimic.name.clone(),
@@ -165,14 +169,14 @@ impl Tree {
             self.mimics[id] = Some(followed);
         }
         // Each joint is marked with the walk that first reached it: reaching a mark of the same walk is a cycle.
-        let mut colour = vec![usize::MAX; edges.len()];
+        let mut visited_by = vec![usize::MAX; edges.len()];
         for start in 0..edges.len() {
             let mut joint = start;
-            while colour[joint] == usize::MAX {
-                colour[joint] = start;
+            while visited_by[joint] == usize::MAX {
+                visited_by[joint] = start;
                 let Some(next) = self.mimics[joint] else { break };
-                if colour[next] == start {
-                    return Err(self.mimic_circle(next, edges));
+                if visited_by[next] == start {
+                    return Err(self.mimic_cycle_error(next, edges));
                 }
                 joint = next;
             }
@@ -180,7 +184,7 @@ impl Tree {
         Ok(())
     }
 
-    fn mimic_circle(&self, start: usize, edges: &[Edge]) -> UrdfError {
+    fn mimic_cycle_error(&self, start: usize, edges: &[JointEdge]) -> UrdfError {
         let mut joints = vec![edges[start].joint.name.clone()];
         let mut next = self.mimics[start];
         while let Some(joint) = next.filter(|&j| j != start) {
@@ -198,8 +202,11 @@ impl Tree {
     }
 }
 
-fn index<'n>(what: &'static str, named: impl Iterator<Item = &'n Named>) -> Result<HashMap<&'n str, usize>, UrdfError> {
-    let mut first: HashMap<&str, (usize, &Source)> = HashMap::new();
+fn index<'n>(
+    what: &'static str,
+    named: impl Iterator<Item = &'n NamedElement>,
+) -> Result<HashMap<&'n str, usize>, UrdfError> {
+    let mut first: HashMap<&str, (usize, &SourceLocation)> = HashMap::new();
     for (id, n) in named.enumerate() {
         if let Some((_, source)) = first.insert(&n.name, (id, &n.source)) {
             return Err(UrdfError::NameRepeated {

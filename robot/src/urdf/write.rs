@@ -3,7 +3,7 @@
 //! The text is the same for the same description, and reads back to the same robot up to rounding (1e-12). Materials
 //! are written inside the visuals, since two components may use one name for two materials.
 
-use super::number::{attribute, row, shortest};
+use super::number::{format_number, format_numbers, write_attribute};
 use super::rotation::rpy_of;
 use crate::description::{Geometry, Inertial, Joint, JointKind, Material, PartialInertial, RobotDescription};
 use kinetoscope_scene::Pose;
@@ -72,7 +72,7 @@ impl Writer {
         self.out.push('<');
         self.out.push_str(element);
         for (name, text) in attributes {
-            attribute(&mut self.out, name, text);
+            write_attribute(&mut self.out, name, text);
         }
     }
 
@@ -97,15 +97,15 @@ impl Writer {
 
     fn origin(&mut self, pose: &Pose) {
         if *pose != Pose::identity() {
-            let xyz = row(pose.translation.vector.as_slice());
-            self.empty("origin", &[("xyz", xyz), ("rpy", row(&rpy_of(&pose.rotation)))]);
+            let xyz = format_numbers(pose.translation.vector.as_slice());
+            self.empty("origin", &[("xyz", xyz), ("rpy", format_numbers(&rpy_of(&pose.rotation)))]);
         }
     }
 
     fn inertial(&mut self, inertial: &Inertial) {
         self.open("inertial", &[]);
         self.origin(&inertial.link_from_com);
-        self.empty("mass", &[("value", shortest(inertial.mass))]);
+        self.empty("mass", &[("value", format_number(inertial.mass))]);
         self.moments(&inertial.inertia);
         self.close("inertial");
     }
@@ -113,12 +113,12 @@ impl Writer {
     fn partial_inertial(&mut self, partial: &PartialInertial) {
         self.open("inertial", &[]);
         if let Some(pose) = &partial.link_from_com {
-            let xyz = row(pose.translation.vector.as_slice());
-            self.empty("origin", &[("xyz", xyz), ("rpy", row(&rpy_of(&pose.rotation)))]);
+            let xyz = format_numbers(pose.translation.vector.as_slice());
+            self.empty("origin", &[("xyz", xyz), ("rpy", format_numbers(&rpy_of(&pose.rotation)))]);
         }
         for (name, value) in [("mass", partial.mass), ("density", partial.density)] {
             if let Some(value) = value {
-                self.empty(name, &[("value", shortest(value))]);
+                self.empty(name, &[("value", format_number(value))]);
             }
         }
         if let Some(inertia) = &partial.inertia {
@@ -130,23 +130,23 @@ impl Writer {
     fn moments(&mut self, i: &Matrix3<f64>) {
         let names = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
         let values = [i[(0, 0)], i[(0, 1)], i[(0, 2)], i[(1, 1)], i[(1, 2)], i[(2, 2)]];
-        let attributes: Vec<_> = names.into_iter().zip(values.map(shortest)).collect();
+        let attributes: Vec<_> = names.into_iter().zip(values.map(format_number)).collect();
         self.empty("inertia", &attributes);
     }
 
     fn geometry(&mut self, geometry: &Geometry, file_name: &impl Fn(&Path) -> String) {
         self.open("geometry", &[]);
         match geometry {
-            Geometry::Box { size } => self.empty("box", &[("size", row(size.as_slice()))]),
+            Geometry::Box { size } => self.empty("box", &[("size", format_numbers(size.as_slice()))]),
             Geometry::Cylinder { radius, length } => {
-                self.empty("cylinder", &[("radius", shortest(*radius)), ("length", shortest(*length))]);
+                self.empty("cylinder", &[("radius", format_number(*radius)), ("length", format_number(*length))]);
             }
             Geometry::Capsule { radius, length } => {
-                self.empty("capsule", &[("radius", shortest(*radius)), ("length", shortest(*length))]);
+                self.empty("capsule", &[("radius", format_number(*radius)), ("length", format_number(*length))]);
             }
-            Geometry::Sphere { radius } => self.empty("sphere", &[("radius", shortest(*radius))]),
+            Geometry::Sphere { radius } => self.empty("sphere", &[("radius", format_number(*radius))]),
             Geometry::Mesh { path, scale, .. } => {
-                self.empty("mesh", &[("filename", file_name(path)), ("scale", row(scale.as_slice()))]);
+                self.empty("mesh", &[("filename", file_name(path)), ("scale", format_numbers(scale.as_slice()))]);
             }
         }
         self.close("geometry");
@@ -159,7 +159,7 @@ impl Writer {
         }
         self.open("material", &name);
         if let Some(rgba) = &material.rgba {
-            self.empty("color", &[("rgba", row(rgba))]);
+            self.empty("color", &[("rgba", format_numbers(rgba))]);
         }
         if let Some(texture) = &material.texture {
             self.empty("texture", &[("filename", file_name(texture))]);
@@ -173,7 +173,7 @@ impl Writer {
         self.empty("parent", &[("link", robot.link(joint.parent).name.clone())]);
         self.empty("child", &[("link", robot.link(joint.child).name.clone())]);
         if !matches!(joint.kind, JointKind::Fixed | JointKind::Floating) {
-            self.empty("axis", &[("xyz", row(joint.axis.as_slice()))]);
+            self.empty("axis", &[("xyz", format_numbers(joint.axis.as_slice()))]);
         }
         // A strict reader requires `<limit>` for these types; without bounds it limits nothing.
         if joint.limit.is_none() && matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic) {
@@ -186,16 +186,16 @@ impl Writer {
                 ("effort", limit.effort),
                 ("velocity", limit.velocity),
             ];
-            self.given("limit", &values);
+            self.element_with_values("limit", &values);
         }
         if joint.damping.is_some() || joint.friction.is_some() {
-            self.given("dynamics", &[("damping", joint.damping), ("friction", joint.friction)]);
+            self.element_with_values("dynamics", &[("damping", joint.damping), ("friction", joint.friction)]);
         }
         if let Some(mimic) = &joint.mimic {
             let attributes = [
                 ("joint", robot.joint(mimic.joint).name.clone()),
-                ("multiplier", shortest(mimic.multiplier)),
-                ("offset", shortest(mimic.offset)),
+                ("multiplier", format_number(mimic.multiplier)),
+                ("offset", format_number(mimic.offset)),
             ];
             self.empty("mimic", &attributes);
         }
@@ -203,8 +203,8 @@ impl Writer {
     }
 
     /// Writes an element with the attributes that have a value.
-    fn given(&mut self, element: &str, values: &[(&'static str, Option<f64>)]) {
-        let given: Vec<_> = values.iter().filter_map(|&(name, v)| v.map(|v| (name, shortest(v)))).collect();
+    fn element_with_values(&mut self, element: &str, values: &[(&'static str, Option<f64>)]) {
+        let given: Vec<_> = values.iter().filter_map(|&(name, v)| v.map(|v| (name, format_number(v)))).collect();
         self.empty(element, &given);
     }
 }

@@ -1,12 +1,12 @@
 //! Repair of XML text that a namespace-aware parser rejects and other readers of URDF accept.
 
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use roxmltree::{Document, Error};
 use std::path::Path;
 
 /// Maximum number of prefixes that are declared for a file; more are not extensions of URDF.
-const MOST_PREFIXES: usize = 32;
+const MAX_PREFIXES: usize = 32;
 
 /// Removes misplaced XML declarations and binds all prefixes, without changing line numbers. `error` is the parser's
 /// first error.
@@ -28,7 +28,7 @@ pub(super) fn repair(
         let blank = text[start..end].bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect::<String>();
         repaired.replace_range(start..end, &blank);
         let message = "the XML declaration <?xml ..?> is not at the very beginning of the file; it was ignored";
-        let at = Source::new(path, line_of(text, start));
+        let at = SourceLocation::new(path, line_of(text, start));
         found.push(Diagnostic::new(DiagnosticKind::DeclarationMisplaced, at, message));
     }
     if !found.is_empty() {
@@ -39,13 +39,13 @@ pub(super) fn repair(
         error = next;
     }
     let Some(insert_at) = prolog.end_of_root_name(&repaired) else { return Err(error) };
-    for _ in 0..MOST_PREFIXES {
+    for _ in 0..MAX_PREFIXES {
         let Error::UnknownNamespace(prefix, position) = &error else { break };
         let message = format!(
             "the XML prefix \"{prefix}\" is bound to no namespace; its elements and attributes were ignored \
              (<robot xmlns:{prefix}=\"http://..\"> would bind it)"
         );
-        found.push(Diagnostic::new(DiagnosticKind::NamespaceUnbound, Source::new(path, position.row), message));
+        found.push(Diagnostic::new(DiagnosticKind::NamespaceUnbound, SourceLocation::new(path, position.row), message));
         repaired.insert_str(insert_at, &format!(" xmlns:{prefix}=\"unbound:{prefix}\""));
         let Some(next) = check(&repaired) else {
             diagnostics.append(&mut found);

@@ -29,7 +29,7 @@ pub(super) fn rotation(axis: [f64; 3], angle: f64) -> Affine {
 }
 
 /// A transform prepared for points and normals.
-pub(super) struct Placement {
+pub(super) struct PreparedAffine {
     matrix: Affine,
     /// Cofactors: the inverse transpose times the determinant, so that no division can fail.
     cofactors: [[f64; 3]; 3],
@@ -37,7 +37,7 @@ pub(super) struct Placement {
     pub(super) mirrored: bool,
 }
 
-impl Placement {
+impl PreparedAffine {
     pub(super) fn new(matrix: &Affine) -> Self {
         let m = matrix;
         let minor = |i: usize, j: usize| {

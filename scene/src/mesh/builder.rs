@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::error::Ctx;
-use super::{MeshError, MeshMaterial, MeshPart, TriMesh};
+use super::error::ReadContext;
+use super::{MeshError, MeshMaterial, Submesh, TriMesh};
 
 /// Largest number of triangles that a file may expand to. It is far above any robot part, and keeps a few malicious
 /// lines of instances from filling the memory.
@@ -36,7 +36,7 @@ impl Builder {
     /// Adds a triangle. `at` describes its position in the file, for errors.
     pub(super) fn triangle(
         &mut self,
-        ctx: &Ctx<'_>,
+        ctx: &ReadContext<'_>,
         mut corners: [Corner; 3],
         material: Option<usize>,
         at: impl Fn() -> String,
@@ -62,7 +62,7 @@ impl Builder {
     ///
     /// If only some corners have a normal, the others get the normal of their triangle. Missing texture coordinates
     /// become 0 if other corners have some. If every triangle is degenerate, all are kept.
-    pub(super) fn finish(mut self, ctx: &Ctx<'_>) -> Result<TriMesh, MeshError> {
+    pub(super) fn finish(mut self, ctx: &ReadContext<'_>) -> Result<TriMesh, MeshError> {
         if self.corners.is_empty() {
             return Err(MeshError::Empty { path: ctx.path.to_owned() });
         }
@@ -102,7 +102,7 @@ impl Builder {
                 mesh.materials.push(m);
                 mesh.materials.len() - 1
             });
-            mesh.parts.push(MeshPart { triangles: start..mesh.triangles.len(), material });
+            mesh.submeshes.push(Submesh { triangles: start..mesh.triangles.len(), material });
         }
         mesh.positions = welder.positions;
         mesh.normals = any_normal.then_some(welder.normals);

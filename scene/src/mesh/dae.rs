@@ -10,10 +10,10 @@ use std::str::FromStr;
 
 use roxmltree::{Document, Node};
 
-use super::affine::{Affine, IDENTITY, Placement, product, rotation};
+use super::affine::{Affine, IDENTITY, PreparedAffine, product, rotation};
 use super::builder::{Builder, Corner};
 use super::dae_material::Binding;
-use super::error::Ctx;
+use super::error::ReadContext;
 use super::format::{Format, begins_with_word};
 use super::polygon::triangulate;
 use super::{DaeUpAxis, MeshError, TriMesh};
@@ -22,7 +22,7 @@ const MAX_DEPTH: usize = 64;
 const MAX_NODES: usize = 100_000;
 
 pub(super) struct Dae<'a, 'i> {
-    pub(super) ctx: &'a Ctx<'a>,
+    pub(super) ctx: &'a ReadContext<'a>,
     pub(super) builder: Builder,
     /// Material handles by the id of `<material>`.
     pub(super) materials: HashMap<&'a str, Option<usize>>,
@@ -69,11 +69,11 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let text = decoded(ctx, bytes)?;
     let document = Document::parse(&text).map_err(|e| {
         let pos = e.pos();
-        ctx.caused(format!("line {}, column {}", pos.row, pos.col), format!("not well-formed XML: {e}"), e)
+        ctx.invalid_with_source(format!("line {}, column {}", pos.row, pos.col), format!("not well-formed XML: {e}"), e)
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
@@ -118,7 +118,7 @@ fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     dae.builder.finish(ctx)
 }
 
-fn decoded<'b>(ctx: &Ctx<'_>, bytes: &'b [u8]) -> Result<Cow<'b, str>, MeshError> {
+fn decoded<'b>(ctx: &ReadContext<'_>, bytes: &'b [u8]) -> Result<Cow<'b, str>, MeshError> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Ok(Cow::Borrowed(text)),
         Err(e) => {
@@ -127,7 +127,7 @@ fn decoded<'b>(ctx: &Ctx<'_>, bytes: &'b [u8]) -> Result<Cow<'b, str>, MeshError
                 return Ok(Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()));
             }
             let line = bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count() + 1;
-            Err(ctx.caused(format!("line {line}"), "text is not UTF-8", e))
+            Err(ctx.invalid_with_source(format!("line {line}"), "text is not UTF-8", e))
         }
     }
 }
@@ -192,7 +192,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         }
         let mut here = *parent;
         for step in node.children().filter(Node::is_element) {
-            if let Some(step) = self.step(step)? {
+            if let Some(step) = self.element_transform(step)? {
                 here = product(&here, &step);
             }
         }
@@ -224,7 +224,7 @@ impl<'a, 'i> Dae<'a, 'i> {
     }
 
     /// Transform of a child element of a node; `None` for an element that is not a transform.
-    fn step(&self, node: Node<'a, 'i>) -> Result<Option<Affine>, MeshError> {
+    fn element_transform(&self, node: Node<'a, 'i>) -> Result<Option<Affine>, MeshError> {
         Ok(Some(match node.tag_name().name() {
             "matrix" => self.matrix(node)?,
             "translate" => {
@@ -271,7 +271,10 @@ impl<'a, 'i> Dae<'a, 'i> {
         let mut out = Vec::with_capacity(node.range().len() / 8);
         for word in texts.flat_map(str::split_ascii_whitespace) {
             let shown = || word.chars().take(32).collect::<String>();
-            out.push(word.parse().map_err(|e| self.ctx.caused(line(node), format!("{:?} is no number", shown()), e))?);
+            out.push(
+                word.parse()
+                    .map_err(|e| self.ctx.invalid_with_source(line(node), format!("{:?} is no number", shown()), e))?,
+            );
         }
         Ok(out)
     }
@@ -289,7 +292,11 @@ impl<'a, 'i> Dae<'a, 'i> {
         };
         let attribute = |name: &str, default: usize| match accessor.and_then(|a| a.attribute(name)) {
             Some(text) => text.trim().parse::<u32>().map(|n| n as usize).map_err(|e| {
-                self.ctx.caused(line(node), format!("{name}={text:?} of the accessor is no whole number"), e)
+                self.ctx.invalid_with_source(
+                    line(node),
+                    format!("{name}={text:?} of the accessor is no whole number"),
+                    e,
+                )
             }),
             None => Ok(default),
         };
@@ -318,7 +325,9 @@ impl<'a, 'i> Dae<'a, 'i> {
             let number = |name: &str| {
                 let text = input.attribute(name).unwrap_or("0");
                 let number = text.trim().parse::<u32>();
-                number.map_err(|e| self.ctx.caused(line(input), format!("{name}={text:?} is no whole number"), e))
+                number.map_err(|e| {
+                    self.ctx.invalid_with_source(line(input), format!("{name}={text:?} is no whole number"), e)
+                })
             };
             let (column, set) = (number("offset")? as usize, number("set")?);
             columns = columns.max(column + 1);
@@ -355,13 +364,13 @@ impl<'a, 'i> Dae<'a, 'i> {
         bindings: &HashMap<&'a str, Binding<'a, 'i>>,
     ) -> Result<(), MeshError> {
         let Some(mesh) = child(geometry, "mesh") else { return Ok(()) };
-        let place = Placement::new(to_world);
+        let place = PreparedAffine::new(to_world);
         for primitive in mesh.children() {
             let kind = primitive.tag_name().name();
             if !matches!(kind, "triangles" | "polylist" | "polygons" | "tristrips" | "trifans") {
                 continue;
             }
-            let (material, uv_set) = self.look(primitive, bindings)?;
+            let (material, uv_set) = self.material_of(primitive, bindings)?;
             let inputs = self.inputs(primitive, uv_set)?;
             let columns = inputs.columns;
             if child(primitive, "ph").is_some() {
@@ -428,7 +437,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         primitive: Node<'a, 'i>,
         inputs: &Inputs,
         row: &[u32],
-        place: &Placement,
+        place: &PreparedAffine,
     ) -> Result<([f64; 3], Corner), MeshError> {
         let bad = |input: &Input, what: &str| {
             let at = format!("{}, {what} index", line(primitive));

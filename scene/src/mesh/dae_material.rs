@@ -35,7 +35,7 @@ impl<'a, 'i> Binding<'a, 'i> {
 
 impl<'a, 'i> Dae<'a, 'i> {
     /// Material of a primitive, and the texture coordinate set of its diffuse texture, if the file names one.
-    pub(super) fn look(
+    pub(super) fn material_of(
         &mut self,
         primitive: Node<'a, 'i>,
         bindings: &HashMap<&'a str, Binding<'a, 'i>>,

@@ -106,17 +106,17 @@ pub enum MeshError {
 }
 
 /// The file and the options of its reader, from which readers make errors.
-pub(super) struct Ctx<'a> {
+pub(super) struct ReadContext<'a> {
     pub(super) path: &'a Path,
     pub(super) options: &'a MeshOptions,
 }
 
-impl Ctx<'_> {
+impl ReadContext<'_> {
     pub(super) fn invalid(&self, at: impl Into<String>, what: impl Into<String>) -> MeshError {
         MeshError::Invalid { path: self.path.to_owned(), at: at.into(), what: what.into(), source: None }
     }
 
-    pub(super) fn caused(
+    pub(super) fn invalid_with_source(
         &self,
         at: impl Into<String>,
         what: impl Into<String>,

@@ -1,6 +1,6 @@
 //! [`Format`]: a mesh file format.
 
-use super::error::Ctx;
+use super::error::ReadContext;
 use super::{MeshError, TriMesh};
 
 /// A mesh file format.
@@ -16,7 +16,7 @@ pub(super) struct Format {
     /// Likelihood that a file without a known extension has this format, by its content; 0 excludes the format.
     pub(super) likelihood: fn(&[u8]) -> u8,
     /// Reads a file.
-    pub(super) read: fn(&Ctx<'_>, &[u8]) -> Result<TriMesh, MeshError>,
+    pub(super) read: fn(&ReadContext<'_>, &[u8]) -> Result<TriMesh, MeshError>,
 }
 
 /// True if the first 4096 bytes contain a word.

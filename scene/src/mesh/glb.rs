@@ -6,9 +6,9 @@
 
 use serde_json::Value;
 
-use super::affine::{Affine, IDENTITY, Placement, product};
+use super::affine::{Affine, IDENTITY, PreparedAffine, product};
 use super::builder::{Builder, Corner};
-use super::error::{Ctx, percent_decoded};
+use super::error::{ReadContext, percent_decoded};
 use super::format::{Format, begins_with_word};
 use super::glb_buffers::{Gltf, item, len};
 use super::{MeshError, MeshMaterial, TextureSource, TriMesh};
@@ -19,7 +19,7 @@ const MAX_DEPTH: usize = 64;
 const MAX_NODES: usize = 100_000;
 
 /// Required extensions that do not affect this reader, or that it implements (quantized accessors).
-const HARMLESS: [&str; 3] = ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
+const SUPPORTED_EXTENSIONS: [&str; 3] = ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
 
 /// The binary glTF format.
 pub(super) const GLB: Format = Format {
@@ -41,7 +41,7 @@ pub(super) const GLTF: Format = Format {
     read: read_gltf,
 };
 
-fn read_glb(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read_glb(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let word = |at: usize| {
         let b = bytes.get(at..at + 4).ok_or_else(|| ctx.truncated("GLB header", at as u64 + 4, bytes.len() as u64))?;
         Ok(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
@@ -75,17 +75,17 @@ fn read_glb(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     read_json(ctx, json, bin)
 }
 
-fn read_gltf(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read_gltf(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     read_json(ctx, bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None)
 }
 
-fn read_json(ctx: &Ctx<'_>, json: &[u8], bin: Option<&[u8]>) -> Result<TriMesh, MeshError> {
+fn read_json(ctx: &ReadContext<'_>, json: &[u8], bin: Option<&[u8]>) -> Result<TriMesh, MeshError> {
     let json: Value = serde_json::from_slice(json).map_err(|e| {
         let at = format!("JSON line {}, column {}", e.line(), e.column());
-        ctx.caused(at, format!("not valid JSON: {e}"), e)
+        ctx.invalid_with_source(at, format!("not valid JSON: {e}"), e)
     })?;
     for extension in array(&json, "extensionsRequired").iter().filter_map(Value::as_str) {
-        if !HARMLESS.contains(&extension) && !extension.starts_with("KHR_materials_") {
+        if !SUPPORTED_EXTENSIONS.contains(&extension) && !extension.starts_with("KHR_materials_") {
             return Err(ctx.unsupported(format!("the required glTF extension {extension:?}")));
         }
     }
@@ -98,7 +98,7 @@ fn read_json(ctx: &Ctx<'_>, json: &[u8], bin: Option<&[u8]>) -> Result<TriMesh, 
     let nodes = len(&json, "nodes");
     let scene = reader.gltf.optional(&json, "scene", "glTF")?;
     let roots: Vec<usize> = match (scene, item(&json, "scenes", 0)) {
-        (Some(index), _) => reader.children(reader.gltf.referred("scenes", index, "glTF")?, "nodes", "scene")?,
+        (Some(index), _) => reader.children(reader.gltf.element_at("scenes", index, "glTF")?, "nodes", "scene")?,
         (None, Some(first)) => reader.children(first, "nodes", "scene")?,
         // Without scenes, every node that is not a child of another node.
         (None, None) => {
@@ -153,7 +153,7 @@ impl Reader<'_> {
     }
 
     fn node(&mut self, index: usize, parent: &Affine, depth: usize, at: &str) -> Result<(), MeshError> {
-        let node = self.gltf.referred("nodes", index, at)?;
+        let node = self.gltf.element_at("nodes", index, at)?;
         let at = format!("node {index}");
         if depth > MAX_DEPTH {
             let what = format!("nodes nest deeper than {MAX_DEPTH}, or in a circle");
@@ -170,7 +170,7 @@ impl Reader<'_> {
                 let t = self.numbers(node, "translation", &at)?.unwrap_or([0.0; 3]);
                 let q = self.numbers(node, "rotation", &at)?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
                 let s = self.numbers(node, "scale", &at)?.unwrap_or([1.0; 3]);
-                trs(t, q, s)
+                translation_rotation_scale(t, q, s)
             }
         };
         let here = product(parent, &local);
@@ -184,15 +184,15 @@ impl Reader<'_> {
     }
 
     fn mesh(&mut self, index: usize, to_world: &Affine, at: &str) -> Result<(), MeshError> {
-        let mesh = self.gltf.referred("meshes", index, at)?;
-        let place = Placement::new(to_world);
+        let mesh = self.gltf.element_at("meshes", index, at)?;
+        let place = PreparedAffine::new(to_world);
         for (number, primitive) in array(mesh, "primitives").iter().enumerate() {
             self.primitive(primitive, &place, &format!("mesh {index}, primitive {number}"))?;
         }
         Ok(())
     }
 
-    fn primitive(&mut self, primitive: &Value, place: &Placement, at: &str) -> Result<(), MeshError> {
+    fn primitive(&mut self, primitive: &Value, place: &PreparedAffine, at: &str) -> Result<(), MeshError> {
         let mode = self.gltf.optional(primitive, "mode", at)?.unwrap_or(4);
         match mode {
             // Points and lines have no surface.
@@ -264,7 +264,7 @@ impl Reader<'_> {
 
     /// Handle and texture coordinate set of a material.
     fn material(&mut self, index: usize, at: &str) -> Result<(usize, usize), MeshError> {
-        let material = self.gltf.referred("materials", index, at)?;
+        let material = self.gltf.element_at("materials", index, at)?;
         if let Some(known) = self.materials[index] {
             return Ok(known);
         }
@@ -273,7 +273,7 @@ impl Reader<'_> {
         let pbr = material.get("pbrMetallicRoughness").unwrap_or(&none);
         let factor: [f64; 4] = self.numbers(pbr, "baseColorFactor", &at)?.unwrap_or([1.0; 4]);
         let [r, g, b, a] = factor.map(|x| x.clamp(0.0, 1.0));
-        let mut rgba = [to_display(r), to_display(g), to_display(b), a].map(|x| x as f32);
+        let mut rgba = [to_srgb(r), to_srgb(g), to_srgb(b), a].map(|x| x as f32);
         if material.get("alphaMode").and_then(Value::as_str).unwrap_or("OPAQUE") == "OPAQUE" {
             rgba[3] = 1.0;
         }
@@ -281,7 +281,7 @@ impl Reader<'_> {
         if let Some(base) = pbr.get("baseColorTexture") {
             uv_set = self.gltf.optional(base, "texCoord", &at)?.unwrap_or(0);
             let number = self.gltf.number(base, "index", &at)?;
-            let entry = self.gltf.referred("textures", number, &at)?;
+            let entry = self.gltf.element_at("textures", number, &at)?;
             // A texture without a source has its image in an extension.
             if let Some(source) = self.gltf.optional(entry, "source", &format!("texture {number}"))? {
                 texture = self.image(source, &at)?;
@@ -294,7 +294,7 @@ impl Reader<'_> {
     }
 
     fn image(&mut self, index: usize, at: &str) -> Result<Option<TextureSource>, MeshError> {
-        let image = self.gltf.referred("images", index, at)?;
+        let image = self.gltf.element_at("images", index, at)?;
         let at = format!("image {index}");
         if let Some(uri) = image.get("uri").and_then(Value::as_str) {
             return Ok(Some(match self.gltf.embedded(uri, &at)? {
@@ -308,7 +308,7 @@ impl Reader<'_> {
 }
 
 /// Transform of a translation, a rotation (x, y, z, w) and a scale.
-fn trs(t: [f64; 3], [x, y, z, w]: [f64; 4], s: [f64; 3]) -> Affine {
+fn translation_rotation_scale(t: [f64; 3], [x, y, z, w]: [f64; 4], s: [f64; 3]) -> Affine {
     let length = (x * x + y * y + z * z + w * w).sqrt();
     let [x, y, z, w] = if length > 0.0 { [x, y, z, w].map(|c| c / length) } else { [0.0, 0.0, 0.0, 1.0] };
     let r = [
@@ -320,7 +320,7 @@ fn trs(t: [f64; 3], [x, y, z, w]: [f64; 4], s: [f64; 3]) -> Affine {
 }
 
 /// Converts linear light to sRGB.
-fn to_display(x: f64) -> f64 {
+fn to_srgb(x: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 

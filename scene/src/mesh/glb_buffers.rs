@@ -5,11 +5,11 @@ use std::borrow::Cow;
 use serde_json::Value;
 
 use super::MeshError;
-use super::error::{Ctx, percent_decoded};
+use super::error::{ReadContext, percent_decoded};
 use super::load::read;
 
 pub(super) struct Gltf<'a> {
-    pub(super) ctx: &'a Ctx<'a>,
+    pub(super) ctx: &'a ReadContext<'a>,
     pub(super) json: &'a Value,
     /// Buffers by index, read when first needed.
     buffers: Vec<Option<Cow<'a, [u8]>>>,
@@ -36,7 +36,7 @@ pub(super) fn len(json: &Value, array: &str) -> usize {
 }
 
 impl<'a> Gltf<'a> {
-    pub(super) fn new(ctx: &'a Ctx<'a>, json: &'a Value, bin: Option<&'a [u8]>) -> Self {
+    pub(super) fn new(ctx: &'a ReadContext<'a>, json: &'a Value, bin: Option<&'a [u8]>) -> Self {
         let buffers = (0..len(json, "buffers")).map(|_| None).collect();
         Self { ctx, json, buffers, bin }
     }
@@ -54,13 +54,13 @@ impl<'a> Gltf<'a> {
     }
 
     /// Element that an index refers to.
-    pub(super) fn referred(&self, array: &str, index: usize, at: &str) -> Result<&'a Value, MeshError> {
+    pub(super) fn element_at(&self, array: &str, index: usize, at: &str) -> Result<&'a Value, MeshError> {
         let found = item(self.json, array, index);
         found.ok_or_else(|| self.ctx.index(format!("{at}, index into {array}"), index as i64, len(self.json, array)))
     }
 
     fn load_buffer(&mut self, index: usize, at: &str) -> Result<(), MeshError> {
-        let buffer = self.referred("buffers", index, at)?;
+        let buffer = self.element_at("buffers", index, at)?;
         if self.buffers[index].is_some() {
             return Ok(());
         }
@@ -106,7 +106,7 @@ impl<'a> Gltf<'a> {
 
     /// Buffer, start, length and stride of a view, checked against its buffer.
     fn view_range(&mut self, index: usize, at: &str) -> Result<(usize, usize, usize, Option<usize>), MeshError> {
-        let view = self.referred("bufferViews", index, at)?;
+        let view = self.element_at("bufferViews", index, at)?;
         let name = format!("bufferView {index}");
         let buffer = self.number(view, "buffer", &name)?;
         self.load_buffer(buffer, &name)?;
@@ -120,7 +120,7 @@ impl<'a> Gltf<'a> {
     }
 
     fn layout(&mut self, index: usize, kind: &str, at: &str) -> Result<Layout, MeshError> {
-        let accessor = self.referred("accessors", index, at)?;
+        let accessor = self.element_at("accessors", index, at)?;
         let name = format!("accessor {index}");
         if accessor.get("sparse").is_some() {
             return Err(self.ctx.unsupported(format!("{name}: a sparse accessor")));

@@ -15,7 +15,7 @@ use super::{HullError, TriMesh};
 
 /// Version of the algorithm. It changes whenever the same input may give another hull; part of the key of
 /// [`super::HullCache`].
-pub(super) const ALGORITHM: u32 = 1;
+pub(super) const ALGORITHM_VERSION: u32 = 1;
 
 /// Smallest tolerance, as a fraction of the diagonal: less than half a unit in the last place of `f32`.
 const RESOLUTION: f64 = 1e-8;
@@ -77,7 +77,7 @@ pub fn convex_hull(points: &[[f32; 3]], cfg: &HullCfg) -> Result<TriMesh, HullEr
     let Some(thickness) = cfg.min_thickness else {
         return Err(HullError::Coplanar { deviation: start.off_plane, tolerance });
     };
-    let slab = thickened(&exact, &start, thickness);
+    let slab = thicken(&exact, &start, thickness);
     // The thickness may be less than the tolerance of a large plate.
     let tolerance = tolerance.min(thickness / 10.0).max(RESOLUTION * diagonal(&slab));
     let start = simplex(&slab);
@@ -151,7 +151,7 @@ fn simplex(points: &[[f64; 3]]) -> Simplex {
 }
 
 /// Points projected into their plane, once on each side of it.
-fn thickened(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3]> {
+fn thicken(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3]> {
     let heights = || points.iter().map(|&p| dot(flat.normal, sub(p, flat.origin)));
     let (lo, hi) = heights().fold((0.0f64, 0.0f64), |(lo, hi), h| (lo.min(h), hi.max(h)));
     let (middle, half) = ((lo + hi) / 2.0, (hi - lo).max(thickness) / 2.0);
@@ -181,7 +181,7 @@ struct Face {
 struct Edge {
     from: usize,
     to: usize,
-    beyond: usize,
+    face_beyond: usize,
 }
 
 /// Candidate for the next point, ordered by distance, then by the smaller index.
@@ -251,7 +251,7 @@ impl Quickhull {
         for _ in 0..8 {
             let everything = (0..points.len()).collect();
             let all: Vec<usize> = (0..hull.faces.len()).filter(|&f| hull.faces[f].alive).collect();
-            hull.hand_out(everything, &all);
+            hull.assign_outside_points(everything, &all);
             if hull.heap.is_empty() || !hull.grow(max_vertices) {
                 break;
             }
@@ -283,7 +283,7 @@ impl Quickhull {
     }
 
     /// True if a point is strictly in front of a face, decided exactly.
-    fn sees(&self, point: usize, face: usize) -> bool {
+    fn is_in_front(&self, point: usize, face: usize) -> bool {
         let distance = self.distance(face, point);
         // The rounding error of `distance` is below 2^-12 steps.
         if distance.abs() > 0.01 {
@@ -318,7 +318,7 @@ impl Quickhull {
     }
 
     /// Assigns each point to the face of `among` that it is farthest in front of, and drops points behind all faces.
-    fn hand_out(&mut self, points: Vec<usize>, among: &[usize]) {
+    fn assign_outside_points(&mut self, points: Vec<usize>, among: &[usize]) {
         for point in points {
             if self.degree[point] > 0 {
                 continue;
@@ -335,12 +335,12 @@ impl Quickhull {
             }
         }
         for &face in among {
-            self.announce(face);
+            self.push_candidate(face);
         }
     }
 
     /// Adds the farthest point of a face to the candidates.
-    fn announce(&mut self, face: usize) {
+    fn push_candidate(&mut self, face: usize) {
         let points = self.faces[face].outside.iter();
         let candidates = points.map(|&point| Candidate { distance: self.distance(face, point), point, face });
         if let Some(best) = candidates.max() {
@@ -353,7 +353,7 @@ impl Quickhull {
         let (seen, rim) = self.horizon(apex, from);
         let first = self.faces.len();
         let count = rim.len();
-        for (i, &Edge { from: a, to: b, beyond }) in rim.iter().enumerate() {
+        for (i, &Edge { from: a, to: b, face_beyond: beyond }) in rim.iter().enumerate() {
             // No face is degenerate: the apex is strictly in front of a face with this edge, so not in line with the
             // edge.
             self.add([a, b, apex], [beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
@@ -366,7 +366,7 @@ impl Quickhull {
             points.extend(self.remove(face));
         }
         let new: Vec<usize> = (first..self.faces.len()).collect();
-        self.hand_out(points, &new);
+        self.assign_outside_points(points, &new);
     }
 
     /// Faces that `apex` sees, starting with `from`, and the edges around them in order. Exact planes of a convex body
@@ -384,11 +384,11 @@ impl Quickhull {
                 if is_seen.contains(&beyond) {
                     continue;
                 }
-                if self.sees(apex, beyond) {
+                if self.is_in_front(apex, beyond) {
                     is_seen.insert(beyond);
                     seen.push(beyond);
                 } else {
-                    edges.insert(corners[i], Edge { from: corners[i], to: corners[(i + 1) % 3], beyond });
+                    edges.insert(corners[i], Edge { from: corners[i], to: corners[(i + 1) % 3], face_beyond: beyond });
                 }
             }
         }

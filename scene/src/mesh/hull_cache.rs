@@ -11,10 +11,10 @@ use super::{DaeUpAxis, HullCfg, MeshError, MeshOptions, TriMesh, convex_hull, hu
 use crate::atomic_file::AtomicFile;
 
 /// Version of the readers. It changes whenever they give other vertices for the same file.
-const READERS: u32 = 1;
+const READERS_VERSION: u32 = 1;
 const MAGIC: &[u8; 12] = b"kshull\r\n\x00\x01\x00\x00";
-pub(super) const KEY: usize = 32;
-const HEAD: usize = MAGIC.len() + KEY + 8;
+pub(super) const KEY_BYTES: usize = 32;
+const HEADER_BYTES: usize = MAGIC.len() + KEY_BYTES + 8;
 
 /// Disk cache of convex hulls, in one folder.
 ///
@@ -29,10 +29,10 @@ impl HullCache {
     /// Cache in `$KINETOSCOPE_CACHE`, else `$XDG_CACHE_HOME/kinetoscope`, else `$HOME/.cache/kinetoscope`, else
     /// disabled.
     pub fn default_location() -> Self {
-        Self::located(|name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from))
+        Self::from_env(|name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from))
     }
 
-    fn located(var: impl Fn(&str) -> Option<PathBuf>) -> Self {
+    fn from_env(var: impl Fn(&str) -> Option<PathBuf>) -> Self {
         let dir = var("KINETOSCOPE_CACHE")
             .or_else(|| var("XDG_CACHE_HOME").map(|d| d.join("kinetoscope")))
             .or_else(|| var("HOME").map(|d| d.join(".cache").join("kinetoscope")));
@@ -86,7 +86,7 @@ impl HullCache {
         let format = format_of(path, &bytes).filter(|format| format.is_one_file);
         let entry = self.dir.as_ref().zip(format).map(|(dir, format)| {
             let key = key(&bytes, format, options, scale, cfg);
-            let mut name = String::with_capacity(2 * KEY + 5);
+            let mut name = String::with_capacity(2 * KEY_BYTES + 5);
             for byte in key {
                 // Writing to a string cannot fail.
                 let _ = write!(name, "{byte:02x}");
@@ -107,13 +107,19 @@ impl HullCache {
     }
 }
 
-pub(super) fn key(bytes: &[u8], format: &Format, options: &MeshOptions, scale: [f64; 3], cfg: &HullCfg) -> [u8; KEY] {
+pub(super) fn key(
+    bytes: &[u8],
+    format: &Format,
+    options: &MeshOptions,
+    scale: [f64; 3],
+    cfg: &HullCfg,
+) -> [u8; KEY_BYTES] {
     let HullCfg { max_vertices, tolerance, min_thickness } = *cfg;
     let MeshOptions { dae_up_axis } = *options;
     let mut hasher = Sha256::new();
     hasher.update(MAGIC);
-    hasher.update(hull::ALGORITHM.to_le_bytes());
-    hasher.update(READERS.to_le_bytes());
+    hasher.update(hull::ALGORITHM_VERSION.to_le_bytes());
+    hasher.update(READERS_VERSION.to_le_bytes());
     hasher.update([format.code, u8::from(dae_up_axis == DaeUpAxis::Apply), u8::from(min_thickness.is_some())]);
     for number in scale.into_iter().chain([tolerance, min_thickness.unwrap_or(0.0)]) {
         hasher.update(number.to_bits().to_le_bytes());
@@ -124,7 +130,7 @@ pub(super) fn key(bytes: &[u8], format: &Format, options: &MeshOptions, scale: [
 }
 
 /// Encodes a hull: magic, key, counts, positions, triangles, and the SHA-256 of all of these.
-pub(super) fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
+pub(super) fn encoded(hull: &TriMesh, key: &[u8; KEY_BYTES]) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
     out.extend(key);
     out.extend((hull.positions.len() as u32).to_le_bytes());
@@ -136,15 +142,15 @@ pub(super) fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
     out
 }
 
-pub(super) fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
-    let (content, sum) = bytes.split_at_checked(bytes.len().checked_sub(KEY)?)?;
-    let (head, body) = content.split_at_checked(HEAD)?;
+pub(super) fn decoded(bytes: &[u8], key: &[u8; KEY_BYTES]) -> Option<TriMesh> {
+    let (content, sum) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
+    let (head, body) = content.split_at_checked(HEADER_BYTES)?;
     let (magic, rest) = head.split_at(MAGIC.len());
-    if magic != MAGIC || rest[..KEY] != key[..] || Sha256::digest(content)[..] != *sum {
+    if magic != MAGIC || rest[..KEY_BYTES] != key[..] || Sha256::digest(content)[..] != *sum {
         return None;
     }
     let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-    let (vertices, faces) = (word(&rest[KEY..]) as usize, word(&rest[KEY + 4..]) as usize);
+    let (vertices, faces) = (word(&rest[KEY_BYTES..]) as usize, word(&rest[KEY_BYTES + 4..]) as usize);
     if body.len() as u64 != 12 * (vertices as u64 + faces as u64) {
         return None;
     }
@@ -199,7 +205,7 @@ mod tests {
         let good = fs::read(&file).unwrap();
         assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh);
         // A hit does not compute the hull again: a hull planted under the right key is returned.
-        let key: [u8; KEY] = good[MAGIC.len()..][..KEY].try_into().unwrap();
+        let key: [u8; KEY_BYTES] = good[MAGIC.len()..][..KEY_BYTES].try_into().unwrap();
         let planted = fresh.scaled([2.0; 3]);
         fs::write(&file, encoded(&planted, &key)).unwrap();
         assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), planted);
@@ -288,7 +294,7 @@ mod tests {
         let all = ["KINETOSCOPE_CACHE", "XDG_CACHE_HOME", "HOME"];
         let located = |set: &[&'static str]| {
             let set = set.to_vec();
-            HullCache::located(move |name| set.contains(&name).then(|| Path::new("/").join(name)))
+            HullCache::from_env(move |name| set.contains(&name).then(|| Path::new("/").join(name)))
         };
         assert_eq!(located(&all), HullCache::at("/KINETOSCOPE_CACHE"));
         assert_eq!(located(&all[1..]), HullCache::at("/XDG_CACHE_HOME/kinetoscope"));

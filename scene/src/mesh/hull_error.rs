@@ -1,6 +1,6 @@
 //! Errors of convex hulls.
 
-use super::MeshFault;
+use super::InvalidMesh;
 
 /// Error of a convex hull or of convex pieces.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -18,7 +18,7 @@ pub enum HullError {
     },
     /// A field of the configuration of convex pieces is out of its range.
     #[error("PiecesCfg::{field} is {value}; expected {expected}")]
-    InvalidPieces {
+    InvalidDecomposition {
         /// Name of the field.
         field: &'static str,
         /// Value of the field.
@@ -36,7 +36,7 @@ pub enum HullError {
     #[error("{source}")]
     Mesh {
         /// The violation.
-        source: MeshFault,
+        source: InvalidMesh,
     },
     /// A mesh has too many triangles to be cut into convex pieces.
     #[error("{found} triangles; at most {most} are cut into convex pieces: simplify the mesh, or let its hull collide")]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::error::Ctx;
+use super::error::ReadContext;
 use super::format::Format;
 use super::{MeshError, MeshOptions, TriMesh, dae, glb, obj, stl};
 
@@ -57,7 +57,7 @@ pub fn load_with(path: &Path, options: &MeshOptions) -> Result<TriMesh, MeshErro
 /// # Errors
 /// As [`load`].
 pub fn load_bytes(path: &Path, bytes: &[u8], options: &MeshOptions) -> Result<TriMesh, MeshError> {
-    let ctx = Ctx { path, options };
+    let ctx = ReadContext { path, options };
     let format = format_of(path, bytes)
         .ok_or_else(|| MeshError::UnknownFormat { path: path.to_owned(), expected: extensions() })?;
     (format.read)(&ctx, bytes)

@@ -40,10 +40,10 @@ pub use hull_cache::HullCache;
 pub use hull_error::HullError;
 pub use load::{load, load_bytes, load_with};
 pub use options::{DaeUpAxis, MeshOptions};
-pub use pieces::{Pieces, PiecesCfg, convex_pieces};
+pub use pieces::{ConvexDecomposition, ConvexDecompositionCfg, convex_decomposition};
 pub use prisms::prisms;
-pub use solid::Solid;
-pub use trimesh::MeshFault;
+pub use solid::VolumeIntegrals;
+pub use trimesh::InvalidMesh;
 pub use write::{write_binary_stl, write_obj};
 
 /// Triangles with optional normals and texture coordinates, in one vertex array.
@@ -62,14 +62,14 @@ pub struct TriMesh {
     /// Vertex indices of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Consecutive runs of `triangles` with one material each; they cover all triangles.
-    pub parts: Vec<MeshPart>,
-    /// Materials that `parts` refer to.
+    pub submeshes: Vec<Submesh>,
+    /// Materials that `submeshes` refer to.
     pub materials: Vec<MeshMaterial>,
 }
 
 /// A run of triangles that share a material.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MeshPart {
+pub struct Submesh {
     /// Range in [`TriMesh::triangles`].
     pub triangles: Range<usize>,
     /// Index in [`TriMesh::materials`]; `None` for triangles without a material in the file.

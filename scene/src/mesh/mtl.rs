@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::error::{Ctx, beside};
+use super::error::{ReadContext, beside};
 use super::{MeshError, MeshMaterial, TextureSource};
 
 /// Options of `map_Kd`, with the largest number of words after each. After the first word, only numbers count.
@@ -25,8 +25,8 @@ const MAP_OPTIONS: [(&str, usize); 12] = [
 ///
 /// `Kd` multiplies the texture, as the format specifies, unless `Kd` is exactly black. Exporters write black to refer
 /// to the texture.
-pub(super) fn read(path: &Path, ctx: &Ctx<'_>, bytes: &[u8]) -> Result<Vec<MeshMaterial>, MeshError> {
-    let ctx = Ctx { path, options: ctx.options };
+pub(super) fn read(path: &Path, ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<Vec<MeshMaterial>, MeshError> {
+    let ctx = ReadContext { path, options: ctx.options };
     let text = String::from_utf8_lossy(bytes);
     let mut materials: Vec<MeshMaterial> = Vec::new();
     for (index, line) in text.lines().enumerate() {
@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path, ctx: &Ctx<'_>, bytes: &[u8]) -> Result<Vec<MeshM
     Ok(materials)
 }
 
-fn numbers(ctx: &Ctx<'_>, words: &str, at: &dyn Fn() -> String) -> Result<Vec<f32>, MeshError> {
+fn numbers(ctx: &ReadContext<'_>, words: &str, at: &dyn Fn() -> String) -> Result<Vec<f32>, MeshError> {
     let number = |word: &str| match word.parse::<f32>() {
         Ok(x) if x.is_finite() => Ok(x.clamp(0.0, 1.0)),
         _ => Err(ctx.invalid(at(), format!("{word:?} is not a number in 0..=1"))),
@@ -108,7 +108,7 @@ mod tests {
 
     fn parse(text: &str) -> Result<Vec<MeshMaterial>, MeshError> {
         let path = Path::new("meshes/arm.mtl");
-        read(path, &Ctx { path, options: &MeshOptions::default() }, text.as_bytes())
+        read(path, &ReadContext { path, options: &MeshOptions::default() }, text.as_bytes())
     }
 
     #[test]

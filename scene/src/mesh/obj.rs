@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 
 use super::builder::{Builder, Corner};
-use super::error::{Ctx, beside};
+use super::error::{ReadContext, beside};
 use super::format::{Format, begins_with_word};
 use super::polygon::triangulate;
 use super::{MeshError, TriMesh, mtl};
@@ -32,7 +32,7 @@ struct Reader {
     material: Option<usize>,
 }
 
-fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let mut reader = Reader::default();
     let mut lines = text.lines().enumerate();
@@ -56,7 +56,7 @@ fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
 }
 
 impl Reader {
-    fn line(&mut self, ctx: &Ctx<'_>, number: usize, line: &str) -> Result<(), MeshError> {
+    fn line(&mut self, ctx: &ReadContext<'_>, number: usize, line: &str) -> Result<(), MeshError> {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         match word {
@@ -77,7 +77,7 @@ impl Reader {
         Ok(())
     }
 
-    fn face(&mut self, ctx: &Ctx<'_>, number: usize, rest: &str) -> Result<(), MeshError> {
+    fn face(&mut self, ctx: &ReadContext<'_>, number: usize, rest: &str) -> Result<(), MeshError> {
         let mut corners = Vec::with_capacity(4);
         for word in rest.split_whitespace().take_while(|w| !w.starts_with('#')) {
             let mut fields = word.split('/');
@@ -106,7 +106,7 @@ impl Reader {
     }
 
     /// Reads the libraries of one `mtllib` line. Missing files are skipped.
-    fn library(&mut self, ctx: &Ctx<'_>, names: &str) -> Result<(), MeshError> {
+    fn library(&mut self, ctx: &ReadContext<'_>, names: &str) -> Result<(), MeshError> {
         // `names` is either one name with spaces or several names.
         let whole = std::fs::read(beside(ctx.path, names)).ok().map(|bytes| vec![(names, bytes)]);
         let files = whole.unwrap_or_else(|| {
@@ -124,21 +124,22 @@ impl Reader {
     }
 }
 
-fn floats<const N: usize>(ctx: &Ctx<'_>, number: usize, rest: &str) -> Result<[f32; N], MeshError> {
+fn floats<const N: usize>(ctx: &ReadContext<'_>, number: usize, rest: &str) -> Result<[f32; N], MeshError> {
     let mut words = rest.split_whitespace();
     let mut out = [0.0; N];
     for x in &mut out {
         let at = || format!("line {number}");
         let word = words.next().ok_or_else(|| ctx.invalid(at(), format!("expected {N} numbers")))?;
-        *x = word.parse().map_err(|e| ctx.caused(at(), format!("{word:?} is not a number"), e))?;
+        *x = word.parse().map_err(|e| ctx.invalid_with_source(at(), format!("{word:?} is not a number"), e))?;
     }
     Ok(out)
 }
 
 /// Element at an OBJ index: counted from 1, or backwards from the newest element if negative.
-fn look_up<T: Copy>(ctx: &Ctx<'_>, number: usize, word: &str, all: &[T], what: &str) -> Result<T, MeshError> {
+fn look_up<T: Copy>(ctx: &ReadContext<'_>, number: usize, word: &str, all: &[T], what: &str) -> Result<T, MeshError> {
     let at = || format!("line {number}, {what} index");
-    let index: i64 = word.parse().map_err(|e| ctx.caused(at(), format!("{word:?} is not a whole number"), e))?;
+    let index: i64 =
+        word.parse().map_err(|e| ctx.invalid_with_source(at(), format!("{word:?} is not a whole number"), e))?;
     let from_zero =
         if index > 0 { Some(index - 1) } else { (all.len() as i64).checked_add(index).filter(|_| index < 0) };
     let found = from_zero.and_then(|i| usize::try_from(i).ok()).and_then(|i| all.get(i));

@@ -6,13 +6,13 @@
 //! solid and the cell.
 
 use super::builder::{cross, dot, sub};
-use super::cell::{Cell, winding};
+use super::cell::{Cell, winding_number};
 use super::{HullCfg, HullError, TriMesh, convex_hull};
 use serde::{Deserialize, Serialize};
 
 /// Version of the algorithm. It changes whenever the same input may give other pieces; part of the key of
 /// [`super::HullCache`].
-pub(super) const ALGORITHM: u32 = 2;
+pub(super) const ALGORITHM_VERSION: u32 = 2;
 
 /// Largest number of triangles of a mesh: the time for a cut grows with it.
 const MAX_TRIANGLES: usize = 50_000;
@@ -23,7 +23,7 @@ const MAX_VERTICES: usize = 4096;
 /// Configuration of the decomposition into convex pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct PiecesCfg {
+pub struct ConvexDecompositionCfg {
     /// Largest number of pieces, 1 to 1024.
     pub max_pieces: usize,
     /// Largest distance of the hull of a piece above its surface, along the surface's normal, or below it \[m\]; above
@@ -31,7 +31,7 @@ pub struct PiecesCfg {
     pub tolerance: f64,
 }
 
-impl Default for PiecesCfg {
+impl Default for ConvexDecompositionCfg {
     /// 64 pieces, 1 mm.
     fn default() -> Self {
         Self { max_pieces: 64, tolerance: 1e-3 }
@@ -40,7 +40,7 @@ impl Default for PiecesCfg {
 
 /// Result of a decomposition into convex pieces.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pieces {
+pub struct ConvexDecomposition {
     /// Closed convex hulls with outward-facing triangles, in the order in which they were cut.
     pub hulls: Vec<TriMesh>,
     /// Largest distance between the hull of a piece and its surface \[m\].
@@ -59,7 +59,7 @@ struct Piece {
     surface: Vec<Triangle>,
     cell: Cell,
     /// Number of consecutive cuts without an improvement.
-    idle: u32,
+    stalled_cuts: u32,
     hull: TriMesh,
     /// Largest distance between the hull and the surface \[m\].
     depth: f64,
@@ -69,9 +69,9 @@ struct Piece {
     normal: V3,
 }
 
-impl PiecesCfg {
+impl ConvexDecompositionCfg {
     fn check(&self) -> Result<(), HullError> {
-        let fault = |field, value, expected| Err(HullError::InvalidPieces { field, value, expected });
+        let fault = |field, value, expected| Err(HullError::InvalidDecomposition { field, value, expected });
         if !(1..=1024).contains(&self.max_pieces) {
             return fault("max_pieces", self.max_pieces as f64, "1 to 1024");
         }
@@ -86,7 +86,7 @@ impl PiecesCfg {
 ///
 /// Together, the pieces contain the whole solid except for what their hulls omit: points that stick out by less than
 /// [`HullCfg::tolerance`], or by half of the tolerance of the pieces if that is less, and what
-/// [`HullCfg::max_vertices`] cuts off, which [`Pieces::depth`] includes. The solid is the inside of a
+/// [`HullCfg::max_vertices`] cuts off, which [`ConvexDecomposition::depth`] includes. The solid is the inside of a
 /// [closed](TriMesh::is_closed) mesh, in either orientation of its triangles. The surface of an enclosed cavity is
 /// treated like any other, so cavities stay empty.
 ///
@@ -96,7 +96,11 @@ impl PiecesCfg {
 /// # Errors
 /// The configuration is out of range, the mesh violates an invariant of [`TriMesh`], it has more than 50000 triangles
 /// or no triangle with an area, or [`convex_hull`] fails for the mesh as a whole.
-pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<Pieces, HullError> {
+pub fn convex_decomposition(
+    mesh: &TriMesh,
+    hull: &HullCfg,
+    cfg: &ConvexDecompositionCfg,
+) -> Result<ConvexDecomposition, HullError> {
     cfg.check()?;
     if hull.max_vertices > MAX_VERTICES {
         let (field, value) = ("max_vertices", hull.max_vertices as f64);
@@ -110,10 +114,10 @@ pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<
         return Err(HullError::NoArea { triangles: mesh.triangles.len() });
     }
     let (lo, hi) = mesh.bounds().unwrap_or_default();
-    let cell = Cell::around(lo.map(f64::from), hi.map(f64::from));
+    let cell = Cell::bounding(lo.map(f64::from), hi.map(f64::from));
     let diagonal = (0..3).map(|k| f64::from(hi[k] - lo[k]).powi(2)).sum::<f64>().sqrt();
     let tolerance = hull.tolerance.min(0.5 * cfg.tolerance / diagonal);
-    let body = Body { all: mesh.is_closed().then(|| surface.clone()), hull: HullCfg { tolerance, ..*hull } };
+    let body = SourceSurface { all: mesh.is_closed().then(|| surface.clone()), hull: HullCfg { tolerance, ..*hull } };
     let mut pieces = vec![Piece::of(body.hull_of(surface, cell)?, 0)];
     // Pieces that no plane improves.
     let mut done: Vec<Piece> = Vec::new();
@@ -130,7 +134,7 @@ pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<
     }
     done.append(&mut pieces);
     let depth = done.iter().map(|piece| piece.depth).fold(0.0, f64::max);
-    Ok(Pieces { hulls: done.into_iter().map(|piece| piece.hull).collect(), depth })
+    Ok(ConvexDecomposition { hulls: done.into_iter().map(|piece| piece.hull).collect(), depth })
 }
 
 /// Triangles of a mesh; for a closed mesh, counter-clockwise seen from outside.
@@ -145,23 +149,23 @@ pub(super) fn triangles_of(mesh: &TriMesh) -> Result<Vec<Triangle>, HullError> {
 }
 
 /// The mesh to decompose.
-struct Body {
+struct SourceSurface {
     /// Whole surface, if it is closed.
     all: Option<Vec<Triangle>>,
     hull: HullCfg,
 }
 
-impl Body {
+impl SourceSurface {
     /// True if a point is in the solid.
-    fn holds(&self, p: V3) -> bool {
-        self.all.as_ref().is_some_and(|all| winding(all, p) > 0.5)
+    fn contains(&self, p: V3) -> bool {
+        self.all.as_ref().is_some_and(|all| winding_number(all, p) > 0.5)
     }
 
     /// Hull of a surface and of the corners of its cell that are in the solid.
     ///
     /// A flat part of an open surface gets its thickness behind its front. A flat part of a solid is an error.
-    fn hull_of(&self, surface: Vec<Triangle>, cell: Cell) -> Result<Hulled, HullError> {
-        let points = distinct(surface.iter().flatten().copied().chain(cell.inside()));
+    fn hull_of(&self, surface: Vec<Triangle>, cell: Cell) -> Result<HulledSurface, HullError> {
+        let points = distinct_points(surface.iter().flatten().copied().chain(cell.corners_inside()));
         let hull = match (convex_hull(&points, &HullCfg { min_thickness: None, ..self.hull }), self.hull.min_thickness)
         {
             (Err(HullError::Coplanar { .. } | HullError::TooFewPoints { .. }), Some(thickness))
@@ -169,18 +173,18 @@ impl Body {
             {
                 let behind = surface.iter().filter_map(|t| Some((t, unit_normal(t)?)));
                 let behind = behind.flat_map(|(t, n)| t.map(|p| [0, 1, 2].map(|k| p[k] - thickness * n[k])));
-                let points = distinct(surface.iter().flatten().copied().chain(behind));
+                let points = distinct_points(surface.iter().flatten().copied().chain(behind));
                 // A plate may be thinner than the tolerance of its size.
                 convex_hull(&points, &HullCfg { min_thickness: None, tolerance: 0.0, ..self.hull })?
             }
             (hull, _) => hull?,
         };
-        Ok(Hulled { surface, cell, hull })
+        Ok(HulledSurface { surface, cell, hull })
     }
 }
 
 /// Distinct points in single precision.
-fn distinct(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
+fn distinct_points(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
     let mut points: Vec<[f32; 3]> = points.map(|p| p.map(|x| x as f32 + 0.0)).collect();
     points.sort_by(|a, b| (0..3).fold(std::cmp::Ordering::Equal, |order, k| order.then(a[k].total_cmp(&b[k]))));
     points.dedup();
@@ -188,7 +192,7 @@ fn distinct(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
 }
 
 impl Piece {
-    fn of(Hulled { surface, cell, hull }: Hulled, idle: u32) -> Self {
+    fn of(HulledSurface { surface, cell, hull }: HulledSurface, idle: u32) -> Self {
         let faces: Vec<(V3, f64)> = hull
             .triangles
             .iter()
@@ -202,8 +206,8 @@ impl Piece {
             let faces = faces.iter().map(|&(n, d)| (dot(n, normal), d - dot(n, p)));
             faces.filter(|(slope, _)| *slope > 1e-6).map(|(slope, gap)| gap / slope).fold(f64::INFINITY, f64::min)
         };
-        let mut piece = Self { depth: 0.0, at: [0.0; 3], normal: [0.0; 3], surface, hull, cell, idle };
-        for p in piece.surface.iter().flatten().copied().chain(piece.cell.inside()) {
+        let mut piece = Self { depth: 0.0, at: [0.0; 3], normal: [0.0; 3], surface, hull, cell, stalled_cuts: idle };
+        for p in piece.surface.iter().flatten().copied().chain(piece.cell.corners_inside()) {
             for &(normal, distance) in &faces {
                 let outside = dot(normal, p) - distance;
                 if outside > piece.depth {
@@ -232,14 +236,14 @@ impl Piece {
     /// the piece. Among nearly equal candidates, halves of similar size are preferred: a bowl has to be cut twice
     /// before its hulls become smaller. Returns `None` if no plane gives two useful halves, or after several
     /// consecutive cuts that made the hulls neither smaller nor closer to the surface.
-    fn cut(&self, body: &Body) -> Option<[Self; 2]> {
+    fn cut(&self, body: &SourceSurface) -> Option<[Self; 2]> {
         /// Weight of the larger half in the cost, added to the sum of both halves.
-        const LARGER: f64 = 0.05;
+        const LARGER_HALF_WEIGHT: f64 = 0.05;
         /// Smallest useful half, as a fraction of the whole volume.
-        const LEAST: f64 = 1e-4;
+        const MIN_VOLUME_RATIO: f64 = 1e-4;
         /// Largest number of consecutive cuts without an improvement.
-        const IDLE: u32 = 4;
-        if self.idle >= IDLE {
+        const MAX_STALLED_CUTS: u32 = 4;
+        if self.stalled_cuts >= MAX_STALLED_CUTS {
             return None;
         }
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -247,18 +251,18 @@ impl Piece {
         let middle = [0, 1, 2].map(|k| (f64::from(lo[k]) + f64::from(hi[k])) / 2.0);
         let here = axes.iter().chain([&self.normal]).map(|&n| (n, dot(n, self.at)));
         let planes = here.chain(axes.iter().map(|&n| (n, dot(n, middle))));
-        let mut best: Option<(f64, f64, [Hulled; 2])> = None;
+        let mut best: Option<(f64, f64, [HulledSurface; 2])> = None;
         let size = (0..3).map(|k| f64::from(hi[k] - lo[k])).fold(0.0, f64::max);
         let whole = self.hull.signed_volume();
-        let inside = |p: V3| body.holds(p);
+        let inside = |p: V3| body.contains(p);
         for (normal, distance) in planes {
-            let [front, back] = halves(&self.surface, normal, distance, 1e-6 * size);
-            let [ahead, behind] = self.cell.halves(normal, distance, &inside);
+            let [front, back] = split_surface(&self.surface, normal, distance, 1e-6 * size);
+            let [ahead, behind] = self.cell.split(normal, distance, &inside);
             let (Ok(front), Ok(back)) = (body.hull_of(front, ahead), body.hull_of(back, behind)) else { continue };
             let volumes = [&front, &back].map(|half| half.hull.signed_volume());
             let both = volumes[0] + volumes[1];
-            let cost = both + LARGER * volumes[0].max(volumes[1]);
-            let halved = volumes.iter().all(|volume| *volume >= LEAST * whole);
+            let cost = both + LARGER_HALF_WEIGHT * volumes[0].max(volumes[1]);
+            let halved = volumes.iter().all(|volume| *volume >= MIN_VOLUME_RATIO * whole);
             if halved && best.as_ref().is_none_or(|(lowest, ..)| cost < *lowest) {
                 best = Some((cost, both, [front, back]));
             }
@@ -267,21 +271,21 @@ impl Piece {
         let mut halves = halves.map(|half| Self::of(half, 0));
         let deepest = halves.iter().map(|half| half.depth).fold(0.0, f64::max);
         if both > 0.999 * whole && deepest > 0.99 * self.depth {
-            halves.iter_mut().for_each(|half| half.idle = self.idle + 1);
+            halves.iter_mut().for_each(|half| half.stalled_cuts = self.stalled_cuts + 1);
         }
         Some(halves)
     }
 }
 
 /// A part of the surface, its cell, and the hull of both.
-struct Hulled {
+struct HulledSurface {
     surface: Vec<Triangle>,
     cell: Cell,
     hull: TriMesh,
 }
 
 /// Parts of a surface in front of a plane and behind it. Corners closer to the plane than `near` \[m\] are on it.
-fn halves(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Triangle>; 2] {
+fn split_surface(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Triangle>; 2] {
     let mut halves = [Vec::new(), Vec::new()];
     for triangle in surface {
         let heights = triangle.map(|p| {
@@ -295,7 +299,7 @@ fn halves(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Tr
             if flat && !faces {
                 continue;
             }
-            let polygon = clipped(triangle, heights.map(|h| h * sign));
+            let polygon = clip_triangle(triangle, heights.map(|h| h * sign));
             for k in 2..polygon.len() {
                 let part = [polygon[0], polygon[k - 1], polygon[k]];
                 half.extend(unit_normal(&part).map(|_| part));
@@ -306,7 +310,7 @@ fn halves(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Tr
 }
 
 /// Part of a triangle where heights are at least 0.
-fn clipped(triangle: &Triangle, heights: [f64; 3]) -> Vec<V3> {
+fn clip_triangle(triangle: &Triangle, heights: [f64; 3]) -> Vec<V3> {
     let mut polygon = Vec::with_capacity(4);
     for k in 0..3 {
         let next = (k + 1) % 3;
@@ -381,7 +385,7 @@ mod tests {
             TriMesh::from_triangles(mesh.positions.iter().map(turn).collect(), mesh.triangles.clone())
         };
         for mesh in [ell(), turned(&ell())] {
-            let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
+            let pieces = convex_decomposition(&mesh, &HullCfg::default(), &ConvexDecompositionCfg::default()).unwrap();
             let volumes: Vec<f64> = pieces.hulls.iter().map(TriMesh::signed_volume).collect();
             assert_eq!(volumes.len(), 2, "{volumes:?}");
             // Corners are in single precision.
@@ -402,7 +406,7 @@ mod tests {
         assert!(mesh.is_closed() && mesh.signed_volume() > 0.0);
         let mut before = f64::INFINITY;
         for (max_pieces, tolerance) in [(4, 1e-6), (16, 1e-6), (64, 0.05)] {
-            let pieces = convex_pieces(&mesh, &all, &PiecesCfg { max_pieces, tolerance }).unwrap();
+            let pieces = convex_decomposition(&mesh, &all, &ConvexDecompositionCfg { max_pieces, tolerance }).unwrap();
             let count = pieces.hulls.len();
             assert!(count <= max_pieces && pieces.depth < before, "{count} {}", pieces.depth);
             assert!(pieces.depth <= tolerance || count == max_pieces);
@@ -429,7 +433,7 @@ mod tests {
         let whole = convex_hull(&mesh.positions, &all).unwrap();
         assert!(within(&whole, [0.0, 0.0, 0.5], 0.0));
         // A convex mesh stays whole.
-        let one = convex_pieces(&whole, &all, &PiecesCfg::default()).unwrap();
+        let one = convex_decomposition(&whole, &all, &ConvexDecompositionCfg::default()).unwrap();
         assert_eq!((one.hulls.len(), one.depth < 1e-3), (1, true), "{}", one.depth);
     }
 
@@ -462,9 +466,9 @@ mod tests {
             (inside, all.len())
         };
         for max_pieces in [24, 64] {
-            let cfg = PiecesCfg { max_pieces, tolerance: 1e-3 };
+            let cfg = ConvexDecompositionCfg { max_pieces, tolerance: 1e-3 };
             for mesh in [mesh.clone(), inside_out(mesh.clone())] {
-                let pieces = convex_pieces(&mesh, &HullCfg::default(), &cfg).unwrap();
+                let pieces = convex_decomposition(&mesh, &HullCfg::default(), &cfg).unwrap();
                 assert!(pieces.hulls.len() >= 8, "{}", pieces.hulls.len());
                 let (inside, all) = covered(&pieces.hulls);
                 assert_eq!(inside, all, "{} pieces", pieces.hulls.len());
@@ -474,7 +478,7 @@ mod tests {
             }
         }
         // Control: without one of the pieces there is a hole.
-        let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
+        let pieces = convex_decomposition(&mesh, &HullCfg::default(), &ConvexDecompositionCfg::default()).unwrap();
         let (inside, all) = covered(&pieces.hulls[1..]);
         assert!(inside < all);
     }
@@ -485,7 +489,7 @@ mod tests {
         let corners: [[f32; 3]; 8] = std::array::from_fn(|k| [k & 1, k >> 1 & 1, k >> 2].map(|x| x as f32));
         let cube = convex_hull(&corners, &HullCfg::default()).unwrap();
         for mesh in [cube.clone(), inside_out(cube)] {
-            let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
+            let pieces = convex_decomposition(&mesh, &HullCfg::default(), &ConvexDecompositionCfg::default()).unwrap();
             assert_eq!((pieces.hulls.len(), pieces.depth < 1e-6), (1, true), "{}", pieces.depth);
             for prism in prisms(&mesh, 0.01).unwrap() {
                 assert!(prism.signed_volume() > 0.0);
@@ -499,12 +503,12 @@ mod tests {
     fn sheet() {
         let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let sheet = TriMesh::from_triangles(corners, vec![[0, 1, 2], [0, 2, 3]]);
-        let cfg = PiecesCfg { tolerance: 1e-4, ..PiecesCfg::default() };
-        let pieces = convex_pieces(&sheet, &HullCfg::default(), &cfg).unwrap();
+        let cfg = ConvexDecompositionCfg { tolerance: 1e-4, ..ConvexDecompositionCfg::default() };
+        let pieces = convex_decomposition(&sheet, &HullCfg::default(), &cfg).unwrap();
         assert_eq!(pieces.hulls.len(), 1);
         let (lo, hi) = pieces.hulls[0].bounds().unwrap();
         assert!(hi[2] == 0.0 && (lo[2] + 1e-3).abs() < 1e-9 && pieces.depth < 1e-9, "{lo:?} {hi:?} {}", pieces.depth);
-        let error = convex_pieces(&sheet, &HullCfg { min_thickness: None, ..HullCfg::default() }, &cfg);
+        let error = convex_decomposition(&sheet, &HullCfg { min_thickness: None, ..HullCfg::default() }, &cfg);
         assert!(matches!(error, Err(HullError::Coplanar { .. })), "{error:?}");
     }
 
@@ -522,7 +526,7 @@ mod tests {
         let ball = convex_hull(&points, &HullCfg { max_vertices: 600, ..HullCfg::default() }).unwrap();
         let of = |max_vertices, max_pieces| {
             let hull = HullCfg { max_vertices, ..HullCfg::default() };
-            convex_pieces(&ball, &hull, &PiecesCfg { max_pieces, tolerance: 1e-3 }).unwrap()
+            convex_decomposition(&ball, &hull, &ConvexDecompositionCfg { max_pieces, tolerance: 1e-3 }).unwrap()
         };
         let (few, all) = (of(16, 1).depth, of(600, 1).depth);
         // Sixteen points leave caps of 4π/16, 1 - cos θ = 1/8 each, if they are distributed evenly.
@@ -536,22 +540,22 @@ mod tests {
         let wrong = TriMesh::from_triangles(corners.clone(), vec![[0, 1, 9]]);
         let flat = TriMesh::from_triangles(corners.clone(), vec![[0, 1, 1]]);
         let many = TriMesh::from_triangles(corners, vec![[0, 1, 2]; MAX_TRIANGLES + 1]);
-        let (hull, cfg) = (HullCfg::default(), PiecesCfg::default());
+        let (hull, cfg) = (HullCfg::default(), ConvexDecompositionCfg::default());
         for (mesh, says) in [(&wrong, "vertex 9"), (&flat, "area"), (&many, "50001")] {
-            let error = convex_pieces(mesh, &hull, &cfg).unwrap_err().to_string();
+            let error = convex_decomposition(mesh, &hull, &cfg).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");
         }
         for (cfg, field) in [
-            (PiecesCfg { max_pieces: 0, ..cfg }, "max_pieces"),
-            (PiecesCfg { max_pieces: 5000, ..cfg }, "max_pieces"),
-            (PiecesCfg { tolerance: 0.0, ..cfg }, "tolerance"),
-            (PiecesCfg { tolerance: f64::NAN, ..cfg }, "tolerance"),
+            (ConvexDecompositionCfg { max_pieces: 0, ..cfg }, "max_pieces"),
+            (ConvexDecompositionCfg { max_pieces: 5000, ..cfg }, "max_pieces"),
+            (ConvexDecompositionCfg { tolerance: 0.0, ..cfg }, "tolerance"),
+            (ConvexDecompositionCfg { tolerance: f64::NAN, ..cfg }, "tolerance"),
         ] {
-            let error = convex_pieces(&ell(), &hull, &cfg).unwrap_err().to_string();
+            let error = convex_decomposition(&ell(), &hull, &cfg).unwrap_err().to_string();
             assert!(error.contains(field), "{error}");
         }
         let fine = HullCfg { max_vertices: 5000, ..hull };
-        assert!(convex_pieces(&ell(), &fine, &cfg).unwrap_err().to_string().contains("max_vertices"));
+        assert!(convex_decomposition(&ell(), &fine, &cfg).unwrap_err().to_string().contains("max_vertices"));
         assert!(prisms(&wrong, 0.01).unwrap_err().to_string().contains("vertex 9"));
         for thickness in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(prisms(&ell(), thickness).unwrap_err().to_string().contains("thickness"));

@@ -16,8 +16,8 @@ pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
     if n == 3 || n > MAX_EARS {
         return fan();
     }
-    let flat = flattened(points);
-    let corner = |a: usize, b: usize, c: usize| turn(flat[a], flat[b], flat[c]);
+    let flat = project_to_plane(points);
+    let corner = |a: usize, b: usize, c: usize| signed_area_doubled(flat[a], flat[b], flat[c]);
     let reflex = |ring: &[usize], i: usize| {
         let k = ring.len();
         corner(ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]) < 0.0
@@ -50,7 +50,7 @@ pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
 }
 
 /// Projection of the polygon along the largest component of its normal (Newell's method), counter-clockwise.
-fn flattened(points: &[[f64; 3]]) -> Vec<[f64; 2]> {
+fn project_to_plane(points: &[[f64; 3]]) -> Vec<[f64; 2]> {
     let mut normal = [0.0; 3];
     for (i, p) in points.iter().enumerate() {
         let q = points[(i + 1) % points.len()];
@@ -66,7 +66,7 @@ fn flattened(points: &[[f64; 3]]) -> Vec<[f64; 2]> {
 }
 
 /// Twice the area of the triangle, positive when it is counter-clockwise.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+fn signed_area_doubled(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 

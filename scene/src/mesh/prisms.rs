@@ -16,7 +16,7 @@ use super::{HullError, TriMesh};
 /// The thickness is not positive and finite, or the mesh violates an invariant of [`TriMesh`].
 pub fn prisms(mesh: &TriMesh, thickness: f64) -> Result<Vec<TriMesh>, HullError> {
     /// Ten times MuJoCo's smallest volume \[m³\].
-    const LEAST: f64 = 1e-14;
+    const MIN_VOLUME: f64 = 1e-14;
     if !(thickness > 0.0 && thickness.is_finite()) {
         return Err(HullError::InvalidThickness { value: thickness });
     }
@@ -30,7 +30,7 @@ pub fn prisms(mesh: &TriMesh, thickness: f64) -> Result<Vec<TriMesh>, HullError>
         // The volume in single precision: the back of a sliver may be degenerate or flipped.
         let expected = super::pieces::area(&triangle) * thickness;
         let volume = prism.signed_volume();
-        (volume >= LEAST && volume >= 0.5 * expected).then_some(prism)
+        (volume >= MIN_VOLUME && volume >= 0.5 * expected).then_some(prism)
     };
     Ok(triangles_of(mesh)?.into_iter().filter_map(prism).collect())
 }

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// Volume, center and second moment of the inside of a closed surface, in the axes of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solid {
+pub struct VolumeIntegrals {
     /// Volume \[m³\], positive.
     pub volume: f64,
     /// Center of volume \[m\].
@@ -51,7 +51,7 @@ impl TriMesh {
     ///
     /// The orientation of each part counts: a part that is inside out, within another part, is a cavity. Beside the
     /// other parts, it subtracts its volume. This is detected if the part is large or far away, but not if it is small.
-    pub fn solid(&self) -> Option<Solid> {
+    pub fn volume_integrals(&self) -> Option<VolumeIntegrals> {
         if !self.is_closed() {
             return None;
         }
@@ -82,7 +82,7 @@ impl TriMesh {
         let inside = (0..3).all(|i| center[i].abs() <= size[i] / 2.0 + 1e-6 * extent);
         let fits = volume <= size.product() * (1.0 + 1e-6);
         let possible = second_moment.symmetric_eigenvalues().min() >= -1e-9 * second_moment.norm();
-        (inside && fits && possible).then_some(Solid { volume, center: middle + center, second_moment })
+        (inside && fits && possible).then_some(VolumeIntegrals { volume, center: middle + center, second_moment })
     }
 }
 
@@ -110,7 +110,7 @@ mod tests {
     /// A tetrahedron with unit legs: ∫x² = 1/60, ∫xy = 1/120 about the corner, its center at 1/4 (textbook integrals).
     #[test]
     fn simplex() {
-        let solid = corner().solid().unwrap();
+        let solid = corner().volume_integrals().unwrap();
         assert!((solid.volume - 1.0 / 6.0).abs() < 1e-15);
         assert!((solid.center - Vector3::repeat(0.25)).norm() < 1e-15);
         let (diagonal, mixed) = (1.0 / 60.0 - 1.0 / 96.0, 1.0 / 120.0 - 1.0 / 96.0);
@@ -127,20 +127,21 @@ mod tests {
         let volume: f64 = size.iter().map(|x| f64::from(*x)).product();
         let own = Matrix3::from_diagonal(&Vector3::from(size.map(|x| volume * f64::from(x).powi(2) / 12.0)));
         let middle = Vector3::from(size.map(|x| f64::from(x) / 2.0));
-        let solid = brick(size).solid().unwrap();
+        let solid = brick(size).volume_integrals().unwrap();
         assert!((solid.volume - volume).abs() < 1e-15 && (solid.center - middle).norm() < 1e-15);
         assert!((solid.second_moment - own).norm() < 1e-15);
         // Positions in single precision: 2^-24 of 10 m, on sides of 0.25 m.
         let pose = from_xyz_rpy([7.0, -9.0, 3.0], [0.3, -0.4, 0.5]);
         let turned = pose.rotation.to_rotation_matrix();
-        let moved = brick(size).transformed(&pose).solid().unwrap_or_else(|| panic!("bits of shared corners agree"));
+        let moved =
+            brick(size).transformed(&pose).volume_integrals().unwrap_or_else(|| panic!("bits of shared corners agree"));
         assert!((moved.volume / volume - 1.0).abs() < 1e-5, "{}", moved.volume);
         assert!((moved.center - (pose * nalgebra::Point3::from(middle)).coords).norm() < 1e-5);
         let expected = turned.matrix() * own * turned.matrix().transpose();
         assert!((moved.second_moment - expected).norm() < 1e-5 * expected.norm());
         let inside_out = turned_inside_out(brick(size));
         assert!((inside_out.signed_volume() + volume).abs() < 1e-12);
-        assert!((inside_out.solid().unwrap().volume - volume).abs() < 1e-15);
+        assert!((inside_out.volume_integrals().unwrap().volume - volume).abs() < 1e-15);
     }
 
     fn both(mut a: TriMesh, b: &TriMesh) -> TriMesh {
@@ -162,15 +163,17 @@ mod tests {
         let (large, small) = (brick([1.0, 1.0, 1.0]), brick([0.5, 0.5, 0.5]));
         for part in [at(large.clone(), 1.5), at(small.clone(), 1.5)] {
             let good = both(large.clone(), &part);
-            assert!((good.solid().unwrap().volume - 1.0 - part.solid().unwrap().volume).abs() < 1e-6);
+            assert!(
+                (good.volume_integrals().unwrap().volume - 1.0 - part.volume_integrals().unwrap().volume).abs() < 1e-6
+            );
             let bad = both(large.clone(), &turned_inside_out(part));
-            assert!(bad.is_closed() && bad.solid().is_none());
+            assert!(bad.is_closed() && bad.volume_integrals().is_none());
         }
         // Within the other shell, it is a cavity.
         let hollow = both(large.clone(), &turned_inside_out(at(small, 0.25)));
-        assert!((hollow.solid().unwrap().volume - 0.875).abs() < 1e-6);
+        assert!((hollow.volume_integrals().unwrap().volume - 0.875).abs() < 1e-6);
         // The same brick twice has more volume than its bounds.
-        assert!(both(large.clone(), &large).solid().is_none());
+        assert!(both(large.clone(), &large).volume_integrals().is_none());
     }
 
     #[test]
@@ -178,15 +181,15 @@ mod tests {
         let mut open = brick([1.0, 1.0, 1.0]);
         assert!(open.is_closed());
         open.triangles.pop();
-        assert!(!open.is_closed() && open.solid().is_none());
+        assert!(!open.is_closed() && open.volume_integrals().is_none());
         // A brick with one flipped triangle is not closed, either.
         let mut turned = brick([1.0, 1.0, 1.0]);
         turned.triangles[3].swap(0, 1);
-        assert!(turned.solid().is_none());
+        assert!(turned.volume_integrals().is_none());
         // Both sides of a sheet are closed, but enclose nothing.
         let positions = vec![[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]];
         let sheet = TriMesh::from_triangles(positions, vec![[0, 1, 2], [0, 2, 1]]);
-        assert!(sheet.is_closed() && sheet.solid().is_none());
-        assert!(TriMesh::default().solid().is_none());
+        assert!(sheet.is_closed() && sheet.volume_integrals().is_none());
+        assert!(TriMesh::default().volume_integrals().is_none());
     }
 }

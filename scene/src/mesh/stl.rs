@@ -4,7 +4,7 @@
 //! triangles share is one vertex.
 
 use super::builder::{Builder, Corner};
-use super::error::Ctx;
+use super::error::ReadContext;
 use super::format::{Format, begins_with_word};
 use super::{MeshError, TriMesh};
 
@@ -32,7 +32,7 @@ fn binary_length(bytes: &[u8]) -> Option<u64> {
     Some(HEADER + RECORD * u64::from(count))
 }
 
-fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let found = bytes.len() as u64;
     let announced = binary_length(bytes);
     // Many exporters begin binary files with "solid", so the length is checked before the words.
@@ -53,7 +53,7 @@ fn is_text(bytes: &[u8]) -> bool {
     begins && !text.iter().take(512).any(|&b| b < 0x20 && !b.is_ascii_whitespace())
 }
 
-fn binary(ctx: &Ctx<'_>, records: &[u8]) -> Result<TriMesh, MeshError> {
+fn binary(ctx: &ReadContext<'_>, records: &[u8]) -> Result<TriMesh, MeshError> {
     let mut builder = Builder::default();
     for (index, record) in records.chunks_exact(RECORD as usize).enumerate() {
         let float = |i: usize| f32::from_le_bytes([record[i], record[i + 1], record[i + 2], record[i + 3]]);
@@ -67,7 +67,7 @@ fn position(position: [f32; 3]) -> Corner {
     Corner { position, normal: None, uv: None }
 }
 
-fn ascii(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn ascii(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut builder = Builder::default();
     let mut facet: Option<Vec<Corner>> = None;
@@ -92,7 +92,9 @@ fn ascii(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
                 let mut xyz = [0.0f32; 3];
                 for x in &mut xyz {
                     let word = words.next().ok_or_else(|| ctx.invalid(at(), "vertex needs three numbers"))?;
-                    *x = word.parse().map_err(|e| ctx.caused(at(), format!("{word:?} is not a number"), e))?;
+                    *x = word
+                        .parse()
+                        .map_err(|e| ctx.invalid_with_source(at(), format!("{word:?} is not a number"), e))?;
                 }
                 if corners.len() == 3 {
                     return Err(ctx.invalid(at(), "fourth vertex of a facet; a facet has three"));
@@ -144,7 +146,7 @@ mod tests {
         let mesh = load(TEXT.as_bytes()).unwrap();
         assert_eq!(mesh.positions, [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.]]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [1, 3, 2]]);
-        assert_eq!((mesh.parts.len(), mesh.normals, mesh.uvs), (1, None, None));
+        assert_eq!((mesh.submeshes.len(), mesh.normals, mesh.uvs), (1, None, None));
         assert_eq!(load(TEXT.replace('\n', "\r\n").as_bytes()).unwrap().triangles.len(), 2);
         // Degenerate triangles are removed unless they are alone.
         let flat = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 1\nvertex 2 2 2\nendloop\nendfacet\n";

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::tests_robots::Random;
+use super::tests_robots::TestRng;
 use super::{MeshOptions, TriMesh, load_bytes, write_binary_stl, write_obj};
 
 fn small_files() -> Vec<(&'static str, Vec<u8>)> {
@@ -65,7 +65,7 @@ fn feed(folder: &Path, name: &str, bytes: &[u8]) -> bool {
 
 #[test]
 fn truncated() {
-    let folder = kinetoscope_testkit::urdf::Files::default();
+    let folder = kinetoscope_testkit::urdf::TempFiles::default();
     folder.write("beside.mtl", "newmtl a\nKd 1 0 0\n");
     for (name, bytes) in small_files() {
         assert!(feed(folder.folder(), name, &bytes), "{name} itself must load");
@@ -78,7 +78,7 @@ fn truncated() {
 #[test]
 fn damaged() {
     let folder = tempfile::tempdir().unwrap();
-    let mut random = Random(42);
+    let mut random = TestRng(42);
     for (name, bytes) in small_files() {
         for _ in 0..4000 {
             let mut damaged = bytes.clone();
@@ -104,7 +104,7 @@ fn damaged() {
 fn damaged_libraries() {
     let lib = b"newmtl a\nKd 1 0.5 0\nd 0.5\nmap_Kd -s 1 1 1 tex.png\nnewmtl b\nTr 0.5\nKd 0 0 0\n";
     let options = MeshOptions::default();
-    let mut random = Random(1);
+    let mut random = TestRng(1);
     for round in 0..4000usize {
         let mut damaged = lib.to_vec();
         for _ in 0..if round < lib.len() { 0 } else { 3 } {
@@ -113,6 +113,6 @@ fn damaged_libraries() {
         }
         damaged.truncate(if round < lib.len() { round } else { lib.len() });
         let path = Path::new("a.mtl");
-        let _ = super::mtl::read(path, &super::error::Ctx { path, options: &options }, &damaged);
+        let _ = super::mtl::read(path, &super::error::ReadContext { path, options: &options }, &damaged);
     }
 }

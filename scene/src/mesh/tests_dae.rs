@@ -153,7 +153,7 @@ pub(crate) const TWO_PARTS: &str = r##"
 #[test]
 fn materials() {
     let mesh = parse(&document("", MATERIALS, TWO_PARTS, BOUND), DaeUpAxis::Ignore).unwrap();
-    assert_eq!(mesh.parts.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
+    assert_eq!(mesh.submeshes.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
     assert_eq!(mesh.materials[0].name, "wood");
     assert_eq!(mesh.materials[0].texture, Some(TextureSource::File("meshes/../tex/my image.png".into())));
     assert_eq!((mesh.materials[1].name.as_str(), mesh.materials[1].rgba), ("m2", [0.5, 0.25, 0.0, 0.75]));

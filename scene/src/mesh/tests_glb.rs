@@ -1,6 +1,6 @@
 //! glTF tests with small files of known content.
 
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use std::path::Path;
 
 use super::*;
@@ -71,7 +71,7 @@ fn check(mesh: &TriMesh) {
     // A quarter turn, 5 up, then twice the size. Strip and fan keep the winding.
     assert_eq!(at(2), [[0., 0., 10.], [0., 2., 10.], [-2., 0., 10.]]);
     assert!((0..6).map(at).all(faces_up));
-    assert_eq!(mesh.parts.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
+    assert_eq!(mesh.submeshes.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
     // Texture coordinates count from the top in the file, and from the bottom in the mesh.
     assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
     let wood = &mesh.materials[0];
@@ -90,7 +90,7 @@ fn square() {
     assert!(mesh.triangles.iter().all(|t| faces_up(t.map(|i| mesh.positions[i as usize]))));
     assert_eq!(mesh.normals.unwrap()[0], [0., 0., 1.]);
     // The same content in separate files.
-    let files = Files::default();
+    let files = TempFiles::default();
     let data = files.write("my data.bin", buffer());
     let json = SQUARE
         .replace("{\"byteLength\": 136}", "{\"byteLength\": 136, \"uri\": \"my%20data.bin\"}")

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use super::super::HullError;
 use super::*;
-use crate::mesh::tests_robots::{Random, files, load_of};
+use crate::mesh::tests_robots::{TestRng, files, load_of};
 
 /// Largest distance of any of `points` in front of any face. Blocks of points whose box is behind the farthest point so
 /// far are skipped; 1e-9 of the size of a box is far more than rounding.
@@ -86,7 +86,7 @@ fn cubes() {
 
 #[test]
 fn random_clouds() {
-    let mut random = Random(7);
+    let mut random = TestRng(7);
     for round in 0..200 {
         let n = 4 + round;
         let stretch = [1.0, random.unit() as f32 + 0.1, [1.0, 0.01, 10.0][round % 3]];
@@ -102,7 +102,7 @@ fn random_clouds() {
 #[test]
 fn grids_and_snapped_clouds() {
     // Many points nearly, but not exactly, in the planes and lines of the hull.
-    let mut random = Random(11);
+    let mut random = TestRng(11);
     for _ in 0..40 {
         let pose = crate::pose::from_xyz_rpy([1.0, 2.0, 3.0], [random.unit() * 6.0, random.unit() * 6.0, 0.3]);
         let turn = |p: &[f32; 3]| {
@@ -122,7 +122,7 @@ fn grids_and_snapped_clouds() {
 
 #[test]
 fn spheres_and_cylinders() {
-    let mut random = Random(3);
+    let mut random = TestRng(3);
     let sphere: Vec<[f32; 3]> = (0..5000)
         .map(|_| {
             let (z, angle) = (random.unit() * 2.0 - 1.0, random.unit() * 2.0 * PI);
@@ -156,7 +156,7 @@ fn spheres_and_cylinders() {
 
 #[test]
 fn thin_plates() {
-    let mut random = Random(5);
+    let mut random = TestRng(5);
     let mut plate = |thickness: f64| -> Vec<[f32; 3]> {
         (0..500)
             .map(|i| {

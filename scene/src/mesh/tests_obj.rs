@@ -1,6 +1,6 @@
 //! Tests of OBJ and MTL files, and of files from [`crate::mesh::write_obj`].
 
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use std::path::Path;
 
 use super::*;
@@ -22,7 +22,7 @@ fn faces() {
     assert_eq!(mesh.normals.as_ref().unwrap()[3], [0.0, 0.0, 1.0]);
     assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
     // Without a library, both materials are unknown, which gives one part without a material.
-    assert_eq!((mesh.parts.len(), mesh.materials.len()), (1, 0));
+    assert_eq!((mesh.submeshes.len(), mesh.materials.len()), (1, 0));
     mesh.validate().unwrap();
     // A face with two corners is a line. Regression: pybullet's monastery has such faces and was rejected.
     assert_eq!(parse(&format!("{SQUARE}f 1 2\n")).unwrap(), mesh);
@@ -30,13 +30,13 @@ fn faces() {
 
 #[test]
 fn libraries() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let lib = "newmtl unused\nKd 1 1 0\nnewmtl blue\nKd 0 0 1\nmap_Kd tex/blue.png\nnewmtl red\nKd 1 0 0\n";
     files.write("my colours.mtl", lib);
     let text = format!("mtllib missing.mtl\nmtllib my colours.mtl\n{SQUARE}usemtl red\nf 2 3 4\n");
     let mesh = load(&files.write("part.obj", text)).unwrap();
-    assert_eq!(mesh.parts.len(), 2);
-    assert_eq!((mesh.parts[0].triangles.clone(), mesh.parts[1].triangles.clone()), (0..3, 3..4));
+    assert_eq!(mesh.submeshes.len(), 2);
+    assert_eq!((mesh.submeshes[0].triangles.clone(), mesh.submeshes[1].triangles.clone()), (0..3, 3..4));
     assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["red", "blue"]);
     assert_eq!(mesh.materials[1].texture, Some(TextureSource::File(files.folder().join("tex/blue.png"))));
 }
@@ -65,7 +65,7 @@ fn errors() {
 #[test]
 fn tobj() {
     // All face corners of a random file in order. The comparison resolves the single indices of both readers.
-    let mut random = crate::mesh::tests_robots::Random(9);
+    let mut random = crate::mesh::tests_robots::TestRng(9);
     let mut text = String::new();
     for _ in 0..60 {
         let mut x = || random.unit();

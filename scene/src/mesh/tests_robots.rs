@@ -8,9 +8,9 @@ use super::builder::{cross, dot, sub};
 use super::{MeshMaterial, TextureSource, TriMesh, load};
 
 /// A small random generator (xorshift64*), so that every run tests the same data.
-pub(super) struct Random(pub(super) u64);
+pub(super) struct TestRng(pub(super) u64);
 
-impl Random {
+impl TestRng {
     pub(super) fn next(&mut self) -> u64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -102,7 +102,7 @@ fn anymal_by_pycollada() {
         let Some(TextureSource::File(image)) = &mesh.materials[0].texture else { panic!("{name} has no texture") };
         assert!(image.is_file(), "{}", image.display());
         let parts = if name == "base.dae" { 6 } else { 1 };
-        assert_eq!((mesh.materials.len(), mesh.parts.len()), (parts, parts));
+        assert_eq!((mesh.materials.len(), mesh.submeshes.len()), (parts, parts));
         // Most normals agree with the winding.
         let normals = mesh.normals.as_ref().unwrap();
         let agree = mesh.triangles.iter().filter(|t| {
@@ -114,7 +114,7 @@ fn anymal_by_pycollada() {
     }
     // Six materials in three instances.
     let mesh = load_of(&files, "base.dae");
-    let counts: Vec<usize> = mesh.parts.iter().map(|p| p.triangles.len()).collect();
+    let counts: Vec<usize> = mesh.submeshes.iter().map(|p| p.triangles.len()).collect();
     assert_eq!(counts, [234, 329, 2221, 658, 746, 88]);
     let names: Vec<&str> = mesh.materials.iter().map(|m| m.name.as_str()).collect();
     assert_eq!(names, ["base", "LWL", "Black plastic", "E-Stop red", "E-Stop yellow", "E-Stop green"]);

@@ -1,14 +1,14 @@
 //! Operations on meshes.
 
-use super::affine::Placement;
+use super::affine::PreparedAffine;
 use super::builder::{cross, dot, unit};
-use super::{MeshPart, TriMesh};
+use super::{Submesh, TriMesh};
 use crate::Pose;
 
 /// A violated invariant of [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum MeshFault {
+pub enum InvalidMesh {
     /// The number of normals or texture coordinates differs from the number of positions.
     #[error("{count} {what} for {positions} positions; expected as many")]
     Length {
@@ -41,7 +41,7 @@ pub enum MeshFault {
     #[error(
         "part {part} covers triangles {found_start}..{found_end}; expected it to begin at {expected_start}, and the last to end at {triangles}"
     )]
-    Parts {
+    Submeshes {
         /// Index of the part (one past the last if triangles are left over).
         part: usize,
         /// First triangle of the part.
@@ -68,8 +68,8 @@ pub enum MeshFault {
 impl TriMesh {
     /// Creates a mesh of one part, without normals, texture coordinates and material.
     pub fn from_triangles(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
-        let parts = vec![MeshPart { triangles: 0..triangles.len(), material: None }];
-        Self { positions, triangles, parts, ..Self::default() }
+        let parts = vec![Submesh { triangles: 0..triangles.len(), material: None }];
+        Self { positions, triangles, submeshes: parts, ..Self::default() }
     }
 
     /// Bounding box: smallest and largest coordinates \[m\]; `None` without vertices.
@@ -117,7 +117,7 @@ impl TriMesh {
     }
 
     fn affine(&self, matrix: &[[f64; 4]; 3]) -> Self {
-        let place = Placement::new(matrix);
+        let place = PreparedAffine::new(matrix);
         let mut out = self.clone();
         for p in &mut out.positions {
             *p = place.point(p.map(f64::from)).map(|x| x as f32);
@@ -138,7 +138,7 @@ impl TriMesh {
     ///
     /// # Errors
     /// The first violated invariant.
-    pub fn validate(&self) -> Result<(), MeshFault> {
+    pub fn validate(&self) -> Result<(), InvalidMesh> {
         let positions = self.positions.len();
         let lengths = [
             ("normals", self.normals.as_ref().map(Vec::len)),
@@ -146,43 +146,43 @@ impl TriMesh {
         ];
         for (what, count) in lengths {
             if let Some(count) = count.filter(|&c| c != positions) {
-                return Err(MeshFault::Length { what, count, positions });
+                return Err(InvalidMesh::Length { what, count, positions });
             }
         }
         let bad = |v: &[f32]| v.iter().any(|x| !x.is_finite());
         if let Some(index) = self.positions.iter().position(|p| bad(p)) {
-            return Err(MeshFault::NonFinite { what: "position", index });
+            return Err(InvalidMesh::NonFinite { what: "position", index });
         }
         if let Some(index) = self.normals.iter().flatten().position(|n| bad(n)) {
-            return Err(MeshFault::NonFinite { what: "normal", index });
+            return Err(InvalidMesh::NonFinite { what: "normal", index });
         }
         if let Some(index) = self.uvs.iter().flatten().position(|uv| bad(uv)) {
-            return Err(MeshFault::NonFinite { what: "texture coordinate", index });
+            return Err(InvalidMesh::NonFinite { what: "texture coordinate", index });
         }
         for (triangle, t) in self.triangles.iter().enumerate() {
             if let Some(&index) = t.iter().find(|&&i| i as usize >= positions) {
-                return Err(MeshFault::Index { triangle, index, positions });
+                return Err(InvalidMesh::Index { triangle, index, positions });
             }
         }
         let (mut expected_start, triangles) = (0, self.triangles.len());
-        let fault = |part, range: &std::ops::Range<usize>, expected_start| MeshFault::Parts {
+        let fault = |part, range: &std::ops::Range<usize>, expected_start| InvalidMesh::Submeshes {
             part,
             found_start: range.start,
             found_end: range.end,
             expected_start,
             triangles,
         };
-        for (part, MeshPart { triangles: range, material }) in self.parts.iter().enumerate() {
+        for (part, Submesh { triangles: range, material }) in self.submeshes.iter().enumerate() {
             if range.start != expected_start || range.end < range.start || range.end > triangles {
                 return Err(fault(part, range, expected_start));
             }
             expected_start = range.end;
             if let Some(material) = material.filter(|&m| m >= self.materials.len()) {
-                return Err(MeshFault::Material { part, material, materials: self.materials.len() });
+                return Err(InvalidMesh::Material { part, material, materials: self.materials.len() });
             }
         }
         if expected_start != triangles {
-            return Err(fault(self.parts.len(), &(expected_start..expected_start), expected_start));
+            return Err(fault(self.submeshes.len(), &(expected_start..expected_start), expected_start));
         }
         Ok(())
     }
@@ -235,8 +235,8 @@ mod tests {
             (|m| m.triangles[2][1] = 9, "triangle 2 refers to vertex 9, but there are 4"),
             (|m| m.positions[3][0] = f32::NAN, "position 3 is not finite"),
             (|m| m.uvs = Some(vec![]), "0 texture coordinates for 4 positions; expected as many"),
-            (|m| m.parts[0].material = Some(0), "part 0 names material 0, but there are 0"),
-            (|m| m.parts.clear(), "part 0 covers triangles 0..0"),
+            (|m| m.submeshes[0].material = Some(0), "part 0 names material 0, but there are 0"),
+            (|m| m.submeshes.clear(), "part 0 covers triangles 0..0"),
         ];
         for (change, fault) in rows {
             let mut mesh = corner();

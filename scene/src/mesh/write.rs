@@ -37,7 +37,7 @@ pub fn write_binary_stl(mesh: &TriMesh, mut out: impl Write) -> Result<()> {
     out.flush()
 }
 
-/// Writes a range of triangles (one [`super::MeshPart`], or `0..mesh.triangles.len()`) as OBJ.
+/// Writes a range of triangles (one [`super::Submesh`], or `0..mesh.triangles.len()`) as OBJ.
 ///
 /// The file has the normals and texture coordinates of the mesh, and only the vertices of the range. Numbers are the
 /// shortest that read back as the same `f32`. Materials are not written.

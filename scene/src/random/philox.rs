@@ -1,7 +1,7 @@
 //! A counter-based generator: a number depends on its key and its counter only. Numbers may therefore be computed on
 //! any thread and in any order.
 
-use super::Random;
+use super::KeyedRng;
 use std::f64::consts::TAU;
 
 /// Philox 4x32-10: a cipher-like function of a key and a counter of 128 bits. Source: Salmon, Moraes, Dror and Shaw
@@ -10,9 +10,9 @@ use std::f64::consts::TAU;
 pub struct Philox([u32; 2]);
 
 impl Philox {
-    /// Creates the generator of the use `name` in the environment with global index `env`, keyed as [`Random::keyed`].
+    /// Creates the generator of the use `name` in the environment with global index `env`, keyed as [`KeyedRng::keyed`].
     pub fn keyed(seed: u64, env: u64, name: &str) -> Self {
-        let mut random = Random::keyed(seed, env, name);
+        let mut random = KeyedRng::keyed(seed, env, name);
         Self([(); 2].map(|()| (random.uniform() * 2f64.powi(32)) as u32))
     }
 

@@ -28,7 +28,7 @@ pub trait AreaSampling {
     }
 
     /// Pdf of directions from `from` \[1/sr\], if [`sample_from`](Self::sample_from) does not sample by area there.
-    fn density_from(&self, _from: V3) -> Option<f64> {
+    fn pdf_from(&self, _from: V3) -> Option<f64> {
         None
     }
 }

@@ -2,7 +2,7 @@
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection};
-use super::interval::slab;
+use super::interval::slab_interval;
 use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, to_f64};
@@ -47,8 +47,8 @@ impl ClosedForm for Box {
 
     #[inline(always)]
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
-        let slabs = [0, 1, 2].map(|k| slab(ray.origin[k], ray.direction[k], self.half[k].into()));
-        let t = slabs[0].and(slabs[1]).and(slabs[2]).first(limit)?;
+        let slabs = [0, 1, 2].map(|k| slab_interval(ray.origin[k], ray.direction[k], self.half[k].into()));
+        let t = slabs[0].intersection(slabs[1]).intersection(slabs[2]).first(limit)?;
         let axis = slabs.iter().position(|s| t == s.enter || t == s.leave).unwrap_or(2);
         Some(Intersection { t, normal: [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }) })
     }

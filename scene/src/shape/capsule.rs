@@ -3,10 +3,10 @@
 use super::area_sampling::AreaSampling;
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
 use super::grid::{arc, revolve};
-use super::interval::{Interval, ball, slab, tube};
+use super::interval::{Interval, sphere_interval, slab_interval, cylinder_interval};
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::vector::{V3, along, unit};
+use crate::vector::{V3, add_scaled, normalize};
 
 /// A capsule: a cylinder along z with a hemisphere at each end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,17 +49,17 @@ impl ClosedForm for Capsule {
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         let (o, d) = (ray.origin, ray.direction);
         let (r, h) = (f64::from(self.radius), f64::from(self.half_length));
-        let side = tube(o, d, r);
+        let side = cylinder_interval(o, d, r);
         // The spheres at the ends are inside of the infinite cylinder.
         if side.is_empty() {
             return None;
         }
-        let middle = side.and(slab(o[2], d[2], h));
+        let middle = side.intersection(slab_interval(o[2], d[2], h));
         let middle = if middle.is_empty() { Interval::EMPTY } else { middle };
-        let whole = [h, -h].iter().fold(middle, |all, end| all.or(ball([o[0], o[1], o[2] - end], d, r)));
+        let whole = [h, -h].iter().fold(middle, |all, end| all.hull(sphere_interval([o[0], o[1], o[2] - end], d, r)));
         let t = whole.first(limit)?;
-        let [x, y, z] = along(o, t, d);
-        Some(Intersection { t, normal: unit([x, y, z - z.clamp(-h, h)])? })
+        let [x, y, z] = add_scaled(o, t, d);
+        Some(Intersection { t, normal: normalize([x, y, z - z.clamp(-h, h)])? })
     }
 
     fn area_sampling(&self) -> Option<&dyn AreaSampling> {

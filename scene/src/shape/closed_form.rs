@@ -70,12 +70,12 @@ pub trait ClosedForm {
 }
 
 /// An operation on a shape with a closed form, compiled for each kind of shape.
-pub trait ForClosedForm {
+pub trait ClosedFormVisitor {
     /// Result of the operation.
     type Output;
 
     /// Runs the operation on a shape.
-    fn run<T: ClosedForm>(self, shape: &T) -> Self::Output;
+    fn visit<T: ClosedForm>(self, shape: &T) -> Self::Output;
 }
 
 /// Length of a vector.

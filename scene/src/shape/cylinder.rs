@@ -3,11 +3,11 @@
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection};
 use super::grid::revolve;
-use super::interval::{slab, tube};
+use super::interval::{slab_interval, cylinder_interval};
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::sampling::{on_disc, turn};
-use crate::vector::{V3, along, unit};
+use crate::sampling::{sample_disk, cos_sin_turns};
+use crate::vector::{V3, add_scaled, normalize};
 use std::f64::consts::PI;
 
 /// A cylinder along z with flat ends.
@@ -55,12 +55,12 @@ impl ClosedForm for Cylinder {
     #[inline(always)]
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         let (o, d, [radius, half_length]) = (ray.origin, ray.direction, self.size());
-        let (side, ends) = (tube(o, d, radius), slab(o[2], d[2], half_length));
-        let t = side.and(ends).first(limit)?;
+        let (side, ends) = (cylinder_interval(o, d, radius), slab_interval(o[2], d[2], half_length));
+        let t = side.intersection(ends).first(limit)?;
         // True if the intersection is at an end.
         let flat = if t == ends.enter || t == ends.leave { t != side.enter && t != side.leave } else { false };
-        let [x, y, _] = along(o, t, d);
-        let normal = if flat { [0.0, 0.0, 1.0] } else { unit([x, y, 0.0])? };
+        let [x, y, _] = add_scaled(o, t, d);
+        let normal = if flat { [0.0, 0.0, 1.0] } else { normalize([x, y, 0.0])? };
         Some(Intersection { t, normal })
     }
 
@@ -87,12 +87,12 @@ impl AreaSampling for Cylinder {
         let [r, h] = self.size();
         let round = 2.0 * h / (r + 2.0 * h);
         if side < round {
-            let [cos, sin] = turn(a);
+            let [cos, sin] = cos_sin_turns(a);
             let position = [r * cos, r * sin, h * (2.0 * b - 1.0)];
             return SurfacePoint { position, normal: [cos, sin, 0.0], triangle: 0 };
         }
         let sign = if side - round < 0.5 * (1.0 - round) { 1.0 } else { -1.0 };
-        let [x, y] = on_disc([a, b]);
+        let [x, y] = sample_disk([a, b]);
         SurfacePoint { position: [r * x, r * y, sign * h], normal: [0.0, 0.0, sign], triangle: 0 }
     }
 }

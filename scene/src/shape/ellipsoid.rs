@@ -2,11 +2,11 @@
 
 use super::area_sampling::AreaSampling;
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
-use super::interval::ball;
+use super::interval::sphere_interval;
 use super::sphere::Sphere;
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::vector::{V3, along, to_f64, unit};
+use crate::vector::{V3, add_scaled, to_f64, normalize};
 
 /// An ellipsoid with its axes along x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +41,9 @@ impl ClosedForm for Ellipsoid {
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         let radii = to_f64(self.radii);
         let round = |v: V3| [0, 1, 2].map(|k| v[k] / radii[k]);
-        let t = ball(round(ray.origin), round(ray.direction), 1.0).first(limit)?;
+        let t = sphere_interval(round(ray.origin), round(ray.direction), 1.0).first(limit)?;
         // The gradient of x²/a² + y²/b² + z²/c².
-        let normal = unit(round(round(along(ray.origin, t, ray.direction))))?;
+        let normal = normalize(round(round(add_scaled(ray.origin, t, ray.direction))))?;
         Some(Intersection { t, normal })
     }
 

@@ -63,8 +63,8 @@ impl HeightField {
         }
         let mesh = TriMesh::from_triangles(positions, triangles);
         // With a floor, the rim is below all heights, so the surface is closed.
-        let prepare = if bottom > 0.0 { RenderMesh::of_closed } else { RenderMesh::new };
-        let mesh = Arc::new(prepare(&mesh, RenderMesh::CREASE));
+        let prepare = if bottom > 0.0 { RenderMesh::from_closed } else { RenderMesh::new };
+        let mesh = Arc::new(prepare(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE));
         Some(Self { size, rows, columns, elevation: elevation.into(), mesh })
     }
 

@@ -1,6 +1,6 @@
 //! Intervals of a ray inside a convex body.
 
-use crate::vector::{V3, along, dot};
+use crate::vector::{V3, add_scaled, dot};
 
 /// Distances at which a ray enters and leaves a convex body. The interval is empty if `leave` is less than `enter`.
 #[derive(Clone, Copy, Debug)]
@@ -20,13 +20,13 @@ impl Interval {
 
     /// Intersection of both intervals.
     #[inline(always)]
-    pub(super) fn and(self, other: Self) -> Self {
+    pub(super) fn intersection(self, other: Self) -> Self {
         Self { enter: self.enter.max(other.enter), leave: self.leave.min(other.leave) }
     }
 
     /// Smallest interval that contains both, for two parts of one convex body.
     #[inline(always)]
-    pub(super) fn or(self, other: Self) -> Self {
+    pub(super) fn hull(self, other: Self) -> Self {
         Self { enter: self.enter.min(other.enter), leave: self.leave.max(other.leave) }
     }
 
@@ -44,16 +44,16 @@ impl Interval {
 /// The distance from the center is computed at the nearest point, not by the discriminant, which cancels for small
 /// spheres far away. Source: Haines et al., Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019.
 #[inline(always)]
-pub(super) fn ball(o: V3, d: V3, radius: f64) -> Interval {
+pub(super) fn sphere_interval(o: V3, d: V3, radius: f64) -> Interval {
     let dd = dot(d, d);
     let middle = -dot(o, d) / dd;
-    let p = along(o, middle, d);
-    around(middle, radius * radius - dot(p, p), dd)
+    let p = add_scaled(o, middle, d);
+    symmetric_interval(middle, radius * radius - dot(p, p), dd)
 }
 
 /// Interval in an infinite cylinder about z.
 #[inline(always)]
-pub(super) fn tube(o: V3, d: V3, radius: f64) -> Interval {
+pub(super) fn cylinder_interval(o: V3, d: V3, radius: f64) -> Interval {
     let dd = d[0] * d[0] + d[1] * d[1];
     if dd < 1e-30 {
         let inside = o[0] * o[0] + o[1] * o[1] <= radius * radius;
@@ -61,11 +61,11 @@ pub(super) fn tube(o: V3, d: V3, radius: f64) -> Interval {
     }
     let middle = -(o[0] * d[0] + o[1] * d[1]) / dd;
     let (x, y) = (o[0] + middle * d[0], o[1] + middle * d[1]);
-    around(middle, radius * radius - (x * x + y * y), dd)
+    symmetric_interval(middle, radius * radius - (x * x + y * y), dd)
 }
 
 #[inline(always)]
-fn around(middle: f64, rest: f64, dd: f64) -> Interval {
+fn symmetric_interval(middle: f64, rest: f64, dd: f64) -> Interval {
     if rest >= 0.0 {
         let half = (rest / dd).sqrt();
         Interval { enter: middle - half, leave: middle + half }
@@ -76,7 +76,7 @@ fn around(middle: f64, rest: f64, dd: f64) -> Interval {
 
 /// Interval between -h and h along one axis.
 #[inline(always)]
-pub(super) fn slab(o: f64, d: f64, h: f64) -> Interval {
+pub(super) fn slab_interval(o: f64, d: f64, h: f64) -> Interval {
     if d == 0.0 {
         return if o.abs() <= h { Interval::ALL } else { Interval::EMPTY };
     }

@@ -17,10 +17,10 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, to_f64};
 pub use area_sampling::{AreaSampling, SurfacePoint};
-pub use closed_form::{ClosedForm, ForClosedForm, HullPart, Intersection};
+pub use closed_form::{ClosedForm, ClosedFormVisitor, HullPart, Intersection};
 pub use deformation::smooth_normals;
 pub(crate) use grid::revolve;
-pub use lod::Level;
+pub use lod::LodLevel;
 pub use render_mesh::{Cluster, RenderMesh};
 use std::sync::Arc;
 pub use triangulated::{TriangleSampling, Triangulated};
@@ -53,18 +53,18 @@ macro_rules! shapes {
                 }
             }
 
-            fn geometry(&self) -> Geometry<'_> {
+            fn geometry(&self) -> ShapeKind<'_> {
                 match self {
-                    $(Self::$Name(shape) => Geometry::ClosedForm(shape),)*
-                    $(Self::$TrianglesName(shape) => Geometry::Triangulated(shape),)*
+                    $(Self::$Name(shape) => ShapeKind::ClosedForm(shape),)*
+                    $(Self::$TrianglesName(shape) => ShapeKind::Triangulated(shape),)*
                 }
             }
 
             /// Runs an operation on a shape with a closed form, compiled for each kind; `None` for triangles.
             #[inline(always)]
-            pub fn with_closed_form<W: ForClosedForm>(&self, work: W) -> Option<W::Output> {
+            pub fn with_closed_form<W: ClosedFormVisitor>(&self, work: W) -> Option<W::Output> {
                 match self {
-                    $(Self::$Name(shape) => Some(work.run(shape)),)*
+                    $(Self::$Name(shape) => Some(work.visit(shape)),)*
                     $(Self::$TrianglesName(_) => None,)*
                 }
             }
@@ -107,7 +107,7 @@ shapes! {
 }
 
 /// The two kinds of geometry.
-enum Geometry<'a> {
+enum ShapeKind<'a> {
     ClosedForm(&'a dyn ClosedForm),
     Triangulated(&'a dyn Triangulated),
 }
@@ -118,16 +118,16 @@ impl Shape {
     /// Infinite planes become 200 m wide.
     pub fn tessellate(&self, segments: usize) -> TriMesh {
         match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.tessellate(segments.clamp(3, 1024)),
-            Geometry::Triangulated(shape) => shape.mesh().to_tri_mesh(),
+            ShapeKind::ClosedForm(shape) => shape.tessellate(segments.clamp(3, 1024)),
+            ShapeKind::Triangulated(shape) => shape.mesh().to_tri_mesh(),
         }
     }
 
     /// Prepared triangles of a shape that is made of triangles; `None` for other shapes.
     pub fn mesh(&self) -> Option<&Arc<RenderMesh>> {
         match self.geometry() {
-            Geometry::ClosedForm(_) => None,
-            Geometry::Triangulated(shape) => Some(shape.mesh()),
+            ShapeKind::ClosedForm(_) => None,
+            ShapeKind::Triangulated(shape) => Some(shape.mesh()),
         }
     }
 
@@ -136,16 +136,16 @@ impl Shape {
         match self.geometry() {
             // A sum of two single-precision numbers is the same, whether it is rounded once or through double
             // precision.
-            Geometry::ClosedForm(shape) => shape.bounds().map(|corner| corner.map(|x| x as f32)),
-            Geometry::Triangulated(shape) => shape.mesh().bounds(),
+            ShapeKind::ClosedForm(shape) => shape.bounds().map(|corner| corner.map(|x| x as f32)),
+            ShapeKind::Triangulated(shape) => shape.mesh().bounds(),
         }
     }
 
     /// Smallest and largest coordinates \[m\]; `None` for an infinite shape.
     pub fn bounds(&self) -> Option<[V3; 2]> {
         let bounds = match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.bounds(),
-            Geometry::Triangulated(shape) => shape.mesh().bounds().map(to_f64),
+            ShapeKind::ClosedForm(shape) => shape.bounds(),
+            ShapeKind::Triangulated(shape) => shape.mesh().bounds().map(to_f64),
         };
         bounds.as_flattened().iter().all(|x| x.is_finite()).then_some(bounds)
     }
@@ -155,8 +155,8 @@ impl Shape {
     /// Infinite along an infinite axis of a plane.
     pub fn support(&self, direction: V3) -> f64 {
         match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.support(direction),
-            Geometry::Triangulated(shape) => extent(shape.mesh().positions(), direction)[1],
+            ShapeKind::ClosedForm(shape) => shape.support(direction),
+            ShapeKind::Triangulated(shape) => extent(shape.mesh().positions(), direction)[1],
         }
     }
 
@@ -164,16 +164,16 @@ impl Shape {
     /// infinite axis of a plane.
     pub fn extent(&self, direction: V3) -> [f64; 2] {
         match self.geometry() {
-            Geometry::ClosedForm(shape) => [-shape.support(direction.map(|x| -x)), shape.support(direction)],
-            Geometry::Triangulated(shape) => extent(shape.mesh().positions(), direction),
+            ShapeKind::ClosedForm(shape) => [-shape.support(direction.map(|x| -x)), shape.support(direction)],
+            ShapeKind::Triangulated(shape) => extent(shape.mesh().positions(), direction),
         }
     }
 
     /// Calls `add` for parts whose convex hull is that of the shape.
     pub fn hull(&self, add: &mut dyn FnMut(HullPart)) {
         match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.hull(add),
-            Geometry::Triangulated(shape) => {
+            ShapeKind::ClosedForm(shape) => shape.hull(add),
+            ShapeKind::Triangulated(shape) => {
                 shape.mesh().positions().iter().for_each(|p| add(HullPart::Point(to_f64(*p))));
             }
         }
@@ -189,37 +189,37 @@ impl Shape {
     /// Number of the smooth face at an intersection with a shape with a closed form; 0 for triangles.
     pub fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
         match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.face(intersection, ray),
-            Geometry::Triangulated(_) => 0,
+            ShapeKind::ClosedForm(shape) => shape.face(intersection, ray),
+            ShapeKind::Triangulated(_) => 0,
         }
     }
 
     /// True if the surface is visible from +z only.
     pub fn is_one_sided(&self) -> bool {
-        matches!(self.geometry(), Geometry::ClosedForm(shape) if shape.is_one_sided())
+        matches!(self.geometry(), ShapeKind::ClosedForm(shape) if shape.is_one_sided())
     }
 
     /// Area sampling of a shape with a closed form; `None` if paths find its light by chance only, and for triangles.
     pub fn area_sampling(&self) -> Option<&dyn AreaSampling> {
         match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.area_sampling(),
-            Geometry::Triangulated(_) => None,
+            ShapeKind::ClosedForm(shape) => shape.area_sampling(),
+            ShapeKind::Triangulated(_) => None,
         }
     }
 
     /// Area sampling of a shape that is made of triangles; `None` if paths find its light by chance only.
     pub fn triangle_sampling(&self) -> Option<TriangleSampling> {
         match self.geometry() {
-            Geometry::ClosedForm(_) => None,
-            Geometry::Triangulated(shape) => shape.area_sampling(),
+            ShapeKind::ClosedForm(_) => None,
+            ShapeKind::Triangulated(shape) => shape.area_sampling(),
         }
     }
 
     /// First size that is not positive and finite, if any.
-    pub fn bad_size(&self) -> Option<f32> {
+    pub fn invalid_size(&self) -> Option<f32> {
         let sizes = match self.geometry() {
-            Geometry::ClosedForm(shape) => shape.sizes(),
-            Geometry::Triangulated(shape) => shape.sizes(),
+            ShapeKind::ClosedForm(shape) => shape.sizes(),
+            ShapeKind::Triangulated(shape) => shape.sizes(),
         };
         sizes.into_iter().find(|s| !(s.is_finite() && *s > 0.0))
     }
@@ -228,11 +228,11 @@ impl Shape {
 /// Operation that returns the nearest intersection of a ray up to a distance.
 struct Intersect<'a>(&'a Ray, f64);
 
-impl ForClosedForm for Intersect<'_> {
+impl ClosedFormVisitor for Intersect<'_> {
     type Output = Option<Intersection>;
 
     #[inline(always)]
-    fn run<T: ClosedForm>(self, shape: &T) -> Self::Output {
+    fn visit<T: ClosedForm>(self, shape: &T) -> Self::Output {
         shape.intersect(self.0, self.1)
     }
 }

@@ -2,15 +2,15 @@
 
 use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
 use super::deformation::Deformation;
-use super::lod::{self, Level};
-use crate::mesh::{MeshPart, TriMesh};
+use super::lod::{self, LodLevel};
+use crate::mesh::{Submesh, TriMesh};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 /// A mesh prepared for rendering, once per asset and shared by all environments.
 ///
-/// Triangles are sorted along a space-filling curve and split into [`Cluster`]s of at most [`RenderMesh::CLUSTER`]
+/// Triangles are sorted along a space-filling curve and split into [`Cluster`]s of at most [`RenderMesh::MAX_CLUSTER_TRIANGLES`]
 /// triangles, which the rasterizer culls and transforms.
 #[derive(Clone, Debug, Default)]
 pub struct RenderMesh {
@@ -19,10 +19,10 @@ pub struct RenderMesh {
     uvs: Option<Vec<[f32; 2]>>,
     triangles: Vec<[u32; 3]>,
     clusters: Vec<Cluster>,
-    lanes: [Vec<f32>; 3],
+    cluster_positions: [Vec<f32>; 3],
     corners: Vec<[u8; 3]>,
     bounds: [[f32; 3]; 2],
-    levels: OnceLock<Vec<Level>>,
+    levels: OnceLock<Vec<LodLevel>>,
     /// Vertex maps of a deformable mesh.
     deformation: Option<Arc<Deformation>>,
 }
@@ -34,10 +34,10 @@ pub struct Cluster {
     pub first: u32,
     /// Number of triangles.
     pub count: u32,
-    /// Index of the first vertex in [`RenderMesh::lanes`].
-    pub first_lane: u32,
+    /// Index of the first vertex in [`RenderMesh::cluster_positions`].
+    pub first_vertex: u32,
     /// Number of vertices, padded to a multiple of 16 by repeating the last one.
-    pub lane_count: u32,
+    pub vertex_count: u32,
     /// Center of the bounding sphere \[m\].
     pub center: [f32; 3],
     /// Radius of the bounding sphere \[m\].
@@ -54,9 +54,9 @@ pub struct Cluster {
 impl RenderMesh {
     /// Crease angle of meshes without normals \[rad\]: 30°. Chamfers of CAD parts (45°) stay sharp, cylinders of 16
     /// sides (22.5°) look round.
-    pub const CREASE: f32 = std::f32::consts::FRAC_PI_6;
+    pub const DEFAULT_CREASE_ANGLE: f32 = std::f32::consts::FRAC_PI_6;
     /// Largest number of triangles per cluster.
-    pub const CLUSTER: usize = 64;
+    pub const MAX_CLUSTER_TRIANGLES: usize = 64;
 
     /// Prepares all triangles. If the mesh has no normals, they are smooth up to the `crease` angle \[rad\].
     ///
@@ -72,7 +72,7 @@ impl RenderMesh {
     /// Prepares a closed surface whose vertices are at different positions, such as a height field.
     ///
     /// This takes a fraction of the time of [`new`](Self::new), because it searches for neither edges nor positions.
-    pub(super) fn of_closed(mesh: &TriMesh, crease: f32) -> Self {
+    pub(super) fn from_closed(mesh: &TriMesh, crease: f32) -> Self {
         let welded: Vec<u32> = (0..mesh.positions.len() as u32).collect();
         Self::prepare(mesh, crease, &welded, &vec![true; mesh.triangles.len()])
     }
@@ -91,8 +91,8 @@ impl RenderMesh {
         out.normals.reserve(vertices);
         out.triangles.reserve(order.len());
         out.corners.reserve(order.len());
-        out.clusters.reserve(order.len().div_ceil(Self::CLUSTER));
-        out.lanes.iter_mut().for_each(|lane| lane.reserve(order.len() * 3 / 4));
+        out.clusters.reserve(order.len().div_ceil(Self::MAX_CLUSTER_TRIANGLES));
+        out.cluster_positions.iter_mut().for_each(|lane| lane.reserve(order.len() * 3 / 4));
         out.bounds = mesh.bounds().map_or([[0.; 3]; 2], |(lo, hi)| [lo, hi]);
         // Vertices that were made from each vertex of `mesh`, one for each normal, as linked lists: the last one, and
         // the previous one of each.
@@ -123,8 +123,8 @@ impl RenderMesh {
         }
         // For each position, the last cluster that contains it, and the number of its vertex there.
         let mut known = vec![(NONE, 0u8); mesh.positions.len()];
-        for (cluster, first) in (0..).zip((0..order.len()).step_by(Self::CLUSTER)) {
-            let end = (first + Self::CLUSTER).min(order.len());
+        for (cluster, first) in (0..).zip((0..order.len()).step_by(Self::MAX_CLUSTER_TRIANGLES)) {
+            let end = (first + Self::MAX_CLUSTER_TRIANGLES).min(order.len());
             let all_closed = order[first..end].iter().all(|&k| closed[k as usize]);
             let faces = order[first..end].iter().map(|&k| faces[k as usize]);
             out.push_cluster(first..end, all_closed, faces, |vertex, next| {
@@ -158,7 +158,7 @@ impl RenderMesh {
         let mesh = &TriMesh { normals: Some(normals.into_iter().map(some).collect()), ..mesh.clone() };
         // Vertices at the same position may separate.
         let welded: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-        let mut out = Self::prepare(mesh, Self::CREASE, &welded, &vec![false; mesh.triangles.len()]);
+        let mut out = Self::prepare(mesh, Self::DEFAULT_CREASE_ANGLE, &welded, &vec![false; mesh.triangles.len()]);
         let mut sources = vec![0; out.positions.len()];
         for (ours, k) in out.triangles.iter().zip(drawing_order(mesh)) {
             let theirs = mesh.triangles[k as usize];
@@ -188,22 +188,22 @@ impl RenderMesh {
             self.positions[k] = positions[source as usize];
             self.normals[k] = if normal == [0.0; 3] { [0.0, 0.0, 1.0] } else { normal };
         }
-        for (lane, &vertex) in deformation.vertex_of_lane.iter().enumerate() {
-            (0..3).for_each(|a| self.lanes[a][lane] = self.positions[vertex as usize][a]);
+        for (lane, &vertex) in deformation.source_vertices.iter().enumerate() {
+            (0..3).for_each(|a| self.cluster_positions[a][lane] = self.positions[vertex as usize][a]);
         }
         let mut all = [[f32::MAX; 3], [f32::MIN; 3]];
         for cluster in &mut self.clusters {
-            let lanes = cluster.first_lane as usize..(cluster.first_lane + cluster.lane_count) as usize;
+            let lanes = cluster.first_vertex as usize..(cluster.first_vertex + cluster.vertex_count) as usize;
             let mut here = [[f32::MAX; 3], [f32::MIN; 3]];
             for a in 0..3 {
-                for &x in &self.lanes[a][lanes.clone()] {
+                for &x in &self.cluster_positions[a][lanes.clone()] {
                     (here[0][a], here[1][a]) = (here[0][a].min(x), here[1][a].max(x));
                 }
                 (all[0][a], all[1][a]) = (all[0][a].min(here[0][a]), all[1][a].max(here[1][a]));
             }
             cluster.center = [0, 1, 2].map(|a| (here[0][a] + here[1][a]) / 2.0);
             let far = lanes
-                .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), cluster.center))
+                .map(|i| sub([0, 1, 2].map(|a| self.cluster_positions[a][i]), cluster.center))
                 .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
             // Slightly enlarged, so that rounding never culls.
             cluster.radius = far * 1.0001;
@@ -214,7 +214,7 @@ impl RenderMesh {
     }
 
     /// Prepares the triangles of one part (one material) of a mesh.
-    pub fn of_part(mesh: &TriMesh, part: &MeshPart, crease: f32) -> Self {
+    pub fn from_submesh(mesh: &TriMesh, part: &Submesh, crease: f32) -> Self {
         let triangles = mesh.triangles[part.triangles.clone()].to_vec();
         let mut map = HashMap::new();
         let mut out = TriMesh { normals: mesh.normals.as_ref().map(|_| vec![]), ..TriMesh::default() };
@@ -248,7 +248,7 @@ impl RenderMesh {
         faces: impl Iterator<Item = [f32; 3]> + Clone,
         mut number: impl FnMut(u32, u8) -> (u8, bool),
     ) {
-        let first_lane = self.lanes[0].len();
+        let first_lane = self.cluster_positions[0].len();
         let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
         let faces = faces.filter(|&n| n != [0.0; 3]);
         let axis = faces.clone().fold([0.0f32; 3], |axis, n| [0, 1, 2].map(|a| axis[a] + n[a]));
@@ -256,11 +256,11 @@ impl RenderMesh {
             let triangle = self.triangles[k];
             let p = triangle.map(|i| self.positions[i as usize]);
             let corner = [0, 1, 2].map(|c| {
-                let next = (self.lanes[0].len() - first_lane) as u8;
+                let next = (self.cluster_positions[0].len() - first_lane) as u8;
                 let (number, is_new) = number(triangle[c], next);
                 if is_new {
                     for a in 0..3 {
-                        self.lanes[a].push(p[c][a]);
+                        self.cluster_positions[a].push(p[c][a]);
                         (lo[a], hi[a]) = (lo[a].min(p[c][a]), hi[a].max(p[c][a]));
                     }
                 }
@@ -268,22 +268,22 @@ impl RenderMesh {
             });
             self.corners.push(corner);
         }
-        let lane_count = (self.lanes[0].len() - first_lane).next_multiple_of(16);
-        for lane in &mut self.lanes {
+        let lane_count = (self.cluster_positions[0].len() - first_lane).next_multiple_of(16);
+        for lane in &mut self.cluster_positions {
             let last = lane.last().copied().unwrap_or(0.0);
             lane.resize(first_lane + lane_count, last);
         }
         let center = [0, 1, 2].map(|a| (lo[a] + hi[a]) / 2.0);
         let far = (first_lane..first_lane + lane_count)
-            .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), center))
+            .map(|i| sub([0, 1, 2].map(|a| self.cluster_positions[a][i]), center))
             .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
         let cone_axis = unit(axis).unwrap_or([0., 0., 1.]);
         let cone_cos = faces.map(|n| dot(n, cone_axis)).fold(1.0, f32::min);
         self.clusters.push(Cluster {
             first: first as u32,
             count: (end - first) as u32,
-            first_lane: first_lane as u32,
-            lane_count: lane_count as u32,
+            first_vertex: first_lane as u32,
+            vertex_count: lane_count as u32,
             center,
             // Slightly enlarged, so that rounding never culls.
             radius: far * 1.0001,
@@ -319,8 +319,8 @@ impl RenderMesh {
     }
 
     /// Positions of the clusters' vertices, one array per axis.
-    pub fn lanes(&self) -> &[Vec<f32>; 3] {
-        &self.lanes
+    pub fn cluster_positions(&self) -> &[Vec<f32>; 3] {
+        &self.cluster_positions
     }
 
     /// Corners of each triangle, as vertex numbers in its cluster.
@@ -337,15 +337,15 @@ impl RenderMesh {
     ///
     /// They are computed when they are first requested (about 2 µs for each triangle) and shared by all holders of the
     /// mesh. Meshes with fewer than 1000 triangles, with texture coordinates or with moving vertices have no levels.
-    pub fn levels(&self) -> &[Level] {
-        self.levels.get_or_init(|| lod::chain(self))
+    pub fn levels(&self) -> &[LodLevel] {
+        self.levels.get_or_init(|| lod::build_levels(self))
     }
 
-    /// Number of the coarsest level whose [`Level::error`] is at most `error` \[m\]; 0 is the mesh itself.
+    /// Number of the coarsest level whose [`LodLevel::error`] is at most `error` \[m\]; 0 is the mesh itself.
     ///
     /// Computes the levels only if one of them may qualify.
     pub fn level_within(&self, error: f32) -> usize {
-        let may = error >= lod::FINEST && lod::may_have_levels(self);
+        let may = error >= lod::MIN_BOUND && lod::may_have_levels(self);
         if may { self.levels().iter().take_while(|level| level.error <= error).count() } else { 0 }
     }
 
@@ -357,7 +357,7 @@ impl RenderMesh {
         number.checked_sub(1).and_then(level).map_or(self, |level| &level.mesh)
     }
 
-    /// [`Level::error`] of the level with a number \[m\]; 0 for the mesh itself.
+    /// [`LodLevel::error`] of the level with a number \[m\]; 0 for the mesh itself.
     pub fn level_error(&self, number: usize) -> f32 {
         let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
         number.checked_sub(1).and_then(level).map_or(0.0, |level| level.error)
@@ -374,26 +374,27 @@ impl RenderMesh {
 
 /// Indices of the triangles in drawing order.
 fn drawing_order(mesh: &TriMesh) -> Vec<u32> {
-    let mut order: Vec<u64> = curve(mesh).into_iter().zip(0..).map(|(code, k)| u64::from(code) << 32 | k).collect();
+    let mut order: Vec<u64> =
+        morton_codes(mesh).into_iter().zip(0..).map(|(code, k)| u64::from(code) << 32 | k).collect();
     order.sort_unstable();
     order.into_iter().map(|place| place as u32).collect()
 }
 
 /// Position of each triangle on a space-filling curve (Morton code of its center, 10 bits per axis).
-fn curve(mesh: &TriMesh) -> Vec<u32> {
+fn morton_codes(mesh: &TriMesh) -> Vec<u32> {
     let (lo, hi) = mesh.bounds().unwrap_or_default();
     let extent = (0..3).map(|a| hi[a] - lo[a]).fold(1e-30, f32::max);
     let code = |t: &[u32; 3]| {
         (0..3).fold(0, |code, a| {
             let middle = t.iter().map(|&i| mesh.positions[i as usize][a]).sum::<f32>() / 3.0;
-            code | spread((((middle - lo[a]) / extent) * 1023.0) as u32) << a
+            code | spread_bits((((middle - lo[a]) / extent) * 1023.0) as u32) << a
         })
     };
     mesh.triangles.iter().map(code).collect()
 }
 
 /// Spreads the lowest 10 bits of a number: bit n becomes bit 3 n.
-pub(super) fn spread(mut v: u32) -> u32 {
+pub(super) fn spread_bits(mut v: u32) -> u32 {
     for (shift, kept) in [(16, 0x0300_00ff), (8, 0x0300_f00f), (4, 0x030c_30c3), (2, 0x0924_9249)] {
         v = (v | v << shift) & kept;
     }

@@ -3,12 +3,12 @@
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
 use super::grid::{arc, revolve};
-use super::interval::ball;
+use super::interval::sphere_interval;
 use crate::Ray;
-use crate::basis::Basis;
+use crate::basis::OrthonormalBasis;
 use crate::mesh::TriMesh;
-use crate::sampling::turn;
-use crate::vector::{V3, along, dot, scale, unit};
+use crate::sampling::cos_sin_turns;
+use crate::vector::{V3, add_scaled, dot, scale, normalize};
 use std::f64::consts::PI;
 
 /// A sphere.
@@ -44,8 +44,8 @@ impl ClosedForm for Sphere {
     #[inline(always)]
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         let radius = f64::from(self.radius);
-        let t = ball(ray.origin, ray.direction, radius).first(limit)?;
-        Some(Intersection { t, normal: scale(along(ray.origin, t, ray.direction), 1.0 / radius) })
+        let t = sphere_interval(ray.origin, ray.direction, radius).first(limit)?;
+        Some(Intersection { t, normal: scale(add_scaled(ray.origin, t, ray.direction), 1.0 / radius) })
     }
 
     fn area_sampling(&self) -> Option<&dyn AreaSampling> {
@@ -55,7 +55,7 @@ impl ClosedForm for Sphere {
 
 impl Sphere {
     /// Radius, and squared distance of a point outside from the center; `None` for a point inside.
-    fn seen_from_outside(&self, from: V3) -> Option<(f64, f64)> {
+    fn outside_distance(&self, from: V3) -> Option<(f64, f64)> {
         let (radius, square) = (f64::from(self.radius), dot(from, from));
         (square > radius * radius * (1.0 + 1e-9)).then_some((radius, square))
     }
@@ -71,28 +71,28 @@ impl AreaSampling for Sphere {
 
     fn sample(&self, _side: f64, [a, b]: [f64; 2]) -> SurfacePoint {
         let z = 2.0 * a - 1.0;
-        let ([cos, sin], flat) = (turn(b), (1.0 - z * z).max(0.0).sqrt());
+        let ([cos, sin], flat) = (cos_sin_turns(b), (1.0 - z * z).max(0.0).sqrt());
         let normal = [flat * cos, flat * sin, z];
         SurfacePoint { position: scale(normal, self.radius.into()), normal, triangle: 0 }
     }
 
     fn sample_from(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, Option<f64>)> {
-        let Some((radius, square)) = self.seen_from_outside(from) else { return Some((self.sample(side, at), None)) };
+        let Some((radius, square)) = self.outside_distance(from) else { return Some((self.sample(side, at), None)) };
         let (distance, sine2) = (square.sqrt(), radius * radius / square);
-        let lost = sine2 / (1.0 + (1.0 - sine2).max(0.0).sqrt());
-        let low = at[0] * lost;
+        let one_minus_cos_max = sine2 / (1.0 + (1.0 - sine2).max(0.0).sqrt());
+        let low = at[0] * one_minus_cos_max;
         let (cos, sin2) = (1.0 - low, (low * (2.0 - low)).max(0.0));
-        let ([c, s], sin) = (turn(at[1]), sin2.sqrt());
-        let basis = Basis::of(scale(from, -1.0 / distance));
+        let ([c, s], sin) = (cos_sin_turns(at[1]), sin2.sqrt());
+        let basis = OrthonormalBasis::from_normal(scale(from, -1.0 / distance));
         let direction = basis.to_world([sin * c, sin * s, cos]);
         let far = distance * cos - (radius * radius - square * sin2).max(0.0).sqrt();
-        let normal = unit(along(from, far, direction))?;
+        let normal = normalize(add_scaled(from, far, direction))?;
         let point = SurfacePoint { position: scale(normal, radius), normal, triangle: 0 };
-        Some((point, Some(1.0 / (2.0 * PI * lost))))
+        Some((point, Some(1.0 / (2.0 * PI * one_minus_cos_max))))
     }
 
-    fn density_from(&self, from: V3) -> Option<f64> {
-        let (radius, square) = self.seen_from_outside(from)?;
+    fn pdf_from(&self, from: V3) -> Option<f64> {
+        let (radius, square) = self.outside_distance(from)?;
         let sine2 = radius * radius / square;
         Some((1.0 + (1.0 - sine2).max(0.0).sqrt()) / (2.0 * PI * sine2))
     }

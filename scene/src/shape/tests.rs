@@ -1,7 +1,7 @@
 //! Tests of properties that all shapes share.
 use super::closed_form::norm;
 use super::*;
-use crate::vector::{along, cross, dot, sub};
+use crate::vector::{add_scaled, cross, dot, sub};
 
 fn all() -> Vec<Shape> {
     let tetrahedron = Sphere { radius: 0.3 }.tessellate(12);
@@ -12,7 +12,7 @@ fn all() -> Vec<Shape> {
         Ellipsoid { radii: [0.1, 0.2, 0.3] }.into(),
         Cylinder { radius: 0.2, half_length: 0.4 }.into(),
         Box { half: [0.1, 0.2, 0.3] }.into(),
-        Mesh { mesh: Arc::new(RenderMesh::new(&tetrahedron, RenderMesh::CREASE)) }.into(),
+        Mesh { mesh: Arc::new(RenderMesh::new(&tetrahedron, RenderMesh::DEFAULT_CREASE_ANGLE)) }.into(),
         HeightField::new([1., 2., 0.5, 0.1], 3, 4, &[0.5; 12]).unwrap().into(),
     ]
 }
@@ -50,13 +50,14 @@ fn closed_surfaces() {
         boxed.tessellate(1),
         Cylinder { radius: 0.2, half_length: 0.4 }.tessellate(40),
     ] {
-        let [all, closed] = [RenderMesh::new, RenderMesh::of_closed].map(|prepare| prepare(&mesh, RenderMesh::CREASE));
+        let [all, closed] =
+            [RenderMesh::new, RenderMesh::from_closed].map(|prepare| prepare(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE));
         assert_eq!(format!("{all:?}"), format!("{closed:?}"));
     }
     // Control: an open surface is not closed.
     let plane = Plane { half: [1.0, 2.0] }.tessellate(1);
     assert!(
-        !RenderMesh::new(&plane, 0.5).clusters()[0].closed && RenderMesh::of_closed(&plane, 0.5).clusters()[0].closed
+        !RenderMesh::new(&plane, 0.5).clusters()[0].closed && RenderMesh::from_closed(&plane, 0.5).clusters()[0].closed
     );
 }
 
@@ -93,8 +94,8 @@ fn deformable_meshes() {
         for k in c.first as usize..(c.first + c.count) as usize {
             for (corner, vertex) in drawn.corners()[k].into_iter().zip(drawn.triangles()[k]) {
                 let p = drawn.positions()[vertex as usize];
-                let lane = c.first_lane as usize + usize::from(corner);
-                assert_eq!([0, 1, 2].map(|a| drawn.lanes()[a][lane]), p);
+                let lane = c.first_vertex as usize + usize::from(corner);
+                assert_eq!([0, 1, 2].map(|a| drawn.cluster_positions()[a][lane]), p);
                 assert!(distance(p, c.center) <= c.radius && !c.closed);
             }
         }
@@ -110,17 +111,17 @@ fn deformable_meshes() {
 #[test]
 fn clusters() {
     let mesh = Sphere { radius: 1.0 }.tessellate(64);
-    let drawn = RenderMesh::new(&mesh, RenderMesh::CREASE);
+    let drawn = RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE);
     assert_eq!(drawn.triangles().len(), mesh.triangles.len());
     let mut next = 0;
     for c in drawn.clusters() {
         assert_eq!(c.first, next);
         next += c.count;
-        assert_eq!(c.lane_count % 16, 0);
+        assert_eq!(c.vertex_count % 16, 0);
         for k in c.first..next {
             for (corner, &i) in drawn.corners()[k as usize].iter().zip(&drawn.triangles()[k as usize]) {
-                let lane = c.first_lane as usize + *corner as usize;
-                let p = [0, 1, 2].map(|a| drawn.lanes()[a][lane]);
+                let lane = c.first_vertex as usize + *corner as usize;
+                let p = [0, 1, 2].map(|a| drawn.cluster_positions()[a][lane]);
                 assert_eq!(p, drawn.positions()[i as usize]);
                 let d = crease::sub(p, c.center);
                 assert!(crease::dot(d, d).sqrt() <= c.radius);
@@ -129,7 +130,7 @@ fn clusters() {
         }
     }
     assert_eq!(next as usize, mesh.triangles.len());
-    let sharp = RenderMesh::new(&Box { half: [1.0; 3] }.tessellate(0), RenderMesh::CREASE);
+    let sharp = RenderMesh::new(&Box { half: [1.0; 3] }.tessellate(0), RenderMesh::DEFAULT_CREASE_ANGLE);
     assert_eq!(sharp.positions().len(), 24, "a box has a normal per face and corner");
     assert!(RenderMesh::new(&TriMesh::default(), 0.5).clusters().is_empty());
 }
@@ -159,7 +160,7 @@ fn corner_normals() {
     for mut mesh in meshes {
         mesh.normals = None;
         let (welded, faces) = (crease::weld(&mesh.positions), crease::face_normals(&mesh));
-        for angle in [0.0, 0.1, RenderMesh::CREASE, 1.7, 3.2] {
+        for angle in [0.0, 0.1, RenderMesh::DEFAULT_CREASE_ANGLE, 1.7, 3.2] {
             let normals = crease::corner_normals(&mesh, &welded, &faces, angle);
             let limit = f32::cos(angle);
             for (k, t) in mesh.triangles.iter().enumerate() {
@@ -189,15 +190,15 @@ fn corner_normals() {
 #[test]
 fn curve() {
     for v in 0..1024u32 {
-        assert_eq!(render_mesh::spread(v), (0..10).fold(0, |out, bit| out | (v >> bit & 1) << (3 * bit)), "{v}");
+        assert_eq!(render_mesh::spread_bits(v), (0..10).fold(0, |out, bit| out | (v >> bit & 1) << (3 * bit)), "{v}");
     }
 }
 
 #[test]
 fn sizes() {
-    assert_eq!(Shape::from(Sphere { radius: -1.0 }).bad_size(), Some(-1.0));
-    assert!(Shape::from(Box { half: [1.0, f32::NAN, 1.0] }).bad_size().unwrap().is_nan());
-    assert_eq!(Shape::from(Plane::INFINITE).bad_size(), None);
+    assert_eq!(Shape::from(Sphere { radius: -1.0 }).invalid_size(), Some(-1.0));
+    assert!(Shape::from(Box { half: [1.0, f32::NAN, 1.0] }).invalid_size().unwrap().is_nan());
+    assert_eq!(Shape::from(Plane::INFINITE).invalid_size(), None);
     assert!(HeightField::new([1.; 4], 1, 3, &[0.; 3]).is_none());
 }
 
@@ -206,7 +207,7 @@ fn sizes() {
 fn mesh_of_a_render_mesh() {
     let mut mesh = Box { half: [0.1, 0.2, 0.3] }.tessellate(1);
     mesh.uvs = Some(mesh.positions.iter().map(|p| [p[0] + 1.0, p[1] - p[2]]).collect());
-    let back = RenderMesh::new(&mesh, RenderMesh::CREASE).to_tri_mesh();
+    let back = RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE).to_tri_mesh();
     back.validate().unwrap();
     let corners = |mesh: &TriMesh| {
         let uvs = mesh.uvs.as_ref().unwrap();
@@ -288,7 +289,7 @@ fn area_samplings() {
         for (k, [x, y, z]) in directions(500).enumerate() {
             let [side, a, b] = [(k as f64 + 0.5) / 500.0, 0.5 + 0.499 * x, 0.5 + 0.499 * y.max(z)];
             let SurfacePoint { position, normal, .. } = sampling.sample(side, [a, b]);
-            let ray = Ray { origin: along(position, 0.01, normal), direction: normal.map(|x| -x) };
+            let ray = Ray { origin: add_scaled(position, 0.01, normal), direction: normal.map(|x| -x) };
             let found = shape.intersect(&ray, 1.0).unwrap();
             assert!((found.t - 0.01).abs() < 1e-9, "{}: {position:?} {normal:?} {found:?}", shape.name());
             assert!(dot(found.normal, normal).abs() > 1.0 - 1e-9, "{}: {normal:?} {found:?}", shape.name());

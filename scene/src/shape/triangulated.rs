@@ -2,7 +2,7 @@
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::render_mesh::RenderMesh;
-use crate::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
+use crate::vector::{V3, add_scaled, cross, dot, normalize, scale, sub, to_f64};
 use std::sync::Arc;
 
 /// A shape made of triangles.
@@ -61,8 +61,8 @@ impl AreaSampling for TriangleSampling {
         let [p, q, r] = corners(&self.mesh, k);
         // Source: Turk, Generating random points in triangles, Graphics Gems, 1990.
         let root = a.sqrt();
-        let position = along(along(scale(p, 1.0 - root), root * (1.0 - b), q), root * b, r);
-        let normal = unit(cross(sub(q, p), sub(r, p))).unwrap_or([0.0, 0.0, 1.0]);
+        let position = add_scaled(add_scaled(scale(p, 1.0 - root), root * (1.0 - b), q), root * b, r);
+        let normal = normalize(cross(sub(q, p), sub(r, p))).unwrap_or([0.0, 0.0, 1.0]);
         SurfacePoint { position, normal, triangle: k as u32 }
     }
 }

@@ -62,7 +62,7 @@ pub enum TerrainError {
     #[error(
         "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; 0 m to {step} m has two"
     )]
-    NoLevel {
+    NoHeightInRange {
         /// Lowest height \[m\].
         low: f64,
         /// Highest height \[m\].
@@ -89,7 +89,7 @@ fn finite(terrain: &'static str, field: &'static str, value: f64) -> Result<(), 
 }
 
 /// Number of points along x and y of a field of `size`.
-fn points(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize; 2], TerrainError> {
+fn grid_size(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize; 2], TerrainError> {
     positive(terrain, "cell", cell)?;
     for side in size {
         positive(terrain, "size", side)?;

@@ -1,7 +1,7 @@
 //! Terrain with random heights.
 
-use super::{TerrainError, finite, points, positive};
-use crate::Random;
+use super::{TerrainError, finite, grid_size, positive};
+use crate::KeyedRng;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -38,7 +38,7 @@ impl RoughTerrain {
     /// range contains no multiple of the step.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "rough terrain";
-        let [columns, rows] = points(NAME, self.size, self.cell)?;
+        let [columns, rows] = grid_size(NAME, self.size, self.cell)?;
         positive(NAME, "step", self.step)?;
         let [low, high] = self.range;
         finite(NAME, "range", low)?;
@@ -48,9 +48,9 @@ impl RoughTerrain {
         let first = (low / self.step - ROUNDING).ceil();
         let levels = (high / self.step + ROUNDING).floor() - first + 1.0;
         if levels.is_nan() || levels < 1.0 {
-            return Err(TerrainError::NoLevel { low, high, step: self.step });
+            return Err(TerrainError::NoHeightInRange { low, high, step: self.step });
         }
-        let mut random = Random::keyed(self.seed, 0, "rough terrain");
+        let mut random = KeyedRng::keyed(self.seed, 0, "rough terrain");
         // Beyond this limit, neighboring multiples are the same number.
         const MOST_LEVELS: f64 = 1e15;
         if levels > MOST_LEVELS {

@@ -1,6 +1,6 @@
 //! An inclined plane.
 
-use super::{TerrainError, finite, points};
+use super::{TerrainError, finite, grid_size};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ impl Slope {
     /// A number is not positive or not finite, a side is not a whole number of cells, or there are too many points.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "slope";
-        let [columns, rows] = points(NAME, self.size, self.cell)?;
+        let [columns, rows] = grid_size(NAME, self.size, self.cell)?;
         let [gx, gy] = self.gradient;
         finite(NAME, "gradient", gx)?;
         finite(NAME, "gradient", gy)?;

@@ -1,6 +1,6 @@
 //! Stairs around a platform.
 
-use super::{TerrainError, finite, points, positive};
+use super::{TerrainError, finite, grid_size, positive};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,7 @@ impl PyramidStairs {
     /// are less than two cells deep, or the platform is larger than the field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "stairs";
-        let [columns, rows] = points(NAME, self.size, self.cell)?;
+        let [columns, rows] = grid_size(NAME, self.size, self.cell)?;
         finite(NAME, "step_height", self.step_height)?;
         positive(NAME, "tread", self.tread)?;
         positive(NAME, "platform", self.platform)?;

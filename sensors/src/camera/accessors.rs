@@ -2,7 +2,7 @@
 
 use super::sensor::Camera;
 use crate::error::SensorError;
-use kinetoscope_render::frame::{self, PictureView};
+use kinetoscope_render::frame::{self, ImageView};
 
 /// Declares one accessor method per channel.
 macro_rules! accessors {
@@ -15,7 +15,7 @@ macro_rules! accessors {
             /// # Errors
             ///
             /// Same as [`channel`](Self::channel).
-            pub fn $name(&self) -> Result<PictureView<'_, frame::$Channel>, SensorError> {
+            pub fn $name(&self) -> Result<ImageView<'_, frame::$Channel>, SensorError> {
                 self.channel::<frame::$Channel>()
             })*
         }

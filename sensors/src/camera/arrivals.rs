@@ -2,52 +2,52 @@
 //!
 //! After a write to the state, a camera shows the state as written. Frames in flight at that time are still delivered
 //! later. They are counted but not shown, because they are older. A reader of every frame, such as a recorder, uses
-//! [`Camera::arrived`].
+//! [`Camera::latest_delivered`].
 
 use super::cfg::CameraCfg;
 use super::error::CameraError;
 use super::extrinsics::CameraConvention;
 use super::frame_buffer::FrameSource;
 use super::sensor::Camera;
-use super::sensor::drawing::DrawnImages;
+use super::sensor::drawing::RenderedImages;
 use crate::cached::Cached;
 use crate::error::SensorError;
 use kinetoscope_render::frame::Channel;
-use kinetoscope_render::frame::{Layout, Listed, PictureView};
+use kinetoscope_render::frame::{ChannelLayout, ImageView, ListedChannel};
 use kinetoscope_scene::pose::to_row;
 use ndarray::{Array1, Array2, Array3, ArrayView, ArrayView2, Axis, Dimension};
 use std::ops::Range;
 
 /// Past images of one channel, shape (views, history, height, width) or (views, history, height, width, components).
-pub type HistoryView<'a, C> = ArrayView<'a, <C as Channel>::Number, <<C as Channel>::Layout as Dimension>::Larger>;
+pub type HistoryView<'a, C> = ArrayView<'a, <C as Channel>::Element, <<C as Channel>::Layout as Dimension>::Larger>;
 
 /// Images of the frame history, row by row, newest first within a row.
 #[derive(Debug)]
-pub(super) struct PastImages {
-    images: DrawnImages,
+pub(super) struct HistoryImages {
+    images: RenderedImages,
     length: usize,
     /// Number of frames of each row delivered since the images were rendered.
-    new: Vec<usize>,
+    delivered_since: Vec<usize>,
 }
 
-impl PastImages {
+impl HistoryImages {
     /// Creates the history images. The first `filled(row)` images of each row are outdated, the others are zero.
     pub(super) fn new(cfg: &CameraCfg, rows: usize, filled: impl Fn(usize) -> usize) -> Self {
         let length = cfg.history_length;
-        let mut images = DrawnImages::new(cfg, rows * length);
+        let mut images = RenderedImages::new(cfg, rows * length);
         (0..rows * length).for_each(|image| images.set_stale(image, image % length < filled(image / length)));
-        Self { images, length, new: vec![0; rows] }
+        Self { images, length, delivered_since: vec![0; rows] }
     }
 
-    fn of_row(&self, row: usize) -> Range<usize> {
+    fn row_range(&self, row: usize) -> Range<usize> {
         row * self.length..(row + 1) * self.length
     }
 
     /// Shifts the images of each row to make room for the frames delivered since.
     fn move_up(&mut self) {
-        for row in 0..self.new.len() {
-            let by = std::mem::take(&mut self.new[row]);
-            self.images.move_up(self.of_row(row), by);
+        for row in 0..self.delivered_since.len() {
+            let by = std::mem::take(&mut self.delivered_since[row]);
+            self.images.move_up(self.row_range(row), by);
         }
     }
 }
@@ -56,22 +56,22 @@ impl Camera {
     /// Capture times of the latest delivered frames \[s\], shape (N). Equal to [`stamps`](Self::stamps), except with a
     /// latency after a write to the state or a move of the camera. Before the first frame is delivered, the time of the
     /// reset.
-    pub fn arrived_stamps(&self) -> Array1<f64> {
+    pub fn latest_delivered_stamps(&self) -> Array1<f64> {
         let shown = self.stamps();
-        Array1::from_shape_fn(shown.len(), |row| match self.frames.unseen(row) {
+        Array1::from_shape_fn(shown.len(), |row| match self.frames.latest_if_not_shown(row) {
             Some(source) => source.frame.stamp,
             None => shown[row],
         })
     }
 
     /// Camera poses at the capture of the latest delivered frames, in the layout of [`pose_w`](Self::pose_w).
-    pub fn arrived_pose_w(&self, convention: CameraConvention) -> Array2<f64> {
+    pub fn latest_delivered_pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let mut poses = self.pose_w(convention);
         for (row, mut pose) in poses.rows_mut().into_iter().enumerate() {
-            if let Some(FrameSource { frame, viewpoint, .. }) = self.frames.unseen(row)
+            if let Some(FrameSource { frame, viewpoint, .. }) = self.frames.latest_if_not_shown(row)
                 && let Some(world) = self.viewpoints.world_from(viewpoint, frame.world_from_parent)
             {
-                pose.iter_mut().zip(to_row(&convention.of_optical(&world))).for_each(|(to, x)| *to = x);
+                pose.iter_mut().zip(to_row(&convention.pose_from_optical(&world))).for_each(|(to, x)| *to = x);
             }
         }
         poses
@@ -79,9 +79,9 @@ impl Camera {
 
     /// Intrinsic matrices of the latest delivered frames, in the layout of
     /// [`intrinsic_matrices`](Self::intrinsic_matrices).
-    pub fn arrived_intrinsic_matrices(&self) -> Array3<f64> {
+    pub fn latest_delivered_intrinsic_matrices(&self) -> Array3<f64> {
         let shown = self.intrinsic_matrices();
-        Array3::from_shape_fn(shown.raw_dim(), |(row, i, j)| match self.frames.unseen(row) {
+        Array3::from_shape_fn(shown.raw_dim(), |(row, i, j)| match self.frames.latest_if_not_shown(row) {
             Some(source) => source.viewpoint.pixels.matrix()[(i, j)],
             None => shown[(row, i, j)],
         })
@@ -93,23 +93,24 @@ impl Camera {
     /// # Errors
     ///
     /// Same as [`channel`](Self::channel).
-    pub fn arrived<C: Listed>(&self) -> Result<PictureView<'_, C>, SensorError> {
+    pub fn latest_delivered<C: ListedChannel>(&self) -> Result<ImageView<'_, C>, SensorError> {
         let rows = self.env_ids().len();
-        if (0..rows).all(|row| self.frames.unseen(row).is_none()) {
+        if (0..rows).all(|row| self.frames.latest_if_not_shown(row).is_none()) {
             return self.channel::<C>();
         }
-        self.must_have::<C>()?;
+        self.require_channel::<C>()?;
         // All shown rows are rendered, although some may not be needed: the caller usually reads them anyway.
-        let shown = self.pictures()?;
+        let shown = self.images()?;
         let make = || {
-            let mut images = DrawnImages::new(&self.cfg, rows);
-            let seen = (0..rows).filter(|&row| self.frames.unseen(row).is_none());
+            let mut images = RenderedImages::new(&self.cfg, rows);
+            let seen = (0..rows).filter(|&row| self.frames.latest_if_not_shown(row).is_none());
             seen.for_each(|row| images.copy(row, shown, rows, row));
             Ok(images)
         };
-        let images =
-            self.latest_images.get_or_update(make, |images| self.redraw(images, |row| self.frames.unseen(row)))?;
-        images.pictures()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
+        let images = self
+            .latest_images
+            .get_or_update(make, |images| self.render_stale(images, |row| self.frames.latest_if_not_shown(row)))?;
+        images.images()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
     }
 
     /// Maximum number of frames in the history: [`CameraCfg::history_length`](super::CameraCfg::history_length).
@@ -139,41 +140,41 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::ChannelOff`], and [`CameraError::Draw`] while the history holds a frame that cannot be rendered.
-    pub fn history<C: Listed>(&self) -> Result<HistoryView<'_, C>, SensorError> {
-        self.must_have::<C>()?;
+    /// [`CameraError::ChannelOff`], and [`CameraError::Render`] while the history holds a frame that cannot be rendered.
+    pub fn history<C: ListedChannel>(&self) -> Result<HistoryView<'_, C>, SensorError> {
+        self.require_channel::<C>()?;
         let (rows, length, (height, width)) = (self.env_ids().len(), self.history_length(), self.image_shape());
-        let of_one = C::Layout::of(length, height, width, C::COMPONENTS);
+        let of_one = C::Layout::dimension(length, height, width, C::COMPONENTS);
         let mut shape = <C::Layout as Dimension>::Larger::default();
         shape[0] = rows;
         for (axis, size) in of_one.slice().iter().enumerate() {
             shape[axis + 1] = *size;
         }
         let off = || self.channel_off::<C>();
-        let pictures = self.past_images()?.images.pictures()?.get::<C>().ok_or_else(off)?;
+        let pictures = self.history_images()?.images.images()?.get::<C>().ok_or_else(off)?;
         ArrayView::from_shape(shape, pictures.to_slice().unwrap_or_default()).map_err(|_| off().into())
     }
 
     /// Renders the history if the camera has one.
-    pub(super) fn draw_history(&self) {
+    pub(super) fn render_history(&self) {
         if self.history_length() > 0 {
             // Errors are returned by the next read.
-            let _ = self.past_images();
+            let _ = self.history_images();
         }
     }
 
     /// Returns the history images, updated with all delivered frames.
-    fn past_images(&self) -> Result<&PastImages, CameraError> {
+    fn history_images(&self) -> Result<&HistoryImages, CameraError> {
         let (rows, length) = (self.env_ids().len(), self.history_length());
         let filled = |row: usize| self.frames.stamp_history().filled(row);
         self.past_images.get_or_update(
-            || Ok(PastImages::new(&self.cfg, rows, filled)),
+            || Ok(HistoryImages::new(&self.cfg, rows, filled)),
             |past| {
                 past.move_up();
                 // Images that are also shown are copied instead of rendered again.
                 let is_shown = |row: &usize| self.frames.shows_latest(*row);
                 let wants_shown = length > 0 && (0..rows).any(|row| is_shown(&row));
-                let shown = if wants_shown { self.pictures().ok() } else { None };
+                let shown = if wants_shown { self.images().ok() } else { None };
                 if let Some(shown) = shown {
                     for row in (0..rows).filter(is_shown) {
                         if past.images.is_stale(row * length) {
@@ -181,29 +182,30 @@ impl Camera {
                         }
                     }
                 }
-                self.redraw(&mut past.images, |image| self.frames.past(image / length, image % length))
+                self.render_stale(&mut past.images, |image| self.frames.history_frame(image / length, image % length))
             },
         )
     }
 
     /// Records that `count` frames of a row were delivered.
-    pub(super) fn note_arrivals(&mut self, row: usize, count: u64) {
+    pub(super) fn record_deliveries(&mut self, row: usize, count: u64) {
         if count == 0 {
             return;
         }
         self.latest_images = Cached::empty();
         self.past_images.invalidate();
         if let Some(past) = self.past_images.value_mut() {
-            past.new[row] = past.new[row].saturating_add(usize::try_from(count).unwrap_or(usize::MAX)).min(past.length);
+            past.delivered_since[row] =
+                past.delivered_since[row].saturating_add(usize::try_from(count).unwrap_or(usize::MAX)).min(past.length);
         }
     }
 
     /// Clears the history images of a row to zero.
-    pub(super) fn forget_past_images(&mut self, row: usize) {
+    pub(super) fn clear_past_images(&mut self, row: usize) {
         self.past_images.invalidate();
         if let Some(past) = self.past_images.value_mut() {
-            past.images.forget(past.of_row(row));
-            past.new[row] = 0;
+            past.images.clear(past.row_range(row));
+            past.delivered_since[row] = 0;
         }
     }
 }

@@ -1,33 +1,33 @@
 //! Construction of cameras from their configurations, with validation.
 
-use super::arrivals::PastImages;
+use super::arrivals::HistoryImages;
 use super::cfg::CameraCfg;
 use super::env_rows::EnvRows;
 use super::error::CameraError;
-use super::faults::Faults;
+use super::faults::SensorNoiseModel;
 use super::frame_buffer::FrameBuffer;
 use super::imperfection::Imperfections;
 use super::motion::Motion;
-use super::sensor::drawing::{DrawnImages, FrameRenderer};
-use super::sensor::{Camera, Lens};
+use super::sensor::drawing::{FrameRenderer, RenderedImages};
+use super::sensor::{Camera, ViewTemplate};
 use super::viewpoints::{Viewpoint, Viewpoints};
 use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_render::Accumulator;
 use kinetoscope_render::Aperture;
-use kinetoscope_render::Film;
-use kinetoscope_render::ParallelRasterizer;
+use kinetoscope_render::ParallelRenderer;
 use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_render::RasterCfg;
 use kinetoscope_render::RenderError;
 use kinetoscope_render::Renderer;
-use kinetoscope_render::Ticket;
+use kinetoscope_render::RngKey;
 use kinetoscope_render::frame::Channels;
-use kinetoscope_render::lens::RaysOfRows;
-use kinetoscope_render::{check_light, check_occlusion};
-use kinetoscope_scene::Requires;
+use kinetoscope_render::lens::LensRayTables;
+use kinetoscope_render::{check_exposure_optics, check_occlusion};
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{Light, Marker, PoseF32};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
@@ -36,13 +36,13 @@ use std::sync::atomic::AtomicU64;
 const MAX_BYTES: u64 = 64 << 30;
 /// Upper bound of the memory of a captured frame besides poses and lights \[bytes\]: viewpoint, lens, stamp and random
 /// key.
-const CAPTURE: usize = 512;
+const FRAME_OVERHEAD: usize = 512;
 
 impl SensorCfg for CameraCfg {
     type Sensor = Camera;
 
     /// Visual state; body poses only if the camera is attached to a body; markers only if the camera renders them.
-    fn requires(&self) -> Requires {
+    fn requires(&self) -> StateFields {
         Camera::requires(self.extrinsics.parent.is_some(), self.draw_markers)
     }
 
@@ -69,23 +69,23 @@ impl SensorCfg for CameraCfg {
         self.renderer.validate().map_err(CameraError::View)?;
         self.aperture.as_ref().map_or(Ok(()), Aperture::check).map_err(CameraError::View)?;
         self.shutter.check().map_err(CameraError::View)?;
-        check_light(self.renderer, self.aperture.as_ref(), self.shutter).map_err(CameraError::View)?;
+        check_exposure_optics(self.renderer, self.aperture.as_ref(), self.shutter).map_err(CameraError::View)?;
         check_occlusion(self.raster, self.renderer).map_err(CameraError::View)?;
         self.check_flow()?;
         self.check_lens()?;
-        let lens = Lens::new(self)?;
+        let lens = ViewTemplate::new(self)?;
         let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
         lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
         let envs = EnvRows::new(self.env_ids.as_deref(), context.num_envs)?;
         self.check_memory(envs.len(), scene.instances().len(), scene.lights.len(), schedule)?;
         let motion = Motion::new(self, schedule, context.dt, envs.len(), &scene)?;
         let rays = self.lens_rays(&pixels, envs.len())?;
-        let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
+        let faults = SensorNoiseModel::new(self, context, schedule.period_steps() as f64 * context.dt)?;
         let viewpoint = Viewpoint { parent_from_camera: self.extrinsics.parent_from_camera()?, pixels };
         let viewpoints = Viewpoints::new(viewpoint, [self.width, self.height], rays, envs, parent);
         let rows = viewpoints.len();
-        let key = |env: &usize| Ticket::first(context.seed, (context.first_env + env) as u64, &context.name);
-        let tickets: Vec<Ticket> = viewpoints.envs.env_ids().iter().map(key).collect();
+        let key = |env: &usize| RngKey::new(context.seed, (context.first_env + env) as u64, &context.name);
+        let rng_keys: Vec<RngKey> = viewpoints.envs.env_ids().iter().map(key).collect();
         let rasterizer = self.rasterizer(context);
         Ok(Camera {
             path: summary::path(context, parent),
@@ -93,32 +93,32 @@ impl SensorCfg for CameraCfg {
             dt: context.dt,
             lens,
             phases: schedule.phases(rows),
-            frames: FrameBuffer::new(self, schedule, &scene, &viewpoints, tickets[0]),
+            frames: FrameBuffer::new(self, schedule, &scene, &viewpoints, rng_keys[0]),
             motion,
-            images: Cached::outdated(DrawnImages::new(self, rows)),
+            images: Cached::outdated(RenderedImages::new(self, rows)),
             latest_images: Cached::empty(),
-            past_images: Cached::outdated(PastImages::new(self, rows, |_| 0)),
+            past_images: Cached::outdated(HistoryImages::new(self, rows, |_| 0)),
             progress: rasterizer.progress().clone(),
             renderer: Mutex::new(FrameRenderer::new(rasterizer, faults)),
-            draws: AtomicU64::new(0),
+            render_count: AtomicU64::new(0),
             changed: Vec::with_capacity(rows),
             cfg: self.clone(),
             scene,
             viewpoints,
-            tickets,
+            rng_keys,
         })
     }
 }
 
 impl CameraCfg {
     /// Creates the rasterizer of all rows.
-    fn rasterizer(&self, context: &SensorContext) -> ParallelRasterizer {
+    fn rasterizer(&self, context: &SensorContext) -> ParallelRenderer {
         let marked = u32::from(self.draw_markers) << Marker::GROUP;
         let raster = RasterCfg { groups: self.raster.groups | marked, ..self.raster };
-        let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_pool(context.pool.clone());
+        let mut rasterizer = ParallelRenderer::new(raster, context.threads).with_pool(context.pool.clone());
         rasterizer.set_renderer(self.renderer);
-        rasterizer.set_light(self.aperture, self.shutter);
-        rasterizer.set_stops(self.imperfections.exposure.map_or(0.0, |exposure| exposure.stops));
+        rasterizer.set_exposure_optics(self.aperture, self.shutter);
+        rasterizer.set_exposure_compensation(self.imperfections.exposure.map_or(0.0, |exposure| exposure.stops));
         rasterizer.share_assets(&context.ray_assets);
         rasterizer
     }
@@ -127,8 +127,8 @@ impl CameraCfg {
     fn check_flow(&self) -> Result<(), CameraError> {
         let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
         match self.channels.flow {
-            true if past => Err(CameraError::FlowOfThePast),
-            true if !self.shutter.is_instant() => Err(CameraError::FlowOfRows),
+            true if past => Err(CameraError::FlowWithLatency),
+            true if !self.shutter.is_instant() => Err(CameraError::FlowWithShutterSpan),
             _ => Ok(()),
         }
     }
@@ -149,14 +149,14 @@ impl CameraCfg {
     }
 
     /// Creates the lens rays of all rows.
-    fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
-        if !self.lens.is_pinhole() && !self.renderer.sees_by_rays(true) {
+    fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<LensRayTables, CameraError> {
+        if !self.lens.is_pinhole() && !self.renderer.traces_visibility(true) {
             let (lens, renderer) = (self.lens.name(), self.renderer.name());
             return Err(CameraError::View(RenderError::LensRenderer { lens, renderer }));
         }
         // Path tracing generates its own rays. Without it, only color takes more samples than the pixel center.
-        let samples = if self.channels.color && !self.renderer.follows_paths() { self.raster.samples } else { 1 };
-        Ok(RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
+        let samples = if self.channels.color && !self.renderer.is_path_tracing() { self.raster.samples } else { 1 };
+        Ok(LensRayTables::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
     }
 
     /// Rejects sizes whose allocation would fail and abort the process.
@@ -164,27 +164,29 @@ impl CameraCfg {
         &self,
         views: usize,
         instances: usize,
-        lamps: usize,
+        lights: usize,
         schedule: Schedule,
     ) -> Result<(), CameraError> {
         let bytes_per_pixel = self.channels.bytes_per_pixel();
         // A shutter of nonzero span keeps two sets of poses.
-        let moments = if self.shutter.is_instant() { 1 } else { 2 };
-        let capture = moments * instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
+        let pose_sets = if self.shutter.is_instant() { 1 } else { 2 };
+        let capture = pose_sets * instances * size_of::<PoseF32>() + lights * size_of::<Light>();
         // The path tracer accumulates one image at a time.
-        let film = match self.renderer {
+        let accumulator = match self.renderer {
             Renderer::RayTraced { denoise, .. } if self.channels.color => {
-                self.width.saturating_mul(self.height).saturating_mul(Film::bytes_per_pixel(denoise))
+                self.width.saturating_mul(self.height).saturating_mul(Accumulator::bytes_per_pixel(denoise))
             }
             _ => 0,
         };
         let picture = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
         let fits = |pictures: usize, captures: usize| {
-            let captures = captures.checked_mul(capture.saturating_add(CAPTURE));
+            let captures = captures.checked_mul(capture.saturating_add(FRAME_OVERHEAD));
             let pictures = picture.and_then(|bytes| bytes.checked_mul(pictures));
             let bytes = pictures
                 .zip(captures)
-                .and_then(|(pictures, captures)| pictures.checked_add(captures)?.checked_mul(views)?.checked_add(film))
+                .and_then(|(pictures, captures)| {
+                    pictures.checked_add(captures)?.checked_mul(views)?.checked_add(accumulator)
+                })
                 .filter(|&bytes| bytes as u64 <= MAX_BYTES);
             // Reserves the memory and returns it untouched. A failed reservation is an error; a failed array allocation
             // would abort.
@@ -192,12 +194,24 @@ impl CameraCfg {
         };
         if !fits(1, 1) {
             let (width, height) = (self.width, self.height);
-            return Err(CameraError::Memory { views, width, height, bytes_per_pixel, paths: film, limit: MAX_BYTES });
+            return Err(CameraError::Memory {
+                views,
+                width,
+                height,
+                bytes_per_pixel,
+                path_tracing_bytes: accumulator,
+                limit: MAX_BYTES,
+            });
         }
-        let (pictures, captures) = (self.history_length, FrameBuffer::pending(self, schedule));
+        let (pictures, captures) = (self.history_length, FrameBuffer::max_pending(self, schedule));
         let all = pictures.saturating_add(captures).saturating_add(1);
         if !fits(pictures.saturating_add(1), all) {
-            return Err(CameraError::Past { pictures, captures, views, limit: MAX_BYTES });
+            return Err(CameraError::HistoryMemory {
+                images: pictures,
+                pending_frames: captures,
+                views,
+                limit: MAX_BYTES,
+            });
         }
         Ok(())
     }

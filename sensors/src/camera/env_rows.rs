@@ -35,7 +35,7 @@ impl EnvRows {
     }
 
     /// Creates a row for every environment.
-    pub(crate) fn all(num_envs: usize) -> Self {
+    pub(crate) fn for_all(num_envs: usize) -> Self {
         Self { env_ids: (0..num_envs).collect(), row_of_env: (0..num_envs).map(Some).collect() }
     }
 
@@ -74,7 +74,7 @@ impl EnvRows {
     /// # Errors
     ///
     /// Same as [`row`](Self::row), and [`CameraError::DuplicateEnvironment`].
-    pub(crate) fn chosen(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
+    pub(crate) fn selected_rows(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
         let Some(env_ids) = env_ids else { return Ok((0..self.len()).collect()) };
         let mut taken = vec![false; self.len()];
         let mut rows = Vec::with_capacity(env_ids.len());
@@ -93,7 +93,7 @@ impl EnvRows {
     /// # Errors
     ///
     /// An environment that does not exist.
-    pub(crate) fn seen(&self, env_ids: &[usize]) -> Result<Vec<usize>, SensorError> {
+    pub(crate) fn visible_rows(&self, env_ids: &[usize]) -> Result<Vec<usize>, SensorError> {
         self.must_exist(env_ids)?;
         Ok(env_ids.iter().filter_map(|&env| self.of(env)).collect())
     }

@@ -13,7 +13,7 @@ pub enum CameraError {
     /// The image of an environment cannot be rendered. It is rendered again after the next capture, or at the next read
     /// if rendering was cancelled.
     #[error("environment {env} cannot be drawn: {error}")]
-    Draw {
+    Render {
         /// The environment.
         env: usize,
         /// Reason.
@@ -64,7 +64,7 @@ pub enum CameraError {
         env: usize,
     },
     /// The camera does not see this environment.
-    #[error("the camera does not see environment {env}; it sees {}", some(.seen))]
+    #[error("the camera does not see environment {env}; it sees {}", first_ids(.seen))]
     NotSeen {
         /// The environment.
         env: usize,
@@ -104,7 +104,7 @@ pub enum CameraError {
     },
     /// Two calibrations do not belong to a left and a right camera.
     #[error("these are no calibrations of a left and a right eye: {what} is {value}; it must be {expected}")]
-    NotAPair {
+    NotAStereoPair {
         /// Name of the number.
         what: &'static str,
         /// Its value.
@@ -132,7 +132,7 @@ pub enum CameraError {
     #[error(
         "flow is from the picture before to the one now: a camera with flow has no latency_steps, dropout or history_length"
     )]
-    FlowOfThePast,
+    FlowWithLatency,
     /// The shutter is open for longer than the time between images.
     #[error(
         "the shutter takes {span} s, from the first light to the last row, and there is a picture every {period} s; make \
@@ -146,7 +146,7 @@ pub enum CameraError {
     },
     /// Flow is combined with a shutter of nonzero span.
     #[error("flow is from one instant to another: a camera with flow has a shutter of one instant")]
-    FlowOfRows,
+    FlowWithShutterSpan,
     /// A mask id is invalid.
     #[error("mask id {id} {problem}")]
     MaskId {
@@ -157,7 +157,7 @@ pub enum CameraError {
     },
     /// The pose of an instance is not finite, so it has no box.
     #[error("the pose of the thing with mask id {id} in environment {env} is not finite: it has no box")]
-    ThingPose {
+    EntityPose {
         /// The environment.
         env: usize,
         /// The mask id.
@@ -167,7 +167,7 @@ pub enum CameraError {
     #[error(
         "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes{} do not fit into memory \
          (at most {limit} bytes)",
-        if *.paths > 0 { format!(", with {} bytes for paths,", .paths) } else { String::new() }
+        if *.path_tracing_bytes > 0 { format!(", with {} bytes for paths,", .path_tracing_bytes) } else { String::new() }
     )]
     Memory {
         /// Number of environments.
@@ -179,20 +179,20 @@ pub enum CameraError {
         /// Memory per pixel \[bytes\].
         bytes_per_pixel: usize,
         /// Memory of path tracing, needed once for all images \[bytes\].
-        paths: usize,
+        path_tracing_bytes: usize,
         /// Memory limit \[bytes\].
         limit: u64,
     },
     /// History and frames in flight do not fit into memory.
     #[error(
-        "{pictures} past pictures and {captures} captures on their way, in each of {views} environments, do not fit into \
+        "{images} past pictures and {pending_frames} captures on their way, in each of {views} environments, do not fit into \
          memory (at most {limit} bytes); make history_length or latency_steps smaller"
     )]
-    Past {
+    HistoryMemory {
         /// Images in the history.
-        pictures: usize,
+        images: usize,
         /// Frames in flight.
-        captures: usize,
+        pending_frames: usize,
         /// Number of environments.
         views: usize,
         /// Memory limit \[bytes\].
@@ -210,7 +210,7 @@ pub enum CameraError {
 }
 
 /// Lists the first eight ids, and counts the others.
-fn some(ids: &[usize]) -> String {
+fn first_ids(ids: &[usize]) -> String {
     let first: Vec<String> = ids.iter().take(8).map(usize::to_string).collect();
     let more = if ids.len() > 8 { format!(" and {} more", ids.len() - 8) } else { String::new() };
     first.join(", ") + &more
@@ -219,6 +219,6 @@ fn some(ids: &[usize]) -> String {
 impl CameraError {
     /// Returns true if rendering was cancelled; the next read renders again.
     pub(super) fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Draw { error: RenderError::Cancelled { .. }, .. })
+        matches!(self, Self::Render { error: RenderError::Canceled { .. }, .. })
     }
 }

@@ -23,7 +23,7 @@ pub enum CameraConvention {
 
 impl CameraConvention {
     /// Returns the rotation that maps vectors of the optical frame ([`Ros`](Self::Ros)) to this convention.
-    pub fn from_ros(self) -> UnitQuaternion<f64> {
+    pub fn rotation_from_ros(self) -> UnitQuaternion<f64> {
         let q = match self {
             Self::Ros => return UnitQuaternion::identity(),
             // Half a turn about x.
@@ -36,12 +36,12 @@ impl CameraConvention {
 
     /// Converts the pose of a camera in this convention to the pose of its optical frame ([`Ros`](Self::Ros)).
     pub fn to_optical(self, pose: &Pose) -> Pose {
-        pose * self.from_ros()
+        pose * self.rotation_from_ros()
     }
 
     /// Converts the pose of an optical frame to the pose of the camera in this convention.
-    pub fn of_optical(self, optical: &Pose) -> Pose {
-        optical * self.from_ros().inverse()
+    pub fn pose_from_optical(self, optical: &Pose) -> Pose {
+        optical * self.rotation_from_ros().inverse()
     }
 }
 
@@ -222,7 +222,7 @@ mod tests {
         let optical = Pose::from_parts(at, ros);
         use CameraConvention::{OpenGl, Ros, World};
         for (convention, rotation) in [(Ros, ros), (OpenGl, open_gl), (World, world)] {
-            let pose = convention.of_optical(&optical);
+            let pose = convention.pose_from_optical(&optical);
             assert!(same_rotation(&pose.rotation, &rotation), "{convention:?}: {:?}", pose.rotation);
             assert_eq!(pose.translation, at);
             assert!(same_rotation(&convention.to_optical(&Pose::from_parts(at, rotation)).rotation, &ros));
@@ -230,7 +230,7 @@ mod tests {
         let looking = look_at_pose([2.5; 3], [0.0; 3], [0.0, 0.0, 1.0]).unwrap();
         assert!(same_rotation(&looking.rotation, &ros));
         let (right, down, forward) = (Vector3::x(), Vector3::y(), Vector3::z());
-        let axes = |c: CameraConvention| [right, down, forward].map(|v| c.from_ros() * v);
+        let axes = |c: CameraConvention| [right, down, forward].map(|v| c.rotation_from_ros() * v);
         assert_eq!(axes(OpenGl), [right, -down, -forward]);
         assert_eq!(axes(World), [-down, -forward, right]);
     }

@@ -1,15 +1,15 @@
 //! Frames of a camera: captured, in flight, shown and past.
 
 use super::cfg::CameraCfg;
-use super::motion::OpeningPoses;
+use super::motion::ShutterOpenPoses;
 use super::viewpoints::{Viewpoint, Viewpoints};
 use crate::delay::{self, DelayLine};
 use crate::history::History;
 use crate::schedule::Schedule;
 use kinetoscope_render::lens::LensRays;
-use kinetoscope_render::{Stream, Ticket};
+use kinetoscope_render::{RngKey, RngStream};
 use kinetoscope_scene::pose::from_row;
-use kinetoscope_scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
+use kinetoscope_scene::{EnvScene, Light, Marker, Pose, PoseF32, RenderScene, SceneState};
 use ndarray::{Array1, Array2, ArrayView1, ArrayViewMut1, Axis};
 use std::sync::Arc;
 
@@ -38,49 +38,49 @@ pub(super) struct CapturedFrame {
     pub(super) poses: Vec<PoseF32>,
     pub(super) lights: Vec<Light>,
     /// The environment's own scene, if it differs from the shared scene.
-    pub(super) scene: OwnScene,
+    pub(super) scene: EnvScene,
     /// Pose of the parent; the identity for a free camera, `None` before the first capture.
     pub(super) world_from_parent: Option<Pose>,
     /// Time of the capture \[s\].
     pub(super) stamp: f64,
     /// Key of the random numbers of the image.
-    pub(super) ticket: Ticket,
+    pub(super) rng_key: RngKey,
     /// Markers of other sensors; empty for a camera that does not render markers.
     pub(super) markers: Vec<Marker>,
     /// Poses at shutter opening, for a shutter of nonzero span.
-    opening: Option<OpeningPoses>,
+    shutter_open: Option<ShutterOpenPoses>,
 }
 
 impl CapturedFrame {
     /// Allocates a frame of a scene; `slow_shutter` also allocates the poses at shutter opening.
-    fn new(scene: &RenderScene, ticket: Ticket, slow_shutter: bool) -> Self {
+    fn new(scene: &RenderScene, ticket: RngKey, slow_shutter: bool) -> Self {
         let instances = scene.instances().len();
         Self {
             poses: vec![PoseF32::IDENTITY; instances],
             lights: vec![Light::default(); scene.lights.len()],
-            scene: OwnScene::default(),
+            scene: EnvScene::default(),
             world_from_parent: None,
             stamp: 0.0,
-            ticket,
+            rng_key: ticket,
             markers: Vec::new(),
-            opening: slow_shutter.then(|| OpeningPoses::new(instances)),
+            shutter_open: slow_shutter.then(|| ShutterOpenPoses::new(instances)),
         }
     }
 
     /// Captures an environment. The state must be checked before.
-    fn capture(&mut self, seen: &Observation<'_>, ticket: Ticket, opening: Option<&OpeningPoses>) {
+    fn capture(&mut self, seen: &Observation<'_>, ticket: RngKey, opening: Option<&ShutterOpenPoses>) {
         let Observation { state, env, .. } = *seen;
         let Some(visible) = &state.visible else { return };
         copy_row(&mut self.poses, &visible.instance_poses, env);
         copy_row(&mut self.lights, &visible.lights, env);
-        self.scene.clone_from(state.seen_scene(env));
+        self.scene.clone_from(state.visible_scene(env));
         self.world_from_parent = Some(seen.parent_pose());
         self.stamp = state.time[env];
-        self.ticket = ticket;
+        self.rng_key = ticket;
         if let Some(markers) = &state.markers {
             self.markers.clone_from(&markers[env]);
         }
-        if let Some(own) = &mut self.opening {
+        if let Some(own) = &mut self.shutter_open {
             own.assign_valid(opening);
         }
     }
@@ -92,16 +92,16 @@ impl CapturedFrame {
         self.scene.clone_from(&other.scene);
         self.world_from_parent = other.world_from_parent;
         self.stamp = other.stamp;
-        self.ticket = other.ticket;
+        self.rng_key = other.rng_key;
         self.markers.clone_from(&other.markers);
-        if let (Some(own), Some(other)) = (&mut self.opening, &other.opening) {
+        if let (Some(own), Some(other)) = (&mut self.shutter_open, &other.shutter_open) {
             own.assign(other);
         }
     }
 
     /// Returns poses of instances and parent at shutter opening; `None` for a frame of one instant.
-    pub(super) fn opened(&self) -> Option<(&[PoseF32], Pose)> {
-        self.opening.as_ref()?.get()
+    pub(super) fn shutter_open_poses(&self) -> Option<(&[PoseF32], Pose)> {
+        self.shutter_open.as_ref()?.get()
     }
 }
 
@@ -116,20 +116,20 @@ pub(super) struct FrameSource<'a> {
 
 impl<'a> FrameSource<'a> {
     /// Combines a frame of a row with the current viewpoint of the row.
-    pub(super) fn present(row: usize, frame: &'a CapturedFrame, viewpoints: &'a Viewpoints) -> Self {
+    pub(super) fn with_current_viewpoint(row: usize, frame: &'a CapturedFrame, viewpoints: &'a Viewpoints) -> Self {
         Self { row, frame, viewpoint: viewpoints.row(row), rays: viewpoints.rays(row) }
     }
 }
 
 /// A delivered frame, with its viewpoint and lens at that time. Later setters do not change it.
 #[derive(Clone, Debug)]
-struct ArrivedFrame {
+struct DeliveredFrame {
     frame: CapturedFrame,
     viewpoint: Viewpoint,
     rays: Option<Arc<LensRays>>,
 }
 
-impl ArrivedFrame {
+impl DeliveredFrame {
     fn assign(&mut self, source: FrameSource<'_>) {
         self.frame.assign(source.frame);
         self.viewpoint = *source.viewpoint;
@@ -151,22 +151,22 @@ pub(super) struct FrameBuffer {
     delay: Option<DelayLine<CapturedFrame>>,
     /// Probability that a frame is lost on its way.
     dropout: f64,
-    arrived: Arrived,
+    delivered: DeliveredFrames,
     /// True if the latest delivered frame is shown, from the viewpoint of its delivery.
     shows_latest: Vec<bool>,
 }
 
 /// Delivered frames.
 #[derive(Debug)]
-struct Arrived {
+struct DeliveredFrames {
     counts: Array1<u64>,
     /// The latest delivered frame, with a latency; without a latency this is the shown frame.
-    latest: History<ArrivedFrame>,
-    history: History<ArrivedFrame>,
+    latest: History<DeliveredFrame>,
+    history: History<DeliveredFrame>,
     stamps: History<f64>,
 }
 
-impl Arrived {
+impl DeliveredFrames {
     fn push(&mut self, source: FrameSource<'_>) {
         let row = source.row;
         self.counts[row] += 1;
@@ -181,7 +181,7 @@ impl Arrived {
 
 impl FrameBuffer {
     /// Returns the number of frames of an environment that are in flight at once.
-    pub(super) fn pending(cfg: &CameraCfg, schedule: Schedule) -> usize {
+    pub(super) fn max_pending(cfg: &CameraCfg, schedule: Schedule) -> usize {
         let keeps_frames = cfg.latency_steps > 0 || cfg.history_length > 0 || cfg.dropout > 0.0;
         if keeps_frames { delay::capacity(cfg.latency_steps.into(), schedule.period_steps()) } else { 0 }
     }
@@ -192,21 +192,21 @@ impl FrameBuffer {
         schedule: Schedule,
         scene: &RenderScene,
         viewpoints: &Viewpoints,
-        ticket: Ticket,
+        ticket: RngKey,
     ) -> Self {
         let rows = viewpoints.len();
         let frame = CapturedFrame::new(scene, ticket, !cfg.shutter.is_instant());
-        let arrived = ArrivedFrame { frame: frame.clone(), viewpoint: *viewpoints.row(0), rays: None };
+        let arrived = DeliveredFrame { frame: frame.clone(), viewpoint: *viewpoints.row(0), rays: None };
         let latency = u64::from(cfg.latency_steps);
         Self {
             shown: vec![frame.clone(); rows],
             stamps: Array1::zeros(rows),
             delay: (latency > 0).then(|| DelayLine::new(rows, latency, schedule.period_steps(), frame)),
             dropout: cfg.dropout,
-            arrived: Arrived {
+            delivered: DeliveredFrames {
                 counts: Array1::zeros(rows),
-                latest: History::of(rows, usize::from(latency > 0), 1, arrived.clone()),
-                history: History::of(rows, cfg.history_length, 1, arrived),
+                latest: History::filled_with(rows, usize::from(latency > 0), 1, arrived.clone()),
+                history: History::filled_with(rows, cfg.history_length, 1, arrived),
                 stamps: History::new(rows, cfg.history_length, 1),
             },
             shows_latest: vec![false; rows],
@@ -219,11 +219,11 @@ impl FrameBuffer {
         &mut self,
         row: usize,
         seen: &Observation<'_>,
-        ticket: Ticket,
-        opening: Option<&OpeningPoses>,
+        ticket: RngKey,
+        opening: Option<&ShutterOpenPoses>,
         viewpoints: &Viewpoints,
     ) -> bool {
-        if self.dropout > 0.0 && ticket.uniforms(Stream::DROPOUT, 0)[0] < self.dropout {
+        if self.dropout > 0.0 && ticket.uniforms(RngStream::DROPOUT, 0)[0] < self.dropout {
             return false;
         }
         if let Some(delay) = &mut self.delay {
@@ -232,15 +232,15 @@ impl FrameBuffer {
         }
         self.shown[row].capture(seen, ticket, opening);
         self.stamps[row] = self.shown[row].stamp;
-        self.arrived.push(FrameSource::present(row, &self.shown[row], viewpoints));
+        self.delivered.push(FrameSource::with_current_viewpoint(row, &self.shown[row], viewpoints));
         true
     }
 
     /// Takes the frames of a row that are due for delivery by `step`; returns true if another frame is shown.
-    pub(super) fn receive(&mut self, row: usize, step: u64, viewpoints: &Viewpoints) -> bool {
+    pub(super) fn deliver(&mut self, row: usize, step: u64, viewpoints: &Viewpoints) -> bool {
         let mut shows = false;
         while let Some((frame, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(row, step)) {
-            self.arrived.push(FrameSource::present(row, frame, viewpoints));
+            self.delivered.push(FrameSource::with_current_viewpoint(row, frame, viewpoints));
             if is_newest {
                 self.shown[row].assign(frame);
                 self.stamps[row] = frame.stamp;
@@ -251,7 +251,7 @@ impl FrameBuffer {
     }
 
     /// Shows the current state of an environment after a reset or a write. This is not a measurement.
-    pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>, ticket: Ticket) {
+    pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>, ticket: RngKey) {
         if let Some(delay) = &mut self.delay {
             delay.refresh(row, seen.state.step[seen.env]);
         }
@@ -261,10 +261,10 @@ impl FrameBuffer {
 
     /// Clears the frames of a row that are in flight or past.
     pub(super) fn reset(&mut self, row: usize) {
-        let Arrived { counts, latest, history, stamps } = &mut self.arrived;
+        let DeliveredFrames { counts, latest, history, stamps } = &mut self.delivered;
         counts[row] = 0;
-        latest.forget(row);
-        history.forget(row);
+        latest.clear(row);
+        history.clear(row);
         stamps.reset(row);
         if let Some(delay) = &mut self.delay {
             delay.clear(row);
@@ -273,7 +273,7 @@ impl FrameBuffer {
 
     /// Returns the steps until the next frame is delivered, at least 1, with the rows at `steps`; `None` if no frame is
     /// in flight.
-    pub(super) fn arrives_in(&self, steps: impl Iterator<Item = u64>) -> Option<u64> {
+    pub(super) fn next_delivery_in(&self, steps: impl Iterator<Item = u64>) -> Option<u64> {
         self.delay.as_ref()?.due_in(steps)
     }
 
@@ -292,14 +292,14 @@ impl FrameBuffer {
     }
 
     /// Returns the latest delivered frame of a row if it is not the shown one.
-    pub(super) fn unseen(&self, row: usize) -> Option<FrameSource<'_>> {
-        let [latest] = self.arrived.latest.slice(row, 0).filter(|_| !self.shows_latest[row])? else { return None };
+    pub(super) fn latest_if_not_shown(&self, row: usize) -> Option<FrameSource<'_>> {
+        let [latest] = self.delivered.latest.slice(row, 0).filter(|_| !self.shows_latest[row])? else { return None };
         Some(latest.source(row))
     }
 
     /// Returns the frame of the history of a row that is `age` frames old; 0 is the newest.
-    pub(super) fn past(&self, row: usize, age: usize) -> Option<FrameSource<'_>> {
-        let [past] = self.arrived.history.slice(row, age)? else { return None };
+    pub(super) fn history_frame(&self, row: usize, age: usize) -> Option<FrameSource<'_>> {
+        let [past] = self.delivered.history.slice(row, age)? else { return None };
         Some(past.source(row))
     }
 
@@ -310,12 +310,12 @@ impl FrameBuffer {
 
     /// Frames delivered since the last reset, shape (rows).
     pub(super) fn counts(&self) -> ArrayView1<'_, u64> {
-        self.arrived.counts.view()
+        self.delivered.counts.view()
     }
 
     /// Times of past frames \[s\], newest first.
     pub(super) fn stamp_history(&self) -> &History<f64> {
-        &self.arrived.stamps
+        &self.delivered.stamps
     }
 }
 

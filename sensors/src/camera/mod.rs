@@ -36,6 +36,6 @@ pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pos
 pub use imperfection::Imperfections;
 pub use placement::CameraPlacement;
 pub use point_cloud::PointFrame;
-pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
+pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, SegmentedEntity, segment_color};
 pub use sensor::Camera;
 pub use stereo::{Rectification, StereoCamera, StereoCameraCfg, StereoOrigin};

@@ -5,7 +5,7 @@ use super::cfg::CameraCfg;
 use super::error::CameraError;
 use super::frame_buffer::{CapturedFrame, Observation, copy_row};
 use crate::schedule::{Phases, Schedule};
-use kinetoscope_render::Before;
+use kinetoscope_render::PreviousState;
 use kinetoscope_render::Shutter;
 use kinetoscope_render::View;
 use kinetoscope_scene::{Pose, PoseF32, RenderScene};
@@ -15,14 +15,14 @@ const ROUNDING: f64 = 1e-6;
 
 /// Poses at shutter opening.
 #[derive(Clone, Debug)]
-pub(super) struct OpeningPoses {
+pub(super) struct ShutterOpenPoses {
     /// World from instance.
     poses: Vec<PoseF32>,
     /// Pose of the parent, the identity for a free camera; `None` while there are no poses.
     parent: Option<Pose>,
 }
 
-impl OpeningPoses {
+impl ShutterOpenPoses {
     pub(super) fn new(instances: usize) -> Self {
         Self { poses: vec![PoseF32::IDENTITY; instances], parent: None }
     }
@@ -57,7 +57,7 @@ impl OpeningPoses {
 pub(super) struct Motion {
     /// Previous frames, row by row; empty for a camera without flow.
     previous: Vec<PreviousFrame>,
-    shutter: Option<SlowShutter>,
+    shutter: Option<TimedShutter>,
 }
 
 /// The frame before the shown one.
@@ -73,13 +73,13 @@ struct PreviousFrame {
 
 /// A shutter that opens one or more steps before its frame is due.
 #[derive(Clone, Debug)]
-struct SlowShutter {
+struct TimedShutter {
     /// Physics steps from the opening until the frame is due, at least 1.
     steps: u64,
     /// The same \[s\].
     seconds: f64,
     /// Poses at the opening, row by row; empty while the shutter is closed.
-    opened: Vec<OpeningPoses>,
+    open_poses: Vec<ShutterOpenPoses>,
 }
 
 impl Motion {
@@ -101,10 +101,10 @@ impl Motion {
                 let (span, period) = (cfg.shutter.span(cfg.height), schedule.period_steps() as f64 * dt);
                 return Err(CameraError::ShutterTooSlow { span, period });
             }
-            steps => steps.map(|steps| SlowShutter {
+            steps => steps.map(|steps| TimedShutter {
                 steps,
                 seconds: steps as f64 * dt,
-                opened: vec![OpeningPoses::new(instances); rows],
+                open_poses: vec![ShutterOpenPoses::new(instances); rows],
             }),
         };
         let previous = PreviousFrame { poses: vec![PoseF32::IDENTITY; instances], view: None, shown_view: None };
@@ -117,37 +117,37 @@ impl Motion {
     }
 
     /// Returns the steps until the shutter opens or a frame is due, given the steps until the frame is due.
-    pub(super) fn wait(&self, due: u64) -> u64 {
+    pub(super) fn steps_until_event(&self, due: u64) -> u64 {
         self.shutter.as_ref().filter(|shutter| due > shutter.steps).map_or(due, |shutter| due - shutter.steps)
     }
 
     /// Returns the poses at the opening of the shutter of a row.
-    pub(super) fn opening(&self, row: usize) -> Option<&OpeningPoses> {
-        self.shutter.as_ref().map(|shutter| &shutter.opened[row])
+    pub(super) fn shutter_open_poses(&self, row: usize) -> Option<&ShutterOpenPoses> {
+        self.shutter.as_ref().map(|shutter| &shutter.open_poses[row])
     }
 
     /// Opens the shutter of a row if its next frame is due after the span of the shutter.
-    pub(super) fn open_if_due(&mut self, row: usize, phases: &Phases, seen: &Observation<'_>) {
+    pub(super) fn open_shutter_if_due(&mut self, row: usize, phases: &Phases, seen: &Observation<'_>) {
         if let Some(shutter) = &mut self.shutter
-            && phases.wait(row, seen.state.step[seen.env]) == shutter.steps
+            && phases.steps_until_due(row, seen.state.step[seen.env]) == shutter.steps
         {
-            shutter.opened[row].capture(seen);
+            shutter.open_poses[row].capture(seen);
         }
     }
 
     /// Replaces the poses of an open shutter after a write to the state: the written state counts since the opening.
     pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>) {
         if let Some(shutter) = &mut self.shutter
-            && shutter.opened[row].parent.is_some()
+            && shutter.open_poses[row].parent.is_some()
         {
-            shutter.opened[row].capture(seen);
+            shutter.open_poses[row].capture(seen);
         }
     }
 
     /// Closes the shutter of a row.
-    pub(super) fn close(&mut self, row: usize) {
+    pub(super) fn close_shutter(&mut self, row: usize) {
         if let Some(shutter) = &mut self.shutter {
-            shutter.opened[row].parent = None;
+            shutter.open_poses[row].parent = None;
         }
     }
 
@@ -161,7 +161,7 @@ impl Motion {
     }
 
     /// Records the view of a newly shown frame.
-    pub(super) fn show(&mut self, row: usize, view: View) {
+    pub(super) fn record_shown_view(&mut self, row: usize, view: View) {
         if let Some(previous) = self.previous.get_mut(row) {
             previous.shown_view = Some(view);
         }
@@ -172,13 +172,13 @@ impl Motion {
         if let Some(previous) = self.previous.get_mut(row) {
             previous.view = None;
         }
-        self.close(row);
+        self.close_shutter(row);
     }
 
     /// Returns the previous frame of a row.
-    pub(super) fn before(&self, row: usize) -> Option<Before<'_>> {
+    pub(super) fn previous_frame(&self, row: usize) -> Option<PreviousState<'_>> {
         let PreviousFrame { poses, view, .. } = self.previous.get(row)?;
-        Some(Before { poses, view: view.as_ref()? })
+        Some(PreviousState { poses, view: view.as_ref()? })
     }
 }
 

@@ -3,15 +3,15 @@
 use super::cfg::CameraCfg;
 use crate::error::SensorError;
 use crate::noise::{NoiseCfg, check};
-use crate::sampling::Channel;
+use crate::sampling::SampleChannel;
 use kinetoscope_render::frame::{Channel as _, Channels, FrameMut};
 use kinetoscope_render::frame::{Color, Depth, Distance};
-use kinetoscope_render::{Stream, Ticket};
+use kinetoscope_render::{RngKey, RngStream};
 use std::collections::BTreeMap;
 
 /// Noise of each channel; `None` for channels without noise.
 #[derive(Clone, Debug)]
-pub(crate) struct PictureNoise {
+pub(crate) struct ImageNoise {
     color: Option<NoiseCfg>,
     depth: Option<NoiseCfg>,
     distance: Option<NoiseCfg>,
@@ -22,9 +22,9 @@ pub(crate) struct PictureNoise {
 }
 
 /// Range of color bytes.
-const BYTES: [f64; 2] = [0.0, 255.0];
+const BYTE_RANGE: [f64; 2] = [0.0, 255.0];
 
-impl PictureNoise {
+impl ImageNoise {
     /// Creates the noise that `cfg` describes, with `period` \[s\] between images; `None` without noise.
     pub(crate) fn new(cfg: &CameraCfg, period: f64) -> Result<Option<Self>, SensorError> {
         let [near, far] = [f64::from(cfg.near as f32), f64::from(cfg.far as f32)];
@@ -33,13 +33,14 @@ impl PictureNoise {
         let depths = if cfg.lens.is_forward() { [near, far] } else { [-far, far] };
         let ranges = [depths, [near, f64::from(f32::MAX)]];
         let candidates = [
-            (cfg.channels.color, Channel::within(Color::NAME, 0, BYTES)),
-            (cfg.channels.depth, Channel::within(Depth::NAME, 0, ranges[0])),
-            (cfg.channels.distance, Channel::within(Distance::NAME, 0, ranges[1])),
+            (cfg.channels.color, SampleChannel::bounded(Color::NAME, 0, BYTE_RANGE)),
+            (cfg.channels.depth, SampleChannel::bounded(Depth::NAME, 0, ranges[0])),
+            (cfg.channels.distance, SampleChannel::bounded(Distance::NAME, 0, ranges[1])),
         ];
-        let measured: Vec<Channel> = candidates.into_iter().filter(|(on, _)| *on).map(|(_, channel)| channel).collect();
+        let measured: Vec<SampleChannel> =
+            candidates.into_iter().filter(|(on, _)| *on).map(|(_, channel)| channel).collect();
         // Alternative channel names are replaced by the canonical ones.
-        let named = cfg.noise.iter().map(|(name, noise)| (own_name(name), noise));
+        let named = cfg.noise.iter().map(|(name, noise)| (canonical_name(name), noise));
         check(cfg.dropout, named.clone(), &measured)?;
         let of = |channel: &str| {
             let mut found = named.clone().filter(|(name, _)| *name == channel).map(|(_, noise)| *noise);
@@ -61,15 +62,15 @@ impl PictureNoise {
     }
 
     /// Adds noise to a frame in which misses are infinite.
-    pub(crate) fn disturb(&self, frame: &mut FrameMut<'_>, ticket: &Ticket) {
+    pub(crate) fn apply(&self, frame: &mut FrameMut<'_>, ticket: &RngKey) {
         if let (Some(noise), Some(bytes)) = (&self.color, frame.color.as_deref_mut()) {
             // Four pixels have twelve numbers: alpha has no noise.
             for (k, pixels) in (0..).zip(bytes.chunks_mut(16)) {
-                let blocks = [0, 1, 2].map(|b| self.errors(noise, 0, ticket, 3 * k + b));
+                let blocks = [0, 1, 2].map(|b| self.sample_block(noise, 0, ticket, 3 * k + b));
                 let errors = blocks.as_flattened().chunks_exact(3);
                 for (pixel, errors) in pixels.chunks_exact_mut(4).zip(errors) {
                     for (byte, error) in pixel.iter_mut().zip(errors) {
-                        *byte = noise.settle(f64::from(*byte) + error, BYTES).round() as u8;
+                        *byte = noise.quantize_and_clamp(f64::from(*byte) + error, BYTE_RANGE).round() as u8;
                     }
                 }
             }
@@ -78,42 +79,44 @@ impl PictureNoise {
         for ((channel, (noise, numbers)), range) in (1..).zip(channels).zip(self.ranges) {
             let (Some(noise), Some(numbers)) = (noise, numbers) else { continue };
             for (block, numbers) in (0..).zip(numbers.chunks_mut(4)) {
-                let errors = self.errors(noise, channel, ticket, block);
+                let errors = self.sample_block(noise, channel, ticket, block);
                 // Misses have no noise.
                 for (number, error) in numbers.iter_mut().zip(errors).filter(|(number, _)| number.is_finite()) {
-                    *number = noise.settle(f64::from(*number) + error, range) as f32;
+                    *number = noise.quantize_and_clamp(f64::from(*number) + error, range) as f32;
                 }
             }
         }
     }
 
     /// Returns the noise of a block of four numbers of a channel.
-    fn errors(&self, noise: &NoiseCfg, channel: u8, ticket: &Ticket, block: u32) -> [f64; 4] {
+    fn sample_block(&self, noise: &NoiseCfg, channel: u8, ticket: &RngKey, block: u32) -> [f64; 4] {
         let mut errors = [0.0; 4];
         let mut add = |size: f64, numbers: [f64; 4]| {
             errors.iter_mut().zip(numbers).for_each(|(error, number)| *error += size * number);
         };
         if noise.bias_std > 0.0 {
-            add(noise.bias_std, ticket.biases(Stream::bias(channel), block));
+            add(noise.bias_std, ticket.biases(RngStream::bias(channel), block));
         }
         if noise.bias_walk > 0.0 {
-            add(noise.bias_walk * self.sqrt_period, ticket.walks(Stream::walk(channel), block));
+            add(noise.bias_walk * self.sqrt_period, ticket.random_walks(RngStream::random_walk(channel), block));
         }
         if noise.std > 0.0 {
-            add(noise.std, ticket.normals(Stream::white(channel), block));
+            add(noise.std, ticket.normals(RngStream::white(channel), block));
         }
         errors
     }
 }
 
 /// Returns the noise of the measured channels. Names that are not channels stay and are rejected by `check`.
-pub(crate) fn of_channels(noise: &BTreeMap<String, NoiseCfg>, channels: Channels) -> BTreeMap<String, NoiseCfg> {
-    let off = |name: &str| Channels::NAMES.contains(&own_name(name)) && !channels.names().contains(&own_name(name));
+pub(crate) fn for_channels(noise: &BTreeMap<String, NoiseCfg>, channels: Channels) -> BTreeMap<String, NoiseCfg> {
+    let off = |name: &str| {
+        Channels::NAMES.contains(&canonical_name(name)) && !channels.names().contains(&canonical_name(name))
+    };
     noise.iter().filter(|(name, _)| !off(name)).map(|(name, noise)| (name.clone(), *noise)).collect()
 }
 
 /// Returns the canonical name of a channel; other names stay unchanged.
-fn own_name(name: &str) -> &str {
+fn canonical_name(name: &str) -> &str {
     Channels::from_names(&[name]).ok().and_then(|channels| channels.names().first().copied()).unwrap_or(name)
 }
 
@@ -137,10 +140,10 @@ mod tests {
                 near: 0.1,
                 ..CameraCfg::default()
             };
-            let noise = PictureNoise::new(&cfg, 0.1).expect("numbers").expect("some");
+            let noise = ImageNoise::new(&cfg, 0.1).expect("numbers").expect("some");
             let mut frame = Frame::new(2, 2, cfg.channels);
             frame.depth = Some(vec![-2.0, 0.0, 0.5, 3.0]);
-            noise.disturb(&mut frame.as_mut(), &Ticket::first(1, 0, "eye"));
+            noise.apply(&mut frame.as_mut(), &RngKey::new(1, 0, "eye"));
             frame.depth.expect("it is on")
         };
         for (found, was) in disturbed("equidistant").into_iter().zip([-2.0, 0.0, 0.5, 3.0]) {

@@ -111,7 +111,7 @@ pub trait CameraPlacement: PlaceRows {
         up: &[[f64; 3]],
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
-        let rows = self.env_rows().chosen(env_ids)?;
+        let rows = self.env_rows().selected_rows(env_ids)?;
         let n = rows.len();
         let points = one_each("eyes", eye, n)?.zip(one_each("targets", target, n)?).zip(one_each("ups", up, n)?);
         let poses: Result<Vec<Pose>, _> = points.map(|((eye, target), up)| look_at_pose(*eye, *target, *up)).collect();
@@ -124,7 +124,7 @@ pub trait CameraPlacement: PlaceRows {
     ///
     /// An environment that the camera does not see or that is named twice. Nothing is changed then.
     fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.env_rows().chosen(env_ids)?;
+        let rows = self.env_rows().selected_rows(env_ids)?;
         self.restore_rows(&rows);
         Ok(())
     }
@@ -137,7 +137,7 @@ fn place_in(
     convention: CameraConvention,
     frame: PoseFrame,
 ) -> Result<(), SensorError> {
-    let rows = camera.env_rows().chosen(env_ids)?;
+    let rows = camera.env_rows().selected_rows(env_ids)?;
     let poses: Vec<Pose> = poses.to_poses()?.iter().map(|pose| convention.to_optical(pose)).collect();
     camera.place_rows(&rows, &poses, frame)
 }

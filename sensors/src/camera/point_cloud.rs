@@ -41,7 +41,7 @@ impl Camera {
         if let Some(points) = points.as_slice_mut() {
             let along = along.iter().map(|&along| self.is_hit(along).then_some(along));
             match rays {
-                Some(rays) => follow(|at| rays.direction(0, at).map(f64::from), &pose, width, along, points),
+                Some(rays) => unproject_along(|at| rays.direction(0, at).map(f64::from), &pose, width, along, points),
                 None => unproject(&PixelIntrinsics { fx, fy, cx, cy }, &pose, width, along, points),
             }
         }
@@ -56,7 +56,7 @@ impl Camera {
     /// Same as [`point_map`](Self::point_map).
     pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
         let map = self.point_map(env, frame)?;
-        Ok(seen(map.view()))
+        Ok(hits_of(map.view()))
     }
 }
 
@@ -74,11 +74,11 @@ pub(crate) fn unproject(
         let (u, v) = (x as f64 + 0.5, y as f64 + 0.5);
         [(u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0]
     };
-    follow(ray, pose, width, depths, points);
+    unproject_along(ray, pose, width, depths, points);
 }
 
 /// Writes points along rays of the optical frame, given in multiples of the ray vector.
-fn follow(
+fn unproject_along(
     ray: impl Fn([usize; 2]) -> [f64; 3],
     pose: &Pose,
     width: usize,
@@ -96,7 +96,7 @@ fn follow(
 }
 
 /// Returns the finite points of a map, shape (points, 3).
-pub(crate) fn seen(map: ArrayView3<'_, f32>) -> Array2<f32> {
+pub(crate) fn hits_of(map: ArrayView3<'_, f32>) -> Array2<f32> {
     let points = map.rows().into_iter().map(|p| [p[0], p[1], p[2]]).filter(|p| p[0].is_finite());
     Array2::from(points.collect::<Vec<[f32; 3]>>())
 }

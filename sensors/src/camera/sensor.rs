@@ -2,7 +2,7 @@
 
 pub(super) mod drawing;
 
-use super::arrivals::PastImages;
+use super::arrivals::HistoryImages;
 use super::cfg::{CameraCfg, DepthMiss};
 use super::env_rows::EnvRows;
 use super::error::CameraError;
@@ -16,16 +16,16 @@ use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::Sensor;
-use drawing::{DrawnImages, FrameRenderer};
+use drawing::{FrameRenderer, RenderedImages};
 use kinetoscope_render::RenderProgress;
-use kinetoscope_render::Ticket;
-use kinetoscope_render::frame::{Channels, Pictures};
-use kinetoscope_render::frame::{Listed, PictureView};
+use kinetoscope_render::RngKey;
+use kinetoscope_render::frame::{Channels, Images};
+use kinetoscope_render::frame::{ImageView, ListedChannel};
 use kinetoscope_render::lens;
 use kinetoscope_render::lens::{LensRays, Optics};
 use kinetoscope_render::{Intrinsics, PixelIntrinsics};
 use kinetoscope_render::{RenderError, View};
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::pose::to_row;
 use kinetoscope_scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use ndarray::{Array2, Array3, ArrayView1};
@@ -56,34 +56,34 @@ pub struct Camera {
     pub(super) num_bodies: usize,
     /// Physics step \[s\].
     pub(super) dt: f64,
-    pub(super) lens: Lens,
+    pub(super) lens: ViewTemplate,
     pub(super) viewpoints: Viewpoints,
     pub(super) phases: Phases,
     /// Keys of the random numbers of the frames captured last, row by row.
-    pub(super) tickets: Vec<Ticket>,
+    pub(super) rng_keys: Vec<RngKey>,
     pub(super) frames: FrameBuffer,
     pub(super) motion: Motion,
     /// Images of the shown frames, of the latest delivered frames where others are shown, and of the history.
-    pub(super) images: Cached<DrawnImages>,
-    pub(super) latest_images: Cached<DrawnImages>,
-    pub(super) past_images: Cached<PastImages>,
+    pub(super) images: Cached<RenderedImages>,
+    pub(super) latest_images: Cached<RenderedImages>,
+    pub(super) past_images: Cached<HistoryImages>,
     pub(super) renderer: Mutex<FrameRenderer>,
     pub(super) progress: RenderProgress,
-    pub(super) draws: AtomicU64,
+    pub(super) render_count: AtomicU64,
     /// Rows that show another frame. Only used within an update, kept for its memory.
     pub(super) changed: Vec<usize>,
 }
 
 /// Image size and depth range, common to all views.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lens {
+pub(super) struct ViewTemplate {
     width: usize,
     height: usize,
     near: f32,
     far: f32,
 }
 
-impl Lens {
+impl ViewTemplate {
     pub(super) fn new(cfg: &CameraCfg) -> Result<Self, CameraError> {
         let (near, far) = (cfg.near as f32, cfg.far as f32);
         // The rasterizer compares the depth with 1/near, which must be finite.
@@ -110,48 +110,48 @@ impl Sensor for Camera {
             let step = state.step[seen.env];
             let is_due = self.phases.is_due(row, step);
             let shown = is_due && self.capture(row, &seen);
-            let shown = self.frames.receive(row, step, &self.viewpoints) || shown;
-            self.note_arrivals(row, self.frames.counts()[row] - before);
+            let shown = self.frames.deliver(row, step, &self.viewpoints) || shown;
+            self.record_deliveries(row, self.frames.counts()[row] - before);
             if shown {
                 changed.push(row);
             }
         }
-        self.outdate(&changed);
+        self.invalidate(&changed);
         changed.iter().for_each(|&row| self.frames.set_shows_latest(row, true));
         self.changed = changed;
-        self.draw_if_eager();
+        self.render_if_eager();
         (0..self.viewpoints.len()).for_each(|row| self.open_shutter(row, state));
         Ok(())
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let rows = self.viewpoints.envs.seen(env_ids)?;
+        let rows = self.viewpoints.envs.visible_rows(env_ids)?;
         for &row in &rows {
             self.phases.reset(row, state.step[self.env_ids()[row]]);
-            self.tickets[row].reset();
+            self.rng_keys[row].reset();
             self.frames.reset(row);
             self.motion.reset(row);
-            self.forget_past_images(row);
+            self.clear_past_images(row);
         }
-        self.show_now(&rows, state);
+        self.show_current_state(&rows, state);
         rows.iter().for_each(|&row| self.open_shutter(row, state));
         Ok(())
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let rows = self.viewpoints.envs.seen(env_ids)?;
-        rows.iter().for_each(|&row| self.tickets[row].refresh());
-        self.show_now(&rows, state);
+        let rows = self.viewpoints.envs.visible_rows(env_ids)?;
+        rows.iter().for_each(|&row| self.rng_keys[row].advance_unscheduled());
+        self.show_current_state(&rows, state);
         rows.iter().for_each(|&row| self.motion.refresh(row, &self.observe(row, state)));
         Ok(())
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
         let steps = || self.env_ids().iter().map(|&env| step[env]);
-        let due = self.phases.first_of(steps(), |due| self.motion.wait(due));
-        self.frames.arrives_in(steps()).map_or(due, |arrival| arrival.min(due))
+        let due = self.phases.min_wait(steps(), |due| self.motion.steps_until_event(due));
+        self.frames.next_delivery_in(steps()).map_or(due, |arrival| arrival.min(due))
     }
 
     /// Axes of the optical frame and an arrow along each edge of the view frustum, at the captured instant. Empty for
@@ -172,13 +172,13 @@ impl PlaceRows for Camera {
     fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError> {
         let Self { viewpoints, frames, .. } = self;
         viewpoints.place(rows, poses, frame, |row| frames.shown(row).world_from_parent)?;
-        self.outdate(rows);
+        self.invalidate(rows);
         Ok(())
     }
 
     fn restore_rows(&mut self, rows: &[usize]) {
         self.viewpoints.restore(rows);
-        self.outdate(rows);
+        self.invalidate(rows);
     }
 }
 
@@ -188,20 +188,20 @@ impl CameraPlacement for Camera {
     }
 
     fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.viewpoints.envs.chosen(env_ids)?;
+        let rows = self.viewpoints.envs.selected_rows(env_ids)?;
         let lens = self.lens;
         self.viewpoints.set_intrinsics(&rows, intrinsics, |pixels| {
             lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
         })?;
-        self.outdate(&rows);
+        self.invalidate(&rows);
         Ok(())
     }
 }
 
 impl Camera {
-    pub(super) fn requires(attached: bool, draws_markers: bool) -> Requires {
-        let part = |wanted: bool, field| if wanted { field } else { Requires::NONE };
-        Requires::VISIBLE | part(attached, Requires::POSES) | part(draws_markers, Requires::MARKERS)
+    pub(super) fn requires(attached: bool, draws_markers: bool) -> StateFields {
+        let part = |wanted: bool, field| if wanted { field } else { StateFields::NONE };
+        StateFields::VISIBLE | part(attached, StateFields::POSES) | part(draws_markers, StateFields::MARKERS)
     }
 
     /// Environments of the camera: the first axis of all its arrays.
@@ -250,12 +250,12 @@ impl Camera {
     }
 
     /// Number of images rendered since the camera was built, summed over environments: a measure of work.
-    pub fn draws(&self) -> u64 {
-        self.draws.load(Ordering::Relaxed)
+    pub fn render_count(&self) -> u64 {
+        self.render_count.load(Ordering::Relaxed)
     }
 
     /// Progress of path tracing, and a way to cancel it from another thread. A cancelled read returns
-    /// [`CameraError::Draw`] with [`RenderError::Cancelled`]; the next read renders again.
+    /// [`CameraError::Render`] with [`RenderError::Canceled`]; the next read renders again.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
@@ -266,18 +266,18 @@ impl Camera {
     /// # Errors
     ///
     /// [`CameraError::ChannelOff`], [`CameraError::NothingCaptured`] before the first reset or update, and
-    /// [`CameraError::Draw`].
-    pub fn channel<C: Listed>(&self) -> Result<PictureView<'_, C>, SensorError> {
-        self.must_have::<C>()?;
-        self.pictures()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
+    /// [`CameraError::Render`].
+    pub fn channel<C: ListedChannel>(&self) -> Result<ImageView<'_, C>, SensorError> {
+        self.require_channel::<C>()?;
+        self.images()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
     }
 
     /// Returns an error if the channel is not measured.
-    pub(super) fn must_have<C: Listed>(&self) -> Result<(), CameraError> {
+    pub(super) fn require_channel<C: ListedChannel>(&self) -> Result<(), CameraError> {
         if self.cfg.channels.has::<C>() { Ok(()) } else { Err(self.channel_off::<C>()) }
     }
 
-    pub(super) fn channel_off<C: Listed>(&self) -> CameraError {
+    pub(super) fn channel_off<C: ListedChannel>(&self) -> CameraError {
         CameraError::ChannelOff { channel: C::NAME, enabled: self.cfg.channels.names() }
     }
 
@@ -285,12 +285,12 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::NothingCaptured`] before the first reset or update, and [`CameraError::Draw`].
-    pub fn pictures(&self) -> Result<&Pictures, SensorError> {
-        (0..self.viewpoints.len()).try_for_each(|row| self.must_have_captured(row))?;
-        let make = || Ok(DrawnImages::new(&self.cfg, self.viewpoints.len()));
-        let draw = |images: &mut DrawnImages| self.redraw(images, |row| Some(self.shown_source(row)));
-        Ok(self.images.get_or_update(make, draw)?.pictures()?)
+    /// [`CameraError::NothingCaptured`] before the first reset or update, and [`CameraError::Render`].
+    pub fn images(&self) -> Result<&Images, SensorError> {
+        (0..self.viewpoints.len()).try_for_each(|row| self.require_captured(row))?;
+        let make = || Ok(RenderedImages::new(&self.cfg, self.viewpoints.len()));
+        let draw = |images: &mut RenderedImages| self.render_stale(images, |row| Some(self.shown_source(row)));
+        Ok(self.images.get_or_update(make, draw)?.images()?)
     }
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
@@ -316,7 +316,7 @@ impl Camera {
     }
 
     /// True if the color channel shows the markers of other sensors.
-    pub fn draws_markers(&self) -> bool {
+    pub fn renders_markers(&self) -> bool {
         self.cfg.draw_markers
     }
 
@@ -328,7 +328,7 @@ impl Camera {
     /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN for
     /// an attached camera before its first capture.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.of_optical(&pose)));
+        let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.pose_from_optical(&pose)));
         Array2::from(
             (0..self.viewpoints.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>(),
         )
@@ -360,12 +360,12 @@ impl Camera {
     }
 
     /// Returns true if straight lines are bent in the image.
-    pub(super) fn bends_lines(&self) -> bool {
+    pub(super) fn is_distorted(&self) -> bool {
         !self.viewpoints.lens().is_pinhole()
     }
 
     /// Returns an error for a lens other than a pinhole; `what` names the feature.
-    pub(super) fn must_be_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
+    pub(super) fn require_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
         let lens = self.viewpoints.lens();
         if lens.is_pinhole() { Ok(()) } else { Err(CameraError::PinholeOnly { what, lens: lens.name() }) }
     }
@@ -390,7 +390,7 @@ impl Camera {
 
     /// Checks that the state belongs to the scene that the camera was built for.
     fn check(&self, state: &SceneState) -> Result<(), SensorError> {
-        let missing = Self::requires(self.is_attached(), self.cfg.draw_markers).without(Requires::present_in(state));
+        let missing = Self::requires(self.is_attached(), self.cfg.draw_markers).without(StateFields::present_in(state));
         let Some(VisibleState { instance_poses, lights, .. }) = state.visible.as_ref().filter(|_| missing.is_empty())
         else {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
@@ -427,41 +427,41 @@ impl Camera {
 
     /// Captures a frame of a row that is due; returns true if it is shown at once.
     fn capture(&mut self, row: usize, seen: &Observation<'_>) -> bool {
-        let Self { frames, motion, viewpoints, tickets, .. } = self;
-        tickets[row].due();
+        let Self { frames, motion, viewpoints, rng_keys: tickets, .. } = self;
+        tickets[row].advance_scheduled();
         motion.advance(row, frames.shown(row));
-        let shown = frames.capture(row, seen, tickets[row], motion.opening(row), viewpoints);
-        motion.close(row);
+        let shown = frames.capture(row, seen, tickets[row], motion.shutter_open_poses(row), viewpoints);
+        motion.close_shutter(row);
         if shown {
-            self.motion.show(row, self.view_of(row));
+            self.motion.record_shown_view(row, self.view_of(row));
         }
         shown
     }
 
     /// Shows the current state of some environments. The state must be checked before.
-    fn show_now(&mut self, rows: &[usize], state: &SceneState) {
+    fn show_current_state(&mut self, rows: &[usize], state: &SceneState) {
         for &row in rows {
-            self.frames.refresh(row, &self.observe(row, state), self.tickets[row]);
-            self.motion.show(row, self.view_of(row));
+            self.frames.refresh(row, &self.observe(row, state), self.rng_keys[row]);
+            self.motion.record_shown_view(row, self.view_of(row));
         }
-        self.outdate(rows);
-        self.draw_if_eager();
+        self.invalidate(rows);
+        self.render_if_eager();
     }
 
     fn open_shutter(&mut self, row: usize, state: &SceneState) {
-        self.motion.open_if_due(row, &self.phases, &self.observe(row, state));
+        self.motion.open_shutter_if_due(row, &self.phases, &self.observe(row, state));
     }
 
-    fn draw_if_eager(&self) {
+    fn render_if_eager(&self) {
         if !self.cfg.lazy {
             // Errors are returned by the next read.
-            let _ = self.pictures();
-            self.draw_history();
+            let _ = self.images();
+            self.render_history();
         }
     }
 
     /// Marks the images of some rows as outdated, after a change of frame or viewpoint.
-    fn outdate(&mut self, rows: &[usize]) {
+    fn invalidate(&mut self, rows: &[usize]) {
         if rows.is_empty() {
             return;
         }
@@ -474,14 +474,14 @@ impl Camera {
     }
 
     /// Returns an error before the first reset or update of a row, while poses are unknown.
-    pub(super) fn must_have_captured(&self, row: usize) -> Result<(), CameraError> {
+    pub(super) fn require_captured(&self, row: usize) -> Result<(), CameraError> {
         let captured = self.frames.shown(row).world_from_parent.is_some();
         captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids()[row] })
     }
 
     /// Returns the shown frame of a row, with its current viewpoint.
     fn shown_source(&self, row: usize) -> FrameSource<'_> {
-        FrameSource::present(row, self.frames.shown(row), &self.viewpoints)
+        FrameSource::with_current_viewpoint(row, self.frames.shown(row), &self.viewpoints)
     }
 
     /// Returns the view of a captured row.

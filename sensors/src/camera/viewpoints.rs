@@ -4,7 +4,7 @@ use super::env_rows::EnvRows;
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses};
 use super::placement::PoseFrame;
-use kinetoscope_render::lens::RaysOfRows;
+use kinetoscope_render::lens::LensRayTables;
 use kinetoscope_render::lens::{Lens, LensRays};
 use kinetoscope_render::{Intrinsics, PixelIntrinsics};
 use kinetoscope_scene::Pose;
@@ -30,7 +30,7 @@ pub(crate) struct Viewpoints {
     size: [usize; 2],
     configured: Viewpoint,
     rows: Vec<Viewpoint>,
-    rays: RaysOfRows,
+    rays: LensRayTables,
 }
 
 impl Viewpoints {
@@ -38,7 +38,7 @@ impl Viewpoints {
     pub(crate) fn new(
         viewpoint: Viewpoint,
         size: [usize; 2],
-        rays: RaysOfRows,
+        rays: LensRayTables,
         envs: EnvRows,
         parent: Option<usize>,
     ) -> Self {
@@ -72,7 +72,7 @@ impl Viewpoints {
 
     /// Frees rays that no row uses any more.
     pub(crate) fn free_unused_rays(&mut self) {
-        self.rays.forget();
+        self.rays.drop_unused();
     }
 
     /// Returns the pose of the optical frame of a viewpoint in the environment; `None` if the pose of the parent is
@@ -87,7 +87,7 @@ impl Viewpoints {
 
     /// Poses in the frame of the parent, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (rows, 7).
     pub(crate) fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        let local = |viewpoint: &Viewpoint| to_row(&convention.of_optical(&viewpoint.parent_from_camera));
+        let local = |viewpoint: &Viewpoint| to_row(&convention.pose_from_optical(&viewpoint.parent_from_camera));
         Array2::from(self.rows.iter().map(local).collect::<Vec<[f64; 7]>>())
     }
 
@@ -128,7 +128,7 @@ impl Viewpoints {
         let [width, height] = self.size;
         let pixels: Result<Vec<_>, _> = intrinsics.iter().map(|lens| lens.to_pixels(width, height)).collect();
         let pixels = pixels?;
-        let made = self.rays.make(&pixels)?;
+        let made = self.rays.compute(&pixels)?;
         pixels.iter().try_for_each(check)?;
         for (&row, pixels) in rows.iter().zip(one_each("intrinsics", &pixels, rows.len())?) {
             self.rows[row].pixels = *pixels;

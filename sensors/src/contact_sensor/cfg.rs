@@ -1,14 +1,14 @@
 //! Contact sensor configuration.
 
-use super::air_time::AirTimes;
-use super::pairs::{Layout, Pairs, count};
+use super::air_time::ContactTimers;
+use super::pairs::{MeasurementLayout, Pairs, value_count};
 use super::sensor::ContactSensor;
 use crate::error::SensorError;
-use crate::sampling::{Channel, Sampler, SamplingCfg, Stamp};
+use crate::sampling::{SampleChannel, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{matching, select};
 use crate::sensor::{SensorCfg, SensorContext};
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`ContactSensor`].
@@ -63,7 +63,7 @@ impl Default for ContactSensorCfg {
 
 impl ContactSensorCfg {
     /// Watches the bodies that one pattern matches.
-    pub fn of(pattern: impl Into<String>) -> Self {
+    pub fn for_bodies(pattern: impl Into<String>) -> Self {
         Self { bodies: vec![pattern.into()], ..Self::default() }
     }
 }
@@ -71,8 +71,8 @@ impl ContactSensorCfg {
 impl SensorCfg for ContactSensorCfg {
     type Sensor = ContactSensor;
 
-    fn requires(&self) -> Requires {
-        if self.track_pose { Requires::CONTACTS | Requires::POSES } else { Requires::CONTACTS }
+    fn requires(&self) -> StateFields {
+        if self.track_pose { StateFields::CONTACTS | StateFields::POSES } else { StateFields::CONTACTS }
     }
 
     fn debug_vis(&self) -> bool {
@@ -100,12 +100,12 @@ impl SensorCfg for ContactSensorCfg {
             return Err(SensorError::OutOfRange { field, value, expected: "it must be 0 N or more" });
         }
         if self.track_friction_forces && self.filters.is_empty() {
-            return Err(SensorError::NoFilters { field: "track_friction_forces", always: "friction_forces_w" });
+            return Err(SensorError::NoFilters { field: "track_friction_forces", total_channel: "friction_forces_w" });
         }
         let groups =
-            self.filters.iter().map(|filter| group(filter, &bodies, context)).collect::<Result<Vec<_>, _>>()?;
+            self.filters.iter().map(|filter| filter_group(filter, &bodies, context)).collect::<Result<Vec<_>, _>>()?;
         let (b, m) = (bodies.len(), groups.len());
-        let layout = Layout {
+        let layout = MeasurementLayout {
             bodies: b,
             groups: m,
             friction: self.track_friction_forces,
@@ -113,8 +113,8 @@ impl SensorCfg for ContactSensorCfg {
             poses: self.track_pose,
             air: self.track_air_time,
         };
-        let vectors = |name, count, unit| Channel::new(name, 3 * count).in_unit(unit).at(Stamp::Force);
-        let counts = |name, count| Channel::exact(name, count).at(Stamp::Force);
+        let vectors = |name, count, unit| SampleChannel::new(name, 3 * count).with_unit(unit).with_stamp(Stamp::Force);
+        let counts = |name, count| SampleChannel::noiseless(name, count).with_stamp(Stamp::Force);
         let mut channels = ["net_forces_w", "friction_forces_w", "total_forces_w"].map(|c| vectors(c, b, "N")).to_vec();
         channels.push(vectors("force_matrix_w", b * m, "N"));
         if layout.friction {
@@ -126,16 +126,17 @@ impl SensorCfg for ContactSensorCfg {
             channels.extend(by_filter);
         }
         if layout.poses {
-            channels.extend([Channel::new("pos_w", 3 * b).in_unit("m"), Channel::exact("quat_w", 4 * b)]);
+            channels
+                .extend([SampleChannel::new("pos_w", 3 * b).with_unit("m"), SampleChannel::noiseless("quat_w", 4 * b)]);
         }
         if layout.air {
-            channels.extend(AirTimes::CHANNELS.map(|(name, unit)| counts(name, b).in_unit(unit)));
+            channels.extend(ContactTimers::CHANNELS.map(|(name, unit)| counts(name, b).with_unit(unit)));
         }
-        debug_assert_eq!(channels.iter().map(|c| c.width).sum::<usize>(), count(&layout));
+        debug_assert_eq!(channels.iter().map(|c| c.width).sum::<usize>(), value_count(&layout));
         Ok(ContactSensor {
             names: bodies.iter().map(|&body| context.bodies[body].clone()).collect(),
             filters: self.filters.clone(),
-            air: self.track_air_time.then(|| AirTimes::new(context.num_envs, b, context.dt, self.force_threshold)),
+            air: self.track_air_time.then(|| ContactTimers::new(context.num_envs, b, context.dt, self.force_threshold)),
             pairs: Pairs::new(layout, bodies, &groups, context.bodies.len()),
             sampler: Sampler::new("contact", self.requires(), context, &self.sampling, &channels)?,
             threshold: self.force_threshold,
@@ -144,7 +145,7 @@ impl SensorCfg for ContactSensorCfg {
 }
 
 /// Returns the bodies that a filter matches, as indices of the body axis; the length of the axis stands for the world.
-fn group(filter: &str, bodies: &[usize], context: &SensorContext) -> Result<Vec<usize>, SensorError> {
+fn filter_group(filter: &str, bodies: &[usize], context: &SensorContext) -> Result<Vec<usize>, SensorError> {
     let world = context.bodies.len();
     let mut names = context.bodies.to_vec();
     names.extend(["ground".to_string(), "world".to_string()]);
@@ -152,7 +153,7 @@ fn group(filter: &str, bodies: &[usize], context: &SensorContext) -> Result<Vec<
     found.iter_mut().for_each(|index| *index = (*index).min(world));
     found.dedup();
     if found == bodies && found.len() == 1 {
-        return Err(SensorError::OwnFilter { body: context.bodies[found[0]].clone(), filter: filter.into() });
+        return Err(SensorError::SelfFilter { body: context.bodies[found[0]].clone(), filter: filter.into() });
     }
     Ok(found)
 }

@@ -6,7 +6,7 @@ use ndarray::Axis;
 
 /// Layout of a measurement.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(super) struct MeasurementLayout {
     pub bodies: usize,
     pub groups: usize,
     /// True if friction is reported by filter.
@@ -18,24 +18,24 @@ pub(super) struct Layout {
 }
 
 /// Returns the number of values of a measurement.
-pub(super) fn count(layout: &Layout) -> usize {
+pub(super) fn value_count(layout: &MeasurementLayout) -> usize {
     let per_body = 9
         + 3 * layout.groups
         + if layout.friction { 3 * layout.groups } else { 0 }
         + if layout.points { 4 * (1 + layout.groups) } else { 0 }
         + if layout.poses { 7 } else { 0 }
-        + if layout.air { super::air_time::AirTimes::CHANNELS.len() } else { 0 };
+        + if layout.air { super::air_time::ContactTimers::CHANNELS.len() } else { 0 };
     layout.bodies * per_body
 }
 
 /// Watched bodies and filter groups, with lookup tables.
 #[derive(Clone, Debug)]
 pub(super) struct Pairs {
-    layout: Layout,
+    layout: MeasurementLayout,
     /// Watched bodies as indices of the body axis.
     bodies: Vec<usize>,
     /// Index in `bodies` of every body of the axis, with the world last; `None` for bodies that are not watched.
-    slots: Vec<Option<usize>>,
+    watched_index: Vec<Option<usize>>,
     /// Filter groups of every body of the axis, with the world last.
     groups: Vec<Vec<usize>>,
 }
@@ -43,10 +43,10 @@ pub(super) struct Pairs {
 impl Pairs {
     /// Creates the lookup tables. `groups` holds indices of the body axis, whose length is `axis`; `axis` stands for
     /// the world.
-    pub(super) fn new(layout: Layout, bodies: Vec<usize>, groups: &[Vec<usize>], axis: usize) -> Self {
+    pub(super) fn new(layout: MeasurementLayout, bodies: Vec<usize>, groups: &[Vec<usize>], axis: usize) -> Self {
         let slots = (0..=axis).map(|body| bodies.iter().position(|&b| b == body)).collect();
         let of = |body| (0..groups.len()).filter(|&g| groups[g].contains(&body)).collect();
-        Self { layout, bodies, slots, groups: (0..=axis).map(of).collect() }
+        Self { layout, bodies, watched_index: slots, groups: (0..=axis).map(of).collect() }
     }
 
     /// Watched bodies as indices of the body axis.
@@ -57,18 +57,18 @@ impl Pairs {
     /// Returns the watched ends of a contact: index of the watched body, sign of the force on it, and axis index of the
     /// other body.
     fn ends<'c>(&'c self, contact: &'c Contact) -> impl Iterator<Item = (usize, f64, usize)> + 'c {
-        let world = self.slots.len() - 1;
+        let world = self.watched_index.len() - 1;
         let index = move |side: usize| contact.bodies[side].map_or(world, |body| (body as usize).min(world));
         // The contact force acts on the second body.
         [(0, -1.0), (1, 1.0)].into_iter().filter_map(move |(side, sign)| {
-            let slot = self.slots[index(side)]?;
+            let slot = self.watched_index[index(side)]?;
             Some((slot, sign, index(1 - side)))
         })
     }
 
     /// Adds the normal forces on the watched bodies of environment `env` to `net`, 3 numbers per body \[N\].
     pub(super) fn net_forces(&self, state: &SceneState, env: usize, net: &mut [f64]) {
-        for contact in state.contacts.iter().flat_map(|contacts| contacts.of(env)) {
+        for contact in state.contacts.iter().flat_map(|contacts| contacts.in_env(env)) {
             for (slot, sign, _) in self.ends(contact) {
                 add(net, slot, sign * contact.normal_force, &contact.normal);
             }
@@ -77,7 +77,7 @@ impl Pairs {
 
     /// Writes forces, points and poses of environment `env` to `row`, which must be zero; returns the rest of the row.
     pub(super) fn read<'r>(&self, state: &SceneState, env: usize, row: &'r mut [f64]) -> &'r mut [f64] {
-        let Layout { bodies: b, groups: m, .. } = self.layout;
+        let MeasurementLayout { bodies: b, groups: m, .. } = self.layout;
         let tracked = |tracked: bool, numbers: usize| if tracked { numbers } else { 0 };
         let (net, row) = row.split_at_mut(3 * b);
         let (friction, row) = row.split_at_mut(3 * b);
@@ -88,7 +88,7 @@ impl Pairs {
         let (counts, row) = row.split_at_mut(tracked(self.layout.points, b));
         let (point_matrix, row) = row.split_at_mut(tracked(self.layout.points, 3 * b * m));
         let (count_matrix, row) = row.split_at_mut(tracked(self.layout.points, b * m));
-        for contact in state.contacts.iter().flat_map(|contacts| contacts.of(env)) {
+        for contact in state.contacts.iter().flat_map(|contacts| contacts.in_env(env)) {
             let sliding: [f64; 3] =
                 std::array::from_fn(|k| contact.force[k] - contact.normal_force * contact.normal[k]);
             for (slot, sign, other) in self.ends(contact) {
@@ -111,8 +111,8 @@ impl Pairs {
                 }
             }
         }
-        divide(points, counts);
-        divide(point_matrix, count_matrix);
+        divide_by_counts(points, counts);
+        divide_by_counts(point_matrix, count_matrix);
         if !self.layout.poses {
             return row;
         }
@@ -137,7 +137,7 @@ fn add(list: &mut [f64], index: usize, factor: f64, vector: &[f64; 3]) {
 }
 
 /// Divides sums of vectors by their counts; sums without a count stay 0.
-fn divide(list: &mut [f64], counts: &[f64]) {
+fn divide_by_counts(list: &mut [f64], counts: &[f64]) {
     for (sum, count) in list.chunks_exact_mut(3).zip(counts).filter(|(_, count)| **count > 0.0) {
         sum.iter_mut().for_each(|x| *x /= count);
     }

@@ -1,6 +1,6 @@
 //! Contact sensor.
 
-use super::air_time::AirTimes;
+use super::air_time::ContactTimers;
 use super::pairs::Pairs;
 use crate::error::SensorError;
 use crate::sampling::{Sampled, Sampler};
@@ -20,7 +20,7 @@ pub struct ContactSensor {
     pub(super) names: Vec<String>,
     pub(super) filters: Vec<String>,
     pub(super) pairs: Pairs,
-    pub(super) air: Option<AirTimes>,
+    pub(super) air: Option<ContactTimers>,
     pub(super) sampler: Sampler,
     pub(super) threshold: f64,
 }
@@ -31,14 +31,14 @@ impl Sensor for ContactSensor {
         let Self { air, pairs, sampler, .. } = self;
         if let Some(air) = air {
             for (env, &step) in state.step.iter().enumerate() {
-                air.look(env, step, |net| pairs.net_forces(state, env, net));
+                air.update(env, step, |net| pairs.net_forces(state, env, net));
             }
         }
         sampler.update(state, |env, row| {
             let row = pairs.read(state, env, row);
             if let Some(air) = air {
                 air.read(env, row);
-                air.told(env);
+                air.clear_events(env);
             }
         })
     }
@@ -90,7 +90,7 @@ impl Sensor for ContactSensor {
 }
 
 /// Writes the measurement of environment `env` to `row`.
-fn read(pairs: &Pairs, air: Option<&AirTimes>, state: &SceneState, env: usize, row: &mut [f64]) {
+fn read(pairs: &Pairs, air: Option<&ContactTimers>, state: &SceneState, env: usize, row: &mut [f64]) {
     let row = pairs.read(state, env, row);
     if let Some(air) = air {
         air.read(env, row);
@@ -216,7 +216,7 @@ impl ContactSensor {
 
     /// Number of contact points of each body, shape (N, B), whole numbers; `None` unless points are tracked.
     pub fn contact_counts(&self) -> Option<ArrayView2<'_, f64>> {
-        self.optional("contact_counts")
+        self.optional_values("contact_counts")
     }
 
     /// Mean of the contact points between the bodies of each filter and each body, with equal weights \[m\], shape
@@ -247,43 +247,43 @@ impl ContactSensor {
         self.sampler.has("quat_w").then(|| self.sampler.values_as("quat_w", shape))
     }
 
-    fn optional(&self, channel: &str) -> Option<ArrayView2<'_, f64>> {
+    fn optional_values(&self, channel: &str) -> Option<ArrayView2<'_, f64>> {
         self.sampler.has(channel).then(|| self.sampler.values(channel))
     }
 
     /// Time since the last contact of each body \[s\], shape (N, B), 0 in contact; `None` unless air times are tracked.
     /// Times are whole numbers of physics steps, counted from the reset on.
     pub fn current_air_time(&self) -> Option<ArrayView2<'_, f64>> {
-        self.optional("current_air_time")
+        self.optional_values("current_air_time")
     }
 
     /// Duration of the current contact of each body \[s\], shape (N, B), 0 without a contact; `None` unless air times
     /// are tracked.
     pub fn current_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
-        self.optional("current_contact_time")
+        self.optional_values("current_contact_time")
     }
 
     /// Duration of the air phase of each body before its last contact began \[s\], shape (N, B); `None` unless air
     /// times are tracked.
     pub fn last_air_time(&self) -> Option<ArrayView2<'_, f64>> {
-        self.optional("last_air_time")
+        self.optional_values("last_air_time")
     }
 
     /// Duration of the last finished contact of each body \[s\], shape (N, B); `None` unless air times are tracked.
     pub fn last_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
-        self.optional("last_contact_time")
+        self.optional_values("last_contact_time")
     }
 
     /// True where contact of a body began since the previous measurement, however short it was, shape (N, B); `None`
     /// unless air times are tracked. A contact that exists at a reset does not count.
     pub fn first_contact(&self) -> Option<Array2<bool>> {
-        self.optional("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
+        self.optional_values("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
     }
 
     /// True where contact of a body ended since the previous measurement, however short the air phase was, shape
     /// (N, B); `None` unless air times are tracked.
     pub fn first_air(&self) -> Option<Array2<bool>> {
-        self.optional("first_air").map(|flags| flags.mapv(|flag| flag > 0.0))
+        self.optional_values("first_air").map(|flags| flags.mapv(|flag| flag > 0.0))
     }
 }
 

@@ -54,7 +54,7 @@ fn cfg() -> ContactSensorCfg {
         track_friction_forces: true,
         track_pose: true,
         track_air_time: true,
-        ..ContactSensorCfg::of(".*_FOOT")
+        ..ContactSensorCfg::for_bodies(".*_FOOT")
     }
 }
 
@@ -101,7 +101,7 @@ fn values() {
 
 #[test]
 fn untracked() {
-    let sensor = ContactSensorCfg::of("cube").build(&context(2)).unwrap();
+    let sensor = ContactSensorCfg::for_bodies("cube").build(&context(2)).unwrap();
     assert!(sensor.pos_w().is_none() && sensor.quat_w().is_none());
     assert!(sensor.contact_points_w().is_none() && sensor.contact_counts().is_none());
     assert!(sensor.contact_point_matrix_w().is_none() && sensor.contact_count_matrix().is_none());
@@ -141,10 +141,10 @@ fn air_times() {
 fn mistakes() {
     let wrong = |cfg: ContactSensorCfg| cfg.build(&context(2)).unwrap_err();
     let filtered =
-        |filter: &str, of: &str| ContactSensorCfg { filters: vec![filter.into()], ..ContactSensorCfg::of(of) };
-    let friction = ContactSensorCfg { track_friction_forces: true, ..ContactSensorCfg::of("cube") };
+        |filter: &str, of: &str| ContactSensorCfg { filters: vec![filter.into()], ..ContactSensorCfg::for_bodies(of) };
+    let friction = ContactSensorCfg { track_friction_forces: true, ..ContactSensorCfg::for_bodies("cube") };
     for (cfg, start, parts) in [
-        (ContactSensorCfg::of("foot"), "there is no body \"foot\"; known are", ["LF_FOOT", ""]),
+        (ContactSensorCfg::for_bodies("foot"), "there is no body \"foot\"; known are", ["LF_FOOT", ""]),
         (ContactSensorCfg::default(), "there are no bodies to watch", ["dog/base", ""]),
         (friction, "", ["`filters`", "friction_forces_w"]),
         (filtered("grond", "cube"), "", ["\"ground\"", ""]),
@@ -152,15 +152,15 @@ fn mistakes() {
         let text = wrong(cfg).to_string();
         assert!(text.starts_with(start) && parts.iter().all(|part| text.contains(part)), "{text}");
     }
-    assert!(matches!(wrong(filtered("cu.e", "cube")), SensorError::OwnFilter { .. }));
+    assert!(matches!(wrong(filtered("cu.e", "cube")), SensorError::SelfFilter { .. }));
     assert!(filtered("LF_FOOT", ".*_FOOT").build(&context(2)).is_ok(), "the other foot may touch it");
     for force_threshold in [-1.0, f64::NAN, f64::INFINITY] {
-        let cfg = ContactSensorCfg { force_threshold, ..ContactSensorCfg::of("cube") };
+        let cfg = ContactSensorCfg { force_threshold, ..ContactSensorCfg::for_bodies("cube") };
         assert!(matches!(wrong(cfg), SensorError::OutOfRange { .. }));
     }
     let twice = ContactSensorCfg { bodies: vec!["cube".into(), "cube".into()], ..Default::default() };
     assert!(matches!(wrong(twice), SensorError::Pattern(_)));
-    let mut sensor = ContactSensorCfg::of("cube").build(&context(2)).unwrap();
+    let mut sensor = ContactSensorCfg::for_bodies("cube").build(&context(2)).unwrap();
     assert!(matches!(sensor.update(&SceneState::new(2)), Err(SensorError::MissingFields { sensor: "contact", .. })));
     let text = ContactSensorCfg { sampling: SamplingCfg::every(1.0), ..cfg() }.build(&context(2)).unwrap().to_string();
     let parts = ["dog/LF_FOOT, dog/RF_FOOT", "(s)    : 1\n", "ground"];

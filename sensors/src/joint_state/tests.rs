@@ -36,7 +36,7 @@ fn built(cfg: JointStateCfg) -> JointState {
 #[test]
 fn values() {
     let cfg = JointStateCfg { joints: Some(vec!["c".into(), "arm/a".into()]), sampling: sampling(0.01, 2) };
-    assert!(cfg.requires().contains(Requires::JOINT_STATE | Requires::JOINT_EFFORTS));
+    assert!(cfg.requires().contains(StateFields::JOINT_STATE | StateFields::JOINT_EFFORTS));
     let mut sensor = built(cfg);
     assert_eq!(sensor.joints(), [2, 0]);
     sensor.update(&state([1, 1])).unwrap();
@@ -112,7 +112,7 @@ fn mistakes() {
     // Root cause: an empty list was accepted, which created a sensor without values.
     let nothing = JointStateCfg { joints: Some(vec![]), ..JointStateCfg::default() };
     let error = nothing.build(&context()).unwrap_err();
-    assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if *candidates == *context().joints));
-    let nobody = SensorContext { joints: [].into(), ..context() };
-    assert_eq!(JointStateCfg::default().build(&nobody).unwrap().joint_names(), [""; 0], "all of none");
+    assert!(matches!(&error, SensorError::EmptySelection { candidates, .. } if *candidates == *context().joints));
+    let without_joints = SensorContext { joints: [].into(), ..context() };
+    assert_eq!(JointStateCfg::default().build(&without_joints).unwrap().joint_names(), [""; 0], "all of none");
 }

@@ -7,12 +7,12 @@ use kinetoscope_render::OpticsError;
 #[non_exhaustive]
 pub enum RayError {
     /// A number of a pattern or of the configuration is invalid.
-    #[error("{what} of the {of} is {value}; it must be {allowed}")]
+    #[error("{what} of the {owner} is {value}; it must be {allowed}")]
     Number {
         /// Name of the number.
         what: &'static str,
         /// Pattern or sensor that the number belongs to.
-        of: &'static str,
+        owner: &'static str,
         /// Value of the number.
         value: f64,
         /// Accepted values.
@@ -63,7 +63,7 @@ pub enum RayError {
     },
     /// The intrinsics of a pattern are invalid.
     #[error(transparent)]
-    Lens(#[from] OpticsError),
+    Intrinsics(#[from] OpticsError),
     /// The ray caster was built without a scene.
     #[error("the ray caster was built without a scene")]
     NoScene,

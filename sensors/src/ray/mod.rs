@@ -9,7 +9,7 @@ mod sampler;
 mod scan;
 mod targets;
 
-pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayPictures};
+pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayImages};
 pub use caster::{RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use pattern::RayPattern;

@@ -4,11 +4,11 @@
 use super::scan::{Rays, Scan};
 use super::{HitTargets, RayError};
 use crate::error::SensorError;
-use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::sampling::{SampleChannel, Sampler, SamplingCfg};
 use crate::sensor::SensorContext;
 use kinetoscope_render::geometry::RayTargets;
-use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
+use kinetoscope_scene::StateFields;
 
 /// Limit of the memory of the rays of a sensor \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
@@ -24,7 +24,7 @@ pub(crate) trait RayModel {
     fn frame(&mut self, env: usize, parent: Option<[f64; 7]>, values: &mut [f64]) -> <Self::Rays as Rays>::View;
 
     /// Updates the outputs of an environment from the current values of the sampler.
-    fn show(&mut self, env: usize, sampler: &Sampler, rays: &Self::Rays);
+    fn update_outputs(&mut self, env: usize, sampler: &Sampler, rays: &Self::Rays);
 
     /// Samples the random numbers of an environment that change at a reset.
     fn reset(&mut self, env: usize) {
@@ -36,7 +36,7 @@ pub(crate) trait RayModel {
 pub(crate) struct RaySamplerCfg<'a, R> {
     /// Kind of sensor, for errors.
     pub(crate) kind: &'static str,
-    pub(crate) requires: Requires,
+    pub(crate) requires: StateFields,
     pub(crate) sampling: &'a SamplingCfg,
     pub(crate) targets: &'a HitTargets,
     pub(crate) groups: u32,
@@ -45,7 +45,7 @@ pub(crate) struct RaySamplerCfg<'a, R> {
     pub(crate) rays: R,
     pub(crate) max_distance: f64,
     /// Channels of the frame, sampled after distances, normals and ids.
-    pub(crate) frame_channels: &'a [Channel],
+    pub(crate) frame_channels: &'a [SampleChannel],
 }
 
 /// Rays of a sensor and the sampler of their hits, in all environments. The channels are `distances`, `normals` and
@@ -76,9 +76,9 @@ impl<R: Rays> RaySampler<R> {
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let count = cfg.rays.count();
         let mut channels = vec![
-            Channel::within("distances", count, [0.0, cfg.max_distance]).in_unit("m"),
-            Channel::exact("normals", 3 * count),
-            Channel::exact("ids", count),
+            SampleChannel::bounded("distances", count, [0.0, cfg.max_distance]).with_unit("m"),
+            SampleChannel::noiseless("normals", 3 * count),
+            SampleChannel::noiseless("ids", count),
         ];
         channels.extend_from_slice(cfg.frame_channels);
         let frame_width = cfg.frame_channels.iter().map(|channel| channel.width).sum();
@@ -137,7 +137,7 @@ impl<R: Rays> RaySampler<R> {
         self.sampler.check(state)?;
         self.sampler.check_envs(env_ids)?;
         env_ids.iter().for_each(|&env| model.reset(env));
-        self.cast_anew(env_ids, state, model);
+        self.cast_after_write(env_ids, state, model);
         let Self { sampler, scan, frames, frame_width, .. } = self;
         sampler.reset(env_ids, state, |env, row| write(scan, frames, *frame_width, env, row))?;
         env_ids.iter().for_each(|&env| self.show(env, model));
@@ -153,7 +153,7 @@ impl<R: Rays> RaySampler<R> {
     ) -> Result<(), SensorError> {
         self.sampler.check(state)?;
         self.sampler.check_envs(env_ids)?;
-        self.cast_anew(env_ids, state, model);
+        self.cast_after_write(env_ids, state, model);
         let Self { sampler, scan, frames, frame_width, .. } = self;
         sampler.refresh(env_ids, state, |env, row| write(scan, frames, *frame_width, env, row))?;
         env_ids.iter().for_each(|&env| self.show(env, model));
@@ -172,15 +172,15 @@ impl<R: Rays> RaySampler<R> {
     }
 
     /// Casts as [`cast`](Self::cast), after a write to the state, which may have moved fixed instances.
-    fn cast_anew(&mut self, envs: &[usize], state: &SceneState, model: &mut impl RayModel<Rays = R>) {
+    fn cast_after_write(&mut self, envs: &[usize], state: &SceneState, model: &mut impl RayModel<Rays = R>) {
         let Some(poses) = &state.instance_poses else { return };
-        envs.iter().for_each(|&env| self.scan.settle(env, poses, state.own_scene(env)));
+        envs.iter().for_each(|&env| self.scan.update_fixed(env, poses, state.env_scene(env)));
         self.cast(envs, state, model);
     }
 
     fn show(&mut self, env: usize, model: &mut impl RayModel<Rays = R>) {
         self.shown[env] = self.sampler.counts()[env];
-        model.show(env, &self.sampler, self.scan.rays());
+        model.update_outputs(env, &self.sampler, self.scan.rays());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Targets of ray sensors.
 
 use crate::error::SensorError;
-use crate::select::{Choice, at_least_one, matching};
+use crate::select::{Selection, at_least_one, matching};
 use crate::sensor::SensorContext;
 use kinetoscope_scene::RenderScene;
 use serde::{Deserialize, Serialize};
@@ -46,26 +46,26 @@ impl HitTargets {
     ) -> Result<Vec<usize>, SensorError> {
         // Ray casters support rigid shapes only.
         let in_groups = |instance: &kinetoscope_scene::Instance| {
-            !instance.deforms && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
+            !instance.is_deformable && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
         };
         let named = match self {
-            Self::Named(patterns) => Some(names(scene, patterns, context, in_groups)?),
+            Self::Named(patterns) => Some(matched_instances(scene, patterns, context, in_groups)?),
             _ => None,
         };
-        let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
-        let wanted = |(index, instance): &(usize, &kinetoscope_scene::Instance)| {
+        let moving_body = |body: usize| context.moving_bodies.get(body).copied().unwrap_or(body);
+        let is_target = |(index, instance): &(usize, &kinetoscope_scene::Instance)| {
             // Hidden instances count too: they may be visible in an environment with its own scene.
             in_groups(instance)
                 && match self {
                     Self::StaticOnly => instance.fixed,
                     Self::Named(_) => named.as_ref().is_some_and(|named| named[*index]),
                     Self::Everything { exclude_parent } => {
-                        let body = instance.body.map(|body| carrier(body as usize));
-                        !exclude_parent || parent.is_none() || body != parent.map(carrier)
+                        let body = instance.body.map(|body| moving_body(body as usize));
+                        !exclude_parent || parent.is_none() || body != parent.map(moving_body)
                     }
                 }
         };
-        Ok(scene.instances().iter().enumerate().filter(wanted).map(|(index, _)| index).collect())
+        Ok(scene.instances().iter().enumerate().filter(is_target).map(|(index, _)| index).collect())
     }
 }
 
@@ -73,7 +73,7 @@ impl HitTargets {
 ///
 /// A new sensor is rejected if a pattern matches only instances that no environment shows: it would miss everything. A
 /// rebuilt sensor is accepted, because visibility may have changed since, and may change again.
-fn names(
+fn matched_instances(
     scene: &RenderScene,
     patterns: &[String],
     context: &SensorContext,
@@ -91,13 +91,13 @@ fn names(
             let own = context.own_scenes.iter().filter_map(|own| own.0.as_deref());
             std::iter::once(scene).chain(own).any(|scene| scene.instances().get(index).is_some_and(|i| i.visible))
         });
-        at_least_one(patterns.len(), Choice { sensor: "ray", field: "targets", what: "thing to hit" }, &shown)?;
+        at_least_one(patterns.len(), Selection { sensor: "ray", field: "targets", what: "thing to hit" }, &shown)?;
         for pattern in patterns {
             matching(pattern, &shown, "thing to hit")?;
         }
     }
     let names = names_of(&|_| true);
-    at_least_one(patterns.len(), Choice { sensor: "ray", field: "targets", what: "thing to hit" }, &names)?;
+    at_least_one(patterns.len(), Selection { sensor: "ray", field: "targets", what: "thing to hit" }, &names)?;
     let mut named = vec![false; names.len()];
     for pattern in patterns {
         matching(pattern, &names, "thing to hit")?.into_iter().for_each(|index| named[index] = true);

@@ -10,8 +10,8 @@ fn context(num_envs: usize) -> SensorContext {
 }
 
 fn try_built(context: &SensorContext, cfg: &SamplingCfg) -> Result<Sampler, SensorError> {
-    let channels = [Channel::new("a", 1), Channel::new("b", 2), Channel::exact("n", 1)];
-    Sampler::new("encoder", Requires::NONE, context, cfg, &channels)
+    let channels = [SampleChannel::new("a", 1), SampleChannel::new("b", 2), SampleChannel::noiseless("n", 1)];
+    Sampler::new("encoder", StateFields::NONE, context, cfg, &channels)
 }
 
 fn sampler(num_envs: usize, cfg: &SamplingCfg) -> Sampler {
@@ -69,11 +69,13 @@ fn latency() {
     }
 }
 
-/// Measurements in flight at a write are delivered one after the other, in the history and in `arrived`. Those from
+/// Measurements in flight at a write are delivered one after the other, in the history and in `latest_delivered`. Those from
 /// before the write do not replace the written value.
 #[test]
 fn refresh() {
-    let read = |s: &Sampler| (s.arrived("b")[(0, 1)], s.arrived_stamps()[0], s.values("b")[(0, 1)], s.stamps()[0]);
+    let read = |s: &Sampler| {
+        (s.latest_delivered("b")[(0, 1)], s.latest_delivered_stamps()[0], s.values("b")[(0, 1)], s.stamps()[0])
+    };
     let mut sampler = sampler(1, &SamplingCfg { latency_steps: 4, ..SamplingCfg::default() });
     reset(&mut sampler, &[0], &[0]);
     for now in 1..=15 {
@@ -84,7 +86,7 @@ fn refresh() {
         let captured = now.saturating_sub(4) as f64;
         let (shown, stamp) = if (6..=10).contains(&now) { (100.0, 6.0) } else { (captured, captured) };
         assert_eq!(read(&sampler), (captured, captured, shown, stamp), "step {now}");
-        assert_eq!(sampler.arrived_force_stamps()[0], captured - 0.5);
+        assert_eq!(sampler.latest_delivered_force_stamps()[0], captured - 0.5);
     }
     // Without a latency nothing is in flight: both are the same.
     let mut sampler = self::sampler(1, &SamplingCfg::default());

@@ -2,7 +2,7 @@ use super::*;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{SensorCfg, SensorContext};
 use crate::{JointState, JointStateCfg};
-use kinetoscope_scene::Random;
+use kinetoscope_scene::KeyedRng;
 use ndarray::Array2;
 use std::any::Any;
 use std::sync::Arc;
@@ -45,7 +45,7 @@ fn measured(slot: &SensorSlot) -> (Vec<u64>, Vec<f64>, Vec<f64>) {
 #[test]
 fn lazy_and_eager() {
     for (seed, period) in [(1, 0.0), (2, 0.01), (3, 0.02), (4, 0.035)] {
-        let mut random = Random::keyed(seed, 0, "slots");
+        let mut random = KeyedRng::keyed(seed, 0, "slots");
         let mut slots = [false, true].map(|lazy| joints(lazy, SamplingCfg::every(period)));
         assert_eq!(slots.each_ref().map(SensorSlot::is_lazy), [false, true]);
         let (mut steps, mut written) = ([0; ENVS], [0; ENVS]);
@@ -118,7 +118,7 @@ fn counting(fails: bool, panics: bool) -> (SensorSlot, Arc<AtomicUsize>) {
     let count = Arc::new(AtomicUsize::new(0));
     let sensor = Counting { count: Arc::clone(&count), fails, panics };
     let schedule = Schedule::new(0.01, 0.005, false).unwrap();
-    let mut slot = SensorSlot::new(Box::new(sensor), Requires::JOINT_STATE, Some(schedule), ENVS);
+    let mut slot = SensorSlot::new(Box::new(sensor), StateFields::JOINT_STATE, Some(schedule), ENVS);
     slot.reset(&[0, 1, 2], &state([0; ENVS], NOT_WRITTEN));
     (slot, count)
 }
@@ -178,5 +178,5 @@ fn errors() {
     assert!(slot.has_failed());
     slot.update(&state([4; ENVS], NOT_WRITTEN));
     assert!(slot.has_failed());
-    assert_eq!(slot.sensor().unwrap_err(), &SensorError::BrokenOff);
+    assert_eq!(slot.sensor().unwrap_err(), &SensorError::Panicked);
 }

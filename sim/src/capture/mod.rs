@@ -8,35 +8,35 @@ mod contacts;
 mod motion;
 
 use crate::body_pose::BodyFrame;
-use crate::index::{FreeIndex, PartIndex, RobotIndex};
+use crate::index::{BodyIndexing, MjcfIndexing, RobotIndexing};
 use kinetoscope_mujoco::{Data, EngineError, Model};
 use kinetoscope_scene::Contact;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use std::sync::Arc;
 
 pub(crate) use motion::body_velocity;
 
 /// Indices of the captured quantities in MuJoCo's arrays, the same for all environments.
 #[derive(Debug)]
-pub(crate) struct Plan {
+pub(crate) struct BodyAxis {
     /// Index on the body axis of the owner of each geom; `None` for the world.
-    owners: Vec<Option<u32>>,
+    geom_owners: Vec<Option<u32>>,
     /// Frame of each body on the body axis.
     bodies: Vec<BodyFrame>,
     /// True if a body of the body axis is a separate MuJoCo body, false if it is fused to another one.
-    carries: Vec<bool>,
+    is_moving_body: Vec<bool>,
 }
 
 /// Request to capture quantities in a step.
 #[derive(Clone, Debug)]
-pub(crate) struct Capture {
-    pub(crate) plan: Arc<Plan>,
-    pub(crate) fields: Requires,
+pub(crate) struct CaptureRequest {
+    pub(crate) body_axis: Arc<BodyAxis>,
+    pub(crate) fields: StateFields,
 }
 
 /// Captured quantities of one environment; empty without a capture or after a failed step.
 #[derive(Debug, Default)]
-pub(crate) struct Solved {
+pub(crate) struct CapturedStep {
     pub(crate) contacts: Vec<Contact>,
     /// Poses `[x, y, z, qw, qx, qy, qz]` \[m\], 7 numbers per body.
     pub(crate) poses: Vec<f64>,
@@ -47,16 +47,16 @@ pub(crate) struct Solved {
     /// Force, then torque \[N, N m\] of the parent joint in link axes, 6 numbers per body.
     pub(crate) wrenches: Vec<f64>,
     /// Scratch memory for velocities of the engine.
-    spare: Vec<f64>,
+    scratch: Vec<f64>,
 }
 
-impl Plan {
+impl BodyAxis {
     /// Creates the plan of a compiled scene; `carriers` is defined in [`kinetoscope_sensors::SensorContext`].
     pub(crate) fn new(
         model: &Model,
-        robots: &[RobotIndex],
-        objects: &[FreeIndex],
-        parts: &[PartIndex],
+        robots: &[RobotIndexing],
+        objects: &[BodyIndexing],
+        parts: &[MjcfIndexing],
         carriers: &[usize],
     ) -> Self {
         let links = robots.iter().flat_map(|robot| robot.links.iter().copied());
@@ -88,7 +88,7 @@ impl Plan {
             first += part.frames.len();
         }
         let carries = carriers.iter().enumerate().map(|(body, &carrier)| body == carrier).collect();
-        Self { owners, bodies, carries }
+        Self { geom_owners: owners, bodies, is_moving_body: carries }
     }
 
     /// Frame of each body on the body axis.
@@ -97,29 +97,29 @@ impl Plan {
     }
 }
 
-impl Capture {
+impl CaptureRequest {
     /// Captures quantities after `mj_step2` of a step that began with the velocities `qvel`. Later steps are not
     /// affected.
-    pub(crate) fn take(&self, data: &mut Data, qvel: &[f64], solved: &mut Solved) -> Result<(), EngineError> {
-        if self.fields.contains(Requires::CONTACTS) {
-            contacts::capture(&self.plan.owners, data, &mut solved.contacts);
+    pub(crate) fn capture(&self, data: &mut Data, qvel: &[f64], solved: &mut CapturedStep) -> Result<(), EngineError> {
+        if self.fields.contains(StateFields::CONTACTS) {
+            contacts::capture(&self.body_axis.geom_owners, data, &mut solved.contacts);
         }
         let (accelerations, wrenches) =
-            (self.fields.contains(Requires::ACCELERATIONS), self.fields.contains(Requires::JOINT_WRENCHES));
+            (self.fields.contains(StateFields::ACCELERATIONS), self.fields.contains(StateFields::JOINT_WRENCHES));
         if accelerations || wrenches {
-            data.solve_accelerations(qvel, &mut solved.spare)?;
+            data.rne_post_constraint(qvel, &mut solved.scratch)?;
         }
         if accelerations {
-            motion::capture(&self.plan.bodies, data, solved);
+            motion::capture(&self.body_axis.bodies, data, solved);
         }
         if wrenches {
-            motion::capture_wrenches(&self.plan, data, &mut solved.wrenches);
+            motion::capture_wrenches(&self.body_axis, data, &mut solved.wrenches);
         }
         Ok(())
     }
 }
 
-impl Solved {
+impl CapturedStep {
     /// Clears the capture of a step that was not completed.
     pub(crate) fn clear(&mut self) {
         self.contacts.clear();

@@ -11,7 +11,7 @@ impl DriveMode for Acceleration {
     }
 
     /// Effective inertia I at the initial pose: tau = I (k (q* - q) + d (v* - v)).
-    fn unit(&self, joint: &JointInfo) -> Option<f64> {
+    fn gain_scale(&self, joint: &JointInfo) -> Option<f64> {
         Some(joint.effective_inertia)
     }
 

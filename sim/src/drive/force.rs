@@ -10,7 +10,7 @@ impl DriveMode for Force {
         "force"
     }
 
-    fn unit(&self, _joint: &JointInfo) -> Option<f64> {
+    fn gain_scale(&self, _joint: &JointInfo) -> Option<f64> {
         Some(1.0)
     }
 }

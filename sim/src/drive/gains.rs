@@ -1,10 +1,10 @@
 //! Gains, settings and targets of drives.
 
-use super::{ActuatorSpec, DriveType, JointInfo};
+use super::{DriveType, JointInfo, PdGains};
 
 /// Configuration of one drive in the user's units; [`Gains`] has the values that the drive law uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
+pub struct DriveSetting {
     /// Meaning of stiffness and damping.
     pub drive_type: DriveType,
     /// Stiffness, in the unit of the drive type.
@@ -15,15 +15,15 @@ pub struct Setting {
     pub inertia: Option<f64>,
 }
 
-impl Setting {
+impl DriveSetting {
     /// Factor from stiffness and damping to torque units; `None` for a passive joint.
-    pub fn unit(&self) -> Option<f64> {
-        self.drive_type.mode().unit(&JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) })
+    pub fn gain_scale(&self) -> Option<f64> {
+        self.drive_type.mode().gain_scale(&JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) })
     }
 
     /// Gains in torque units; `None` for a passive joint.
-    pub fn actuator(&self) -> Option<ActuatorSpec> {
-        self.unit().map(|unit| ActuatorSpec { kp: self.stiffness * unit, kd: self.damping * unit })
+    pub fn torque_gains(&self) -> Option<PdGains> {
+        self.gain_scale().map(|unit| PdGains { kp: self.stiffness * unit, kd: self.damping * unit })
     }
 }
 

@@ -27,7 +27,7 @@ pub mod plan;
 pub mod table;
 
 pub use cfg::{DriveCfg, DriveCfgError, JointGains, PerJoint, resolve};
-pub use mode::{ActuatorSpec, DriveMode, JointInfo};
+pub use mode::{DriveMode, JointInfo, PdGains};
 pub use models::{ActuatorModel, DcMotor, DelayedPd, IdealPd};
 
 use serde::{Deserialize, Serialize};
@@ -63,7 +63,7 @@ drive_modes! {
     /// Gains are accelerations: multiplied by the inertia the joint feels.
     Acceleration => acceleration::Acceleration,
     /// No drive: the joint moves freely.
-    None => none::None,
+    None => none::Passive,
 }
 
 impl std::str::FromStr for DriveType {

@@ -9,7 +9,7 @@ pub struct JointInfo {
 
 /// Proportional and derivative gains of an actuator in torque units \[N m/rad, N m s/rad\] or \[N/m, N s/m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ActuatorSpec {
+pub struct PdGains {
     /// Proportional gain.
     pub kp: f64,
     /// Derivative gain.
@@ -21,8 +21,8 @@ pub trait DriveMode: std::fmt::Debug + Sync {
     /// Name in configuration files, as in EmbodiChain.
     fn name(&self) -> &'static str;
 
-    /// Factor from stiffness and damping to the gains of [`ActuatorSpec`], in torque units; `None` for a passive joint.
-    fn unit(&self, joint: &JointInfo) -> Option<f64>;
+    /// Factor from stiffness and damping to the gains of [`PdGains`], in torque units; `None` for a passive joint.
+    fn gain_scale(&self, joint: &JointInfo) -> Option<f64>;
 
     /// True if the unit depends on [`JointInfo::effective_inertia`], which is NaN for other modes.
     fn needs_inertia(&self) -> bool {

@@ -3,14 +3,14 @@
 use super::{DriveMode, JointInfo};
 
 #[derive(Debug)]
-pub(super) struct None;
+pub(super) struct Passive;
 
-impl DriveMode for None {
+impl DriveMode for Passive {
     fn name(&self) -> &'static str {
         "none"
     }
 
-    fn unit(&self, _joint: &JointInfo) -> Option<f64> {
+    fn gain_scale(&self, _joint: &JointInfo) -> Option<f64> {
         Option::None
     }
 }

@@ -2,13 +2,13 @@
 //! `RobotDescription` and MJCF.
 
 use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, JointGains, resolve};
-use super::gains::{Gains, Setting};
+use super::gains::{DriveSetting, Gains};
 use super::models::ActuatorModel;
-use super::{ActuatorSpec, DriveType, JointInfo};
+use super::{DriveType, JointInfo, PdGains};
 use crate::pattern::{self, PatternError};
-use kinetoscope_robot::description::{Curve, FileDrive, Joint, JointId, JointKind, RobotDescription};
+use kinetoscope_robot::description::{CouplingPolynomial, FileActuation, Joint, JointId, JointKind, RobotDescription};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_robot::dynamics::{Configuration, DynamicsError, Kinematics};
+use kinetoscope_robot::dynamics::{Configuration, Dynamics, DynamicsError};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
@@ -18,11 +18,11 @@ pub struct JointPlan {
     /// Id of the joint in the description.
     pub joint: JointId,
     /// Gains of its actuator; `None` for passive and mimic joints.
-    pub actuator: Option<ActuatorSpec>,
+    pub actuator: Option<PdGains>,
     /// Explicit actuator model; `None` for a joint with the robot's drive model.
     pub model: Option<ActuatorModel>,
     /// User values that the actuator's gains are computed from.
-    pub setting: Setting,
+    pub setting: DriveSetting,
     /// Effort limit \[N m or N\]; infinite without a limit.
     pub max_effort: f64,
     /// Velocity limit \[rad/s or m/s\], infinite without a limit; reported, not enforced.
@@ -37,7 +37,7 @@ pub struct JointPlan {
     pub limit: Option<[f64; 2]>,
     /// Range of position targets \[rad or m\]: the joint's own limits, narrowed by those of joints that mimic it;
     /// infinite without limits.
-    pub usable: [f64; 2],
+    pub target_range: [f64; 2],
     /// Mimic relation (driver, multiplier, offset) with chains resolved:
     /// `position = multiplier * position(driver) + offset`.
     pub mimic: Option<(JointId, f64, f64)>,
@@ -106,14 +106,14 @@ pub fn plan(
                 joint: id,
                 actuator: None,
                 model: gains.actuator,
-                setting: setting(joint, drive.drive_type, gains),
+                setting: drive_setting(joint, drive.drive_type, gains),
                 max_effort: gains.max_effort.or(effort).unwrap_or(f64::INFINITY),
                 max_velocity: gains.max_velocity.or(velocity).unwrap_or(f64::INFINITY),
                 friction: gains.friction.or(joint.friction).unwrap_or(0.0),
                 armature: gains.armature.or(joint.defaults.map(|file| file.armature)).unwrap_or(0.0),
                 damping: joint.damping.unwrap_or(0.0),
                 limit,
-                usable: limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+                target_range: limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
                 mimic: joint.mimic.as_ref().map(|_| description.mimic_driver(id)),
                 initial: 0.0,
             }
@@ -129,7 +129,7 @@ pub fn plan(
         }
     }
     for plan in plans.iter_mut().filter(|plan| plan.mimic.is_none()) {
-        plan.actuator = plan.setting.actuator();
+        plan.actuator = plan.setting.torque_gains();
     }
     for plan in &mut plans {
         let (Some(actuator), Some(model)) = (plan.actuator, plan.model) else {
@@ -150,22 +150,22 @@ pub fn plan(
 /// User values of a joint's drive: from the configuration, or else the file, or else EmbodiChain's defaults. A joint
 /// that is passive in its file is driven only if the configuration names it. A joint that a coupling moves is never
 /// driven.
-fn setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Setting {
-    let of_file = joint.defaults.map_or(FileDrive::Unsaid, |file| file.drive);
+fn drive_setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> DriveSetting {
+    let of_file = joint.defaults.map_or(FileActuation::Unspecified, |file| file.drive);
     // The file's gains are in torque units. For a unit that needs the inertia, they cannot be converted here.
     let mode = drive_type.mode();
-    let unit = mode.unit(&JointInfo { effective_inertia: f64::NAN }).filter(|_| !mode.needs_inertia());
+    let unit = mode.gain_scale(&JointInfo { effective_inertia: f64::NAN }).filter(|_| !mode.needs_inertia());
     let (stiffness, damping) = match (of_file, unit) {
-        (FileDrive::Servo { stiffness, damping }, Some(unit)) => (Some(stiffness / unit), Some(damping / unit)),
+        (FileActuation::Servo { stiffness, damping }, Some(unit)) => (Some(stiffness / unit), Some(damping / unit)),
         _ => (None, None),
     };
     let named = gains.stiffness.is_some() || gains.damping.is_some() || gains.actuator.is_some();
     let driven = match of_file {
-        FileDrive::Coupled(_) => false,
-        FileDrive::Passive => named,
-        FileDrive::Unsaid | FileDrive::Effort | FileDrive::Servo { .. } => true,
+        FileActuation::Coupled(_) => false,
+        FileActuation::Passive => named,
+        FileActuation::Unspecified | FileActuation::Effort | FileActuation::Servo { .. } => true,
     };
-    Setting {
+    DriveSetting {
         drive_type: if driven { drive_type } else { DriveType::None },
         stiffness: gains.stiffness.or(stiffness).unwrap_or(DEFAULT_STIFFNESS),
         damping: gains.damping.or(damping).unwrap_or(DEFAULT_DAMPING),
@@ -181,10 +181,10 @@ pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
 }
 
 /// Tolerance for limits that are written with few digits \[rad or m\].
-const SLACK: f64 = 1e-6;
+const LIMIT_TOLERANCE: f64 = 1e-6;
 
 /// Fraction of its own range that a driver keeps at least; limits of a follower that would leave less are ignored.
-const LEAST_RANGE: f64 = 0.01;
+const MIN_RANGE_FRACTION: f64 = 0.01;
 
 /// Narrows the range of every driver to positions that all its followers can reach. A follower that leaves no range is
 /// released: its limits become those of the driver's range.
@@ -198,16 +198,16 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
         let Some(d) = plans.iter().position(|p| p.joint == driver) else { continue };
         let ends = limit.map(|end| (end - offset) / multiplier);
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        let [old_low, old_high] = plans[d].usable;
-        if low <= old_low + SLACK && high >= old_high - SLACK {
+        let [old_low, old_high] = plans[d].target_range;
+        if low <= old_low + LIMIT_TOLERANCE && high >= old_high - LIMIT_TOLERANCE {
             continue;
         }
         let (joint, driver_joint) = (description.joint(plans[i].joint), description.joint(driver));
         // Positive zeros: a range from -0 would look like a mistake.
         let narrowed = [old_low.max(low) + 0.0, old_high.min(high) + 0.0];
         let own_extent = plans[d].limit.map_or(0.0, |[low, high]| high - low);
-        let outcome = if narrowed[1] - narrowed[0] > (LEAST_RANGE * own_extent).max(SLACK) {
-            plans[d].usable = narrowed;
+        let outcome = if narrowed[1] - narrowed[0] > (MIN_RANGE_FRACTION * own_extent).max(LIMIT_TOLERANCE) {
+            plans[d].target_range = narrowed;
             format!("the usable range of {:?} is {:.4} .. {:.4}", driver_joint.name, narrowed[0], narrowed[1])
         } else {
             released.push((i, d));
@@ -224,10 +224,10 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
     }
     for (i, d) in released {
         let Some((_, multiplier, offset)) = plans[i].mimic else { continue };
-        let ends = plans[d].usable.map(|end| multiplier * end + offset);
+        let ends = plans[d].target_range.map(|end| multiplier * end + offset);
         let limit = [ends[0].min(ends[1]), ends[0].max(ends[1])];
         plans[i].limit = Some(limit).filter(|limit| limit.iter().all(|end| end.is_finite()));
-        plans[i].usable = plans[i].limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        plans[i].target_range = plans[i].limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
     }
 }
 
@@ -237,34 +237,35 @@ fn set_initial_positions(
     initial: &[Option<f64>],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<(), PlanError> {
-    let follows = |plan: &JointPlan| plan.mimic.is_some() || curve(description.joint(plan.joint)).is_some();
+    let follows = |plan: &JointPlan| plan.mimic.is_some() || coupling_curve(description.joint(plan.joint)).is_some();
     for (plan, value) in plans.iter_mut().zip(initial) {
         let joint = description.joint(plan.joint);
         let wanted = value.or(joint.defaults.map(|file| file.position)).unwrap_or(0.0);
         if !wanted.is_finite() {
             return Err(PlanError::InitialValue { joint: joint.name.clone(), value: wanted });
         }
-        plan.initial = wanted.clamp(plan.usable[0], plan.usable[1]);
+        plan.initial = wanted.clamp(plan.target_range[0], plan.target_range[1]);
         if !follows(plan) && plan.initial != wanted {
             diagnostics.push(Diagnostic::new(
                 DiagnosticKind::InitialPositionClamped,
                 joint.source.clone(),
                 format!(
                     "joint {:?}: the start position {wanted} is outside of {:.4} .. {:.4}; it starts at {:.4}",
-                    joint.name, plan.usable[0], plan.usable[1], plan.initial
+                    joint.name, plan.target_range[0], plan.target_range[1], plan.initial
                 ),
             ));
         }
     }
     for i in (0..plans.len()).filter(|&i| follows(&plans[i])).collect::<Vec<_>>() {
         let of_plan = |joint| plans.iter().find(|plan| plan.joint == joint).map_or(0.0, |plan| plan.initial);
-        let (joint, initial) = (description.joint(plans[i].joint), followed(description, &of_plan, plans[i].joint));
+        let (joint, initial) =
+            (description.joint(plans[i].joint), followed_position(description, &of_plan, plans[i].joint));
         if !initial.is_finite() {
             return Err(PlanError::InitialValue { joint: joint.name.clone(), value: initial });
         }
         plans[i].initial = initial;
         let Some([low, high]) = plans[i].limit else { continue };
-        if initial < low - SLACK || initial > high + SLACK {
+        if initial < low - LIMIT_TOLERANCE || initial > high + LIMIT_TOLERANCE {
             diagnostics.push(Diagnostic::new(
                 DiagnosticKind::FollowerStartsBeyondLimits,
                 joint.source.clone(),
@@ -279,20 +280,26 @@ fn set_initial_positions(
 }
 
 /// Coupling curve of a joint that follows another one.
-pub(crate) fn curve(joint: &Joint) -> Option<Curve> {
+pub(crate) fn coupling_curve(joint: &Joint) -> Option<CouplingPolynomial> {
     match joint.defaults?.drive {
-        FileDrive::Coupled(curve) => curve,
+        FileActuation::Coupled(curve) => curve,
         _ => None,
     }
 }
 
-/// Position of a joint that may follow others by mimics and curves, both of which are acyclic. `of_free` gives the
+/// Position of a joint that may follow others by mimics and curves, both of which are acyclic. `free_position` gives the
 /// positions of joints that follow no other.
-pub(crate) fn followed(description: &RobotDescription, of_free: &dyn Fn(JointId) -> f64, joint: JointId) -> f64 {
+pub(crate) fn followed_position(
+    description: &RobotDescription,
+    free_position: &dyn Fn(JointId) -> f64,
+    joint: JointId,
+) -> f64 {
     let (driver, multiplier, offset) = description.mimic_driver(joint);
-    let at_driver = match curve(description.joint(driver)) {
-        Some(curve) => curve.position(curve.joint.map_or(curve.at, |joint| followed(description, of_free, joint))),
-        None => of_free(driver),
+    let at_driver = match coupling_curve(description.joint(driver)) {
+        Some(curve) => curve.position(
+            curve.joint.map_or(curve.driver_start, |joint| followed_position(description, free_position, joint)),
+        ),
+        None => free_position(driver),
     };
     if driver == joint { at_driver } else { multiplier * at_driver + offset }
 }
@@ -318,9 +325,9 @@ pub(crate) fn mass_matrix_at_start(
     let mut configuration = Configuration::zero(description);
     configuration.floating_base = floating_base;
     configuration.joint_positions = plans.iter().map(|p| p.initial).collect();
-    let kinematics = Kinematics::new(description, &configuration)?;
+    let kinematics = Dynamics::new(description, &configuration)?;
     let mut matrix = kinematics.mass_matrix();
-    let columns: Vec<usize> = plans.iter().map(|p| kinematics.columns(p.joint).start).collect();
+    let columns: Vec<usize> = plans.iter().map(|p| kinematics.dof_range(p.joint).start).collect();
     for (plan, &column) in plans.iter().zip(&columns) {
         matrix[(column, column)] += plan.armature;
     }

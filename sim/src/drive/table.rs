@@ -1,7 +1,7 @@
 //! Drives of a compiled model (joint, row or actuator), and their gains and targets in one environment.
 
-use super::drawn::DrawnGains;
-use super::gains::{Gains, Setting, Target};
+use super::drawn::GainOverrides;
+use super::gains::{DriveSetting, Gains, Target};
 use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
 use super::{DriveType, actuator, implicit};
 use kinetoscope_mujoco as mj;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Realization {
     /// Friction row of its degree of freedom: see [`DriveTable::rows`].
-    Row,
+    ConstraintRow,
     /// MuJoCo actuator with the drive law.
     Actuator,
     /// MuJoCo actuator as a plain effort source; an explicit model computes its control.
@@ -36,7 +36,7 @@ pub struct Drive {
     /// Initial gains and limits.
     pub initial: Gains,
     /// User values that the gains are computed from.
-    pub setting: Setting,
+    pub setting: DriveSetting,
     /// Range of position targets \[rad or m\].
     pub range: [f64; 2],
 }
@@ -47,7 +47,7 @@ pub struct DriveTable {
     /// The drives, in the order in which they were added.
     pub drives: Vec<Drive>,
     /// Explicit models of the drives that have one.
-    pub models: Vec<DriveActuator>,
+    pub models: Vec<ExplicitDrive>,
     /// Degrees of freedom with viscous damping moved from the model to [`implicit`], and the coefficient \[N m s/rad or
     /// N s/m\].
     pub damped: Vec<(usize, f64)>,
@@ -57,7 +57,7 @@ pub struct DriveTable {
 
 /// Explicit actuator model of a drive.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DriveActuator {
+pub struct ExplicitDrive {
     /// Index of the drive.
     pub drive: usize,
     /// The model.
@@ -70,24 +70,24 @@ impl DriveTable {
     /// Assigns an explicit model to a drive.
     pub(crate) fn push_model(&mut self, drive: usize, model: ActuatorModel) {
         let first = self.models.last().map_or(0, |last| last.memory.end);
-        let memory = first..first + model.law().memory().len();
+        let memory = first..first + model.law().initial_memory().len();
         self.drives[drive].realization = Realization::Explicit { model: self.models.len() };
-        self.models.push(DriveActuator { drive, model, memory });
+        self.models.push(ExplicitDrive { drive, model, memory });
     }
 
     /// Friction row of each drive in environments of `model`, counted among the friction rows of degrees of freedom; 0
     /// for drives without a row. MuJoCo creates a row for each degree of freedom with friction, in their order.
     pub fn rows(&self, model: &mj::Model) -> Vec<usize> {
         let before = |dof: usize| model.dof_frictionloss()[..dof].iter().filter(|friction| **friction > 0.0).count();
-        let row = |drive: &Drive| if drive.realization == Realization::Row { before(drive.dof) } else { 0 };
+        let row = |drive: &Drive| if drive.realization == Realization::ConstraintRow { before(drive.dof) } else { 0 };
         self.drives.iter().map(row).collect()
     }
 
     /// Explicit model of a drive.
-    pub(crate) fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
+    pub(crate) fn model_of(&self, drive: usize) -> Option<&ExplicitDrive> {
         match self.drives[drive].realization {
             Realization::Explicit { model } => Some(&self.models[model]),
-            Realization::Row | Realization::Actuator => None,
+            Realization::ConstraintRow | Realization::Actuator => None,
         }
     }
 }
@@ -95,9 +95,9 @@ impl DriveTable {
 /// Copy-on-write array shared by all environments. Most settings are never changed, so the shared copy stays in the
 /// cache.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shared<T>(Arc<[T]>);
+pub struct CowArray<T>(Arc<[T]>);
 
-impl<T> Deref for Shared<T> {
+impl<T> Deref for CowArray<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
@@ -105,24 +105,24 @@ impl<T> Deref for Shared<T> {
     }
 }
 
-impl<T: Clone> DerefMut for Shared<T> {
+impl<T: Clone> DerefMut for CowArray<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         Arc::make_mut(&mut self.0)
     }
 }
 
-impl<T: Copy + PartialEq> Shared<T> {
+impl<T: Copy + PartialEq> CowArray<T> {
     /// Writes `value` if it differs, so that equal values keep the array shared.
-    pub(super) fn put(&mut self, index: usize, value: T) {
+    pub(super) fn set_if_changed(&mut self, index: usize, value: T) {
         if self[index] != value {
             self[index] = value;
         }
     }
 }
 
-impl Shared<f64> {
+impl CowArray<f64> {
     /// Sets all values, bit for bit; shares `common` if the values are equal.
-    fn take(&mut self, values: &[f64], common: &Self) {
+    fn copy_or_share(&mut self, values: &[f64], common: &Self) {
         let same = |list: &[f64]| list.iter().map(|x| x.to_bits()).eq(values.iter().map(|x| x.to_bits()));
         if same(common) {
             self.clone_from(common);
@@ -134,44 +134,44 @@ impl Shared<f64> {
 
 /// Initial values of all environments.
 #[derive(Debug, PartialEq)]
-struct Initial {
+struct InitialDrives {
     table: Arc<DriveTable>,
     position: Box<[f64]>,
     /// Zero per drive.
-    no_targets: Shared<f64>,
+    zero_targets: CowArray<f64>,
     /// Zero per degree of freedom.
-    no_forces: Shared<f64>,
+    zero_forces: CowArray<f64>,
 }
 
 /// Targets and gains of the drives in one environment, and their last efforts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveState {
-    initial: Arc<Initial>,
+    initial: Arc<InitialDrives>,
     /// Gains, one per drive.
-    pub gains: Shared<Gains>,
+    pub gains: CowArray<Gains>,
     /// User values that the gains are computed from, one per drive.
-    pub settings: Shared<Setting>,
+    pub settings: CowArray<DriveSetting>,
     /// Overrides of gains, which are properties of the environment and not part of its state.
-    pub(super) drawn: Shared<DrawnGains>,
+    pub(super) overrides: CowArray<GainOverrides>,
     /// Range of position targets \[rad or m\], one per drive.
-    pub ranges: Shared<[f64; 2]>,
+    pub ranges: CowArray<[f64; 2]>,
     /// Position targets \[rad or m\].
     pub position: Box<[f64]>,
     /// Velocity targets \[rad/s or m/s\].
-    pub velocity: Shared<f64>,
+    pub velocity: CowArray<f64>,
     /// Feed-forward efforts \[N m or N\]; they stay until changed.
-    pub feedforward: Shared<f64>,
+    pub feedforward: CowArray<f64>,
     /// Effort of each drive in the last step \[N m or N\].
     pub effort: Box<[f64]>,
     /// Generalized forces applied by the user, by degree of freedom; the implicit damping adds to them.
-    pub applied: Shared<f64>,
+    pub applied: CowArray<f64>,
     /// Memory of explicit models from step to step.
     pub memory: Box<[f64]>,
     /// Friction row of each drive; 0 for drives without a row. Dry friction of other joints shifts these indices.
-    rows: Shared<usize>,
+    rows: CowArray<usize>,
     /// Coefficients of the damping inside the drive solve, in the order of [`DriveTable::damped`]. The model's armature
     /// holds the other half of this damping, so both change together.
-    damping: Shared<f64>,
+    damping: CowArray<f64>,
 }
 
 impl DriveState {
@@ -179,24 +179,29 @@ impl DriveState {
     pub fn new(table: &Arc<DriveTable>, model: &mj::Model) -> Self {
         let n = table.drives.len();
         let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
-        let no_targets = Shared(vec![0.0; n].into());
-        let no_forces = Shared(vec![0.0; model.nv()].into());
+        let no_targets = CowArray(vec![0.0; n].into());
+        let no_forces = CowArray(vec![0.0; model.nv()].into());
         let mut state = Self {
-            gains: Shared(table.drives.iter().map(|d| d.initial).collect()),
-            settings: Shared(table.drives.iter().map(|d| d.setting).collect()),
-            drawn: Shared(vec![DrawnGains::default(); n].into()),
-            ranges: Shared(table.drives.iter().map(|d| d.range).collect()),
+            gains: CowArray(table.drives.iter().map(|d| d.initial).collect()),
+            settings: CowArray(table.drives.iter().map(|d| d.setting).collect()),
+            overrides: CowArray(vec![GainOverrides::default(); n].into()),
+            ranges: CowArray(table.drives.iter().map(|d| d.range).collect()),
             position: position.clone(),
             velocity: no_targets.clone(),
             feedforward: no_targets.clone(),
             effort: vec![0.0; n].into(),
             applied: no_forces.clone(),
-            memory: table.models.iter().flat_map(|drive| drive.model.law().memory()).collect(),
-            rows: Shared(table.rows(model).into()),
-            damping: Shared(table.damped.iter().map(|(_, damping)| *damping).collect()),
-            initial: Arc::new(Initial { table: Arc::clone(table), position, no_targets, no_forces }),
+            memory: table.models.iter().flat_map(|drive| drive.model.law().initial_memory()).collect(),
+            rows: CowArray(table.rows(model).into()),
+            damping: CowArray(table.damped.iter().map(|(_, damping)| *damping).collect()),
+            initial: Arc::new(InitialDrives {
+                table: Arc::clone(table),
+                position,
+                zero_targets: no_targets,
+                zero_forces: no_forces,
+            }),
         };
-        state.start();
+        state.reset_memory();
         state
     }
 
@@ -208,8 +213,8 @@ impl DriveState {
     }
 
     /// Resets the memory of explicit models, with the current targets as those at the start.
-    pub(crate) fn start(&mut self) {
-        self.each_memory(|law, target, memory| law.start(target, memory));
+    pub(crate) fn reset_memory(&mut self) {
+        self.for_each_model(|law, target, memory| law.reset_memory(target, memory));
     }
 
     /// Targets of a drive.
@@ -219,7 +224,7 @@ impl DriveState {
     }
 
     /// Calls `act` for each explicit model with the targets and the memory of its drive.
-    fn each_memory(&mut self, act: impl Fn(&dyn ActuatorLaw, &Target, &mut [f64])) {
+    fn for_each_model(&mut self, act: impl Fn(&dyn ActuatorLaw, &Target, &mut [f64])) {
         let mut memory = std::mem::take(&mut self.memory);
         for explicit in &self.initial.table.models {
             act(explicit.model.law(), &self.target(explicit.drive), &mut memory[explicit.memory.clone()]);
@@ -231,18 +236,18 @@ impl DriveState {
     pub(crate) fn reset(&mut self) {
         let initial = &*self.initial;
         self.position.copy_from_slice(&initial.position);
-        self.velocity.clone_from(&initial.no_targets);
-        self.feedforward.clone_from(&initial.no_targets);
+        self.velocity.clone_from(&initial.zero_targets);
+        self.feedforward.clone_from(&initial.zero_targets);
         self.effort.fill(0.0);
-        self.applied.clone_from(&initial.no_forces);
+        self.applied.clone_from(&initial.zero_forces);
     }
 
     /// Changes the user values of a drive and computes its gains from them; limits stay.
-    pub fn set(&mut self, drive: usize, change: impl FnOnce(&mut Setting)) {
+    pub fn update_setting(&mut self, drive: usize, change: impl FnOnce(&mut DriveSetting)) {
         let (old, mut setting) = (self.settings[drive], self.settings[drive]);
         change(&mut setting);
         let mut gains = self.gains[drive];
-        let (kp, kd) = setting.actuator().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
+        let (kp, kd) = setting.torque_gains().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
         // A randomized gain is not the exact product of its user value, so a gain with an unchanged user value must
         // stay.
         let same_type = (setting.drive_type, setting.inertia) == (old.drive_type, old.inertia);
@@ -252,30 +257,30 @@ impl DriveState {
         if !same_type || setting.damping.to_bits() != old.damping.to_bits() {
             gains.kd = kd;
         }
-        self.settings.put(drive, setting);
-        self.gains.put(drive, gains);
+        self.settings.set_if_changed(drive, setting);
+        self.gains.set_if_changed(drive, gains);
     }
 
     /// Changes the limits of a drive.
     pub(crate) fn set_limits(&mut self, drive: usize, change: impl FnOnce(Gains) -> Gains) {
-        self.gains.put(drive, change(self.gains[drive]));
+        self.gains.set_if_changed(drive, change(self.gains[drive]));
     }
 
     /// Changes the range of position targets of a drive; the current target is clamped to it.
     pub(crate) fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
-        self.ranges.put(drive, [low, high]);
+        self.ranges.set_if_changed(drive, [low, high]);
         self.position[drive] = self.position[drive].clamp(low, high);
     }
 
     /// Copies gains, limits, targets and effort from drive `from` of `other` to drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
-        self.gains.put(to, other.gains[from]);
-        self.settings.put(to, other.settings[from]);
-        self.drawn.put(to, other.drawn[from]);
-        self.ranges.put(to, other.ranges[from]);
+        self.gains.set_if_changed(to, other.gains[from]);
+        self.settings.set_if_changed(to, other.settings[from]);
+        self.overrides.set_if_changed(to, other.overrides[from]);
+        self.ranges.set_if_changed(to, other.ranges[from]);
         self.position[to] = other.position[from];
-        self.velocity.put(to, other.velocity[from]);
-        self.feedforward.put(to, other.feedforward[from]);
+        self.velocity.set_if_changed(to, other.velocity[from]);
+        self.feedforward.set_if_changed(to, other.feedforward[from]);
         self.effort[to] = other.effort[from];
         if let (Some(mine), Some(theirs)) = (self.initial.table.model_of(to), other.initial.table.model_of(from)) {
             self.memory[mine.memory.clone()].copy_from_slice(&other.memory[theirs.memory.clone()]);
@@ -284,27 +289,27 @@ impl DriveState {
 
     /// Copies the applied force from degree of freedom `from` of `other` to degree of freedom `to`.
     pub(crate) fn copy_applied_from(&mut self, other: &Self, from: usize, to: usize) {
-        self.applied.put(to, other.applied[from]);
+        self.applied.set_if_changed(to, other.applied[from]);
     }
 
     /// Sets the coefficients of the damping inside the drive solve.
     pub(crate) fn set_damping(&mut self, damping: &[f64]) {
-        damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
+        damping.iter().enumerate().for_each(|(index, value)| self.damping.set_if_changed(index, *value));
     }
 
     /// Sets the friction rows, as [`DriveTable::rows`] returns them.
     pub(crate) fn set_rows(&mut self, rows: &[usize]) {
-        rows.iter().enumerate().for_each(|(index, row)| self.rows.put(index, *row));
+        rows.iter().enumerate().for_each(|(index, row)| self.rows.set_if_changed(index, *row));
     }
 
-    /// Flat array of the state, for [`set_numbers`](Self::set_numbers). It has ten numbers per drive (gains and limits,
+    /// Flat array of the state, for [`set_from_flat`](Self::set_from_flat). It has ten numbers per drive (gains and limits,
     /// their user values, target range; without overrides), then targets (position, velocity, feed-forward), efforts,
     /// applied forces, and the memory of explicit models.
-    pub(crate) fn numbers(&self) -> Vec<f64> {
+    pub(crate) fn to_flat(&self) -> Vec<f64> {
         let settings = self.ranges.iter().enumerate().flat_map(|(drive, range)| {
-            let (gains, setting) = self.without_drawn(drive);
+            let (gains, setting) = self.base_gains(drive);
             let drive_type = DriveType::ALL.iter().position(|known| *known == setting.drive_type).unwrap_or(0) as f64;
-            let Setting { stiffness, damping, inertia, .. } = setting;
+            let DriveSetting { stiffness, damping, inertia, .. } = setting;
             let Gains { kp, kd, max_effort, max_velocity } = gains;
             // 0 stands for no inertia.
             let inertia = inertia.unwrap_or(0.0);
@@ -315,18 +320,18 @@ impl DriveState {
         settings.chain(targets.into_iter().flatten().copied()).collect()
     }
 
-    /// Restores a flat array of [`numbers`](Self::numbers) with the same number of drives. Overrides of gains stay in
+    /// Restores a flat array of [`to_flat`](Self::to_flat) with the same number of drives. Overrides of gains stay in
     /// effect.
-    pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
+    pub(crate) fn set_from_flat(&mut self, numbers: &[f64]) {
         let n = self.position.len();
         let (settings, rest) = numbers.split_at(10 * n);
         for (i, &numbers) in settings.as_chunks::<10>().0.iter().enumerate() {
             let [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] = numbers;
             let drive_type = DriveType::ALL.get(drive_type as usize).copied().unwrap_or_default();
             let inertia = Some(inertia).filter(|inertia| *inertia > 0.0);
-            let setting = Setting { drive_type, stiffness, damping, inertia };
-            self.set_below_drawn(i, Gains { kp, kd, max_effort, max_velocity }, setting);
-            self.ranges.put(i, [low, high]);
+            let setting = DriveSetting { drive_type, stiffness, damping, inertia };
+            self.set_base_gains(i, Gains { kp, kd, max_effort, max_velocity }, setting);
+            self.ranges.set_if_changed(i, [low, high]);
         }
         let (position, rest) = rest.split_at(n);
         let (velocity, rest) = rest.split_at(n);
@@ -335,10 +340,10 @@ impl DriveState {
         let (applied, memory) = rest.split_at(self.applied.len());
         let initial = Arc::clone(&self.initial);
         self.position.copy_from_slice(position);
-        self.velocity.take(velocity, &initial.no_targets);
-        self.feedforward.take(feedforward, &initial.no_targets);
+        self.velocity.copy_or_share(velocity, &initial.zero_targets);
+        self.feedforward.copy_or_share(feedforward, &initial.zero_targets);
         self.effort.copy_from_slice(effort);
-        self.applied.take(applied, &initial.no_forces);
+        self.applied.copy_or_share(applied, &initial.zero_forces);
         self.memory.copy_from_slice(memory);
     }
 
@@ -355,10 +360,10 @@ impl DriveState {
         for (i, drive) in table.drives.iter().enumerate() {
             let target = self.target(i);
             match drive.realization {
-                Realization::Row => implicit::apply(drive, self.rows[i], &self.gains[i], &target, data),
+                Realization::ConstraintRow => implicit::apply(drive, self.rows[i], &self.gains[i], &target, data),
                 Realization::Actuator => actuator::apply(drive, &self.gains[i], &target, data),
                 Realization::Explicit { model } => {
-                    let DriveActuator { model, memory, .. } = &table.models[model];
+                    let ExplicitDrive { model, memory, .. } = &table.models[model];
                     let (position, velocity) = (data.qpos()[drive.qpos], data.qvel()[drive.dof]);
                     let now = JointMotion { position, velocity, range: self.ranges[i] };
                     let effort = model.law().effort(&now, &target, &self.gains[i], &self.memory[memory.clone()]);
@@ -372,7 +377,7 @@ impl DriveState {
     pub(crate) fn finish_step(&mut self, efforts: &[f64]) {
         self.effort.copy_from_slice(efforts);
         if !self.memory.is_empty() {
-            self.each_memory(|law, target, memory| law.remember(target, memory));
+            self.for_each_model(|law, target, memory| law.update_memory(target, memory));
         }
     }
 
@@ -380,15 +385,15 @@ impl DriveState {
     pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {
-            Realization::Row => implicit::effort(self.rows[i], &self.gains[i], self.feedforward[i], data),
+            Realization::ConstraintRow => implicit::effort(self.rows[i], &self.gains[i], self.feedforward[i], data),
             Realization::Actuator | Realization::Explicit { .. } => data.actuator_force()[drive.ctrl],
         }));
     }
 }
 
-/// Error in a flat array that [`DriveState::numbers`] cannot have produced for this number of drives; `None` for a
+/// Error in a flat array that [`DriveState::to_flat`] cannot have produced for this number of drives; `None` for a
 /// valid one.
-pub(crate) fn numbers_fault(numbers: &[f64], drives: usize) -> Option<&'static str> {
+pub(crate) fn flat_error(numbers: &[f64], drives: usize) -> Option<&'static str> {
     let Some((settings, rest)) = numbers.split_at_checked(10 * drives) else {
         return Some("drives have fewer numbers than they need");
     };
@@ -424,48 +429,48 @@ mod tests {
         .expect("compiles")
         .into_model();
         let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY, max_velocity: f64::INFINITY };
-        let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
+        let setting = DriveSetting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
         let (realization, range) = (Realization::Actuator, [-1.0, 1.0]);
         let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization, initial, setting, range };
         let fresh = DriveState::new(&Arc::new(DriveTable { drives: vec![drive], ..Default::default() }), &model);
-        let (mut told, other) = (fresh.clone(), fresh.clone());
-        assert!(std::ptr::eq(&*told.velocity, &*other.velocity));
-        told.position[0] = 0.1;
-        told.velocity[0] = 0.2;
-        told.feedforward[0] = 0.3;
-        told.applied[0] = 0.4;
-        told.effort[0] = 0.5;
-        told.set_range(0, [0.2, 0.7]);
-        assert_eq!((told.position[0], other.ranges[0]), (0.2, range), "the target is inside of its range");
+        let (mut changed, other) = (fresh.clone(), fresh.clone());
+        assert!(std::ptr::eq(&*changed.velocity, &*other.velocity));
+        changed.position[0] = 0.1;
+        changed.velocity[0] = 0.2;
+        changed.feedforward[0] = 0.3;
+        changed.applied[0] = 0.4;
+        changed.effort[0] = 0.5;
+        changed.set_range(0, [0.2, 0.7]);
+        assert_eq!((changed.position[0], other.ranges[0]), (0.2, range), "the target is inside of its range");
         assert_eq!(other, fresh);
         let mut copy = other.clone();
-        copy.copy_from(&told, 0, 0);
-        copy.copy_applied_from(&told, 0, 0);
-        assert_eq!(copy, told);
+        copy.copy_from(&changed, 0, 0);
+        copy.copy_applied_from(&changed, 0, 0);
+        assert_eq!(copy, changed);
         let mut copy = other.clone();
-        copy.set_numbers(&told.numbers());
-        assert_eq!(copy, told);
-        copy.set_numbers(&other.numbers());
+        copy.set_from_flat(&changed.to_flat());
+        assert_eq!(copy, changed);
+        copy.set_from_flat(&other.to_flat());
         assert!(std::ptr::eq(&*copy.velocity, &*other.velocity) && copy == other, "shared again");
-        copy.set_numbers(&other.numbers().iter().map(|x| if *x == 0.0 { -0.0 } else { *x }).collect::<Vec<_>>());
+        copy.set_from_flat(&other.to_flat().iter().map(|x| if *x == 0.0 { -0.0 } else { *x }).collect::<Vec<_>>());
         assert!(copy.feedforward[0].is_sign_negative() && copy.applied[0].is_sign_negative(), "to the last bit");
-        told.set(0, |setting| setting.stiffness = 7.0);
-        told.reset();
-        assert_eq!((told.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");
-        assert_eq!((told.gains[0].kd, told.ranges[0]), (1.0, [0.2, 0.7]), "limits stay");
-        told.set(0, |setting| setting.stiffness = 3.0);
-        told.set_range(0, range);
-        assert_eq!(told, fresh);
-        assert!(std::ptr::eq(&*told.velocity, &*other.velocity), "shared again");
+        changed.update_setting(0, |setting| setting.stiffness = 7.0);
+        changed.reset();
+        assert_eq!((changed.gains[0].kp, other.gains[0].kp), (7.0, 3.0), "gains stay");
+        assert_eq!((changed.gains[0].kd, changed.ranges[0]), (1.0, [0.2, 0.7]), "limits stay");
+        changed.update_setting(0, |setting| setting.stiffness = 3.0);
+        changed.set_range(0, range);
+        assert_eq!(changed, fresh);
+        assert!(std::ptr::eq(&*changed.velocity, &*other.velocity), "shared again");
     }
 
     #[test]
     fn equal_values_stay_shared() {
-        let mut list = Shared(Arc::from([1.0, 2.0]));
+        let mut list = CowArray(Arc::from([1.0, 2.0]));
         let same = list.clone();
-        list.put(1, 2.0);
+        list.set_if_changed(1, 2.0);
         assert!(std::ptr::eq(&*list, &*same));
-        list.put(1, 3.0);
+        list.set_if_changed(1, 3.0);
         assert_eq!((&*list, &*same), (&[1.0, 3.0][..], &[1.0, 2.0][..]));
     }
 }

@@ -1,21 +1,21 @@
 //! Accelerations of links and objects, with the poses and velocities of the same time.
 
-use super::rows::captured;
+use super::rows::fill_captured;
 use super::{poses, velocities};
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
-    let solved = env.solved();
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+    let solved = env.captured();
     if solved.poses.is_empty() {
         // Nothing was solved for this state, but its poses and velocities exist.
         poses::rows(simulation, env, i, &mut state.force_poses);
         velocities::rows(simulation, env, i, &mut state.force_velocities);
     } else {
-        captured(&solved.poses, i, &mut state.force_poses);
-        captured(&solved.velocities, i, &mut state.force_velocities);
+        fill_captured(&solved.poses, i, &mut state.force_poses);
+        fill_captured(&solved.velocities, i, &mut state.force_velocities);
     }
-    captured(&solved.accelerations, i, &mut state.body_accelerations);
+    fill_captured(&solved.accelerations, i, &mut state.body_accelerations);
 }

@@ -1,6 +1,6 @@
 //! Controls, forces and activations of drives and of the actuators of attached MJCF files.
 
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
@@ -11,14 +11,14 @@ fn drives(simulation: &Simulation) -> impl Iterator<Item = usize> {
 
 /// Number of actuators.
 pub(super) fn count(simulation: &Simulation) -> usize {
-    drives(simulation).count() + simulation.parts.iter().map(|part| part.actuators.len()).sum::<usize>()
+    drives(simulation).count() + simulation.mjcf_models.iter().map(|part| part.actuators.len()).sum::<usize>()
 }
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
     let (model, data) = (simulation.batch.model(), env.data());
     let of_drives = drives(simulation).map(|drive| [env.drives.position[drive], env.drives.effort[drive], 0.0]);
-    let of_parts = simulation.parts.iter().flat_map(|part| part.actuators.iter().zip(&part.controls));
+    let of_parts = simulation.mjcf_models.iter().flat_map(|part| part.actuators.iter().zip(&part.controls));
     let of_parts = of_parts.map(|(&actuator, &control)| {
         // MuJoCo computes the force from the last of several activations.
         let activation = model.actuator_activation(actuator).next_back().map_or(0.0, |place| data.act()[place]);

@@ -1,14 +1,14 @@
 //! Poses of the instances of the render scene, in double precision.
 
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
 /// Fills the row of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
-    if let (Some(visible), Some(poses)) = (&simulation.visible, &mut state.instance_poses)
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+    if let (Some(visible), Some(poses)) = (&simulation.visual_scene, &mut state.instance_poses)
         && let Some(poses) = poses.row_mut(i).as_slice_mut()
     {
-        visible.read_exact(env.data(), poses);
+        visible.read_poses_f64(env.data(), poses);
     }
 }

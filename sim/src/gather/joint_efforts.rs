@@ -1,17 +1,17 @@
 //! Efforts of joints.
 
-use super::rows::joints;
-use crate::env::Env;
+use super::rows::fill_joints;
+use crate::env::SimEnv;
 use crate::index::JointIndexing;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
 /// Fills the row of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
     // A joint without a drive of this crate may have actuators of an MJCF file.
     let effort = |joint: &JointIndexing| match joint.drive {
         Some(drive) => env.drives.effort[drive],
         None => env.data().qfrc_actuator()[joint.dof],
     };
-    joints(&mut state.joint_efforts, i, simulation, effort);
+    fill_joints(&mut state.joint_efforts, i, simulation, effort);
 }

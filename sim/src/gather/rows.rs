@@ -7,11 +7,11 @@ use ndarray::{Array2, Array3, Axis};
 /// Movable joints of all robots, then the joints of attached MJCF files with one degree of freedom.
 pub(super) fn all_joints(simulation: &Simulation) -> impl Iterator<Item = &JointIndexing> {
     let of_robots = simulation.robots.iter().flat_map(|robot| &robot.joints);
-    of_robots.chain(simulation.parts.iter().flat_map(|part| &part.joints))
+    of_robots.chain(simulation.mjcf_models.iter().flat_map(|part| &part.joints))
 }
 
 /// Fills the row of an environment with one number per joint.
-pub(super) fn joints(
+pub(super) fn fill_joints(
     array: &mut Option<Array2<f64>>,
     env: usize,
     simulation: &Simulation,
@@ -25,7 +25,7 @@ pub(super) fn joints(
 }
 
 /// Copies captured quantities to the rows of an environment; zeros if the capture is empty after a failed step.
-pub(super) fn captured(values: &[f64], env: usize, array: &mut Option<Array3<f64>>) {
+pub(super) fn fill_captured(values: &[f64], env: usize, array: &mut Option<Array3<f64>>) {
     if let Some(array) = array
         && let Some(row) = array.index_axis_mut(Axis(0), env).as_slice_mut()
     {

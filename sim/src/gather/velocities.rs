@@ -1,20 +1,20 @@
 //! Velocities of links and objects.
 
 use crate::capture::body_velocity;
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 use ndarray::Array3;
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
     rows(simulation, env, i, &mut state.body_velocities);
 }
 
 /// Writes the current velocities of environment `i` to `array`.
-pub(super) fn rows(simulation: &Simulation, env: &Env, i: usize, array: &mut Option<Array3<f64>>) {
+pub(super) fn rows(simulation: &Simulation, env: &SimEnv, i: usize, array: &mut Option<Array3<f64>>) {
     let Some(array) = array else { return };
-    for (b, link) in simulation.plan.bodies().iter().enumerate() {
+    for (b, link) in simulation.body_axis.bodies().iter().enumerate() {
         let origin = link.pose(env.data()).translation.vector;
         let [velocity, turning] = body_velocity(env.data(), link.body, &origin);
         for (k, value) in velocity.iter().chain(&turning).enumerate() {

@@ -10,23 +10,23 @@
 mod report;
 mod text;
 
-pub use report::{JointReport, LinkReport, MimicReport, Report, Warning};
+pub use report::{JointReport, LinkReport, MimicReport, ReportWarning, RobotReport};
 
 use crate::drive::DriveCfg;
-use crate::drive::plan::{curve, followed, plan};
+use crate::drive::plan::{coupling_curve, followed_position, plan};
 use crate::error::Error;
 use crate::objects::robot::RobotCfg;
-use crate::objects::robot_data::described;
+use crate::objects::robot_data::describe_robot;
 use crate::objects::robot_file::MjcfFile;
-use crate::pattern::{closest, list};
+use crate::pattern::{closest_names, format_candidates};
 use kinetoscope_robot::body_inertia::{fuse, rigid_bodies};
-use kinetoscope_robot::description::{Curve, Geometry, JointId, JointKind, RobotDescription};
+use kinetoscope_robot::description::{CouplingPolynomial, Geometry, JointId, JointKind, RobotDescription};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_robot::dynamics::{Configuration, DynamicsError, Kinematics};
-use kinetoscope_robot::shape_inertia::Hulls;
+use kinetoscope_robot::dynamics::{Configuration, Dynamics, DynamicsError};
+use kinetoscope_robot::shape_inertia::HullSet;
 use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::mesh::load;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ use std::path::PathBuf;
 const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 /// Largest difference between a given position of a mimic joint and the one that its driver implies without a warning
 /// \[rad or m\].
-const MIMIC_SLACK: f64 = 1e-6;
+const MIMIC_TOLERANCE: f64 = 1e-6;
 
 /// Robot files and position to inspect.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,7 +60,7 @@ pub enum InspectError {
     #[error(transparent)]
     Load(Box<Error>),
     /// A position is given for a joint that does not exist.
-    #[error("qpos: there is no joint {name:?}; {}", list(.candidates, *.total))]
+    #[error("qpos: there is no joint {name:?}; {}", format_candidates(.candidates, *.total))]
     JointUnknown {
         /// The name given.
         name: String,
@@ -73,7 +73,7 @@ pub enum InspectError {
     #[error("{at}: qpos: joint {name:?} is {kind}; only revolute, continuous and prismatic joints have a position")]
     JointUnmovable {
         /// File and line of the joint.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         name: String,
         /// Type of the joint.
@@ -119,15 +119,15 @@ impl From<Error> for InspectError {
 ///
 /// # Errors
 /// [`add_robot`](crate::SimulationManager::add_robot) rejects the files, or a position is invalid.
-pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
+pub fn inspect(cfg: &InspectCfg) -> Result<RobotReport, InspectError> {
     let robot = RobotCfg {
         urdf: cfg.urdf.clone(),
         mjcf: cfg.mjcf.clone(),
         fix_base: !cfg.floating_base,
         ..RobotCfg::default()
     };
-    let mut hulls = Hulls::new(&robot.hull);
-    let (file, description, mut diagnostics) = described(&robot, &(&robot.uid).into(), 0, None, &mut hulls)?;
+    let mut hulls = HullSet::new(&robot.hull);
+    let (file, description, mut diagnostics) = describe_robot(&robot, &(&robot.uid).into(), 0, None, &mut hulls)?;
     let configuration = configuration(&description, cfg, &mut diagnostics)?;
     hulls.of_collisions(&description).map_err(Error::from)?;
     check_visual_meshes(&description, &mut diagnostics);
@@ -138,10 +138,10 @@ pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
         }
     }
     diagnostics.extend(joint_diagnostics(&description, cfg.floating_base)?);
-    sort_by_place(&mut diagnostics, cfg);
-    let kinematics = Kinematics::new(&description, &configuration)?;
+    sort_by_location(&mut diagnostics, cfg);
+    let kinematics = Dynamics::new(&description, &configuration)?;
     let qpos = configuration.resolved_positions(&description)?;
-    Ok(Report::new(cfg, &description, &kinematics, qpos, &GRAVITY, &diagnostics))
+    Ok(RobotReport::new(cfg, &description, &kinematics, qpos, &GRAVITY, &diagnostics))
 }
 
 /// Configuration with the given positions, in the order of the drivable joints.
@@ -155,7 +155,7 @@ fn configuration(
     for (name, value) in &cfg.qpos {
         let Some(id) = description.joint_id(name) else {
             let names = drivable.iter().map(|&id| description.joint(id).name.as_str());
-            let candidates = closest(name, names).into_iter().map(str::to_owned).collect();
+            let candidates = closest_names(name, names).into_iter().map(str::to_owned).collect();
             return Err(InspectError::JointUnknown { name: name.clone(), candidates, total: drivable.len() });
         };
         let joint = description.joint(id);
@@ -173,28 +173,29 @@ fn configuration(
     let mut configuration = Configuration::zero(description);
     configuration.floating_base = cfg.floating_base;
     let start = |id: JointId| description.joint(id).defaults.map_or(0.0, |file| file.position);
-    let of_free = |id: JointId| {
+    let free_position = |id: JointId| {
         let column = drivable.iter().position(|&d| d == id);
         column.and_then(|column| given[column]).unwrap_or_else(|| start(id))
     };
-    configuration.joint_positions = drivable.iter().map(|&id| followed(description, &of_free, id)).collect();
+    configuration.joint_positions =
+        drivable.iter().map(|&id| followed_position(description, &free_position, id)).collect();
     let resolved = configuration.resolved_positions(description)?;
     for ((id, given), followed) in drivable.into_iter().zip(given).zip(resolved) {
         let joint = description.joint(id);
-        let Some(given) = given.filter(|given| (given - followed).abs() > MIMIC_SLACK) else { continue };
-        let (source, whom) = match (&joint.mimic, curve(joint)) {
+        let Some(given) = given.filter(|given| (given - followed).abs() > MIMIC_TOLERANCE) else { continue };
+        let (source, relation) = match (&joint.mimic, coupling_curve(joint)) {
             (Some(mimic), _) => {
                 let driver = &description.joint(description.mimic_driver(id).0).name;
                 (&mimic.source, format!("follows {driver:?} to"))
             }
-            (None, Some(Curve { joint: Some(driver), .. })) => {
+            (None, Some(CouplingPolynomial { joint: Some(driver), .. })) => {
                 (&joint.source, format!("follows {:?} to", description.joint(driver).name))
             }
-            (None, Some(Curve { joint: None, .. })) => (&joint.source, "is held at".to_owned()),
+            (None, Some(CouplingPolynomial { joint: None, .. })) => (&joint.source, "is held at".to_owned()),
             (None, None) => continue,
         };
         let message =
-            format!("joint {:?} {whom} {followed}; the position {given} given for it was ignored", joint.name);
+            format!("joint {:?} {relation} {followed}; the position {given} given for it was ignored", joint.name);
         diagnostics.push(Diagnostic::new(DiagnosticKind::MimicPositionIgnored, source.clone(), message));
     }
     Ok(configuration)
@@ -225,7 +226,7 @@ fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Dia
 fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
     let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
     let (_, mut diagnostics) =
-        planned.map_err(|error| Error::Plan { robot: (&description.name).into(), error: Box::new(error) })?;
+        planned.map_err(|error| Error::DrivePlan { robot: (&description.name).into(), error: Box::new(error) })?;
     // Start positions belong to a simulation, not to the files.
     let of_start = [DiagnosticKind::InitialPositionClamped, DiagnosticKind::FollowerStartsBeyondLimits];
     diagnostics.retain(|d| !of_start.contains(&d.kind));
@@ -233,7 +234,7 @@ fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Res
 }
 
 /// Sorts by file in the given order, then by line.
-fn sort_by_place(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
+fn sort_by_location(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
     let files: Vec<_> = cfg.files().collect();
     diagnostics.sort_by_key(|d| {
         d.source.as_ref().map(|s| (files.iter().position(|f| **f == *s.file).unwrap_or(usize::MAX), s.line))

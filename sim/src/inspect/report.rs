@@ -4,7 +4,7 @@ use super::{FREE_COLUMNS, InspectCfg, free_joint_columns};
 use crate::drive::plan::own_limit;
 use kinetoscope_robot::description::{Joint, JointKind, LinkId, RobotDescription};
 use kinetoscope_robot::diagnostic::Diagnostic;
-use kinetoscope_robot::dynamics::Kinematics;
+use kinetoscope_robot::dynamics::Dynamics;
 use kinetoscope_robot::inertia::RigidInertia;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 /// Report on a robot in one position.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
+pub struct RobotReport {
     /// Name of the robot.
     pub robot: String,
     /// The files, as given.
@@ -41,7 +41,7 @@ pub struct Report {
     /// Generalized force that holds the robot still at `qpos`, for gravity (0, 0, -9.81) m/s².
     pub gravity_torque: Vec<f64>,
     /// Warnings about everything repaired, ignored or missing.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<ReportWarning>,
 }
 
 /// Report on a link.
@@ -100,7 +100,7 @@ pub struct MimicReport {
 
 /// Warning about something repaired, ignored or missing.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Warning {
+pub struct ReportWarning {
     /// Stable name of the kind ([`DiagnosticKind::name`](kinetoscope_robot::diagnostic::DiagnosticKind::name)).
     pub kind: &'static str,
     /// The file; `None` if the warning belongs to no file.
@@ -111,11 +111,11 @@ pub struct Warning {
     pub message: String,
 }
 
-impl Report {
+impl RobotReport {
     pub(super) fn new(
         cfg: &InspectCfg,
         description: &RobotDescription,
-        kinematics: &Kinematics<'_>,
+        kinematics: &Dynamics<'_>,
         qpos: Vec<f64>,
         gravity: &Vector3<f64>,
         diagnostics: &[Diagnostic],
@@ -127,7 +127,7 @@ impl Report {
         let poses = kinematics.link_poses();
         let mut mass_matrix = kinematics.mass_matrix();
         for (id, joint) in description.drivable_joints() {
-            let column = kinematics.columns(id).start;
+            let column = kinematics.dof_range(id).start;
             mass_matrix[(column, column)] += joint.defaults.map_or(0.0, |file| file.armature);
         }
         Self {
@@ -142,7 +142,7 @@ impl Report {
             columns,
             mass_matrix: mass_matrix.row_iter().map(|r| r.iter().copied().collect()).collect(),
             gravity_torque: kinematics.gravity_torque(gravity).iter().copied().collect(),
-            warnings: diagnostics.iter().map(Warning::new).collect(),
+            warnings: diagnostics.iter().map(ReportWarning::new).collect(),
         }
     }
 }
@@ -187,7 +187,7 @@ impl JointReport {
     }
 }
 
-impl Warning {
+impl ReportWarning {
     fn new(diagnostic: &Diagnostic) -> Self {
         Self {
             kind: diagnostic.kind.name(),

@@ -1,6 +1,6 @@
 //! Report as text: tree, joints, dynamics and warnings in columns.
 
-use super::{JointReport, LinkReport, Report};
+use super::{JointReport, LinkReport, RobotReport};
 use nalgebra::Matrix3;
 use std::collections::HashMap;
 use std::fmt;
@@ -8,26 +8,26 @@ use std::fmt;
 /// Maximum width of tables and sentences \[characters\].
 const WIDTH: usize = 120;
 /// Spaces between columns.
-const GAP: usize = 2;
+const COLUMN_GAP: usize = 2;
 /// Minimum width of a shortened column, unless its heading is wider.
-const NARROWEST: usize = 24;
+const MIN_COLUMN_WIDTH: usize = 24;
 /// Number of tree levels that are drawn; for deeper links, the levels nearest to the root are cut off.
-const DRAWN_LEVELS: usize = 16;
+const MAX_TREE_LEVELS: usize = 16;
 
-impl fmt::Display for Report {
+impl fmt::Display for RobotReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.write_robot(f)?;
         if self.warnings.is_empty() {
             return writeln!(f, "\nNo warnings");
         }
-        writeln!(f, "\n{}", counted(self.warnings.len(), "warning"))?;
+        writeln!(f, "\n{}", pluralized(self.warnings.len(), "warning"))?;
         for warning in &self.warnings {
             writeln!(f)?;
             match (&warning.file, warning.line) {
                 (Some(file), Some(line)) => writeln!(f, "{file}:{line}: {}", warning.kind)?,
                 _ => writeln!(f, "{}", warning.kind)?,
             }
-            for line in wrapped(&warning.message, WIDTH - 4) {
+            for line in wrap_lines(&warning.message, WIDTH - 4) {
                 writeln!(f, "    {line}")?;
             }
         }
@@ -35,11 +35,11 @@ impl fmt::Display for Report {
     }
 }
 
-fn counted(n: usize, what: &str) -> String {
+fn pluralized(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-impl Report {
+impl RobotReport {
     /// The report without its warnings, for programs that display these in another way.
     pub fn without_warnings(&self) -> impl fmt::Display {
         fmt::from_fn(|f| self.write_robot(f))
@@ -51,12 +51,14 @@ impl Report {
         writeln!(
             f,
             "{}, {}: {movable} movable, {} fixed",
-            counted(self.links.len(), "link"),
-            counted(self.joints.len(), "joint"),
+            pluralized(self.links.len(), "link"),
+            pluralized(self.joints.len(), "joint"),
             self.joints.len() - movable
         )?;
-        let com = self.com.map(|c| format!(", centre of mass in the world ({}) m", c.map(|x| number(x, 4)).join(", ")));
-        writeln!(f, "total mass {} kg{}", number(self.total_mass, 6), com.unwrap_or_default())?;
+        let com = self
+            .com
+            .map(|c| format!(", centre of mass in the world ({}) m", c.map(|x| format_number(x, 4)).join(", ")));
+        writeln!(f, "total mass {} kg{}", format_number(self.total_mass, 6), com.unwrap_or_default())?;
 
         write!(f, "\nLinks\n\n{}", self.tree())?;
         let inertias = self.inertia_table();
@@ -88,14 +90,14 @@ impl Report {
         while let Some((link, trunk, branch)) = open.pop() {
             let joint = by_child.get(link.name.as_str());
             table.push([
-                format!("{trunk}{}{}", branch.tip(), link.name),
+                format!("{trunk}{}{}", branch.connector(), link.name),
                 joint.map_or_else(|| "-".to_owned(), |j| j.name.clone()),
                 joint.map_or_else(|| "root".to_owned(), |j| j.kind.to_owned()),
-                if link.mass == 0.0 { "-".to_owned() } else { fixed(link.mass, 4) },
-                link.com.filter(|_| link.mass != 0.0).map_or_else(|| "-".to_owned(), |c| vector(&c)),
+                if link.mass == 0.0 { "-".to_owned() } else { format_fixed(link.mass, 4) },
+                link.com.filter(|_| link.mass != 0.0).map_or_else(|| "-".to_owned(), |c| format_vector(&c)),
             ]);
             let below = children.remove(link.name.as_str()).unwrap_or_default();
-            let trunk = shortened(trunk + branch.trunk());
+            let trunk = truncated_prefix(trunk + branch.continuation());
             let count = below.len();
             for (i, child) in below.into_iter().enumerate().rev() {
                 let branch = if i + 1 == count { Branch::Last } else { Branch::Inner };
@@ -121,13 +123,13 @@ impl Report {
     fn joint_table(&self) -> Table {
         let mut table = Table::new("<joint <type <parent <child <axis >lower >upper >effort >speed");
         for joint in self.joints.iter().filter(|j| j.kind != "fixed") {
-            let limit = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| number(v, 4));
+            let limit = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format_number(v, 4));
             table.push([
                 joint.name.clone(),
                 joint.kind.to_owned(),
                 joint.parent.clone(),
                 joint.child.clone(),
-                joint.axis.map(|x| number(x, 3)).join(" "),
+                joint.axis.map(|x| format_number(x, 3)).join(" "),
                 limit(joint.lower),
                 limit(joint.upper),
                 limit(joint.effort),
@@ -146,12 +148,12 @@ impl Report {
         for (name, mimic) in couplings {
             write!(f, "{name:<width$} = ")?;
             if mimic.multiplier != 1.0 {
-                write!(f, "{} * ", number(mimic.multiplier, 4))?;
+                write!(f, "{} * ", format_number(mimic.multiplier, 4))?;
             }
             write!(f, "{}", mimic.joint)?;
             if mimic.offset != 0.0 {
                 let sign = if mimic.offset < 0.0 { '-' } else { '+' };
-                write!(f, " {sign} {}", number(mimic.offset.abs(), 4))?;
+                write!(f, " {sign} {}", format_number(mimic.offset.abs(), 4))?;
             }
             writeln!(f)?;
         }
@@ -166,7 +168,7 @@ impl Report {
             table.push([
                 column.clone(),
                 positions.get(column.as_str()).map_or_else(|| "-".to_owned(), |q| format!("{q:.4}")),
-                fixed(self.mass_matrix[i][i], 6),
+                format_fixed(self.mass_matrix[i][i], 6),
                 // Avoids a negative zero.
                 format!("{:.4}", if torque.abs() < 5e-5 { 0.0 } else { *torque }),
             ]);
@@ -184,7 +186,7 @@ enum Branch {
 }
 
 impl Branch {
-    fn tip(self) -> &'static str {
+    fn connector(self) -> &'static str {
         match self {
             Self::Root => "",
             Self::Inner => "├─",
@@ -193,7 +195,7 @@ impl Branch {
     }
 
     /// Prefix of the lines of all descendants.
-    fn trunk(self) -> &'static str {
+    fn continuation(self) -> &'static str {
         match self {
             Self::Root => "",
             Self::Inner => "│ ",
@@ -202,12 +204,12 @@ impl Branch {
     }
 }
 
-fn shortened(trunk: String) -> String {
+fn truncated_prefix(trunk: String) -> String {
     let levels = trunk.chars().count() / 2;
-    if levels < DRAWN_LEVELS {
+    if levels < MAX_TREE_LEVELS {
         return trunk;
     }
-    std::iter::once('…').chain(" ".chars()).chain(trunk.chars().skip(2 * (levels - DRAWN_LEVELS + 2))).collect()
+    std::iter::once('…').chain(" ".chars()).chain(trunk.chars().skip(2 * (levels - MAX_TREE_LEVELS + 2))).collect()
 }
 
 /// Rows of cells in columns.
@@ -246,7 +248,7 @@ impl Table {
             self.columns.iter().enumerate().map(|(i, c)| cells(i).max().unwrap_or(0).max(c.heading.len())).collect();
         let excess = |widths: &[usize]| {
             let shown = widths.iter().filter(|&&w| w > 0);
-            (shown.clone().sum::<usize>() + GAP * shown.count().saturating_sub(1)).saturating_sub(WIDTH)
+            (shown.clone().sum::<usize>() + COLUMN_GAP * shown.count().saturating_sub(1)).saturating_sub(WIDTH)
         };
         for (i, column) in self.columns.iter().enumerate() {
             if column.optional && excess(&widths) > 0 {
@@ -255,10 +257,10 @@ impl Table {
         }
         loop {
             let excess = excess(&widths);
-            let narrowable = (0..widths.len()).filter(|&i| !self.columns[i].right && widths[i] > NARROWEST);
+            let narrowable = (0..widths.len()).filter(|&i| !self.columns[i].right && widths[i] > MIN_COLUMN_WIDTH);
             // The first column identifies the row, so it is shortened last.
             let Some(widest) = narrowable.max_by_key(|&i| (i > 0, widths[i])).filter(|_| excess > 0) else { break };
-            widths[widest] = widths[widest].saturating_sub(excess).max(NARROWEST);
+            widths[widest] = widths[widest].saturating_sub(excess).max(MIN_COLUMN_WIDTH);
         }
         widths
     }
@@ -271,9 +273,9 @@ impl fmt::Display for Table {
         for line in std::iter::once(&heading).chain(&self.rows) {
             let mut text = String::new();
             for ((cell, column), &width) in line.iter().zip(&self.columns).zip(&widths).filter(|(_, w)| **w > 0) {
-                let cell = elided(cell, width);
+                let cell = elide(cell, width);
                 text += &if column.right { format!("{cell:>width$}") } else { format!("{cell:<width$}") };
-                text += &" ".repeat(GAP);
+                text += &" ".repeat(COLUMN_GAP);
             }
             writeln!(f, "{}", text.trim_end())?;
         }
@@ -282,7 +284,7 @@ impl fmt::Display for Table {
 }
 
 /// Returns the text; the middle is replaced by `…` if the text is wider than `width`.
-fn elided(text: &str, width: usize) -> String {
+fn elide(text: &str, width: usize) -> String {
     let count = text.chars().count();
     if count <= width {
         return text.to_owned();
@@ -292,13 +294,13 @@ fn elided(text: &str, width: usize) -> String {
 }
 
 /// Formats with `decimals`, so that columns line up. Numbers that would lose all but one digit get an exponent.
-fn fixed(value: f64, decimals: usize) -> String {
+fn format_fixed(value: f64, decimals: usize) -> String {
     let vanishes = value != 0.0 && value.abs() < 10f64.powi(1 - decimals as i32);
     if vanishes || value.abs() >= 1e9 { format!("{value:.3e}") } else { format!("{value:.decimals$}") }
 }
 
 /// Formats with at most `decimals`, without trailing zeros.
-fn number(value: f64, decimals: usize) -> String {
+fn format_number(value: f64, decimals: usize) -> String {
     if value != 0.0 && (value.abs() >= 1e9 || value.abs() < 0.5 * 10f64.powi(-(decimals as i32))) {
         return format!("{value:.2e}");
     }
@@ -308,12 +310,12 @@ fn number(value: f64, decimals: usize) -> String {
 }
 
 /// Formats the components in aligned columns.
-fn vector(v: &[f64; 3]) -> String {
+fn format_vector(v: &[f64; 3]) -> String {
     v.map(|x| format!("{:7.4}", if x.abs() < 5e-5 { 0.0 } else { x })).join(" ").trim_end().to_owned()
 }
 
 /// Breaks lines between words. A word longer than `width` stays whole, so that paths can be copied.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
+fn wrap_lines(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         let Some(line) = lines.last_mut() else { break };
@@ -335,11 +337,20 @@ mod tests {
 
     #[test]
     fn numbers() {
-        assert_eq!([number(1.0, 4), number(-0.5, 4), number(2.792_52, 4)], ["1", "-0.5", "2.7925"]);
-        assert_eq!([number(0.0, 4), number(-1e-17, 4), number(1e30, 4)], ["0", "-1.00e-17", "1.00e30"]);
-        assert_eq!([fixed(0.0, 4), fixed(0.25, 4), fixed(2e-6, 6)], ["0.0000", "0.2500", "2.000e-6"]);
-        assert_eq!(elided("depth_camera", 7), "dep…era");
-        assert_eq!(wrapped("one two a_very_long_word end", 8), ["one two", "a_very_long_word", "end"]);
+        assert_eq!(
+            [format_number(1.0, 4), format_number(-0.5, 4), format_number(2.792_52, 4)],
+            ["1", "-0.5", "2.7925"]
+        );
+        assert_eq!(
+            [format_number(0.0, 4), format_number(-1e-17, 4), format_number(1e30, 4)],
+            ["0", "-1.00e-17", "1.00e30"]
+        );
+        assert_eq!(
+            [format_fixed(0.0, 4), format_fixed(0.25, 4), format_fixed(2e-6, 6)],
+            ["0.0000", "0.2500", "2.000e-6"]
+        );
+        assert_eq!(elide("depth_camera", 7), "dep…era");
+        assert_eq!(wrap_lines("one two a_very_long_word end", 8), ["one two", "a_very_long_word", "end"]);
     }
 
     #[test]
@@ -362,7 +373,7 @@ mod tests {
             inertia: None,
             pose: [0.0; 7],
         };
-        let report = Report {
+        let report = RobotReport {
             robot: "chain".to_owned(),
             files: Vec::new(),
             total_mass: 0.0,

@@ -2,16 +2,16 @@
 //! and sensors of any crate.
 
 use crate::error::{Error, Result};
-use crate::ids::{MjcfId, ObjectId, RobotId, TerrainId};
+use crate::ids::{MjcfId, RigidObjectId, RobotId, TerrainId};
 use crate::manager::SimulationManager;
 use crate::objects::articulation::{ArticulationCfg, ArticulationId};
-use crate::objects::mjcf_part_data::MjcfCfg;
-use crate::objects::object_group_data::{GroupId, RigidObjectGroupCfg};
+use crate::objects::mjcf_part_data::MjcfPartCfg;
+use crate::objects::object_group_data::{RigidObjectGroupCfg, RigidObjectGroupId};
 use crate::objects::rigid_object_data::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
 use crate::objects::weld_data::{WeldCfg, WeldId};
-use crate::pattern::in_every_env;
+use crate::pattern::strip_env_prefix;
 use crate::sensor_list::SensorId;
 use kinetoscope_sensors::{Sensor, SensorCfg};
 use std::any::Any;
@@ -32,11 +32,11 @@ pub enum EntityCfg {
     /// A terrain. Its uid is the name of the entity.
     Terrain(Box<TerrainCfg>),
     /// An attached MJCF file. Its uid is the name of the entity.
-    Mjcf(Box<MjcfCfg>),
+    Mjcf(Box<MjcfPartCfg>),
     /// A weld, initially released. Its uid is the name of the entity.
     Weld(Box<WeldCfg>),
     /// A sensor of any type.
-    Sensor(Box<dyn SensorEntity>),
+    Sensor(Box<dyn AnySensorCfg>),
 }
 
 impl From<RobotCfg> for EntityCfg {
@@ -69,8 +69,8 @@ impl From<TerrainCfg> for EntityCfg {
     }
 }
 
-impl From<MjcfCfg> for EntityCfg {
-    fn from(cfg: MjcfCfg) -> Self {
+impl From<MjcfPartCfg> for EntityCfg {
+    fn from(cfg: MjcfPartCfg) -> Self {
         Self::Mjcf(Box::new(cfg))
     }
 }
@@ -83,59 +83,59 @@ impl From<WeldCfg> for EntityCfg {
 
 impl EntityCfg {
     /// Build phase: bodies first, then the welds between them, then the sensors.
-    pub(super) fn turn(&self) -> Turn {
+    pub(super) fn build_phase(&self) -> BuildPhase {
         match self {
-            Self::Weld(_) => Turn::Weld,
-            Self::Sensor(_) => Turn::Sensor,
-            _ => Turn::Thing,
+            Self::Weld(_) => BuildPhase::Weld,
+            Self::Sensor(_) => BuildPhase::Sensor,
+            _ => BuildPhase::Body,
         }
     }
 }
 
 /// Build phases of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Turn {
+pub(super) enum BuildPhase {
     /// Robots, articulations, objects, terrains, attached MJCF files.
-    Thing,
+    Body,
     /// Welds, which need two bodies.
     Weld,
     /// Sensors, which may refer to any body.
     Sensor,
 }
 
-impl<C: SensorEntity> From<C> for EntityCfg {
+impl<C: AnySensorCfg> From<C> for EntityCfg {
     fn from(cfg: C) -> Self {
         Self::Sensor(Box::new(cfg))
     }
 }
 
 /// Type-erased configuration of a sensor. Every [`SensorCfg`] with `Clone`, `Debug`, `Send` and `Sync` implements it.
-/// `&dyn SensorEntity` converts to `&dyn Any`, for a downcast to the configuration.
-pub trait SensorEntity: Any + Debug + Send + Sync {
+/// `&dyn AnySensorCfg` converts to `&dyn Any`, for a downcast to the configuration.
+pub trait AnySensorCfg: Any + Debug + Send + Sync {
     /// Clones the configuration into a new box.
-    fn boxed_clone(&self) -> Box<dyn SensorEntity>;
+    fn boxed_clone(&self) -> Box<dyn AnySensorCfg>;
 
     /// Adds the sensor to a simulation.
     ///
     /// # Errors
     /// As [`SimulationManager::add_sensor`].
-    fn add_to(&self, sim: &mut SimulationManager, uid: &str) -> Result<SensorHandle>;
+    fn add_to(&self, sim: &mut SimulationManager, uid: &str) -> Result<AnySensorId>;
 }
 
-impl<C> SensorEntity for C
+impl<C> AnySensorCfg for C
 where
     C: SensorCfg + Clone + Debug + Send + Sync + 'static,
 {
-    fn boxed_clone(&self) -> Box<dyn SensorEntity> {
+    fn boxed_clone(&self) -> Box<dyn AnySensorCfg> {
         Box::new(self.clone())
     }
 
-    fn add_to(&self, sim: &mut SimulationManager, uid: &str) -> Result<SensorHandle> {
-        sim.add_sensor(uid, self.clone()).map(SensorHandle::new)
+    fn add_to(&self, sim: &mut SimulationManager, uid: &str) -> Result<AnySensorId> {
+        sim.add_sensor(uid, self.clone()).map(AnySensorId::new)
     }
 }
 
-impl Clone for Box<dyn SensorEntity> {
+impl Clone for Box<dyn AnySensorCfg> {
     fn clone(&self) -> Self {
         (**self).boxed_clone()
     }
@@ -143,15 +143,15 @@ impl Clone for Box<dyn SensorEntity> {
 
 /// Type-erased [`SensorId`].
 #[derive(Debug)]
-pub struct SensorHandle {
+pub struct AnySensorId {
     id: Box<dyn Any + Send + Sync>,
     index: usize,
     type_name: &'static str,
 }
 
-impl SensorHandle {
+impl AnySensorId {
     fn new<S: Sensor>(id: SensorId<S>) -> Self {
-        Self { id: Box::new(id), index: id.index(), type_name: short_name::<S>() }
+        Self { id: Box::new(id), index: id.index(), type_name: short_type_name::<S>() }
     }
 
     /// The handle, if the sensor has type `S`.
@@ -170,7 +170,7 @@ impl SensorHandle {
 }
 
 /// Name of a type without its module path.
-pub(super) fn short_name<T>() -> &'static str {
+pub(super) fn short_type_name<T>() -> &'static str {
     let full = std::any::type_name::<T>();
     // Arguments of a generic type have paths of their own.
     let end = full.find('<').unwrap_or(full.len());
@@ -180,18 +180,18 @@ pub(super) fn short_name<T>() -> &'static str {
 
 /// Handle of an entity of a scene.
 #[derive(Debug)]
-pub(super) enum Handle {
+pub(super) enum EntityHandle {
     Robot(RobotId),
     Articulation(ArticulationId),
-    RigidObject(ObjectId),
-    Group(GroupId),
+    RigidObject(RigidObjectId),
+    Group(RigidObjectGroupId),
     Terrain(TerrainId),
     Mjcf(MjcfId),
     Weld(WeldId),
-    Sensor(SensorHandle),
+    Sensor(AnySensorId),
 }
 
-impl Handle {
+impl EntityHandle {
     /// Adds the entity to a simulation, under the name `uid`.
     pub(super) fn add(sim: &mut SimulationManager, uid: &str, cfg: &EntityCfg) -> Result<Self> {
         match cfg {
@@ -208,9 +208,9 @@ impl Handle {
             EntityCfg::Terrain(cfg) => {
                 sim.add_terrain(TerrainCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Terrain)
             }
-            EntityCfg::Mjcf(cfg) => sim.add_mjcf(MjcfCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Mjcf),
+            EntityCfg::Mjcf(cfg) => sim.add_mjcf(MjcfPartCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Mjcf),
             EntityCfg::Weld(cfg) => {
-                let [first, second] = [&cfg.first, &cfg.second].map(|name| in_every_env(name).into());
+                let [first, second] = [&cfg.first, &cfg.second].map(|name| strip_env_prefix(name).into());
                 sim.add_weld(WeldCfg { uid: uid.into(), first, second }).map(Self::Weld)
             }
             EntityCfg::Sensor(cfg) => cfg.add_to(sim, uid).map(Self::Sensor),
@@ -218,7 +218,7 @@ impl Handle {
     }
 
     /// Error for a lookup of the entity `name` as a `wanted`.
-    pub(super) fn is_no(&self, name: &str, wanted: String) -> Error {
+    pub(super) fn type_mismatch(&self, name: &str, wanted: String) -> Error {
         let found = match self {
             Self::Robot(_) => "robot".into(),
             Self::Articulation(_) => "articulation".into(),
@@ -235,11 +235,11 @@ impl Handle {
 
 #[cfg(test)]
 mod tests {
-    use super::short_name;
+    use super::short_type_name;
 
     #[test]
     fn names_of_types() {
-        assert_eq!(short_name::<kinetoscope_sensors::camera::Camera>(), "Camera");
-        assert_eq!(short_name::<Vec<std::cell::Cell<u8>>>(), "Vec<core::cell::Cell<u8>>");
+        assert_eq!(short_type_name::<kinetoscope_sensors::camera::Camera>(), "Camera");
+        assert_eq!(short_type_name::<Vec<std::cell::Cell<u8>>>(), "Vec<core::cell::Cell<u8>>");
     }
 }

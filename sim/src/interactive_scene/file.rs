@@ -4,14 +4,14 @@ use super::entity::EntityCfg;
 use super::types::EntityTypes;
 use super::value::{Value, ValueError};
 use super::yaml;
-use super::{ExclusionCfg, SceneCfg, in_every_env};
+use super::{ExclusionCfg, SceneCfg, strip_env_prefix};
 use crate::error::{Error, Result};
 use crate::objects::robot_file::MjcfFile;
 use crate::objects::shape::ObjectShape;
-use crate::pattern::closest;
+use crate::pattern::closest_names;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_robot::urdf::UrdfCfg;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use kinetoscope_scene::yaml::{YamlError, parse};
 use serde::Deserialize;
 use std::ops::Range;
@@ -65,7 +65,7 @@ impl SceneCfg {
     /// other numbers and names are checked when the scene is built.
     pub fn from_toml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let reader = Reader { text: Some(text), file: file.as_ref(), types };
-        let root = DeTable::parse(text).map_err(|e| reader.located(&e, 0..0))?;
+        let root = DeTable::parse(text).map_err(|e| reader.toml_error(&e, 0..0))?;
         reader.scene(root.into_inner())
     }
 
@@ -75,7 +75,7 @@ impl SceneCfg {
     /// As [`from_toml`](Self::from_toml); in addition, several documents, tags and `null` are rejected.
     pub fn from_yaml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let reader = Reader { text: None, file: file.as_ref(), types };
-        let wrong = |error: YamlError| reader.at(error.line..error.line, error.message);
+        let wrong = |error: YamlError| reader.error_at(error.line..error.line, error.message);
         let root = parse(text, &yaml::DIALECT).map_err(wrong)?;
         reader.scene(yaml::table(root.as_ref()).map_err(wrong)?)
     }
@@ -92,7 +92,7 @@ impl SceneCfg {
         scene.insert("simulation".into(), simulation.map_err(|e| fail("simulation", e.to_string()))?.into());
         let mut entities = toml::Table::new();
         for (name, entity) in &self.entities {
-            let name = in_every_env(name);
+            let name = strip_env_prefix(name);
             let (kind, table) = types.write(entity).ok_or_else(|| {
                 let known: Vec<&str> = types.names().collect();
                 fail(name, format!("its kind is none of {}; add it with EntityTypes::with_sensor", known.join(", ")))
@@ -100,8 +100,10 @@ impl SceneCfg {
             let mut written = toml::Table::new();
             written.insert("type".into(), kind.into());
             // The key of the table is the name.
-            let fields =
-                table.map_err(|e| fail(name, e.to_string()))?.into_iter().filter(|(key, _)| !has_name(entity, key));
+            let fields = table
+                .map_err(|e| fail(name, e.to_string()))?
+                .into_iter()
+                .filter(|(key, _)| !is_name_field(entity, key));
             written.extend(fields);
             if entities.insert(name.into(), written.into()).is_some() {
                 return Err(Error::DuplicateUid(name.into()));
@@ -109,7 +111,7 @@ impl SceneCfg {
         }
         scene.insert("entities".into(), entities.into());
         if !self.exclusions.is_empty() {
-            let pair = |exclusion: &ExclusionCfg| toml::Value::from(exclusion.between.to_vec());
+            let pair = |exclusion: &ExclusionCfg| toml::Value::from(exclusion.pair.to_vec());
             scene.insert(EXCLUSIONS.into(), self.exclusions.iter().map(pair).collect::<Vec<_>>().into());
         }
         toml::to_string(&scene).map_err(|e| fail("the scene", e.to_string()))
@@ -117,7 +119,7 @@ impl SceneCfg {
 }
 
 /// True if the field is the name of an entity, which files give as the key of its table.
-fn has_name(entity: &EntityCfg, field: &str) -> bool {
+fn is_name_field(entity: &EntityCfg, field: &str) -> bool {
     field == "uid" && !matches!(entity, EntityCfg::Sensor(_))
 }
 
@@ -139,15 +141,15 @@ impl<'a> Reader<'a> {
                     let (table, _) = self.table(value, "entities")?;
                     for (name, entity) in table {
                         let entity = self.entity(name.get_ref(), entity, name.span())?;
-                        let source = Source::new(self.file, self.line(name.span()));
-                        scene.sources.insert(in_every_env(name.get_ref()).to_owned(), source);
+                        let source = SourceLocation::new(self.file, self.line(name.span()));
+                        scene.sources.insert(strip_env_prefix(name.get_ref()).to_owned(), source);
                         scene.entities.push((name.into_inner().into_owned(), entity));
                     }
                 }
                 EXCLUSIONS => scene.exclusions = self.exclusions(value)?,
                 other => {
-                    let known = closest(other, SECTIONS).join("`, `");
-                    return Err(self.at(key.span(), format!("unknown key `{other}`, expected one of `{known}`")));
+                    let known = closest_names(other, SECTIONS).join("`, `");
+                    return Err(self.error_at(key.span(), format!("unknown key `{other}`, expected one of `{known}`")));
                 }
             }
         }
@@ -162,33 +164,33 @@ impl<'a> Reader<'a> {
             let found = PRESETS.iter().find(|(name, _)| preset.get_ref().as_str() == Some(name));
             let (_, make) = found.ok_or_else(|| {
                 let names: Vec<&str> = PRESETS.iter().map(|(name, _)| *name).collect();
-                self.at(preset.span(), format!("unknown preset, expected one of `{}`", names.join("`, `")))
+                self.error_at(preset.span(), format!("unknown preset, expected one of `{}`", names.join("`, `")))
             })?;
             defaults = make();
         }
         let defaults = toml::to_string(&defaults)
             .map_err(|e| Error::SceneFileWrite { what: "preset".into(), reason: e.to_string() })?;
-        let mut merged = DeTable::parse(&defaults).map_err(|e| self.located(&e, span.clone()))?.into_inner();
+        let mut merged = DeTable::parse(&defaults).map_err(|e| self.toml_error(&e, span.clone()))?.into_inner();
         for (key, value) in table {
             // Replacing a key keeps the span of the old key, which does not exist in the user's file.
             merged.remove(key.get_ref().as_ref());
             merged.insert(key, value);
         }
         let value = Spanned::new(span.clone(), DeValue::Table(merged));
-        SimulationManagerCfg::deserialize(Value(value)).map_err(|e| self.wrong(e, span))
+        SimulationManagerCfg::deserialize(Value(value)).map_err(|e| self.value_error(e, span))
     }
 
     /// Reads pairs of names, each with its position in the file.
     fn exclusions(&self, value: Spanned<DeValue<'a>>) -> Result<Vec<ExclusionCfg>> {
         let span = value.span();
         let DeValue::Array(pairs) = value.into_inner() else {
-            return Err(self.at(span, format!("`{EXCLUSIONS}` is a list of pairs: [[\"ball\", \"table\"], ...]")));
+            return Err(self.error_at(span, format!("`{EXCLUSIONS}` is a list of pairs: [[\"ball\", \"table\"], ...]")));
         };
         let read = |pair: Spanned<DeValue<'a>>| {
             let at = pair.span();
-            let source = Source::new(self.file, self.line(at.clone()));
-            let between = <[String; 2]>::deserialize(Value(pair)).map_err(|e| self.wrong(e, at))?;
-            Ok(ExclusionCfg { between, at: Some(source) })
+            let source = SourceLocation::new(self.file, self.line(at.clone()));
+            let between = <[String; 2]>::deserialize(Value(pair)).map_err(|e| self.value_error(e, at))?;
+            Ok(ExclusionCfg { pair: between, at: Some(source) })
         };
         pairs.into_iter().map(read).collect()
     }
@@ -198,47 +200,47 @@ impl<'a> Reader<'a> {
         let (mut table, span) = self.table(value, name)?;
         let known = || self.types.names().collect::<Vec<_>>().join("`, `");
         let Some(kind) = table.remove("type") else {
-            return Err(self.at(at, format!("entity {name:?} has no `type`, expected one of `{}`", known())));
+            return Err(self.error_at(at, format!("entity {name:?} has no `type`, expected one of `{}`", known())));
         };
         let found = kind.get_ref().as_str().and_then(|kind| self.types.get(kind)).ok_or_else(|| {
-            self.at(kind.span(), format!("entity {name:?} is of an unknown type, expected one of `{}`", known()))
+            self.error_at(kind.span(), format!("entity {name:?} is of an unknown type, expected one of `{}`", known()))
         })?;
         let uid = table.get_key_value("uid").map(|(key, _)| key.span());
         let value = Spanned::new(span, DeValue::Table(table));
-        let mut entity = (found.read)(Value(value)).map_err(|e| self.wrong(e, at))?;
-        if let Some(uid) = uid.filter(|_| has_name(&entity, "uid")) {
-            return Err(self.at(uid, format!("the uid of an entity is its name, {name:?}; leave `uid` out")));
+        let mut entity = (found.read)(Value(value)).map_err(|e| self.value_error(e, at))?;
+        if let Some(uid) = uid.filter(|_| is_name_field(&entity, "uid")) {
+            return Err(self.error_at(uid, format!("the uid of an entity is its name, {name:?}; leave `uid` out")));
         }
-        self.name_and_place(&mut entity, name);
+        self.set_name_and_paths(&mut entity, name);
         Ok(entity)
     }
 
     /// Sets the name of an entity, and makes its paths relative to the file.
-    fn name_and_place(&self, entity: &mut EntityCfg, name: &str) {
-        let uid = in_every_env(name).to_owned();
+    fn set_name_and_paths(&self, entity: &mut EntityCfg, name: &str) {
+        let uid = strip_env_prefix(name).to_owned();
         match entity {
             EntityCfg::Robot(robot) => {
                 robot.uid = uid;
-                self.place_urdf(&mut robot.urdf);
-                self.place_mjcf(&mut robot.mjcf);
+                self.resolve_urdf_paths(&mut robot.urdf);
+                self.resolve_mjcf_paths(&mut robot.mjcf);
             }
             EntityCfg::Articulation(articulation) => {
                 articulation.uid = uid;
-                self.place_urdf(&mut articulation.urdf);
-                self.place_mjcf(&mut articulation.mjcf);
+                self.resolve_urdf_paths(&mut articulation.urdf);
+                self.resolve_mjcf_paths(&mut articulation.mjcf);
             }
             EntityCfg::RigidObject(object) => {
                 object.uid = uid;
-                self.place_shape(&mut object.shape);
+                self.resolve_shape_path(&mut object.shape);
             }
             EntityCfg::Group(group) => {
                 group.uid = uid;
-                group.objects.iter_mut().for_each(|object| self.place_shape(&mut object.shape));
+                group.objects.iter_mut().for_each(|object| self.resolve_shape_path(&mut object.shape));
             }
             EntityCfg::Terrain(terrain) => terrain.uid = uid,
             EntityCfg::Mjcf(part) => {
                 part.uid = uid;
-                part.place_beside(|path| self.beside(path));
+                part.resolve_path(|path| self.resolve(path));
             }
             EntityCfg::Weld(weld) => weld.uid = uid,
             EntityCfg::Sensor(_) => {}
@@ -246,29 +248,29 @@ impl<'a> Reader<'a> {
     }
 
     /// Makes the path of a mesh relative to the scene file.
-    fn place_shape(&self, shape: &mut ObjectShape) {
+    fn resolve_shape_path(&self, shape: &mut ObjectShape) {
         if let ObjectShape::Mesh { path, .. } = shape {
-            *path = self.beside(path);
+            *path = self.resolve(path);
         }
     }
 
     /// Makes the paths of URDF files relative to the scene file.
-    fn place_urdf(&self, urdf: &mut UrdfCfg) {
+    fn resolve_urdf_paths(&self, urdf: &mut UrdfCfg) {
         let components = urdf.components.iter_mut().map(|component| &mut component.urdf);
         for path in components.chain(urdf.packages.values_mut()).chain(urdf.asset_root.as_mut()) {
-            *path = self.beside(path);
+            *path = self.resolve(path);
         }
     }
 
     /// Makes the path of an MJCF file relative to the scene file.
-    fn place_mjcf(&self, mjcf: &mut Option<MjcfFile>) {
+    fn resolve_mjcf_paths(&self, mjcf: &mut Option<MjcfFile>) {
         if let Some(file) = mjcf {
-            file.place_beside(|path| self.beside(path));
+            file.resolve_path(|path| self.resolve(path));
         }
     }
 
     /// Path relative to the folder of the scene file; an absolute path stays.
-    fn beside(&self, path: &Path) -> PathBuf {
+    fn resolve(&self, path: &Path) -> PathBuf {
         self.file.parent().map_or_else(|| path.into(), |folder| folder.join(path))
     }
 
@@ -276,22 +278,22 @@ impl<'a> Reader<'a> {
         let span = value.span();
         match value.into_inner() {
             DeValue::Table(table) => Ok((table, span)),
-            other => Err(self.at(span, format!("`{name}` is a {}, expected a table", other.type_str()))),
+            other => Err(self.error_at(span, format!("`{name}` is a {}, expected a table", other.type_str()))),
         }
     }
 
     /// Error of a value, at its own position or at `fallback`.
-    fn wrong(&self, error: ValueError, fallback: Range<usize>) -> Error {
-        self.at(error.span.unwrap_or(fallback), error.message)
+    fn value_error(&self, error: ValueError, fallback: Range<usize>) -> Error {
+        self.error_at(error.span.unwrap_or(fallback), error.message)
     }
 
     /// Error of the TOML parser, at its own position or at `fallback`.
-    fn located(&self, error: &toml::de::Error, fallback: Range<usize>) -> Error {
-        self.at(error.span().unwrap_or(fallback), error.message().into())
+    fn toml_error(&self, error: &toml::de::Error, fallback: Range<usize>) -> Error {
+        self.error_at(error.span().unwrap_or(fallback), error.message().into())
     }
 
-    fn at(&self, span: Range<usize>, reason: String) -> Error {
-        Error::SceneFile { at: Source::new(self.file, self.line(span)), reason }
+    fn error_at(&self, span: Range<usize>, reason: String) -> Error {
+        Error::SceneFile { at: SourceLocation::new(self.file, self.line(span)), reason }
     }
 
     /// Line of a span, counted from 1.

@@ -1,30 +1,30 @@
 //! Lookup of the entities of a scene by name.
 
 use super::InteractiveScene;
-use super::entity::{Handle, short_name};
+use super::entity::{EntityHandle, short_type_name};
 use crate::error::{Error, Result};
-use crate::ids::{MjcfId, ObjectId, RobotId, TerrainId};
+use crate::ids::{MjcfId, RigidObjectId, RobotId, TerrainId};
 use crate::objects::articulation::{Articulation, ArticulationId, ArticulationMut};
 use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
 use crate::objects::object_group::{RigidObjectGroup, RigidObjectGroupMut};
-use crate::objects::object_group_data::GroupId;
+use crate::objects::object_group_data::RigidObjectGroupId;
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::terrain::Terrain;
 use crate::objects::weld::{Weld, WeldMut};
 use crate::objects::weld_data::WeldId;
-use crate::pattern::{closest, in_every_env};
+use crate::pattern::{closest_names, strip_env_prefix};
 use crate::sensor_list::SensorId;
 use kinetoscope_sensors::Sensor;
 
 impl InteractiveScene {
-    fn find(&self, name: &str) -> Result<&Handle> {
-        let name = in_every_env(name);
+    fn find(&self, name: &str) -> Result<&EntityHandle> {
+        let name = strip_env_prefix(name);
         let found = self.entities.iter().find(|(known, _)| known == name);
         found.map(|(_, handle)| handle).ok_or_else(|| Error::UnknownName {
             what: "entity of the scene called",
             name: name.into(),
-            candidates: closest(name, self.keys()).into_iter().map(String::from).collect(),
+            candidates: closest_names(name, self.keys()).into_iter().map(String::from).collect(),
         })
     }
 
@@ -34,8 +34,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not a robot.
     pub fn robot_id(&self, name: &str) -> Result<RobotId> {
         match self.find(name)? {
-            Handle::Robot(id) => Ok(*id),
-            other => Err(other.is_no(name, "robot".into())),
+            EntityHandle::Robot(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "robot".into())),
         }
     }
 
@@ -62,8 +62,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not a passive articulation.
     pub fn articulation_id(&self, name: &str) -> Result<ArticulationId> {
         match self.find(name)? {
-            Handle::Articulation(id) => Ok(*id),
-            other => Err(other.is_no(name, "articulation".into())),
+            EntityHandle::Articulation(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "articulation".into())),
         }
     }
 
@@ -88,10 +88,10 @@ impl InteractiveScene {
     ///
     /// # Errors
     /// The entity does not exist, or is not a rigid object.
-    pub fn rigid_object_id(&self, name: &str) -> Result<ObjectId> {
+    pub fn rigid_object_id(&self, name: &str) -> Result<RigidObjectId> {
         match self.find(name)? {
-            Handle::RigidObject(id) => Ok(*id),
-            other => Err(other.is_no(name, "rigid object".into())),
+            EntityHandle::RigidObject(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "rigid object".into())),
         }
     }
 
@@ -116,10 +116,10 @@ impl InteractiveScene {
     ///
     /// # Errors
     /// The entity does not exist, or is not a group.
-    pub fn rigid_object_group_id(&self, name: &str) -> Result<GroupId> {
+    pub fn rigid_object_group_id(&self, name: &str) -> Result<RigidObjectGroupId> {
         match self.find(name)? {
-            Handle::Group(id) => Ok(*id),
-            other => Err(other.is_no(name, "group of rigid objects".into())),
+            EntityHandle::Group(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "group of rigid objects".into())),
         }
     }
 
@@ -146,8 +146,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not a terrain.
     pub fn terrain_id(&self, name: &str) -> Result<TerrainId> {
         match self.find(name)? {
-            Handle::Terrain(id) => Ok(*id),
-            other => Err(other.is_no(name, "terrain".into())),
+            EntityHandle::Terrain(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "terrain".into())),
         }
     }
 
@@ -165,8 +165,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not an attached MJCF file.
     pub fn mjcf_id(&self, name: &str) -> Result<MjcfId> {
         match self.find(name)? {
-            Handle::Mjcf(id) => Ok(*id),
-            other => Err(other.is_no(name, "MJCF part".into())),
+            EntityHandle::Mjcf(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "MJCF part".into())),
         }
     }
 
@@ -193,8 +193,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not a weld.
     pub fn weld_id(&self, name: &str) -> Result<WeldId> {
         match self.find(name)? {
-            Handle::Weld(id) => Ok(*id),
-            other => Err(other.is_no(name, "weld".into())),
+            EntityHandle::Weld(id) => Ok(*id),
+            other => Err(other.type_mismatch(name, "weld".into())),
         }
     }
 
@@ -221,8 +221,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not a sensor of this type.
     pub fn sensor_id<S: Sensor>(&self, name: &str) -> Result<SensorId<S>> {
         let handle = self.find(name)?;
-        let id = if let Handle::Sensor(sensor) = handle { sensor.get() } else { None };
-        id.ok_or_else(|| handle.is_no(name, format!("sensor of type {}", short_name::<S>())))
+        let id = if let EntityHandle::Sensor(sensor) = handle { sensor.get() } else { None };
+        id.ok_or_else(|| handle.type_mismatch(name, format!("sensor of type {}", short_type_name::<S>())))
     }
 
     /// Returns a sensor of type `S` for reading.
@@ -249,8 +249,8 @@ impl InteractiveScene {
     /// The entity does not exist, or is not a sensor.
     pub fn set_debug_vis(&mut self, name: &str, shown: bool) -> Result<()> {
         let index = match self.find(name)? {
-            Handle::Sensor(sensor) => sensor.index(),
-            other => return Err(other.is_no(name, "sensor".into())),
+            EntityHandle::Sensor(sensor) => sensor.index(),
+            other => return Err(other.type_mismatch(name, "sensor".into())),
         };
         self.sim.sensors.set_debug_vis(index, shown)
     }

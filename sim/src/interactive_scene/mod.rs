@@ -11,17 +11,17 @@ mod types;
 mod value;
 mod yaml;
 
-pub use entity::{EntityCfg, SensorEntity, SensorHandle};
+pub use entity::{AnySensorCfg, AnySensorId, EntityCfg};
 pub use exclusion::ExclusionCfg;
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::manager::SimulationManager;
-use crate::pattern::in_every_env;
+use crate::pattern::strip_env_prefix;
 use crate::simulation_cfg::SimulationManagerCfg;
-use entity::{Handle, Turn};
-use kinetoscope_scene::source::Source;
+use entity::{BuildPhase, EntityHandle};
+use kinetoscope_scene::source::SourceLocation;
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -65,7 +65,7 @@ pub struct SceneCfg {
     /// Pairs that never collide.
     pub exclusions: Vec<ExclusionCfg>,
     /// File and line of the declaration by entity name, for error messages; empty for a scene from Rust.
-    pub sources: BTreeMap<String, Source>,
+    pub sources: BTreeMap<String, SourceLocation>,
 }
 
 impl SceneCfg {
@@ -76,7 +76,7 @@ impl SceneCfg {
 
     /// Adds an entity: a [`RobotCfg`](crate::RobotCfg), an [`ArticulationCfg`](crate::ArticulationCfg), a
     /// [`RigidObjectCfg`](crate::RigidObjectCfg), a [`RigidObjectGroupCfg`](crate::RigidObjectGroupCfg), a
-    /// [`TerrainCfg`](crate::TerrainCfg), an [`MjcfCfg`](crate::MjcfCfg), a [`WeldCfg`](crate::WeldCfg), or the
+    /// [`TerrainCfg`](crate::TerrainCfg), an [`MjcfPartCfg`](crate::MjcfPartCfg), a [`WeldCfg`](crate::WeldCfg), or the
     /// configuration of any sensor.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, cfg: impl Into<EntityCfg>) -> Self {
@@ -88,13 +88,13 @@ impl SceneCfg {
     /// prefix `{ENV}/` is ignored.
     #[must_use]
     pub fn exclude_collision(mut self, one: impl Into<String>, other: impl Into<String>) -> Self {
-        self.exclusions.push(ExclusionCfg { between: [one.into(), other.into()], at: None });
+        self.exclusions.push(ExclusionCfg { pair: [one.into(), other.into()], at: None });
         self
     }
 
     /// Names of the entities, in the order of declaration.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
-        self.entities.iter().map(|(name, _)| in_every_env(name))
+        self.entities.iter().map(|(name, _)| strip_env_prefix(name))
     }
 }
 
@@ -102,7 +102,7 @@ impl SceneCfg {
 #[derive(Debug)]
 pub struct InteractiveScene {
     sim: SimulationManager,
-    entities: Vec<(String, Handle)>,
+    entities: Vec<(String, EntityHandle)>,
 }
 
 impl InteractiveScene {
@@ -122,24 +122,27 @@ impl InteractiveScene {
             taken.push(name);
         }
         let mut sim = SimulationManager::new(cfg.simulation.clone())?;
-        let mut handles: Vec<Option<Handle>> = cfg.entities.iter().map(|_| None).collect();
-        for turn in [Turn::Thing, Turn::Weld, Turn::Sensor] {
-            if turn == Turn::Weld {
+        let mut handles: Vec<Option<EntityHandle>> = cfg.entities.iter().map(|_| None).collect();
+        for turn in [BuildPhase::Body, BuildPhase::Weld, BuildPhase::Sensor] {
+            if turn == BuildPhase::Weld {
                 cfg.exclusions.iter().try_for_each(|exclusion| exclusion.add_to(&mut sim))?;
             }
             for ((name, entity), handle) in cfg.entities.iter().zip(&mut handles) {
-                if entity.turn() == turn {
-                    let name = in_every_env(name);
+                if entity.build_phase() == turn {
+                    let name = strip_env_prefix(name);
                     *handle =
-                        Some(Handle::add(&mut sim, name, entity).map_err(|error| match cfg.sources.get(name) {
-                            Some(at) => Error::Entity { at: at.clone(), name: name.into(), error: Box::new(error) },
-                            None => error,
-                        })?);
+                        Some(EntityHandle::add(&mut sim, name, entity).map_err(
+                            |error| match cfg.sources.get(name) {
+                                Some(at) => Error::Entity { at: at.clone(), name: name.into(), error: Box::new(error) },
+                                None => error,
+                            },
+                        )?);
                 }
             }
         }
-        let named =
-            |((name, _), handle): ((String, _), Option<Handle>)| Some((in_every_env(&name).to_owned(), handle?));
+        let named = |((name, _), handle): ((String, _), Option<EntityHandle>)| {
+            Some((strip_env_prefix(&name).to_owned(), handle?))
+        };
         let entities = cfg.entities.into_iter().zip(handles).filter_map(named).collect();
         Ok(Self { sim, entities })
     }

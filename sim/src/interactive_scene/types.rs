@@ -1,9 +1,9 @@
 //! Entity types of scene files, one line each.
 
-use super::entity::{EntityCfg, SensorEntity};
+use super::entity::{AnySensorCfg, EntityCfg};
 use super::value::{Value, ValueError};
 use crate::objects::articulation::ArticulationCfg;
-use crate::objects::mjcf_part_data::MjcfCfg;
+use crate::objects::mjcf_part_data::MjcfPartCfg;
 use crate::objects::object_group_data::RigidObjectGroupCfg;
 use crate::objects::rigid_object_data::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
@@ -52,7 +52,7 @@ impl Default for EntityTypes {
             .with::<RigidObjectCfg>("rigid_object")
             .with::<RigidObjectGroupCfg>("rigid_object_group")
             .with::<TerrainCfg>("terrain")
-            .with::<MjcfCfg>("mjcf")
+            .with::<MjcfPartCfg>("mjcf")
             .with::<WeldCfg>("weld")
             .with_sensor::<CameraCfg>("camera")
             .with_sensor::<StereoCameraCfg>("stereo_camera")
@@ -74,9 +74,9 @@ impl EntityTypes {
     #[must_use]
     pub fn with_sensor<C>(self, name: impl Into<String>) -> Self
     where
-        C: SensorEntity + Serialize + DeserializeOwned,
+        C: AnySensorCfg + Serialize + DeserializeOwned,
     {
-        self.with::<Sensor<C>>(name)
+        self.with::<SensorKind<C>>(name)
     }
 
     /// Names of the types, in insertion order.
@@ -84,11 +84,11 @@ impl EntityTypes {
         self.entries.iter().map(|entry| entry.name.as_str())
     }
 
-    fn with<K: Kind>(mut self, name: impl Into<String>) -> Self {
+    fn with<K: EntityKind>(mut self, name: impl Into<String>) -> Self {
         let entry = EntityType {
             name: name.into(),
             read: |value| K::Cfg::deserialize(value).map(Into::into),
-            write: |entity| K::of(entity).map(toml::Table::try_from),
+            write: |entity| K::from_entity(entity).map(toml::Table::try_from),
         };
         self.entries.retain(|other| other.name != entry.name);
         self.entries.push(entry);
@@ -106,75 +106,75 @@ impl EntityTypes {
 }
 
 /// An entity type that can be read and recognized among entities.
-trait Kind {
+trait EntityKind {
     type Cfg: Serialize + DeserializeOwned + Into<EntityCfg>;
 
-    fn of(entity: &EntityCfg) -> Option<&Self::Cfg>;
+    fn from_entity(entity: &EntityCfg) -> Option<&Self::Cfg>;
 }
 
-impl Kind for RobotCfg {
+impl EntityKind for RobotCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Robot(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
-impl Kind for ArticulationCfg {
+impl EntityKind for ArticulationCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Articulation(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
-impl Kind for RigidObjectCfg {
+impl EntityKind for RigidObjectCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::RigidObject(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
-impl Kind for RigidObjectGroupCfg {
+impl EntityKind for RigidObjectGroupCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Group(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
-impl Kind for TerrainCfg {
+impl EntityKind for TerrainCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Terrain(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
-impl Kind for MjcfCfg {
+impl EntityKind for MjcfPartCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Mjcf(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
-impl Kind for WeldCfg {
+impl EntityKind for WeldCfg {
     type Cfg = Self;
 
-    fn of(entity: &EntityCfg) -> Option<&Self> {
+    fn from_entity(entity: &EntityCfg) -> Option<&Self> {
         if let EntityCfg::Weld(cfg) = entity { Some(cfg) } else { None }
     }
 }
 
 /// Entity type of a sensor with configuration `C`.
-struct Sensor<C>(std::marker::PhantomData<C>);
+struct SensorKind<C>(std::marker::PhantomData<C>);
 
-impl<C: SensorEntity + Serialize + DeserializeOwned> Kind for Sensor<C> {
+impl<C: AnySensorCfg + Serialize + DeserializeOwned> EntityKind for SensorKind<C> {
     type Cfg = C;
 
-    fn of(entity: &EntityCfg) -> Option<&C> {
+    fn from_entity(entity: &EntityCfg) -> Option<&C> {
         let EntityCfg::Sensor(sensor) = entity else { return None };
         let any: &dyn Any = sensor.as_ref();
         any.downcast_ref()

@@ -58,7 +58,7 @@ fn quoted(names: &[&str]) -> String {
 }
 
 /// Description of a value in TOML's terms.
-fn said(value: &DeValue<'_>) -> String {
+fn describe(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("string {text:?}"),
         DeValue::Integer(number) => format!("integer `{number}`"),
@@ -91,8 +91,8 @@ impl<'de> Deserializer<'de> for Value<'de> {
             },
             DeValue::Boolean(yes) => visitor.visit_bool(yes),
             DeValue::Datetime(when) => Err(de::Error::custom(format!("the date `{when}` is expected nowhere"))),
-            DeValue::Array(array) => visitor.visit_seq(Items(array.into_iter())),
-            DeValue::Table(table) => visitor.visit_map(Fields::new(table)),
+            DeValue::Array(array) => visitor.visit_seq(ArrayItems(array.into_iter())),
+            DeValue::Table(table) => visitor.visit_map(TableEntries::new(table)),
         };
         read.map_err(|error| error.at(&span))
     }
@@ -119,7 +119,7 @@ impl<'de> Deserializer<'de> for Value<'de> {
         if matches!(self.0.get_ref(), DeValue::Table(_)) {
             return self.deserialize_any(visitor);
         }
-        let message = format!("invalid type: {}, expected a table of {}", said(self.0.get_ref()), quoted(fields));
+        let message = format!("invalid type: {}, expected a table of {}", describe(self.0.get_ref()), quoted(fields));
         Err(ValueError { message, span: Some(self.0.span()) })
     }
 
@@ -132,21 +132,21 @@ impl<'de> Deserializer<'de> for Value<'de> {
         let span = self.0.span();
         let wrong = |found: String| Err(de::Error::custom(format!("{found}, expected one of {}", quoted(variants))));
         let read = match self.0.into_inner() {
-            DeValue::String(name) => visitor.visit_enum(Variant { name: &name, content: None }),
+            DeValue::String(name) => visitor.visit_enum(EnumVariant { name: &name, content: None }),
             DeValue::Table(table) => {
                 let names: Vec<String> = table.keys().map(|key| key.get_ref().to_string()).collect();
                 let mut content = table.into_iter();
                 match (content.next(), content.next()) {
                     (Some((name, content)), None) => {
                         let at = name.span();
-                        let chosen = Variant { name: name.get_ref(), content: Some(Value(content)) };
+                        let chosen = EnumVariant { name: name.get_ref(), content: Some(Value(content)) };
                         visitor.visit_enum(chosen).map_err(|error| error.at(&at))
                     }
                     (None, _) => wrong("nothing is named here".into()),
                     _ => wrong(format!("`{}` are {}", names.join("`, `"), names.len())),
                 }
             }
-            other => wrong(format!("invalid type: {}", said(&other))),
+            other => wrong(format!("invalid type: {}", describe(&other))),
         };
         read.map_err(|error| error.at(&span))
     }
@@ -166,9 +166,9 @@ impl<'de> IntoDeserializer<'de, ValueError> for Value<'de> {
 }
 
 /// Iterator over an array.
-struct Items<'a>(<DeArray<'a> as IntoIterator>::IntoIter);
+struct ArrayItems<'a>(<DeArray<'a> as IntoIterator>::IntoIter);
 
-impl<'de> SeqAccess<'de> for Items<'de> {
+impl<'de> SeqAccess<'de> for ArrayItems<'de> {
     type Error = ValueError;
 
     fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, ValueError> {
@@ -181,18 +181,18 @@ impl<'de> SeqAccess<'de> for Items<'de> {
 }
 
 /// Iterator over a table.
-struct Fields<'a> {
+struct TableEntries<'a> {
     rest: <DeTable<'a> as IntoIterator>::IntoIter,
     value: Option<Value<'a>>,
 }
 
-impl<'a> Fields<'a> {
+impl<'a> TableEntries<'a> {
     fn new(table: DeTable<'a>) -> Self {
         Self { rest: table.into_iter(), value: None }
     }
 }
 
-impl<'de> MapAccess<'de> for Fields<'de> {
+impl<'de> MapAccess<'de> for TableEntries<'de> {
     type Error = ValueError;
 
     fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, ValueError> {
@@ -210,29 +210,29 @@ impl<'de> MapAccess<'de> for Fields<'de> {
 }
 
 /// A variant of an enum: its name and its content.
-struct Variant<'n, 'a> {
+struct EnumVariant<'n, 'a> {
     name: &'n str,
     content: Option<Value<'a>>,
 }
 
-impl<'de> EnumAccess<'de> for Variant<'_, 'de> {
+impl<'de> EnumAccess<'de> for EnumVariant<'_, 'de> {
     type Error = ValueError;
-    type Variant = Content<'de>;
+    type Variant = VariantContent<'de>;
 
-    fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, Content<'de>), ValueError> {
+    fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, VariantContent<'de>), ValueError> {
         let name: StrDeserializer<'_, ValueError> = self.name.into_deserializer();
-        let content = Content { name: self.name.into(), value: self.content };
+        let content = VariantContent { name: self.name.into(), value: self.content };
         seed.deserialize(name).map(|variant| (variant, content))
     }
 }
 
 /// Content of a variant.
-struct Content<'a> {
+struct VariantContent<'a> {
     name: String,
     value: Option<Value<'a>>,
 }
 
-impl<'a> Content<'a> {
+impl<'a> VariantContent<'a> {
     /// Content of a variant that must have one.
     fn value(self) -> Result<Value<'a>, ValueError> {
         let name = self.name;
@@ -242,7 +242,7 @@ impl<'a> Content<'a> {
     }
 }
 
-impl<'de> VariantAccess<'de> for Content<'de> {
+impl<'de> VariantAccess<'de> for VariantContent<'de> {
     type Error = ValueError;
 
     fn unit_variant(self) -> Result<(), ValueError> {

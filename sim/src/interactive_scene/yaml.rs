@@ -2,13 +2,13 @@
 //!
 //! The span of a value is its line, `line..line + 1`.
 
-use kinetoscope_scene::yaml::{Dialect, Node, Scalar, ScalarKind, Value, YamlError};
+use kinetoscope_scene::yaml::{Node, Scalar, ScalarKind, Value, YamlError, YamlFeatures};
 use std::borrow::Cow;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// YAML dialect of scene files.
-pub(super) const DIALECT: Dialect = Dialect { files: "scene files", aliases: true, tags: false };
+pub(super) const DIALECT: YamlFeatures = YamlFeatures { files: "scene files", aliases: true, tags: false };
 
 /// Returns the table of a scene. An empty file is an empty table.
 ///

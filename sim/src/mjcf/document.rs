@@ -3,10 +3,10 @@
 //! It holds what both supported MuJoCo versions have in common; [`super::write`](mod@super::write) handles the
 //! differences.
 
-use super::part::MjcfPart;
-use crate::light_cfg::LampKind;
+use super::part::PartDocument;
+use crate::light_cfg::LightKindCfg;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub struct Mjcf {
     /// Keyframes: named positions of all joints.
     pub keyframes: Vec<Keyframe>,
     /// MJCF files that are embedded in the scene.
-    pub parts: Vec<Arc<MjcfPart>>,
+    pub parts: Vec<Arc<PartDocument>>,
 }
 
 /// Physics options: `<option>`, and the default friction of geoms.
@@ -58,7 +58,7 @@ pub struct PhysicsOption {
     /// Integrator.
     pub integrator: Integrator,
     /// Friction cone.
-    pub cone: Cone,
+    pub cone: FrictionCone,
     /// Ratio of frictional to normal impedance.
     pub impratio: f64,
     /// Largest number of solver iterations.
@@ -98,7 +98,7 @@ impl Integrator {
 /// Type of friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Cone {
+pub enum FrictionCone {
     /// Four-sided pyramid.
     #[default]
     Pyramidal,
@@ -116,7 +116,7 @@ pub struct MeshAsset {
     /// True for a mesh of visual geoms only, which may be flat or open.
     pub visual: bool,
     /// Location of the element that names the mesh.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Storage of a mesh.
@@ -184,7 +184,7 @@ pub struct Body {
     /// Named frames.
     pub sites: Vec<Site>,
     /// Location of the link that the body comes from.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Mass properties in principal axes: `<inertial>`.
@@ -199,7 +199,7 @@ pub struct Inertial {
     /// Principal moments \[kg m²\].
     pub moments: Vector3<f64>,
     /// Location of the declaration.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Joint: `<joint>`.
@@ -220,12 +220,12 @@ pub struct Joint {
     /// Rotor inertia \[kg m² or kg\].
     pub armature: f64,
     /// Location of the declaration.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 impl Joint {
     /// Creates a free joint, for a child of the world.
-    pub fn free(name: impl Into<String>, source: Option<Source>) -> Self {
+    pub fn free(name: impl Into<String>, source: Option<SourceLocation>) -> Self {
         Self {
             name: name.into(),
             kind: JointType::Free,
@@ -266,18 +266,18 @@ pub struct Geom {
     /// Sliding, torsional and rolling friction; `None` for the document's default.
     pub friction: Option<[f64; 3]>,
     /// Contact compliance; `None` for MuJoCo's defaults.
-    pub surface: Option<Surface>,
+    pub surface: Option<ContactParams>,
     /// RGBA color; `None` for MuJoCo's gray.
     pub rgba: Option<[f64; 4]>,
     /// Name of the material.
     pub material: Option<String>,
     /// Location of the declaration.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Contact compliance of a geom.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Surface {
+pub struct ContactParams {
     /// Distance at which contact forces begin \[m\]: MuJoCo's `margin`.
     pub margin: f64,
     /// MuJoCo's `solref`, `solimp` and `solmix`; `None` for its defaults.
@@ -288,11 +288,11 @@ pub struct Surface {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSolver {
     /// Reference: MuJoCo's `solref`.
-    pub reference: [f64; 2],
+    pub solref: [f64; 2],
     /// Impedance: MuJoCo's `solimp`.
-    pub impedance: [f64; 5],
+    pub solimp: [f64; 5],
     /// Weight in a contact with another geom: MuJoCo's `solmix`.
-    pub weight: f64,
+    pub solmix: f64,
 }
 
 /// Role of a geom.
@@ -306,7 +306,7 @@ pub enum GeomRole {
         conaffinity: i32,
         /// True if the geom is visible as well, like the ground and objects. Collision shapes of robots are not: the
         /// visuals stand in their place.
-        seen: bool,
+        visible: bool,
     },
     /// Visible geom without collisions.
     Visual,
@@ -352,7 +352,7 @@ pub struct Light {
     /// Diffuse color.
     pub diffuse: [f64; 3],
     /// Type of the light.
-    pub kind: LampKind,
+    pub kind: LightKindCfg,
     /// Constant, linear and quadratic attenuation.
     pub attenuation: [f64; 3],
     /// Radius of the light \[m\]; not supported by MuJoCo 2.2.2.
@@ -375,7 +375,7 @@ pub struct JointEquality {
     /// Offset \[rad or m\].
     pub offset: f64,
     /// Location of the declaration.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Weld constraint that is inactive at first: `<equality><weld>`.
@@ -418,7 +418,7 @@ pub struct Actuator {
     /// Range of the control; `None` without a limit.
     pub ctrl_range: Option<[f64; 2]>,
     /// Location of the joint.
-    pub source: Option<Source>,
+    pub source: Option<SourceLocation>,
 }
 
 /// Keyframe: `<key>`.

@@ -1,18 +1,18 @@
 //! Errors of robots that MJCF cannot represent.
 
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 
 /// Maximum number of moving bodies one below the other. MuJoCo's XML reader rejects documents that are nested deeper
 /// than 100 elements on 2.2.2 and 500 on 4.x.
-pub const MAX_BODY_DEPTH: usize = match kinetoscope_mujoco::TARGET {
-    kinetoscope_mujoco::Target::V2 => 96,
-    kinetoscope_mujoco::Target::V4 => 480,
+pub const MAX_BODY_DEPTH: usize = match kinetoscope_mujoco::BUILD_VERSION {
+    kinetoscope_mujoco::SupportedVersion::V2 => 96,
+    kinetoscope_mujoco::SupportedVersion::V4 => 480,
 };
 
 /// Error of adding a robot to an MJCF document.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum EmitError {
+pub enum RobotMjcfError {
     /// The tree of moving bodies is too deep for MuJoCo.
     #[error(
         "{source_line}: link {link:?} is {depth} moving bodies below the root; MuJoCo reads at most {MAX_BODY_DEPTH}: \
@@ -22,7 +22,7 @@ pub enum EmitError {
         /// Name of the link.
         link: String,
         /// Location of the link.
-        source_line: Source,
+        source_line: SourceLocation,
         /// Number of moving bodies from the root to the link.
         depth: usize,
     },

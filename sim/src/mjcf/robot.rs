@@ -4,7 +4,7 @@ use super::document::{
     Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
     MaterialAsset, MeshAsset, MeshContent, Mjcf, Shape, Site,
 };
-use super::error::{EmitError, MAX_BODY_DEPTH};
+use super::error::{MAX_BODY_DEPTH, RobotMjcfError};
 use crate::drive::plan::JointPlan;
 use kinetoscope_robot::body_inertia::{BodyInertia, RigidBody, fuse};
 use kinetoscope_robot::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
@@ -12,18 +12,18 @@ use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::TriMesh;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Use of the document: simulation or export.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Purpose<'a> {
+pub(crate) enum MjcfDialect<'a> {
     /// Simulation by this crate. Each visual mesh becomes a proxy geom that only has a pose. With `friction_tendons`,
     /// dry friction of driven joints is a tendon, since the joint's own friction row carries the drive, and this crate
     /// applies the damping.
-    Run {
+    Simulation {
         /// True if drives are friction rows.
         friction_tendons: bool,
     },
@@ -35,12 +35,12 @@ pub(crate) enum Purpose<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct VisualAssets {
     /// Parts of each mesh.
-    pub parts: BTreeMap<MeshKey, Vec<VisualPart>>,
+    pub parts: BTreeMap<MeshKey, Vec<VisualSubmesh>>,
 }
 
 /// Part of a visual mesh with one material.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct VisualPart {
+pub(crate) struct VisualSubmesh {
     /// Name of the mesh asset.
     pub mesh: String,
     /// Name of the material asset; `None` if the mesh file gives no material.
@@ -49,7 +49,7 @@ pub(crate) struct VisualPart {
 
 /// Settings for adding a robot to the document.
 #[derive(Clone, Debug)]
-pub(crate) struct RobotCfg<'a> {
+pub(crate) struct RobotMjcfCfg<'a> {
     /// Prefix of all names: `uid/link`.
     pub uid: &'a str,
     /// Contact bits of all its geoms.
@@ -63,9 +63,9 @@ pub(crate) struct RobotCfg<'a> {
     /// Convex hulls of collision meshes.
     pub hulls: &'a BTreeMap<MeshKey, TriMesh>,
     /// True if every driven joint gets a tendon for dry friction, even without friction at first.
-    pub room_for_friction: bool,
+    pub reserve_friction_tendons: bool,
     /// Use of the document.
-    pub purpose: Purpose<'a>,
+    pub dialect: MjcfDialect<'a>,
 }
 
 /// Names of the robot's elements in the document.
@@ -76,7 +76,7 @@ pub(crate) struct RobotLayout {
     /// Name of the free joint of the root link; `None` for a fixed base.
     pub free_joint: Option<String>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
-    pub base_pairs: Vec<(String, String)>,
+    pub base_contact_exclusions: Vec<(String, String)>,
     /// Owner of every named geom.
     pub geoms: Vec<GeomOwner>,
     /// Joints whose damping is integrated with the drives; see [`crate::drive::implicit`].
@@ -122,11 +122,11 @@ pub(crate) struct LinkFrame {
 /// The tree is deeper than MuJoCo can read.
 pub(crate) fn add(
     description: &RobotDescription,
-    cfg: &RobotCfg<'_>,
+    cfg: &RobotMjcfCfg<'_>,
     mjcf: &mut Mjcf,
     diagnostics: &mut Vec<Diagnostic>,
-) -> Result<RobotLayout, EmitError> {
-    let mut emitter = Emitter {
+) -> Result<RobotLayout, RobotMjcfError> {
+    let mut emitter = RobotWriter {
         description,
         cfg,
         mjcf,
@@ -134,8 +134,8 @@ pub(crate) fn add(
         plan_of: cfg.plans.iter().map(|p| (p.joint, p)).collect(),
         free_joint: None,
         depth: BTreeMap::new(),
-        placed: vec![None; description.links.len()],
-        masses: BTreeMap::new(),
+        link_frames: vec![None; description.links.len()],
+        fused_links: BTreeMap::new(),
         geoms: Vec::new(),
         damped: Vec::new(),
     };
@@ -144,7 +144,7 @@ pub(crate) fn add(
     emitter.couplings_and_actuators();
     let base_pairs = emitter.base_pairs();
     let links = emitter
-        .placed
+        .link_frames
         .iter()
         .map(|placed| {
             // Every link is reachable from the root: `urdf::merge` rejects any other robot.
@@ -152,13 +152,13 @@ pub(crate) fn add(
             LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
         })
         .collect();
-    let Emitter { free_joint, geoms, damped, .. } = emitter;
-    Ok(RobotLayout { links, free_joint, base_pairs, geoms, damped })
+    let RobotWriter { free_joint, geoms, damped, .. } = emitter;
+    Ok(RobotLayout { links, free_joint, base_contact_exclusions: base_pairs, geoms, damped })
 }
 
-struct Emitter<'a, 'm> {
+struct RobotWriter<'a, 'm> {
     description: &'a RobotDescription,
-    cfg: &'a RobotCfg<'a>,
+    cfg: &'a RobotMjcfCfg<'a>,
     mjcf: &'m mut Mjcf,
     diagnostics: &'m mut Vec<Diagnostic>,
     plan_of: BTreeMap<JointId, &'a JointPlan>,
@@ -167,26 +167,27 @@ struct Emitter<'a, 'm> {
     /// Number of bodies above each body of this robot.
     depth: BTreeMap<usize, usize>,
     /// Body and frame of each link.
-    placed: Vec<Option<(usize, Pose)>>,
+    link_frames: Vec<Option<(usize, Pose)>>,
     /// Links fused into each body.
-    masses: BTreeMap<usize, Vec<LinkId>>,
+    fused_links: BTreeMap<usize, Vec<LinkId>>,
     geoms: Vec<GeomOwner>,
     damped: Vec<DampedJoint>,
 }
 
-impl Emitter<'_, '_> {
+impl RobotWriter<'_, '_> {
     fn name(&self, name: &str) -> String {
         format!("{}/{name}", self.cfg.uid)
     }
 
-    fn unused(&self, own: &str) -> String {
-        unused_joint(self.description, self.cfg.uid, own)
+    fn unused_joint_name(&self, own: &str) -> String {
+        unused_joint_name(self.description, self.cfg.uid, own)
     }
 
     /// Adds the links depth first from the root, with a body for each link that moves.
-    fn bodies(&mut self) -> Result<(), EmitError> {
+    fn bodies(&mut self) -> Result<(), RobotMjcfError> {
         let root = self.description.root;
-        let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![Joint::free(self.unused("base"), None)] };
+        let root_joints =
+            if self.cfg.fix_base { Vec::new() } else { vec![Joint::free(self.unused_joint_name("base"), None)] };
         self.free_joint = root_joints.first().map(|joint| joint.name.clone());
         let body = self.push_body(root, 0, self.cfg.base_pose, root_joints)?;
         self.place(root, body, Pose::identity());
@@ -194,14 +195,14 @@ impl Emitter<'_, '_> {
         while let Some(id) = stack.pop() {
             let joint = self.description.joint(id);
             // Parents are placed before their children are pushed.
-            let (parent_body, body_from_parent) = self.placed[joint.parent.0].unwrap_or((0, Pose::identity()));
+            let (parent_body, body_from_parent) = self.link_frames[joint.parent.0].unwrap_or((0, Pose::identity()));
             let body_from_joint = body_from_parent * joint.parent_from_joint;
             if joint.kind == JointKind::Fixed {
                 self.place(joint.child, parent_body, body_from_joint);
             } else {
                 let (parent, pose) = self.parent_for(joint.kind, parent_body, body_from_joint);
                 let mut joints = self.joints(id, parent);
-                self.move_damping(&mut joints);
+                self.move_damping_to_armature(&mut joints);
                 let body = self.push_body(joint.child, parent, pose, joints)?;
                 self.place(joint.child, body, Pose::identity());
             }
@@ -221,11 +222,17 @@ impl Emitter<'_, '_> {
         }
     }
 
-    fn push_body(&mut self, link: LinkId, parent: usize, pose: Pose, joints: Vec<Joint>) -> Result<usize, EmitError> {
+    fn push_body(
+        &mut self,
+        link: LinkId,
+        parent: usize,
+        pose: Pose,
+        joints: Vec<Joint>,
+    ) -> Result<usize, RobotMjcfError> {
         let depth = self.depth.get(&parent).map_or(1, |d| d + 1);
         let described = self.description.link(link);
         if depth > MAX_BODY_DEPTH {
-            return Err(EmitError::TooDeep {
+            return Err(RobotMjcfError::TooDeep {
                 link: described.name.clone(),
                 source_line: described.source.clone(),
                 depth,
@@ -249,8 +256,8 @@ impl Emitter<'_, '_> {
 
     /// Adds the shapes of a link to its body.
     fn place(&mut self, link: LinkId, body: usize, body_from_link: Pose) {
-        self.placed[link.0] = Some((body, body_from_link));
-        self.masses.entry(body).or_default().push(link);
+        self.link_frames[link.0] = Some((body, body_from_link));
+        self.fused_links.entry(body).or_default().push(link);
         let described = self.description.link(link);
         for (i, collision) in described.collisions.iter().enumerate() {
             let name = self.name(&format!("{}/collision{i}", described.name));
@@ -288,13 +295,13 @@ impl Emitter<'_, '_> {
                 });
             }
         }
-        if matches!(self.cfg.purpose, Purpose::Export(_)) {
+        if matches!(self.cfg.dialect, MjcfDialect::Export(_)) {
             let site = Site { name: self.name(&described.name), pose: body_from_link };
             self.mjcf.bodies[body].sites.push(site);
         }
     }
 
-    fn collision_shape(&mut self, geometry: &Geometry, source: &Source) -> Shape {
+    fn collision_shape(&mut self, geometry: &Geometry, source: &SourceLocation) -> Shape {
         match geometry {
             Geometry::Mesh { path, scale, .. } => Shape::Mesh(self.hull_asset(path, scale, source)),
             primitive => primitive_shape(primitive),
@@ -302,7 +309,7 @@ impl Emitter<'_, '_> {
     }
 
     /// Adds the hull of a collision mesh as an inline asset, once per file and scale. Returns the name of the asset.
-    fn hull_asset(&mut self, path: &Path, scale: &Vector3<f64>, source: &Source) -> String {
+    fn hull_asset(&mut self, path: &Path, scale: &Vector3<f64>, source: &SourceLocation) -> String {
         let key = MeshKey::new(path, scale);
         let index = self.cfg.hulls.keys().position(|k| *k == key).unwrap_or(usize::MAX);
         // The slash keeps the name distinct from exported meshes, the uid from hulls of other robots.
@@ -327,10 +334,10 @@ impl Emitter<'_, '_> {
     ) -> Vec<(Shape, Option<[f64; 4]>, Option<String>)> {
         /// Size of a proxy \[m\]: it has a pose, no mass and no contact.
         const PROXY: f64 = 1e-3;
-        match (&self.cfg.purpose, geometry) {
-            (Purpose::Run { .. }, Geometry::Mesh { .. }) => vec![(Shape::Sphere(PROXY), rgba, None)],
-            (Purpose::Run { .. }, primitive) => vec![(primitive_shape(primitive), rgba, None)],
-            (Purpose::Export(assets), Geometry::Mesh { path, scale, .. }) => {
+        match (&self.cfg.dialect, geometry) {
+            (MjcfDialect::Simulation { .. }, Geometry::Mesh { .. }) => vec![(Shape::Sphere(PROXY), rgba, None)],
+            (MjcfDialect::Simulation { .. }, primitive) => vec![(primitive_shape(primitive), rgba, None)],
+            (MjcfDialect::Export(assets), Geometry::Mesh { path, scale, .. }) => {
                 let parts = assets.parts.get(&MeshKey::new(path, scale));
                 // A material of the URDF overrides those of the mesh file (as RViz does).
                 parts
@@ -342,7 +349,7 @@ impl Emitter<'_, '_> {
                     })
                     .collect()
             }
-            (Purpose::Export(_), primitive) => vec![(primitive_shape(primitive), rgba, None)],
+            (MjcfDialect::Export(_), primitive) => vec![(primitive_shape(primitive), rgba, None)],
         }
     }
 
@@ -351,7 +358,11 @@ impl Emitter<'_, '_> {
         let joint = self.description.joint(id);
         let name = self.name(&joint.name);
         let plain = |suffix: &str, kind, axis| Joint {
-            name: if suffix.is_empty() { name.clone() } else { self.unused(&format!("{}{suffix}", joint.name)) },
+            name: if suffix.is_empty() {
+                name.clone()
+            } else {
+                self.unused_joint_name(&format!("{}{suffix}", joint.name))
+            },
             kind,
             axis,
             range: None,
@@ -383,7 +394,7 @@ impl Emitter<'_, '_> {
                 let kind = if joint.kind == JointKind::Prismatic { JointType::Slide } else { JointType::Hinge };
                 let tendon = plan.actuator.is_some() && self.friction_is_tendon();
                 vec![Joint {
-                    range: plan.limit.map(open_range),
+                    range: plan.limit.map(widen_range),
                     damping: plan.damping,
                     frictionloss: if tendon { 0.0 } else { plan.friction },
                     armature: plan.armature,
@@ -396,7 +407,7 @@ impl Emitter<'_, '_> {
     /// Moves viscous damping out of the document where drives are friction rows. Damping B then acts inside the solve
     /// as well: `h B` as armature (in the document, so that every constant that MuJoCo derives from the inertia
     /// includes it) and `-B v` applied in each step.
-    fn move_damping(&mut self, joints: &mut [Joint]) {
+    fn move_damping_to_armature(&mut self, joints: &mut [Joint]) {
         // RK4 evaluates forces inside its step, where no code of this crate runs, and row drives do not support RK4.
         if !self.friction_is_tendon() || self.mjcf.option.integrator == Integrator::Rk4 {
             return;
@@ -411,16 +422,17 @@ impl Emitter<'_, '_> {
     }
 
     fn friction_is_tendon(&self) -> bool {
-        matches!(self.cfg.purpose, Purpose::Run { friction_tendons: true })
+        matches!(self.cfg.dialect, MjcfDialect::Simulation { friction_tendons: true })
     }
 
     /// Sets the mass properties of every body from the links fused into it, repaired where they are physically
     /// impossible.
     fn inertias(&mut self) {
-        let masses = std::mem::take(&mut self.masses);
+        let masses = std::mem::take(&mut self.fused_links);
         for (body, links) in masses {
-            let pose =
-                |link: LinkId| self.placed[link.0].map_or_else(Pose::identity, |(_, body_from_link)| body_from_link);
+            let pose = |link: LinkId| {
+                self.link_frames[link.0].map_or_else(Pose::identity, |(_, body_from_link)| body_from_link)
+            };
             let links = links.into_iter().map(|link| (link, pose(link))).collect();
             let rigid = RigidBody { links, moves: is_moving(&self.mjcf.bodies, body) };
             let Some(BodyInertia { inertia, source }) = fuse(self.description, &rigid, self.diagnostics) else {
@@ -446,7 +458,7 @@ impl Emitter<'_, '_> {
                     source: joint.mimic.as_ref().map(|m| m.source.clone()),
                 });
             }
-            let tendon = self.friction_is_tendon() && (plan.friction > 0.0 || self.cfg.room_for_friction);
+            let tendon = self.friction_is_tendon() && (plan.friction > 0.0 || self.cfg.reserve_friction_tendons);
             add_drive(self.mjcf, self.cfg.uid, joint, plan, tendon);
         }
     }
@@ -454,7 +466,7 @@ impl Emitter<'_, '_> {
     /// Pairs of a fixed base and its child bodies. MuJoCo does not exclude contacts of a body with a parent that is
     /// fixed in the world.
     fn base_pairs(&self) -> Vec<(String, String)> {
-        let Some((base, _)) = self.placed[self.description.root.0].filter(|_| self.cfg.fix_base) else {
+        let Some((base, _)) = self.link_frames[self.description.root.0].filter(|_| self.cfg.fix_base) else {
             return Vec::new();
         };
         let bodies = &self.mjcf.bodies;
@@ -466,7 +478,7 @@ impl Emitter<'_, '_> {
 }
 
 /// Full name of an added joint: `own`, with primes appended while a joint of the files has that name.
-pub(super) fn unused_joint(description: &RobotDescription, uid: &str, own: &str) -> String {
+pub(super) fn unused_joint_name(description: &RobotDescription, uid: &str, own: &str) -> String {
     let mut own = own.to_owned();
     while description.joint_id(&own).is_some() {
         own.push('\'');
@@ -486,15 +498,15 @@ pub(super) fn add_drive(
     let name = format!("{uid}/{}", joint.name);
     // Without stiffness the control is a velocity; without stiffness and damping it is an effort.
     let gain = [actuator.kp, actuator.kd, 1.0].into_iter().find(|&g| g > 0.0).unwrap_or(1.0);
-    let positions = actuator.kp > 0.0 && plan.usable.iter().all(|end| end.is_finite());
+    let positions = actuator.kp > 0.0 && plan.target_range.iter().all(|end| end.is_finite());
     mjcf.actuators.push(Actuator {
         name: name.clone(),
         joint: name.clone(),
         gain,
         kp: actuator.kp,
         kd: actuator.kd,
-        force_limit: Some(plan.max_effort.max(SMALLEST_EFFORT)).filter(|limit| limit.is_finite()),
-        ctrl_range: positions.then_some(plan.usable).map(open_range),
+        force_limit: Some(plan.max_effort.max(MIN_FORCE_LIMIT)).filter(|limit| limit.is_finite()),
+        ctrl_range: positions.then_some(plan.target_range).map(widen_range),
         source: Some(joint.source.clone()),
     });
     if friction_tendon {
@@ -507,12 +519,12 @@ pub(super) fn add_drive(
 }
 
 /// Smallest force limit \[N m or N\]: MuJoCo rejects an empty force range.
-const SMALLEST_EFFORT: f64 = 1e-12;
+const MIN_FORCE_LIMIT: f64 = 1e-12;
 
 /// Widens equal limits, which lock a joint, by a tiny amount: MuJoCo rejects an empty range.
-fn open_range([low, high]: [f64; 2]) -> [f64; 2] {
-    const HAIR: f64 = 1e-9;
-    let hair = HAIR * low.abs().max(1.0);
+fn widen_range([low, high]: [f64; 2]) -> [f64; 2] {
+    const MIN_WIDTH: f64 = 1e-9;
+    let hair = MIN_WIDTH * low.abs().max(1.0);
     if high - low < hair { [low - hair, high + hair] } else { [low, high] }
 }
 
@@ -539,8 +551,8 @@ fn primitive_shape(geometry: &Geometry) -> Shape {
 
 impl VisualAssets {
     /// Adds a mesh part and its material to the document.
-    pub(crate) fn declare(mjcf: &mut Mjcf, mesh: MeshAsset, material: Option<MaterialAsset>) -> VisualPart {
-        let part = VisualPart { mesh: mesh.name.clone(), material: material.as_ref().map(|m| m.name.clone()) };
+    pub(crate) fn declare(mjcf: &mut Mjcf, mesh: MeshAsset, material: Option<MaterialAsset>) -> VisualSubmesh {
+        let part = VisualSubmesh { mesh: mesh.name.clone(), material: material.as_ref().map(|m| m.name.clone()) };
         mjcf.meshes.push(mesh);
         if let Some(material) = material
             && !mjcf.materials.iter().any(|m| m.name == material.name)

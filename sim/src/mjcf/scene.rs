@@ -1,12 +1,12 @@
 //! Ground, terrain, objects and lights of the MJCF document.
 
 use super::document::{
-    Body, ContactSolver, Geom, GeomRole, HeightFieldAsset, Inertial, Joint, Light, MeshAsset, MeshContent, Mjcf, Shape,
-    Surface,
+    Body, ContactParams, ContactSolver, Geom, GeomRole, HeightFieldAsset, Inertial, Joint, Light, MeshAsset,
+    MeshContent, Mjcf, Shape,
 };
-use super::robot::Purpose;
+use super::robot::MjcfDialect;
 use super::scene_names::{MAX_ROBOTS, light_name};
-use crate::light_cfg::{LampKind, LightCfg};
+use crate::light_cfg::{LightCfg, LightKindCfg};
 use crate::objects::mass_properties::MassProperties;
 use crate::objects::restitution;
 use crate::objects::rigid_object_data::{BodyType, RigidObjectData};
@@ -20,14 +20,14 @@ const ALL_BITS: i32 = i32::MAX;
 
 /// Contact bits of the ground and of objects, which collide with everything.
 pub(crate) const WORLD_CONTACT: GeomRole =
-    GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: true };
+    GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, visible: true };
 
 /// Contact bits of robot `index`. It collides with the world and with other robots, and with itself if `self_collision`
 /// is set.
 pub(crate) fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
     let bit = 1 << (index + 1).min(MAX_ROBOTS);
     let conaffinity = if self_collision { ALL_BITS } else { ALL_BITS & !bit };
-    GeomRole::Collision { contype: bit, conaffinity, seen: false }
+    GeomRole::Collision { contype: bit, conaffinity, visible: false }
 }
 
 /// Adds a ground plane at z = 0 \[m\].
@@ -57,7 +57,7 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
     mjcf.height_fields.push(HeightFieldAsset {
         name: cfg.uid.clone(),
         file: terrain_file(index),
-        size: [x, y, terrain.rise(), cfg.thickness],
+        size: [x, y, terrain.elevation_scale(), cfg.thickness],
     });
     // Elevation 0 of MuJoCo is the lowest point.
     let lowest = Pose::translation(0.0, 0.0, terrain.height_range()[0]);
@@ -76,14 +76,14 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
 
 /// Adds a rigid object: a body named by its uid, with the geom `uid/shape` (and `uid/shape1`... for several collision
 /// shapes) and the joint `uid/free`. An object with visual meshes has geoms named `uid/visual` as well.
-pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Purpose<'_>) {
+pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &MjcfDialect<'_>) {
     let cfg = object.cfg();
     let MassProperties { mass, com, axes, moments } = *object.mass_properties();
     let moves = cfg.body_type == BodyType::Dynamic;
     let mut free = Joint::free(format!("{}/free", cfg.uid), None);
     if cfg.linear_damping == cfg.angular_damping {
         free.damping = cfg.linear_damping;
-    } else if matches!(purpose, Purpose::Export(_)) {
+    } else if matches!(purpose, MjcfDialect::Export(_)) {
         mjcf.comments.push(format!(
             "{}: linear damping {} N s/m and angular damping {} N m s/rad are not in this file: a free joint has one.",
             cfg.uid, cfg.linear_damping, cfg.angular_damping
@@ -91,19 +91,19 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
     }
     let mut shapes = vec![format!("{}/shape", cfg.uid)];
     if let Some(mesh) = object.mesh() {
-        shapes.extend((1..mesh.shapes.len()).map(|k| format!("{}/shape{k}", cfg.uid)));
-        for (name, mesh) in shapes.iter().zip(&mesh.shapes) {
+        shapes.extend((1..mesh.collision.len()).map(|k| format!("{}/shape{k}", cfg.uid)));
+        for (name, mesh) in shapes.iter().zip(&mesh.collision) {
             let (vertices, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
             let content = MeshContent::Inline { vertices, triangles };
             mjcf.meshes.push(MeshAsset { name: name.clone(), content, visual: false, source: None });
         }
     }
-    let visuals = visuals(object, purpose);
-    let role = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: visuals.is_empty() };
+    let visuals = visual_geoms(object, purpose);
+    let role = GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, visible: visuals.is_empty() };
     let solver = cfg.restitution.map(|wanted| ContactSolver {
-        reference: restitution::solref(wanted, mjcf.option.timestep),
-        impedance: restitution::IMPEDANCE,
-        weight: restitution::WEIGHT,
+        solref: restitution::solref(wanted, mjcf.option.timestep),
+        solimp: restitution::IMPEDANCE,
+        solmix: restitution::SOLMIX,
     });
     let collision = |shape: String| Geom {
         name: Some(shape.clone()),
@@ -111,7 +111,7 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
         pose: Pose::identity(),
         role,
         friction: cfg.friction,
-        surface: Some(Surface { margin: cfg.contact_margin, solver }),
+        surface: Some(ContactParams { margin: cfg.contact_margin, solver }),
         rgba: Some(cfg.rgba),
         material: None,
         source: None,
@@ -131,7 +131,7 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
 
 /// Visual geoms of an object that looks different from its collision shapes. A simulation has a proxy that only has a
 /// pose, an export has the parts of the mesh file.
-fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
+fn visual_geoms(object: &RigidObjectData, purpose: &MjcfDialect<'_>) -> Vec<Geom> {
     let cfg = object.cfg();
     let Some(key) = object.mesh_key() else { return Vec::new() };
     let visual = |name: String, shape, rgba, material| Geom {
@@ -147,8 +147,8 @@ fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
     };
     let name = format!("{}/visual", cfg.uid);
     match purpose {
-        Purpose::Run { .. } => vec![visual(name, Shape::Sphere(PROXY), None, None)],
-        Purpose::Export(assets) => {
+        MjcfDialect::Simulation { .. } => vec![visual(name, Shape::Sphere(PROXY), None, None)],
+        MjcfDialect::Export(assets) => {
             let parts = assets.parts.get(&key).into_iter().flatten().enumerate();
             parts
                 .map(|(k, part)| {
@@ -165,7 +165,7 @@ const PROXY: f64 = 1e-3;
 
 /// Adds a light. Dome lights are skipped: MuJoCo does not have them, and only the renderers of this project use them.
 pub(crate) fn add_light(mjcf: &mut Mjcf, index: usize, cfg: &LightCfg) {
-    if matches!(cfg.kind, LampKind::Dome { .. }) {
+    if matches!(cfg.kind, LightKindCfg::Dome { .. }) {
         return;
     }
     mjcf.lights.push(Light {

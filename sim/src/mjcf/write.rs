@@ -3,30 +3,30 @@
 //! Differences between the supported MuJoCo versions are handled here, and for parts in `part`.
 
 use super::document::{
-    Actuator, Body, Cone, ContactSolver, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent, Mjcf,
-    Shape,
+    Actuator, Body, ContactSolver, FrictionCone, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent,
+    Mjcf, Shape,
 };
 use super::part::PartLines;
-use crate::light_cfg::LampKind;
-use kinetoscope_mujoco::{CompileError, Target};
+use crate::light_cfg::LightKindCfg;
+use kinetoscope_mujoco::{CompileError, SupportedVersion};
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::fmt::Write as _;
 
 /// MJCF text with the source of each of its lines.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Text {
+pub struct MjcfText {
     /// XML text.
     pub xml: String,
     /// Element of the user's file that caused each line of `xml`.
-    pub sources: Vec<Option<Source>>,
+    pub sources: Vec<Option<SourceLocation>>,
 }
 
-impl Text {
+impl MjcfText {
     /// Adds to a compile error the location in the user's file that caused the line in MuJoCo's message.
     #[must_use]
     pub fn locate(&self, mut error: CompileError) -> CompileError {
-        error.source_line = error
+        error.source_location = error
             .line
             .and_then(|line| self.sources.get(usize::try_from(line).ok()?.checked_sub(1)?))
             .cloned()
@@ -36,8 +36,8 @@ impl Text {
 }
 
 /// Writes the document for `target`.
-pub fn write(mjcf: &Mjcf, target: Target) -> Text {
-    let mut out = Writer {
+pub fn write(mjcf: &Mjcf, target: SupportedVersion) -> MjcfText {
+    let mut out = MjcfWriter {
         xml: String::new(),
         sources: Vec::new(),
         depth: 0,
@@ -45,7 +45,7 @@ pub fn write(mjcf: &Mjcf, target: Target) -> Text {
         friction: [2.0 * mjcf.option.timestep, 1.0],
     };
     out.document(mjcf);
-    Text { xml: out.xml, sources: out.sources }
+    MjcfText { xml: out.xml, sources: out.sources }
 }
 
 /// Impedance of dry friction: MuJoCo's largest. Friction at rest is a stiff damper: under a load below its friction, a
@@ -58,11 +58,11 @@ const FRICTION_IMPEDANCE: &str = "0.9999 0.9999 0.001 0.5 2";
 /// its load would cause; a finger link of 10 g under its own weight would hang 30 mrad low at MuJoCo's default 0.95.
 const COUPLING_IMPEDANCE: &str = "0.9999 0.9999 0.001 0.5 2";
 
-struct Writer {
+struct MjcfWriter {
     xml: String,
-    sources: Vec<Option<Source>>,
+    sources: Vec<Option<SourceLocation>>,
     depth: usize,
-    target: Target,
+    target: SupportedVersion,
     /// `solreffriction` of dry friction in joints.
     friction: [f64; 2],
 }
@@ -143,8 +143,8 @@ fn escape(text: &str) -> String {
     out
 }
 
-impl Writer {
-    fn line(&mut self, text: &str, source: Option<&Source>) {
+impl MjcfWriter {
+    fn line(&mut self, text: &str, source: Option<&SourceLocation>) {
         for _ in 0..self.depth {
             self.xml.push_str("  ");
         }
@@ -153,11 +153,11 @@ impl Writer {
         self.sources.push(source.cloned());
     }
 
-    fn leaf(&mut self, element: Element, source: Option<&Source>) {
+    fn leaf(&mut self, element: Element, source: Option<&SourceLocation>) {
         self.line(&element.leaf(), source);
     }
 
-    fn open(&mut self, element: Element, source: Option<&Source>) {
+    fn open(&mut self, element: Element, source: Option<&SourceLocation>) {
         self.line(&element.open(), source);
         self.depth += 1;
     }
@@ -196,7 +196,7 @@ impl Writer {
         }
         self.parts(mjcf, "actuator", |part| &part.actuators);
         // MuJoCo 2.2.2 requires actuators with an activation after all others.
-        self.parts(mjcf, "actuator", |part| &part.actuators_with_state);
+        self.parts(mjcf, "actuator", |part| &part.stateful_actuators);
         self.parts(mjcf, "sensor", |part| &part.sensors);
         if !mjcf.keyframes.is_empty() {
             self.open(Element::new("keyframe"), None);
@@ -219,14 +219,14 @@ impl Writer {
                 .attr("timestep", number(o.timestep))
                 .numbers("gravity", o.gravity.as_slice())
                 .attr("integrator", o.integrator.name())
-                .attr("cone", if o.cone == Cone::Elliptic { "elliptic" } else { "pyramidal" })
+                .attr("cone", if o.cone == FrictionCone::Elliptic { "elliptic" } else { "pyramidal" })
                 .attr("impratio", number(o.impratio))
                 .attr("iterations", o.iterations),
             None,
         );
         // 2.2.2's defaults (500 rows, 100 contacts) drop contacts silently in plain viewers; 4.x sizes its arena on its
         // own.
-        if self.target == Target::V2 {
+        if self.target == SupportedVersion::V2 {
             self.leaf(Element::new("size").attr("njmax", 1500).attr("nconmax", 300), None);
         }
     }
@@ -289,7 +289,7 @@ impl Writer {
 
     fn mesh(&mut self, mesh: &MeshAsset) {
         let mut element = Element::new("mesh").attr("name", &mesh.name);
-        if mesh.visual && self.target == Target::V4 {
+        if mesh.visual && self.target == SupportedVersion::V4 {
             // A flat or open mesh has no volume: 4.x needs its inertia as a shell; 2.2.2 does not support the
             // attribute.
             element = element.attr("inertia", "shell");
@@ -315,19 +315,19 @@ impl Writer {
         for light in &mjcf.lights {
             let element = Element::new("light").attr("name", &light.name);
             let element = match (light.kind, self.target) {
-                (LampKind::Directional, _) => element.attr("directional", "true"),
-                (LampKind::Spot { cutoff_deg, exponent }, _) => {
+                (LightKindCfg::Directional, _) => element.attr("directional", "true"),
+                (LightKindCfg::Spot { cutoff_deg, exponent }, _) => {
                     element.attr("directional", "false").attr("cutoff", cutoff_deg).attr("exponent", exponent)
                 }
-                (LampKind::Point, Target::V4) => element.attr("type", "point"),
+                (LightKindCfg::Point, SupportedVersion::V4) => element.attr("type", "point"),
                 // As in OpenGL: a cone in all directions. A document has no dome lights.
-                (LampKind::Point | LampKind::Dome { .. }, _) => {
+                (LightKindCfg::Point | LightKindCfg::Dome { .. }, _) => {
                     element.attr("directional", "false").attr("cutoff", 180).attr("exponent", 0)
                 }
             };
             // Defaults of MuJoCo are omitted. A directional light has an angle, not a radius.
             let attenuation = light.attenuation.map(|x| x.to_string()).join(" ");
-            let radius = self.target == Target::V4 && light.kind != LampKind::Directional;
+            let radius = self.target == SupportedVersion::V4 && light.kind != LightKindCfg::Directional;
             let element = element
                 .numbers("pos", light.position.as_slice())
                 .numbers("dir", light.direction.as_slice())
@@ -366,7 +366,7 @@ impl Writer {
             element = element.attr("mocap", "true");
         }
         let is_free = body.joints.iter().any(|joint| joint.kind == JointType::Free);
-        if self.target == Target::V4 && is_free && is_leaf {
+        if self.target == SupportedVersion::V4 && is_free && is_leaf {
             // Otherwise 4.x keeps only the diagonal of the inertia matrix of a centered body without children, and an
             // environment cannot have another center of mass. 2.2.2 does not support the attribute.
             element = element.attr("simple", "false");
@@ -445,7 +445,7 @@ impl Writer {
         element = element.pose(&geom.pose);
         element = match geom.role {
             // MuJoCo's viewers show groups 0 to 2.
-            GeomRole::Collision { contype, conaffinity, seen } => element
+            GeomRole::Collision { contype, conaffinity, visible: seen } => element
                 .attr("contype", contype)
                 .attr("conaffinity", conaffinity)
                 .attr("group", if seen { 0 } else { 3 }),
@@ -458,7 +458,7 @@ impl Writer {
             if surface.margin != 0.0 {
                 element = element.attr("margin", number(surface.margin));
             }
-            if let Some(ContactSolver { reference, impedance, weight }) = &surface.solver {
+            if let Some(ContactSolver { solref: reference, solimp: impedance, solmix: weight }) = &surface.solver {
                 let element_with = element.numbers("solref", reference).numbers("solimp", impedance);
                 element = element_with.attr("solmix", number(*weight));
             }

@@ -14,17 +14,17 @@ impl SimulationManager {
     /// # Errors
     /// A name is unknown (the error lists the nearest names), or both names are the same single body.
     pub fn exclude_collision(&mut self, one: &str, other: &str) -> Result<()> {
-        let bodies = self.contents.bodies_called(one)?;
-        if bodies == self.contents.bodies_called(other)? && bodies.is_none_or(|all| all.len() == 1) {
+        let bodies = self.entities.find_bodies(one)?;
+        if bodies == self.entities.find_bodies(other)? && bodies.is_none_or(|all| all.len() == 1) {
             let (value, expected) = (format!("{:?}", [one, other]), "the two must be different bodies");
             return Err(Error::Config { field: "exclude_collision", value, expected });
         }
         let known = |[a, b]: &[String; 2]| a == one && b == other || a == other && b == one;
-        if self.contents.apart.iter().any(known) {
+        if self.entities.collision_exclusions.iter().any(known) {
             return Ok(());
         }
-        let mut contents = self.contents.clone();
-        contents.apart.push([one.into(), other.into()]);
-        self.replace_contents(contents, Vec::new())
+        let mut contents = self.entities.clone();
+        contents.collision_exclusions.push([one.into(), other.into()]);
+        self.recompile_with(contents, Vec::new())
     }
 }

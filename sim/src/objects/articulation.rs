@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::ids::RobotId;
 use crate::manager::SimulationManager;
 use crate::objects::robot::{Robot, RobotCfg, RobotMut};
-use crate::objects::robot_data::Role;
+use crate::objects::robot_data::RobotKind;
 use crate::objects::robot_file::MjcfFile;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_robot::urdf::UrdfCfg;
@@ -80,7 +80,7 @@ impl Default for ArticulationCfg {
 
 impl ArticulationCfg {
     /// Converts to the equivalent robot configuration and the semantic class.
-    pub(crate) fn into_robot(self) -> (RobotCfg, String) {
+    pub(crate) fn into_robot_cfg(self) -> (RobotCfg, String) {
         let passive = || DriveCfg { drive_type: DriveType::None, ..Default::default() };
         let drive = self.drive.unwrap_or_else(passive);
         let (friction, armature) = (self.friction.or(drive.friction), self.armature.unwrap_or(drive.armature));
@@ -123,8 +123,8 @@ impl SimulationManager {
     /// # Errors
     /// As [`add_robot`](Self::add_robot).
     pub fn add_articulation(&mut self, cfg: ArticulationCfg) -> Result<ArticulationId> {
-        let (cfg, class) = cfg.into_robot();
-        self.add_as(cfg, Role::Articulation(class)).map(ArticulationId)
+        let (cfg, class) = cfg.into_robot_cfg();
+        self.add_with_role(cfg, RobotKind::Articulation(class)).map(ArticulationId)
     }
 
     /// Read access to an articulation.

@@ -1,11 +1,11 @@
 //! Poses and velocities of bodies that are placed in the world: objects and root links of robots.
 
 use crate::body_pose::body_pose;
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::FreeIndex;
-use crate::objects::rows::{Rows, Table, distinct_envs};
+use crate::index::BodyIndexing;
+use crate::objects::rows::{ArgumentSpec, EnvRows, unique_envs};
 use crate::randomization::Property;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
@@ -18,7 +18,7 @@ use ndarray::{Array2, ArrayView2};
 #[derive(Clone, Copy)]
 pub(super) struct FreeBody<'a> {
     pub(super) simulation: &'a Simulation,
-    pub(super) index: FreeIndex,
+    pub(super) index: BodyIndexing,
 }
 
 impl FreeBody<'_> {
@@ -30,7 +30,7 @@ impl FreeBody<'_> {
     /// Velocities of the frame, then angular velocities, in world axes, shape (N, 6); 0 for a fixed body.
     pub(super) fn velocities(&self) -> Array2<f64> {
         self.rows(|env| {
-            let Some((_, dof)) = self.index.joint else { return [0.0; 6] };
+            let Some((_, dof)) = self.index.free_joint else { return [0.0; 6] };
             let v = &env.data().qvel()[dof..dof + 6];
             // MuJoCo stores the angular velocity of a free joint in the axes of the body.
             let angular = body_pose(env.data(), self.index.body).rotation * Vector3::new(v[3], v[4], v[5]);
@@ -38,14 +38,14 @@ impl FreeBody<'_> {
         })
     }
 
-    fn rows<const K: usize>(&self, read: impl Fn(&Env) -> [f64; K]) -> Array2<f64> {
+    fn rows<const K: usize>(&self, read: impl Fn(&SimEnv) -> [f64; K]) -> Array2<f64> {
         self.simulation.batch.gather_rows(read)
     }
 }
 
 /// Storage of the pose of a body that can be placed.
 #[derive(Clone, Copy)]
-enum Place {
+enum PoseStorage {
     /// Indices of the first position and the first degree of freedom of its free joint.
     Joint(usize, usize),
     /// Mocap index of the body.
@@ -55,13 +55,13 @@ enum Place {
 }
 
 /// Checked poses with unit quaternions, by environment.
-pub(super) struct Poses {
-    place: Place,
+pub(super) struct CheckedPoses {
+    place: PoseStorage,
     rows: Vec<(usize, [f64; 7])>,
 }
 
 /// Checked velocities of the six degrees of freedom from `dof` on, by environment.
-pub(super) struct Velocities {
+pub(super) struct CheckedVelocities {
     dof: usize,
     rows: Vec<(usize, [f64; 6])>,
 }
@@ -70,7 +70,7 @@ pub(super) struct Velocities {
 pub(super) struct FreeBodyMut<'a> {
     pub(super) simulation: &'a mut Simulation,
     pub(super) sensors: &'a mut SensorList,
-    pub(super) index: FreeIndex,
+    pub(super) index: BodyIndexing,
     /// Owner of the body in error messages.
     pub(super) owner: &'a str,
 }
@@ -85,7 +85,7 @@ impl FreeBodyMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let poses = self.check_poses(argument, poses, env_ids)?;
-        self.put_poses(&poses)?;
+        self.write_checked_poses(&poses)?;
         let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
         self.sensors.refresh(&envs, self.simulation);
         Ok(())
@@ -97,8 +97,8 @@ impl FreeBodyMut<'_> {
         argument: &'static str,
         poses: ArrayView2<'_, f64>,
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Poses> {
-        let place = self.place()?;
+    ) -> Result<CheckedPoses> {
+        let place = self.pose_storage()?;
         let rows = self.check(argument, 7, "environments, x y z qw qx qy qz", poses, env_ids)?;
         for (row, (_, pose)) in rows.arrays::<7>().enumerate() {
             let norm = pose[3..].iter().map(|q| q * q).sum::<f64>().sqrt();
@@ -111,14 +111,17 @@ impl FreeBodyMut<'_> {
                 });
             }
         }
-        Ok(Poses { place, rows: rows.arrays::<7>().map(|(env, pose)| (env, to_row(&from_row(&pose)))).collect() })
+        Ok(CheckedPoses {
+            place,
+            rows: rows.arrays::<7>().map(|(env, pose)| (env, to_row(&from_row(&pose)))).collect(),
+        })
     }
 
     /// Writes checked poses; the caller refreshes the sensors. MuJoCo may still reject the poses of a static object;
     /// then no pose is written.
-    pub(super) fn put_poses(&mut self, poses: &Poses) -> Result<()> {
+    pub(super) fn write_checked_poses(&mut self, poses: &CheckedPoses) -> Result<()> {
         let (place, body) = (poses.place, self.index.body);
-        if matches!(place, Place::Model) {
+        if matches!(place, PoseStorage::Model) {
             let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
             // Environments are visited in this order.
             let mut rows = poses.rows.iter();
@@ -131,7 +134,7 @@ impl FreeBodyMut<'_> {
         for &(env, row) in &poses.rows {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| match place {
-                    Place::Joint(qpos, dof) => {
+                    PoseStorage::Joint(qpos, dof) => {
                         // The angular velocity is preserved in world axes, as it is read; MuJoCo stores it in the axes
                         // of the body.
                         let before = body_pose(data, body).rotation;
@@ -143,11 +146,11 @@ impl FreeBodyMut<'_> {
                         }
                         data.qpos_mut()[qpos..qpos + 7].copy_from_slice(&row);
                     }
-                    Place::Mocap(mocap) => {
+                    PoseStorage::Mocap(mocap) => {
                         data.mocap_pos_mut()[3 * mocap..3 * mocap + 3].copy_from_slice(&row[..3]);
                         data.mocap_quat_mut()[4 * mocap..4 * mocap + 4].copy_from_slice(&row[3..]);
                     }
-                    Place::Model => {}
+                    PoseStorage::Model => {}
                 });
             });
         }
@@ -174,7 +177,7 @@ impl FreeBodyMut<'_> {
         arm: impl Fn(&mj::Data) -> Vector3<f64>,
     ) -> Result<()> {
         let velocities = self.check_velocities(argument, velocities, env_ids)?;
-        self.put_velocities(&velocities, arm);
+        self.write_checked_velocities(&velocities, arm);
         let envs: Vec<usize> = velocities.rows.iter().map(|(env, _)| *env).collect();
         self.sensors.refresh(&envs, self.simulation);
         Ok(())
@@ -186,19 +189,23 @@ impl FreeBodyMut<'_> {
         argument: &'static str,
         velocities: ArrayView2<'_, f64>,
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Velocities> {
-        let dof = match self.place()? {
-            Place::Joint(_, dof) => dof,
-            Place::Mocap(_) => return Err(Error::NotDynamic { argument, object: self.owner.into() }),
-            Place::Model => return Err(Error::FixedBody(self.owner.into())),
+    ) -> Result<CheckedVelocities> {
+        let dof = match self.pose_storage()? {
+            PoseStorage::Joint(_, dof) => dof,
+            PoseStorage::Mocap(_) => return Err(Error::NotDynamic { argument, object: self.owner.into() }),
+            PoseStorage::Model => return Err(Error::FixedBody(self.owner.into())),
         };
         let rows = self.check(argument, 6, "environments, vx vy vz wx wy wz", velocities, env_ids)?;
-        Ok(Velocities { dof, rows: rows.arrays::<6>().collect() })
+        Ok(CheckedVelocities { dof, rows: rows.arrays::<6>().collect() })
     }
 
     /// Writes checked velocities as [`write_velocities_of`](Self::write_velocities_of) does; the caller refreshes the
     /// sensors.
-    pub(super) fn put_velocities(&mut self, velocities: &Velocities, arm: impl Fn(&mj::Data) -> Vector3<f64>) {
+    pub(super) fn write_checked_velocities(
+        &mut self,
+        velocities: &CheckedVelocities,
+        arm: impl Fn(&mj::Data) -> Vector3<f64>,
+    ) {
         let (dof, body) = (velocities.dof, self.index.body);
         for &(env, v) in &velocities.rows {
             self.simulation.batch.write(env, |env| {
@@ -213,12 +220,13 @@ impl FreeBodyMut<'_> {
         }
     }
 
-    fn place(&self) -> Result<Place> {
-        let FreeIndex { joint, mocap, .. } = self.index;
-        let joint = joint.map(|(qpos, dof)| Place::Joint(qpos, dof));
+    fn pose_storage(&self) -> Result<PoseStorage> {
+        let BodyIndexing { free_joint: joint, mocap, .. } = self.index;
+        let joint = joint.map(|(qpos, dof)| PoseStorage::Joint(qpos, dof));
         // Among fixed bodies, only objects can be moved: the base of a robot is where its description says.
-        let stands = self.simulation.objects.iter().any(|object| object.stands() && object.body == self.index.body);
-        let place = joint.or(mocap.map(Place::Mocap)).or(stands.then_some(Place::Model));
+        let is_static =
+            self.simulation.objects.iter().any(|object| object.is_static() && object.body == self.index.body);
+        let place = joint.or(mocap.map(PoseStorage::Mocap)).or(is_static.then_some(PoseStorage::Model));
         place.ok_or_else(|| Error::FixedBody(self.owner.into()))
     }
 
@@ -235,7 +243,7 @@ impl FreeBodyMut<'_> {
     }
 
     /// Refreshes the sensors in the environments of written poses.
-    pub(super) fn refresh(&mut self, poses: &Poses) {
+    pub(super) fn refresh_sensors(&mut self, poses: &CheckedPoses) {
         let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
         self.sensors.refresh(&envs, self.simulation);
     }
@@ -247,9 +255,14 @@ impl FreeBodyMut<'_> {
         meaning: &'static str,
         values: ArrayView2<'v, f64>,
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Rows<'v>> {
+    ) -> Result<EnvRows<'v>> {
         let of = |_| format!("{:?}", self.owner);
-        distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
-        Rows::check(Table { argument, meaning, columns, of: &of }, values, env_ids, self.simulation.batch.num_envs())
+        unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        EnvRows::check(
+            ArgumentSpec { argument, meaning, columns, column_label: &of },
+            values,
+            env_ids,
+            self.simulation.batch.num_envs(),
+        )
     }
 }

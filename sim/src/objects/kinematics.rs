@@ -1,13 +1,15 @@
 //! Forward kinematics, Jacobians and inverse kinematics of robots in a simulation.
 
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list};
 use crate::objects::robot::Robot;
-use crate::objects::robot_data::{check_pose, unknown};
-use crate::objects::rows::{Rows, Table};
-use kinetoscope_robot::description::{FileDrive, JointId, JointKind, LinkId};
-use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, KinematicsError, Posture, Tip, TipName, link_poses};
+use crate::objects::robot_data::{check_pose, unknown_name_error};
+use crate::objects::rows::{ArgumentSpec, EnvRows};
+use kinetoscope_robot::description::{FileActuation, JointId, JointKind, LinkId};
+use kinetoscope_robot::kinematics::{
+    Chain, IkCfg, IkSolver, KinematicsError, NullSpacePosture, TipFrame, TipSelector, link_poses,
+};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use kinetoscope_sensors::camera::{CameraError, Poses};
@@ -34,8 +36,8 @@ pub struct IkResult {
     pub seed: Array1<u32>,
 }
 
-/// [`Tip`] that is resolved for a robot.
-struct Resolved {
+/// [`TipFrame`] that is resolved for a robot.
+struct ResolvedTip {
     chain: Chain,
     /// Columns of `qpos` of the selected joints, which are the columns of all arrays.
     columns: Vec<usize>,
@@ -58,7 +60,7 @@ impl Robot<'_> {
     pub fn compute_fk<'t, 'n>(
         &self,
         qpos: impl AsArray<'t, f64, Ix2>,
-        tip: impl Into<Tip<'n>>,
+        tip: impl Into<TipFrame<'n>>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Array2<f64>> {
         let resolved = self.resolve(&tip.into())?;
@@ -66,8 +68,8 @@ impl Robot<'_> {
         let mut poses = Array2::zeros((rows.envs().len(), 7));
         let mut positions = vec![0.0; self.dof()];
         for (i, (env, row)) in rows.iter().enumerate() {
-            let env_from_base = self.present(env, resolved.chain.base(), &mut positions);
-            put(&resolved.columns, row, &mut positions);
+            let env_from_base = self.read_positions(env, resolved.chain.base(), &mut positions);
+            scatter(&resolved.columns, row, &mut positions);
             let pose = env_from_base * resolved.chain.pose(&positions);
             poses.row_mut(i).assign(&ArrayView1::from(&to_row(&pose)));
         }
@@ -92,7 +94,7 @@ impl Robot<'_> {
         let mut poses = Array3::zeros((rows.envs().len(), links, 7));
         let mut positions = vec![0.0; self.dof()];
         for (i, (env, row)) in rows.iter().enumerate() {
-            put(&columns, row, &mut positions);
+            scatter(&columns, row, &mut positions);
             let standing = |link| self.simulation.batch.read(env, |env| self.link_in(env, link));
             for (link, pose) in link_poses(description, &positions, standing).iter().take(links).enumerate() {
                 for (k, value) in to_row(pose).into_iter().enumerate() {
@@ -114,22 +116,22 @@ impl Robot<'_> {
     /// As [`compute_fk`](Self::compute_fk).
     pub fn jacobian<'n>(
         &self,
-        tip: impl Into<Tip<'n>>,
+        tip: impl Into<TipFrame<'n>>,
         qpos: Option<ArrayView2<'_, f64>>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Array3<f64>> {
-        let Resolved { chain, columns, .. } = self.resolve(&tip.into())?;
+        let ResolvedTip { chain, columns, .. } = self.resolve(&tip.into())?;
         let present = self.qpos();
         let rows = qpos.map(|qpos| self.part_rows("jacobian", qpos, &columns, env_ids)).transpose()?;
         let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
         let mut jacobians = Array3::zeros((envs.len(), 6, columns.len()));
         let mut positions = vec![0.0; self.dof()];
         let mut of_joint = vec![Vector6::zeros(); self.dof()];
-        let mut given = rows.as_ref().map(Rows::iter);
+        let mut given = rows.as_ref().map(EnvRows::iter);
         for (i, &env) in envs.iter().enumerate() {
-            let env_from_base = self.present(env, chain.base(), &mut positions);
+            let env_from_base = self.read_positions(env, chain.base(), &mut positions);
             match given.as_mut().and_then(Iterator::next) {
-                Some((_, row)) => put(&columns, row, &mut positions),
+                Some((_, row)) => scatter(&columns, row, &mut positions),
                 None => positions.iter_mut().zip(present.row(env)).for_each(|(position, now)| *position = *now),
             }
             chain.jacobian(&positions, &mut of_joint);
@@ -211,12 +213,12 @@ impl Robot<'_> {
     pub fn compute_ik<'n>(
         &self,
         targets: &(impl Poses + ?Sized),
-        tip: impl Into<Tip<'n>>,
+        tip: impl Into<TipFrame<'n>>,
         cfg: &IkCfg,
         initial: Option<ArrayView2<'_, f64>>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<IkResult> {
-        let Resolved { chain, columns, of, link } = self.resolve(&tip.into())?;
+        let ResolvedTip { chain, columns, of, link } = self.resolve(&tip.into())?;
         let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
         let targets = targets.to_poses().map_err(|error| target_error(error, envs.len()))?;
         if targets.len() != envs.len() && targets.len() != 1 {
@@ -236,21 +238,21 @@ impl Robot<'_> {
             .filter(|&k| self.data.plans()[columns[k]].mimic.is_none() && chain.is_moved_by(columns[k]))
             .collect();
         if free.is_empty() {
-            return Err(self.nothing_moves(&chain, of, link));
+            return Err(self.no_moving_joint(&chain, of, link));
         }
-        if let Some(column) = self.curve_follower(&chain, &free.iter().map(|&k| columns[k]).collect::<Vec<_>>()) {
+        if let Some(column) = self.polynomial_follower(&chain, &free.iter().map(|&k| columns[k]).collect::<Vec<_>>()) {
             let (joint, link) = (self.joint_names()[column].clone(), self.description().link(link).name.clone());
-            return Err(self.kinematics_error(KinematicsError::CurveFollower { joint, link }));
+            return Err(self.kinematics_error(KinematicsError::PolynomialCoupling { joint, link }));
         }
         let mut variable_of = vec![None; self.dof()];
         free.iter().enumerate().for_each(|(variable, &k)| variable_of[columns[k]] = Some(variable));
-        let limits = free.iter().map(|&k| self.data.plans()[columns[k]].usable).collect();
-        let posture = cfg
-            .posture
-            .as_ref()
-            .map(|posture| Posture { rest: free.iter().map(|&k| posture.rest[k]).collect(), ..posture.clone() });
+        let limits = free.iter().map(|&k| self.data.plans()[columns[k]].target_range).collect();
+        let posture = cfg.posture.as_ref().map(|posture| NullSpacePosture {
+            rest: free.iter().map(|&k| posture.rest[k]).collect(),
+            ..posture.clone()
+        });
         let cfg = IkCfg { posture, ..cfg.clone() };
-        let bound = chain.held(&free.iter().map(|&k| columns[k]).collect::<Vec<_>>(), &vec![0.0; self.dof()]);
+        let bound = chain.reduced(&free.iter().map(|&k| columns[k]).collect::<Vec<_>>(), &vec![0.0; self.dof()]);
         let mut solver = IkSolver::new(bound, limits, cfg).map_err(|error| self.kinematics_error(error))?;
 
         let mut result = IkResult {
@@ -263,13 +265,13 @@ impl Robot<'_> {
         };
         let followers = self.mimic_drivers();
         let (mut positions, mut start) = (vec![0.0; self.dof()], vec![0.0; free.len()]);
-        let mut given = rows.as_ref().map(Rows::iter);
+        let mut given = rows.as_ref().map(EnvRows::iter);
         for (i, &env) in envs.iter().enumerate() {
-            let env_from_base = self.present(env, chain.base(), &mut positions);
+            let env_from_base = self.read_positions(env, chain.base(), &mut positions);
             if let Some((_, row)) = given.as_mut().and_then(Iterator::next) {
-                put(&columns, row, &mut positions);
+                scatter(&columns, row, &mut positions);
             }
-            chain.hold_into(&variable_of, &positions, solver.chain_mut());
+            chain.reduce_into(&variable_of, &positions, solver.chain_mut());
             start.iter_mut().zip(&free).for_each(|(start, &k)| *start = positions[columns[k]]);
             let target = env_from_base.inv_mul(&targets[if targets.len() == 1 { 0 } else { i }]);
             let found = solver.solve(&target, &start).map_err(|error| self.kinematics_error(error))?;
@@ -289,16 +291,16 @@ impl Robot<'_> {
     }
 
     /// Resolves the link and the joints that `tip` names.
-    fn resolve(&self, tip: &Tip<'_>) -> Result<Resolved> {
+    fn resolve(&self, tip: &TipFrame<'_>) -> Result<ResolvedTip> {
         check_pose("tcp", &tip.tcp)?;
         let part = match tip.name {
-            TipName::Part(part) => Some(part),
-            TipName::Link(_) => None,
-            TipName::Either(name) if self.control_parts().contains(&name) => Some(name),
-            TipName::Either(name) if self.description().link_id(name).is_some() => None,
-            TipName::Either(name) => {
+            TipSelector::Part(part) => Some(part),
+            TipSelector::Link(_) => None,
+            TipSelector::PartOrLink(name) if self.control_parts().contains(&name) => Some(name),
+            TipSelector::PartOrLink(name) if self.description().link_id(name).is_some() => None,
+            TipSelector::PartOrLink(name) => {
                 let names = self.control_parts().into_iter().chain(self.link_names());
-                return Err(unknown("control part or link", name, names));
+                return Err(unknown_name_error("control part or link", name, names));
             }
         };
         let (columns, of): (Vec<usize>, String) = match part {
@@ -309,17 +311,17 @@ impl Robot<'_> {
             None => ((0..self.dof()).collect(), "the robot".into()),
         };
         let link = match (tip.link, tip.name) {
-            (Some(link), _) | (None, TipName::Link(link)) => self.link_id(link)?,
-            (None, TipName::Part(name) | TipName::Either(name)) => match part {
+            (Some(link), _) | (None, TipSelector::Link(link)) => self.link_id(link)?,
+            (None, TipSelector::Part(name) | TipSelector::PartOrLink(name)) => match part {
                 Some(part) => self.end_of(part, &columns)?,
                 None => self.link_id(name)?,
             },
         };
         let chain = Chain::new(self.description(), link, &tip.tcp).map_err(|error| self.kinematics_error(error))?;
-        Ok(Resolved { chain, columns, of, link })
+        Ok(ResolvedTip { chain, columns, of, link })
     }
 
-    /// Link at the end of a part: see [`Tip::of_part`].
+    /// Link at the end of a part: see [`TipFrame::of_part`].
     fn end_of(&self, part: &str, columns: &[usize]) -> Result<LinkId> {
         let description = self.description();
         let child = |column: usize| description.joint(self.data.plans()[column].joint).child;
@@ -334,12 +336,12 @@ impl Robot<'_> {
             moved.iter().copied().filter(|end| !moved.iter().any(|&other| above(other).any(|l| l == *end))).collect();
         let [mut end] = ends[..] else {
             let error = match ends.is_empty() {
-                true => KinematicsError::NothingMoves {
+                true => KinematicsError::NoMovingJoint {
                     of: format!("control part {part:?}, which is empty,"),
                     link: description.link(description.root).name.clone(),
-                    movers: Vec::new(),
+                    moving_joints: Vec::new(),
                 },
-                false => KinematicsError::SeveralTips {
+                false => KinematicsError::AmbiguousTip {
                     part: part.into(),
                     links: ends.iter().map(|&l| description.link(l).name.clone()).collect(),
                 },
@@ -362,33 +364,33 @@ impl Robot<'_> {
 
     /// Finds a joint that moves the end of the chain by a polynomial coupling, and that is searched or follows a
     /// searched joint.
-    fn curve_follower(&self, chain: &Chain, free: &[usize]) -> Option<usize> {
+    fn polynomial_follower(&self, chain: &Chain, free: &[usize]) -> Option<usize> {
         let (description, plans) = (self.description(), self.data.plans());
         let column_of = |joint: JointId| plans.iter().position(|plan| plan.joint == joint);
         (0..plans.len()).filter(|&column| chain.is_moved_by(column)).find(|&column| {
             let Some(defaults) = description.joint(plans[column].joint).defaults else { return false };
-            let FileDrive::Coupled(curve) = defaults.drive else { return false };
+            let FileActuation::Coupled(curve) = defaults.drive else { return false };
             let driver = curve.and_then(|curve| curve.joint).map(|joint| description.mimic_driver(joint).0);
             free.contains(&column) || driver.and_then(column_of).is_some_and(|driver| free.contains(&driver))
         })
     }
 
-    fn nothing_moves(&self, chain: &Chain, of: String, link: LinkId) -> Error {
+    fn no_moving_joint(&self, chain: &Chain, of: String, link: LinkId) -> Error {
         let movers = (0..self.dof()).filter(|&column| chain.is_moved_by(column));
-        self.kinematics_error(KinematicsError::NothingMoves {
+        self.kinematics_error(KinematicsError::NoMovingJoint {
             of,
             link: self.description().link(link).name.clone(),
-            movers: movers.map(|column| self.joint_names()[column].clone()).collect(),
+            moving_joints: movers.map(|column| self.joint_names()[column].clone()).collect(),
         })
     }
 
     fn kinematics_error(&self, error: KinematicsError) -> Error {
-        Error::Kinematics { robot: self.data.named(), error: Box::new(error) }
+        Error::Kinematics { robot: self.data.label(), error: Box::new(error) }
     }
 
     /// Fills `positions` with the current positions of all joints in an environment, and returns the pose of the link
     /// `base`.
-    fn present(&self, env: usize, base: LinkId, positions: &mut [f64]) -> Pose {
+    fn read_positions(&self, env: usize, base: LinkId, positions: &mut [f64]) -> Pose {
         self.simulation.batch.read(env, |env| {
             for (position, joint) in positions.iter_mut().zip(&self.indexing().joints) {
                 *position = env.data().qpos()[joint.qpos];
@@ -397,7 +399,7 @@ impl Robot<'_> {
         })
     }
 
-    fn link_in(&self, env: &Env, link: LinkId) -> Pose {
+    fn link_in(&self, env: &SimEnv, link: LinkId) -> Pose {
         self.indexing().links[link.0].pose(env.data())
     }
 
@@ -408,14 +410,15 @@ impl Robot<'_> {
         values: ArrayView2<'v, f64>,
         columns: &[usize],
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Rows<'v>> {
+    ) -> Result<EnvRows<'v>> {
         let of = |column: usize| format!("joint {:?}", self.joint_names()[columns[column]]);
-        let table = Table { argument, meaning: "environments, joints", columns: columns.len(), of: &of };
-        Rows::check(table, values, env_ids, self.simulation.batch.num_envs())
+        let table =
+            ArgumentSpec { argument, meaning: "environments, joints", columns: columns.len(), column_label: &of };
+        EnvRows::check(table, values, env_ids, self.simulation.batch.num_envs())
     }
 }
 
-fn put(columns: &[usize], row: ArrayView1<'_, f64>, positions: &mut [f64]) {
+fn scatter(columns: &[usize], row: ArrayView1<'_, f64>, positions: &mut [f64]) {
     for (&column, &value) in columns.iter().zip(row) {
         positions[column] = value;
     }
@@ -430,7 +433,7 @@ fn target_error(error: CameraError, envs: usize) -> Error {
             Error::Shape { argument, found, expected, meaning: "environments, x y z qw qx qy qz" }
         }
         CameraError::Pose { row, pose } => match pose.iter().position(|x| !x.is_finite()) {
-            Some(column) => Error::NotFinite { argument, row, column, of: "target".into(), value: pose[column] },
+            Some(column) => Error::NotFinite { argument, row, column, item: "target".into(), value: pose[column] },
             None => Error::Config {
                 field: "target of compute_ik",
                 value: format!("{pose:?} in row {row}"),

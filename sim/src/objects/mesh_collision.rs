@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::objects::rigid_object_data::{BodyType, RigidObjectCfg};
 use crate::objects::shape::ObjectShape;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::mesh::{HullCache, HullCfg, MeshError, PiecesCfg, TriMesh, prisms};
+use kinetoscope_scene::mesh::{ConvexDecompositionCfg, HullCache, HullCfg, MeshError, TriMesh, prisms};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ pub enum MeshCollision {
     /// [`ObjectShape::Mesh`], and cached on disk with the hulls. A diagnostic reports when the pieces are too few for
     /// the tolerance. Each piece costs time while another body is near the object. Together they contain everything
     /// that a closed mesh encloses; for an open mesh, which a diagnostic names, they contain the surface.
-    Pieces(PiecesCfg),
+    Pieces(ConvexDecompositionCfg),
     /// Every triangle exactly as in the file, as the front of a prism. This is for static and kinematic objects of up
     /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it. A body that
     /// penetrates the front by more than that falls through. Bodies at rest lie where they should. Bodies that slide
@@ -49,7 +49,7 @@ impl MeshCollision {
             _ if !matches!(cfg.shape, ObjectShape::Mesh { .. }) => {
                 fail("only an ObjectShape::Mesh collides in pieces or triangles; leave it MeshCollision::Hull")
             }
-            Self::Pieces(PiecesCfg { max_pieces, tolerance }) => {
+            Self::Pieces(ConvexDecompositionCfg { max_pieces, tolerance }) => {
                 let good = (1..=1024).contains(max_pieces) && *tolerance > 0.0 && tolerance.is_finite();
                 if good { Ok(()) } else { fail("max_pieces must be 1 to 1024, the tolerance a length above 0 m") }
             }
@@ -89,7 +89,7 @@ impl MeshCollision {
         match self {
             Self::Hull => Ok(vec![Arc::new(cache.hull_of_file(path, scale, hull).map_err(failed)?)]),
             Self::Pieces(cfg) => {
-                let pieces = cache.pieces_of_file(path, scale, hull, cfg).map_err(failed)?;
+                let pieces = cache.decomposition_of_file(path, scale, hull, cfg).map_err(failed)?;
                 if pieces.depth > cfg.tolerance {
                     let (count, depth) = (pieces.hulls.len(), pieces.depth);
                     diagnostics.push(Diagnostic::new(

@@ -1,12 +1,12 @@
 //! MJCF parts in a running simulation: read and write access.
 
-use super::mjcf_part_data::{ActuatorIndex, MjcfCfg, MjcfData};
+use super::mjcf_part_data::{ActuatorIndex, MjcfData, MjcfPartCfg};
 use crate::body_pose::BodyFrame;
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::PartIndex;
-use crate::objects::rows::{Rows, Table, check_distinct, distinct_envs};
+use crate::index::MjcfIndexing;
+use crate::objects::rows::{ArgumentSpec, EnvRows, check_unique_columns, unique_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
@@ -29,8 +29,8 @@ impl<'a> MjcfPart<'a> {
         Self { data, simulation, index }
     }
 
-    fn places(&self) -> &'a PartIndex {
-        &self.simulation.parts[self.index]
+    fn indices(&self) -> &'a MjcfIndexing {
+        &self.simulation.mjcf_models[self.index]
     }
 
     /// Name of the part.
@@ -39,7 +39,7 @@ impl<'a> MjcfPart<'a> {
     }
 
     /// Configuration that the part was added with.
-    pub fn cfg(&self) -> &'a MjcfCfg {
+    pub fn cfg(&self) -> &'a MjcfPartCfg {
         self.data.cfg()
     }
 
@@ -116,7 +116,7 @@ impl<'a> MjcfPart<'a> {
 
     fn select<P: AsRef<str>>(&self, patterns: &[P], names: &[String], what: &'static str) -> Result<Vec<usize>> {
         pattern::select(patterns, names, what)
-            .map_err(|error| Error::MjcfNames { part: self.uid().into(), error: Box::new(error) })
+            .map_err(|error| Error::MjcfNames { uid: self.uid().into(), error: Box::new(error) })
     }
 
     /// Sum of the masses of its bodies \[kg\] in the file. Randomized masses of environments are not included: see
@@ -128,29 +128,29 @@ impl<'a> MjcfPart<'a> {
     /// Positions of its joints in MuJoCo's layout \[m, rad, quaternions w x y z\], in the environment, shape (N, nq).
     #[doc(alias = "get_qpos")]
     pub fn qpos(&self) -> Array2<f64> {
-        self.rows(&self.places().qpos, |env, place| env.data().qpos()[place])
+        self.rows(&self.indices().qpos, |env, place| env.data().qpos()[place])
     }
 
     /// Velocities of its joints in MuJoCo's layout \[m/s, rad/s\], shape (N, nv).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
-        self.rows(&self.places().dofs, |env, place| env.data().qvel()[place])
+        self.rows(&self.indices().dofs, |env, place| env.data().qvel()[place])
     }
 
     /// Controls of its actuators, in the units that the file gives them, shape (N, nu).
     #[doc(alias = "get_ctrl")]
     pub fn ctrl(&self) -> Array2<f64> {
-        self.rows(&self.places().controls, |env, place| env.data().ctrl()[place])
+        self.rows(&self.indices().controls, |env, place| env.data().ctrl()[place])
     }
 
     /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step. After a
     /// reset or a write they are 0, or those of the current state if a sensor needs solved quantities.
     #[doc(alias = "get_actuator_force")]
     pub fn actuator_force(&self) -> Array2<f64> {
-        self.rows(&self.places().actuators, |env, place| env.data().actuator_force()[place])
+        self.rows(&self.indices().actuators, |env, place| env.data().actuator_force()[place])
     }
 
-    fn rows(&self, places: &[usize], read: impl Fn(&Env, usize) -> f64) -> Array2<f64> {
+    fn rows(&self, places: &[usize], read: impl Fn(&SimEnv, usize) -> f64) -> Array2<f64> {
         self.simulation.batch.gather(places, |env, &place| read(env, place))
     }
 
@@ -160,7 +160,7 @@ impl<'a> MjcfPart<'a> {
     /// The body does not exist; the error lists the nearest names.
     pub fn body_pose(&self, name: &str) -> Result<Array2<f64>> {
         let body = self.find("body", name, self.body_names())? + 1;
-        Ok(self.poses(&BodyFrame::of_body(self.places().bodies[body])))
+        Ok(self.poses(&BodyFrame::of_body(self.indices().bodies[body])))
     }
 
     /// Pose of a site in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
@@ -170,7 +170,7 @@ impl<'a> MjcfPart<'a> {
     pub fn site_pose(&self, name: &str) -> Result<Array2<f64>> {
         let site = self.find("site", name, self.site_names())?;
         let (p, q) = (&self.model().site_pos()[3 * site..], &self.model().site_quat()[4 * site..]);
-        let body = self.places().bodies[self.model().site_bodyid()[site] as usize];
+        let body = self.indices().bodies[self.model().site_bodyid()[site] as usize];
         let body_from_frame = from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]);
         Ok(self.poses(&BodyFrame { body, body_from_frame }))
     }
@@ -179,7 +179,7 @@ impl<'a> MjcfPart<'a> {
         names.iter().position(|known| known == name).ok_or_else(|| Error::UnknownName {
             what,
             name: name.into(),
-            candidates: pattern::closest(name, names.iter().map(String::as_str))
+            candidates: pattern::closest_names(name, names.iter().map(String::as_str))
                 .into_iter()
                 .map(String::from)
                 .collect(),
@@ -234,7 +234,7 @@ impl<'a> MjcfPartMut<'a> {
         actuators: Option<&[ActuatorIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let all = &self.simulation.parts[self.index].controls;
+        let all = &self.simulation.mjcf_models[self.index].controls;
         let count = all.len();
         let exists = |&ActuatorIndex(index): &ActuatorIndex| {
             if index < count { Ok(index) } else { Err(Error::UnknownIndex { what: "actuator", index, count }) }
@@ -245,10 +245,15 @@ impl<'a> MjcfPartMut<'a> {
         };
         let places: Vec<usize> = chosen.iter().map(|&index| all[index]).collect();
         let of = |column: usize| format!("actuator {:?}", self.data.names.actuators[chosen[column]]);
-        check_distinct("set_ctrl", &chosen, &of)?;
-        distinct_envs("set_ctrl", env_ids, self.simulation.batch.num_envs())?;
-        let table = Table { argument: "set_ctrl", meaning: "environments, actuators", columns: chosen.len(), of: &of };
-        let rows = Rows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
+        check_unique_columns("set_ctrl", &chosen, &of)?;
+        unique_envs("set_ctrl", env_ids, self.simulation.batch.num_envs())?;
+        let table = ArgumentSpec {
+            argument: "set_ctrl",
+            meaning: "environments, actuators",
+            columns: chosen.len(),
+            column_label: &of,
+        };
+        let rows = EnvRows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
         for (env, row) in rows.iter() {
             self.simulation.batch.write(env, |env| {
                 env.set_controls(|controls| {
@@ -267,14 +272,14 @@ impl<'a> MjcfPartMut<'a> {
     /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;
     /// then nothing is written.
     pub fn write_qpos<'t>(&mut self, positions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
-        let places = self.simulation.parts[self.index].qpos.clone();
-        let rows = self.checked("write_qpos", positions.into(), &places, env_ids)?;
+        let places = self.simulation.mjcf_models[self.index].qpos.clone();
+        let rows = self.checked_rows("write_qpos", positions.into(), &places, env_ids)?;
         let quaternions = self.quaternions();
         let normalised: Vec<(usize, Vec<f64>)> = rows
             .iter()
             .map(|(env, row)| {
                 let mut row = row.to_vec();
-                quaternions.iter().try_for_each(|&first| normalise("write_qpos", &mut row, first))?;
+                quaternions.iter().try_for_each(|&first| normalize_quaternion("write_qpos", &mut row, first))?;
                 Ok((env, row))
             })
             .collect::<Result<_>>()?;
@@ -296,8 +301,8 @@ impl<'a> MjcfPartMut<'a> {
     /// # Errors
     /// Wrong shape, an unknown or repeated environment, or a value that is not finite; then nothing is written.
     pub fn write_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
-        let places = self.simulation.parts[self.index].dofs.clone();
-        let rows = self.checked("write_qvel", velocities.into(), &places, env_ids)?;
+        let places = self.simulation.mjcf_models[self.index].dofs.clone();
+        let rows = self.checked_rows("write_qvel", velocities.into(), &places, env_ids)?;
         for (env, row) in rows.iter() {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| {
@@ -328,20 +333,24 @@ impl<'a> MjcfPartMut<'a> {
         let found = by_hand.iter().find(|&&b| names[b] == body).ok_or_else(|| Error::UnknownName {
             what: "body moved by hand (mocap) called",
             name: body.into(),
-            candidates: pattern::closest(body, by_hand.iter().map(|&b| names[b].as_str()))
+            candidates: pattern::closest_names(body, by_hand.iter().map(|&b| names[b].as_str()))
                 .into_iter()
                 .map(String::from)
                 .collect(),
         })?;
-        let here = self.simulation.parts[self.index].bodies[*found];
+        let here = self.simulation.mjcf_models[self.index].bodies[*found];
         let mocap = self.simulation.batch.model().body_mocapid()[here];
         let of = |_| format!("body {body:?}");
-        let table =
-            Table { argument: "write_mocap_pose", meaning: "environments, x y z qw qx qy qz", columns: 7, of: &of };
-        distinct_envs(table.argument, env_ids, self.simulation.batch.num_envs())?;
-        let rows = Rows::check(table, poses.into(), env_ids, self.simulation.batch.num_envs())?;
+        let table = ArgumentSpec {
+            argument: "write_mocap_pose",
+            meaning: "environments, x y z qw qx qy qz",
+            columns: 7,
+            column_label: &of,
+        };
+        unique_envs(table.argument, env_ids, self.simulation.batch.num_envs())?;
+        let rows = EnvRows::check(table, poses.into(), env_ids, self.simulation.batch.num_envs())?;
         let mut places: Vec<(usize, [f64; 7])> = rows.arrays::<7>().collect();
-        places.iter_mut().try_for_each(|(_, pose)| normalise("write_mocap_pose", pose, 3))?;
+        places.iter_mut().try_for_each(|(_, pose)| normalize_quaternion("write_mocap_pose", pose, 3))?;
         let mocap = usize::try_from(mocap).map_err(|_| Error::FixedBody(body.into()))?;
         for (env, [x, y, z, quaternion @ ..]) in places {
             self.simulation.batch.write(env, |env| {
@@ -369,22 +378,27 @@ impl<'a> MjcfPartMut<'a> {
         (0..model.njnt()).filter_map(first).collect()
     }
 
-    fn checked<'v>(
+    fn checked_rows<'v>(
         &self,
         argument: &'static str,
         values: ArrayView2<'v, f64>,
         places: &[usize],
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Rows<'v>> {
+    ) -> Result<EnvRows<'v>> {
         let of = |_| format!("part {:?}", self.data.uid());
-        let table = Table { argument, meaning: "environments, numbers of the joints", columns: places.len(), of: &of };
-        distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
-        Rows::check(table, values, env_ids, self.simulation.batch.num_envs())
+        let table = ArgumentSpec {
+            argument,
+            meaning: "environments, numbers of the joints",
+            columns: places.len(),
+            column_label: &of,
+        };
+        unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        EnvRows::check(table, values, env_ids, self.simulation.batch.num_envs())
     }
 }
 
 /// Normalizes the quaternion at `first` in a row.
-fn normalise(argument: &'static str, row: &mut [f64], first: usize) -> Result<()> {
+fn normalize_quaternion(argument: &'static str, row: &mut [f64], first: usize) -> Result<()> {
     let quaternion = &mut row[first..first + 4];
     let norm = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
     if !(norm > 1e-9 && norm.is_finite()) {

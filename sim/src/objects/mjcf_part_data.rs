@@ -1,8 +1,8 @@
 //! Data of MJCF parts: configuration, compiled model, frames.
 
 use crate::error::{Error, Result};
-use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
-use crate::named::Named;
+use crate::mjcf::part::{PartDocument, PartNames, PartSource, sensors_left_out, setting_warnings};
+use crate::named::EntityLabel;
 use crate::objects::robot_data::check_pose;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_mujoco as mj;
@@ -10,7 +10,7 @@ use kinetoscope_mujoco::{CompileError, LoadError, Model, words};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use kinetoscope_sensors::EngineSensor;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -38,7 +38,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct MjcfCfg {
+pub struct MjcfPartCfg {
     /// Name of the part, unique in the simulation; prefix of its names.
     pub uid: String,
     /// Path of the file; with `text`, only its name in error messages.
@@ -56,7 +56,7 @@ pub struct MjcfCfg {
     pub semantic_class: Option<String>,
 }
 
-impl Default for MjcfCfg {
+impl Default for MjcfPartCfg {
     /// Configuration without a file.
     fn default() -> Self {
         Self {
@@ -70,7 +70,7 @@ impl Default for MjcfCfg {
     }
 }
 
-impl MjcfCfg {
+impl MjcfPartCfg {
     /// Creates the configuration of a file whose world is the environment.
     pub fn file(uid: impl Into<String>, path: impl Into<PathBuf>) -> Self {
         Self { uid: uid.into(), path: path.into(), ..Self::default() }
@@ -88,7 +88,7 @@ pub struct ActuatorIndex(pub usize);
 
 /// Body or site of a part, as a frame for sensors.
 #[derive(Clone, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct SensorFrame {
     /// Name of the frame: `uid/body` or `uid/site`.
     pub(crate) name: String,
     /// Index of the body in the file.
@@ -96,18 +96,18 @@ pub(crate) struct Frame {
     /// Pose of the frame in the body.
     pub(crate) body_from_frame: Pose,
     /// Index of the frame of the moving body that carries this frame; the own index of a static frame.
-    pub(crate) carrier: usize,
+    pub(crate) moving_frame: usize,
 }
 
 /// MJCF file of a part: everything that does not change while the simulation runs.
 #[derive(Debug)]
 pub(crate) struct MjcfData {
-    cfg: MjcfCfg,
+    cfg: MjcfPartCfg,
     pub(super) model: Model,
     pub(super) names: PartNames,
     document: Arc<PartDocument>,
     files: Vec<mj::Asset>,
-    frames: Vec<Frame>,
+    frames: Vec<SensorFrame>,
     sensors: Vec<EngineSensor>,
     pub(super) sensor_names: Vec<String>,
     first_mask_id: i32,
@@ -123,7 +123,7 @@ impl MjcfData {
 
     /// Reads and compiles the file of part `index` of the simulation. `scene` is the current model.
     pub(crate) fn load(
-        cfg: MjcfCfg,
+        cfg: MjcfPartCfg,
         index: usize,
         first_mask_id: i32,
         scene: &Model,
@@ -131,22 +131,23 @@ impl MjcfData {
     ) -> Result<Self> {
         check_pose("init_pose", &cfg.init_pose)?;
         let file = cfg.path.display().to_string();
-        let (text, model) = read(&cfg.path, cfg.text.as_deref(), |error| Error::MjcfFile {
-            part: cfg.uid.clone(),
+        let (text, model) = read_and_compile(&cfg.path, cfg.text.as_deref(), |error| Error::MjcfFile {
+            uid: cfg.uid.clone(),
             file: file.clone(),
             error: Box::new(error),
         })?;
         let names = PartNames::of_model(&model);
-        let named = Named { what: "part", uid: cfg.uid.clone() };
+        let named = EntityLabel { kind: "part", uid: cfg.uid.clone() };
         let surfaces = SurfaceCfg::assign(&cfg.surfaces, &names.bodies, "body", named)?;
-        let (stem, source) = (format!("part{index}_"), Source::new(&cfg.path, 1));
-        let of = PartOf { model: &model, names: &names, uid: &cfg.uid, pose: &cfg.init_pose, stem: &stem, rig: None };
+        let (stem, source) = (format!("part{index}_"), SourceLocation::new(&cfg.path, 1));
+        let of =
+            PartSource { model: &model, names: &names, uid: &cfg.uid, pose: &cfg.init_pose, stem: &stem, rig: None };
         let document = PartDocument::new(&of, sensors_left_out(&model, &names), &source);
         let (document, files) = document
             .and_then(|document| Ok((document, of.files()?)))
-            .map_err(|error| Error::MjcfPart { part: cfg.uid.clone(), file, error: Box::new(error) })?;
+            .map_err(|error| Error::MjcfAttach { uid: cfg.uid.clone(), file, error: Box::new(error) })?;
         let left_out = document.sensors_left_out();
-        diagnostics.extend(compare(&format!("part {:?}", cfg.uid), &text, &cfg.path, &model, scene, left_out));
+        diagnostics.extend(setting_warnings(&format!("part {:?}", cfg.uid), &text, &cfg.path, &model, scene, left_out));
         let frames = frames(&cfg.uid, &model, &names, diagnostics);
         let is_kept = |s: &usize| left_out.iter().all(|(other, _)| other != s);
         let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
@@ -172,7 +173,7 @@ impl MjcfData {
     }
 
     /// Configuration that the part was added with.
-    pub(crate) fn cfg(&self) -> &MjcfCfg {
+    pub(crate) fn cfg(&self) -> &MjcfPartCfg {
         &self.cfg
     }
 
@@ -196,7 +197,7 @@ impl MjcfData {
     }
 
     /// Frames for sensors: all bodies except the world, then the sites with a name.
-    pub(crate) fn frames(&self) -> &[Frame] {
+    pub(crate) fn frames(&self) -> &[SensorFrame] {
         &self.frames
     }
 
@@ -206,13 +207,13 @@ impl MjcfData {
     }
 
     /// Names of the joints with one degree of freedom, in MuJoCo's order.
-    pub(crate) fn single_joints(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn single_dof_joints(&self) -> impl Iterator<Item = &str> {
         let names = self.names.joints.iter().zip(self.model.jnt_type());
         names.filter(|(_, kind)| matches!(words::joint(**kind), Some("hinge" | "slide"))).map(|(name, _)| name.as_str())
     }
 
     /// Name in the scene of an element of the file.
-    pub(crate) fn full(&self, name: &str) -> String {
+    pub(crate) fn scoped_name(&self, name: &str) -> String {
         format!("{}/{name}", self.cfg.uid)
     }
 
@@ -223,7 +224,7 @@ impl MjcfData {
 }
 
 /// Reads MJCF from a file or from `text`, and compiles it. `refused` wraps the compile errors of MuJoCo.
-pub(crate) fn read(
+pub(crate) fn read_and_compile(
     path: &Path,
     text: Option<&str>,
     refused: impl FnOnce(CompileError) -> Error,
@@ -239,7 +240,7 @@ pub(crate) fn read(
     };
     let compiled = compiled.map_err(|error| match error {
         LoadError::Version(error) => Error::MujocoVersion(error),
-        LoadError::Compile(error) if is_file => refused(located(error, path, &text)),
+        LoadError::Compile(error) if is_file => refused(with_location(error, path, &text)),
         LoadError::Compile(error) => refused(error),
     })?;
     Ok((text, compiled.into_model()))
@@ -247,24 +248,24 @@ pub(crate) fn read(
 
 /// Adds the location of the line that MuJoCo names. In a file with includes the file of that line is unknown, so
 /// nothing is added.
-fn located(error: CompileError, path: &Path, text: &str) -> CompileError {
-    let line = error.line.filter(|_| !text.contains("<include")).map(|line| Source::new(path, line));
-    CompileError { source_line: error.source_line.clone().or(line), ..error }
+fn with_location(error: CompileError, path: &Path, text: &str) -> CompileError {
+    let line = error.line.filter(|_| !text.contains("<include")).map(|line| SourceLocation::new(path, line));
+    CompileError { source_location: error.source_location.clone().or(line), ..error }
 }
 
 /// Frames of the bodies and the named sites. A site with the name of a body gets the suffix `.site`.
-fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Diagnostic>) -> Vec<Frame> {
+fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Diagnostic>) -> Vec<SensorFrame> {
     // Frame k is body k + 1. A body that is welded to a moving body moves with it; each static body carries itself.
     let carrier = |body: usize| match model.body_weldid()[body] as usize {
         0 => body - 1,
         moving => moving - 1,
     };
-    let mut frames: Vec<Frame> = (1..model.nbody())
-        .map(|body| Frame {
+    let mut frames: Vec<SensorFrame> = (1..model.nbody())
+        .map(|body| SensorFrame {
             name: format!("{uid}/{}", names.bodies[body]),
             body,
             body_from_frame: Pose::identity(),
-            carrier: carrier(body),
+            moving_frame: carrier(body),
         })
         .collect();
     for site in (0..model.nsite()).filter(|&site| names.named_sites[site]) {
@@ -277,11 +278,11 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
         }
         let (p, q) = (&model.site_pos()[3 * site..3 * site + 3], &model.site_quat()[4 * site..4 * site + 4]);
         let carrier = if body == 0 { frames.len() } else { carrier(body) };
-        frames.push(Frame {
+        frames.push(SensorFrame {
             name: format!("{uid}/{name}"),
             body,
             body_from_frame: from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]),
-            carrier,
+            moving_frame: carrier,
         });
     }
     frames
@@ -298,7 +299,7 @@ pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: 
                 let joint = usize::try_from(model.sensor_objid()[s]).ok()?;
                 words::joint(model.jnt_type()[joint]).map(|kind| kind == "hinge")
             };
-            let unit = match word.word {
+            let unit = match word.keyword {
                 "jointpos" | "jointlimitpos" => hinge().map(|hinge| if hinge { "rad" } else { "m" }),
                 "jointvel" | "jointlimitvel" => hinge().map(|hinge| if hinge { "rad/s" } else { "m/s" }),
                 "jointlimitfrc" | "jointactuatorfrc" => hinge().map(|hinge| if hinge { "N m" } else { "N" }),
@@ -309,20 +310,20 @@ pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: 
             next += width;
             Some(EngineSensor {
                 name: format!("{uid}/{}", names.sensors[s]),
-                kind: word.word.into(),
+                kind: word.keyword.into(),
                 unit: unit.map(Into::into),
                 first,
                 width,
-                solved: words::is_solved(model.sensor_needstage()[s]),
-                quaternion: word.quaternion,
+                force_stage: words::needs_acceleration_stage(model.sensor_needstage()[s]),
+                is_quaternion: word.quaternion,
             })
         })
         .collect()
 }
 
-impl MjcfCfg {
+impl MjcfPartCfg {
     /// Replaces its path by the result of `beside`; MJCF text has no path.
-    pub(crate) fn place_beside(&mut self, beside: impl Fn(&Path) -> PathBuf) {
+    pub(crate) fn resolve_path(&mut self, beside: impl Fn(&Path) -> PathBuf) {
         if self.text.is_none() {
             self.path = beside(&self.path);
         }

@@ -1,9 +1,9 @@
 //! Groups of rigid objects with one name, read and written together.
 
 use super::free_body::{FreeBody, FreeBodyMut};
-use super::object_group_data::{GroupData, GroupId, RigidObjectGroupCfg};
-use super::rows::distinct_envs;
-use crate::contents::Contents;
+use super::object_group_data::{RigidObjectGroupCfg, RigidObjectGroupData, RigidObjectGroupId};
+use super::rows::unique_envs;
+use crate::contents::EntitySet;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::manager::SimulationManager;
@@ -17,13 +17,13 @@ use std::sync::Arc;
 /// Read access to a group of rigid objects. Arrays have one row per environment and object.
 #[derive(Clone, Copy, Debug)]
 pub struct RigidObjectGroup<'a> {
-    data: &'a GroupData,
-    contents: &'a Contents,
+    data: &'a RigidObjectGroupData,
+    contents: &'a EntitySet,
     simulation: &'a Simulation,
 }
 
 impl<'a> RigidObjectGroup<'a> {
-    pub(crate) fn new(data: &'a GroupData, contents: &'a Contents, simulation: &'a Simulation) -> Self {
+    pub(crate) fn new(data: &'a RigidObjectGroupData, contents: &'a EntitySet, simulation: &'a Simulation) -> Self {
         Self { data, contents, simulation }
     }
 
@@ -71,16 +71,16 @@ impl<'a> RigidObjectGroup<'a> {
 /// Write access to a group of rigid objects.
 #[derive(Debug)]
 pub struct RigidObjectGroupMut<'a> {
-    data: &'a GroupData,
-    contents: &'a Contents,
+    data: &'a RigidObjectGroupData,
+    contents: &'a EntitySet,
     simulation: &'a mut Simulation,
     sensors: &'a mut SensorList,
 }
 
 impl<'a> RigidObjectGroupMut<'a> {
     pub(crate) fn new(
-        data: &'a GroupData,
-        contents: &'a Contents,
+        data: &'a RigidObjectGroupData,
+        contents: &'a EntitySet,
         simulation: &'a mut Simulation,
         sensors: &'a mut SensorList,
     ) -> Self {
@@ -107,7 +107,7 @@ impl<'a> RigidObjectGroupMut<'a> {
         for k in 0..self.data.objects.len() {
             checked.push(self.body(k).check_poses(argument, poses.index_axis(Axis(1), k), env_ids)?);
         }
-        let written = checked.iter().enumerate().try_for_each(|(k, poses)| self.body(k).put_poses(poses));
+        let written = checked.iter().enumerate().try_for_each(|(k, poses)| self.body(k).write_checked_poses(poses));
         self.sensors.refresh(&envs, self.simulation);
         written
     }
@@ -130,7 +130,7 @@ impl<'a> RigidObjectGroupMut<'a> {
             checked.push(self.body(k).check_velocities(argument, velocities.index_axis(Axis(1), k), env_ids)?);
         }
         for (k, velocities) in checked.iter().enumerate() {
-            self.body(k).put_velocities(velocities, |_| Vector3::zeros());
+            self.body(k).write_checked_velocities(velocities, |_| Vector3::zeros());
         }
         self.sensors.refresh(&envs, self.simulation);
         Ok(())
@@ -145,7 +145,7 @@ impl<'a> RigidObjectGroupMut<'a> {
         meaning: &'static str,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Vec<usize>> {
-        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        let envs = unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         let (rows, objects, width) = values.dim();
         if ![1, envs.len()].contains(&rows) || objects != self.data.objects.len() || width != numbers {
             let (found, expected) = (values.shape().to_vec(), vec![envs.len(), self.data.objects.len(), numbers]);
@@ -170,23 +170,23 @@ impl SimulationManager {
     /// # Errors
     /// The group is empty, a name is taken or used twice, or the configuration of an object is invalid; then nothing is
     /// added.
-    pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<GroupId> {
+    pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<RigidObjectGroupId> {
         self.check_world_uid(&cfg.uid)?;
         if cfg.objects.is_empty() {
             let expected = "a group needs at least 1 object";
             return Err(Error::Config { field: "objects", value: "[]".into(), expected });
         }
-        let (mut contents, mut diagnostics) = (self.contents.clone(), Vec::new());
+        let (mut contents, mut diagnostics) = (self.entities.clone(), Vec::new());
         let first = contents.objects.len();
         for mut object in cfg.objects {
             object.uid = format!("{}.{}", cfg.uid, object.uid);
-            contents.check_uid(&object.uid)?;
+            contents.check_uid_free(&object.uid)?;
             let object = RigidObjectData::new(object, contents.next_mask_id(), &mut diagnostics)?;
             contents.objects.push(Arc::new(object));
         }
-        contents.groups.push(GroupData { uid: cfg.uid, objects: first..contents.objects.len() });
-        self.replace_contents(contents, diagnostics)?;
-        Ok(GroupId { manager: self.serial, index: self.contents.groups.len() - 1 })
+        contents.groups.push(RigidObjectGroupData { uid: cfg.uid, objects: first..contents.objects.len() });
+        self.recompile_with(contents, diagnostics)?;
+        Ok(RigidObjectGroupId { manager: self.serial, index: self.entities.groups.len() - 1 })
     }
 
     /// Read access to a group of rigid objects.
@@ -194,9 +194,9 @@ impl SimulationManager {
     /// # Panics
     /// The handle belongs to another manager.
     #[track_caller]
-    pub fn rigid_object_group(&self, id: GroupId) -> RigidObjectGroup<'_> {
+    pub fn rigid_object_group(&self, id: RigidObjectGroupId) -> RigidObjectGroup<'_> {
         let index = self.index_of(id.manager, id.index);
-        RigidObjectGroup::new(&self.contents.groups[index], &self.contents, &self.simulation)
+        RigidObjectGroup::new(&self.entities.groups[index], &self.entities, &self.simulation)
     }
 
     /// Write access to a group of rigid objects.
@@ -204,9 +204,9 @@ impl SimulationManager {
     /// # Panics
     /// The handle belongs to another manager.
     #[track_caller]
-    pub fn rigid_object_group_mut(&mut self, id: GroupId) -> RigidObjectGroupMut<'_> {
+    pub fn rigid_object_group_mut(&mut self, id: RigidObjectGroupId) -> RigidObjectGroupMut<'_> {
         let index = self.index_of(id.manager, id.index);
-        let group = &self.contents.groups[index];
-        RigidObjectGroupMut::new(group, &self.contents, &mut self.simulation, &mut self.sensors)
+        let group = &self.entities.groups[index];
+        RigidObjectGroupMut::new(group, &self.entities, &mut self.simulation, &mut self.sensors)
     }
 }

@@ -24,14 +24,14 @@ impl Default for RigidObjectGroupCfg {
 
 /// Handle of a group of rigid objects; valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct GroupId {
+pub struct RigidObjectGroupId {
     pub(super) manager: u64,
     pub(super) index: usize,
 }
 
 /// Group of a simulation, as a range of its objects.
 #[derive(Clone, Debug)]
-pub(crate) struct GroupData {
+pub(crate) struct RigidObjectGroupData {
     pub(crate) uid: String,
     pub(crate) objects: Range<usize>,
 }

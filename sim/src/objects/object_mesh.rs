@@ -5,7 +5,7 @@ use super::shape::{ObjectShape, cone};
 use crate::error::{Error, Result};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::inertia::RigidInertia;
-use kinetoscope_scene::mesh::{HullCache, Solid, TriMesh};
+use kinetoscope_scene::mesh::{HullCache, TriMesh, VolumeIntegrals};
 use nalgebra::Matrix3;
 use std::sync::Arc;
 
@@ -13,9 +13,9 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectMesh {
     /// Convex collision shapes.
-    pub(crate) shapes: Vec<Arc<TriMesh>>,
+    pub(crate) collision: Vec<Arc<TriMesh>>,
     /// Visual mesh: the triangles of a file; `None` if the hull is visible.
-    pub(crate) seen: Option<Arc<TriMesh>>,
+    pub(crate) visual: Option<Arc<TriMesh>>,
     /// Mass properties for a density of 1 kg/m³; `None` if the shape gives them.
     pub(crate) inertia: Option<RigidInertia>,
 }
@@ -28,7 +28,7 @@ impl ObjectMesh {
         let (path, scale, cfg) = match &cfg.shape {
             ObjectShape::Cone { radius, height } => {
                 let shapes = vec![Arc::new(cone(*radius, *height))];
-                return Ok(Some(Self { shapes, seen: None, inertia: None }));
+                return Ok(Some(Self { collision: shapes, visual: None, inertia: None }));
             }
             ObjectShape::Mesh { path, scale, hull } => (path, *scale, hull),
             _ => return Ok(None),
@@ -37,7 +37,7 @@ impl ObjectMesh {
         let seen = kinetoscope_scene::mesh::load(path).map_err(failed)?.scaled(scale);
         let hull = HullCache::default_location().hull_of_file(path, scale, cfg).map_err(failed)?;
         let shapes = collision.shapes(uid, path, &seen, scale, cfg, diagnostics)?;
-        let solid = match seen.solid() {
+        let solid = match seen.volume_integrals() {
             Some(solid) => Some(solid),
             None => {
                 diagnostics.push(Diagnostic::new(
@@ -49,17 +49,17 @@ impl ObjectMesh {
                         path.display()
                     ),
                 ));
-                hull.solid()
+                hull.volume_integrals()
             }
         };
         // Hulls are closed and have a volume: flat ones were made thicker.
         let inertia = Some(solid.map_or(RigidInertia::ZERO, |solid| inertia(&solid)));
-        Ok(Some(Self { shapes, seen: Some(Arc::new(seen)), inertia }))
+        Ok(Some(Self { collision: shapes, visual: Some(Arc::new(seen)), inertia }))
     }
 }
 
 /// Mass properties of a solid of 1 kg/m³: `I = tr(Σ) 1 - Σ`.
-fn inertia(solid: &Solid) -> RigidInertia {
+fn inertia(solid: &VolumeIntegrals) -> RigidInertia {
     let tensor = Matrix3::identity() * solid.second_moment.trace() - solid.second_moment;
     RigidInertia { mass: solid.volume, com: solid.center, inertia: tensor }
 }

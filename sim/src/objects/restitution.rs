@@ -16,11 +16,11 @@
 use std::f64::consts::PI;
 
 /// Smallest restitution of a contact below critical damping: a little above exp(-2).
-pub(crate) const LEAST: f64 = 0.14;
+pub(crate) const MIN_RESTITUTION: f64 = 0.14;
 
 /// Duration of a contact without damping, in steps. Longer contacts are more exact, and softer: a body with impact
 /// velocity v penetrates by `v STEPS h / π`.
-const STEPS: f64 = 10.0;
+const CONTACT_STEPS: f64 = 10.0;
 
 /// Impedance d of such a contact, the same at every depth, since the formula needs a constant. It is the largest that
 /// MuJoCo accepts (`mjMAXIMP`). With pyramidal cones a contact yields by `mu² (1 + mu²) / 2` times `(1 - d) / d` (the
@@ -28,7 +28,7 @@ const STEPS: f64 = 10.0;
 pub(crate) const IMPEDANCE: [f64; 5] = [0.9999, 0.9999, 0.001, 0.5, 2.0];
 
 /// Weight of these contact parameters (`solmix`) against those of other surfaces, which have 1.
-pub(crate) const WEIGHT: f64 = 1e6;
+pub(crate) const SOLMIX: f64 = 1e6;
 
 /// Restitution of a contact with a damping ratio of 0 to below 1.
 fn restitution(ratio: f64) -> f64 {
@@ -36,7 +36,7 @@ fn restitution(ratio: f64) -> f64 {
     (-ratio / omega * (2.0 * ratio * omega).atan2(ratio * ratio - omega * omega)).exp()
 }
 
-/// MuJoCo's `solref` for surfaces with this restitution, [`LEAST`] to 1, at time steps of `timestep` \[s\].
+/// MuJoCo's `solref` for surfaces with this restitution, [`MIN_RESTITUTION`] to 1, at time steps of `timestep` \[s\].
 pub(crate) fn solref(restitution_wanted: f64, timestep: f64) -> [f64; 2] {
     // The restitution falls from 1 to exp(-2): bisection finds the damping ratio to the last bit.
     let (mut low, mut high) = (0.0, 1.0 - 1e-12);
@@ -45,7 +45,7 @@ pub(crate) fn solref(restitution_wanted: f64, timestep: f64) -> [f64; 2] {
         if restitution(middle) > restitution_wanted { low = middle } else { high = middle }
     }
     let ratio = if restitution_wanted >= 1.0 { 0.0 } else { (low + high) / 2.0 };
-    let frequency = PI / (STEPS * timestep);
+    let frequency = PI / (CONTACT_STEPS * timestep);
     // MuJoCo treats 0 like a positive number, which has another meaning.
     let damping = (2.0 * ratio * frequency).max(1e-9);
     [-frequency * frequency, -damping]
@@ -78,7 +78,7 @@ mod tests {
             let [stiffness, damping] = solref(wanted, 0.002).map(|x| -x);
             let found = bounce(stiffness, damping);
             assert!((found - wanted).abs() < 1e-5, "{wanted}: {found}");
-            assert!((stiffness.sqrt() * 0.002 * STEPS / PI - 1.0).abs() < 1e-12);
+            assert!((stiffness.sqrt() * 0.002 * CONTACT_STEPS / PI - 1.0).abs() < 1e-12);
         }
         assert_eq!(solref(1.0, 0.01)[1], -1e-9);
         assert!((restitution(1.0 - 1e-9) - (-2.0_f64).exp()).abs() < 1e-4);

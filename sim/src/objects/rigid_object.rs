@@ -90,7 +90,7 @@ impl<'a> RigidObjectMut<'a> {
     ///
     /// A kinematic object stays there until the next write or reset. A static object stays there over resets, until the
     /// next write or [`reset_properties`](crate::EnvPropertiesMut::reset). Its pose is
-    /// [`Property::Position`](crate::Property) and `Rotation`, and an environment with another pose gets a model of its
+    /// [`crate::Property`](crate::Property) and `Rotation`, and an environment with another pose gets a model of its
     /// own. A body that touches the object at its new pose is pushed out as in any contact.
     ///
     /// # Errors

@@ -159,7 +159,7 @@ impl RigidObjectData {
             }
         }
         if let Some(restitution) = cfg.restitution
-            && !(restitution::LEAST..=1.0).contains(&restitution)
+            && !(restitution::MIN_RESTITUTION..=1.0).contains(&restitution)
         {
             let expected = "it must be 0.14 to 1; leave it out for contacts that hardly bounce";
             return fail("restitution", &restitution, expected);

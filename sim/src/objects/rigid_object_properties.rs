@@ -3,12 +3,12 @@
 //! An environment whose object differs from the others gets a model of its own, which owns only the arrays that differ:
 //! see [`randomization`](crate::randomization), whose properties these are.
 
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::rigid_object_data::BodyType;
-use crate::objects::rows::{Rows, Table, distinct_envs};
+use crate::objects::rows::{ArgumentSpec, EnvRows, unique_envs};
 use crate::randomization::Property;
 use crate::wrenches::{Wrench, WrenchFrame};
 use kinetoscope_mujoco::Model;
@@ -16,7 +16,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix1, Ix2};
 
 /// Robot index of the wrenches on objects, larger than the number of robots.
-const OBJECTS: usize = 1 << 20;
+const OBJECT_WRENCH_OWNER: usize = 1 << 20;
 
 impl RigidObject<'_> {
     /// Mass in each environment \[kg\], shape (N), as in MuJoCo's model; the configured mass for an object that is not
@@ -24,14 +24,15 @@ impl RigidObject<'_> {
     #[doc(alias = "get_mass")]
     pub fn mass(&self) -> Array1<f64> {
         let nominal = self.data.mass_properties().mass;
-        self.numbers(1, [nominal].into(), |model, body| model.body_mass()[body..=body].to_vec()).remove_axis(Axis(1))
+        self.read_body_values(1, [nominal].into(), |model, body| model.body_mass()[body..=body].to_vec())
+            .remove_axis(Axis(1))
     }
 
     /// Center of mass in the object's frame in each environment \[m\], shape (N, 3).
     #[doc(alias = "get_center_of_mass")]
     pub fn center_of_mass(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().com.iter().copied().collect();
-        self.numbers(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
+        self.read_body_values(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
     }
 
     /// Principal moments of inertia about the center of mass in each environment \[kg m²\], shape (N, 3), along x, y
@@ -40,7 +41,7 @@ impl RigidObject<'_> {
     #[doc(alias = "get_inertia")]
     pub fn inertia(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().moments.iter().copied().collect();
-        self.numbers(3, nominal, |model, body| model.body_inertia()[3 * body..3 * body + 3].to_vec())
+        self.read_body_values(3, nominal, |model, body| model.body_inertia()[3 * body..3 * body + 3].to_vec())
     }
 
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] in each environment, shape (N, 3).
@@ -63,7 +64,7 @@ impl RigidObject<'_> {
     #[doc(alias = "get_damping")]
     pub fn damping(&self) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
-        if let Some((_, dof)) = self.simulation.objects[self.index].joint {
+        if let Some((_, dof)) = self.simulation.objects[self.index].free_joint {
             self.simulation.batch.for_each(|i, env| {
                 let damping = env.data().model().dof_damping();
                 [damping[dof], damping[dof + 3]].into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
@@ -77,8 +78,9 @@ impl RigidObject<'_> {
     #[doc(alias = "get_external_wrench")]
     pub fn external_wrench(&self) -> Array2<f64> {
         let mut wrenches = Array2::zeros((self.simulation.batch.num_envs(), 6));
-        self.simulation.batch.for_each(|i, env: &Env| {
-            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of == (OBJECTS, self.index)) {
+        self.simulation.batch.for_each(|i, env: &SimEnv| {
+            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.owner == (OBJECT_WRENCH_OWNER, self.index))
+            {
                 let [force, torque] = wrench.in_world(env.data());
                 force.iter().chain(&torque).enumerate().for_each(|(k, value)| wrenches[(i, k)] = *value);
             }
@@ -87,7 +89,12 @@ impl RigidObject<'_> {
     }
 
     /// Reads numbers of the body in each environment; an object that is not dynamic has the configured numbers.
-    fn numbers(&self, width: usize, nominal: Vec<f64>, read: impl Fn(&Model, usize) -> Vec<f64>) -> Array2<f64> {
+    fn read_body_values(
+        &self,
+        width: usize,
+        nominal: Vec<f64>,
+        read: impl Fn(&Model, usize) -> Vec<f64>,
+    ) -> Array2<f64> {
         let body = self.simulation.objects[self.index].body;
         let moves = self.cfg().body_type == BodyType::Dynamic;
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), width));
@@ -210,14 +217,14 @@ impl RigidObjectMut<'_> {
         self.check_dynamic(argument)?;
         let forces = self.rows("set_external_wrench (forces)", meaning, 3, forces.into(), env_ids)?;
         let torques = self.rows("set_external_wrench (torques)", meaning, 3, torques.into(), env_ids)?;
-        let of = (OBJECTS, self.index);
+        let of = (OBJECT_WRENCH_OWNER, self.index);
         let body = self.simulation.objects[self.index].body;
         for ((env, force), (_, torque)) in forces.arrays::<3>().zip(torques.arrays::<3>()) {
             let (force, torque) = (Vector3::from(force), Vector3::from(torque));
             let axes = (frame == WrenchFrame::Link).then(UnitQuaternion::identity);
             self.simulation.batch.write(env, |env| {
                 env.set_wrenches(|wrenches| {
-                    wrenches.replace(Wrench { of, body, axes, force, torque });
+                    wrenches.replace(Wrench { owner: of, body, axes, force, torque });
                 });
             });
         }
@@ -238,10 +245,10 @@ impl RigidObjectMut<'_> {
         columns: usize,
         values: ArrayView2<'v, f64>,
         env_ids: Option<&[EnvId]>,
-    ) -> Result<Rows<'v>> {
+    ) -> Result<EnvRows<'v>> {
         let num_envs = self.simulation.batch.num_envs();
-        distinct_envs(argument, env_ids, num_envs)?;
+        unique_envs(argument, env_ids, num_envs)?;
         let of = |_| format!("object {:?}", self.data.uid());
-        Rows::check(Table { argument, meaning, columns, of: &of }, values, env_ids, num_envs)
+        EnvRows::check(ArgumentSpec { argument, meaning, columns, column_label: &of }, values, env_ids, num_envs)
     }
 }

@@ -2,14 +2,14 @@
 
 pub use super::robot_cfg::RobotCfg;
 
-use super::robot_data::{JointIndex, RobotData, unknown};
+use super::robot_data::{JointIndex, RobotData, unknown_name_error};
 use crate::drive::plan::JointPlan;
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::{JointIndexing, RobotIndex};
+use crate::index::{JointIndexing, RobotIndexing};
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
-use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
+use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, check_unique_indices, unique_envs};
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
@@ -37,7 +37,7 @@ impl<'a> Robot<'a> {
         self.index
     }
 
-    pub(super) fn indexing(&self) -> &'a RobotIndex {
+    pub(super) fn indexing(&self) -> &'a RobotIndexing {
         &self.simulation.robots[self.index]
     }
 
@@ -80,7 +80,8 @@ impl<'a> Robot<'a> {
     #[doc(alias = "get_joint_ids")]
     pub fn joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let Some(part) = part.into() else { return Ok((0..self.dof()).map(JointIndex).collect()) };
-        let members = self.data.parts.get(part).ok_or_else(|| unknown("control part", part, self.control_parts()))?;
+        let members =
+            self.data.parts.get(part).ok_or_else(|| unknown_name_error("control part", part, self.control_parts()))?;
         Ok(members.iter().map(|&i| JointIndex(i)).collect())
     }
 
@@ -93,7 +94,7 @@ impl<'a> Robot<'a> {
             .iter()
             .position(|n| n == name)
             .map(JointIndex)
-            .ok_or_else(|| unknown("joint", name, self.joint_names().iter().map(String::as_str)))
+            .ok_or_else(|| unknown_name_error("joint", name, self.joint_names().iter().map(String::as_str)))
     }
 
     /// True if a joint follows another joint.
@@ -199,7 +200,7 @@ impl<'a> Robot<'a> {
     /// # Errors
     /// The link does not exist; the error lists the nearest names.
     pub fn link_id(&self, name: &str) -> Result<LinkId> {
-        self.data.description.link_id(name).ok_or_else(|| unknown("link", name, self.link_names()))
+        self.data.description.link_id(name).ok_or_else(|| unknown_name_error("link", name, self.link_names()))
     }
 
     pub(super) fn root(&self) -> FreeBody<'a> {
@@ -216,7 +217,7 @@ impl<'a> Robot<'a> {
         Ok(self.simulation.batch.gather_rows(|env| to_row(&frame.pose(env.data()))))
     }
 
-    pub(super) fn gather(&self, read: impl Fn(&crate::env::Env, &JointIndexing) -> f64) -> Array2<f64> {
+    pub(super) fn gather(&self, read: impl Fn(&crate::env::SimEnv, &JointIndexing) -> f64) -> Array2<f64> {
         self.simulation.batch.gather(&self.indexing().joints, read)
     }
 }
@@ -319,7 +320,7 @@ impl<'a> RobotMut<'a> {
         env_ids: Option<&[EnvId]>,
         change: impl Fn(&mut DriveState, &JointIndexing, &JointPlan, f64),
     ) -> Result<()> {
-        let write = self.checked(argument, values, joint_ids, env_ids)?;
+        let write = self.checked_rows(argument, values, joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
@@ -344,7 +345,7 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked("write_qpos", positions.into(), joint_ids, env_ids)?;
+        let write = self.checked_rows("write_qpos", positions.into(), joint_ids, env_ids)?;
         let limits: Vec<[f64; 2]> =
             self.data.plans.iter().map(|plan| plan.limit.unwrap_or([f64::MIN, f64::MAX])).collect();
         let addresses = self.addresses(|joint| joint.qpos);
@@ -366,7 +367,7 @@ impl<'a> RobotMut<'a> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked("write_qvel", velocities.into(), joint_ids, env_ids)?;
+        let write = self.checked_rows("write_qvel", velocities.into(), joint_ids, env_ids)?;
         let addresses = self.addresses(|joint| joint.dof);
         self.write_joints(&write, |data, joint, value| data.qvel_mut()[addresses[joint]] = value);
         Ok(())
@@ -416,31 +417,32 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Checks an argument of finite numbers before anything is written.
-    pub(super) fn checked<'v>(
+    pub(super) fn checked_rows<'v>(
         &self,
         argument: &'static str,
         values: ArrayView2<'v, f64>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<JointRows<'v>> {
-        self.checked_numbers(argument, Numbers::Finite, values, joint_ids, env_ids)
+        self.checked_numbers(argument, NumberKind::Finite, values, joint_ids, env_ids)
     }
 
-    /// Checks an argument like [`checked`](Self::checked), for numbers of another kind.
+    /// Checks an argument like [`checked_rows`](Self::checked_rows), for numbers of another kind.
     pub(super) fn checked_numbers<'v>(
         &self,
         argument: &'static str,
-        numbers: Numbers,
+        numbers: NumberKind,
         values: ArrayView2<'v, f64>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<JointRows<'v>> {
         let joints = self.joint_columns(argument, joint_ids)?;
         let of = |column: usize| format!("joint {:?}", self.data.joint_names[joints[column]]);
-        let table = Table { argument, meaning: "environments, joints", columns: joints.len(), of: &of };
+        let table =
+            ArgumentSpec { argument, meaning: "environments, joints", columns: joints.len(), column_label: &of };
         let num_envs = self.simulation.batch.num_envs();
-        distinct_envs(argument, env_ids, num_envs)?;
-        let rows = Rows::check_numbers(table, numbers, values, env_ids, num_envs)?;
+        unique_envs(argument, env_ids, num_envs)?;
+        let rows = EnvRows::check_numbers(table, numbers, values, env_ids, num_envs)?;
         Ok(JointRows { joints, rows })
     }
 
@@ -453,7 +455,7 @@ impl<'a> RobotMut<'a> {
             None => Ok((0..count).collect()),
             Some(ids) => {
                 let joints = ids.iter().map(|&JointIndex(index)| exists(index)).collect::<Result<Vec<_>>>()?;
-                check_named_once(argument, &joints, &|joint| format!("joint {:?}", self.data.joint_names[joint]))?;
+                check_unique_indices(argument, &joints, &|joint| format!("joint {:?}", self.data.joint_names[joint]))?;
                 Ok(joints)
             }
         }
@@ -463,5 +465,5 @@ impl<'a> RobotMut<'a> {
 /// Checked argument: joint columns, and one row of values per environment.
 pub(super) struct JointRows<'v> {
     pub(super) joints: Vec<usize>,
-    pub(super) rows: Rows<'v>,
+    pub(super) rows: EnvRows<'v>,
 }

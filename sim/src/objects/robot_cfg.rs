@@ -51,9 +51,9 @@ pub struct RobotCfg {
     /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
     ///   `solimpfriction` apply to the other joints.
     /// - Named sites are links on fixed joints. The end of a control part
-    ///   ([`Tip::of_part`](kinetoscope_robot::kinematics::Tip::of_part)) follows such a joint if there is exactly one.
+    ///   ([`TipFrame::of_part`](kinetoscope_robot::kinematics::TipFrame::of_part)) follows such a joint if there is exactly one.
     ///   So a site that is added to the last body, for a touch sensor say, moves that end. Name the link
-    ///   ([`Tip::at`](kinetoscope_robot::kinematics::Tip::at)) where this matters.
+    ///   ([`TipFrame::at`](kinetoscope_robot::kinematics::TipFrame::at)) where this matters.
     /// - Elements of the file's world (a floor, lights), global settings and keyframes are not part of the robot.
     ///   [`diagnostics`](crate::SimulationManager::diagnostics) names everything that is left out.
     ///

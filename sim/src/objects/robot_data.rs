@@ -2,11 +2,11 @@
 
 use crate::drive::gains::Gains;
 use crate::drive::plan::{JointPlan, plan};
-use crate::drive::{ActuatorSpec, DriveModel};
+use crate::drive::{DriveModel, PdGains};
 use crate::error::{Error, Result};
 use crate::mjcf::document::Integrator;
-use crate::mjcf::robot_file::{Loading, RobotFile, RobotFileError};
-use crate::named::Named;
+use crate::mjcf::robot_file::{LoadSettings, MjcfRobotFile, RobotFileError};
+use crate::named::EntityLabel;
 use crate::objects::robot_cfg::RobotCfg;
 use crate::pattern;
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -15,8 +15,8 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_robot::description::RobotDescription;
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_robot::mesh_key::MeshKey;
-use kinetoscope_robot::shape_inertia::{Hulls, ball, complete};
-use kinetoscope_robot::urdf::{Assembly, assemble};
+use kinetoscope_robot::shape_inertia::{HullSet, complete, solid_ball_inertial};
+use kinetoscope_robot::urdf::{MergedRobot, assemble};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::pose::to_row;
@@ -36,30 +36,30 @@ pub(crate) struct RobotData {
     pub(super) parts: BTreeMap<String, Vec<usize>>,
     hulls: BTreeMap<MeshKey, TriMesh>,
     /// MJCF file of the robot; `None` for a robot from URDF files.
-    file: Option<RobotFile>,
+    file: Option<MjcfRobotFile>,
     first_mask_id: i32,
-    role: Role,
+    role: RobotKind,
     /// Surface properties of some links, in addition to those of the files.
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
 /// Kind of entity that a robot was added as.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Role {
+pub(crate) enum RobotKind {
     /// Added by `add_robot`.
     Robot,
     /// Added by `add_articulation`, with its semantic class.
     Articulation(String),
 }
 
-impl Role {
+impl RobotKind {
     /// Label of the robot in errors.
-    fn named(&self, uid: &str) -> Named {
+    fn label(&self, uid: &str) -> EntityLabel {
         let what = match self {
             Self::Robot => "robot",
             Self::Articulation(_) => "articulation",
         };
-        Named { what, uid: uid.into() }
+        EntityLabel { kind: what, uid: uid.into() }
     }
 }
 
@@ -68,7 +68,7 @@ impl RobotData {
     /// model.
     pub(crate) fn load(
         cfg: RobotCfg,
-        role: Role,
+        role: RobotKind,
         manager: &SimulationManagerCfg,
         index: usize,
         scene: &mj::Model,
@@ -87,30 +87,30 @@ impl RobotData {
         for component in &cfg.urdf.components {
             check_pose("component transform", &component.transform)?;
         }
-        let mut hulls = Hulls::new(&cfg.hull);
+        let mut hulls = HullSet::new(&cfg.hull);
         let (file, mut description, mut found) =
-            described(&cfg, &role.named(&cfg.uid), index, Some(scene), &mut hulls)?;
-        load_up(&mut description, &cfg)?;
+            describe_robot(&cfg, &role.label(&cfg.uid), index, Some(scene), &mut hulls)?;
+        add_payloads(&mut description, &cfg)?;
         let link_names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
-        let surfaces = SurfaceCfg::assign(&cfg.surfaces, &link_names, "link", role.named(&cfg.uid))?;
+        let surfaces = SurfaceCfg::assign(&cfg.surfaces, &link_names, "link", role.label(&cfg.uid))?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();
         for (part, patterns) in &cfg.control_parts {
             let members = pattern::select(patterns, &joint_names, "joint").map_err(|error| Error::ControlPart {
-                robot: role.named(&cfg.uid),
+                robot: role.label(&cfg.uid),
                 part: part.clone(),
                 error: Box::new(error),
             })?;
             if parts.insert(part.clone(), members).is_some() {
-                return Err(Error::ControlPartRepeated { robot: role.named(&cfg.uid), part: part.clone() });
+                return Err(Error::ControlPartRepeated { robot: role.label(&cfg.uid), part: part.clone() });
             }
         }
-        let at_plan = |error| Error::Plan { robot: role.named(&cfg.uid), error: Box::new(error) };
+        let at_plan = |error| Error::DrivePlan { robot: role.label(&cfg.uid), error: Box::new(error) };
         let (plans, mut planned) =
             plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
         check_integrator(&cfg, &role, &plans, manager.integrator)?;
         found.append(&mut planned);
-        let explicit = explicitly_driven(&plans, cfg.drive.model);
+        let explicit = explicit_drive_plans(&plans, cfg.drive.model);
         if explicit.iter().any(|plan| plan.actuator.is_some()) {
             let dt = manager.physics_option().timestep;
             found.extend(crate::drive::actuator::warn_if_unstable(&description, &explicit, !cfg.fix_base, dt));
@@ -138,19 +138,19 @@ impl RobotData {
     /// Semantic class in the table of mask ids.
     pub(crate) fn semantic_class(&self) -> &str {
         match &self.role {
-            Role::Robot => "robot",
-            Role::Articulation(class) => class,
+            RobotKind::Robot => "robot",
+            RobotKind::Articulation(class) => class,
         }
     }
 
     /// Label of the robot in errors.
-    pub(crate) fn named(&self) -> Named {
-        self.role.named(self.uid())
+    pub(crate) fn label(&self) -> EntityLabel {
+        self.role.label(self.uid())
     }
 
     /// True if it was added as a robot, false for another articulation.
     pub(crate) fn is_robot(&self) -> bool {
-        self.role == Role::Robot
+        self.role == RobotKind::Robot
     }
 
     /// Merged robot as its files describe it, with its payloads.
@@ -179,13 +179,13 @@ impl RobotData {
     }
 
     /// MJCF file of the robot; `None` for a robot from URDF files.
-    pub(crate) fn file(&self) -> Option<&RobotFile> {
+    pub(crate) fn file(&self) -> Option<&MjcfRobotFile> {
         self.file.as_ref()
     }
 
     /// Wraps an error of its MJCF file.
     pub(crate) fn file_error(&self, error: RobotFileError) -> Error {
-        file_error(&self.cfg, self.named(), error)
+        file_error(&self.cfg, self.label(), error)
     }
 
     /// Initial pose of the root link.
@@ -194,7 +194,7 @@ impl RobotData {
     }
 
     /// Moves the initial pose along z \[m\].
-    pub(super) fn raise(&mut self, by: f64) {
+    pub(super) fn move_initial_pose_z(&mut self, by: f64) {
         self.cfg.init_pose.translation.z += by;
     }
 
@@ -203,22 +203,22 @@ impl RobotData {
     }
 }
 
-fn file_error(cfg: &RobotCfg, robot: Named, error: RobotFileError) -> Error {
+fn file_error(cfg: &RobotCfg, robot: EntityLabel, error: RobotFileError) -> Error {
     let path = cfg.mjcf.as_ref().map(|file| file.path.display().to_string());
     Error::RobotFile { robot, file: path.unwrap_or_default(), error: Box::new(error) }
 }
 
 /// Describes a robot from its files, without payloads, with diagnostics about the files. With a `scene`, the
 /// diagnostics include settings of its MJCF file that differ from the scene's.
-pub(crate) fn described(
+pub(crate) fn describe_robot(
     cfg: &RobotCfg,
-    named: &Named,
+    named: &EntityLabel,
     index: usize,
     scene: Option<&mj::Model>,
-    hulls: &mut Hulls<'_>,
-) -> Result<(Option<RobotFile>, RobotDescription, Vec<Diagnostic>)> {
+    hulls: &mut HullSet<'_>,
+) -> Result<(Option<MjcfRobotFile>, RobotDescription, Vec<Diagnostic>)> {
     let Some(file) = &cfg.mjcf else {
-        let Assembly { mut description, mut diagnostics } = assemble(&cfg.urdf)?;
+        let MergedRobot { mut description, mut diagnostics } = assemble(&cfg.urdf)?;
         complete(&mut description, cfg.urdf.missing_inertia, !cfg.fix_base, hulls, &mut diagnostics)?;
         return Ok((None, description, diagnostics));
     };
@@ -228,22 +228,22 @@ pub(crate) fn described(
     }
     let mut found = Vec::new();
     let (fix_base, self_collision) = (cfg.fix_base, cfg.self_collision);
-    let loading = Loading { uid: &cfg.uid, named, index, fix_base, self_collision, scene };
+    let loading = LoadSettings { uid: &cfg.uid, named, index, fix_base, self_collision, scene };
     let (file, description) =
-        RobotFile::load(file, &loading, |error| file_error(cfg, named.clone(), error), &mut found)?;
+        MjcfRobotFile::load(file, &loading, |error| file_error(cfg, named.clone(), error), &mut found)?;
     Ok((Some(file), description, found))
 }
 
 /// Plans in which only the explicit drives, evaluated at the start of a step, have gains. The damping is the largest
 /// that the model of the joint can produce.
-fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
+fn explicit_drive_plans(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
     let explicit = |plan: &JointPlan| {
         let spec = plan.actuator?;
         match plan.model {
             Some(law) => {
                 let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
                 let kd = law.law().damping(&Gains { kp: spec.kp, kd: spec.kd, max_effort, max_velocity });
-                Some(ActuatorSpec { kd, ..spec })
+                Some(PdGains { kd, ..spec })
             }
             None => Some(spec).filter(|_| model == DriveModel::Actuator),
         }
@@ -252,7 +252,7 @@ fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
 }
 
 /// Adds the payloads of links.
-fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
+fn add_payloads(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     if let Some((_, mass)) = cfg.payload.iter().find(|(_, mass)| !(mass.is_finite() && *mass >= 0.0)) {
         let expected = "a payload must be a finite mass >= 0 kg";
         return Err(Error::Config { field: "payload", value: mass.to_string(), expected });
@@ -265,15 +265,19 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
         match &mut link.inertial {
             // A point at the center of mass changes neither the center of mass nor the inertia about it.
             Some(inertial) => inertial.mass += payload,
-            None => link.inertial = Some(ball(link, payload, 1000.0)),
+            None => link.inertial = Some(solid_ball_inertial(link, payload, 1000.0)),
         }
     }
     Ok(())
 }
 
 /// Creates an error about an unknown name, with the nearest existing names.
-pub(super) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Error {
-    let candidates = pattern::closest(name, names).into_iter().map(str::to_string).collect();
+pub(super) fn unknown_name_error<'n>(
+    what: &'static str,
+    name: &str,
+    names: impl IntoIterator<Item = &'n str>,
+) -> Error {
+    let candidates = pattern::closest_names(name, names).into_iter().map(str::to_string).collect();
     Error::UnknownName { what, name: name.into(), candidates }
 }
 
@@ -289,17 +293,17 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
 }
 
 /// Checks the integrator: implicit drives need one that adds nothing to the acceleration that the solver found.
-fn check_integrator(cfg: &RobotCfg, role: &Role, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
+fn check_integrator(cfg: &RobotCfg, role: &RobotKind, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,
-        Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
+        Integrator::ImplicitFast => mj::BUILD_VERSION == mj::SupportedVersion::V4,
         Integrator::Rk4 | Integrator::Implicit => false,
     };
     // Joints that are passive, follow other joints or have an explicit model have no friction row.
     let row = |plan: &JointPlan| plan.actuator.is_some() && plan.model.is_none();
     if cfg.drive.model == DriveModel::Implicit && plans.iter().any(row) && !allowed {
-        let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };
-        return Err(Error::Integrator { robot: role.named(&cfg.uid), integrator: integrator.name(), also });
+        let also = if mj::BUILD_VERSION == mj::SupportedVersion::V4 { " or implicitfast" } else { "" };
+        return Err(Error::Integrator { robot: role.label(&cfg.uid), integrator: integrator.name(), also });
     }
     Ok(())
 }

@@ -5,13 +5,13 @@
 //! [`set_armature`](RobotMut::set_armature).
 
 use crate::drive::plan::{PlanError, effective_inertias};
-use crate::drive::table::{DriveActuator, DriveState, Realization};
+use crate::drive::table::{DriveState, ExplicitDrive, Realization};
 use crate::drive::{ActuatorModel, DelayedPd, DriveType};
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{JointRows, Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
-use crate::objects::rows::{Numbers, distinct_envs};
+use crate::objects::rows::{NumberKind, unique_envs};
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl Robot<'_> {
     #[doc(alias = "get_delay")]
     pub fn delay(&self) -> Array2<u32> {
         let delays = self.gather(|env, joint| match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
-            Some(DriveActuator { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
+            Some(ExplicitDrive { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
                 f64::from(DelayedPd::delay_of(&env.drives.memory[memory.clone()]))
             }
             _ => 0.0,
@@ -90,7 +90,7 @@ impl RobotMut<'_> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        self.set_drives("set_stiffness", Numbers::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
+        self.set_drives("set_stiffness", NumberKind::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
             drives.set_stiffness(drive, value);
         })
     }
@@ -107,7 +107,7 @@ impl RobotMut<'_> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        self.set_drives("set_damping", Numbers::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
+        self.set_drives("set_damping", NumberKind::Gain, values.into(), joint_ids, env_ids, |drives, drive, value| {
             drives.set_drive_damping(drive, value);
         })
     }
@@ -132,9 +132,9 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let argument = "set_drive_type";
-        let drives = self.drives_of(argument, &self.joint_columns(argument, joint_ids)?)?;
-        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
-        let inertias = if drive_type.mode().needs_inertia() { Some(self.inertias_at_start()?) } else { None };
+        let drives = self.changeable_drives(argument, &self.joint_columns(argument, joint_ids)?)?;
+        let envs = unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        let inertias = if drive_type.mode().needs_inertia() { Some(self.initial_effective_inertias()?) } else { None };
         for env in envs {
             self.simulation.batch.write(env, |env| {
                 for &(_, joint, drive) in &drives {
@@ -164,22 +164,22 @@ impl RobotMut<'_> {
         let argument = "set_delay";
         let steps: ArrayView2<'_, u32> = steps.into();
         let steps = steps.mapv(f64::from);
-        let write = self.checked_numbers(argument, Numbers::Gain, steps.view(), joint_ids, env_ids)?;
-        let drives = self.driven(argument, &write.joints)?;
+        let write = self.checked_numbers(argument, NumberKind::Gain, steps.view(), joint_ids, env_ids)?;
+        let drives = self.drives_of_joints(argument, &write.joints)?;
         let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
         let name = |joint: usize| self.data.joint_names()[joint].clone();
         let mut memories = Vec::with_capacity(drives.len());
         for &(column, joint, drive) in &drives {
-            let Some(DriveActuator { model: ActuatorModel::DelayedPd(model), memory, .. }) = table.model_of(drive)
+            let Some(ExplicitDrive { model: ActuatorModel::DelayedPd(model), memory, .. }) = table.model_of(drive)
             else {
-                return Err(Error::NoDelay { robot: self.data.named(), joint: name(joint) });
+                return Err(Error::NoDelay { robot: self.data.label(), joint: name(joint) });
             };
             for (row, (_, steps)) in write.rows.iter().enumerate() {
-                let (value, longest) = (steps[column], model.longest());
+                let (value, longest) = (steps[column], model.delay_capacity());
                 if value > f64::from(longest) {
                     let (of, expected) =
                         (format!("joint {:?}", name(joint)), format!("at most {longest}, its max_delay"));
-                    return Err(Error::OutOfRange { argument, row, column, of, value, expected });
+                    return Err(Error::OutOfRange { argument, row, column, item: of, value, expected });
                 }
             }
             memories.push((column, memory.clone()));
@@ -194,24 +194,24 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    fn inertias_at_start(&self) -> Result<Vec<f64>> {
+    fn initial_effective_inertias(&self) -> Result<Vec<f64>> {
         let data = self.data;
         effective_inertias(data.description(), data.plans(), !data.cfg().fix_base)
-            .map_err(|error| Error::Plan { robot: data.named(), error: Box::new(PlanError::Dynamics(error)) })
+            .map_err(|error| Error::DrivePlan { robot: data.label(), error: Box::new(PlanError::Dynamics(error)) })
     }
 
     /// Changes drives by one number each, after all checks.
     pub(super) fn set_drives(
         &mut self,
         argument: &'static str,
-        numbers: Numbers,
+        numbers: NumberKind,
         values: ArrayView2<'_, f64>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
         change: impl Fn(&mut DriveState, usize, f64),
     ) -> Result<()> {
         let write = self.checked_numbers(argument, numbers, values, joint_ids, env_ids)?;
-        let drives = self.drives_of(argument, &write.joints)?;
+        let drives = self.changeable_drives(argument, &write.joints)?;
         self.change_drives(&write, &drives, change);
         Ok(())
     }
@@ -232,22 +232,30 @@ impl RobotMut<'_> {
 
     /// Returns `(column, joint, drive)` of `joints` without the mimic joints. The gains of all these drives must be
     /// changeable.
-    pub(super) fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
+    pub(super) fn changeable_drives(
+        &self,
+        argument: &'static str,
+        joints: &[usize],
+    ) -> Result<Vec<(usize, usize, usize)>> {
         let native = |drive: usize| {
             self.simulation.batch.read(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
         };
-        let drives = self.driven(argument, joints)?;
+        let drives = self.drives_of_joints(argument, joints)?;
         match drives.iter().find(|(_, _, drive)| native(*drive)) {
             Some(&(_, joint, _)) => {
                 let joint = self.data.joint_names()[joint].clone();
-                Err(Error::GainsInModel { argument, robot: self.data.named(), joint })
+                Err(Error::GainsInModel { argument, robot: self.data.label(), joint })
             }
             None => Ok(drives),
         }
     }
 
     /// Returns `(column, joint, drive)` of `joints` without the mimic joints.
-    pub(super) fn driven(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
+    pub(super) fn drives_of_joints(
+        &self,
+        argument: &'static str,
+        joints: &[usize],
+    ) -> Result<Vec<(usize, usize, usize)>> {
         let mut drives = Vec::with_capacity(joints.len());
         for (column, &joint) in joints.iter().enumerate() {
             if self.data.plans()[joint].mimic.is_some() {
@@ -255,7 +263,7 @@ impl RobotMut<'_> {
             }
             let Some(drive) = self.simulation.robots[self.index].joints[joint].drive else {
                 let joint = self.data.joint_names()[joint].clone();
-                return Err(Error::NotDriven { argument, robot: self.data.named(), joint });
+                return Err(Error::NotDriven { argument, robot: self.data.label(), joint });
             };
             drives.push((column, joint, drive));
         }

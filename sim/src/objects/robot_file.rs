@@ -25,7 +25,7 @@ impl MjcfFile {
     }
 
     /// Replaces its path by the result of `beside`; MJCF text has no path.
-    pub(crate) fn place_beside(&mut self, beside: impl Fn(&Path) -> PathBuf) {
+    pub(crate) fn resolve_path(&mut self, beside: impl Fn(&Path) -> PathBuf) {
         if self.text.is_none() {
             self.path = beside(&self.path);
         }

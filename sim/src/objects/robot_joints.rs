@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::ids::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
-use crate::objects::rows::Numbers;
+use crate::objects::rows::NumberKind;
 use crate::randomization::Property;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 
@@ -36,7 +36,7 @@ impl Robot<'_> {
     fn property(&self, property: Property) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), self.dof()));
         for (joint, mut column) in values.columns_mut().into_iter().enumerate() {
-            self.simulation.property_of_all(property, &property_name(self, joint), |env, value| column[env] = value);
+            self.simulation.read_property(property, &property_name(self, joint), |env, value| column[env] = value);
         }
         values
     }
@@ -130,9 +130,9 @@ impl RobotMut<'_> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked_numbers(argument, Numbers::Gain, values, joint_ids, env_ids)?;
+        let write = self.checked_numbers(argument, NumberKind::Gain, values, joint_ids, env_ids)?;
         let names: Vec<String> = write.joints.iter().map(|&joint| property_name(&self.read(), joint)).collect();
-        let known = self.simulation.properties_named(property, &names);
+        let known = self.simulation.have_property(property, &names);
         // Environments are visited in this order.
         let mut rows = write.rows.iter();
         self.simulation.change_properties(write.rows.envs(), |_, properties| {

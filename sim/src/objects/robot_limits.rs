@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{JointRows, Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
-use crate::objects::rows::{Numbers, Rows, Table, distinct_envs};
+use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, unique_envs};
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ impl Robot<'_> {
     /// Range of position targets \[rad or m\], shape (N, dof, 2): the joint's own limits, narrowed by the limits of
     /// joints that mimic it, or the range of [`set_qpos_limits`](RobotMut::set_qpos_limits); infinite without limits.
     pub fn qpos_limits(&self) -> Array3<f64> {
-        self.ends(|range| range)
+        self.range_limits(|range| range)
     }
 
     /// Soft limits \[rad or m\], shape (N, dof, 2): the fraction `soft_limit_factor` of the range of
@@ -23,7 +23,7 @@ impl Robot<'_> {
     /// Infinite without limits.
     pub fn soft_qpos_limits(&self) -> Array3<f64> {
         let factor = self.data.cfg().soft_limit_factor;
-        self.ends(|[low, high]| {
+        self.range_limits(|[low, high]| {
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * factor);
             // A range with an infinite end has the same soft range.
             if half.is_finite() && middle.is_finite() { [middle - half, middle + half] } else { [low, high] }
@@ -53,10 +53,10 @@ impl Robot<'_> {
     }
 
     /// Computes two numbers from the range of each joint.
-    fn ends(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
+    fn range_limits(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
         let joints: Vec<_> = self.indexing().joints.iter().zip(self.data.plans()).collect();
         self.simulation.batch.gather_rows_of(&joints, |env, (joint, plan)| {
-            of(joint.drive.map_or(plan.usable, |drive| env.drives.ranges[drive]))
+            of(joint.drive.map_or(plan.target_range, |drive| env.drives.ranges[drive]))
         })
     }
 }
@@ -85,7 +85,7 @@ impl RobotMut<'_> {
         let limits: ArrayView3<'_, f64> = limits.into();
         let joints = self.joint_columns(argument, joint_ids)?;
         let num_envs = self.simulation.batch.num_envs();
-        let envs = distinct_envs(argument, env_ids, num_envs)?.len();
+        let envs = unique_envs(argument, env_ids, num_envs)?.len();
         let (rows, columns, ends) = limits.dim();
         let fits = [1, envs].contains(&rows) && columns == joints.len() && ends == 2;
         let Some(flat) = limits.to_shape((rows, columns * ends)).ok().filter(|_| fits) else {
@@ -98,15 +98,19 @@ impl RobotMut<'_> {
             let end = ["lower", "upper"][column % 2];
             format!("{end} end of joint {:?}", name(joints[column / 2]))
         };
-        let table =
-            Table { argument, meaning: "environments, lower and upper end of joints", columns: 2 * columns, of: &of };
-        let rows = Rows::check_numbers(table, Numbers::End, flat.view(), env_ids, num_envs)?;
-        let drives = self.driven(argument, &joints)?;
+        let table = ArgumentSpec {
+            argument,
+            meaning: "environments, lower and upper end of joints",
+            columns: 2 * columns,
+            column_label: &of,
+        };
+        let rows = EnvRows::check_numbers(table, NumberKind::RangeEnd, flat.view(), env_ids, num_envs)?;
+        let drives = self.drives_of_joints(argument, &joints)?;
         for (row, (_, ends)) in rows.iter().enumerate() {
             for &(k, joint, _) in &drives {
-                let [first, last] = self.data.plans()[joint].usable;
+                let [first, last] = self.data.plans()[joint].target_range;
                 let refuse = |column: usize, expected: String| {
-                    Err(Error::OutOfRange { argument, row, column, of: of(column), value: ends[column], expected })
+                    Err(Error::OutOfRange { argument, row, column, item: of(column), value: ends[column], expected })
                 };
                 let (low, high) = (2 * k, 2 * k + 1);
                 if let Some(column) = [low, high].into_iter().find(|&c| !(first..=last).contains(&ends[c])) {
@@ -151,8 +155,8 @@ impl RobotMut<'_> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let write = self.checked_numbers("set_qvel_limits", Numbers::Limit, limits.into(), joint_ids, env_ids)?;
-        let drives = self.driven("set_qvel_limits", &write.joints)?;
+        let write = self.checked_numbers("set_qvel_limits", NumberKind::Limit, limits.into(), joint_ids, env_ids)?;
+        let drives = self.drives_of_joints("set_qvel_limits", &write.joints)?;
         let change = |gains: Gains, max_velocity| Gains { max_velocity, ..gains };
         self.check_models("set_qvel_limits", &write, &drives, change)?;
         self.change_drives(&write, &drives, |drives, drive, max_velocity| {
@@ -177,8 +181,8 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let argument = "set_qf_limits";
-        let write = self.checked_numbers(argument, Numbers::Limit, limits.into(), joint_ids, env_ids)?;
-        let drives = self.drives_of(argument, &write.joints)?;
+        let write = self.checked_numbers(argument, NumberKind::Limit, limits.into(), joint_ids, env_ids)?;
+        let drives = self.changeable_drives(argument, &write.joints)?;
         self.check_models(argument, &write, &drives, |gains, max_effort| Gains { max_effort, ..gains })?;
         self.change_drives(&write, &drives, DriveState::set_max_effort);
         Ok(())
@@ -200,7 +204,7 @@ impl RobotMut<'_> {
                 explicit.model.law().check(&change(table.drives[drive].initial, value)).map_err(|expected| {
                     let of = format!("joint {:?}", self.data.joint_names()[joint]);
                     let expected = format!("right for its model: {expected}");
-                    Error::OutOfRange { argument, row, column, of, value, expected }
+                    Error::OutOfRange { argument, row, column, item: of, value, expected }
                 })?;
             }
         }

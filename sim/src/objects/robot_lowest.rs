@@ -1,9 +1,9 @@
 //! Heights of the lowest collision points of a robot: clearance above the ground, or penetration.
 
 use crate::compile::compile;
-use crate::contents::Contents;
+use crate::contents::EntitySet;
 use crate::error::{Error, Result};
-use crate::index::GeomIndex;
+use crate::index::GeomIndexing;
 use crate::objects::robot::Robot;
 use crate::objects::robot_data::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -24,7 +24,7 @@ impl Robot<'_> {
         let links: Vec<usize> = (0..self.link_names().len()).collect();
         self.simulation.batch.gather(&links, |env, link| {
             let geoms = self.indexing().geoms.iter().filter(|geom| geom.link == *link);
-            lowest(env.data(), geoms)
+            lowest_height(env.data(), geoms)
         })
     }
 
@@ -33,7 +33,7 @@ impl Robot<'_> {
     /// negative height the penetration.
     #[doc(alias = "get_lowest_heights")]
     pub fn lowest_heights(&self) -> Array1<f64> {
-        let heights = self.simulation.batch.gather(&[()], |env, ()| lowest(env.data(), &self.indexing().geoms));
+        let heights = self.simulation.batch.gather(&[()], |env, ()| lowest_height(env.data(), &self.indexing().geoms));
         heights.index_axis(Axis(1), 0).to_owned()
     }
 
@@ -55,7 +55,7 @@ impl RobotData {
     pub(crate) fn with_clearance(
         self,
         manager: &SimulationManagerCfg,
-        others: &Contents,
+        others: &EntitySet,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
         let Some(clearance) = self.cfg().ground_clearance else { return Ok(self) };
@@ -67,12 +67,12 @@ impl RobotData {
         let height = Robot::new(&contents.robots[index], &trial, index).lowest_heights()[0];
         let mut robot = Arc::unwrap_or_clone(contents.robots.swap_remove(index));
         if height.is_finite() {
-            robot.raise(clearance - height);
+            robot.move_initial_pose_z(clearance - height);
         } else {
             let message = format!(
                 "{}: no link has a collision shape: ground_clearance {clearance} is ignored, and the ground does not hold \
                  the robot",
-                robot.named()
+                robot.label()
             );
             diagnostics.push(Diagnostic::new(DiagnosticKind::ClearanceIgnored, None, message));
         }
@@ -81,15 +81,15 @@ impl RobotData {
 }
 
 /// Height of the lowest point of the collision geoms among `geoms` \[m\].
-fn lowest<'g>(data: &Data, geoms: impl IntoIterator<Item = &'g GeomIndex>) -> f64 {
+fn lowest_height<'g>(data: &Data, geoms: impl IntoIterator<Item = &'g GeomIndexing>) -> f64 {
     let model = data.model();
     let collides = |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;
     let shapes = geoms.into_iter().filter(|geom| geom.visual.is_none() && collides(geom.geom));
-    shapes.map(|geom| lowest_of(model, data, geom.geom)).fold(f64::INFINITY, f64::min)
+    shapes.map(|geom| lowest_geom_height(model, data, geom.geom)).fold(f64::INFINITY, f64::min)
 }
 
 /// Height of the lowest point of a geom \[m\]; +∞ for planes and height fields, which do not move.
-fn lowest_of(model: &Model, data: &Data, geom: usize) -> f64 {
+fn lowest_geom_height(model: &Model, data: &Data, geom: usize) -> f64 {
     let middle = data.geom_xpos().as_chunks::<3>().0[geom][2];
     // The world's z axis in the axes of the geom.
     let [.., x, y, z] = data.geom_xmat().as_chunks::<9>().0[geom];

@@ -2,13 +2,13 @@
 
 use crate::body_pose::{BodyFrame, body_pose};
 use crate::capture::body_velocity;
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::RobotIndex;
+use crate::index::RobotIndexing;
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
-use crate::objects::rows::Numbers;
+use crate::objects::rows::NumberKind;
 use crate::pattern::{self, PatternError};
 use kinetoscope_robot::description::LinkId;
 use kinetoscope_scene::Pose;
@@ -83,7 +83,7 @@ impl Robot<'_> {
     }
 
     fn name_error(&self, error: PatternError) -> Error {
-        Error::RobotNames { robot: self.data.named(), error: Box::new(error) }
+        Error::RobotNames { robot: self.data.label(), error: Box::new(error) }
     }
 }
 
@@ -143,7 +143,7 @@ impl Robot<'_> {
     /// Center of mass of the root link and of the links fixed to it, in the environment \[m\], shape (N, 3).
     #[doc(alias = "get_root_com_position")]
     pub fn root_com_position(&self) -> Array2<f64> {
-        self.rows(|env, robot| centre_of_mass(env, robot).into())
+        self.rows(|env, robot| root_center_of_mass(env, robot).into())
     }
 
     /// Velocity of the center of mass of the root link and of the links fixed to it, then its angular velocity, in
@@ -152,7 +152,7 @@ impl Robot<'_> {
     #[doc(alias = "get_root_com_velocity")]
     pub fn root_com_velocity(&self) -> Array2<f64> {
         self.rows(|env, robot| {
-            let [v, w] = body_velocity(env.data(), robot.root.body, &centre_of_mass(env, robot));
+            let [v, w] = body_velocity(env.data(), robot.root.body, &root_center_of_mass(env, robot));
             [v.x, v.y, v.z, w.x, w.y, w.z]
         })
     }
@@ -191,14 +191,14 @@ impl Robot<'_> {
         headings.index_axis(Axis(1), 0).to_owned()
     }
 
-    fn in_root_axes(&self, of: impl Fn(&Env, &RobotIndex, &Pose) -> Vector3<f64>) -> Array2<f64> {
+    fn in_root_axes(&self, of: impl Fn(&SimEnv, &RobotIndexing, &Pose) -> Vector3<f64>) -> Array2<f64> {
         self.rows(|env, robot| {
             let root = body_pose(env.data(), robot.root.body);
             root.rotation.inverse_transform_vector(&of(env, robot, &root)).into()
         })
     }
 
-    fn rows<const K: usize>(&self, read: impl Fn(&Env, &RobotIndex) -> [f64; K]) -> Array2<f64> {
+    fn rows<const K: usize>(&self, read: impl Fn(&SimEnv, &RobotIndexing) -> [f64; K]) -> Array2<f64> {
         self.simulation.batch.gather_rows(|env| read(env, self.indexing()))
     }
 }
@@ -229,17 +229,17 @@ impl Robot<'_> {
         Ok(self.rows(|env, robot| link_velocity(env, &robot.links[link.0])))
     }
 
-    fn of_links<const K: usize>(&self, read: impl Fn(&Env, &BodyFrame) -> [f64; K]) -> Array3<f64> {
+    fn of_links<const K: usize>(&self, read: impl Fn(&SimEnv, &BodyFrame) -> [f64; K]) -> Array3<f64> {
         self.simulation.batch.gather_rows_of(&self.indexing().links, read)
     }
 }
 
-fn link_velocity(env: &Env, link: &BodyFrame) -> [f64; 6] {
+fn link_velocity(env: &SimEnv, link: &BodyFrame) -> [f64; 6] {
     let [v, w] = body_velocity(env.data(), link.body, &link.pose(env.data()).translation.vector);
     [v.x, v.y, v.z, w.x, w.y, w.z]
 }
 
-fn centre_of_mass(env: &Env, robot: &RobotIndex) -> Vector3<f64> {
+fn root_center_of_mass(env: &SimEnv, robot: &RobotIndexing) -> Vector3<f64> {
     Vector3::from_column_slice(&env.data().xipos()[3 * robot.root.body..3 * robot.root.body + 3])
 }
 
@@ -263,7 +263,7 @@ impl RobotMut<'_> {
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        let (argument, numbers) = ("write_qacc", Numbers::Acceleration);
+        let (argument, numbers) = ("write_qacc", NumberKind::Acceleration);
         let write = self.checked_numbers(argument, numbers, accelerations.into(), joint_ids, env_ids)?;
         let addresses = self.addresses(|joint| joint.dof);
         self.write_joints(&write, |data, joint, value| {

@@ -39,9 +39,9 @@ impl RobotMut<'_> {
         let (poses, velocities) = states.split_at(Axis(1), 7);
         let poses = root.check_poses("write_root_state", poses, env_ids)?;
         let velocities = root.check_velocities("write_root_state", velocities, env_ids)?;
-        root.put_poses(&poses)?;
-        root.put_velocities(&velocities, |_| Vector3::zeros());
-        root.refresh(&poses);
+        root.write_checked_poses(&poses)?;
+        root.write_checked_velocities(&velocities, |_| Vector3::zeros());
+        root.refresh_sensors(&poses);
         Ok(())
     }
 
@@ -61,7 +61,7 @@ impl RobotMut<'_> {
         for (argument, values) in
             [("write_joint_state (positions)", positions), ("write_joint_state (velocities)", velocities)]
         {
-            self.checked(argument, values, joint_ids, env_ids)?;
+            self.checked_rows(argument, values, joint_ids, env_ids)?;
         }
         self.write_qpos(positions, joint_ids, env_ids)?;
         self.write_qvel(velocities, joint_ids, env_ids)

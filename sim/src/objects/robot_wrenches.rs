@@ -4,7 +4,7 @@ use crate::body_pose::BodyFrame;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
-use crate::objects::rows::{Rows, Table, check_named_once, distinct_envs};
+use crate::objects::rows::{ArgumentSpec, EnvRows, check_unique_indices, unique_envs};
 use crate::wrenches::{Wrench, WrenchFrame};
 use kinetoscope_robot::description::LinkId;
 use nalgebra::Vector3;
@@ -18,11 +18,12 @@ impl Robot<'_> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
         let mut wrenches = Array3::zeros((n, links, 6));
         self.simulation.batch.for_each(|i, env| {
-            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of.0 == self.index() && wrench.of.1 < links)
+            for wrench in
+                env.wrenches().list.iter().filter(|wrench| wrench.owner.0 == self.index() && wrench.owner.1 < links)
             {
                 let [force, torque] = wrench.in_world(env.data());
                 for (k, value) in force.iter().chain(&torque).enumerate() {
-                    wrenches[(i, wrench.of.1, k)] = *value;
+                    wrenches[(i, wrench.owner.1, k)] = *value;
                 }
             }
         });
@@ -36,7 +37,7 @@ impl Robot<'_> {
         let mut weightless = Array2::from_elem((self.simulation.batch.num_envs(), links.len()), false);
         self.simulation.batch.for_each(|i, env| {
             for (l, link) in links.iter().enumerate() {
-                weightless[(i, l)] = env.wrenches().weightless.contains(&link.body);
+                weightless[(i, l)] = env.wrenches().gravity_compensated.contains(&link.body);
             }
         });
         weightless
@@ -85,7 +86,7 @@ impl RobotMut<'_> {
     ) -> Result<()> {
         let argument = "set_external_wrench";
         let links = self.links(argument, link_ids)?;
-        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        let envs = unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         let forces = self.vectors("set_external_wrench (forces)", forces.into(), &links, env_ids)?;
         let torques = self.vectors("set_external_wrench (torques)", torques.into(), &links, env_ids)?;
         let robot = self.index;
@@ -100,7 +101,7 @@ impl RobotMut<'_> {
                         let BodyFrame { body, body_from_frame } = frames[link];
                         let axes = (frame == WrenchFrame::Link).then_some(body_from_frame.rotation);
                         let (force, torque) = (vector(force_row, k), vector(torque_row, k));
-                        wrenches.replace(Wrench { of: (robot, link), body, axes, force, torque });
+                        wrenches.replace(Wrench { owner: (robot, link), body, axes, force, torque });
                     }
                 });
             });
@@ -129,9 +130,9 @@ impl RobotMut<'_> {
             links.iter().map(|&link| self.simulation.robots[self.index].links[link].body).collect();
         bodies.sort_unstable();
         bodies.dedup();
-        for env in distinct_envs(argument, env_ids, self.simulation.batch.num_envs())? {
+        for env in unique_envs(argument, env_ids, self.simulation.batch.num_envs())? {
             self.simulation.batch.write(env, |env| {
-                env.set_wrenches(|wrenches| wrenches.set_weightless(&bodies, on));
+                env.set_wrenches(|wrenches| wrenches.set_gravity_compensation(&bodies, on));
             });
         }
         Ok(())
@@ -147,7 +148,7 @@ impl RobotMut<'_> {
             None => Ok((0..count).collect()),
             Some(ids) => {
                 let links = ids.iter().map(|&LinkId(index)| exists(index)).collect::<Result<Vec<_>>>()?;
-                check_named_once(argument, &links, &|link| format!("link {:?}", known[link].name))?;
+                check_unique_indices(argument, &links, &|link| format!("link {:?}", known[link].name))?;
                 Ok(links)
             }
         }
@@ -172,7 +173,12 @@ impl RobotMut<'_> {
         };
         let name = |link: usize| &self.data.description().links[link].name;
         let of = |column: usize| format!("{} of link {:?}", ["x", "y", "z"][column % 3], name(links[column / 3]));
-        Rows::check(Table { argument, meaning, columns: 3 * columns, of: &of }, flat.view(), env_ids, num_envs)?;
+        EnvRows::check(
+            ArgumentSpec { argument, meaning, columns: 3 * columns, column_label: &of },
+            flat.view(),
+            env_ids,
+            num_envs,
+        )?;
         Ok(flat.rows().into_iter().map(|row| row.to_vec()).collect())
     }
 }

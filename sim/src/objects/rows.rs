@@ -6,7 +6,7 @@ use ndarray::{ArrayView1, ArrayView2};
 
 /// Expected layout of a table of numbers.
 #[derive(Clone, Copy)]
-pub(super) struct Table<'a> {
+pub(super) struct ArgumentSpec<'a> {
     /// Name of the method in errors.
     pub(super) argument: &'static str,
     /// Meaning of rows and columns, for errors.
@@ -14,12 +14,12 @@ pub(super) struct Table<'a> {
     /// Number of columns.
     pub(super) columns: usize,
     /// Description of a column, such as `joint "elbow"`.
-    pub(super) of: &'a dyn Fn(usize) -> String,
+    pub(super) column_label: &'a dyn Fn(usize) -> String,
 }
 
 /// Kind of numbers that a table may contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Numbers {
+pub(super) enum NumberKind {
     /// Finite numbers.
     Finite,
     /// Accelerations that MuJoCo accepts: its `mjMAXVAL` bounds them.
@@ -29,17 +29,17 @@ pub(super) enum Numbers {
     /// Limits: numbers of at least 0, and infinity for no limit.
     Limit,
     /// Ends of a range: all numbers except NaN, infinite for no limit.
-    End,
+    RangeEnd,
 }
 
-impl Numbers {
+impl NumberKind {
     fn allow(self, value: f64) -> bool {
         match self {
             Self::Finite => value.is_finite(),
             Self::Acceleration => value.abs() <= 1e10,
             Self::Gain => value.is_finite() && value >= 0.0,
             Self::Limit => value >= 0.0,
-            Self::End => !value.is_nan(),
+            Self::RangeEnd => !value.is_nan(),
         }
     }
 
@@ -49,7 +49,7 @@ impl Numbers {
             Self::Acceleration => "from -1e10 to 1e10, beyond which an acceleration counts as diverged",
             Self::Gain => "a finite number >= 0",
             Self::Limit => "a number >= 0, or infinite for no limit",
-            Self::End => "a number, or infinite for no limit",
+            Self::RangeEnd => "a number, or infinite for no limit",
         }
     }
 }
@@ -61,58 +61,66 @@ fn first_repeat(chosen: &[usize]) -> Option<(usize, usize)> {
 }
 
 /// Rejects columns that are selected twice: it would be ambiguous which of them applies. `of` describes a column.
-pub(super) fn check_distinct(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
+pub(super) fn check_unique_columns(
+    argument: &'static str,
+    chosen: &[usize],
+    of: &dyn Fn(usize) -> String,
+) -> Result<()> {
     match first_repeat(chosen) {
-        Some((first, second)) => Err(Error::RepeatedColumn { argument, of: of(second), first, second }),
+        Some((first, second)) => Err(Error::RepeatedColumn { argument, item: of(second), first, second }),
         None => Ok(()),
     }
 }
 
 /// Rejects repeated indices in a list of valid indices. `of` describes an index.
-pub(super) fn check_named_once(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
+pub(super) fn check_unique_indices(
+    argument: &'static str,
+    chosen: &[usize],
+    of: &dyn Fn(usize) -> String,
+) -> Result<()> {
     match first_repeat(chosen) {
-        Some((first, second)) => Err(Error::Repeated { argument, of: of(chosen[second]), first, second }),
+        Some((first, second)) => Err(Error::RepeatedItem { argument, item: of(chosen[second]), first, second }),
         None => Ok(()),
     }
 }
 
 /// Selected environments, each once.
-pub(super) fn distinct_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
+pub(super) fn unique_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
     let envs = env_list(env_ids, num_envs)?;
     if env_ids.is_some() {
-        check_named_once(argument, &envs, &|env| format!("environment {env}"))?;
+        check_unique_indices(argument, &envs, &|env| format!("environment {env}"))?;
     }
     Ok(envs)
 }
 
 /// Checked table: every number is valid, every environment exists.
 #[derive(Debug)]
-pub(super) struct Rows<'v> {
+pub(super) struct EnvRows<'v> {
     envs: Vec<usize>,
     values: ArrayView2<'v, f64>,
 }
 
-impl<'v> Rows<'v> {
+impl<'v> EnvRows<'v> {
     /// Checks finite `values`: a row for each of `env_ids` (`None` for all `num_envs` environments), or one row for all
     /// of them.
     pub(super) fn check(
-        table: Table<'_>,
+        table: ArgumentSpec<'_>,
         values: ArrayView2<'v, f64>,
         env_ids: Option<&[EnvId]>,
         num_envs: usize,
     ) -> Result<Self> {
-        Self::check_numbers(table, Numbers::Finite, values, env_ids, num_envs)
+        Self::check_numbers(table, NumberKind::Finite, values, env_ids, num_envs)
     }
 
     /// Checks values like [`check`](Self::check), for numbers of another kind.
     pub(super) fn check_numbers(
-        table: Table<'_>,
-        numbers: Numbers,
+        table: ArgumentSpec<'_>,
+        numbers: NumberKind,
         values: ArrayView2<'v, f64>,
         env_ids: Option<&[EnvId]>,
         num_envs: usize,
     ) -> Result<Self> {
-        let Table { argument, meaning, columns, of } = table;
+        let ArgumentSpec { argument, meaning, columns, column_label: of } = table;
         let envs = env_list(env_ids, num_envs)?;
         if values.ncols() != columns || (values.nrows() != envs.len() && values.nrows() != 1) {
             let (found, expected) = (values.shape().to_vec(), vec![envs.len(), columns]);
@@ -121,10 +129,10 @@ impl<'v> Rows<'v> {
         if let Some(((row, column), &value)) = values.indexed_iter().find(|(_, v)| !numbers.allow(**v)) {
             let of = of(column);
             return Err(match numbers {
-                Numbers::Finite | Numbers::Acceleration if !value.is_finite() => {
-                    Error::NotFinite { argument, row, column, of, value }
+                NumberKind::Finite | NumberKind::Acceleration if !value.is_finite() => {
+                    Error::NotFinite { argument, row, column, item: of, value }
                 }
-                _ => Error::OutOfRange { argument, row, column, of, value, expected: numbers.expected().into() },
+                _ => Error::OutOfRange { argument, row, column, item: of, value, expected: numbers.expected().into() },
             });
         }
         Ok(Self { envs, values })

@@ -215,7 +215,8 @@ mod tests {
     #[test]
     fn pyramid_and_cone() {
         let (radius, height) = (0.3, 0.8);
-        let (shape, solid) = (ObjectShape::Cone { radius, height }, cone(radius, height).solid().expect("closed"));
+        let (shape, solid) =
+            (ObjectShape::Cone { radius, height }, cone(radius, height).volume_integrals().expect("closed"));
         let polygon = 32.0 * radius * radius * (TAU / 64.0).sin() * height / 3.0;
         // Corners are in single precision.
         assert!((solid.volume / polygon - 1.0).abs() < 1e-6);

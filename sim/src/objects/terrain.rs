@@ -110,7 +110,7 @@ impl Terrain {
         for ((row, column), &value) in cfg.heights.indexed_iter() {
             if !value.is_finite() {
                 let of = format!("terrain {:?}", cfg.uid);
-                return Err(Error::NotFinite { argument: "heights", row, column, of, value });
+                return Err(Error::NotFinite { argument: "heights", row, column, item: of, value });
             }
         }
         let range = [
@@ -182,7 +182,7 @@ impl Terrain {
     }
 
     /// Height difference between the elevations 0 and 1 \[m\]. MuJoCo requires a positive value for flat ground too.
-    pub(crate) fn rise(&self) -> f64 {
+    pub(crate) fn elevation_scale(&self) -> f64 {
         let rise = self.range[1] - self.range[0];
         if rise > 0.0 { rise } else { 1e-3 }
     }
@@ -193,7 +193,7 @@ impl Terrain {
         let (rows, columns) = self.cfg.heights.dim();
         // `MAX_POINTS` bounds both numbers, so they fit into 32 bits.
         let mut bytes: Vec<u8> = [rows, columns].iter().flat_map(|&n| (n as i32).to_le_bytes()).collect();
-        let elevation = |height: &f64| ((height - self.range[0]) / self.rise()) as f32;
+        let elevation = |height: &f64| ((height - self.range[0]) / self.elevation_scale()) as f32;
         bytes.extend(self.cfg.heights.iter().flat_map(|height| elevation(height).to_le_bytes()));
         bytes
     }

@@ -88,7 +88,7 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Heights, A::Error> {
-        let mut keys = Keys { map: &mut map, any: false };
+        let mut keys = KeyTracker { map: &mut map, any: false };
         let generator = TerrainGenerator::deserialize(MapAccessDeserializer::new(&mut keys));
         if !keys.any {
             return Err(A::Error::custom(
@@ -104,12 +104,12 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
 }
 
 /// Map access that records whether the table has any key.
-struct Keys<'a, A> {
+struct KeyTracker<'a, A> {
     map: &'a mut A,
     any: bool,
 }
 
-impl<'de, A: MapAccess<'de>> MapAccess<'de> for Keys<'_, A> {
+impl<'de, A: MapAccess<'de>> MapAccess<'de> for KeyTracker<'_, A> {
     type Error = A::Error;
 
     fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, A::Error> {

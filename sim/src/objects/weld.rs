@@ -4,9 +4,9 @@ use super::weld_data::{WeldCfg, WeldData, WeldId};
 use crate::body_pose::body_pose;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::WeldIndex;
+use crate::index::WeldIndexing;
 use crate::manager::SimulationManager;
-use crate::objects::rows::distinct_envs;
+use crate::objects::rows::unique_envs;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
@@ -35,7 +35,7 @@ impl<'a> Weld<'a> {
 
     /// True where the weld holds, shape (N).
     pub fn is_attached(&self) -> Array1<bool> {
-        let WeldIndex { equality, .. } = self.simulation.welds[self.index];
+        let WeldIndexing { equality, .. } = self.simulation.welds[self.index];
         let mut attached = Array1::from_elem(self.simulation.batch.num_envs(), false);
         self.simulation.batch.for_each(|i, env| {
             attached[i] = env.welds().iter().any(|weld| weld.equality == equality);
@@ -81,7 +81,7 @@ impl<'a> WeldMut<'a> {
     /// # Errors
     /// An unknown or repeated environment; then nothing is changed.
     pub fn attach(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
-        self.change("attach", env_ids, true)
+        self.set_attached("attach", env_ids, true)
     }
 
     /// Releases the two bodies, in `env_ids` (`None` for all environments). A forward pass follows.
@@ -89,12 +89,12 @@ impl<'a> WeldMut<'a> {
     /// # Errors
     /// As [`attach`](Self::attach).
     pub fn release(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
-        self.change("release", env_ids, false)
+        self.set_attached("release", env_ids, false)
     }
 
-    fn change(&mut self, argument: &'static str, env_ids: Option<&[EnvId]>, attached: bool) -> Result<()> {
-        let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
-        let WeldIndex { equality, bodies } = self.simulation.welds[self.index];
+    fn set_attached(&mut self, argument: &'static str, env_ids: Option<&[EnvId]>, attached: bool) -> Result<()> {
+        let envs = unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
+        let WeldIndexing { equality, bodies } = self.simulation.welds[self.index];
         for &env in &envs {
             self.simulation.batch.write(env, |env| {
                 let [first, second]: [Pose; 2] = bodies.map(|body| body_pose(env.data(), body));
@@ -121,9 +121,9 @@ impl SimulationManager {
     pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
         self.check_world_uid(&cfg.uid)?;
         let model = self.simulation.batch.model();
-        let body = |name: &str| match self.contents.bodies_called(name)?.as_deref() {
+        let body = |name: &str| match self.entities.find_bodies(name)?.as_deref() {
             None => Ok(0),
-            Some(&[one]) => Ok(self.simulation.plan.bodies()[one].body),
+            Some(&[one]) => Ok(self.simulation.body_axis.bodies()[one].body),
             Some(_) => Err(Error::Config {
                 field: "weld",
                 value: format!("{name:?}"),
@@ -147,10 +147,10 @@ impl SimulationManager {
             return fail("one of the two must move by itself: both are fixed or moved by hand");
         }
         let second_is_fixed = other == 0;
-        let mut contents = self.contents.clone();
+        let mut contents = self.entities.clone();
         contents.welds.push(WeldData { cfg: Arc::new(cfg), second_is_fixed });
-        self.replace_contents(contents, Vec::new())?;
-        Ok(WeldId { manager: self.serial, index: self.contents.welds.len() - 1 })
+        self.recompile_with(contents, Vec::new())?;
+        Ok(WeldId { manager: self.serial, index: self.entities.welds.len() - 1 })
     }
 
     /// Read access to a weld.
@@ -160,7 +160,7 @@ impl SimulationManager {
     #[track_caller]
     pub fn weld(&self, id: WeldId) -> Weld<'_> {
         let index = self.index_of(id.manager, id.index);
-        Weld::new(&self.contents.welds[index].cfg, &self.simulation, index)
+        Weld::new(&self.entities.welds[index].cfg, &self.simulation, index)
     }
 
     /// Write access to a weld, to attach and release it.
@@ -170,6 +170,6 @@ impl SimulationManager {
     #[track_caller]
     pub fn weld_mut(&mut self, id: WeldId) -> WeldMut<'_> {
         let index = self.index_of(id.manager, id.index);
-        WeldMut::new(&self.contents.welds[index].cfg, &mut self.simulation, &mut self.sensors, index)
+        WeldMut::new(&self.entities.welds[index].cfg, &mut self.simulation, &mut self.sensors, index)
     }
 }

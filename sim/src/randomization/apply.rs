@@ -2,23 +2,23 @@
 
 use super::Property;
 use super::error::RandomizationError;
-use super::properties::{OwnValues, Properties};
-use super::tables::{FrictionPlace, dofs_of, friction_place};
+use super::properties::{Properties, PropertyOverrides};
+use super::tables::{FrictionLocation, dofs_of, friction_location};
 use crate::drive::gains::Gains;
 use crate::drive::table::{DriveState, DriveTable};
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::Result;
-use kinetoscope_mujoco::{DiagonalInertia, Editor, Model};
+use kinetoscope_mujoco::{DiagonalInertia, Model, ModelEditor};
 
 /// Creator of environment models for one compiled scene.
 #[derive(Debug)]
-pub(crate) struct Maker {
-    editor: Editor,
+pub(crate) struct ModelPatcher {
+    editor: ModelEditor,
     base: Model,
 }
 
 /// Model and drive settings that are prepared for an environment.
-pub(crate) struct Made {
+pub(crate) struct EnvPatch {
     /// New model; `None` if the environment keeps its model.
     model: Option<Model>,
     /// Proportional gain, derivative gain and effort limit of each drive; `None` for values that stay.
@@ -32,15 +32,21 @@ pub(crate) struct Made {
     rows: Vec<usize>,
 }
 
-impl Maker {
+impl ModelPatcher {
     /// Creates models for environments of the compiled model `base`.
     pub(crate) fn new(base: &Model) -> Result<Self> {
-        Ok(Self { editor: Editor::new(base)?, base: base.clone() })
+        Ok(Self { editor: ModelEditor::new(base)?, base: base.clone() })
     }
 
     /// Prepares environment `index`, which is `env`, for these properties. `own` are its own values, from
     /// [`Properties::own`].
-    pub(crate) fn make(&mut self, properties: &Properties, own: &OwnValues, index: usize, env: &Env) -> Result<Made> {
+    pub(crate) fn prepare(
+        &mut self,
+        properties: &Properties,
+        own: &PropertyOverrides,
+        index: usize,
+        env: &SimEnv,
+    ) -> Result<EnvPatch> {
         let drives = env.drives.table();
         properties.check(index)?;
         check_models(properties, &env.drives, index)?;
@@ -54,14 +60,14 @@ impl Maker {
             env.data().model().own_arrays().next().is_none() && env.data().model().gravity() == self.base.gravity();
         let model = (!(is_nominal && had_none)).then(|| self.editor.model(env.data().model()));
         let values = |property: Property| &properties.values[property as usize];
-        let places = &properties.tables.get(Property::Stiffness).places;
+        let places = &properties.tables.get(Property::Stiffness).indices;
         let gains = places.iter().enumerate().map(|(element, &drive)| {
             let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
-            let drawn = |of: Property| properties.is_asked(of, element).then(|| values(of)[element]);
+            let drawn = |of: Property| properties.is_changed(of, element).then(|| values(of)[element]);
             (drive, gains.map(drawn))
         });
         let rows = drives.rows(model.as_ref().unwrap_or(env.data().model()));
-        Ok(Made { model, gains: gains.collect(), nominal_gains: properties.nominal_gains, damping, rows })
+        Ok(EnvPatch { model, gains: gains.collect(), nominal_gains: properties.nominal_gains, damping, rows })
     }
 
     /// Writes the values that differ from the nominal ones. Returns true if MuJoCo's derived constants must be
@@ -79,7 +85,7 @@ impl Maker {
         // Joint damping comes before armature, which contains a part of it.
         for property in Property::ALL.into_iter().filter(|property| !property.is_gain()) {
             let (table, width) = (properties.tables.get(property), property.width());
-            for (element, &place) in table.places.iter().enumerate() {
+            for (element, &place) in table.indices.iter().enumerate() {
                 let at = element * width..(element + 1) * width;
                 let value = &properties.values[property as usize][at.clone()];
                 let dofs = || dofs_of(base, place);
@@ -115,9 +121,9 @@ impl Maker {
                             editor.dof_armature_mut()[dof] = value[0] + implicit;
                         }
                     }
-                    Property::DryFriction => match friction_place(base, drives, place) {
-                        Some(FrictionPlace::Tendon(tendon)) => editor.tendon_frictionloss_mut()[tendon] = value[0],
-                        Some(FrictionPlace::Joint) => {
+                    Property::DryFriction => match friction_location(base, drives, place) {
+                        Some(FrictionLocation::Tendon(tendon)) => editor.tendon_frictionloss_mut()[tendon] = value[0],
+                        Some(FrictionLocation::Joint) => {
                             dofs().for_each(|dof| editor.dof_frictionloss_mut()[dof] = value[0]);
                         }
                         None => {}
@@ -158,8 +164,8 @@ impl Maker {
 /// Checks randomized gains and limits, and those that are set, against the explicit models of the drives.
 fn check_models(properties: &Properties, drives: &DriveState, env: usize) -> Result<(), RandomizationError> {
     let table = properties.tables.get(Property::MaxEffort);
-    for (element, (name, &drive)) in table.names.iter().zip(&table.places).enumerate() {
-        let asked = |of: Property| properties.is_asked(of, element).then(|| properties.values[of as usize][element]);
+    for (element, (name, &drive)) in table.names.iter().zip(&table.indices).enumerate() {
+        let asked = |of: Property| properties.is_changed(of, element).then(|| properties.values[of as usize][element]);
         let [kp, kd, max_effort] = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort].map(asked);
         let Some(explicit) = drives.table().model_of(drive) else { continue };
         if kp.or(kd).or(max_effort).is_none() {
@@ -178,14 +184,14 @@ fn check_models(properties: &Properties, drives: &DriveState, env: usize) -> Res
     Ok(())
 }
 
-impl Made {
+impl EnvPatch {
     /// Applies the model and the drive settings to the environment.
-    pub(crate) fn give(self, env: &mut Env) {
+    pub(crate) fn apply(self, env: &mut SimEnv) {
         for (drive, gains) in self.gains {
             if self.nominal_gains {
-                env.drives.become_nominal(drive);
+                env.drives.reset_to_nominal(drive);
             }
-            env.drives.draw_gains(drive, gains);
+            env.drives.override_gains(drive, gains);
         }
         env.drives.set_damping(&self.damping);
         env.drives.set_rows(&self.rows);

@@ -1,11 +1,11 @@
 //! Access to properties of environments through the manager.
 
-use super::{OwnValues, Properties, Property, Randomization};
+use super::{Properties, Property, PropertyOverrides, Randomization};
 use crate::error::Result;
 use crate::ids::{EnvId, env_mask};
 use crate::manager::SimulationManager;
 use crate::snapshot::Snapshot;
-use kinetoscope_scene::Random;
+use kinetoscope_scene::KeyedRng;
 
 impl SimulationManager {
     /// Read access to properties of environments: masses, frictions, sizes, gains.
@@ -55,7 +55,7 @@ impl<'a> EnvProperties<'a> {
     pub fn of(&self, env: EnvId) -> Result<Properties> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let tables = self.sim.simulation.tables();
-        Ok(self.sim.simulation.batch.edit(env.0, |here| self.sim.simulation.properties_of(tables, env.0, here)))
+        Ok(self.sim.simulation.batch.with_env(env.0, |here| self.sim.simulation.properties_of(tables, env.0, here)))
     }
 
     /// Memory of an environment's own properties \[bytes\]: the struct and the arrays of the model that it does not
@@ -66,10 +66,10 @@ impl<'a> EnvProperties<'a> {
     /// The environment does not exist.
     pub fn bytes(&self, env: EnvId) -> Result<usize> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let Some(own) = &self.sim.simulation.own_values[env.0] else { return Ok(0) };
+        let Some(own) = &self.sim.simulation.property_overrides[env.0] else { return Ok(0) };
         let values: usize = own.iter().flatten().map(|values| size_of_val(&**values)).sum();
         let model = self.sim.simulation.batch.read(env.0, |env| env.data().model().own_bytes());
-        Ok(model + size_of::<OwnValues>() + values)
+        Ok(model + size_of::<PropertyOverrides>() + values)
     }
 }
 
@@ -93,11 +93,11 @@ impl<'a> EnvPropertiesMut<'a> {
     /// invalid, such as a negative mass; then nothing changes.
     pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
         let resolved = randomization.resolve(&self.sim.properties().of(EnvId(0))?)?;
-        let keys = self.keys();
+        let keys = self.rng_keys();
         // One buffer for all texts: there is a key for each environment, property and name.
         let mut what = String::new();
-        self.draw(env_ids, |env, properties| {
-            resolved.draw(properties, |property, name| {
+        self.randomize_counted(env_ids, |env, properties| {
+            resolved.apply(properties, |property, name| {
                 what.clear();
                 what.extend(["/", property.name(), "/", name]);
                 keys(env, &what)
@@ -115,10 +115,10 @@ impl<'a> EnvPropertiesMut<'a> {
     pub fn randomize_with(
         &mut self,
         env_ids: Option<&[EnvId]>,
-        mut change: impl FnMut(&mut Random, EnvId, &mut Properties) -> Result<()>,
+        mut change: impl FnMut(&mut KeyedRng, EnvId, &mut Properties) -> Result<()>,
     ) -> Result<()> {
-        let keys = self.keys();
-        self.draw(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
+        let keys = self.rng_keys();
+        self.randomize_counted(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
     }
 
     /// Resets environments to the nominal properties, gains of drives included. They then share the whole model again.
@@ -167,20 +167,20 @@ impl<'a> EnvPropertiesMut<'a> {
     }
 
     /// Random numbers of the next randomization, by environment and purpose.
-    fn keys(&self) -> impl Fn(usize, &str) -> Random + use<> {
-        let (seed, first, draws) = (self.sim.cfg.seed, self.sim.cfg.first_env(), self.sim.draws.clone());
-        move |env, what| Random::keyed(seed, (first + env) as u64, &format!("properties/{}{what}", draws[env]))
+    fn rng_keys(&self) -> impl Fn(usize, &str) -> KeyedRng + use<> {
+        let (seed, first, draws) = (self.sim.cfg.seed, self.sim.cfg.first_env(), self.sim.randomization_count.clone());
+        move |env, what| KeyedRng::keyed(seed, (first + env) as u64, &format!("properties/{}{what}", draws[env]))
     }
 
     /// Changes properties with random numbers, and counts the randomization.
-    fn draw(
+    fn randomize_counted(
         &mut self,
         env_ids: Option<&[EnvId]>,
         change: impl FnMut(usize, &mut Properties) -> Result<()>,
     ) -> Result<()> {
         let chosen = env_mask(env_ids, self.sim.num_envs())?;
         self.change(env_ids, change)?;
-        let counted = self.sim.draws.iter_mut().zip(chosen);
+        let counted = self.sim.randomization_count.iter_mut().zip(chosen);
         counted.for_each(|(draws, chosen)| *draws = draws.wrapping_add(u64::from(chosen)));
         Ok(())
     }

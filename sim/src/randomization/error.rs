@@ -54,7 +54,7 @@ pub enum RandomizationError {
     },
     /// The size of a mesh, a plane or a height field is not a property.
     #[error("the size of {name:?} cannot differ between environments: {reason}")]
-    Unsized {
+    NoSizeProperty {
         /// Name of the element.
         name: String,
         /// Reason and remedy.
@@ -74,7 +74,7 @@ pub enum RandomizationError {
     },
     /// The scene of an environment cannot be rendered.
     #[error("environment {env} cannot be drawn as it would be: {error}")]
-    Look {
+    EnvScene {
         /// Index of the environment.
         env: usize,
         /// Error of the scene.

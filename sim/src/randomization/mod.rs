@@ -9,58 +9,59 @@ mod property;
 mod tables;
 mod terms;
 
-use apply::Made;
-pub(crate) use apply::Maker;
+use apply::EnvPatch;
+pub(crate) use apply::ModelPatcher;
 pub use env_properties::{EnvProperties, EnvPropertiesMut};
 pub use error::RandomizationError;
 pub(crate) use named::NamedValue;
-pub(crate) use properties::OwnValues;
 pub use properties::Properties;
+pub(crate) use properties::PropertyOverrides;
 pub use property::Property;
-use tables::Beside;
-pub(crate) use tables::Tables;
-pub use terms::{Draw, Randomization, Term};
+pub(crate) use tables::PropertyTables;
+use tables::SceneContext;
+pub use terms::{Randomization, RandomizationOp, RandomizationTerm};
 
-use crate::env::Env;
+use crate::env::SimEnv;
 use crate::error::Result;
 use crate::simulation::Simulation;
-use kinetoscope_scene::{OwnScene, RenderSceneError};
+use kinetoscope_scene::{EnvScene, RenderSceneError};
 use std::sync::Arc;
 
 impl Simulation {
     /// Tables of the properties of the scene, created on first use.
-    pub(crate) fn tables(&self) -> &Arc<Tables> {
-        self.tables.get_or_init(|| {
+    pub(crate) fn tables(&self) -> &Arc<PropertyTables> {
+        self.property_tables.get_or_init(|| {
             let drives = self.batch.read(0, |env| Arc::clone(env.drives.table()));
-            let standing: Vec<usize> = self.objects.iter().filter(|object| object.stands()).map(|o| o.body).collect();
-            let beside = Beside { proxies: &self.proxies, standing: &standing };
-            Arc::new(Tables::of(self.batch.model(), &drives, beside))
+            let standing: Vec<usize> =
+                self.objects.iter().filter(|object| object.is_static()).map(|o| o.body).collect();
+            let beside = SceneContext { proxies: &self.visual_proxies, static_bodies: &standing };
+            Arc::new(PropertyTables::of(self.batch.model(), &drives, beside))
         })
     }
 
-    fn properties_of(&self, tables: &Arc<Tables>, index: usize, env: &Env) -> Properties {
-        let own = self.own_values[index].as_deref().unwrap_or(&NOTHING);
+    fn properties_of(&self, tables: &Arc<PropertyTables>, index: usize, env: &SimEnv) -> Properties {
+        let own = self.property_overrides[index].as_deref().unwrap_or(&NO_OVERRIDES);
         Properties::new(tables, own, &env.drives)
     }
 
     /// Own property values of an environment, `here`, by name.
-    pub(crate) fn named_properties(&self, env: usize, here: &Env) -> Vec<NamedValue> {
-        self.tables().named(self.own_values[env].as_deref().unwrap_or(&NOTHING), &here.drives)
+    pub(crate) fn named_properties(&self, env: usize, here: &SimEnv) -> Vec<NamedValue> {
+        self.tables().named_overrides(self.property_overrides[env].as_deref().unwrap_or(&NO_OVERRIDES), &here.drives)
     }
 
     /// Reads a scalar property (not a gain) of the element `name` in every environment. Does nothing if no such element
     /// has it.
-    pub(crate) fn property_of_all(&self, property: Property, name: &str, mut read: impl FnMut(usize, f64)) {
+    pub(crate) fn read_property(&self, property: Property, name: &str, mut read: impl FnMut(usize, f64)) {
         let table = self.tables().get(property);
         let Some(element) = table.names.iter().position(|of| of == name) else { return };
-        for (env, own) in self.own_values.iter().enumerate() {
+        for (env, own) in self.property_overrides.iter().enumerate() {
             let own = own.as_ref().and_then(|own| own[property as usize].as_ref());
             read(env, own.map_or(table.nominal[element], |values| values[element]));
         }
     }
 
     /// True for each name of an element that has the property.
-    pub(crate) fn properties_named(&self, property: Property, names: &[String]) -> Vec<bool> {
+    pub(crate) fn have_property(&self, property: Property, names: &[String]) -> Vec<bool> {
         let table = self.tables().get(property);
         names.iter().map(|name| table.names.contains(name)).collect()
     }
@@ -71,98 +72,99 @@ impl Simulation {
         envs: &[usize],
         mut change: impl FnMut(usize, &mut Properties) -> Result<()>,
     ) -> Result<()> {
-        let mut maker = match self.maker.take() {
+        let mut maker = match self.model_patcher.take() {
             Some(maker) => maker,
-            None => Maker::new(self.batch.model())?,
+            None => ModelPatcher::new(self.batch.model())?,
         };
         // Created before an environment is locked: the creation reads an environment.
         let tables = Arc::clone(self.tables());
         let made: Result<Vec<_>> = envs
             .iter()
             .map(|&index| {
-                self.batch.edit(index, |env| {
+                self.batch.with_env(index, |env| {
                     let mut properties = self.properties_of(&tables, index, env);
                     change(index, &mut properties)?;
-                    let own = properties.own();
-                    let made = maker.make(&properties, &own, index, env)?;
+                    let own = properties.overrides();
+                    let made = maker.prepare(&properties, &own, index, env)?;
                     Ok((index, own, made))
                 })
             })
             .collect();
-        self.maker = Some(maker);
+        self.model_patcher = Some(maker);
         let made = made?;
-        let looks_other = |(index, own, _): &&(usize, OwnValues, Made)| {
-            let before = self.own_values[*index].as_deref().unwrap_or(&NOTHING);
+        let looks_other = |(index, own, _): &&(usize, PropertyOverrides, EnvPatch)| {
+            let before = self.property_overrides[*index].as_deref().unwrap_or(&NO_OVERRIDES);
             [Property::Size, Property::Color].iter().any(|p| before[*p as usize] != own[*p as usize])
         };
         let others: Vec<_> = made.iter().filter(looks_other).map(|(index, own, _)| (*index, own)).collect();
         let mut looks = Vec::with_capacity(others.len());
-        for (env, look) in self.looks(&others) {
-            looks.push((env, look.map_err(|error| RandomizationError::Look { env, error })?));
+        for (env, look) in self.env_scenes(&others) {
+            looks.push((env, look.map_err(|error| RandomizationError::EnvScene { env, error })?));
         }
         for (index, own, made) in made {
-            self.own_values[index] = own.iter().any(Option::is_some).then(|| own.into());
-            self.batch.edit(index, |env| made.give(env));
+            self.property_overrides[index] = own.iter().any(Option::is_some).then(|| own.into());
+            self.batch.with_env(index, |env| made.apply(env));
         }
-        self.look_so(looks);
+        self.set_env_scenes(looks);
         Ok(())
     }
 
     /// Render scenes of environments with these own values; empty while the scene is not rendered.
-    fn looks(&self, envs: &[(usize, &OwnValues)]) -> Vec<(usize, Result<OwnScene, RenderSceneError>)> {
-        let of = |own: &&OwnValues, property: Property| own[property as usize].is_some();
-        let looks_own = |own: &&OwnValues| of(own, Property::Size) || of(own, Property::Color);
-        let Some(visible) = &self.visible else { return Vec::new() };
-        if self.own_scenes.is_empty() && !envs.iter().any(|(_, own)| looks_own(own)) {
+    fn env_scenes(&self, envs: &[(usize, &PropertyOverrides)]) -> Vec<(usize, Result<EnvScene, RenderSceneError>)> {
+        let of = |own: &&PropertyOverrides, property: Property| own[property as usize].is_some();
+        let looks_own = |own: &&PropertyOverrides| of(own, Property::Size) || of(own, Property::Color);
+        let Some(visible) = &self.visual_scene else { return Vec::new() };
+        if self.env_scenes.is_empty() && !envs.iter().any(|(_, own)| looks_own(own)) {
             return Vec::new();
         }
         let tables = self.tables();
-        let scene = |own: &OwnValues| {
+        let scene = |own: &PropertyOverrides| {
             if !looks_own(&own) {
-                return Ok(OwnScene(None));
+                return Ok(EnvScene(None));
             }
             let [sizes, colors] = [Property::Size, Property::Color].map(|property| {
                 let values = own[property as usize].as_deref().unwrap_or(&[]);
                 tables.get(property).changes(property.width(), values)
             });
-            visible.own_scene(self.batch.model(), &sizes, &colors)
+            visible.env_scene(self.batch.model(), &sizes, &colors)
         };
         envs.iter().map(|(env, own)| (*env, scene(own))).collect()
     }
 
     /// Sets the render scenes of these environments.
-    fn look_so(&mut self, looks: Vec<(usize, OwnScene)>) {
+    fn set_env_scenes(&mut self, looks: Vec<(usize, EnvScene)>) {
         if !looks.is_empty() {
-            self.own_scenes.resize(self.own_values.len(), OwnScene(None));
+            self.env_scenes.resize(self.property_overrides.len(), EnvScene(None));
         }
-        looks.into_iter().for_each(|(env, look)| self.own_scenes[env] = look);
+        looks.into_iter().for_each(|(env, look)| self.env_scenes[env] = look);
     }
 
     /// Builds the render scenes of all environments when rendering starts. An environment whose scene is invalid is
     /// rendered with the nominal scene; its error is returned.
-    pub(crate) fn look_anew(&mut self) -> Vec<(usize, RenderSceneError)> {
-        let own = self.own_values.iter().map(|own| own.as_deref().unwrap_or(&NOTHING));
+    pub(crate) fn rebuild_env_scenes(&mut self) -> Vec<(usize, RenderSceneError)> {
+        let own = self.property_overrides.iter().map(|own| own.as_deref().unwrap_or(&NO_OVERRIDES));
         let (mut looks, mut faults) = (Vec::new(), Vec::new());
-        for (env, look) in self.looks(&own.enumerate().collect::<Vec<_>>()) {
+        for (env, look) in self.env_scenes(&own.enumerate().collect::<Vec<_>>()) {
             match look {
                 Ok(look) => looks.push((env, look)),
                 Err(error) => faults.push((env, error)),
             }
         }
-        self.look_so(looks);
+        self.set_env_scenes(looks);
         faults
     }
 
     /// Carries over the own property values of the environments of `old`, by name.
     pub(crate) fn carry_properties(&mut self, old: &Self) -> Result<()> {
-        let envs: Vec<usize> = (0..old.own_values.len()).filter(|&env| old.own_values[env].is_some()).collect();
+        let envs: Vec<usize> =
+            (0..old.property_overrides.len()).filter(|&env| old.property_overrides[env].is_some()).collect();
         if envs.is_empty() {
             return Ok(());
         }
         let tables = Arc::clone(self.tables());
         self.change_properties(&envs, |env, properties| {
-            if let Some(own) = &old.own_values[env] {
-                let own = Properties::carried_to(own, old.tables(), &tables);
+            if let Some(own) = &old.property_overrides[env] {
+                let own = Properties::transferred(own, old.tables(), &tables);
                 for (values, own) in properties.values.iter_mut().zip(own) {
                     if let Some(own) = own {
                         *values = own.into();
@@ -175,4 +177,4 @@ impl Simulation {
 }
 
 /// Own values of an environment without any.
-const NOTHING: OwnValues = [const { None }; Property::ALL.len()];
+const NO_OVERRIDES: PropertyOverrides = [const { None }; Property::ALL.len()];

@@ -1,8 +1,8 @@
 //! Own property values of environments by name, for snapshots.
 
 use super::Property;
-use super::properties::OwnValues;
-use super::tables::Tables;
+use super::properties::PropertyOverrides;
+use super::tables::PropertyTables;
 use crate::drive::table::DriveState;
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ pub(crate) struct NamedValue {
 /// Elements of a property, by name and index among the elements of that name.
 pub(crate) type Elements<'t> = BTreeMap<(&'t str, u32), usize>;
 
-impl Tables {
+impl PropertyTables {
     /// Indexes the elements of a property.
     pub(crate) fn elements(&self, property: Property) -> Elements<'_> {
         let (mut seen, mut elements) = (BTreeMap::<&str, u32>::new(), Elements::new());
@@ -33,7 +33,7 @@ impl Tables {
     }
 
     /// Collects the values that are not nominal, bit by bit, and the randomized gains.
-    pub(crate) fn named(&self, own: &OwnValues, drives: &DriveState) -> Vec<NamedValue> {
+    pub(crate) fn named_overrides(&self, own: &PropertyOverrides, drives: &DriveState) -> Vec<NamedValue> {
         let mut values = Vec::new();
         for property in Property::ALL {
             let (table, width) = (self.get(property), property.width());
@@ -43,9 +43,9 @@ impl Tables {
                 let same = mine.iter().map(|x| x.to_bits()).eq(nominal.iter().map(|x| x.to_bits()));
                 (!same).then_some(mine)
             };
-            let gain = |element: usize| property.gain().and_then(|k| drives.drawn_values(table.places[element])[k]);
+            let gain = |element: usize| property.gain().and_then(|k| drives.override_values(table.indices[element])[k]);
             let has_own = match property.gain() {
-                Some(k) => table.places.iter().any(|&drive| drives.drawn_values(drive)[k].is_some()),
+                Some(k) => table.indices.iter().any(|&drive| drives.override_values(drive)[k].is_some()),
                 None => own[property as usize].is_some(),
             };
             if !has_own {

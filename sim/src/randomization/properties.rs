@@ -2,7 +2,7 @@
 
 use super::Property;
 use super::error::RandomizationError;
-use super::tables::{Table, Tables};
+use super::tables::{PropertyTable, PropertyTables};
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
 use crate::pattern;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Own property values of an environment, in the order of [`Property::ALL`]; `None` for nominal properties. Gains are
 /// stored with the drives instead.
-pub(crate) type OwnValues = [Option<Box<[f64]>>; Property::ALL.len()];
+pub(crate) type PropertyOverrides = [Option<Box<[f64]>>; Property::ALL.len()];
 
 /// Properties of one environment.
 ///
@@ -19,19 +19,19 @@ pub(crate) type OwnValues = [Option<Box<[f64]>>; Property::ALL.len()];
 /// ground and of gravity are `ground` and `gravity`. Links behind fixed joints are part of the link they are fused to.
 #[derive(Clone, Debug)]
 pub struct Properties {
-    pub(super) tables: Arc<Tables>,
+    pub(super) tables: Arc<PropertyTables>,
     /// Values in the order of [`Property::ALL`].
     pub(super) values: [Vec<f64>; Property::ALL.len()],
     /// Gains that were randomized or set here, by property and element. They count as randomized even if they have the
     /// same value.
-    asked: BTreeSet<(Property, usize)>,
-    /// True if all gains except those in `asked` become nominal and are no longer randomized.
+    changed_gains: BTreeSet<(Property, usize)>,
+    /// True if all gains except those in `changed_gains` become nominal and are no longer randomized.
     pub(super) nominal_gains: bool,
 }
 
 impl Properties {
     /// Properties of an environment with these own values and drives.
-    pub(super) fn new(tables: &Arc<Tables>, own: &OwnValues, drives: &DriveState) -> Self {
+    pub(super) fn new(tables: &Arc<PropertyTables>, own: &PropertyOverrides, drives: &DriveState) -> Self {
         let values = Property::ALL.map(|property| {
             let table = tables.get(property);
             let gain = |place: &usize| {
@@ -43,21 +43,21 @@ impl Properties {
                 }
             };
             match &own[property as usize] {
-                _ if property.is_gain() => table.places.iter().map(gain).collect(),
+                _ if property.is_gain() => table.indices.iter().map(gain).collect(),
                 Some(values) => values.to_vec(),
                 None => table.nominal.clone(),
             }
         });
-        Self { tables: Arc::clone(tables), values, asked: BTreeSet::new(), nominal_gains: false }
+        Self { tables: Arc::clone(tables), values, changed_gains: BTreeSet::new(), nominal_gains: false }
     }
 
     /// True if a gain was randomized or set here.
-    pub(super) fn is_asked(&self, gain: Property, element: usize) -> bool {
-        self.asked.contains(&(gain, element))
+    pub(super) fn is_changed(&self, gain: Property, element: usize) -> bool {
+        self.changed_gains.contains(&(gain, element))
     }
 
     /// Collects the values that differ from the nominal values, bit by bit.
-    pub(super) fn own(&self) -> OwnValues {
+    pub(super) fn overrides(&self) -> PropertyOverrides {
         Property::ALL.map(|property| {
             let (mine, nominal) = (&self.values[property as usize], &self.tables.get(property).nominal);
             let same = mine.iter().map(|x| x.to_bits()).eq(nominal.iter().map(|x| x.to_bits()));
@@ -78,7 +78,7 @@ impl Properties {
 
     /// Names of the elements that a randomization of a property changes. It keeps nominal opacities, so it does not
     /// change the visible color of an element that is nominally invisible.
-    pub(super) fn names_to_draw(&self, property: Property) -> Vec<&str> {
+    pub(super) fn randomizable_names(&self, property: Property) -> Vec<&str> {
         let table = self.tables.get(property);
         let is_seen = |name: &str| {
             let opacities = table.nominal.chunks(property.width()).map(|color| color[3]);
@@ -91,10 +91,11 @@ impl Properties {
 
     /// First element that a pattern matches and that cannot have the property, with the reason. `None` if the pattern
     /// matches an element that can have it.
-    pub(super) fn only_without(&self, property: Property, pattern: &str) -> Option<(String, &'static str)> {
-        let without = &self.tables.get(property).without;
-        let matched = |names: &[&str]| pattern::select(&[pattern], names, property.owner()).unwrap_or_default();
-        if !matched(&self.names_to_draw(property)).is_empty() {
+    pub(super) fn unsupported_match(&self, property: Property, pattern: &str) -> Option<(String, &'static str)> {
+        let without = &self.tables.get(property).unsupported;
+        let matched =
+            |names: &[&str]| pattern::select(&[pattern], names, property.element_description()).unwrap_or_default();
+        if !matched(&self.randomizable_names(property)).is_empty() {
             return None;
         }
         let names: Vec<&str> = without.iter().map(|(name, _)| name.as_str()).collect();
@@ -120,12 +121,12 @@ impl Properties {
     fn value<'v>(&self, property: Property, name: &str, values: &'v [f64]) -> Result<&'v [f64]> {
         let table = self.tables.get(property);
         let element = table.names.iter().position(|known| known == name);
-        let element = element.ok_or_else(|| match table.why_not(name) {
-            Some(reason) => RandomizationError::Unsized { name: name.into(), reason }.into(),
+        let element = element.ok_or_else(|| match table.unsupported_reason(name) {
+            Some(reason) => RandomizationError::NoSizeProperty { name: name.into(), reason }.into(),
             None => Error::UnknownName {
-                what: property.owner(),
+                what: property.element_description(),
                 name: name.into(),
-                candidates: pattern::closest(name, self.names(property)).into_iter().map(String::from).collect(),
+                candidates: pattern::closest_names(name, self.names(property)).into_iter().map(String::from).collect(),
             },
         })?;
         Ok(&values[element * property.width()..(element + 1) * property.width()])
@@ -155,7 +156,7 @@ impl Properties {
         let at = element * width..(element + 1) * width;
         self.values[property as usize][at.clone()].copy_from_slice(value);
         if property.is_gain() {
-            self.asked.insert((property, element));
+            self.changed_gains.insert((property, element));
         }
         if property == Property::Size {
             // Sizes that the shape does not have.
@@ -170,14 +171,14 @@ impl Properties {
     }
 
     /// Resets all properties except gains to their nominal values.
-    pub(crate) fn become_nominal(&mut self) {
+    pub(crate) fn reset_to_nominal(&mut self) {
         for property in Property::ALL.into_iter().filter(|property| !property.is_gain()) {
             self.values[property as usize].clone_from(&self.tables.get(property).nominal);
         }
     }
 
     /// Sets the value of one element without side effects on other properties.
-    pub(crate) fn put(&mut self, property: Property, element: usize, value: &[f64]) {
+    pub(crate) fn set_element_only(&mut self, property: Property, element: usize, value: &[f64]) {
         let width = property.width();
         self.values[property as usize][element * width..(element + 1) * width].copy_from_slice(value);
     }
@@ -185,7 +186,7 @@ impl Properties {
     /// Nominal moments of a body, scaled by the ratio of its mass to the nominal mass. Bodies have the same order in
     /// the tables of masses and of moments.
     pub(super) fn proportional_moments(&self, element: usize) -> [f64; 3] {
-        let nominal: &Table = self.tables.get(Property::Mass);
+        let nominal: &PropertyTable = self.tables.get(Property::Mass);
         let (mass, before) = (self.values[Property::Mass as usize][element], nominal.nominal[element]);
         let moments = &self.tables.get(Property::Inertia).nominal;
         // A single factor of exactly 1 preserves every bit.
@@ -200,7 +201,7 @@ impl Properties {
             for (name, (value, nominal)) in table.names.iter().zip(values) {
                 // Nominal values passed the compiler.
                 if value != nominal
-                    && let Some(expected) = property.fault(value, nominal)
+                    && let Some(expected) = property.invalid_reason(value, nominal)
                 {
                     let (property, name, value) = (property.name(), name.clone(), value.to_vec());
                     return Err(RandomizationError::Value { env, property, name, value, expected });
@@ -212,7 +213,11 @@ impl Properties {
 
     /// Transfers own values to another scene, by name; elements that are new there are nominal. Among shapes of one
     /// name, the k-th takes over from the k-th.
-    pub(super) fn carried_to(own: &OwnValues, from: &Tables, to: &Tables) -> OwnValues {
+    pub(super) fn transferred(
+        own: &PropertyOverrides,
+        from: &PropertyTables,
+        to: &PropertyTables,
+    ) -> PropertyOverrides {
         Property::ALL.map(|property| {
             let values = own[property as usize].as_ref()?;
             let (from, to, width) = (from.get(property), to.get(property), property.width());

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 pub enum Property {
     /// Mass of a link or object \[kg\], 1 number. Setting it scales the nominal moments of inertia in proportion, as
     /// another density would. Values computed from the files stay nominal: `total_mass` and `nominal_mass`, the
-    /// inertias behind the gains of [`DriveType::Acceleration`](crate::DriveType), and
+    /// inertias behind the gains of [`crate::DriveType`](crate::DriveType), and
     /// [`dynamics`](kinetoscope_robot::dynamics) of a description.
     Mass,
     /// Center of mass in the link's (object's) own frame \[m\], 3 numbers. MuJoCo 4.x does not support it for a freely
     /// moving body of an MJCF file that is nominally centered: see
-    /// [`RandomizationError::DiagonalInertia`](super::RandomizationError).
+    /// [`super::RandomizationError`](super::RandomizationError).
     CenterOfMass,
     /// Principal moments of inertia about the center of mass \[kg m²\], 3 numbers; the axes stay.
     Inertia,
@@ -50,13 +50,13 @@ pub enum Property {
     /// Meshes, planes and height fields have no size of their own in an environment; in a body with other shapes they
     /// stay as they are. MuJoCo stores the vertices of a mesh and the heights of a field once for all uses, with the
     /// values that its compiler derives from them. A plane collides everywhere, whatever its size. A size for a body
-    /// without any other shape is the error [`RandomizationError::Unsized`](super::RandomizationError::Unsized), which
+    /// without any other shape is the error [`RandomizationError::NoSizeProperty`](super::RandomizationError::NoSizeProperty), which
     /// suggests alternatives.
     ///
     /// Mass, center of mass and moments stay: they are properties of their own. Sizes of sites stay too: a touch sensor
     /// of an MJCF file measures contacts in its nominal volume. Frames of links and joints stay in place, so that
     /// [`compute_fk`](crate::Robot::compute_fk) and [`compute_ik`](crate::Robot::compute_ik) are valid in every
-    /// environment. Use [`Tip::with_tcp`](kinetoscope_robot::kinematics::Tip::with_tcp) for the tip of a link that
+    /// environment. Use [`TipFrame::with_tcp`](kinetoscope_robot::kinematics::TipFrame::with_tcp) for the tip of a link that
     /// became longer.
     Size,
     /// Color and opacity of the visible shapes of a link, an object or a terrain, 4 sRGB numbers from 0 to 1. It
@@ -128,16 +128,16 @@ impl Property {
     pub fn width(self) -> usize {
         match self {
             Self::CenterOfMass | Self::Inertia | Self::Gravity | Self::Size | Self::Position => 3,
-            Self::Color | Self::Rotation => Self::WIDEST,
+            Self::Color | Self::Rotation => Self::MAX_WIDTH,
             _ => 1,
         }
     }
 
     /// Largest number of values of any property.
-    pub(super) const WIDEST: usize = 4;
+    pub(super) const MAX_WIDTH: usize = 4;
 
     /// Description of the elements that have the property, for messages.
-    pub(super) fn owner(self) -> &'static str {
+    pub(super) fn element_description(self) -> &'static str {
         match self {
             Self::Mass | Self::CenterOfMass | Self::Inertia => "body that moves and is called",
             Self::Friction | Self::TorsionalFriction | Self::RollingFriction => "body or ground that collides, called",
@@ -165,7 +165,7 @@ impl Property {
     }
 
     /// Describes the accepted values if these are invalid. A size that is nominally 0 may be 0.
-    pub(crate) fn fault(self, values: &[f64], nominal: &[f64]) -> Option<&'static str> {
+    pub(crate) fn invalid_reason(self, values: &[f64], nominal: &[f64]) -> Option<&'static str> {
         let all = |good: fn(f64) -> bool| values.iter().all(|&value| good(value));
         match self {
             Self::Mass => {

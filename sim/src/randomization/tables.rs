@@ -8,42 +8,42 @@ use std::collections::BTreeMap;
 
 /// Elements that have one property.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Table {
+pub(crate) struct PropertyTable {
     /// Name of each element; shapes of one body have the same name.
     pub(super) names: Vec<String>,
     /// Index of each element in MuJoCo's arrays, or among the drives.
-    pub(super) places: Vec<usize>,
+    pub(super) indices: Vec<usize>,
     /// Nominal values, element by element.
     pub(super) nominal: Vec<f64>,
     /// Elements that cannot have the property, with the reason.
-    pub(super) without: Vec<(String, &'static str)>,
+    pub(super) unsupported: Vec<(String, &'static str)>,
 }
 
 /// Facts about the scene that the model does not contain.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Beside<'a> {
+pub(crate) struct SceneContext<'a> {
     /// True for each proxy geom, which only has a pose and is replaced by another shape in rendering.
     pub(crate) proxies: &'a [bool],
     /// Static bodies, whose poses can differ between environments.
-    pub(crate) standing: &'a [usize],
+    pub(crate) static_bodies: &'a [usize],
 }
 
 /// Properties of a compiled scene.
 #[derive(Clone, Debug)]
-pub(crate) struct Tables {
+pub(crate) struct PropertyTables {
     /// Tables in the order of [`Property::ALL`].
-    tables: [Table; Property::ALL.len()],
+    tables: [PropertyTable; Property::ALL.len()],
 }
 
-impl Tables {
+impl PropertyTables {
     /// Creates the tables for a model with its drives.
-    pub(crate) fn of(model: &Model, drives: &DriveTable, beside: Beside<'_>) -> Self {
+    pub(crate) fn of(model: &Model, drives: &DriveTable, beside: SceneContext<'_>) -> Self {
         Self { tables: Property::ALL.map(|property| table(property, model, drives, beside)) }
     }
 
     /// Index of an element in MuJoCo's arrays, or among the drives.
-    pub(crate) fn place(&self, property: Property, element: usize) -> usize {
-        self.get(property).places[element]
+    pub(crate) fn index(&self, property: Property, element: usize) -> usize {
+        self.get(property).indices[element]
     }
 
     /// Nominal value of an element.
@@ -52,32 +52,32 @@ impl Tables {
         &self.get(property).nominal[element * width..(element + 1) * width]
     }
 
-    pub(super) fn get(&self, property: Property) -> &Table {
+    pub(super) fn get(&self, property: Property) -> &PropertyTable {
         &self.tables[property as usize]
     }
 }
 
-impl Table {
+impl PropertyTable {
     /// Values that differ from the nominal values, `width` numbers each, by index in MuJoCo's arrays.
     pub(super) fn changes<'v>(&self, width: usize, values: &'v [f64]) -> BTreeMap<usize, &'v [f64]> {
-        let elements = values.chunks(width).zip(self.nominal.chunks(width)).zip(&self.places);
+        let elements = values.chunks(width).zip(self.nominal.chunks(width)).zip(&self.indices);
         elements.filter(|((value, nominal), _)| value != nominal).map(|((value, _), &place)| (place, value)).collect()
     }
 
     /// Reason why the element `name` cannot have the property, if there is a reason.
-    pub(super) fn why_not(&self, name: &str) -> Option<&'static str> {
-        self.without.iter().find(|(of, _)| of == name).map(|(_, reason)| *reason)
+    pub(super) fn unsupported_reason(&self, name: &str) -> Option<&'static str> {
+        self.unsupported.iter().find(|(of, _)| of == name).map(|(_, reason)| *reason)
     }
 
     fn push(&mut self, name: String, place: usize, values: &[f64]) {
         self.names.push(name);
-        self.places.push(place);
+        self.indices.push(place);
         self.nominal.extend_from_slice(values);
     }
 }
 
-fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<'_>) -> Table {
-    let mut table = Table::default();
+fn table(property: Property, model: &Model, drives: &DriveTable, beside: SceneContext<'_>) -> PropertyTable {
+    let mut table = PropertyTable::default();
     match property {
         Property::Mass => bodies(model, &mut table, |body| &model.body_mass()[body..=body]),
         Property::CenterOfMass => bodies(model, &mut table, |body| &model.body_ipos()[3 * body..3 * body + 3]),
@@ -95,9 +95,9 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<
             Some(user_armature(model, drives, dof))
         }),
         Property::DryFriction => joints(model, &mut table, |joint| {
-            Some(match friction_place(model, drives, joint)? {
-                FrictionPlace::Joint => model.dof_frictionloss()[model.jnt_dofadr()[joint] as usize],
-                FrictionPlace::Tendon(tendon) => model.tendon_frictionloss()[tendon],
+            Some(match friction_location(model, drives, joint)? {
+                FrictionLocation::Joint => model.dof_frictionloss()[model.jnt_dofadr()[joint] as usize],
+                FrictionLocation::Tendon(tendon) => model.tendon_frictionloss()[tendon],
             })
         }),
         Property::Gravity => table.push("gravity".into(), 0, &model.gravity()),
@@ -120,13 +120,13 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<
             for geom in (0..model.ngeom()).filter(|&geom| !beside.proxies[geom]) {
                 let (size, numbers) = (&model.geom_size()[3 * geom..3 * geom + 3], sizes(model.geom_type()[geom]));
                 let value = [0, 1, 2].map(|k| if k < numbers { size[k] } else { 0.0 });
-                match (geom_name(model, geom), no_sizes(model.geom_type()[geom])) {
+                match (geom_name(model, geom), no_size_reason(model.geom_type()[geom])) {
                     (Some(name), None) if numbers > 0 => table.push(name, geom, &value),
-                    (Some(name), Some(reason)) => table.without.push((name, reason)),
+                    (Some(name), Some(reason)) => table.unsupported.push((name, reason)),
                     _ => {}
                 }
             }
-            let Table { names, without, .. } = &mut table;
+            let PropertyTable { names, unsupported: without, .. } = &mut table;
             without.retain(|(name, _)| !names.contains(name));
         }
         Property::Color => {
@@ -156,7 +156,7 @@ fn sizes(kind: i32) -> usize {
 }
 
 /// Reason why the size of a geom type is not a property, if there is a reason.
-fn no_sizes(kind: i32) -> Option<&'static str> {
+fn no_size_reason(kind: i32) -> Option<&'static str> {
     match kind as u32 {
         mj::mjGEOM_MESH => Some(
             "it is a mesh, whose vertices MuJoCo keeps once for all that is made of it, with the hull, frame and boxes that \
@@ -183,8 +183,13 @@ fn geom_name(model: &Model, geom: usize) -> Option<String> {
 }
 
 /// Adds the static bodies.
-fn standing<'m>(model: &'m Model, table: &mut Table, beside: Beside<'_>, values: impl Fn(usize) -> &'m [f64]) {
-    for &body in beside.standing {
+fn standing<'m>(
+    model: &'m Model,
+    table: &mut PropertyTable,
+    beside: SceneContext<'_>,
+    values: impl Fn(usize) -> &'m [f64],
+) {
+    for &body in beside.static_bodies {
         if let Some(name) = model.name(ObjectKind::Body, body) {
             table.push(name, body, values(body));
         }
@@ -192,7 +197,7 @@ fn standing<'m>(model: &'m Model, table: &mut Table, beside: Beside<'_>, values:
 }
 
 /// Adds the bodies that can move and have a mass.
-fn bodies<'m>(model: &'m Model, table: &mut Table, values: impl Fn(usize) -> &'m [f64]) {
+fn bodies<'m>(model: &'m Model, table: &mut PropertyTable, values: impl Fn(usize) -> &'m [f64]) {
     for body in 1..model.nbody() {
         if model.body_weldid()[body] != 0
             && model.body_mass()[body] > 0.0
@@ -205,7 +210,7 @@ fn bodies<'m>(model: &'m Model, table: &mut Table, values: impl Fn(usize) -> &'m
 
 /// Adds the free joints, named after the bodies that they move. Their indices are degrees of freedom: the `first` of
 /// each joint's six, together with the two after it.
-fn free_bodies(model: &Model, table: &mut Table, first: usize) {
+fn free_bodies(model: &Model, table: &mut PropertyTable, first: usize) {
     for joint in 0..model.njnt() {
         let name = model.name(ObjectKind::Body, usize::try_from(model.jnt_bodyid()[joint]).unwrap_or(0));
         if let Some(name) = name.filter(|_| model.jnt_type()[joint] as u32 == mj::mjJNT_FREE) {
@@ -216,7 +221,7 @@ fn free_bodies(model: &Model, table: &mut Table, first: usize) {
 }
 
 /// Adds the geoms that collide, named after their body or, in the world, after themselves.
-fn shapes(model: &Model, table: &mut Table, coefficient: usize) {
+fn shapes(model: &Model, table: &mut PropertyTable, coefficient: usize) {
     for geom in 0..model.ngeom() {
         if model.geom_contype()[geom] == 0 && model.geom_conaffinity()[geom] == 0 {
             continue;
@@ -229,7 +234,7 @@ fn shapes(model: &Model, table: &mut Table, coefficient: usize) {
 
 /// Adds the joints for which `value` returns a value, except free joints. All degrees of freedom of a joint have this
 /// value.
-fn joints(model: &Model, table: &mut Table, value: impl Fn(usize) -> Option<f64>) {
+fn joints(model: &Model, table: &mut PropertyTable, value: impl Fn(usize) -> Option<f64>) {
     for joint in 0..model.njnt() {
         if model.jnt_type()[joint] as u32 != mj::mjJNT_FREE
             && let (Some(name), Some(value)) = (model.name(ObjectKind::Joint, joint), value(joint))
@@ -255,7 +260,7 @@ pub(super) fn user_armature(model: &Model, drives: &DriveTable, dof: usize) -> f
 }
 
 /// Location of the dry friction of a joint in the model.
-pub(super) enum FrictionPlace {
+pub(super) enum FrictionLocation {
     /// The friction of the joint itself.
     Joint,
     /// A fixed tendon, because the joint's own friction row carries its drive, or could.
@@ -264,12 +269,12 @@ pub(super) enum FrictionPlace {
 
 /// Finds the dry friction of a joint; `None` if its drive uses the friction row and it has no tendon. The writer of the
 /// scene adds the tendons: wherever drives are rows, every joint with a drive has one, also with an explicit model.
-pub(super) fn friction_place(model: &Model, drives: &DriveTable, joint: usize) -> Option<FrictionPlace> {
+pub(super) fn friction_location(model: &Model, drives: &DriveTable, joint: usize) -> Option<FrictionLocation> {
     let tendon = format!("{}/friction", model.name(ObjectKind::Joint, joint)?);
     if let Some(tendon) = model.id(ObjectKind::Tendon, &tendon) {
-        return Some(FrictionPlace::Tendon(tendon));
+        return Some(FrictionLocation::Tendon(tendon));
     }
     let dof = model.jnt_dofadr()[joint] as usize;
-    let is_row = |drive: &Drive| drive.dof == dof && drive.realization == Realization::Row;
-    (!drives.drives.iter().any(is_row)).then_some(FrictionPlace::Joint)
+    let is_row = |drive: &Drive| drive.dof == dof && drive.realization == Realization::ConstraintRow;
+    (!drives.drives.iter().any(is_row)).then_some(FrictionLocation::Joint)
 }

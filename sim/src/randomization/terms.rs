@@ -4,7 +4,7 @@ use super::Property;
 use super::error::RandomizationError;
 use super::properties::Properties;
 use crate::pattern;
-use kinetoscope_scene::Random;
+use kinetoscope_scene::KeyedRng;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// previous random value. For a color, red, green and blue are randomized; the opacity stays nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Draw {
+pub enum RandomizationOp {
     /// Multiplies all numbers of the property by one random factor.
     Scale([f64; 2]),
     /// Adds a random summand to each number.
@@ -21,7 +21,7 @@ pub enum Draw {
     Set([f64; 2]),
 }
 
-impl Draw {
+impl RandomizationOp {
     fn range(self) -> [f64; 2] {
         match self {
             Self::Scale(range) | Self::Add(range) | Self::Set(range) => range,
@@ -32,13 +32,13 @@ impl Draw {
 /// Randomization of one property for all names that a pattern matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Term {
+pub struct RandomizationTerm {
     /// Property to randomize.
     pub property: Property,
     /// Regular expression that matches whole names (see [`Properties`]).
     pub pattern: String,
     /// Random operation. All elements of one name share one sample.
-    pub draw: Draw,
+    pub draw: RandomizationOp,
 }
 
 /// Randomization of the properties of environments.
@@ -64,7 +64,7 @@ pub struct Term {
 #[serde(default, deny_unknown_fields)]
 pub struct Randomization {
     /// Terms; two terms of one property must not match the same name.
-    pub terms: Vec<Term>,
+    pub terms: Vec<RandomizationTerm>,
 }
 
 impl Randomization {
@@ -75,14 +75,14 @@ impl Randomization {
 
     /// Adds a term.
     #[must_use]
-    pub fn with(mut self, property: Property, pattern: impl Into<String>, draw: Draw) -> Self {
-        self.terms.push(Term { property, pattern: pattern.into(), draw });
+    pub fn with(mut self, property: Property, pattern: impl Into<String>, draw: RandomizationOp) -> Self {
+        self.terms.push(RandomizationTerm { property, pattern: pattern.into(), draw });
         self
     }
 
     /// Resolves the patterns to elements, property by property.
-    pub(super) fn resolve(&self, properties: &Properties) -> Result<Resolved, RandomizationError> {
-        for Term { property, pattern, draw } in &self.terms {
+    pub(super) fn resolve(&self, properties: &Properties) -> Result<ResolvedRandomization, RandomizationError> {
+        for RandomizationTerm { property, pattern, draw } in &self.terms {
             let [low, high] = draw.range();
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 let (property, pattern) = (property.name(), pattern.clone());
@@ -92,55 +92,56 @@ impl Randomization {
         let mut resolved = Vec::new();
         for property in Property::ALL {
             let terms = self.terms.iter().filter(|term| term.property == property);
-            let entries: Vec<(String, Draw)> = terms.map(|term| (term.pattern.clone(), term.draw)).collect();
+            let entries: Vec<(String, RandomizationOp)> = terms.map(|term| (term.pattern.clone(), term.draw)).collect();
             if entries.is_empty() {
                 continue;
             }
-            if let Some((name, reason)) = entries.iter().find_map(|(of, _)| properties.only_without(property, of)) {
-                return Err(RandomizationError::Unsized { name, reason });
+            if let Some((name, reason)) = entries.iter().find_map(|(of, _)| properties.unsupported_match(property, of))
+            {
+                return Err(RandomizationError::NoSizeProperty { name, reason });
             }
-            let names = properties.names_to_draw(property);
-            let draws = pattern::assign(&entries, &BTreeMap::new(), &names, property.owner())
+            let names = properties.randomizable_names(property);
+            let draws = pattern::assign(&entries, &BTreeMap::new(), &names, property.element_description())
                 .map_err(|error| RandomizationError::Pattern { property: property.name(), error: Box::new(error) })?;
             let elements_of = |wanted: &str| {
                 let all = properties.tables.get(property).names.iter().enumerate();
                 all.filter(|(_, name)| *name == wanted).map(|(element, _)| element).collect()
             };
             let chosen = names.iter().zip(draws).filter_map(|(name, draw)| {
-                Some(ResolvedDraw { name: name.to_string(), elements: elements_of(name), draw: draw? })
+                Some(ResolvedOp { name: name.to_string(), elements: elements_of(name), draw: draw? })
             });
             resolved.push((property, chosen.collect()));
         }
-        Ok(Resolved(resolved))
+        Ok(ResolvedRandomization(resolved))
     }
 }
 
 /// Randomization that is resolved for a scene, property by property.
-pub(super) struct Resolved(Vec<(Property, Vec<ResolvedDraw>)>);
+pub(super) struct ResolvedRandomization(Vec<(Property, Vec<ResolvedOp>)>);
 
 /// Random operation for a name: one sample for all elements of that name.
-struct ResolvedDraw {
+struct ResolvedOp {
     name: String,
     elements: Vec<usize>,
-    draw: Draw,
+    draw: RandomizationOp,
 }
 
-impl Resolved {
+impl ResolvedRandomization {
     /// Randomizes an environment. `random` creates the generator of a property and a name.
-    pub(super) fn draw(&self, properties: &mut Properties, mut random: impl FnMut(Property, &str) -> Random) {
+    pub(super) fn apply(&self, properties: &mut Properties, mut random: impl FnMut(Property, &str) -> KeyedRng) {
         let tables = std::sync::Arc::clone(&properties.tables);
         for (property, draws) in &self.0 {
             let (table, width) = (tables.get(*property), property.width());
             // Opacity is never randomized: a factor of a color does not apply to it.
             let drawn = if *property == Property::Color { 3 } else { width };
-            for ResolvedDraw { name, elements, draw } in draws {
+            for ResolvedOp { name, elements, draw } in draws {
                 let mut random = random(*property, name);
                 let [low, high] = draw.range();
-                let mut numbers = [0.0; Property::WIDEST];
-                let count = if matches!(draw, Draw::Scale(_)) { 1 } else { drawn };
-                numbers[..count].fill_with(|| random.between(low, high));
+                let mut numbers = [0.0; Property::MAX_WIDTH];
+                let count = if matches!(draw, RandomizationOp::Scale(_)) { 1 } else { drawn };
+                numbers[..count].fill_with(|| random.uniform_range(low, high));
                 for &element in elements {
-                    let mut value = [0.0; Property::WIDEST];
+                    let mut value = [0.0; Property::MAX_WIDTH];
                     let value = &mut value[..width];
                     value.copy_from_slice(&table.nominal[element * width..(element + 1) * width]);
                     if *property == Property::Inertia {
@@ -148,9 +149,9 @@ impl Resolved {
                     }
                     let (drawn, numbers) = (value[..drawn].iter_mut(), numbers.iter());
                     match draw {
-                        Draw::Scale(_) => drawn.for_each(|number| *number *= numbers.as_slice()[0]),
-                        Draw::Add(_) => drawn.zip(numbers).for_each(|(number, more)| *number += more),
-                        Draw::Set(_) => drawn.zip(numbers).for_each(|(number, new)| *number = *new),
+                        RandomizationOp::Scale(_) => drawn.for_each(|number| *number *= numbers.as_slice()[0]),
+                        RandomizationOp::Add(_) => drawn.zip(numbers).for_each(|(number, more)| *number += more),
+                        RandomizationOp::Set(_) => drawn.zip(numbers).for_each(|(number, new)| *number = *new),
                     }
                     properties.set_element(*property, element, value);
                 }

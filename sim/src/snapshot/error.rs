@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub enum SnapshotError {
     /// The file is not a snapshot.
     #[error("{path}: not a snapshot; snapshots are files that Snapshot::save wrote")]
-    Foreign {
+    NotASnapshot {
         /// Path of the file.
         path: PathBuf,
     },
@@ -40,7 +40,7 @@ pub enum SnapshotError {
     },
     /// The file was saved with another MuJoCo version, which would continue with other bits.
     #[error("{path}: saved with MuJoCo {found}; this program runs MuJoCo {running}, which would go on differently")]
-    Mujoco {
+    MujocoVersion {
         /// Path of the file.
         path: PathBuf,
         /// MuJoCo version of the file.
@@ -63,11 +63,13 @@ pub enum SnapshotError {
         difference: String,
     },
     /// The snapshot has another number of environments than the number to restore.
-    #[error("the snapshot holds {held} environments, and {wanted} are to be restored; take as many, or one for all")]
-    Count {
+    #[error(
+        "the snapshot holds {saved} environments, and {requested} are to be restored; take as many, or one for all"
+    )]
+    EnvCount {
         /// Number of environments in the snapshot.
-        held: usize,
+        saved: usize,
         /// Number of environments to restore.
-        wanted: usize,
+        requested: usize,
     },
 }

@@ -8,16 +8,16 @@
 //! file can be distinguished from one of another version. The content of format 3: MuJoCo's version, the lines of the
 //! layout, the environments, each with its properties.
 
-use super::bytes::{Malformed, Reader, Writer};
-use super::layout::Layout;
-use super::{Entry, OwnProperties, Snapshot, SnapshotError};
-use crate::drive::table::numbers_fault;
+use super::bytes::{ByteReader, ByteWriter, Malformed};
+use super::layout::StateLayout;
+use super::{EnvEntry, SavedProperties, Snapshot, SnapshotError};
+use crate::drive::table::flat_error;
 use crate::env::{Divergence, EnvState, EnvStatus};
 use crate::error::{Error, Result};
 use crate::randomization::{NamedValue, Property};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco::{Buffers, EngineError, Inputs, Motion, Warning, Weld};
+use kinetoscope_mujoco::{Buffers, EngineError, IntegrationState, UserInputs, Warning, Weld};
 use kinetoscope_scene::AtomicFile;
 use sha2::{Digest, Sha256};
 use std::io::Write as _;
@@ -58,7 +58,7 @@ impl Snapshot {
     }
 
     fn encode(&self, format: u32, mujoco: &str) -> Vec<u8> {
-        let mut out = Writer::default();
+        let mut out = ByteWriter::default();
         out.0.extend_from_slice(&MAGIC);
         out.u64(0);
         out.u32(format);
@@ -80,7 +80,7 @@ impl Snapshot {
     fn decode(bytes: &[u8], path: &Path) -> Result<Self, SnapshotError> {
         let known = bytes.len().min(MAGIC.len());
         if bytes[..known] != MAGIC[..known] {
-            return Err(SnapshotError::Foreign { path: path.into() });
+            return Err(SnapshotError::NotASnapshot { path: path.into() });
         }
         let damaged = || SnapshotError::Damaged { path: path.into() };
         let length = bytes.get(8..16).and_then(|b| b.first_chunk::<8>()).map(|b| u64::from_le_bytes(*b));
@@ -97,34 +97,34 @@ impl Snapshot {
             return Err(damaged());
         }
         let malformed = |Malformed(what)| SnapshotError::Malformed { path: path.into(), what };
-        let mut reader = Reader(&content[16..]);
+        let mut reader = ByteReader(&content[16..]);
         let found = reader.u32().map_err(malformed)?;
         if found != FORMAT {
             return Err(SnapshotError::Format { path: path.into(), found, supported: FORMAT });
         }
         let (found, running) = (reader.text().map_err(malformed)?, mj::version_string());
         if found != running {
-            return Err(SnapshotError::Mujoco { path: path.into(), found, running });
+            return Err(SnapshotError::MujocoVersion { path: path.into(), found, running });
         }
         read_content(&mut reader).map_err(malformed)
     }
 }
 
-fn read_content(reader: &mut Reader<'_>) -> Result<Snapshot, Malformed> {
+fn read_content(reader: &mut ByteReader<'_>) -> Result<Snapshot, Malformed> {
     // The length of a text takes 8 bytes.
     let lines = (0..reader.count(8)?).map(|_| reader.text()).collect::<Result<Vec<_>, _>>()?;
-    let layout = Layout::from_lines(lines);
+    let layout = StateLayout::from_lines(lines);
     let entries = (0..reader.count(8)?).map(|_| read_entry(reader, layout.drives())).collect::<Result<Vec<_>, _>>()?;
     if !reader.0.is_empty() {
         return Err(Malformed("something stands after the last environment"));
     }
-    if !entries.iter().all(|entry| entry.state.fits(&entries[0].state)) {
+    if !entries.iter().all(|entry| entry.state.has_same_lengths(&entries[0].state)) {
         return Err(Malformed("environments have different numbers of numbers"));
     }
     Ok(Snapshot { layout: Arc::new(layout), entries: entries.into() })
 }
 
-fn write_entry(entry: &Entry, out: &mut Writer) {
+fn write_entry(entry: &EnvEntry, out: &mut ByteWriter) {
     let EnvState { motion, inputs, drives, wrenches, welds, steps, diverged } = &entry.state;
     let (values, active) = inputs.values();
     out.u64(entry.env as u64);
@@ -133,13 +133,13 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
     out.numbers(values);
     out.flags(active);
     out.numbers(drives);
-    out.numbers(&wrenches.numbers());
+    out.numbers(&wrenches.to_flat());
     out.u64(welds.len() as u64);
     for weld in welds {
         out.u64(weld.equality as u64);
         out.numbers(&weld.pose);
     }
-    let OwnProperties { values, draws } = &*entry.own;
+    let SavedProperties { values, randomizations: draws } = &*entry.overrides;
     out.u64(*draws);
     out.u64(values.len() as u64);
     for NamedValue { property, name, nth, value } in values {
@@ -167,40 +167,40 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
 }
 
 /// Maximum number of steps, far from overflow and beyond any run: a step of a microsecond for 285 years.
-const MOST_STEPS: u64 = 1 << 53;
+const MAX_STEPS: u64 = 1 << 53;
 
 /// Reads an environment of a scene with this many drives.
-fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malformed> {
-    let finite = |reader: &mut Reader<'_>, what| {
+fn read_entry(reader: &mut ByteReader<'_>, drive_count: usize) -> Result<EnvEntry, Malformed> {
+    let finite = |reader: &mut ByteReader<'_>, what| {
         let numbers = reader.numbers()?;
         if numbers.iter().all(|number| number.is_finite()) { Ok(numbers) } else { Err(Malformed(what)) }
     };
-    let steps = |reader: &mut Reader<'_>| match reader.u64()? {
-        steps if steps <= MOST_STEPS => Ok(steps),
+    let steps = |reader: &mut ByteReader<'_>| match reader.u64()? {
+        steps if steps <= MAX_STEPS => Ok(steps),
         _ => Err(Malformed("a count of steps is larger than any run's")),
     };
-    let size = |reader: &mut Reader<'_>| {
+    let size = |reader: &mut ByteReader<'_>| {
         usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))
     };
     let env = size(reader)?;
     let done = steps(reader)?;
-    let motion = Motion::from_values(finite(reader, "a time, position or velocity is not finite")?);
+    let motion = IntegrationState::from_values(finite(reader, "a time, position or velocity is not finite")?);
     let (values, active) = (finite(reader, "a control or an applied force is not finite")?, reader.flags()?);
     let drives = reader.numbers()?;
-    if let Some(what) = numbers_fault(&drives, drive_count) {
+    if let Some(what) = flat_error(&drives, drive_count) {
         return Err(Malformed(what));
     }
     let wrenches = finite(reader, "a wrench is not finite")?;
-    let wrenches = Wrenches::from_numbers(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
+    let wrenches = Wrenches::from_flat(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
     // An index, and a list of seven numbers with its length.
     let welds = (0..reader.count(8 * 9)?).map(|_| read_weld(reader)).collect::<Result<Vec<_>, _>>()?;
     let draws = match reader.u64()? {
-        draws if draws <= MOST_STEPS => draws,
+        draws if draws <= MAX_STEPS => draws,
         _ => return Err(Malformed("a count of draws is larger than any run's")),
     };
     // Two texts and a list with their lengths, and a number.
     let own = (0..reader.count(8 + 8 + 4 + 8)?).map(|_| read_property(reader)).collect::<Result<Vec<_>, _>>()?;
-    let own = Arc::new(OwnProperties { values: own, draws });
+    let own = Arc::new(SavedProperties { values: own, randomizations: draws });
     let reason = match reader.u8()? {
         0 => None,
         1 => {
@@ -219,12 +219,12 @@ fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malf
         None => None,
         Some(reason) => Some(Box::new(EnvStatus::Diverged { step: steps(reader)?, reason })),
     };
-    let inputs = Inputs::from_values(values, active);
+    let inputs = UserInputs::from_values(values, active);
     let state = EnvState { motion, inputs, drives, wrenches, welds, steps: done, diverged };
-    Ok(Entry { env, state, own })
+    Ok(EnvEntry { env, state, overrides: own })
 }
 
-fn read_property(reader: &mut Reader<'_>) -> Result<NamedValue, Malformed> {
+fn read_property(reader: &mut ByteReader<'_>) -> Result<NamedValue, Malformed> {
     let word = reader.text()?;
     let property = Property::ALL.into_iter().find(|property| property.name() == word);
     let property = property.ok_or(Malformed("a property is unknown"))?;
@@ -233,13 +233,13 @@ fn read_property(reader: &mut Reader<'_>) -> Result<NamedValue, Malformed> {
         return Err(Malformed("a property has not all its numbers"));
     }
     // The scene decides which numbers of a size must be 0.
-    match property.fault(&value, &value) {
+    match property.invalid_reason(&value, &value) {
         None => Ok(NamedValue { property, name, nth, value: value.into() }),
         Some(_) => Err(Malformed("a property has a value that cannot be")),
     }
 }
 
-fn read_weld(reader: &mut Reader<'_>) -> Result<Weld, Malformed> {
+fn read_weld(reader: &mut ByteReader<'_>) -> Result<Weld, Malformed> {
     let equality = usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))?;
     let pose: [f64; 7] = reader.numbers()?.try_into().map_err(|_| Malformed("a weld has not all its numbers"))?;
     let length = pose[3..].iter().map(|q| q * q).sum::<f64>();
@@ -253,25 +253,25 @@ fn read_weld(reader: &mut Reader<'_>) -> Result<Weld, Malformed> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::gains::{Gains, Setting};
+    use crate::drive::gains::{DriveSetting, Gains};
     use crate::drive::table::{Drive, DriveTable, Realization};
     use crate::drive::{DelayedPd, DriveType};
-    use crate::env::Env;
+    use crate::env::SimEnv;
 
     /// Environment of a small model, with a joint that a delayed drive moves.
-    fn env() -> (Env, Layout) {
+    fn env() -> (SimEnv, StateLayout) {
         let text = r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/>
             <body name="c"><joint name="k" axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></body></worldbody>
             <actuator><motor name="m" joint="k"/></actuator></mujoco>"#;
         let model = mj::compile(text, &[]).expect("compiles").into_model();
         let initial = Gains { kp: 3.0, kd: 1.0, max_effort: f64::INFINITY, max_velocity: 9.0 };
-        let setting = Setting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
+        let setting = DriveSetting { drive_type: DriveType::Force, stiffness: 3.0, damping: 1.0, inertia: None };
         let (realization, range) = (Realization::Actuator, [f64::NEG_INFINITY, 1.0]);
         let drive = Drive { qpos: 4, dof: 3, ctrl: 0, realization, initial, setting, range };
         let mut table = DriveTable { drives: vec![drive], ..DriveTable::default() };
         table.push_model(0, DelayedPd { delay: 2, max_delay: 3 }.into());
-        let layout = Layout::of(&model, &table, 1);
-        (Env::new(&model, &Arc::new(table)).expect("small"), layout)
+        let layout = StateLayout::of(&model, &table, 1);
+        (SimEnv::new(&model, &Arc::new(table)).expect("small"), layout)
     }
 
     /// Snapshot of two such environments, one of which has diverged for `reason`.
@@ -288,9 +288,12 @@ mod tests {
             value(Property::Size, 2, &[0.1, 0.2, 0.0]),
             value(Property::MaxEffort, 0, &[f64::INFINITY]),
         ];
-        let own = [Arc::new(OwnProperties { values, draws: 5 }), Arc::default()];
-        let mut entries: Vec<Entry> =
-            own.into_iter().zip([3, 0]).map(|(own, at)| Entry { env: at, state: env.remember(), own }).collect();
+        let own = [Arc::new(SavedProperties { values, randomizations: 5 }), Arc::default()];
+        let mut entries: Vec<EnvEntry> = own
+            .into_iter()
+            .zip([3, 0])
+            .map(|(own, at)| EnvEntry { env: at, state: env.save_state(), overrides: own })
+            .collect();
         entries[1].state.diverged = Some(Box::new(EnvStatus::Diverged { step: 7, reason }));
         Snapshot { layout: Arc::new(layout), entries: entries.into() }
     }
@@ -338,7 +341,7 @@ mod tests {
             bytes[bit / 8] ^= 1 << (bit % 8);
             let error = decode(&bytes).expect_err("damaged");
             match (bit / 8, &error) {
-                (0..8, SnapshotError::Foreign { .. }) => {}
+                (0..8, SnapshotError::NotASnapshot { .. }) => {}
                 // An increased length cannot be distinguished from a truncated file.
                 (8..16, SnapshotError::Truncated { .. } | SnapshotError::Damaged { .. }) => {}
                 (16.., SnapshotError::Damaged { .. }) => {}
@@ -349,12 +352,12 @@ mod tests {
 
     #[test]
     fn foreign_files() {
-        assert!(matches!(decode(b"PK\x03\x04 something else"), Err(SnapshotError::Foreign { .. })));
+        assert!(matches!(decode(b"PK\x03\x04 something else"), Err(SnapshotError::NotASnapshot { .. })));
         let snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
         let other = decode(&snapshot.encode(2, &mj::version_string()));
         assert!(matches!(other, Err(SnapshotError::Format { found: 2, supported: 3, .. })));
         let other = decode(&snapshot.encode(FORMAT, "3.9.9"));
-        assert!(matches!(other, Err(SnapshotError::Mujoco { found, .. }) if found == "3.9.9"));
+        assert!(matches!(other, Err(SnapshotError::MujocoVersion { found, .. }) if found == "3.9.9"));
     }
 
     /// Changes every byte of the content, and corrects the checksum. The result is an error or another snapshot, never
@@ -365,7 +368,7 @@ mod tests {
         let good = bytes();
         let (mut refused, mut stepped) = (0, 0);
         let (mut env, _) = env();
-        let like = env.remember();
+        let like = env.save_state();
         for at in HEADER..good.len() - CHECKSUM {
             for value in [0, 1, 0x7f, 0xff] {
                 let mut bytes = good[..good.len() - CHECKSUM].to_vec();
@@ -374,8 +377,8 @@ mod tests {
                 bytes.extend_from_slice(&sum);
                 match decode(&bytes) {
                     Ok(snapshot) => {
-                        for entry in snapshot.entries.iter().filter(|entry| entry.state.fits(&like)) {
-                            env.recall(&entry.state);
+                        for entry in snapshot.entries.iter().filter(|entry| entry.state.has_same_lengths(&like)) {
+                            env.load_state(&entry.state);
                             env.step(3);
                             assert!(env.data().qpos().iter().all(|q| q.is_finite()), "byte {at}: {value}");
                             stepped += 1;
@@ -386,12 +389,12 @@ mod tests {
             }
         }
         assert!(refused > 100 && stepped > 1000, "{refused} {stepped}");
-        env.recall(&like);
-        assert_eq!(env.remember(), like, "what was restored meanwhile left nothing behind");
+        env.load_state(&like);
+        assert_eq!(env.save_state(), like, "what was restored meanwhile left nothing behind");
     }
 
     /// Error of a snapshot with changed entries.
-    fn fault(change: &dyn Fn(&mut Vec<Entry>)) -> Option<String> {
+    fn fault(change: &dyn Fn(&mut Vec<EnvEntry>)) -> Option<String> {
         let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
         let mut entries = snapshot.entries.to_vec();
         change(&mut entries);
@@ -412,7 +415,7 @@ mod tests {
             move |state: &mut EnvState| {
                 let mut values = state.motion.values().to_vec();
                 values[3] = value;
-                state.motion = Motion::from_values(values);
+                state.motion = IntegrationState::from_values(values);
             }
         };
         let input = |value| {
@@ -420,7 +423,7 @@ mod tests {
                 let (values, active) = state.inputs.values();
                 let (mut values, active) = (values.to_vec(), active.to_vec());
                 values[0] = value;
-                state.inputs = Inputs::from_values(values, active);
+                state.inputs = UserInputs::from_values(values, active);
             }
         };
         let drive = |index: usize, value| move |state: &mut EnvState| state.drives[index] = value;
@@ -455,28 +458,29 @@ mod tests {
             assert_eq!(fault(&drive(index, value)), None, "number {index}: {value}");
         }
         assert!(fault(&|state| state.drives.truncate(5)).is_some());
-        assert!(fault(&|state| state.steps = MOST_STEPS + 1).is_some_and(|what| what.contains("steps")));
-        assert_eq!(fault(&|state| state.steps = MOST_STEPS), None);
+        assert!(fault(&|state| state.steps = MAX_STEPS + 1).is_some_and(|what| what.contains("steps")));
+        assert_eq!(fault(&|state| state.steps = MAX_STEPS), None);
     }
 
     #[test]
     fn impossible_properties() {
-        let fault = |change: &dyn Fn(&mut OwnProperties)| fault(&|entries| change(Arc::make_mut(&mut entries[0].own)));
+        let fault =
+            |change: &dyn Fn(&mut SavedProperties)| fault(&|entries| change(Arc::make_mut(&mut entries[0].overrides)));
         assert_eq!(fault(&|_| {}), None, "control");
         for bad in [vec![], vec![1.0, 2.0], vec![0.0], vec![f64::NAN], vec![-1.0]] {
             assert!(fault(&|own| own.values[0].value = bad.clone().into()).is_some(), "{bad:?}");
         }
         assert!(fault(&|own| own.values[1].value = [0.1, -0.2, 0.0].into()).is_some());
-        assert!(fault(&|own| own.draws = MOST_STEPS + 1).is_some_and(|what| what.contains("draws")));
+        assert!(fault(&|own| own.randomizations = MAX_STEPS + 1).is_some_and(|what| what.contains("draws")));
     }
 
     #[test]
     fn most_steps() {
         let (mut env, _) = env();
-        let mut state = env.remember();
-        for (steps, then) in [(MOST_STEPS, MOST_STEPS + 2), (u64::MAX, u64::MAX)] {
+        let mut state = env.save_state();
+        for (steps, then) in [(MAX_STEPS, MAX_STEPS + 2), (u64::MAX, u64::MAX)] {
             state.steps = steps;
-            env.recall(&state);
+            env.load_state(&state);
             env.step(2);
             assert_eq!((env.steps(), env.status()), (then, &EnvStatus::Running));
         }

@@ -5,9 +5,9 @@ use kinetoscope_mujoco::{Model, ObjectKind, words};
 
 /// Step settings, then sizes and names of everything that has numbers in a state, one line each.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layout(Vec<String>);
+pub(crate) struct StateLayout(Vec<String>);
 
-impl Layout {
+impl StateLayout {
     /// Layout of a model with its drives. One step of the simulation is `substeps` steps of the model.
     pub(crate) fn of(model: &Model, drives: &DriveTable, substeps: u32) -> Self {
         let sizes = [

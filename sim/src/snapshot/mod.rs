@@ -7,8 +7,8 @@ mod layout;
 mod own;
 
 pub use error::SnapshotError;
-pub(crate) use layout::Layout;
-pub(crate) use own::OwnProperties;
+pub(crate) use layout::StateLayout;
+pub(crate) use own::SavedProperties;
 
 use crate::env::EnvState;
 use crate::error::Result;
@@ -42,22 +42,22 @@ use std::sync::Arc;
 /// * Events on the way: counts of warnings and of buffers that grew.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    layout: Arc<Layout>,
-    entries: Arc<[Entry]>,
+    layout: Arc<StateLayout>,
+    entries: Arc<[EnvEntry]>,
 }
 
 /// State of one environment.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Entry {
+pub(crate) struct EnvEntry {
     /// Index of the environment that the state was taken from.
     pub(crate) env: usize,
     pub(crate) state: EnvState,
     /// Own properties of the environment.
-    pub(crate) own: Arc<OwnProperties>,
+    pub(crate) overrides: Arc<SavedProperties>,
 }
 
 impl Snapshot {
-    pub(crate) fn new(simulation: &Simulation, entries: Vec<Entry>) -> Self {
+    pub(crate) fn new(simulation: &Simulation, entries: Vec<EnvEntry>) -> Self {
         Self { layout: Arc::clone(&simulation.layout), entries: entries.into() }
     }
 
@@ -81,25 +81,25 @@ impl Snapshot {
         self.entries.iter().map(|entry| entry.state.motion.values().first().copied().unwrap_or(0.0)).collect()
     }
 
-    /// Index of the state for each of `wanted` environments, after a check that the snapshot is of this scene; a single
+    /// Index of the state for each of `requested` environments, after a check that the snapshot is of this scene; a single
     /// state applies to all.
     pub(crate) fn states_for(&self, wanted: usize, simulation: &Simulation) -> Result<Vec<usize>> {
         if let Some(difference) = self.layout.difference(&simulation.layout) {
             return Err(SnapshotError::OtherScene { difference }.into());
         }
-        let like = simulation.batch.read(0, |env| env.remember());
-        if !self.entries.iter().all(|entry| entry.state.fits(&like)) {
+        let like = simulation.batch.read(0, |env| env.save_state());
+        if !self.entries.iter().all(|entry| entry.state.has_same_lengths(&like)) {
             let difference = "its states have other numbers of numbers".into();
             return Err(SnapshotError::OtherScene { difference }.into());
         }
         match self.entries.len() {
             held if held == wanted => Ok((0..held).collect()),
             1 => Ok(vec![0; wanted]),
-            held => Err(SnapshotError::Count { held, wanted }.into()),
+            held => Err(SnapshotError::EnvCount { saved: held, requested: wanted }.into()),
         }
     }
 
-    pub(crate) fn entries(&self) -> &Arc<[Entry]> {
+    pub(crate) fn entries(&self) -> &Arc<[EnvEntry]> {
         &self.entries
     }
 }
@@ -113,8 +113,8 @@ impl SimulationManager {
     pub fn snapshot(&self, env_ids: Option<&[EnvId]>) -> Result<Snapshot> {
         let envs = env_list(env_ids, self.num_envs())?;
         let entry = |env| {
-            let state = self.simulation.batch.read(env, |env| env.remember());
-            Entry { env, state, own: self.simulation.own_properties(env, self.draws[env]) }
+            let state = self.simulation.batch.read(env, |env| env.save_state());
+            EnvEntry { env, state, overrides: self.simulation.own_properties(env, self.randomization_count[env]) }
         };
         Ok(Snapshot::new(&self.simulation, envs.into_iter().map(entry).collect()))
     }
@@ -132,10 +132,10 @@ impl SimulationManager {
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
         self.simulation.batch.run(|i, env| {
             if let Some(source) = sources[i] {
-                env.recall(&snapshot.entries()[source].state);
+                env.load_state(&snapshot.entries()[source].state);
             }
         });
-        self.sensors.note_written(&chosen);
+        self.sensors.mark_written(&chosen);
         if !self.sensors.is_empty() {
             self.sensors.reset(&chosen, &mut self.simulation);
         }

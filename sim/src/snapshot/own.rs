@@ -4,23 +4,23 @@ use super::{Snapshot, SnapshotError};
 use crate::error::Result;
 use crate::ids::EnvId;
 use crate::manager::SimulationManager;
-use crate::randomization::{NamedValue, Property, RandomizationError, Tables};
+use crate::randomization::{NamedValue, Property, PropertyTables, RandomizationError};
 use crate::simulation::Simulation;
 use std::sync::Arc;
 
 /// Own property values of an environment, and the number of its randomizations.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct OwnProperties {
+pub(crate) struct SavedProperties {
     pub(crate) values: Vec<NamedValue>,
-    pub(crate) draws: u64,
+    pub(crate) randomizations: u64,
 }
 
 /// Values of properties of an environment, by element.
-type Found<'s> = Vec<(Property, usize, &'s [f64])>;
+type ResolvedValues<'s> = Vec<(Property, usize, &'s [f64])>;
 
-impl OwnProperties {
+impl SavedProperties {
     /// Finds the elements of the values in a scene.
-    fn found_in<'s>(&'s self, tables: &Tables, env: usize) -> Result<Found<'s>> {
+    fn resolve_in<'s>(&'s self, tables: &PropertyTables, env: usize) -> Result<ResolvedValues<'s>> {
         let mut found = Vec::with_capacity(self.values.len());
         for values in self.values.chunk_by(|a, b| a.property == b.property) {
             let elements = tables.elements(values[0].property);
@@ -33,7 +33,7 @@ impl OwnProperties {
                 let has_none = |(number, nominal): (&f64, &f64)| *nominal == 0.0 && *number != 0.0;
                 let other_shape = *property == Property::Size && value.iter().zip(nominal).any(has_none);
                 let other_shape = other_shape.then_some("numbers of a size that the shape does not have must be 0");
-                if let Some(expected) = property.fault(value, nominal).or(other_shape) {
+                if let Some(expected) = property.invalid_reason(value, nominal).or(other_shape) {
                     let (property, name, value) = (property.name(), name.clone(), value.to_vec());
                     return Err(RandomizationError::Value { env, property, name, value, expected }.into());
                 }
@@ -46,11 +46,11 @@ impl OwnProperties {
 
 impl Simulation {
     /// Properties of an environment as a snapshot stores them.
-    pub(crate) fn own_properties(&self, env: usize, draws: u64) -> Arc<OwnProperties> {
+    pub(crate) fn own_properties(&self, env: usize, draws: u64) -> Arc<SavedProperties> {
         // Created before an environment is locked: the creation reads an environment.
         self.tables();
         let values = self.batch.read(env, |here| self.named_properties(env, here));
-        Arc::new(OwnProperties { values, draws })
+        Arc::new(SavedProperties { values, randomizations: draws })
     }
 }
 
@@ -61,35 +61,35 @@ impl SimulationManager {
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
         let tables = Arc::clone(self.simulation.tables());
         let entries = Arc::clone(snapshot.entries());
-        let own = |env: usize| sources[env].map(|source| &*entries[source].own);
-        let mut found: Vec<Found<'_>> = Vec::with_capacity(chosen.len());
+        let own = |env: usize| sources[env].map(|source| &*entries[source].overrides);
+        let mut found: Vec<ResolvedValues<'_>> = Vec::with_capacity(chosen.len());
         for &env in &chosen {
-            found.push(own(env).map_or_else(|| Ok(Vec::new()), |own| own.found_in(&tables, env))?);
+            found.push(own(env).map_or_else(|| Ok(Vec::new()), |own| own.resolve_in(&tables, env))?);
         }
         // Environments are visited in this order.
         let mut values = found.iter();
         self.simulation.change_properties(&chosen, |_, properties| {
-            properties.become_nominal();
+            properties.reset_to_nominal();
             let all = values.next().into_iter().flatten();
             all.filter(|(property, ..)| property.gain().is_none()).for_each(|(property, element, value)| {
-                properties.put(*property, *element, value);
+                properties.set_element_only(*property, *element, value);
             });
             Ok(())
         })?;
         for (&env, values) in chosen.iter().zip(&found) {
             let Some(source) = sources[env] else { continue };
-            self.draws[env] = entries[source].own.draws;
+            self.randomization_count[env] = entries[source].overrides.randomizations;
             self.simulation.batch.write(env, |here| {
-                here.drives.forget_drawn();
-                here.recall(&entries[source].state);
+                here.drives.clear_overrides();
+                here.load_state(&entries[source].state);
                 for (property, element, value) in values {
                     if let Some(kind) = property.gain() {
-                        here.drives.redraw_gain(tables.place(*property, *element), kind, value[0]);
+                        here.drives.restore_override(tables.index(*property, *element), kind, value[0]);
                     }
                 }
             });
         }
-        self.sensors.note_written(&chosen);
+        self.sensors.mark_written(&chosen);
         if !self.sensors.is_empty() {
             self.sensors.reset(&chosen, &mut self.simulation);
         }

@@ -1,6 +1,6 @@
 //! Shapes of MuJoCo's geoms for rendering.
 
-use super::identity::GeomIdentity;
+use super::identity::ElementIdentity;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::Model;
 use kinetoscope_scene::mesh::TriMesh;
@@ -12,13 +12,13 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Shapes of a model's geoms. Meshes and height fields are prepared once.
-pub(super) struct Shapes<'a> {
+pub(super) struct GeomShapes<'a> {
     model: &'a Model,
     meshes: HashMap<usize, Arc<RenderMesh>>,
     fields: HashMap<usize, Option<HeightField>>,
 }
 
-impl<'a> Shapes<'a> {
+impl<'a> GeomShapes<'a> {
     pub(super) fn of(model: &'a Model) -> Self {
         Self { model, meshes: HashMap::new(), fields: HashMap::new() }
     }
@@ -39,7 +39,7 @@ impl<'a> Shapes<'a> {
             mj::mjGEOM_HFIELD => {
                 data.and_then(|data| self.height_field(data)).ok_or("its height field cannot be drawn")?.into()
             }
-            kind => return sized(kind, size).ok_or("cameras do not draw signed distance fields"),
+            kind => return shape_from_size(kind, size).ok_or("cameras do not draw signed distance fields"),
         })
     }
 
@@ -66,7 +66,7 @@ impl<'a> Shapes<'a> {
 }
 
 /// Shape of a geom type that its sizes \[m\] define; `None` for other types.
-pub(super) fn sized(kind: u32, size: &[f64]) -> Option<Shape> {
+pub(super) fn shape_from_size(kind: u32, size: &[f64]) -> Option<Shape> {
     let [x, y, z] = [0, 1, 2].map(|k| size[k] as f32);
     Some(match kind {
         mj::mjGEOM_SPHERE => Sphere { radius: x }.into(),
@@ -79,14 +79,14 @@ pub(super) fn sized(kind: u32, size: &[f64]) -> Option<Shape> {
 }
 
 /// Instance of a site; `None` for a type of shape that sites do not have.
-pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, material: Material) -> Option<Instance> {
-    let shape = sized(model.site_type()[site] as u32, &model.site_size()[3 * site..3 * site + 3])?;
+pub(super) fn of_site(model: &Model, site: usize, identity: &ElementIdentity, material: Material) -> Option<Instance> {
+    let shape = shape_from_size(model.site_type()[site] as u32, &model.site_size()[3 * site..3 * site + 3])?;
     let body = model.site_bodyid()[site] as usize;
     let [x, y, z] = [0, 1, 2].map(|k| model.site_pos()[3 * site + k]);
     let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|k| model.site_quat()[4 * site + k]);
     let frame_from_instance =
         if body > 0 { from_row(&[x, y, z, qw, qx, qy, qz]) } else { kinetoscope_scene::Pose::identity() };
-    let GeomIdentity { mask_id, name, body: of } = identity.clone();
+    let ElementIdentity { mask_id, name, body: of } = identity.clone();
     Some(Instance {
         shape,
         material,
@@ -96,7 +96,7 @@ pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, mater
         name,
         body: of,
         fixed: model.is_fixed(body),
-        deforms: false,
+        is_deformable: false,
         frame_from_instance,
     })
 }
@@ -126,5 +126,5 @@ fn render_mesh(model: &Model, mesh: usize) -> RenderMesh {
     }
     let mut mesh = TriMesh::from_triangles(out.positions, out.triangles);
     mesh.uvs = out.uvs;
-    RenderMesh::new(&mesh, RenderMesh::CREASE)
+    RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)
 }

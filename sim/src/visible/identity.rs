@@ -1,9 +1,9 @@
 //! Mask ids: the numbers in the mask channel of cameras, and the elements that they identify.
 
 use super::{deforming, shown, surface};
-use crate::contents::Contents;
+use crate::contents::EntitySet;
 use kinetoscope_mujoco::{Model, ObjectKind};
-use kinetoscope_sensors::camera::Thing;
+use kinetoscope_sensors::camera::SegmentedEntity;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ impl MaskId {
     }
 }
 
-impl From<&MaskId> for Thing {
+impl From<&MaskId> for SegmentedEntity {
     fn from(id: &MaskId) -> Self {
         Self { id: id.id, object: id.object.clone(), link: id.link.clone(), class: id.class.clone() }
     }
@@ -40,24 +40,24 @@ impl From<&MaskId> for Thing {
 
 /// Mask ids of the elements of a model.
 #[derive(Clone, Debug)]
-pub(crate) struct Identities {
+pub(crate) struct MaskIdMap {
     table: Arc<[MaskId]>,
-    of_geom: Vec<GeomIdentity>,
+    of_geom: Vec<ElementIdentity>,
     /// Rendered sites.
-    of_site: Vec<(usize, GeomIdentity)>,
+    of_site: Vec<(usize, ElementIdentity)>,
     /// Rendered elements whose shape changes.
-    of_drawable: Vec<(Drawable, GeomIdentity)>,
+    of_drawable: Vec<(DeformingElement, ElementIdentity)>,
 }
 
 /// Rendered element whose shape changes, by its index in MuJoCo's arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Drawable {
+pub(crate) enum DeformingElement {
     Tendon(usize),
     Skin(usize),
     Flex(usize),
 }
 
-impl Drawable {
+impl DeformingElement {
     /// Class of the element in a table of mask ids.
     pub(crate) fn class(self) -> &'static str {
         match self {
@@ -80,7 +80,7 @@ impl Drawable {
 
 /// Mask id and owner of a rendered element.
 #[derive(Clone, Debug)]
-pub(super) struct GeomIdentity {
+pub(super) struct ElementIdentity {
     pub(super) mask_id: i32,
     /// Name: `uid/link`, the uid of an object, or the name of a geom of the world.
     pub(super) name: Arc<str>,
@@ -88,19 +88,19 @@ pub(super) struct GeomIdentity {
     pub(super) body: Option<u32>,
 }
 
-impl Identities {
+impl MaskIdMap {
     /// Mask id and owner of a geom.
-    pub(super) fn of(&self, geom: usize) -> &GeomIdentity {
+    pub(super) fn of(&self, geom: usize) -> &ElementIdentity {
         &self.of_geom[geom]
     }
 
     /// Rendered sites.
-    pub(super) fn sites(&self) -> impl Iterator<Item = (usize, &GeomIdentity)> {
+    pub(super) fn sites(&self) -> impl Iterator<Item = (usize, &ElementIdentity)> {
         self.of_site.iter().map(|(site, identity)| (*site, identity))
     }
 
     /// Rendered elements whose shape changes.
-    pub(super) fn drawables(&self) -> impl Iterator<Item = (Drawable, &GeomIdentity)> {
+    pub(super) fn drawables(&self) -> impl Iterator<Item = (DeformingElement, &ElementIdentity)> {
         self.of_drawable.iter().map(|(drawable, identity)| (*drawable, identity))
     }
 
@@ -126,14 +126,14 @@ fn body_name(model: &Model, body: usize) -> String {
 
 /// Assigns a mask id to each body, each geom of the world, tendon, skin and flex. With `sites`, bodies with sites only
 /// and sites of the world have mask ids as well.
-pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
+pub(super) fn by_body(model: &Model, sites: bool) -> MaskIdMap {
     let mut table: Vec<MaskId> = Vec::new();
     let mut of_body = vec![0; model.nbody()];
     let of_geom = (0..model.ngeom())
         .map(|geom| {
             let body = model.geom_bodyid()[geom] as usize;
             let name = if body > 0 { body_name(model, body) } else { geom_name(model, geom) };
-            let identity = |mask_id| GeomIdentity { mask_id, name: name.into(), body: None };
+            let identity = |mask_id| ElementIdentity { mask_id, name: name.into(), body: None };
             if body > 0 && of_body[body] > 0 {
                 let id: i32 = of_body[body];
                 table[id as usize - 1].geoms.push(geom_name(model, geom));
@@ -154,7 +154,7 @@ pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
             identity(id)
         })
         .collect();
-    let of_drawable = deforming::shown(model)
+    let of_drawable = deforming::visible_elements(model)
         .into_iter()
         .map(|drawable| {
             let (id, name) = (table.len() as i32 + 1, drawable.name(model));
@@ -166,11 +166,11 @@ pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
                 body: body_name(model, 0),
                 geoms: Vec::new(),
             });
-            (drawable, GeomIdentity { mask_id: id, name: name.into(), body: None })
+            (drawable, ElementIdentity { mask_id: id, name: name.into(), body: None })
         })
         .collect();
     let shown = (0..if sites { model.nsite() } else { 0 })
-        .filter(|&site| shown::is_shown(model.site_group()[site], &surface::color_of_site(model, site)));
+        .filter(|&site| shown::is_visible(model.site_group()[site], &surface::color_of_site(model, site)));
     let of_site = shown
         .map(|site| {
             let body = model.site_bodyid()[site] as usize;
@@ -188,15 +188,15 @@ pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
                     geoms: Vec::new(),
                 });
             }
-            (site, GeomIdentity { mask_id: of_body[body], name: name.into(), body: None })
+            (site, ElementIdentity { mask_id: of_body[body], name: name.into(), body: None })
         })
         .collect();
-    Identities { table: table.into(), of_geom, of_site, of_drawable }
+    MaskIdMap { table: table.into(), of_geom, of_site, of_drawable }
 }
 
 /// Owner of a geom in a simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Owner {
+pub(crate) struct ElementOwner {
     pub(crate) id: i32,
     pub(crate) object: String,
     pub(crate) link: Option<String>,
@@ -206,7 +206,11 @@ pub(crate) struct Owner {
 }
 
 /// Mask ids of a simulation, from the owners of all geoms and of rendered elements whose shape changes.
-pub(crate) fn of_simulation(model: &Model, owners: &[Owner], of_drawables: &[(Drawable, Owner)]) -> Identities {
+pub(crate) fn of_simulation(
+    model: &Model,
+    owners: &[ElementOwner],
+    of_drawables: &[(DeformingElement, ElementOwner)],
+) -> MaskIdMap {
     let mut table: BTreeMap<i32, MaskId> = BTreeMap::new();
     for (geom, owner) in owners.iter().enumerate() {
         let entry = table.entry(owner.id).or_insert_with(|| MaskId {
@@ -229,14 +233,14 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner], of_drawables: &[(Dr
             geoms: Vec::new(),
         });
     }
-    let identity = |owner: &Owner| {
+    let identity = |owner: &ElementOwner| {
         let name = match &owner.link {
             Some(link) => format!("{}/{link}", owner.object).into(),
             None => owner.object.as_str().into(),
         };
-        GeomIdentity { mask_id: owner.id, name, body: owner.body }
+        ElementIdentity { mask_id: owner.id, name, body: owner.body }
     };
-    Identities {
+    MaskIdMap {
         table: table.into_values().collect(),
         of_geom: owners.iter().map(identity).collect(),
         of_site: Vec::new(),
@@ -245,11 +249,11 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner], of_drawables: &[(Dr
 }
 
 /// Owners of the visible spatial tendons, which belong to robots and parts from MJCF files.
-pub(crate) fn tendon_owners(model: &Model, contents: &Contents) -> Vec<(Drawable, Owner)> {
+pub(crate) fn tendon_owners(model: &Model, contents: &EntitySet) -> Vec<(DeformingElement, ElementOwner)> {
     let of_robots = contents.robots.iter().map(|robot| {
         (robot.uid(), robot.tendons(), robot.mask_id(robot.description().links.len()), robot.semantic_class())
     });
-    let of_parts = contents.parts.iter().map(|part| {
+    let of_parts = contents.mjcf_models.iter().map(|part| {
         let class = part.cfg().semantic_class.as_deref().unwrap_or("mjcf");
         (part.uid(), &part.names().tendons[..], part.mask_id(part.model().nbody()), class)
     });
@@ -257,12 +261,13 @@ pub(crate) fn tendon_owners(model: &Model, contents: &Contents) -> Vec<(Drawable
     for (uid, tendons, first_id, class) in of_robots.chain(of_parts) {
         for (id, name) in (first_id..).zip(tendons) {
             if let Some(tendon) = model.id(ObjectKind::Tendon, &format!("{uid}/{name}")) {
-                let owner = Owner { id, object: uid.into(), link: Some(name.clone()), class: class.into(), body: None };
-                owners.push((Drawable::Tendon(tendon), owner));
+                let owner =
+                    ElementOwner { id, object: uid.into(), link: Some(name.clone()), class: class.into(), body: None };
+                owners.push((DeformingElement::Tendon(tendon), owner));
             }
         }
     }
-    let shown = deforming::shown(model);
+    let shown = deforming::visible_elements(model);
     owners.retain(|(drawable, _)| shown.contains(drawable));
     owners
 }

@@ -1,20 +1,20 @@
 //! Lights, headlight and sky of MuJoCo models.
 
 use super::surface;
-use crate::contents::Contents;
-use crate::light_cfg::{LampKind, LightCfg};
+use crate::contents::EntitySet;
+use crate::light_cfg::{LightCfg, LightKindCfg};
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
 use kinetoscope_scene::decode_srgb;
-use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, RenderScene, Sky};
+use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightingSpace, RenderScene, Sky};
 
 /// Lighting of a scene besides its lights.
 #[derive(Clone, Debug)]
-pub(crate) enum Look<'a> {
+pub(crate) enum Lighting<'a> {
     /// Lighting of simulations: their own headlight, ambient light and sky, or the first skybox of these models. Light
     /// is summed in linear color space.
-    Own {
+    Default {
         /// Models of the MJCF files, whose lights are already in the scene's model.
         files: Vec<&'a Model>,
     },
@@ -26,18 +26,18 @@ pub(crate) enum Look<'a> {
     },
 }
 
-impl<'a> Look<'a> {
+impl<'a> Lighting<'a> {
     /// Selects the lighting of a simulation. A simulation that shows only one MJCF file and the ground, with the
     /// default lights, has MuJoCo's lighting without those lights. Every other simulation has the lighting of
     /// simulations, such as a recorded scene without lights of its own.
-    pub(crate) fn of(cfg: &SimulationManagerCfg, contents: &'a Contents) -> Self {
-        let Contents { robots, objects, terrains, parts, .. } = contents;
+    pub(crate) fn of(cfg: &SimulationManagerCfg, contents: &'a EntitySet) -> Self {
+        let EntitySet { robots, objects, terrains, mjcf_models: parts, .. } = contents;
         let by_default = cfg.lights == SimulationManagerCfg::default().lights;
         match &parts[..] {
             [part] if robots.is_empty() && objects.is_empty() && terrains.is_empty() && by_default => {
                 Self::Mujoco { file: part.model() }
             }
-            _ => Self::Own { files: parts.iter().map(|part| part.model()).collect() },
+            _ => Self::Default { files: parts.iter().map(|part| part.model()).collect() },
         }
     }
 
@@ -51,8 +51,8 @@ const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
 
 /// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns a message about a
 /// skybox that cannot be rendered.
-pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> Option<String> {
-    let linear = |color: [f32; 3]| if look.is_mujoco() { color } else { linear(color) };
+pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Option<String> {
+    let linear = |color: [f32; 3]| if look.is_mujoco() { color } else { to_linear(color) };
     scene.lights = (0..model.nlight())
         .map(|index| {
             let light = model.light(index);
@@ -82,11 +82,11 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
         .collect();
     let files = match look {
         // MuJoCo's default headlight is not used: this one matches the ambient light of simulations.
-        Look::Own { files } => {
+        Lighting::Default { files } => {
             scene.headlight = Headlight::default();
             &files[..]
         }
-        Look::Mujoco { file } => {
+        Lighting::Mujoco { file } => {
             let headlight = file.headlight();
             scene.headlight = Headlight {
                 ambient: headlight.ambient,
@@ -96,7 +96,7 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
             };
             scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
             scene.sky = Sky::uniform([0.0; 3]);
-            scene.light_sum = LightSum::Display;
+            scene.lighting_space = LightingSpace::Display;
             // The light of a simulation: lights of parts cannot have its name, since their names begin with that of the
             // part.
             if !std::ptr::eq(*file, model)
@@ -122,7 +122,7 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
     if look.is_mujoco() {
         let (color, width) = file.haze();
         // With a skybox, infinite planes of MuJoCo's renderer end at it.
-        let radius = (SKYBOX_RADIUS * file.clip()[1]) as f32;
+        let radius = (SKYBOX_RADIUS * file.clip_distances()[1]) as f32;
         scene.horizon = Some(HorizonHaze { color, radius, width });
     }
     None
@@ -131,14 +131,14 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
 /// Converts a light color to linear color space. MuJoCo multiplies colors in display space, the renderer here
 /// multiplies them in linear space. For one light the results agree up to the small linear part of sRGB: (c l)^2.2 =
 /// c^2.2 l^2.2.
-fn linear(color: [f32; 3]) -> [f32; 3] {
+fn to_linear(color: [f32; 3]) -> [f32; 3] {
     color.map(decode_srgb)
 }
 
 /// Sum of all dome lights, linear; `None` without a dome light.
-pub(super) fn domes(lamps: &[LightCfg]) -> Option<[f32; 3]> {
+pub(super) fn dome_light_sum(lamps: &[LightCfg]) -> Option<[f32; 3]> {
     let domes = lamps.iter().filter_map(|lamp| match lamp.kind {
-        LampKind::Dome { intensity } => Some(linear(lamp.color.map(|c| c as f32)).map(|c| c * intensity as f32)),
+        LightKindCfg::Dome { intensity } => Some(to_linear(lamp.color.map(|c| c as f32)).map(|c| c * intensity as f32)),
         _ => None,
     });
     domes.reduce(|sum, dome| std::array::from_fn(|k| sum[k] + dome[k]))
@@ -155,9 +155,9 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Visible;
+    use super::super::VisualScene;
     use super::*;
-    use crate::objects::mjcf_part_data::MjcfCfg;
+    use crate::objects::mjcf_part_data::MjcfPartCfg;
     use crate::objects::rigid_object_data::RigidObjectCfg;
     use crate::simulation_cfg::GroundCfg;
     use crate::{LightCfg, SimulationManager};
@@ -177,11 +177,11 @@ mod tests {
     #[test]
     fn skybox_and_haze() {
         let model = mj::compile(STARS, &[]).expect("compiles").into_model();
-        let visible = Visible::of_model(&model);
-        assert_eq!(visible.left_out(), [""; 0]);
+        let visible = VisualScene::of_model(&model);
+        assert_eq!(visible.omitted(), [""; 0]);
         let scene = visible.scene();
         let (image, arrays) = (scene.skybox.as_ref().expect("an image"), model.texture(0).expect("a texture"));
-        let level = &image.levels()[0];
+        let level = &image.mip_levels()[0];
         assert_eq!([level.width() as usize, level.height() as usize], [arrays.width, arrays.height]);
         for (k, pixel) in arrays.pixels.chunks_exact(arrays.channels).enumerate() {
             let found = level.pixel((k % arrays.width) as u32, (k / arrays.width) as u32);
@@ -192,7 +192,7 @@ mod tests {
         assert!((haze.radius - 59.4 / 2.0f32.sqrt()).abs() < 1e-4, "{haze:?}");
         // Without a skybox MuJoCo renders no haze.
         let plain = mj::compile("<mujoco><worldbody><geom type='plane' size='0 0 1'/></worldbody></mujoco>", &[]);
-        let plain = Visible::of_model(&plain.expect("compiles").into_model());
+        let plain = VisualScene::of_model(&plain.expect("compiles").into_model());
         assert!(plain.scene().horizon.is_none() && plain.scene().skybox.is_none());
     }
 
@@ -206,29 +206,29 @@ mod tests {
             let mut cfg = SimulationManagerCfg { ground: None, ..Default::default() };
             change(&mut cfg);
             let mut sim = SimulationManager::new(cfg).expect("a simulation");
-            sim.add_mjcf(MjcfCfg::text("stars", STARS)).expect("a part");
+            sim.add_mjcf(MjcfPartCfg::text("stars", STARS)).expect("a part");
             if ball {
                 sim.add_rigid_object(RigidObjectCfg::default()).expect("an object");
             }
-            let visible = sim.scene_mut().visible();
+            let visible = sim.scene_mut().visual_scene();
             (**visible.scene()).clone()
         };
         let active = |scene: &RenderScene| scene.lights.iter().filter(|light| light.active).count();
-        let alone = Visible::of_model(&mj::compile(STARS, &[]).expect("compiles").into_model());
+        let alone = VisualScene::of_model(&mj::compile(STARS, &[]).expect("compiles").into_model());
         let alone = alone.scene();
         let grounds: [&dyn Fn(&mut SimulationManagerCfg); 2] =
             [&|_| {}, &|cfg| cfg.ground = Some(GroundCfg::default())];
         for change in grounds {
             let shown = scene(change, false);
             assert_eq!((shown.headlight, shown.ambient, shown.sky), (alone.headlight, alone.ambient, alone.sky));
-            assert_eq!((shown.light_sum, shown.horizon), (LightSum::Display, alone.horizon));
+            assert_eq!((shown.lighting_space, shown.horizon), (LightingSpace::Display, alone.horizon));
             assert_eq!((shown.skybox.as_ref(), active(&shown)), (alone.skybox.as_ref(), 1), "the file's lamp");
         }
         let two: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.push(LightCfg::default());
         let none: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.clear();
         for (change, ball, lamps) in [(grounds[0], true, 2), (two, false, 3), (none, false, 1)] {
             let shown = scene(change, ball);
-            assert_eq!((shown.headlight, shown.light_sum), (Headlight::default(), LightSum::Linear));
+            assert_eq!((shown.headlight, shown.lighting_space), (Headlight::default(), LightingSpace::Linear));
             assert_eq!((shown.skybox.as_ref(), shown.horizon, active(&shown)), (alone.skybox.as_ref(), None, lamps));
         }
     }

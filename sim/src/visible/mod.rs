@@ -3,7 +3,7 @@
 //!
 //! Every geom of the model is an instance, whatever file the model came from, and so are tendons, skins and flexes.
 //! Proxy geoms of URDF visuals (see `mjcf::robot`) are replaced by the real shapes. Constant data is extracted once;
-//! [`Visible::read`] copies the poses of one environment.
+//! [`VisualScene::read_poses`] copies the poses of one environment.
 
 mod deforming;
 mod geom;
@@ -17,13 +17,13 @@ mod still;
 mod surface;
 mod urdf_visual;
 
-use self::painted::Surfaces;
-use deforming::{Buffers, Deforming};
-use identity::GeomIdentity;
+use self::painted::SurfaceOverrides;
+use deforming::{DeformingInstances, SceneBufferPool};
+use identity::ElementIdentity;
 pub use identity::MaskId;
-pub(crate) use identity::{Identities, Owner, of_simulation, tendon_owners};
-pub(crate) use lighting::Look;
-pub use still::{FreeCamera, ModelCamera, Still};
+pub(crate) use identity::{ElementOwner, MaskIdMap, of_simulation, tendon_owners};
+pub(crate) use lighting::Lighting;
+pub use still::{FreeCamera, ModelCamera, OffscreenScene};
 pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
@@ -36,20 +36,20 @@ use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{
-    Hemisphere, Instance, Light, Material, OwnScene, Pose, PoseF32, PoseF64, RenderScene, Texture,
+    EnvScene, Hemisphere, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Texture,
 };
 use std::sync::Arc;
 
 /// Render scene of a model, whose instances move with elements of the model.
 #[derive(Clone, Debug)]
-pub struct Visible {
+pub struct VisualScene {
     scene: Arc<RenderScene>,
     /// Element of the model that each instance moves with.
     anchors: Vec<Anchor>,
     ids: Arc<[MaskId]>,
     left_out: Vec<String>,
-    deforming: Arc<Deforming>,
-    buffers: Arc<Buffers>,
+    deforming: Arc<DeformingInstances>,
+    buffers: Arc<SceneBufferPool>,
 }
 
 /// Element of a model that an instance moves with.
@@ -63,7 +63,7 @@ pub(crate) enum Anchor {
 
 /// Shape and material that are rendered for a geom.
 #[derive(Clone, Debug)]
-pub(crate) struct Part {
+pub(crate) struct VisualPart {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
 }
@@ -82,23 +82,23 @@ fn frame_from_geom(model: &Model, geom: usize, link: Option<&BodyFrame>) -> Pose
 }
 
 /// Ground of a simulation.
-pub(crate) fn ground(cfg: &GroundCfg) -> Part {
+pub(crate) fn ground(cfg: &GroundCfg) -> VisualPart {
     let [r, g, b] = cfg.color.map(|c| c as f32);
     let material = Material { specular: 0.05, shininess: 0.1, ..Material::from_rgba([r, g, b, 1.0]) };
     let half = cfg.half_size as f32;
     let shape = Plane { half: [half, half] }.into();
     if !cfg.checker {
-        return Part { shape, material: cfg.surface.over(material) };
+        return VisualPart { shape, material: cfg.surface.apply_to(material) };
     }
     let shade = |k: f32| [r, g, b].map(|c| ((c * k).clamp(0.0, 1.0) * 255.0).round() as u8);
     // Two by two squares of half a meter repeat once per meter. The texture supplies the color.
     let texture = Some(Arc::new(Texture::checker(256, shade(0.94), shade(1.08))));
     let material = Material { rgba: [1.0; 4], texture, tex_repeat: [2.0; 2], tex_uniform: true, ..material };
-    Part { shape, material: cfg.surface.over(material) }
+    VisualPart { shape, material: cfg.surface.apply_to(material) }
 }
 
 /// Positions \[m\] and rotation matrices of elements in `data`.
-fn places(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
+fn element_poses(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
     let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
     let sites = (data.site_xpos().as_chunks::<3>().0, data.site_xmat().as_chunks::<9>().0);
     move |anchor| match anchor {
@@ -108,42 +108,49 @@ fn places(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
     }
 }
 
-impl Visible {
+impl VisualScene {
     /// Creates the scene of the geoms of `model` with the lighting of MuJoCo's renderer. Each body has one mask id,
     /// each geom of the world its own.
     pub fn of_model(model: &Model) -> Self {
-        Self::in_mujoco_look(model, &identity::by_body(model, false))
+        Self::with_mujoco_lighting(model, &identity::by_body(model, false))
     }
 
     /// Creates the scene of the geoms and sites of `model`, as in MuJoCo's viewers. Mask ids are those of
     /// [`of_model`](Self::of_model); bodies with sites only, and sites of the world, have further ones.
     pub fn with_sites(model: &Model) -> Self {
-        Self::in_mujoco_look(model, &identity::by_body(model, true))
+        Self::with_mujoco_lighting(model, &identity::by_body(model, true))
     }
 
-    fn in_mujoco_look(model: &Model, identities: &Identities) -> Self {
-        Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), &Look::Mujoco { file: model })
+    fn with_mujoco_lighting(model: &Model, identities: &MaskIdMap) -> Self {
+        Self::extract(
+            model,
+            identities,
+            &Replacements::new(),
+            &[],
+            &SurfaceOverrides::new(),
+            &Lighting::Mujoco { file: model },
+        )
     }
 
     /// Extracts the render scene of `model`. The geoms in `replacements` are rendered as these parts. `frames` are the
     /// frames on the body axis of sensors, `painted` has additional surface properties, and `look` is the lighting.
     pub(crate) fn extract(
         model: &Model,
-        identities: &Identities,
+        identities: &MaskIdMap,
         replacements: &Replacements,
         frames: &[BodyFrame],
-        painted: &Surfaces,
-        look: &Look<'_>,
+        painted: &SurfaceOverrides,
+        look: &Lighting<'_>,
     ) -> Self {
-        let surfaces = surface::Surfaces::of(model);
-        let mut shapes = geom::Shapes::of(model);
+        let surfaces = surface::ModelMaterials::of(model);
+        let mut shapes = geom::GeomShapes::of(model);
         let mut left_out = surfaces.left_out().to_vec();
         let (mut instances, mut anchors) = (Vec::new(), Vec::new());
         for geom in 0..model.ngeom() {
             let parts = match replacements.get(&geom) {
                 Some(parts) => parts.clone(),
                 None => match shapes.get(geom) {
-                    Ok(shape) => vec![Part { shape, material: surfaces.of_geom(geom) }],
+                    Ok(shape) => vec![VisualPart { shape, material: surfaces.of_geom(geom) }],
                     Err(reason) => {
                         let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| geom.to_string());
                         left_out.push(format!("geom {name} is not drawn: {reason}"));
@@ -151,12 +158,12 @@ impl Visible {
                     }
                 },
             };
-            for Part { shape, material } in parts {
+            for VisualPart { shape, material } in parts {
                 let group = u8::try_from(model.geom_group()[geom].clamp(0, 31)).unwrap_or(0);
                 let visible = material.rgba[3] > 0.0;
-                let GeomIdentity { mask_id, name, body } = identities.of(geom).clone();
+                let ElementIdentity { mask_id, name, body } = identities.of(geom).clone();
                 let material =
-                    painted.get(&*name).map_or_else(|| material.clone(), |surface| surface.over(material.clone()));
+                    painted.get(&*name).map_or_else(|| material.clone(), |surface| surface.apply_to(material.clone()));
                 let fixed = model.is_fixed(model.geom_bodyid()[geom] as usize);
                 let frame_from_instance = frame_from_geom(model, geom, body.and_then(|body| frames.get(body as usize)));
                 let instance = Instance {
@@ -168,7 +175,7 @@ impl Visible {
                     name,
                     body,
                     fixed,
-                    deforms: false,
+                    is_deformable: false,
                     frame_from_instance,
                 };
                 if let Err(reason) = instance.validate() {
@@ -179,9 +186,9 @@ impl Visible {
                 anchors.push(Anchor::Geom(geom));
             }
         }
-        let mut deforming = Deforming::default();
+        let mut deforming = DeformingInstances::default();
         for (drawable, identity) in identities.drawables() {
-            let GeomIdentity { mask_id, ref name, body } = *identity;
+            let ElementIdentity { mask_id, ref name, body } = *identity;
             let like = Instance { body, ..Instance::new(Plane { half: [1.0; 2] }, Material::default(), mask_id) };
             let like = Instance { name: Arc::clone(name), ..like };
             if let Err(reason) = deforming.add(model, &surfaces, drawable, &like, &mut instances) {
@@ -202,10 +209,10 @@ impl Visible {
         let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
             left_out.push(format!("nothing is drawn: {error}"));
             anchors.clear();
-            deforming = Deforming::default();
+            deforming = DeformingInstances::default();
             RenderScene::empty()
         });
-        left_out.extend(lighting::light(model, look, &mut scene));
+        left_out.extend(lighting::set_lighting(model, look, &mut scene));
         Self {
             scene: Arc::new(scene),
             anchors,
@@ -230,9 +237,9 @@ impl Visible {
     }
 
     /// Adds the properties of lights that MuJoCo does not have: their radii, by name, and dome lights.
-    pub(crate) fn with_lamps_of(mut self, model: &Model, lamps: &[LightCfg]) -> Self {
+    pub(crate) fn with_light_cfgs(mut self, model: &Model, lamps: &[LightCfg]) -> Self {
         let scene = Arc::make_mut(&mut self.scene);
-        if let Some(light) = lighting::domes(lamps) {
+        if let Some(light) = lighting::dome_light_sum(lamps) {
             scene.ambient = Hemisphere { sky: light, ground: light };
         }
         for (index, lamp) in lamps.iter().enumerate() {
@@ -245,7 +252,7 @@ impl Visible {
     }
 
     /// Render scene, the same for all environments. [`scene_at`](Self::scene_at) has the current shapes of instances
-    /// that [change their shape](Instance::deforms).
+    /// that [change their shape](Instance::is_deformable).
     pub fn scene(&self) -> &Arc<RenderScene> {
         &self.scene
     }
@@ -253,8 +260,8 @@ impl Visible {
     /// Render scene with the shapes of tendons, skins and flexes in `data`; [`scene`](Self::scene) for a model without
     /// them.
     pub fn scene_at(&self, data: &Data) -> Arc<RenderScene> {
-        let mut out = OwnScene(None);
-        self.shape(data, 0, &OwnScene(None), &mut out);
+        let mut out = EnvScene(None);
+        self.update_shapes(data, 0, &EnvScene(None), &mut out);
         out.0.unwrap_or_else(|| Arc::clone(&self.scene))
     }
 
@@ -265,7 +272,7 @@ impl Visible {
 
     /// Puts the scene of environment `env`, whose own scene is `own`, into `out` with the shapes of `data`; `own`
     /// itself if no shape changes. The memory of scenes without other holders is reused.
-    pub(crate) fn shape(&self, data: &Data, env: usize, own: &OwnScene, out: &mut OwnScene) {
+    pub(crate) fn update_shapes(&self, data: &Data, env: usize, own: &EnvScene, out: &mut EnvScene) {
         if self.deforms() {
             let scene = own.0.as_ref().unwrap_or(&self.scene);
             self.buffers.fill(&self.deforming, env, scene, data, out);
@@ -275,25 +282,25 @@ impl Visible {
     }
 
     /// Mask ids, and the elements that they identify.
-    pub fn ids(&self) -> &Arc<[MaskId]> {
+    pub fn mask_ids(&self) -> &Arc<[MaskId]> {
         &self.ids
     }
 
     /// Messages about elements that are not rendered: textures or meshes that cannot be read, and signed distance
     /// fields, which cameras do not support.
-    pub fn left_out(&self) -> &[String] {
+    pub fn omitted(&self) -> &[String] {
         &self.left_out
     }
 
     /// Copies the poses in `data` in double precision: world from instance, for each instance; the identity for
-    /// instances that [change their shape](Instance::deforms).
+    /// instances that [change their shape](Instance::is_deformable).
     ///
     /// # Panics
     /// The slice does not have the length of the scene's instances.
     #[track_caller]
-    pub fn read_exact(&self, data: &Data, poses: &mut [PoseF64]) {
+    pub fn read_poses_f64(&self, data: &Data, poses: &mut [PoseF64]) {
         assert_eq!(poses.len(), self.anchors.len(), "a slice of another scene");
-        let place = places(data);
+        let place = element_poses(data);
         for (pose, &anchor) in poses.iter_mut().zip(&self.anchors) {
             let (translation, [r0, r1, r2, r3, r4, r5, r6, r7, r8]) = place(anchor);
             *pose = PoseF64 { rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]], translation };
@@ -305,12 +312,12 @@ impl Visible {
     /// # Panics
     /// The slices do not have the lengths of the scene's instances and lights.
     #[track_caller]
-    pub fn read(&self, data: &Data, poses: &mut [PoseF32], lights: &mut [Light]) {
+    pub fn read_poses(&self, data: &Data, poses: &mut [PoseF32], lights: &mut [Light]) {
         assert!(
             poses.len() == self.anchors.len() && lights.len() == self.scene.lights.len(),
             "slices of another scene"
         );
-        let place = places(data);
+        let place = element_poses(data);
         for (pose, &anchor) in poses.iter_mut().zip(&self.anchors) {
             let (translation, rotation) = place(anchor);
             let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rotation.map(|x| x as f32);
@@ -319,7 +326,7 @@ impl Visible {
                 translation: translation.map(|x| x as f32),
             };
         }
-        self.deforming.place(data, poses);
+        self.deforming.update_poses(data, poses);
         lighting::read(data, &self.scene.lights, lights);
     }
 }

@@ -1,12 +1,12 @@
 //! Several environments in one scene, side by side.
 
-use super::Visible;
+use super::VisualScene;
 use crate::contents::GROUND_MASK_ID;
 use crate::error::{Error, Result};
 use kinetoscope_scene::{Marker, PoseF32, RenderScene};
 
 /// Environment in the overview.
-pub(super) struct Place<'a> {
+pub(super) struct OverviewEnv<'a> {
     /// Position of the environment \[m\].
     pub(super) origin: [f32; 3],
     /// Scene of the environment.
@@ -17,9 +17,9 @@ pub(super) struct Place<'a> {
 }
 
 /// Repeats the instances of `visible` at every place, and adds markers; the ground is included once.
-pub(super) fn side_by_side(visible: &Visible, places: &[Place<'_>]) -> Result<(Visible, Vec<PoseF32>)> {
+pub(super) fn side_by_side(visible: &VisualScene, places: &[OverviewEnv<'_>]) -> Result<(VisualScene, Vec<PoseF32>)> {
     let (mut instances, mut poses) = (Vec::new(), Vec::new());
-    for (index, Place { origin, scene, poses: own, markers }) in places.iter().enumerate() {
+    for (index, OverviewEnv { origin, scene, poses: own, markers }) in places.iter().enumerate() {
         let moved = |pose: &PoseF32| {
             let t = pose.translation;
             PoseF32 { translation: [t[0] + origin[0], t[1] + origin[1], t[2] + origin[2]], ..*pose }

@@ -1,26 +1,26 @@
 //! Render scenes of environments with sizes or colors of their own.
 
-use super::{Anchor, Visible, geom};
+use super::{Anchor, VisualScene, geom};
 use kinetoscope_mujoco::{Data, Model};
-use kinetoscope_scene::{Material, OwnScene, RenderSceneError};
+use kinetoscope_scene::{EnvScene, Material, RenderSceneError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-impl Visible {
+impl VisualScene {
     /// Creates the scene with other sizes \[m\] and colors, by geom of `model`. Meshes and textures are shared.
     ///
     /// # Errors
     /// A size or a color is invalid for rendering. Those of [`Properties`](crate::Properties) are valid.
-    pub(crate) fn own_scene(
+    pub(crate) fn env_scene(
         &self,
         model: &Model,
         sizes: &BTreeMap<usize, &[f64]>,
         colors: &BTreeMap<usize, &[f64]>,
-    ) -> Result<OwnScene, RenderSceneError> {
+    ) -> Result<EnvScene, RenderSceneError> {
         let mut instances = self.scene.instances().to_vec();
         for (instance, anchor) in instances.iter_mut().zip(&self.anchors) {
             let Anchor::Geom(geom) = anchor else { continue };
-            let size = sizes.get(geom).and_then(|size| geom::sized(model.geom_type()[*geom] as u32, size));
+            let size = sizes.get(geom).and_then(|size| geom::shape_from_size(model.geom_type()[*geom] as u32, size));
             if let Some(shape) = size {
                 instance.shape = shape;
             }
@@ -30,11 +30,11 @@ impl Visible {
                 instance.material = Material { rgba, ..instance.material.clone() };
             }
         }
-        Ok(OwnScene(Some(Arc::new(self.scene.with_instances(instances)?))))
+        Ok(EnvScene(Some(Arc::new(self.scene.with_instances(instances)?))))
     }
 
     /// Returns this scene with the shapes of `data`, in memory that is not shared.
-    pub(super) fn at(self: &Arc<Self>, data: &Data) -> Arc<Self> {
+    pub(super) fn with_shapes_of(self: &Arc<Self>, data: &Data) -> Arc<Self> {
         if !self.deforms() {
             return Arc::clone(self);
         }
@@ -44,7 +44,7 @@ impl Visible {
     }
 
     /// Returns this scene as in an environment whose own scene is `own`.
-    pub(super) fn seen_as(self: &Arc<Self>, own: &OwnScene) -> Arc<Self> {
+    pub(super) fn with_env_scene(self: &Arc<Self>, own: &EnvScene) -> Arc<Self> {
         match &own.0 {
             None => Arc::clone(self),
             Some(scene) => Arc::new(Self { scene: Arc::clone(scene), ..(**self).clone() }),
@@ -62,10 +62,10 @@ mod tests {
     fn invalid_appearance() {
         let text = r#"<mujoco><worldbody><geom type="box" size="0.1 0.2 0.3"/></worldbody></mujoco>"#;
         let model = mj::compile(text, &[]).expect("compiles").into_model();
-        let visible = Visible::of_model(&model);
+        let visible = VisualScene::of_model(&model);
         let look = |size: [f64; 3], red: f64| {
             let (size, color) = ([(0, &size[..])].into(), [red, 0.0, 0.0, 1.0]);
-            visible.own_scene(&model, &size, &[(0, &color[..])].into())
+            visible.env_scene(&model, &size, &[(0, &color[..])].into())
         };
         let error = look([0.1, 0.0, 0.3], 0.5).expect_err("no box is flat");
         assert!(matches!(error, RenderSceneError::Size { shape: "box", .. }), "{error}");

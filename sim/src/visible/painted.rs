@@ -4,4 +4,4 @@ use crate::surface_cfg::SurfaceCfg;
 use std::collections::BTreeMap;
 
 /// Surface properties, by the name of their instance.
-pub(crate) type Surfaces = BTreeMap<String, SurfaceCfg>;
+pub(crate) type SurfaceOverrides = BTreeMap<String, SurfaceCfg>;

@@ -1,19 +1,19 @@
 //! Visibility of sites, tendons, skins and flexes by group.
 
 /// Largest group that is rendered by default, as in MuJoCo's viewers.
-const LAST_SHOWN_GROUP: i32 = 2;
+const MAX_VISIBLE_GROUP: i32 = 2;
 
 /// True if MuJoCo's viewers show a site, tendon, skin or flex.
-pub(super) fn is_shown(group: i32, rgba: &[f32]) -> bool {
-    group <= LAST_SHOWN_GROUP && rgba[3] > 0.0
+pub(super) fn is_visible(group: i32, rgba: &[f32]) -> bool {
+    group <= MAX_VISIBLE_GROUP && rgba[3] > 0.0
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Visible;
+    use super::super::VisualScene;
     use kinetoscope_mujoco as mj;
     use kinetoscope_mujoco::Data;
-    use kinetoscope_scene::{Hemisphere, LightSum, PoseF32, Sky};
+    use kinetoscope_scene::{Hemisphere, LightingSpace, PoseF32, Sky};
 
     const SCENE: &str = r#"<mujoco><worldbody>
         <light pos="0 0 3"/>
@@ -31,16 +31,16 @@ mod tests {
     #[test]
     fn sites_and_tendons() {
         let model = mj::compile(SCENE, &[]).expect("compiles").into_model();
-        let (all, geoms) = (Visible::with_sites(&model), Visible::of_model(&model));
+        let (all, geoms) = (VisualScene::with_sites(&model), VisualScene::of_model(&model));
         for visible in [&all, &geoms] {
-            assert_eq!(visible.left_out(), [""; 0]);
+            assert_eq!(visible.omitted(), [""; 0]);
         }
         let mut data = Data::new(&model).expect("data");
         data.forward().expect("forward");
-        let places = |visible: &Visible| {
+        let places = |visible: &VisualScene| {
             let scene = visible.scene();
             let (mut poses, mut lights) = (vec![PoseF32::IDENTITY; scene.instances().len()], scene.lights.clone());
-            visible.read(&data, &mut poses, &mut lights);
+            visible.read_poses(&data, &mut poses, &mut lights);
             let scene = visible.scene_at(&data);
             let shown = scene.instances().iter().zip(&poses).filter(|(instance, _)| instance.visible);
             shown.map(|(instance, pose)| (instance.mask_id, pose.translation)).collect::<Vec<_>>()
@@ -49,7 +49,7 @@ mod tests {
         let (plane, ball, string) = ((1, [0.0, 0.0, 0.0]), (2, [0.0, 0.0, 1.0]), (3, [0.05, 0.0, 0.65]));
         assert_eq!(places(&geoms), [plane, ball, string]);
         assert_eq!(places(&all), [plane, ball, string, (4, [0.5, 0.0, 0.2]), (2, [0.1, 0.0, 1.0])]);
-        let named = |index: usize| (all.ids()[index].name(), all.ids()[index].class.as_str());
+        let named = |index: usize| (all.mask_ids()[index].name(), all.mask_ids()[index].class.as_str());
         assert_eq!([named(2), named(3)], [("string".into(), "tendon"), ("goal".into(), "world")]);
     }
 
@@ -57,9 +57,9 @@ mod tests {
     #[test]
     fn light_of_the_file() {
         let model = mj::compile(SCENE, &[]).expect("compiles").into_model();
-        let visible = Visible::of_model(&model);
+        let visible = VisualScene::of_model(&model);
         let scene = visible.scene();
-        assert_eq!((scene.sky, scene.light_sum), (Sky::uniform([0.0; 3]), LightSum::Display));
+        assert_eq!((scene.sky, scene.lighting_space), (Sky::uniform([0.0; 3]), LightingSpace::Display));
         assert_eq!(scene.ambient, Hemisphere { sky: [0.0; 3], ground: [0.0; 3] });
         // MuJoCo's values, unchanged.
         assert_eq!((scene.headlight.diffuse, scene.lights[0].diffuse), ([0.4; 3], [0.7; 3]));

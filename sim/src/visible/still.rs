@@ -1,15 +1,15 @@
 //! Model at one moment, which can be rendered without a simulation.
 
-use super::{MaskId, Visible, overview};
+use super::{MaskId, VisualScene, overview};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list, env_mask};
 use crate::manager::SimulationManager;
 use crate::pattern;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{Data, Model, ObjectKind};
-use kinetoscope_render::Shot;
+use kinetoscope_render::RenderRequest;
 use kinetoscope_render::View;
-use kinetoscope_scene::framing::{FILL, Framing, Placed};
+use kinetoscope_scene::framing::{CameraFit, DEFAULT_FILL, PosedScene};
 use kinetoscope_scene::{Light, Marker, Pose, PoseF32};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -17,14 +17,14 @@ use std::sync::Arc;
 
 /// Posed scene: a model at one moment, with its render scene, poses, lights and cameras.
 #[derive(Clone, Debug)]
-pub struct Still {
-    visible: Arc<Visible>,
+pub struct OffscreenScene {
+    visual_scene: Arc<VisualScene>,
     poses: Vec<PoseF32>,
     lights: Vec<Light>,
     cameras: Vec<ModelCamera>,
     free_camera: FreeCamera,
     /// Viewing direction of [`first_view`](Self::first_view).
-    forward: [f64; 3],
+    view_direction: [f64; 3],
 }
 
 /// Camera that a model file defines.
@@ -52,9 +52,9 @@ pub struct FreeCamera {
 }
 
 /// Viewing direction of first views of simulations, as in windows: from the front, the side and above.
-const ASIDE: [f64; 3] = [-0.664, 0.608, -0.435];
+const DEFAULT_VIEW_DIRECTION: [f64; 3] = [-0.664, 0.608, -0.435];
 
-impl Still {
+impl OffscreenScene {
     /// Creates the posed scene of an MJCF file, at the positions `qpos` (`None` for those of the file).
     ///
     /// # Errors
@@ -73,15 +73,15 @@ impl Still {
             }
             if let Some(column) = qpos.iter().position(|q| !q.is_finite()) {
                 let (of, value) = (format!("position {column}"), qpos[column]);
-                return Err(Error::NotFinite { argument: "qpos", row: 0, column, of, value });
+                return Err(Error::NotFinite { argument: "qpos", row: 0, column, item: of, value });
             }
             data.qpos_mut().copy_from_slice(qpos);
         }
         data.step1()?;
-        let still = Self::of_data(&Arc::new(Visible::with_sites(&model)), &data);
+        let still = Self::of_data(&Arc::new(VisualScene::with_sites(&model)), &data);
         let FreeCamera { eye, target, .. } = still.free_camera;
         // The author of the file chose the viewing direction.
-        Ok(Self { forward: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
+        Ok(Self { view_direction: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
     }
 
     /// Creates the posed scene of one environment of a simulation in its current state.
@@ -90,7 +90,7 @@ impl Still {
     /// The environment does not exist.
     pub fn of_env(sim: &mut SimulationManager, env: EnvId) -> Result<Self> {
         env_mask(Some(&[env]), sim.num_envs())?;
-        let visible = sim.scene_mut().visible().seen_as(sim.own_scene(env));
+        let visible = sim.scene_mut().visual_scene().with_env_scene(sim.env_scene(env));
         Ok(sim.simulation.batch.read(env.0, |env| Self::of_data(&visible, env.data())))
     }
 
@@ -104,14 +104,14 @@ impl Still {
     pub fn overview(sim: &mut SimulationManager, envs: Option<&[EnvId]>, markers: &[(EnvId, Marker)]) -> Result<Self> {
         let envs = env_list(envs, sim.num_envs())?;
         env_list(Some(&markers.iter().map(|(env, _)| *env).collect::<Vec<_>>()), sim.num_envs())?;
-        let (visible, origins) = (sim.scene_mut().visible(), sim.cfg().env_origins());
+        let (visible, origins) = (sim.scene_mut().visual_scene(), sim.cfg().env_origins());
         let stills: Vec<(usize, Self)> = envs
             .iter()
             .map(|&env| {
                 (
                     env,
                     sim.simulation.batch.read(env, |here| {
-                        let visible = visible.seen_as(sim.own_scene(EnvId(env)));
+                        let visible = visible.with_env_scene(sim.env_scene(EnvId(env)));
                         Self::of_data(&visible, here.data())
                     }),
                 )
@@ -120,37 +120,37 @@ impl Still {
         let places = stills.iter().map(|(env, still)| {
             let markers = markers.iter().filter(|(of, _)| of.0 == *env).map(|(_, marker)| *marker).collect();
             let origin = [0, 1, 2].map(|k| origins[(*env, k)] as f32);
-            overview::Place { origin, scene: still.visible.scene(), poses: &still.poses, markers }
+            overview::OverviewEnv { origin, scene: still.visual_scene.scene(), poses: &still.poses, markers }
         });
         let (visible, poses) = overview::side_by_side(&visible, &places.collect::<Vec<_>>())?;
-        Ok(Self { visible: Arc::new(visible), poses, ..Self::of_env(sim, EnvId(0))? })
+        Ok(Self { visual_scene: Arc::new(visible), poses, ..Self::of_env(sim, EnvId(0))? })
     }
 
-    fn of_data(visible: &Arc<Visible>, data: &Data) -> Self {
-        let visible = &visible.at(data);
+    fn of_data(visible: &Arc<VisualScene>, data: &Data) -> Self {
+        let visible = &visible.with_shapes_of(data);
         let scene = visible.scene();
         let mut poses = vec![PoseF32::IDENTITY; scene.instances().len()];
         let mut lights = scene.lights.clone();
-        visible.read(data, &mut poses, &mut lights);
+        visible.read_poses(data, &mut poses, &mut lights);
         let model = data.model();
         Self {
-            visible: Arc::clone(visible),
+            visual_scene: Arc::clone(visible),
             poses,
             lights,
             cameras: (0..model.ncam()).map(|camera| model_camera(data, camera)).collect(),
             free_camera: free_camera(model),
-            forward: ASIDE,
+            view_direction: DEFAULT_VIEW_DIRECTION,
         }
     }
 
     /// Render scene of the model.
-    pub fn visible(&self) -> &Arc<Visible> {
-        &self.visible
+    pub fn visible(&self) -> &Arc<VisualScene> {
+        &self.visual_scene
     }
 
     /// Mask ids, and the elements that they identify.
     pub fn mask_ids(&self) -> &[MaskId] {
-        self.visible.ids()
+        self.visual_scene.mask_ids()
     }
 
     /// Cameras of the model file.
@@ -166,10 +166,13 @@ impl Still {
         self.cameras.iter().find(|c| c.name == name).ok_or_else(|| Error::UnknownName {
             what: "camera",
             name: name.into(),
-            candidates: pattern::closest(name, self.cameras.iter().map(|c| c.name.as_str()).filter(|n| !n.is_empty()))
-                .into_iter()
-                .map(str::to_string)
-                .collect(),
+            candidates: pattern::closest_names(
+                name,
+                self.cameras.iter().map(|c| c.name.as_str()).filter(|n| !n.is_empty()),
+            )
+            .into_iter()
+            .map(str::to_string)
+            .collect(),
         })
     }
 
@@ -184,8 +187,8 @@ impl Still {
     pub fn first_view(&self, size: [usize; 2]) -> FreeCamera {
         let FreeCamera { eye, target, fovy, clip: [near, far] } = self.free_camera;
         let [width, height] = size.map(|n| n.max(1) as f64);
-        let framing = Framing { forward: self.forward, fovy, aspect: width / height, fill: FILL };
-        let Some(placement) = framing.place(&[self.placed()]) else {
+        let framing = CameraFit { forward: self.view_direction, fovy, aspect: width / height, fill: DEFAULT_FILL };
+        let Some(placement) = framing.fit(&[self.placed()]) else {
             return FreeCamera { eye, target, fovy, clip: [near, far] };
         };
         let distance = Vector3::from(placement.eye).metric_distance(&Vector3::from(placement.target));
@@ -196,19 +199,19 @@ impl Still {
     }
 
     /// Rendered instances with their poses.
-    pub fn placed(&self) -> Placed<'_> {
-        Placed { scene: self.visible.scene(), poses: &self.poses, origin: [0.0; 3], reach: f32::INFINITY }
+    pub fn placed(&self) -> PosedScene<'_> {
+        PosedScene { scene: self.visual_scene.scene(), poses: &self.poses, origin: [0.0; 3], reach: f32::INFINITY }
     }
 
     /// Render request for the scene from `view`.
-    pub fn shot<'a>(&'a self, view: &'a View) -> Shot<'a> {
-        Shot {
-            scene: self.visible.scene(),
+    pub fn render_request<'a>(&'a self, view: &'a View) -> RenderRequest<'a> {
+        RenderRequest {
+            scene: self.visual_scene.scene(),
             poses: &self.poses,
             view,
             lights: Some(&self.lights),
             lens: None,
-            before: None,
+            previous: None,
         }
     }
 }
@@ -233,5 +236,5 @@ fn free_camera(model: &Model) -> FreeCamera {
     let [fovy, azimuth, elevation] = model.free_camera().map(f64::to_radians);
     let (target, distance) = (model.center(), 1.5 * model.extent());
     let forward = [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
-    FreeCamera { eye: [0, 1, 2].map(|i| target[i] - distance * forward[i]), target, fovy, clip: model.clip() }
+    FreeCamera { eye: [0, 1, 2].map(|i| target[i] - distance * forward[i]), target, fovy, clip: model.clip_distances() }
 }

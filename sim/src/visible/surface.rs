@@ -6,13 +6,13 @@ use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
 /// Materials of a model, for rendering.
-pub(super) struct Surfaces<'a> {
+pub(super) struct ModelMaterials<'a> {
     model: &'a Model,
     materials: Vec<Material>,
     left_out: Vec<String>,
 }
 
-impl<'a> Surfaces<'a> {
+impl<'a> ModelMaterials<'a> {
     pub(super) fn of(model: &'a Model) -> Self {
         let mut left_out = Vec::new();
         let textures: Vec<Option<Arc<Texture>>> = (0..model.ntex())
@@ -90,10 +90,10 @@ pub(super) fn color_of_site(model: &Model, site: usize) -> [f32; 4] {
 
 pub(super) fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
     /// MuJoCo's gray of geoms without a color.
-    const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
+    const DEFAULT_GEOM_RGBA: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
     let own = [own[0], own[1], own[2], own[3]].map(|c| c.clamp(0.0, 1.0));
     match usize::try_from(material) {
-        Ok(material) if own == UNSET && material < model.nmat() => {
+        Ok(material) if own == DEFAULT_GEOM_RGBA && material < model.nmat() => {
             model.material(material).rgba.map(|c| c.clamp(0.0, 1.0))
         }
         _ => own,

@@ -1,6 +1,6 @@
 //! Visuals of URDF files and of mesh objects, which are rendered in place of their proxy geoms.
 
-use super::Part;
+use super::VisualPart;
 use crate::objects::rigid_object_data::RigidObjectData;
 use crate::objects::robot_data::RobotData;
 use kinetoscope_robot::description::{Geometry, Visual};
@@ -9,14 +9,14 @@ use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Parts that are rendered in place of geoms, by geom.
-pub(crate) type Replacements = HashMap<usize, Vec<Part>>;
+pub(crate) type Replacements = HashMap<usize, Vec<VisualPart>>;
 
 /// Cache of visual meshes and textures: adding a robot reads only new files.
 #[derive(Clone, Debug, Default)]
@@ -34,9 +34,9 @@ struct MeshPart {
 }
 
 /// Owner of a visual in diagnostics.
-struct Of {
+struct VisualOwner {
     name: String,
-    source: Option<Source>,
+    source: Option<SourceLocation>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -52,7 +52,7 @@ impl VisualCache {
     }
 
     /// Reports that an environment is rendered with nominal sizes and colors.
-    pub(crate) fn say_look(&mut self, env: usize, error: &kinetoscope_scene::RenderSceneError) {
+    pub(crate) fn warn_env_scene(&mut self, env: usize, error: &kinetoscope_scene::RenderSceneError) {
         let message = format!("environment {env} is drawn with nominal sizes and colours: its own cannot be: {error}");
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
     }
@@ -73,8 +73,8 @@ impl VisualCache {
     }
 
     /// Parts that are rendered for a visual.
-    pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<Part> {
-        let of = Of { name: format!("link {link:?}"), source: Some(visual.source.clone()) };
+    pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<VisualPart> {
+        let of = VisualOwner { name: format!("link {link:?}"), source: Some(visual.source.clone()) };
         let own = visual.material.as_ref().map(|m| {
             let texture = m.texture.as_ref().and_then(|path| self.texture(&TextureSource::File(path.clone()), &of));
             let rgba = m.rgba.map(|c| c.map(|x| x as f32));
@@ -85,7 +85,7 @@ impl VisualCache {
             let base = Material::default();
             Material { rgba: rgba.unwrap_or(base.rgba), texture, ..base }
         };
-        let one = |shape: kinetoscope_scene::shape::Shape| vec![Part { shape, material: plain() }];
+        let one = |shape: kinetoscope_scene::shape::Shape| vec![VisualPart { shape, material: plain() }];
         match &visual.geometry {
             Geometry::Box { size } => one(Cuboid { half: [0, 1, 2].map(|i| (size[i] / 2.0) as f32) }.into()),
             Geometry::Cylinder { radius, length } => {
@@ -103,7 +103,7 @@ impl VisualCache {
                     self.meshes.insert(key, Arc::clone(&parts));
                     parts
                 });
-                let mut parts = drawn(&parts, &Material::default());
+                let mut parts = with_default_material(&parts, &Material::default());
                 // A material of the URDF overrides those of the mesh file, as in exports.
                 if let Some((rgba, texture)) = own {
                     for part in &mut parts {
@@ -121,9 +121,9 @@ impl VisualCache {
     }
 
     /// Parts that are rendered for a mesh object.
-    pub(crate) fn object_parts(&mut self, object: &RigidObjectData) -> Vec<Part> {
-        let of = Of { name: format!("object {:?}", object.uid()), source: None };
-        let Some((key, mesh)) = object.mesh_key().zip(object.mesh().and_then(|mesh| mesh.seen.as_ref())) else {
+    pub(crate) fn object_parts(&mut self, object: &RigidObjectData) -> Vec<VisualPart> {
+        let of = VisualOwner { name: format!("object {:?}", object.uid()), source: None };
+        let Some((key, mesh)) = object.mesh_key().zip(object.mesh().and_then(|mesh| mesh.visual.as_ref())) else {
             return Vec::new();
         };
         let known = self.meshes.get(&key).cloned();
@@ -132,11 +132,11 @@ impl VisualCache {
             self.meshes.insert(key, Arc::clone(&parts));
             parts
         });
-        drawn(&parts, &Material::from_rgba(object.cfg().rgba.map(|c| c as f32)))
+        with_default_material(&parts, &Material::from_rgba(object.cfg().rgba.map(|c| c as f32)))
     }
 
     /// Reads the parts of a mesh file, one for each material.
-    fn load(&mut self, of: &Of, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
+    fn load(&mut self, of: &VisualOwner, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
         match kinetoscope_scene::mesh::load(path) {
             Ok(mesh) => self.mesh_parts(of, &mesh.scaled(scale)),
             // The reader of the robot already warned about a missing file.
@@ -152,27 +152,27 @@ impl VisualCache {
         }
     }
 
-    fn mesh_parts(&mut self, of: &Of, mesh: &TriMesh) -> Vec<MeshPart> {
-        let whole = mesh.parts.len() == 1;
-        let part = |part: &kinetoscope_scene::mesh::MeshPart| {
+    fn mesh_parts(&mut self, of: &VisualOwner, mesh: &TriMesh) -> Vec<MeshPart> {
+        let whole = mesh.submeshes.len() == 1;
+        let part = |part: &kinetoscope_scene::mesh::Submesh| {
             let material = part.material.and_then(|m| mesh.materials.get(m));
             let triangles = if whole {
-                RenderMesh::new(mesh, RenderMesh::CREASE)
+                RenderMesh::new(mesh, RenderMesh::DEFAULT_CREASE_ANGLE)
             } else {
-                RenderMesh::of_part(mesh, part, RenderMesh::CREASE)
+                RenderMesh::from_submesh(mesh, part, RenderMesh::DEFAULT_CREASE_ANGLE)
             };
             let material = material.map(|material| self.material(material, of));
             MeshPart { shape: Mesh { mesh: Arc::new(triangles) }.into(), material }
         };
-        mesh.parts.iter().map(part).collect()
+        mesh.submeshes.iter().map(part).collect()
     }
 
-    fn material(&mut self, material: &MeshMaterial, of: &Of) -> Material {
+    fn material(&mut self, material: &MeshMaterial, of: &VisualOwner) -> Material {
         let texture = material.texture.as_ref().and_then(|source| self.texture(source, of));
         Material { rgba: material.rgba, texture, ..Material::default() }
     }
 
-    fn texture(&mut self, source: &TextureSource, of: &Of) -> Option<Arc<Texture>> {
+    fn texture(&mut self, source: &TextureSource, of: &VisualOwner) -> Option<Arc<Texture>> {
         let key = match source {
             TextureSource::File(path) => TextureSourceKey::File(path.clone()),
             TextureSource::Embedded(bytes) => TextureSourceKey::Embedded(bytes.clone()),
@@ -194,9 +194,9 @@ impl VisualCache {
 }
 
 /// Parts with their own materials, or with `otherwise`.
-fn drawn(parts: &[MeshPart], otherwise: &Material) -> Vec<Part> {
+fn with_default_material(parts: &[MeshPart], otherwise: &Material) -> Vec<VisualPart> {
     let material = |part: &MeshPart| part.material.clone().unwrap_or_else(|| otherwise.clone());
-    parts.iter().map(|part| Part { shape: part.shape.clone(), material: material(part) }).collect()
+    parts.iter().map(|part| VisualPart { shape: part.shape.clone(), material: material(part) }).collect()
 }
 
 fn read_texture(source: &TextureSource) -> Result<Texture, String> {

@@ -1,8 +1,8 @@
 //! Solving inverse kinematics allocates no memory.
 
-use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, Posture};
+use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, NullSpacePosture};
 use kinetoscope_robot::urdf::{UrdfCfg, assemble};
-use kinetoscope_scene::{Pose, Random};
+use kinetoscope_scene::{KeyedRng, Pose};
 
 #[test]
 fn solve() {
@@ -13,11 +13,11 @@ fn solve() {
         .drivable_joints()
         .map(|(_, joint)| joint.limit.as_ref().map(|l| [l.lower.unwrap(), l.upper.unwrap()]).unwrap())
         .collect();
-    let mut random = Random::keyed(3, 0, "targets");
-    let mut positions = || limits.iter().map(|&[low, high]| random.between(low, high)).collect::<Vec<f64>>();
+    let mut random = KeyedRng::keyed(3, 0, "targets");
+    let mut positions = || limits.iter().map(|&[low, high]| random.uniform_range(low, high)).collect::<Vec<f64>>();
     let targets: Vec<Pose> = (0..20).map(|_| chain.pose(&positions())).collect();
     let far = Pose::translation(9.0, 0.0, 0.0);
-    let cfg = IkCfg { posture: Some(Posture::at([0.0; 7])), ..Default::default() };
+    let cfg = IkCfg { posture: Some(NullSpacePosture::at([0.0; 7])), ..Default::default() };
     let mut solver = IkSolver::new(chain.clone(), limits, cfg).unwrap();
     let (mut solved, mut starts) = (0, 0);
     let count = crate::allocations(|| {

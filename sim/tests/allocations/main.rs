@@ -31,12 +31,12 @@ fn assert_settles(what: &str, mut allocations: impl FnMut() -> u64) {
 
 /// Number of allocations of all slots of a pool, and number of slots that worked.
 #[derive(Debug, Default)]
-struct Counting {
+struct AllocationCounter {
     allocations: AtomicU64,
     visits: AtomicU64,
 }
 
-impl Counting {
+impl AllocationCounter {
     /// Creates a pool that counts the allocations of jobs with `slots` slots.
     fn pool(self: &Arc<Self>, slots: usize) -> ThreadPool {
         let (counting, start) = (Arc::clone(self), Barrier::new(slots));

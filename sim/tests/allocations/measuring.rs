@@ -1,10 +1,10 @@
 //! Sensors allocate no memory after they were built, with any configuration.
 
-use crate::{Counting, allocations, assert_settles};
+use crate::{AllocationCounter, allocations, assert_settles};
 use kinetoscope_render::Intrinsics;
 use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::{Color, Depth};
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Contact, Contacts};
 use kinetoscope_scene::{Instance, Light, Material, PoseF32, PoseF64, RenderScene, SceneState, VisibleState};
@@ -43,7 +43,7 @@ fn state([a, b]: [usize; 2]) -> SceneState {
 
 /// Contact, IMU, frame, MuJoCo and wrench sensors, read at every step, and lazily.
 #[test]
-fn numbers() {
+fn numeric_sensors() {
     let bodies = ["a", "b", "c"].map(String::from);
     let engine_sensors = [EngineSensor { name: "a/own".into(), width: 3, ..EngineSensor::default() }].into();
     let context =
@@ -56,18 +56,18 @@ fn numbers() {
         track_contact_points: true,
         track_friction_forces: true,
         sampling: sampling(),
-        ..ContactSensorCfg::of(".*")
+        ..ContactSensorCfg::for_bodies(".*")
     };
     let noisy = SamplingCfg { dropout: 0.1, noise: [("lin_acc_b".to_string(), NOISE)].into(), ..sampling() };
     let imu = ImuCfg { sampling: noisy, ..ImuCfg::on("b") };
-    let targets = vec![TargetFrameCfg::of(".*")];
-    let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("a", targets) };
+    let targets = vec![TargetFrameCfg::for_bodies(".*")];
+    let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::new("a", targets) };
     let (links, frame) = (vec!["[ab]".into()], vec!["c".into()]);
     let wrench = JointWrenchCfg { links, frames: frame, sampling: sampling(), debug_vis: true };
     let own = MujocoSensorCfg { sensors: Some(vec!["own".into()]), sampling: sampling() };
     let schedule = Schedule::new(0.02, context.dt, false).unwrap();
     // For the wrench sensor, the third body is fused to the second.
-    let fused = SensorContext { carriers: [0, 1, 1].into(), ..context.clone() };
+    let fused = SensorContext { moving_bodies: [0, 1, 1].into(), ..context.clone() };
     let sensors: [Box<dyn Sensor>; 5] = [
         Box::new(contact.build(&context).unwrap()),
         Box::new(imu.build(&context).unwrap()),
@@ -95,8 +95,8 @@ fn numbers() {
 fn lazy(sensor: Box<dyn Sensor>, schedule: Schedule) {
     let mut states = [[3, 3], [0, 5], [6, 1]].map(state);
     let measured = Arc::new(AtomicUsize::new(0));
-    let sensor = Box::new(Counted { sensor, measured: Arc::clone(&measured) });
-    let mut slot = SensorSlot::new(sensor, Requires::present_in(&states[0]), Some(schedule), 2);
+    let sensor = Box::new(CountedSensor { sensor, measured: Arc::clone(&measured) });
+    let mut slot = SensorSlot::new(sensor, StateFields::present_in(&states[0]), Some(schedule), 2);
     slot.reset(&[0, 1], &states[0]);
     let mut steps = |slot: &mut SensorSlot| {
         let (before, mut asked) = (measured.load(Ordering::Relaxed), 0);
@@ -125,12 +125,12 @@ fn lazy(sensor: Box<dyn Sensor>, schedule: Schedule) {
 
 /// Wrapper that counts the measurements of a sensor.
 #[derive(Debug)]
-struct Counted {
+struct CountedSensor {
     sensor: Box<dyn Sensor>,
     measured: Arc<AtomicUsize>,
 }
 
-impl Sensor for Counted {
+impl Sensor for CountedSensor {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
         self.measured.fetch_add(1, Ordering::Relaxed);
         self.sensor.update(state)
@@ -151,8 +151,8 @@ impl Sensor for Counted {
 
 /// Scene of a plane and moving balls.
 fn balls(num_envs: usize, count: usize) -> (SensorContext, Vec<SceneState>) {
-    let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).fixed()];
-    let ball = |k: usize| Instance::new(Sphere { radius: 0.3 }, Material::default(), 2 + k as i32).of_body(k as u32);
+    let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).into_fixed()];
+    let ball = |k: usize| Instance::new(Sphere { radius: 0.3 }, Material::default(), 2 + k as i32).with_body(k as u32);
     instances.extend((0..count).map(ball));
     let scene = Some(Arc::new(RenderScene::new(instances).unwrap()));
     let bodies: Vec<String> = (0..count).map(|k| format!("ball{k}")).collect();
@@ -195,7 +195,7 @@ fn cameras() {
         channels: Channels { flow: false, ..Channels::ALL },
         ..CameraCfg::default()
     };
-    let troubled = CameraCfg {
+    let degraded = CameraCfg {
         update_period: 0.02,
         history_length: 3,
         latency_steps: 5,
@@ -212,7 +212,7 @@ fn cameras() {
         ..perfect.clone()
     };
     for (cfg, images, lazy) in
-        [(&perfect, 60, true), (&perfect, 60, false), (&troubled, 15, true), (&troubled, 15, false)]
+        [(&perfect, 60, true), (&perfect, 60, false), (&degraded, 15, true), (&degraded, 15, false)]
     {
         let mut camera = CameraCfg { lazy, ..cfg.clone() }.build(&context).unwrap();
         camera.reset(&[0, 1], &states[0]).unwrap();
@@ -246,7 +246,7 @@ fn rays() {
     let extrinsics = Extrinsics { placement, ..Extrinsics::default() };
     let camera = RayCasterCameraCfg { width: 120, height: 80, intrinsics, extrinsics, ..Default::default() };
     for threads in [1, 4] {
-        let counting = Arc::new(Counting::default());
+        let counting = Arc::new(AllocationCounter::default());
         let context = SensorContext { threads, pool: counting.pool(threads), ..context.clone() };
         let sensors: [(&str, Box<dyn Sensor>); 2] = [
             ("caster", Box::new(caster.build(&context).unwrap())),

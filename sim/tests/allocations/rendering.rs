@@ -1,12 +1,13 @@
 //! After the first frame, rendering allocates no memory, and scratch memory stays small.
 
-use crate::{Counting, allocations, assert_settles};
+use crate::{AllocationCounter, allocations, assert_settles};
 use kinetoscope_render::View;
 use kinetoscope_render::frame::{Channels, Frame};
 use kinetoscope_render::lens::Equidistant;
 use kinetoscope_render::lens::{LensRays, Optics};
 use kinetoscope_render::{
-    Aperture, Before, Opened, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot, Shutter, Take,
+    Aperture, FrameSample, ImageRenderer, ParallelRenderer, PreviousState, RasterCfg, RenderRequest, Renderer, Shutter,
+    ShutterOpenState,
 };
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Sphere};
@@ -18,7 +19,7 @@ use std::sync::atomic::Ordering;
 /// Capsules, a mesh and a plane under two lights.
 fn scene() -> (RenderScene, Vec<PoseF32>) {
     let ball: TriMesh = Shape::from(Sphere { radius: 0.3 }).tessellate(96);
-    let mesh = Arc::new(RenderMesh::new(&ball, RenderMesh::CREASE));
+    let mesh = Arc::new(RenderMesh::new(&ball, RenderMesh::DEFAULT_CREASE_ANGLE));
     let instance = |shape: Shape, id| Instance::new(shape, Material::default(), id);
     let mut instances = vec![instance(Plane::INFINITE.into(), 1), instance(Mesh { mesh }.into(), 2)];
     let mut poses = vec![PoseF32::from_translation([0., 0., -0.5]), PoseF32::IDENTITY];
@@ -57,7 +58,7 @@ fn raster() {
         for (samples, shadows) in [(1, false), (4, false), (1, true), (4, true)] {
             let what = format!("{size:?}, {samples} samples, shadows {shadows}");
             let (view, mut frame) = (view(size), Frame::new(size[0], size[1], FOUR));
-            let mut rasterizer = Rasterizer::new(RasterCfg { samples, shadows, ..RasterCfg::default() });
+            let mut rasterizer = ImageRenderer::new(RasterCfg { samples, shadows, ..RasterCfg::default() });
             assert_steady(&what, || rasterizer.render(&scene, &poses, &view, &mut frame).unwrap());
             let (scratch, image) = (rasterizer.scratch_bytes(), 24 * size[0] * size[1]);
             assert!(scratch <= 3 * image, "{what}: {scratch} > 3 x {image}");
@@ -76,23 +77,24 @@ fn renderers() {
     let rays = LensRays::new(&optics, [320, 240], 4).unwrap();
     // Less than 80 bytes per block of 64 pixels for its cone, and five samples of 12 bytes per pixel.
     assert!(rays.bytes() < 320 * 240 * (60 + 2), "{}", rays.bytes());
-    let still = Shot { scene: &scene, poses: &poses, view: &small, lights: None, lens: None, before: None };
-    let moving = Shot { before: Some(Before { poses: &moved, view: &small }), ..still };
-    let lens = Shot { view: &wide, lens: Some(&rays), ..still };
+    let static_request =
+        RenderRequest { scene: &scene, poses: &poses, view: &small, lights: None, lens: None, previous: None };
+    let moving = RenderRequest { previous: Some(PreviousState { poses: &moved, view: &small }), ..static_request };
+    let lens = RenderRequest { view: &wide, lens: Some(&rays), ..static_request };
     for (what, shot, channels, renderer) in [
-        ("still", still, FOUR, Renderer::Hybrid),
-        ("still", still, FOUR, Renderer::FastRayTraced),
-        ("still", still, FOUR, paths(2)),
+        ("still", static_request, FOUR, Renderer::Hybrid),
+        ("still", static_request, FOUR, Renderer::FastRayTraced),
+        ("still", static_request, FOUR, paths(2)),
         ("albedo and flow", moving, Channels::ALL, Renderer::Raster),
         ("albedo and flow", moving, Channels::ALL, Renderer::FastRayTraced),
         ("lens", lens, FOUR, Renderer::FastRayTraced),
         ("lens", lens, FOUR, paths(1)),
     ] {
         let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
-        let mut rasterizer = Rasterizer::default();
+        let mut rasterizer = ImageRenderer::default();
         rasterizer.renderer = renderer;
         assert_steady(&format!("{what}, {renderer:?}"), || {
-            rasterizer.render_shot(&shot, &mut frame.as_mut()).unwrap();
+            rasterizer.render_request(&shot, &mut frame.as_mut()).unwrap();
         });
     }
 }
@@ -105,15 +107,15 @@ fn rolling_shutter() {
     instances.iter_mut().for_each(|instance| instance.material.emission = 0.5);
     let (scene, view) = (RenderScene::new(instances).unwrap(), view([64, 48]));
     let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
-    let opened = Opened { poses: &moved, world_from_camera: view.world_from_camera, before: 0.1 };
-    let take = Take { noise: 1, opened: Some(opened) };
+    let opened = ShutterOpenState { poses: &moved, world_from_camera: view.world_from_camera, age: 0.1 };
+    let take = FrameSample { noise: 1, shutter_open: Some(opened) };
     let mut frame = Frame::new(view.width, view.height, FOUR);
-    let mut rasterizer = Rasterizer::default();
+    let mut rasterizer = ImageRenderer::default();
     rasterizer.renderer = paths(2);
     rasterizer.aperture = Some(Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 });
     rasterizer.shutter = Shutter { row_time: 1e-3, exposure_time: 0.01 };
-    let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
-    assert_steady("paths", || rasterizer.render_take(&shot, &take, &mut frame.as_mut()).unwrap());
+    let shot = RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
+    assert_steady("paths", || rasterizer.render_sample(&shot, &take, &mut frame.as_mut()).unwrap());
 }
 
 /// Objects that enter the light and the image, approach and separate cause no further allocation.
@@ -125,17 +127,18 @@ fn moving_objects() {
     let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 1.0 };
     scene.lights = vec![Light { kind: spot, ..Light::default() }];
     let far = [50.0, 0.0, 0.3];
-    let moments = [
+    let ball_positions = [
         [far, far],
         [[0.0, 0.0, 0.4], far],
         [[-1.8, 0.0, 0.4], [1.8, 0.0, 0.4]],
         [[-1.2, -1.2, 0.4], [1.2, 1.2, 0.4]],
         [[0.0, 0.0, 2.6], [0.0, 0.0, 0.4]],
     ];
-    let moments = moments.map(|[a, b]| [PoseF32::IDENTITY, PoseF32::from_translation(a), PoseF32::from_translation(b)]);
+    let moments =
+        ball_positions.map(|[a, b]| [PoseF32::IDENTITY, PoseF32::from_translation(a), PoseF32::from_translation(b)]);
     for size in [[320, 240], [640, 480]] {
         let view = View::look_at(size, 0.9, [0.1, 0.0, 5.0], [0.; 3], [0., 0., 1.]).unwrap();
-        let (mut frame, mut rasterizer) = (Frame::new(size[0], size[1], FOUR), Rasterizer::default());
+        let (mut frame, mut rasterizer) = (Frame::new(size[0], size[1], FOUR), ImageRenderer::default());
         rasterizer.render(&scene, &moments[0], &view, &mut frame).unwrap();
         for (k, poses) in moments.iter().enumerate() {
             let draw = || rasterizer.render(&scene, poses, &view, &mut frame).unwrap();
@@ -150,10 +153,11 @@ fn batches() {
     let (scene, poses) = scene();
     for (size, frames) in [([320, 240], 1), ([160, 120], 3), ([160, 120], 37)] {
         let view = view(size);
-        let counting = Arc::new(Counting::default());
-        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_pool(counting.pool(3));
+        let counting = Arc::new(AllocationCounter::default());
+        let mut rasterizer = ParallelRenderer::new(RasterCfg::default(), 3).with_pool(counting.pool(3));
         let mut images = vec![Frame::new(view.width, view.height, FOUR); frames];
-        let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
+        let shot =
+            RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
         let mut jobs: Vec<_> = images.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
         let mut draw = || {
             rasterizer.render(&mut jobs).unwrap();

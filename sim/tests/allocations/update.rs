@@ -1,7 +1,7 @@
 //! After the first steps, stepping and measuring allocate no memory on the calling thread.
 
 use crate::{allocations, assert_settles};
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement};
 use kinetoscope_sensors::ray::pattern::Grid;
 use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
@@ -9,7 +9,7 @@ use kinetoscope_sensors::{
     ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
     SamplingCfg, SensorCfg, TargetFrameCfg,
 };
-use kinetoscope_sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use kinetoscope_sim::{MjcfPartCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 
 /// A pendulum with sensors of its own.
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0"/>
@@ -36,7 +36,7 @@ fn world(threads: usize) -> SimulationManager {
 }
 
 /// Number of allocations of ten steps, after thirty steps of warm-up.
-fn of_steps(sim: &mut SimulationManager) -> u64 {
+fn allocations_of_steps(sim: &mut SimulationManager) -> u64 {
     sim.update(30);
     allocations(|| (0..10).for_each(|_| sim.update(1)))
 }
@@ -45,23 +45,26 @@ fn of_steps(sim: &mut SimulationManager) -> u64 {
 fn steps() {
     for threads in [1, 3] {
         let mut sim = world(threads);
-        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, no sensors");
-        let contact =
-            ContactSensorCfg { filters: vec!["ground".into()], track_air_time: true, ..ContactSensorCfg::of("box") };
+        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, no sensors");
+        let contact = ContactSensorCfg {
+            filters: vec!["ground".into()],
+            track_air_time: true,
+            ..ContactSensorCfg::for_bodies("box")
+        };
         sim.add_sensor("contact", contact).unwrap();
         let sampling = SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("ball") }).unwrap();
-        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, sensors of numbers");
+        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, sensors of numbers");
         // 10201 rays per environment, and a camera with 3072: enough work for all threads.
         let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
         let offset = kinetoscope_scene::Pose::translation(0.0, 0.0, 2.0);
         let scanner = RayCasterCfg { offset, pattern: grid.into(), ..RayCasterCfg::default() };
-        assert!(scanner.requires().contains(Requires::INSTANCES));
+        assert!(scanner.requires().contains(StateFields::INSTANCES));
         sim.add_sensor("scanner", scanner).unwrap();
         sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
-        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, rays");
+        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, rays");
         // MuJoCo's own sensors and joint wrenches, of an attached MJCF file; a camera that captures the visible state.
-        sim.add_mjcf(MjcfCfg::text("m", PENDULUM)).unwrap();
+        sim.add_mjcf(MjcfPartCfg::text("m", PENDULUM)).unwrap();
         let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("own", MujocoSensorCfg { sensors: None, sampling: sampling() }).unwrap();
         let frames = vec!["m/tip".into()];
@@ -69,8 +72,8 @@ fn steps() {
         sim.add_sensor("wrench", wrench).unwrap();
         sim.add_sensor("joints", JointStateCfg { joints: None, sampling: sampling() }).unwrap();
         sim.add_sensor("actuators", ActuatorStateCfg { actuators: None, sampling: sampling() }).unwrap();
-        let targets = vec![TargetFrameCfg::of(".*")];
-        let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("m/tip", targets) };
+        let targets = vec![TargetFrameCfg::for_bodies(".*")];
+        let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::new("m/tip", targets) };
         sim.add_sensor("frames", frames).unwrap();
         let camera = CameraCfg {
             width: 64,
@@ -78,12 +81,16 @@ fn steps() {
             extrinsics: Extrinsics { parent: Some("m/rod".into()), ..Extrinsics::default() },
             ..CameraCfg::default()
         };
-        let late = CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, ..camera.clone() };
-        sim.add_sensor("late", late).unwrap();
+        let delayed = CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, ..camera.clone() };
+        sim.add_sensor("late", delayed).unwrap();
         let camera = sim.add_sensor("camera", camera).unwrap();
-        assert_eq!(of_steps(&mut sim), 0, "{threads} threads, every kind of sensor");
+        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, every kind of sensor");
         let captured = sim.sensor(camera).unwrap();
-        assert_eq!((captured.frame_counts()[0], captured.draws()), (40, 0), "it saw all of it, and drew nothing yet");
+        assert_eq!(
+            (captured.frame_counts()[0], captured.render_count()),
+            (40, 0),
+            "it saw all of it, and drew nothing yet"
+        );
     }
 }
 
@@ -93,7 +100,7 @@ fn images() {
     for (threads, width, height) in [(1, 64, 48), (3, 64, 48), (3, 320, 240)] {
         let mut sim = world(threads);
         // The tendon changes its shape in every step, and with it the scene that cameras see.
-        sim.add_mjcf(MjcfCfg::text("string", STRING)).unwrap();
+        sim.add_mjcf(MjcfPartCfg::text("string", STRING)).unwrap();
         let base = CameraCfg { width, height, lazy: false, ..CameraCfg::default() };
         let extrinsics = |x: f64| {
             let placement = Placement::LookAt { eye: [x, -1.0, 0.8], target: [0.2, 0.0, 0.0], up: [0.0, 0.0, 1.0] };
@@ -105,8 +112,12 @@ fn images() {
         assert_settles(&format!("{threads} threads, {width} x {height}"), || allocations(|| sim.update(1)));
         let (all, some) = (sim.sensor(all).unwrap(), sim.sensor(some).unwrap());
         // One more for the reset at the start.
-        let pictures = 1 + all.frame_counts()[0];
-        assert_eq!((all.draws(), some.draws()), (4 * pictures, 3 * pictures), "they are drawn when they are due");
+        let frames = 1 + all.frame_counts()[0];
+        assert_eq!(
+            (all.render_count(), some.render_count()),
+            (4 * frames, 3 * frames),
+            "they are drawn when they are due"
+        );
     }
 }
 
@@ -125,7 +136,7 @@ fn actuator_models() {
         };
         actuators.push((joint, model));
     }
-    let files = kinetoscope_testkit::urdf::Files::default();
+    let files = kinetoscope_testkit::urdf::TempFiles::default();
     let path = files.write("robot.urdf", kinetoscope_testkit::urdf::robot("r", &urdf));
     let drive = kinetoscope_sim::DriveCfg {
         actuators,
@@ -142,5 +153,5 @@ fn actuator_models() {
         ..Default::default()
     })
     .unwrap();
-    assert_eq!(of_steps(&mut sim), 0);
+    assert_eq!(allocations_of_steps(&mut sim), 0);
 }

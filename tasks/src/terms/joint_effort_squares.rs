@@ -1,6 +1,6 @@
 //! Reward of joint efforts.
 
-use super::{columns, joints};
+use super::{select_joints, find_joints};
 use crate::error::Result;
 use crate::reward::RewardTerm;
 use ndarray::Axis;
@@ -14,16 +14,16 @@ use kinetoscope_sim::{RobotId, SimulationManager};
 ///
 /// # Panics
 /// The robot belongs to another manager.
-pub fn joint_effort_squares(
+pub fn joint_torques_l2(
     sim: &SimulationManager,
     name: &str,
     weight: f64,
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<RewardTerm> {
-    let (_, joints) = joints(sim, robot, patterns)?;
+    let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(RewardTerm::new(name, weight, move |now| {
-        let efforts = columns(&now.sim().robot(robot).qf(), &joints);
+        let efforts = select_joints(&now.sim().robot(robot).qf(), &joints);
         Ok(efforts.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum()))
     }))
 }

@@ -1,6 +1,6 @@
 //! Termination by joint limits.
 
-use super::joints;
+use super::find_joints;
 use crate::error::Result;
 use crate::termination::TerminationTerm;
 use ndarray::{Array1, Axis};
@@ -20,7 +20,7 @@ pub fn joint_out_of_limits(
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<TerminationTerm> {
-    let (_, joints) = joints(sim, robot, patterns)?;
+    let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(TerminationTerm::new(name, move |now| {
         let robot = now.sim().robot(robot);
         let (positions, limits) = (robot.qpos(), robot.soft_qpos_limits());

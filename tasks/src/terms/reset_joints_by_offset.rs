@@ -1,6 +1,6 @@
 //! Random initial joint states.
 
-use super::joints;
+use super::find_joints;
 use crate::error::Result;
 use crate::event::EventTerm;
 use ndarray::Array2;
@@ -23,12 +23,12 @@ pub fn reset_joints_by_offset(
     positions: [f64; 2],
     velocities: [f64; 2],
 ) -> Result<EventTerm> {
-    let (_, joints) = joints(sim, robot, patterns)?;
+    let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(EventTerm::on_reset(name, move |sim, dice| {
         let starts = sim.robot(robot).default_qpos();
         for die in dice {
             let env = die.env();
-            let mut drawn = |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.between(low, high));
+            let mut drawn = |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.uniform_range(low, high));
             let (mut at, moving) = (drawn(positions), drawn(velocities));
             at.indexed_iter_mut().for_each(|((_, k), x)| *x += starts[(env.0, joints[k].0)]);
             // Written positions are clamped to the limits.

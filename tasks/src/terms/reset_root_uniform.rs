@@ -1,6 +1,6 @@
 //! Random initial root states.
 
-use crate::dice::Dice;
+use crate::dice::EpisodeRng;
 use crate::event::EventTerm;
 use ndarray::Array2;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
@@ -21,7 +21,7 @@ pub struct RootRanges {
 
 /// Randomizes the pose and the velocity of the root link when an episode begins. The robot must not have a fixed base.
 pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> EventTerm {
-    let drawn = |die: &mut Dice, ranges: [[f64; 2]; 3]| ranges.map(|[low, high]| die.between(low, high));
+    let drawn = |die: &mut EpisodeRng, ranges: [[f64; 2]; 3]| ranges.map(|[low, high]| die.uniform_range(low, high));
     EventTerm::on_reset(name, move |sim, dice| {
         for die in dice {
             let start: [f64; 7] = {

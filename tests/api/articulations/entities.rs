@@ -5,8 +5,8 @@ use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::JointStateCfg;
 use kinetoscope::sim::{EntityTypes, Error};
-use kinetoscope_testkit::refusal::{assert_error, assert_refused_unchanged};
-use kinetoscope_testkit::worlds::{add_ball, errors, object, pose_in};
+use kinetoscope_testkit::refusal::{assert_error, assert_errors_unchanged};
+use kinetoscope_testkit::worlds::{add_ball, object, pose_error, pose_of_row};
 
 #[test]
 fn free_base() {
@@ -18,7 +18,7 @@ fn free_base() {
     let drawers = sim.articulation(id).link_pose("drawer").unwrap();
     for (env, place) in places.iter().enumerate() {
         // A mass of 22 kg on four soft contacts sinks in by micrometers.
-        let (off, angle) = errors(&pose_in(&drawers, env), &(place * Pose::translation(0.2, 0.0, 0.2)));
+        let (off, angle) = pose_error(&pose_of_row(&drawers, env), &(place * Pose::translation(0.2, 0.0, 0.2)));
         assert!(off < 5e-4 && angle < 1e-3, "{off} {angle}");
     }
 }
@@ -143,7 +143,7 @@ fn refused_configurations() {
     let cabinet =
         |sim: &SimulationManager| (sim.articulation(id).qpos(), sim.entities().articulation_id("cabinet").unwrap());
     assert_eq!(cabinet(&sim), (array![[0.0]], id));
-    assert_refused_unchanged(&mut sim, cabinet, rows, |sim, cfg| sim.add_articulation(cfg));
+    assert_errors_unchanged(&mut sim, cabinet, rows, |sim, cfg| sim.add_articulation(cfg));
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn handle_of_another_manager() {
 /// MuJoCo has 31 contact bits; the world uses one.
 #[test]
 fn too_many() {
-    let (files, mut sim) = (Files::default(), sim(1));
+    let (files, mut sim) = (TempFiles::default(), sim(1));
     let door = door(&files);
     for k in 0..30 {
         sim.add_articulation(ArticulationCfg { uid: format!("door{k}"), ..door.clone() }).unwrap();

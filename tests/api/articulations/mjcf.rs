@@ -19,7 +19,7 @@ fn leaf(text: &str) -> ArticulationCfg {
 /// to rounding.
 #[test]
 fn swinging_door() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let [mine, other] = [leaf(LEAF), door(&files)].map(|cfg| {
         let (mut sim, id) = with(2, cfg);
         sim.articulation_mut(id).set_qf_target(&array![[2.0], [-1.0]], None, None).unwrap();
@@ -67,7 +67,7 @@ fn mistakes() {
 /// Scene files refer to the MJCF file by a path relative to themselves, and keep it when they are written again.
 #[test]
 fn scene_file() {
-    let files = Files::default();
+    let files = TempFiles::default();
     files.write("door.xml", LEAF);
     let path = files.write("scene.toml", "[entities.door]\ntype = \"articulation\"\nmjcf = \"door.xml\"\n");
     let text = SceneCfg::from_file(&path).unwrap().to_toml(&EntityTypes::default()).unwrap();

@@ -6,7 +6,7 @@ mod motion;
 
 use kinetoscope::prelude::*;
 use kinetoscope::sim::ArticulationId;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::text_robot;
 
 /// Short time step, because results are compared with closed forms in continuous time \[s\].
@@ -33,7 +33,7 @@ fn with(num_envs: usize, cfg: ArticulationCfg) -> (SimulationManager, Articulati
 }
 
 /// A door on hinges along z, without friction or damping.
-fn door(files: &Files) -> ArticulationCfg {
+fn door(files: &TempFiles) -> ArticulationCfg {
     let urdf = r#"<robot name="door">
   <link name="frame"/>
   <link name="leaf"><inertial><origin xyz="0.4 0 1"/><mass value="20"/>

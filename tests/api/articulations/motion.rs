@@ -16,7 +16,7 @@ const SOFT: Tolerance = Tolerance::relative(
 );
 
 /// Stopping distance of a mass with an initial speed.
-fn slides(mass: f64, speed: f64, friction: f64) -> f64 {
+fn stopping_distance(mass: f64, speed: f64, friction: f64) -> f64 {
     let rest = friction / DAMPING;
     mass / DAMPING * speed - rest * mass / DAMPING * (1.0 + speed / rest).ln()
 }
@@ -29,14 +29,14 @@ fn sliding_drawer() {
     sim.articulation_mut(id).write_qvel(&array![[0.5], [0.3]], None, None).unwrap();
     sim.update(1000);
     let (open, speed) = (sim.articulation(id).qpos(), sim.articulation(id).qvel());
-    assert_number("way", open[(0, 0)], slides(MASS, 0.5, FRICTION), SOFT);
-    assert_number("way", open[(1, 0)], slides(MASS, 0.3, FRICTION), SOFT);
+    assert_number("way", open[(0, 0)], stopping_distance(MASS, 0.5, FRICTION), SOFT);
+    assert_number("way", open[(1, 0)], stopping_distance(MASS, 0.3, FRICTION), SOFT);
     assert!(speed.iter().all(|v| v.abs() < 1e-6), "{speed}");
     assert_eq!(sim.articulation(id).qf(), array![[0.0], [0.0]], "no drive gives anything");
     // Controls: other values give clearly different positions.
     let (friction, rotor) = (3.0, 2.0);
-    assert!((open[(0, 0)] / slides(MASS, 0.5, 1.5 * FRICTION) - 1.0).abs() > 0.1);
-    assert!((open[(0, 0)] / slides(MASS + rotor, 0.5, friction) - 1.0).abs() > 0.1);
+    assert!((open[(0, 0)] / stopping_distance(MASS, 0.5, 1.5 * FRICTION) - 1.0).abs() > 0.1);
+    assert!((open[(0, 0)] / stopping_distance(MASS + rotor, 0.5, friction) - 1.0).abs() > 0.1);
 
     let other = DriveCfg { friction: Some(50.0.into()), armature: 70.0.into(), ..no_drive() };
     for drive in [None, Some(other)] {
@@ -46,7 +46,7 @@ fn sliding_drawer() {
         assert_number("rotor inertia", sim.articulation(id).armature()[(0, 0)], rotor, SOFT);
         sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
         sim.update(1000);
-        assert_number("way", sim.articulation(id).qpos()[(0, 0)], slides(MASS + rotor, 0.5, friction), SOFT);
+        assert_number("way", sim.articulation(id).qpos()[(0, 0)], stopping_distance(MASS + rotor, 0.5, friction), SOFT);
         assert_eq!(sim.articulation(id).qf(), array![[0.0]], "no drive gives anything");
     }
     let (mut sim, id) = with(1, ArticulationCfg { drive: Some(DriveCfg::default()), ..cabinet() });
@@ -72,13 +72,14 @@ fn pushed_drawer() {
     assert!((open[(0, 0)] - 0.3).abs() < 2e-3, "open to its stop: {open}");
 
     let (mut sim, id) = with(2, cabinet());
-    let sticky = Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", Draw::Set([6.0, 6.0]));
+    let sticky =
+        Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", RandomizationOp::Set([6.0, 6.0]));
     sim.properties_mut().randomize(&sticky, Some(&[EnvId(1)])).unwrap();
     sim.articulation_mut(id).write_qvel(&array![[0.5], [0.5]], None, None).unwrap();
     sim.update(1000);
     let open = sim.articulation(id).qpos();
-    assert_number("way", open[(0, 0)], slides(MASS, 0.5, FRICTION), SOFT);
-    assert_number("way", open[(1, 0)], slides(MASS, 0.5, 6.0), SOFT);
+    assert_number("way", open[(0, 0)], stopping_distance(MASS, 0.5, FRICTION), SOFT);
+    assert_number("way", open[(1, 0)], stopping_distance(MASS, 0.5, 6.0), SOFT);
 }
 
 /// Without a drive targets have no effect, and states are as written.
@@ -99,7 +100,7 @@ fn targets_and_states() {
 /// A spring closes a door, up to 0.5 rad against a torque of 2.5 N m.
 #[test]
 fn sprung_door() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let (mut sim, id) =
         with(2, ArticulationCfg { drive: Some(kinetoscope_testkit::worlds::gains(5.0, 8.0)), ..door(&files) });
     sim.articulation_mut(id).write_qpos(&array![[1.0], [1.0]], None, None).unwrap();

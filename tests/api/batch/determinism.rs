@@ -5,7 +5,7 @@ use super::support::{add_ball, add_walker, all_bits, cfg, most_contacts, row, si
 use kinetoscope::mujoco::{Data, compile};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use kinetoscope_testkit::urdf::{Files, joint, limit, link, robot};
+use kinetoscope_testkit::urdf::{TempFiles, joint, limit, link, robot};
 use kinetoscope_testkit::worlds::{arm_and_hand, text_robot};
 
 /// The arm reaches into the ground, the walker falls on it and kicks; each environment has its own targets.
@@ -79,7 +79,7 @@ fn efforts_beside_contacts() {
         let lever = link("lever", 2.0, 0.05, [0.5, 0.0, 0.0], "");
         let urdf = robot("lever", &format!("<link name=\"post\"/>{hinge}{lever}"));
         let init_pose = Pose::translation(0.0, 0.0, 2.0);
-        let files = Files::default();
+        let files = TempFiles::default();
         let lever = RobotCfg { init_pose, ..text_robot(&files, "lever", &urdf) };
         let id = sim.add_robot(lever).unwrap();
         for i in 0..balls {

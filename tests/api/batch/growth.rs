@@ -1,9 +1,9 @@
 //! Growth of buffers: a step with too small buffers is repeated with larger ones, with the same bits.
 
 use super::support::{add_ball, add_plate, all_bits, assert_quiet, bits_of, cfg, copy_of, most_contacts, row, sim};
-use kinetoscope::mujoco::{Buffers, Data, Model, TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, Buffers, Data, Model, SupportedVersion};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::env::Env;
+use kinetoscope::sim::env::SimEnv;
 
 /// Buffers that are large enough for all tests of this file.
 const HUGE: Buffers = Buffers { contacts: 1000, constraints: 3000, arena_bytes: 64 << 20 };
@@ -23,7 +23,7 @@ fn compare_with_huge_buffers(sim: &mut SimulationManager, steps: u32, contacts: 
             most = most.max(most_contacts(sim.batch()));
         }
     }
-    assert_eq!(reference.growths(), 0, "the reference had room");
+    assert_eq!(reference.buffer_growths(), 0, "the reference had room");
     assert!(most >= contacts, "{most} contacts");
     assert_quiet(sim);
 }
@@ -58,11 +58,11 @@ fn pile_of_robots() {
     }
     compare_with_huge_buffers(&mut sim, 60, 24);
     // On 4.x the arena of a scene of 24 robots has room for the pile.
-    assert!(sim.warnings().buffer_growths() > 0 || TARGET != Target::V2);
+    assert!(sim.warnings().buffer_growths() > 0 || BUILD_VERSION != SupportedVersion::V2);
 }
 
 /// The model, and an environment with many contacts.
-fn resting_plate() -> (Model, Env) {
+fn resting_plate() -> (Model, SimEnv) {
     let mut sim = sim(cfg(1, 1));
     add_plate(&mut sim, [9, 3], [0.0, 0.0, 0.03], [0.0; 3]);
     let model = sim.batch().model().with_buffers(HUGE);
@@ -74,7 +74,7 @@ fn resting_plate() -> (Model, Env) {
 }
 
 /// The half of the step (1 or 2) in which an allocation first fails.
-fn first_failure(model: &Model, start: &Env) -> Option<u8> {
+fn first_failure(model: &Model, start: &SimEnv) -> Option<u8> {
     let Ok(mut data) = Data::new(model) else { return Some(1) };
     data.qpos_mut().copy_from_slice(start.data().qpos());
     data.qvel_mut().copy_from_slice(start.data().qvel());
@@ -91,7 +91,7 @@ fn first_failure(model: &Model, start: &Env) -> Option<u8> {
 
 /// The place of the failed allocation within a step depends on the size of the buffers; the test covers every place.
 #[test]
-fn every_place_in_a_step() {
+fn every_failing_allocation() {
     let (model, start) = resting_plate();
     let reference = |steps: u32| {
         let mut env = copy_of(&model, &start);
@@ -99,8 +99,10 @@ fn every_place_in_a_step() {
         bits_of(&env)
     };
     let (mut in_step1, mut in_step2) = (0, 0);
-    let sizes: Vec<Buffers> = match TARGET {
-        Target::V2 => (0..10).map(|i| Buffers { contacts: 1 << i, constraints: 1 << (9 - i), ..HUGE }).collect(),
+    let sizes: Vec<Buffers> = match BUILD_VERSION {
+        SupportedVersion::V2 => {
+            (0..10).map(|i| Buffers { contacts: 1 << i, constraints: 1 << (9 - i), ..HUGE }).collect()
+        }
         _ => (0..60).map(|i| Buffers { arena_bytes: (4096.0 * 1.12_f64.powi(i)) as usize, ..HUGE }).collect(),
     };
     let expected = reference(20);
@@ -111,18 +113,18 @@ fn every_place_in_a_step() {
         in_step2 += u32::from(failure == Some(2));
         let mut env = copy_of(&small, &start);
         env.step(20);
-        assert_eq!(bits_of(&env), expected, "{buffers:?}, grown {} times", env.growths());
+        assert_eq!(bits_of(&env), expected, "{buffers:?}, grown {} times", env.buffer_growths());
         assert_eq!(*env.warnings(), Default::default(), "{buffers:?}");
     }
     // On 2.2.2 the stack is sized to fit the rows; on 4.x both share the arena.
-    assert!(in_step1 > 0 && (in_step2 > 0 || TARGET == Target::V2), "{in_step1} {in_step2}");
+    assert!(in_step1 > 0 && (in_step2 > 0 || BUILD_VERSION == SupportedVersion::V2), "{in_step1} {in_step2}");
     let expected = reference(5);
-    for nothing in [0, 1] {
-        let buffers = Buffers { contacts: nothing, constraints: nothing, arena_bytes: nothing };
+    for minimum in [0, 1] {
+        let buffers = Buffers { contacts: minimum, constraints: minimum, arena_bytes: minimum };
         let mut env = copy_of(&model.with_buffers(buffers), &start);
         env.step(5);
         assert_eq!(bits_of(&env), expected, "{buffers:?}");
-        assert!(env.growths() > 0);
+        assert!(env.buffer_growths() > 0);
     }
 }
 

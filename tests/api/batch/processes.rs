@@ -2,19 +2,19 @@
 //! dropping a manager frees its memory and ends its threads. The tests run in separate processes.
 
 use super::support::{add_plate, add_walker, bits_of, cfg, sim, wheel};
-use kinetoscope::mujoco::{Asset, Data, Model, TARGET, Target, compile, compile_file};
+use kinetoscope::mujoco::{Asset, BUILD_VERSION, Data, Model, SupportedVersion, compile, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::table::DriveTable;
-use kinetoscope::sim::env::{Env, EnvStatus};
+use kinetoscope::sim::env::{EnvStatus, SimEnv};
 use kinetoscope_testkit::process::{is_child, run, text};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::arm_and_hand;
 use std::path::Path;
 use std::sync::Arc;
 
 /// A pile of boxes with too little memory for the solver: MuJoCo stops in the middle of a step with `mju_error`.
-fn starved() -> Model {
+fn model_without_memory() -> Model {
     // The boxes start in the air, because the compiler takes a step as well.
     let boxes: String = [0.15, 0.4, 0.65, 0.9]
         .map(|z| format!(r#"<body pos="0.01 0 {z}"><freejoint/><geom type="box" size=".1 .1 .1"/></body>"#))
@@ -22,9 +22,9 @@ fn starved() -> Model {
     // The size that is too small for a step but large enough for the compiler differs between versions, so it is
     // searched for.
     for i in 0..200 {
-        let size = match TARGET {
-            Target::V2 => format!(r#"<size njmax="500" nconmax="100" nstack="{}"/>"#, 1000 + 200 * i),
-            Target::V4 => format!(r#"<size memory="{}"/>"#, 4096 + 1024 * i),
+        let size = match BUILD_VERSION {
+            SupportedVersion::V2 => format!(r#"<size njmax="500" nconmax="100" nstack="{}"/>"#, 1000 + 200 * i),
+            SupportedVersion::V4 => format!(r#"<size memory="{}"/>"#, 4096 + 1024 * i),
         };
         let world = format!(r#"<worldbody><geom type="plane" size="1 1 1"/>{boxes}</worldbody>"#);
         let Ok(compiled) = compile(&format!("<mujoco>{size}{world}</mujoco>"), &[]) else { continue };
@@ -50,7 +50,7 @@ fn provoke(model: &Model) {
 
 #[test]
 fn engine_errors_in_threads() {
-    let model = starved();
+    let model = model_without_memory();
     provoke(&model);
     let calm = || {
         let mut sim = sim(cfg(4, 2));
@@ -70,14 +70,14 @@ fn engine_errors_in_threads() {
 /// An environment with this little memory never ends the process, and never shows a partial step.
 #[test]
 fn engine_errors_in_an_environment() {
-    let (model, table) = (starved(), Arc::new(DriveTable::default()));
-    let mut env = Env::new(&model, &table).unwrap();
+    let (model, table) = (model_without_memory(), Arc::new(DriveTable::default()));
+    let mut env = SimEnv::new(&model, &table).unwrap();
     env.step(100);
     assert_eq!(*env.status(), EnvStatus::Running);
-    assert!(env.growths() > 0);
+    assert!(env.buffer_growths() > 0);
     let mut roomy = model.buffers();
     (roomy.contacts, roomy.constraints, roomy.arena_bytes) = (1000, 2000, 16 << 20);
-    let mut reference = Env::new(&model.with_buffers(roomy), &table).unwrap();
+    let mut reference = SimEnv::new(&model.with_buffers(roomy), &table).unwrap();
     reference.step(100);
     assert_eq!(bits_of(&env), bits_of(&reference));
 }
@@ -108,7 +108,7 @@ fn scenario_everything_goes_wrong() {
     if !is_child() {
         return;
     }
-    let (files, mut sim) = (Files::default(), sim(cfg(4, 2)));
+    let (files, mut sim) = (TempFiles::default(), sim(cfg(4, 2)));
     let robot = sim.add_robot(wheel(&files)).unwrap();
     sim.add_robot(arm_and_hand("sr5")).unwrap();
     add_plate(&mut sim, [14, 0], [1.0, 1.0, 0.1], [0.3, 0.2, 0.1]);
@@ -117,7 +117,7 @@ fn scenario_everything_goes_wrong() {
     sim.robot_mut(robot).write_qpos(&array![[9e9]], None, Some(&[EnvId(2)])).unwrap();
     sim.update(10);
     assert_eq!(sim.diverged().len(), 2);
-    provoke(&starved());
+    provoke(&model_without_memory());
     for text in ["", "<mujoco><worldbody><geom size='-1'/></worldbody></mujoco>", "<mujoco><nonsense/></mujoco>"] {
         let _ = compile(text, &[]).unwrap_err();
     }

@@ -8,7 +8,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::DivergedEnv;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::env::{Divergence, EnvStatus, with_small_buffers};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use std::sync::Arc;
 
 type BlowUp = (&'static str, fn(&mut Data), Warning);
@@ -58,7 +58,7 @@ fn one_of_64() {
 }
 
 fn wheels(num_envs: usize) -> (SimulationManager, RobotId) {
-    let (files, mut sim) = (Files::default(), sim(cfg(num_envs, 2)));
+    let (files, mut sim) = (TempFiles::default(), sim(cfg(num_envs, 2)));
     let robot = sim.add_robot(wheel(&files)).unwrap();
     (sim, robot)
 }

@@ -5,13 +5,13 @@ use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::IdealPd;
-use kinetoscope::sim::env::Env;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope::sim::env::SimEnv;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{arm_and_hand, fixed, gains, no_drive, object};
 
 /// Bits of the time and of position, velocity and warm start of all joints with names that start with `prefix`, in
 /// order.
-fn bits_of_robot(env: &Env, prefix: &str) -> Vec<u64> {
+fn bits_of_robot(env: &SimEnv, prefix: &str) -> Vec<u64> {
     let (data, model) = (env.data(), env.data().model());
     let mut bits = vec![data.time().to_bits()];
     for joint in 0..model.njnt() {
@@ -68,7 +68,7 @@ fn robot_far_away() {
         sim.robot_mut(arm).set_qpos_target(&Array2::from_elem((1, dof), 0.3), None, None).unwrap();
         sim.update(30);
         if add {
-            let files = Files::default();
+            let files = TempFiles::default();
             sim.add_robot(RobotCfg { init_pose: Pose::translation(50.0, 0.0, 1.0), ..wheel(&files) }).unwrap();
         }
         sim.update(100);
@@ -92,7 +92,7 @@ enum Added {
 /// Positions, velocities and poses over one second after the addition, for a tumbling falling body, a passive pendulum
 /// and a wheel with an explicit drive.
 fn second_without_rows(added: Added) -> Vec<f64> {
-    let (files, mut sim) = (Files::default(), sim(SimulationManagerCfg { ground: None, ..cfg(2, 1) }));
+    let (files, mut sim) = (TempFiles::default(), sim(SimulationManagerCfg { ground: None, ..cfg(2, 1) }));
     let wheel_at = |uid: &str, x: f64, drive| RobotCfg {
         uid: uid.into(),
         drive,

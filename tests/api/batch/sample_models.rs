@@ -2,7 +2,7 @@
 
 use kinetoscope::mujoco::compile_file;
 use kinetoscope::sim::drive::table::DriveTable;
-use kinetoscope::sim::env::{Env, EnvStatus};
+use kinetoscope::sim::env::{EnvStatus, SimEnv};
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ fn compile_and_step() {
         match compile_file(file) {
             Ok(compiled) => {
                 let model = compiled.into_model();
-                let mut env = Env::new(&model, &Arc::new(DriveTable::default())).unwrap();
+                let mut env = SimEnv::new(&model, &Arc::new(DriveTable::default())).unwrap();
                 env.step(100);
                 assert_eq!(*env.status(), EnvStatus::Running, "{}", file.display());
                 assert!(env.data().qpos().iter().all(|q| q.is_finite()));

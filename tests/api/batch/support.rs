@@ -4,13 +4,13 @@ use kinetoscope::mujoco::Model;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::batch::Batch;
-use kinetoscope::sim::env::Env;
-use kinetoscope_testkit::urdf::{Files, collision, joint, limit, link, robot};
+use kinetoscope::sim::env::SimEnv;
+use kinetoscope_testkit::urdf::{TempFiles, collision, joint, limit, link, robot};
 pub(crate) use kinetoscope_testkit::worlds::{all_bits, bits_of, cfg, row, sim};
 
 /// Adds a robot of URDF elements with a floating base.
 pub(crate) fn add_free(sim: &mut SimulationManager, uid: &str, elements: &str, at: [f64; 3], rpy: [f64; 3]) -> RobotId {
-    let (files, init_pose) = (Files::default(), from_xyz_rpy(at, rpy));
+    let (files, init_pose) = (TempFiles::default(), from_xyz_rpy(at, rpy));
     let cfg = kinetoscope_testkit::worlds::text_robot(&files, uid, &robot(uid, elements));
     sim.add_robot(RobotCfg { fix_base: false, init_pose, ..cfg }).unwrap()
 }
@@ -58,7 +58,7 @@ pub(crate) fn add_ball(sim: &mut SimulationManager, uid: &str, at: [f64; 3]) -> 
 }
 
 /// A wheel on a fixed post at (1, 1, 1): a continuous joint, which `write_qpos` does not clamp.
-pub(crate) fn wheel(files: &Files) -> RobotCfg {
+pub(crate) fn wheel(files: &TempFiles) -> RobotCfg {
     let spin = joint("spin", "continuous", ["post", "disc"], [0.0; 3], "0 1 0", "");
     let urdf = robot("wheel", &format!("<link name=\"post\"/>{spin}{}", link("disc", 1.0, 0.01, [0.1, 0.0, 0.0], "")));
     let init_pose = from_xyz_rpy([1.0; 3], [0.3, 0.2, 0.1]);
@@ -84,8 +84,8 @@ pub(crate) fn assert_quiet(sim: &SimulationManager) {
 }
 
 /// An environment of `model` with the state and the targets of `other`.
-pub(crate) fn copy_of(model: &Model, other: &Env) -> Env {
-    let mut env = Env::new(model, other.drives.table()).unwrap();
+pub(crate) fn copy_of(model: &Model, other: &SimEnv) -> SimEnv {
+    let mut env = SimEnv::new(model, other.drives.table()).unwrap();
     env.reset(|data, drives| {
         data.qpos_mut().copy_from_slice(other.data().qpos());
         data.qvel_mut().copy_from_slice(other.data().qvel());

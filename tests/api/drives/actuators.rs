@@ -12,7 +12,7 @@ use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::actuator::{Scheme, stable_timestep_of, warn_if_unstable};
 use kinetoscope::sim::drive::plan::{PlanError, effective_inertias, plan};
-use kinetoscope::sim::env::Env;
+use kinetoscope::sim::env::SimEnv;
 use kinetoscope::sim::{
     ActuatorModel, DcMotor, DelayedPd, DriveModel, DriveType, Error, IdealPd, Integrator, RandomizationError,
 };
@@ -60,7 +60,7 @@ fn ideal_pd() {
             let mut saturated = 0;
             for k in 0..200 {
                 let aim = [0.7 * (0.05 * f64::from(k)).sin(), 0.3, 0.1 * f64::from(k % 7)];
-                world.command([aim]);
+                world.set_targets([aim]);
                 let before = law.v;
                 let (tau, bound) = law.step_to(aim);
                 saturated += u32::from(bound);
@@ -99,7 +99,7 @@ fn dc_motor_quadrants() {
     ] {
         for sign in [1.0, -1.0] {
             let mut env = world.env();
-            push(&mut env, &[0.0], &[sign * speed]);
+            set_state(&mut env, &[0.0], &[sign * speed]);
             env.drives.feedforward[0] = sign * asked;
             step(&mut env);
             let what = format!("{asked} N m at {speed} rad/s, sign {sign}");
@@ -112,8 +112,8 @@ fn dc_motor_quadrants() {
     // Inside the torque-speed lines it is the ideal controller with its gains.
     let drive = with(DcMotor { saturation_effort: 120.0 }, 40.0, 5.0);
     let mut env = self::world(&[wheel().effort(80.0)], drive, weightless()).env();
-    push(&mut env, &[0.1], &[1.0]);
-    command(&mut env, [0.5, 2.0, 0.0]);
+    set_state(&mut env, &[0.1], &[1.0]);
+    set_drive_targets(&mut env, [0.5, 2.0, 0.0]);
     step(&mut env);
     assert_number("inside of the lines", env.drives.effort[0], 40.0 * 0.4 + 5.0 * 1.0, EXACT);
 }
@@ -157,7 +157,7 @@ fn dc_motor_from_rest() {
         let (top, r) = (stall / slope, 1.0 - H * slope / M);
         let drive = DriveCfg { max_velocity: Some(top.into()), ..motor(stall) };
         let mut world = world(&[wheel().effort(1.5 * stall)], drive, weightless());
-        assert_eq!(world.warned_unstable(), !stable, "slope {slope}");
+        assert_eq!(world.has_stability_warning(), !stable, "slope {slope}");
         world.robot().set_qf_target(&array![[1e4]], None, None).unwrap();
         for n in 1..=200 {
             world.step(1);
@@ -201,7 +201,7 @@ fn delay_per_environment() {
     for round in 0..2 {
         let (mut laws, mut apart) = ([law(25.0, 1.0); 4], 0.0_f64);
         for n in 0..200 {
-            world.command([wobble(n)]);
+            world.set_targets([wobble(n)]);
             if n == 100 {
                 // Delayed targets are carried over to a new model.
                 add_ball(&mut world.sim, &format!("ball{round}"), [5.0, f64::from(round), 5.0]);
@@ -233,7 +233,7 @@ fn delay_that_changes() {
             delay = *changed;
             world.robot().set_delay(&array![[delay as u32]], None, None).unwrap();
         }
-        world.command([wobble(n)]);
+        world.set_targets([wobble(n)]);
         world.step(1);
         acted.push(n - delay);
         law.step_to(delayed(n, delay));
@@ -252,25 +252,25 @@ fn delay_across_limits() {
     let mut world = world(&[wheel()], with(DelayedPd { delay, max_delay: 0 }, 25.0, 1.0), weightless());
     let (wide, tight) = ([f64::NEG_INFINITY, f64::INFINITY], [-0.1, 0.15]);
     let clamp = |[low, high]: [f64; 2], x: f64| x.max(low).min(high);
-    let (mut set, mut law, mut cut, mut spared) = (Vec::new(), law(25.0, 1.0), 0, 0);
+    let (mut set, mut law, mut clamped, mut unclamped) = (Vec::new(), law(25.0, 1.0), 0, 0);
     for n in 0..200 {
         let range = if n % 40 >= 20 && n % 40 < 23 { tight } else { wide };
         if [0, 20, 23].contains(&(n % 40)) {
             world.robot().set_qpos_limits(&array![[[range[0], range[1]]]], None, None).unwrap();
         }
         let [q, v, tau] = wobble(n);
-        world.command([[q, v, tau]]);
+        world.set_targets([[q, v, tau]]);
         world.step(1);
         set.push([clamp(range, q), v, tau]);
         let acts = set.len().checked_sub(1 + delay as usize).map_or([0.0; 3], |k| set[k]);
         let aim = clamp(range, acts[0]);
-        cut += u32::from(aim != acts[0]);
+        clamped += u32::from(aim != acts[0]);
         // Set before the range became tight, and acting after.
-        spared += u32::from(n % 40 >= 23 && n % 40 < 25 && clamp(tight, aim) != aim);
+        unclamped += u32::from(n % 40 >= 23 && n % 40 < 25 && clamp(tight, aim) != aim);
         law.step_to([aim, acts[1], acts[2]]);
         assert_at([world.q()[0], world.v()[0]], &law, &format!("step {n}"));
     }
-    assert!(cut > 3 && spared > 3, "the control: {cut} were clamped when they acted, {spared} were not");
+    assert!(clamped > 3 && unclamped > 3, "the control: {clamped} were clamped when they acted, {unclamped} were not");
 }
 
 /// A step that is repeated with larger buffers counts as one step of the delay line.
@@ -280,7 +280,7 @@ fn delay_in_a_repeated_step() {
     let world = world(&joints, with(DelayedPd { delay: 3, max_delay: 0 }, 25.0, 1.0), weightless());
     let sized = |buffers: Buffers| {
         let (model, drives) = world.sim.batch().read(0, |env| (env.data().model().clone(), env.drives.clone()));
-        let mut env = Env::new(&model.with_buffers(buffers), &Arc::clone(drives.table())).unwrap();
+        let mut env = SimEnv::new(&model.with_buffers(buffers), &Arc::clone(drives.table())).unwrap();
         env.drives = drives;
         env
     };
@@ -290,7 +290,7 @@ fn delay_in_a_repeated_step() {
     for i in 0..40 {
         let arena_bytes = (512.0 * 1.15_f64.powi(i)) as usize;
         let (mut small, mut large) = (sized(Buffers { constraints: 1, arena_bytes, ..huge }), sized(huge));
-        let before = small.growths();
+        let before = small.buffer_growths();
         for n in 0..60 {
             for env in [&mut small, &mut large] {
                 for drive in 0..3 {
@@ -302,8 +302,8 @@ fn delay_in_a_repeated_step() {
             assert_eq!(small.data().qpos(), large.data().qpos(), "step {n}, arena {arena_bytes}");
             assert_eq!(small.drives, large.drives, "step {n}, arena {arena_bytes}");
         }
-        in_motion += small.growths() - before;
-        assert_eq!(large.growths(), 0);
+        in_motion += small.buffer_growths() - before;
+        assert_eq!(large.buffer_growths(), 0);
     }
     assert!(in_motion > 0, "some step was done again");
 }
@@ -320,7 +320,7 @@ fn second_order() {
         let [one, half] = [1e-3, 5e-4].map(|h: f64| {
             let drive = DriveCfg { max_velocity: Some(1e6.into()), ..with(model, kp, kd) };
             let mut world = world(&[Joint::wheel("j", m).effort(100.0)], drive, at_dt(h, weightless()));
-            world.aim(&[aim]);
+            world.set_position_targets(&[aim]);
             let mut worst = 0.0_f64;
             for n in 1..=(1.0 / h).round() as u32 {
                 world.step(1);
@@ -346,7 +346,7 @@ fn models_beside_rows() {
     let mut world = world(&joints, modelled("[bc]", IdealPd {}, kp, kd), weightless());
     let first = |world: &mut World| {
         world.sim.reset(None).unwrap();
-        world.aim(&[0.4; 3]);
+        world.set_position_targets(&[0.4; 3]);
         world.step(1);
         world.v()
     };
@@ -360,7 +360,7 @@ fn models_beside_rows() {
     assert_number("8 N m, clamped to 3", first(&mut world)[1], H * 3.0 / M, EXACT);
     world.robot().set_qf_limits(&array![[500.0]], second, None).unwrap();
     assert_number("no limit of the model is in the way", first(&mut world)[1], H * 20.0 * 0.4 / M, EXACT);
-    world.assert_well();
+    world.assert_healthy();
 }
 
 /// h² kp + 2 h kd = 4 I, where I is the inertia of a wheel plus the squared ratio times that of its follower. Gains
@@ -369,7 +369,7 @@ fn models_beside_rows() {
 fn largest_stable_step() {
     // kp = (0.8 - 0.02) / 1e-4 = 7800.
     for (kp, warns) in [(7700.0, false), (7900.0, true)] {
-        assert_eq!(world(&[wheel()], with(IdealPd {}, kp, 1.0), weightless()).warned_unstable(), warns, "{kp}");
+        assert_eq!(world(&[wheel()], with(IdealPd {}, kp, 1.0), weightless()).has_stability_warning(), warns, "{kp}");
     }
     let (kp, kd, ratio, [leader, follower]) = (200.0, 4.0, -2.0, [0.3, 0.05]);
     let joints = [Joint::wheel("a", leader), Joint::wheel("b", follower).following("a", ratio)];
@@ -410,7 +410,7 @@ fn refused_models() {
     for (drive, parts) in rows {
         let what = format!("{drive:?}");
         let error = *try_world(&[wheel()], drive, weightless()).unwrap_err();
-        let Error::Plan { error: plan, .. } = &error else { panic!("{error}") };
+        let Error::DrivePlan { error: plan, .. } = &error else { panic!("{error}") };
         assert!(matches!(**plan, PlanError::ActuatorModel { .. } | PlanError::Drive(_)), "{error}");
         assert!(parts.iter().all(|part| error.to_string().contains(part)), "{error} lacks {parts:?}, of {what}");
     }
@@ -490,8 +490,9 @@ fn change(world: &mut World, settings: &mut Settings, n: i32) {
             kind.fill(DriveType::Force);
         }
         200 => {
-            let drawn = Randomization::new().with(Property::MaxEffort, "robot/a", Draw::Set([0.5, 0.5]));
-            world.sim.properties_mut().randomize(&drawn, ONE).unwrap();
+            let randomization =
+                Randomization::new().with(Property::MaxEffort, "robot/a", RandomizationOp::Set([0.5, 0.5]));
+            world.sim.properties_mut().randomize(&randomization, ONE).unwrap();
             limit[(1, 0)] = 0.5;
         }
         _ => return,
@@ -529,7 +530,7 @@ fn changes_at_run_time() {
                     change(&mut world, &mut settings, n);
                 }
                 for world in [&mut world, &mut unchanged] {
-                    world.command([0, 1, 2].map(|joint| wobble(n, joint)));
+                    world.set_targets([0, 1, 2].map(|joint| wobble(n, joint)));
                     world.step(1);
                 }
                 let (q, v, effort) = (world.view().qpos(), world.view().qvel(), world.view().qf());
@@ -568,7 +569,7 @@ fn changes_at_run_time() {
             }
             assert_eq!(settings_of(&world), settings, "{name}: they stay through a reset");
         }
-        world.assert_well();
+        world.assert_healthy();
     }
 }
 

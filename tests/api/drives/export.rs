@@ -8,11 +8,11 @@
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds;
 
 struct Export {
-    files: Files,
+    files: TempFiles,
     xml: String,
     start: Vec<f64>,
     targets: Vec<f64>,
@@ -26,9 +26,9 @@ fn between<'t>(text: &'t str, from: &str, to: &str) -> &'t str {
 }
 
 fn export(cfg: RobotCfg) -> Export {
-    let (world, files) = (load(cfg, worlds::cfg(1, 1)), Files::default());
+    let (world, files) = (load(cfg, worlds::cfg(1, 1)), TempFiles::default());
     world.sim.dump(files.folder()).unwrap();
-    let version = if mj::TARGET == mj::Target::V2 { 2 } else { 4 };
+    let version = if mj::BUILD_VERSION == mj::SupportedVersion::V2 { 2 } else { 4 };
     let xml = std::fs::read_to_string(files.folder().join(format!("robot.mjcf{version}.xml"))).unwrap();
     let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().unwrap()).collect::<Vec<f64>>();
     let start = numbers(between(&xml, "<key name=\"start\" qpos=\"", "\""));
@@ -118,18 +118,18 @@ fn followers_track() {
 
 #[test]
 fn without_followers() {
-    let (files, drive) = (Files::default(), tutorial_gains("a.*", "h.*"));
+    let (files, drive) = (TempFiles::default(), tutorial_gains("a.*", "h.*"));
     let chain = worlds::text_robot(&files, "robot", &urdf(&arm_and_hand()));
     let export = export(RobotCfg { drive, init_qpos: vec![("a2".into(), 0.4)], ..chain });
     let bound = export.bound.expect("drives have limits: both lines name a step");
     for h in [1e-3, 0.01, 0.05] {
         assert!(export.run(h, 1000, 0.0).unwrap() < 1e-3, "{h}");
         // On 2.2.2, velocity-implicit: stable up to the named step, with and without saturation.
-        assert!(mj::TARGET != mj::Target::V2 || export.run(h, 3000, 0.5).unwrap() < 1e-3, "{h}");
+        assert!(mj::BUILD_VERSION != mj::SupportedVersion::V2 || export.run(h, 3000, 0.5).unwrap() < 1e-3, "{h}");
     }
-    match mj::TARGET {
-        mj::Target::V2 => assert!(bound > 0.05, "{bound}"),
-        mj::Target::V4 => {
+    match mj::BUILD_VERSION {
+        mj::SupportedVersion::V2 => assert!(bound > 0.05, "{bound}"),
+        mj::SupportedVersion::V4 => {
             let reach = export.run(0.98 * bound, 4000, 0.5).unwrap();
             assert!(reach < 10.0, "{reach}");
             assert!(export.run(0.01, 400, 0.5).is_none(), "the control: saturated drives diverge at 0.01 s");
@@ -142,7 +142,7 @@ fn without_followers() {
 #[test]
 fn little_damping() {
     let (m, kp, kd) = (1e-5, 1e4, 0.1_f64);
-    let (files, joint) = (Files::default(), Joint { axis: [0.0, 0.0, 1.0], ..Joint::wheel("j", m) });
+    let (files, joint) = (TempFiles::default(), Joint { axis: [0.0, 0.0, 1.0], ..Joint::wheel("j", m) });
     let robot = worlds::text_robot(&files, "robot", &urdf(&[joint]));
     let export = export(RobotCfg { drive: gains(kp, kd), ..robot });
     let (bound, expected) = (export.bound.unwrap(), (kd + (kd * kd + 4.0 * m * kp).sqrt()) / kp);

@@ -36,7 +36,7 @@ fn band() {
     let (band, creep) = (F / kp, creep(F, 3.0));
     for (aim, inside) in [(0.5 * band, true), (-0.9 * band, true), (0.99 * band, true), (0.4, false), (-0.4, false)] {
         let mut world = world(&[rough("j")], gains(kp, kd), weightless());
-        world.aim(&[aim]);
+        world.set_position_targets(&[aim]);
         world.step(300);
         let q = world.q()[0];
         if inside {
@@ -57,7 +57,7 @@ fn one_step() {
     let world = world(&[rough("j")], gains(kp, kd), weightless());
     for (aim, v0) in [(0.5, 1.0), (0.5, 0.0), (-0.2, -2.0)] {
         let mut env = world.env();
-        push(&mut env, &[0.0], &[v0]);
+        set_state(&mut env, &[0.0], &[v0]);
         env.drives.position[0] = aim;
         step(&mut env);
         let v = (M * v0 + H * (kp * aim - F * f64::signum(aim))) / (M + H * kd + H * H * kp);
@@ -76,7 +76,7 @@ fn holds_a_load() {
         let [held, moved] = [1.1, 0.8].map(|share| {
             let mut world = world(&[lever.clone().rough(share * load)], drive.clone(), earth());
             world.step(300);
-            world.assert_well();
+            world.assert_healthy();
             world.q()[0].abs()
         });
         assert!(held <= creep(load, 3.0), "{name}: {held}");
@@ -94,9 +94,9 @@ fn arm_in_its_band() {
     let b = Joint::lever("b", 0.5, 0.15, 0.002).rough(1.0).after(&a, [0.4, 0.0, 0.0]);
     let mut world = world(&[a.effort(60.0), b.effort(20.0)], gains(400.0, 40.0), earth());
     let aim = [0.6, -0.4];
-    world.aim(&aim);
+    world.set_position_targets(&aim);
     world.step(300);
-    world.assert_well();
+    world.assert_healthy();
     let load = world.load_by_gravity(&EARTH);
     for (i, f) in [3.0, 1.0].into_iter().enumerate() {
         let left = 400.0 * (aim[i] - world.q()[i]) - load[i];
@@ -118,7 +118,7 @@ fn rows_of_one_list() {
         Joint::wheel("d", M).rough(0.5).effort(1.5),
     ];
     let mut world = world(&joints, gains(kp, kd), weightless());
-    let files = kinetoscope_testkit::urdf::Files::default();
+    let files = kinetoscope_testkit::urdf::TempFiles::default();
     let second =
         kinetoscope_testkit::worlds::text_robot(&files, "second", &urdf(&[Joint::wheel("free", M).rough(0.3)]));
     world.sim.add_robot(RobotCfg { drive: no_drive(), ..second }).unwrap_or_else(|e| panic!("{e}"));
@@ -148,9 +148,9 @@ fn sag() {
     let b = Joint::lever("b", 0.3, 0.15, 0.002).after(&a, [0.4, 0.0, 0.0]);
     let mut world = world(&[a.effort(30.0), b.effort(10.0)], gains(kp, kd), earth());
     let aim = [0.3, -0.2];
-    world.aim(&aim);
+    world.set_position_targets(&aim);
     world.step(1000);
-    world.assert_well();
+    world.assert_healthy();
     let (q, load) = (world.q(), world.load_by_gravity(&EARTH));
     for i in 0..2 {
         assert!((load[i] / kp).abs() > 0.01, "a visible sag");

@@ -14,8 +14,8 @@ use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope::sim::Cone;
-use kinetoscope_testkit::urdf::{Files, collision, robot};
+use kinetoscope::sim::FrictionCone;
+use kinetoscope_testkit::urdf::{TempFiles, collision, robot};
 
 const KP: f64 = 1e3;
 const KD: f64 = 1e2;
@@ -26,7 +26,7 @@ const FACE: f64 = 0.3;
 /// Moment of inertia about the joint \[kg m²\].
 const MOMENT: f64 = 3e-5 + 0.045 * 0.045 * 0.045;
 
-fn scene(drive: DriveCfg, cone: Cone) -> World {
+fn scene(drive: DriveCfg, cone: FrictionCone) -> World {
     let finger = Joint {
         axis: [1.0, 0.0, 0.0],
         mass: 0.045,
@@ -38,7 +38,7 @@ fn scene(drive: DriveCfg, cone: Cone) -> World {
     let mut world = world(&[finger.effort(LIMIT)], drive, SimulationManagerCfg { cone, ..weightless() });
     let shape = collision("<box size=\"0.1 0.04 0.1\"/>", [0.0; 3]);
     let block = robot("block", &format!("<link name=\"block\">{shape}</link>"));
-    let (files, init_pose) = (Files::default(), from_xyz_rpy([0.0, -0.0556, 0.0846], [FACE, 0.0, 0.0]));
+    let (files, init_pose) = (TempFiles::default(), from_xyz_rpy([0.0, -0.0556, 0.0846], [FACE, 0.0, 0.0]));
     let block = RobotCfg { init_pose, ..kinetoscope_testkit::worlds::text_robot(&files, "block", &block) };
     world.sim.add_robot(block).unwrap_or_else(|e| panic!("{e}"));
     world
@@ -65,7 +65,7 @@ fn press(world: &World, mut outside: impl FnMut(&mj::Data) -> f64) -> [f64; 4] {
 
 #[test]
 fn limit_at_the_tip() {
-    for cone in [Cone::Pyramidal, Cone::Elliptic] {
+    for cone in [FrictionCone::Pyramidal, FrictionCone::Elliptic] {
         let [force, q, v, effort] = press(&scene(gains(KP, KD), cone), |_| 0.0);
         assert!((force / (LIMIT / LEVER) - 1.0).abs() < 0.05, "{cone:?}: {force} N");
         assert_eq!(effort, LIMIT);
@@ -75,7 +75,7 @@ fn limit_at_the_tip() {
 
 #[test]
 fn torque_computed_without_the_contact() {
-    let [force, ..] = press(&scene(no_drive(), Cone::Pyramidal), |data| {
+    let [force, ..] = press(&scene(no_drive(), FrictionCone::Pyramidal), |data| {
         let (q, v) = (data.qpos()[0], data.qvel()[0]);
         let a = (KP * (AIM - q - H * v) - KD * v) / (MOMENT + H * KD + H * H * KP);
         (KP * (AIM - q - H * v - H * H * a) - KD * (v + H * a)).clamp(-LIMIT, LIMIT)

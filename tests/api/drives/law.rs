@@ -65,9 +65,9 @@ impl Law {
         let Law { h, m, b, kp, kd, limit, q, v, aim: [aim, v_aim, ff], .. } = *self;
         let now = kp * (aim - q) + kd * v_aim + ff;
         let end = (m * v + h * now) / (m + h * b + h * kd + h * h * kp);
-        let asked = if self.explicit { now - kd * v } else { now - (kd + h * kp) * end };
-        let tau = asked.max(-limit).min(limit);
-        self.v = if self.explicit || tau != asked { (m * v + h * tau) / (m + h * b) } else { end };
+        let demand = if self.explicit { now - kd * v } else { now - (kd + h * kp) * end };
+        let tau = demand.max(-limit).min(limit);
+        self.v = if self.explicit || tau != demand { (m * v + h * tau) / (m + h * b) } else { end };
         self.q += h * self.v;
         tau
     }
@@ -88,11 +88,11 @@ impl Law {
     /// Steps a joint with this drive; returns the number of steps at its limit.
     fn check(mut self, what: &str, joint: &Joint, drive: DriveCfg, steps: usize) -> usize {
         let world = world(std::slice::from_ref(joint), drive, at_dt(self.h, weightless()));
-        assert!(!world.warned_unstable(), "{what}");
+        assert!(!world.has_stability_warning(), "{what}");
         let mut env = world.env();
-        push(&mut env, &[self.q], &[self.v]);
+        set_state(&mut env, &[self.q], &[self.v]);
         if !env.drives.position.is_empty() {
-            command(&mut env, self.aim);
+            set_drive_targets(&mut env, self.aim);
         }
         let mut saturated = 0;
         for k in 0..steps {
@@ -195,7 +195,7 @@ fn substeps() {
     let mut law = Law { h: 0.002, q: 0.0, v: 0.0, ..CASES[0] };
     let cfg = SimulationManagerCfg { substeps: 5, ..weightless() };
     let mut world = world(&[law.joint()], gains(law.kp, law.kd), cfg);
-    world.aim(&[0.6]);
+    world.set_position_targets(&[0.6]);
     world.step(1);
     for _ in 0..5 {
         law.step();
@@ -241,7 +241,7 @@ fn effort_limit_of_the_file() {
         assert_eq!(world.limits(), [f64::INFINITY]);
         let warned = world.sim.diagnostics().iter().any(|d| d.kind == DiagnosticKind::EffortUnlimited);
         assert!(warned, "{:?}", world.sim.diagnostics());
-        world.aim(&[1.0]);
+        world.set_position_targets(&[1.0]);
         world.step(1);
         let v = H * 1e8 / (0.1 + H * H * 1e8);
         assert_number("velocity", world.v()[0], v, EXACT);
@@ -253,7 +253,7 @@ fn effort_limit_of_the_file() {
         let drive = DriveCfg { max_effort: Some([("j", limit)].into()), ..gains(1e3, 1e2) };
         let mut world = world(&[Joint::wheel("j", 0.1).effort(3.0)], drive, weightless());
         assert_eq!(world.limits(), [limit]);
-        world.aim(&[2.0]);
+        world.set_position_targets(&[2.0]);
         world.step(1);
         assert_eq!(world.effort()[0] == 0.5, limit == 0.5, "{:?}", world.effort());
     }
@@ -282,7 +282,7 @@ fn chain() {
         let joints: Vec<Joint> = joints.map(|((joint, limit), b)| joint.effort(limit).damped(b)).collect();
         let world = world(&joints, drive, earth());
         let mut env = world.env();
-        push(&mut env, &q, &v);
+        set_state(&mut env, &q, &v);
         env.drives.position.copy_from_slice(&aim);
         step(&mut env);
         let (tau, (mass, bias)) = (env.drives.effort.clone(), world.dynamics(&q, &v, &EARTH));
@@ -308,7 +308,7 @@ fn chain() {
 /// On a chain, the inertia of an acceleration drive is the joint's effective inertia with the other joints free,
 /// including the rotor.
 #[test]
-fn felt_inertia() {
+fn effective_inertia() {
     let a = Joint::lever("a", 3.0, 0.2, 0.02);
     let b = Joint::lever("b", 1.0, 0.1, 5e-3).after(&a, [0.4, 0.0, 0.0]);
     let drive = DriveCfg { drive_type: DriveType::Acceleration, armature: 0.01.into(), ..gains(90.0, 15.0) };
@@ -369,9 +369,9 @@ fn setters() {
     let case = CASES[5];
     let mut world = world(&[case.joint()], gains(case.kp, case.kd), at_dt(case.h, weightless()));
     let mut env = world.env();
-    command(&mut env, case.aim);
+    set_drive_targets(&mut env, case.aim);
     env.step(50);
-    world.aim(&[case.aim[0]]);
+    world.set_position_targets(&[case.aim[0]]);
     let mut robot = world.robot();
     robot.set_qvel_target(&row(&[case.aim[1]]), None, None).unwrap();
     robot.set_qf_target(&row(&[case.aim[2]]), Some(&[JointIndex(0)]), Some(&[EnvId(0)])).unwrap();
@@ -394,7 +394,7 @@ fn joint_without_a_drive() {
     }
     let moment = 0.01 + 0.5 * 0.2 * 0.2;
     let mut world = self::world(&[Joint::lever("j", 0.5, 0.2, 0.01).effort(3.0)], no_drive(), earth());
-    world.aim(&[1.0]);
+    world.set_position_targets(&[1.0]);
     let (mut q, mut v) = (0.0_f64, 0.0);
     for _ in 0..100 {
         world.step(1);
@@ -404,7 +404,7 @@ fn joint_without_a_drive() {
         assert_number("velocity of a pendulum", world.v()[0], v, EXACT);
     }
     assert_eq!((world.target(), world.effort()), (world.q(), vec![0.0]));
-    world.assert_well();
+    world.assert_healthy();
 }
 
 /// Targets are clamped to the usable range: the joint's own, narrowed by those of its followers; the clamped target is
@@ -413,7 +413,7 @@ fn joint_without_a_drive() {
 fn target_range() {
     let mut world = world(&[Joint::wheel("j", 0.1).range(-0.4, 0.7).effort(50.0)], gains(1e3, 1e2), weightless());
     for (aim, expected) in [(2.0, 0.7), (-9.0, -0.4), (0.3, 0.3)] {
-        world.aim(&[aim]);
+        world.set_position_targets(&[aim]);
         assert_eq!(world.target(), [expected]);
         world.step(200);
         let limit = Tolerance::mixed(1e-6, "of the way 1.1^-200 is left after 2 s: kd / kp is ten steps");
@@ -427,7 +427,7 @@ fn target_range() {
         let mut world = self::world(&[driver.clone(), follower.clone()], drive, weightless());
         let clipped = world.sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::MimicRangeClipped);
         assert_eq!(clipped.count(), 1);
-        world.aim(&[2.0, 123.0]);
+        world.set_position_targets(&[2.0, 123.0]);
         let (limits, target) = (world.view().qpos_limits(), world.target());
         for (what, found, expected) in [
             ("lower end of the driver", limits[(0, 0, 0)], -0.2),
@@ -438,7 +438,7 @@ fn target_range() {
             assert_number(what, found, expected, Tolerance::mixed(1e-15, "one rounding"));
         }
         world.step(300);
-        world.assert_well();
+        world.assert_healthy();
         let limit =
             Tolerance::mixed(1e-5, "of the way 1.1^-300 is left; the yield of the coupling is measured, not derived");
         assert_number("driver", world.q()[0], 0.4, limit);
@@ -459,9 +459,9 @@ fn target_range() {
         let limits = world.view().qpos_limits();
         let ends = [0, 1].map(|joint| [0, 1].map(|end| limits[(0, joint, end)]));
         assert_eq!(ends, [[0.0, 0.548], [-0.548, 0.0]], "{what}");
-        world.aim(&[0.5, 0.0]);
+        world.set_position_targets(&[0.5, 0.0]);
         world.step(300);
-        world.assert_well();
+        world.assert_healthy();
         let limit = Tolerance::mixed(1e-5, "of the way 1.1^-300 is left, and the yield of the coupling");
         assert_number("driver", world.q()[0], 0.5, limit);
         assert_number("follower", world.q()[1], -0.5, Tolerance::mixed(1e-5, "as for the driver"));

@@ -75,12 +75,12 @@ fn integrators_that_change_the_solution() {
         assert!(matches!(*error, Error::Integrator { .. }), "joint b is a row");
     }
     let fast = of(&["j"], gains(10.0, 1.0), Integrator::ImplicitFast);
-    match mj::TARGET {
-        mj::Target::V2 => assert!(matches!(*fast.unwrap_err(), Error::IntegratorUnknown { .. })),
-        mj::Target::V4 => {
+    match mj::BUILD_VERSION {
+        mj::SupportedVersion::V2 => assert!(matches!(*fast.unwrap_err(), Error::UnsupportedIntegrator { .. })),
+        mj::SupportedVersion::V4 => {
             // The law holds with implicitfast too.
             let mut world = fast.unwrap();
-            world.aim(&[0.5]);
+            world.set_position_targets(&[0.5]);
             world.step(1);
             assert_number("velocity", world.v()[0], H * 10.0 * 0.5 / (0.1 + H * 1.0 + H * H * 10.0), EXACT);
         }
@@ -132,7 +132,7 @@ fn order_of_rk4() {
     for drive in [no_drive(), native(0.0, 0.0)] {
         let cfg = SimulationManagerCfg { integrator: Integrator::Rk4, ..weightless() };
         let mut env = world(&[Joint::wheel("j", 0.2).damped(0.5)], drive, cfg).env();
-        push(&mut env, &[0.0], &[3.0]);
+        set_state(&mut env, &[0.0], &[3.0]);
         env.step(100);
         let limit = Tolerance::mixed(5e-9, "RK4: (λ h)⁴ λ t / 120 = 8e-9 of 0.25 rad/s, λ = b / M = 2.5 / s");
         assert_number("decay over 1 s", env.data().qvel()[0], 3.0 * f64::exp(-0.5 / 0.2), limit);

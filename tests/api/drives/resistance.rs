@@ -97,7 +97,7 @@ fn damping() {
 /// an implicit drive, which uses the friction row, unless the robot's configuration reserves another row.
 #[test]
 fn dry_friction() {
-    let room = DriveCfg { friction: Some(0.0.into()), ..gains(0.0, 0.0) };
+    let with_friction_row = DriveCfg { friction: Some(0.0.into()), ..gains(0.0, 0.0) };
     for (own, drive) in [
         (1.0, no_drive()),
         (1.0, gains(0.0, 0.0)),
@@ -105,7 +105,7 @@ fn dry_friction() {
         (1.0, beside(DriveModel::Actuator)),
         (0.0, no_drive()),
         (0.0, beside(DriveModel::Actuator)),
-        (0.0, room),
+        (0.0, with_friction_row),
     ] {
         let mut world = slides(0.0, own, drive, 5e-4);
         let mut robot = world.robot();
@@ -197,7 +197,7 @@ fn lasting() {
 #[test]
 fn read_and_set_again() {
     let joints = [Joint::slide("a", M[0]).damped(1.5).rough(1.0), Joint::slide("b", M[1])];
-    for (drive, has_place) in [(no_drive(), true), (gains(10.0, 1.0), false)] {
+    for (drive, has_friction_row) in [(no_drive(), true), (gains(10.0, 1.0), false)] {
         let mut world = world(&joints, drive, weightless_envs(ENVS));
         let read = resistance(&world);
         assert_eq!([read[0].row(0), read[1].row(0)], [array![1.0, 0.0].view(), array![1.5, 0.0].view()]);
@@ -210,7 +210,7 @@ fn read_and_set_again() {
         assert_eq!(resistance(&world)[..2], expected);
         // Control: an implicit drive without a separate friction row cannot have friction.
         let more = world.robot().set_friction(&array![[1.0, 0.1]], None, None);
-        if has_place {
+        if has_friction_row {
             more.unwrap();
             assert_eq!(world.view().friction(), Array2::from_shape_fn((ENVS, 2), |(_, joint)| [1.0, 0.1][joint]));
         } else {

@@ -73,7 +73,7 @@ fn cycle([arm, hand]: [PathBuf; 2], arm_joints: &str, hand_joints: &str) {
                 law = law.max((asked - tau[i]).abs() / limit);
             }
         }
-        world.assert_well();
+        world.assert_healthy();
         let (q, tau, target, load) = (world.q(), world.effort(), world.target(), world.load_by_gravity(&EARTH));
         for (i, gains) in drivers() {
             assert!(tau[i].abs() < effort_limits[i], "joint {i} rests below its limit");
@@ -110,7 +110,7 @@ fn anymal_on_the_ground() {
         let robot = RobotCfg { drive, fix_base: false, init_pose, init_qpos, ..urdf_robot("robot", &file) };
         let mut world = load(robot, cfg(1, 1));
         world.step(100);
-        world.assert_well();
+        world.assert_healthy();
         let height = world.view().link_pose("base").unwrap()[(0, 2)];
         assert!(height > 0.05 && height < 0.63, "{name}: {height}");
         assert_eq!(height > 0.45, name != "limp", "{name}: {height}");
@@ -122,7 +122,7 @@ fn settling() {
     let mut world = world(&arm_and_hand(), tutorial_gains("a.*", "h.*"), earth());
     let limits = world.limits();
     let n = limits.len();
-    world.aim(&vec![STEP; n]);
+    world.set_position_targets(&vec![STEP; n]);
     let of = |i: usize| if i < 6 { (1e4, 1e3) } else { (1e3, 1e2) };
     let (mut settled, mut saturated, mut law) = (vec![0.0; n], vec![0; n], 0.0_f64);
     for k in 1..=200 {
@@ -139,7 +139,7 @@ fn settling() {
             }
         }
     }
-    world.assert_well();
+    world.assert_healthy();
     assert!(settled.iter().all(|t| *t <= 0.5), "{settled:?}");
     assert!(saturated[1] > 10, "a limit binds: {saturated:?}");
     assert!(law < 1e-6, "{law}");
@@ -151,7 +151,7 @@ fn settling() {
     // Control.
     let drive = DriveCfg { model: DriveModel::Actuator, ..tutorial_gains("a.*", "h.*") };
     let mut world = self::world(&arm_and_hand(), drive, earth());
-    world.aim(&vec![STEP; n]);
+    world.set_position_targets(&vec![STEP; n]);
     world.step(200);
     assert_eq!(world.sim.diverged().len(), 1);
 }
@@ -167,7 +167,7 @@ fn binding_limits() {
     }
     let mut world = world(&joints, tutorial_gains("a.*", "h.*"), earth());
     let limits = world.limits();
-    world.aim(&vec![STEP; limits.len()]);
+    world.set_position_targets(&vec![STEP; limits.len()]);
     let mut saturated = vec![0; limits.len()];
     for _ in 0..500 {
         world.step(1);
@@ -176,7 +176,7 @@ fn binding_limits() {
             saturated[i] += usize::from(tau.abs() == limits[i]);
         }
     }
-    world.assert_well();
+    world.assert_healthy();
     assert!(saturated.iter().all(|&s| s > 0), "{saturated:?}");
     assert!(world.q().iter().all(|q| (q - STEP).abs() < SETTLED), "{:?}", world.q());
 }
@@ -192,13 +192,13 @@ fn jumping_targets() {
             let share = (state >> 11) as f64 / (1_u64 << 53) as f64;
             if i < 6 { -3.0 + 6.0 * share } else { -0.3 + 1.9 * share }
         });
-        world.aim(&aim.collect::<Vec<f64>>());
+        world.set_position_targets(&aim.collect::<Vec<f64>>());
         for _ in 0..30 {
             world.step(1);
             assert!(world.effort().iter().zip(&limits).all(|(tau, limit)| tau.abs() <= *limit));
         }
     }
-    world.assert_well();
+    world.assert_healthy();
 }
 
 fn hand(gravity: Vector3<f64>) -> World {
@@ -217,7 +217,7 @@ fn mimic_lag() {
         let mut world = hand(gravity);
         let (mut moving, mut resting, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64);
         for aim in [9.0, -9.0, 9.0] {
-            world.aim(&vec![aim; world.q().len()]);
+            world.set_position_targets(&vec![aim; world.q().len()]);
             for _ in 0..150 {
                 world.step(1);
                 moving = moving.max(lag(&world));
@@ -225,7 +225,7 @@ fn mimic_lag() {
             }
             resting = resting.max(lag(&world));
         }
-        world.assert_well();
+        world.assert_healthy();
         assert!(moving < 0.02 && resting < 0.001, "gravity {gravity:?}: {moving} rad in motion, {resting} at rest");
         assert!(fastest > 3.0, "a fast step");
     }
@@ -269,6 +269,6 @@ fn mimic_lag_under_load() {
         robot.set_external_wrench(&forces, &torques, WrenchFrame::Link, Some(&followers), None).unwrap();
         loaded = loaded.max(worst(&mut world));
     }
-    world.assert_well();
+    world.assert_healthy();
     assert!(loaded < 0.02 && loaded > 5.0 * unloaded, "{loaded} loaded, {unloaded} unloaded");
 }

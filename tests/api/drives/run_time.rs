@@ -9,7 +9,7 @@ use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{DriveType, Error, Result, RobotMut};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{add_ball, text_robot};
 
 const M: [f64; 2] = [0.2, 0.5];
@@ -22,7 +22,7 @@ const ENV1: Option<&[EnvId]> = Some(&[EnvId(1)]);
 /// Two independent wheels in three environments, with targets set.
 fn wheels(drive: DriveCfg) -> World {
     let mut world = world(&[Joint::wheel("a", M[0]), Joint::wheel("b", M[1])], drive, weightless_envs(ENVS));
-    world.aim(&[AIM; 2]);
+    world.set_position_targets(&[AIM; 2]);
     world
 }
 
@@ -103,7 +103,7 @@ fn drive_types() {
     world.sim.reset(None).unwrap();
     set(&mut world, DriveType::Force, 1);
     set(&mut world, DriveType::Force, 2);
-    world.aim(&[AIM; 2]);
+    world.set_position_targets(&[AIM; 2]);
     world.step(1);
     for env in 0..ENVS {
         assert_eq!(world.view().qvel().row(env), v.row(0), "environment {env}");
@@ -137,7 +137,7 @@ fn effort_limits() {
 #[test]
 fn position_limits() {
     let mut world = ranged();
-    world.aim(&[1.5, 1.5]);
+    world.set_position_targets(&[1.5, 1.5]);
     let tight = array![[[-0.5, 0.5], [-f64::INFINITY, 0.25]]];
     world.robot().set_qpos_limits(&tight, None, ENV1).unwrap();
     let own = array![[-1.0, 2.0], [f64::NEG_INFINITY, f64::INFINITY]];
@@ -147,11 +147,11 @@ fn position_limits() {
     }
     // Current targets are clamped at once, later ones when they are set.
     assert_eq!(world.view().qpos_target(), array![[1.5, 1.5], [0.5, 0.25], [1.5, 1.5]]);
-    world.aim(&[-9.0, -9.0]);
+    world.set_position_targets(&[-9.0, -9.0]);
     assert_eq!(world.view().qpos_target(), array![[-1.0, -9.0], [-0.5, -9.0], [-1.0, -9.0]]);
     // Wider again, up to the robot's own limits.
     world.robot().set_qpos_limits(&array![[[-1.0, 2.0]]], FIRST, ENV1).unwrap();
-    world.aim(&[-9.0, -9.0]);
+    world.set_position_targets(&[-9.0, -9.0]);
     assert_eq!(world.view().qpos_target().column(0).to_vec(), [-1.0; 3]);
     // Joint stops do not move: a load pushes beyond a tighter limit, but not beyond the stop (which yields by the depth
     // that MuJoCo's constraint needs to hold 40 N m).
@@ -165,7 +165,7 @@ fn position_limits() {
 /// Center ± half of the range times the factor.
 #[test]
 fn soft_limits() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let robot = text_robot(&files, "robot", &urdf(&[Joint::wheel("a", 0.1).range(-1.0, 2.0), Joint::wheel("b", 0.1)]));
     let cfg = |soft_limit_factor| RobotCfg { soft_limit_factor, ..robot.clone() };
     let mut world = load(cfg(0.9), weightless());
@@ -192,7 +192,7 @@ fn speed_limits() {
     assert_eq!(world.view().qvel_limits(), array![[100.0, 3.0]]);
     world.robot().set_qvel_limits(&array![[0.5]], SECOND, None).unwrap();
     assert_eq!(world.view().qvel_limits(), array![[100.0, 0.5]]);
-    world.aim(&[1.0, 1.0]);
+    world.set_position_targets(&[1.0, 1.0]);
     world.step(10);
     assert!(world.v()[1] > 0.5, "{:?}", world.v());
 }
@@ -210,7 +210,7 @@ fn changes_of_the_world() {
     add_ball(&mut world.sim, "ball", [0.0; 3]);
     assert_eq!(settings(&world), before);
     world.sim.reset(None).unwrap();
-    world.aim(&[AIM; 2]);
+    world.set_position_targets(&[AIM; 2]);
     assert_eq!(settings(&world), before);
     world.step(1);
     assert_number("the law of the new gains", world.view().qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT);
@@ -279,7 +279,7 @@ fn mistakes() {
             (2, None, Some(&[EnvId(2), EnvId(2)][..]), 1, "environment 2"),
         ] {
             let error = call(&mut world.robot(), columns, joints, envs).unwrap_err();
-            assert!(matches!(error, Error::Repeated { first: 0, second: found, .. } if found == second), "{error}");
+            assert!(matches!(error, Error::RepeatedItem { first: 0, second: found, .. } if found == second), "{error}");
             assert!(error.to_string().contains(&format!("{name} names {what} twice")), "{error}");
             assert_eq!(settings(&world), before, "{error}");
         }
@@ -323,6 +323,6 @@ fn mimic_joints() {
     robot.set_qpos_limits(&array![[[-1.0, 1.0], [5.0, -5.0]]], None, None).unwrap();
     assert_eq!(world.view().stiffness(), array![[50.0, 0.0]]);
     assert_eq!(world.view().qf_limits(), array![[f64::INFINITY, f64::INFINITY]]);
-    world.aim(&[3.0, 0.0]);
+    world.set_position_targets(&[3.0, 0.0]);
     assert_eq!(world.target(), [1.0, 2.0]);
 }

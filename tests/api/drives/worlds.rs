@@ -4,12 +4,12 @@
 use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use kinetoscope::robot::dynamics::{Configuration, Kinematics, MimicPositions};
+use kinetoscope::robot::dynamics::{Configuration, Dynamics, MimicPositions};
 use kinetoscope::sim;
-use kinetoscope::sim::env::{Env, EnvStatus};
+use kinetoscope::sim::env::{EnvStatus, SimEnv};
 use kinetoscope::sim::{ActuatorModel, DriveModel, Error};
 pub(crate) use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
-use kinetoscope_testkit::urdf::{Files, joint, robot};
+use kinetoscope_testkit::urdf::{TempFiles, joint, robot};
 pub(crate) use kinetoscope_testkit::worlds::{gains, no_drive};
 use kinetoscope_testkit::worlds::{text_robot, weightless_cfg};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -179,7 +179,7 @@ pub(crate) fn world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg
 }
 
 pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManagerCfg) -> Result<World, Box<Error>> {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut sim = SimulationManager::new(cfg)?;
     let robot = sim.add_robot(RobotCfg { drive, ..text_robot(&files, "robot", &urdf(joints)) })?;
     Ok(World { sim, robot })
@@ -223,12 +223,12 @@ impl World {
     }
 
     /// Sets the position targets of all joints.
-    pub(crate) fn aim(&mut self, targets: &[f64]) {
+    pub(crate) fn set_position_targets(&mut self, targets: &[f64]) {
         self.robot().set_qpos_target(&row(targets), None, None).unwrap();
     }
 
     /// Sets the targets of position, velocity and effort of all joints.
-    pub(crate) fn command<const N: usize>(&mut self, targets: [[f64; 3]; N]) {
+    pub(crate) fn set_targets<const N: usize>(&mut self, targets: [[f64; 3]; N]) {
         let of = |k: usize| row(&targets.map(|target| target[k]));
         let mut robot = self.robot();
         robot.set_qpos_target(&of(0), None, None).unwrap();
@@ -241,25 +241,25 @@ impl World {
     }
 
     /// A copy of the environment, for stepping below the public API.
-    pub(crate) fn env(&self) -> Env {
+    pub(crate) fn env(&self) -> SimEnv {
         let (model, drives, qpos, qvel) = self.sim.batch().read(0, |env| {
             let data = env.data();
             (data.model().clone(), env.drives.clone(), data.qpos().to_vec(), data.qvel().to_vec())
         });
-        let mut env = Env::new(&model, &Arc::clone(drives.table())).unwrap();
+        let mut env = SimEnv::new(&model, &Arc::clone(drives.table())).unwrap();
         env.drives = drives;
-        push(&mut env, &qpos, &qvel);
+        set_state(&mut env, &qpos, &qvel);
         env
     }
 
     /// True if a warning reports unstable drives at this time step.
-    pub(crate) fn warned_unstable(&self) -> bool {
+    pub(crate) fn has_stability_warning(&self) -> bool {
         self.sim.warnings().counts().keys().any(|name| name.contains("unstable"))
     }
 
     /// Asserts that no environment diverged and MuJoCo gave no warning.
     #[track_caller]
-    pub(crate) fn assert_well(&self) {
+    pub(crate) fn assert_healthy(&self) {
         assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
         let counts = self.sim.warnings().counts();
         assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
@@ -272,10 +272,10 @@ impl World {
         let view = self.view();
         let mut at = Configuration::zero(view.description());
         (at.joint_positions, at.mimic) = (self.q(), MimicPositions::AsGiven);
-        let kinematics = Kinematics::new(view.description(), &at).unwrap();
+        let kinematics = Dynamics::new(view.description(), &at).unwrap();
         let torque = kinematics.gravity_torque(gravity);
         let joints = view.description().drivable_joints();
-        let own: Vec<f64> = joints.map(|(id, _)| torque[kinematics.columns(id).start]).collect();
+        let own: Vec<f64> = joints.map(|(id, _)| torque[kinematics.dof_range(id).start]).collect();
         let mut load = vec![0.0; own.len()];
         for (i, (driver, multiplier, _)) in view.mimic_drivers().into_iter().enumerate() {
             load[driver.0] += multiplier * own[i];
@@ -288,7 +288,7 @@ impl World {
         let view = self.view();
         let mut at = Configuration::zero(view.description());
         at.joint_positions = q.to_vec();
-        let kinematics = Kinematics::new(view.description(), &at).unwrap();
+        let kinematics = Dynamics::new(view.description(), &at).unwrap();
         (kinematics.mass_matrix(), kinematics.bias_force(&DVector::from_column_slice(v), gravity))
     }
 }
@@ -298,7 +298,7 @@ pub(crate) fn row(values: &[f64]) -> Array2<f64> {
 }
 
 /// Sets the state of a separate environment.
-pub(crate) fn push(env: &mut Env, q: &[f64], v: &[f64]) {
+pub(crate) fn set_state(env: &mut SimEnv, q: &[f64], v: &[f64]) {
     env.write(|data| {
         data.qpos_mut().copy_from_slice(q);
         data.qvel_mut().copy_from_slice(v);
@@ -306,12 +306,12 @@ pub(crate) fn push(env: &mut Env, q: &[f64], v: &[f64]) {
 }
 
 /// Sets the targets of the first drive of a separate environment.
-pub(crate) fn command(env: &mut Env, [position, velocity, effort]: [f64; 3]) {
+pub(crate) fn set_drive_targets(env: &mut SimEnv, [position, velocity, effort]: [f64; 3]) {
     (env.drives.position[0], env.drives.velocity[0], env.drives.feedforward[0]) = (position, velocity, effort);
 }
 
 #[track_caller]
-pub(crate) fn step(env: &mut Env) {
+pub(crate) fn step(env: &mut SimEnv) {
     env.step(1);
     assert_eq!(*env.status(), EnvStatus::Running);
 }

@@ -1,31 +1,31 @@
 //! The number of threads, environments and processes does not change a bit.
 
-use super::tasks::{cfg, everything, policy};
+use super::tasks::{all_terms_task, cfg, policy};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Shard;
-use kinetoscope::tasks::Ended;
+use kinetoscope::tasks::EndedEpisode;
 use kinetoscope_testkit::bits::bits;
 
 /// All bits of 150 steps, by environment, and the reasons of all episode ends.
 fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
-    let mut env = everything(settings);
+    let mut env = all_terms_task(settings);
     let n = env.num_envs();
     let mut seen = env.reset(None, Some(77)).unwrap();
     let (mut all, mut ends) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-    let put = |all: &mut Vec<Vec<u64>>, of: &Array2<f64>| {
+    let append_bits = |all: &mut Vec<Vec<u64>>, of: &Array2<f64>| {
         all.iter_mut().zip(of.rows()).for_each(|(all, row)| all.extend(bits(row)));
     };
-    put(&mut all, &seen);
+    append_bits(&mut all, &seen);
     for _ in 0..150 {
         let step = env.step(&policy(seen.view())).unwrap();
         for numbers in [&step.observations, &step.final_observations, &step.info.reward_terms] {
-            put(&mut all, numbers);
+            append_bits(&mut all, numbers);
         }
         for (e, all) in all.iter_mut().enumerate() {
             all.extend([step.rewards[e].to_bits(), step.terminated[e].into(), step.truncated[e].into()]);
         }
-        for Ended { env, reason, steps, reward_sums } in step.info.ended {
+        for EndedEpisode { env, reason, steps, reward_sums } in step.info.ended {
             ends[env.0].push(format!("{reason} {steps} {reward_sums:?}"));
         }
         seen = step.observations;

@@ -3,7 +3,7 @@
 use super::tasks::{cfg, world};
 use kinetoscope::ndarray::{Array1, Array2, Axis, array, concatenate};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use kinetoscope::tasks::{
     ActionTerm, EndReason, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm,
 };
@@ -16,7 +16,7 @@ const BOUND: f64 = 2.0;
 
 /// The random start of an episode; both loops compute it independently.
 fn start(seed: u64, env: usize, episode: u64) -> Array2<f64> {
-    let mut random = Random::keyed(seed, env as u64, &format!("my own start {episode}"));
+    let mut random = KeyedRng::keyed(seed, env as u64, &format!("my own start {episode}"));
     array![[0.4 * (random.uniform() - 0.5), 0.2 * (random.uniform() - 0.5)]]
 }
 
@@ -29,7 +29,7 @@ fn command(observations: &Array2<f64>) -> Array2<f64> {
     })
 }
 
-fn look(sim: &SimulationManager, robot: RobotId) -> Array2<f64> {
+fn observe(sim: &SimulationManager, robot: RobotId) -> Array2<f64> {
     let robot = sim.robot(robot);
     concatenate(Axis(1), &[robot.qpos().view(), robot.qvel().view()]).unwrap()
 }
@@ -47,13 +47,13 @@ fn by_hand(num_envs: usize, steps: usize, seed: u64) -> Vec<Vec<Row>> {
     for env in 0..num_envs {
         sim.robot_mut(robot).write_qpos(&start(seed, env, 0), None, Some(&[EnvId(env)])).unwrap();
     }
-    let mut seen = look(&sim, robot);
+    let mut seen = observe(&sim, robot);
     let mut all = Vec::new();
     for _ in 0..steps {
         let force = command(&seen).mapv(|force| force.clamp(-BOUND, BOUND));
         sim.robot_mut(robot).set_qf_target(&force, Some(&[slide]), None).unwrap();
         sim.update(DECIMATION);
-        let last = look(&sim, robot);
+        let last = observe(&sim, robot);
         let mut ends = Vec::new();
         for env in 0..num_envs {
             lengths[env] += 1;
@@ -68,7 +68,7 @@ fn by_hand(num_envs: usize, steps: usize, seed: u64) -> Vec<Vec<Row>> {
                 sim.robot_mut(robot).write_qpos(&start, None, Some(&[EnvId(env)])).unwrap();
             }
         }
-        seen = look(&sim, robot);
+        seen = observe(&sim, robot);
         let of = |(env, &(reward, terminated, truncated)): (usize, &(f64, bool, bool))| {
             row(&seen, &last, env, reward, terminated, truncated)
         };
@@ -87,7 +87,9 @@ fn loop_by_hand() {
         .action(ActionTerm::new("push", space, move |sim, forces| {
             Ok(sim.robot_mut(robot).set_qf_target(forces, Some(&[slide]), None)?)
         }))
-        .observation(ObservationTerm::new("state", ["x", "angle", "v", "spin"], move |now| Ok(look(now.sim(), robot))))
+        .observation(ObservationTerm::new("state", ["x", "angle", "v", "spin"], move |now| {
+            Ok(observe(now.sim(), robot))
+        }))
         .reward(RewardTerm::new("alive", 1.0, |now| Ok(Array1::ones(now.num_envs()))))
         .reward(RewardTerm::new("middle", -0.25, move |now| {
             Ok(now.sim().robot(robot).qpos().column(0).mapv(|x| x * x))

@@ -1,21 +1,21 @@
 //! `kinetoscope_tasks::check` finds nothing in valid tasks, and the fault of broken ones.
 
-use super::tasks::{cart_env, cart_task, cfg, everything, world};
+use super::tasks::{all_terms_task, cart_env, cart_task, cfg, world};
 use super::vector_env::Carts;
 use kinetoscope::ndarray::{Array2, ArrayView2, s};
-use kinetoscope::tasks::{Env, EnvCfg, EnvError, Finding, Info, Space, Step, VectorEnv, check};
+use kinetoscope::tasks::{Env, EnvCfg, EnvError, Finding, Space, Step, StepInfo, VectorEnv, check};
 
 #[test]
 fn good_tasks() {
     assert_eq!(check(&mut cart_env(3, Some(20)), 7), []);
     assert_eq!(check(&mut cart_env(1, None), 7), []);
-    assert_eq!(check(&mut everything(cfg(4, 2)), 11), []);
+    assert_eq!(check(&mut all_terms_task(cfg(4, 2)), 11), []);
     // The hand-written carts accept two kinds of invalid actions.
-    let taken = |finding: &Finding| matches!(finding, Finding::Accepted { .. });
+    let is_accepted = |finding: &Finding| matches!(finding, Finding::MissingError { .. });
     let found = check(&mut Carts::new(3, 1.0, 20), 7);
-    assert!(found.iter().all(taken) && found.len() == 2, "{found:?}");
-    let said: Vec<String> = found.iter().map(ToString::to_string).collect();
-    assert!(said[0].contains("a column too many") && said[1].contains("no number"), "{said:?}");
+    assert!(found.iter().all(is_accepted) && found.len() == 2, "{found:?}");
+    let messages: Vec<String> = found.iter().map(ToString::to_string).collect();
+    assert!(messages[0].contains("a column too many") && messages[1].contains("no number"), "{messages:?}");
 }
 
 /// Faults of an environment that the check must detect.
@@ -23,16 +23,16 @@ fn good_tasks() {
 pub(super) enum Fault {
     None,
     RowMissing,
-    Narrow,
-    Restless,
+    NarrowSpace,
+    NotReproducible,
     MaskIgnored,
-    Neighbours,
-    BeyondBounds,
-    NeverBeginsAnew,
-    FinalIsZero,
-    NoReward,
-    Refuses,
-    TakesAnyMask,
+    NeighborDependent,
+    ActionsNotClamped,
+    NeverRestarts,
+    WrongFinalObservations,
+    NanReward,
+    StepFails,
+    AcceptsWrongMask,
 }
 
 /// A valid task with a fault added.
@@ -42,7 +42,7 @@ pub(super) struct Broken {
     narrow: Space,
     resets: u32,
     steps: u32,
-    over: Option<Array2<f64>>,
+    ended_observations: Option<Array2<f64>>,
 }
 
 impl Broken {
@@ -56,20 +56,20 @@ impl Broken {
 
     pub(super) fn around(inner: Env, fault: Fault) -> Self {
         let narrow = Space::uniform(["place/x"], [-1e-6, 1e-6]).unwrap();
-        Self { inner, fault, narrow, resets: 0, steps: 0, over: None }
+        Self { inner, fault, narrow, resets: 0, steps: 0, ended_observations: None }
     }
 }
 
 impl VectorEnv for Broken {
     type Error = EnvError;
-    type Info = Info;
+    type Info = StepInfo;
 
     fn num_envs(&self) -> usize {
         self.inner.num_envs()
     }
 
     fn observation_space(&self) -> &Space {
-        if self.fault == Fault::Narrow { &self.narrow } else { self.inner.observation_space() }
+        if self.fault == Fault::NarrowSpace { &self.narrow } else { self.inner.observation_space() }
     }
 
     fn action_space(&self) -> &Space {
@@ -77,37 +77,37 @@ impl VectorEnv for Broken {
     }
 
     fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {
-        (self.resets, self.over) = (self.resets + 1, None);
+        (self.resets, self.ended_observations) = (self.resets + 1, None);
         let mask = match (self.fault, mask) {
             (Fault::MaskIgnored, Some(mask)) if mask.len() == self.num_envs() => None,
-            (Fault::TakesAnyMask, _) => None,
+            (Fault::AcceptsWrongMask, _) => None,
             (_, mask) => mask,
         };
         let seen = self.inner.reset(mask, seed)?;
         Ok(match self.fault {
             Fault::RowMissing => seen.slice(s![1.., ..]).to_owned(),
-            Fault::Restless => seen + f64::from(self.resets),
+            Fault::NotReproducible => seen + f64::from(self.resets),
             _ => seen,
         })
     }
 
     fn step(&mut self, actions: ArrayView2<'_, f64>) -> Result<Step, EnvError> {
         self.steps += 1;
-        if self.fault == Fault::Refuses && self.steps == 5 {
+        if self.fault == Fault::StepFails && self.steps == 5 {
             return Err(EnvError::ResetFirst { env: 0 });
         }
         let mut step = self.inner.step(actions)?;
         match self.fault {
-            Fault::Neighbours => {
+            Fault::NeighborDependent => {
                 step.observations[(0, 0)] += 1e-9 * actions[(1, 0)];
                 step.final_observations[(0, 0)] += 1e-9 * actions[(1, 0)];
             }
-            Fault::BeyondBounds => step.rewards += &actions.column(0),
-            Fault::FinalIsZero => step.final_observations.fill(0.0),
-            Fault::NoReward => step.rewards[2] = f64::NAN,
-            Fault::NeverBeginsAnew if self.over.is_some() || step.truncated.iter().any(|over| *over) => {
+            Fault::ActionsNotClamped => step.rewards += &actions.column(0),
+            Fault::WrongFinalObservations => step.final_observations.fill(0.0),
+            Fault::NanReward => step.rewards[2] = f64::NAN,
+            Fault::NeverRestarts if self.ended_observations.is_some() || step.truncated.iter().any(|over| *over) => {
                 // The environment stays at the end of its episode and reports that end in every step.
-                let over = self.over.get_or_insert_with(|| step.final_observations.clone()).clone();
+                let over = self.ended_observations.get_or_insert_with(|| step.final_observations.clone()).clone();
                 (step.observations, step.final_observations) = (over.clone(), over);
                 step.truncated.fill(true);
             }
@@ -118,27 +118,39 @@ impl VectorEnv for Broken {
 }
 
 /// True for the expected finding.
-type Is = fn(&Finding) -> bool;
+type IsExpected = fn(&Finding) -> bool;
 
 #[test]
 fn broken_tasks() {
     assert_eq!(check(&mut Broken::new(Fault::None), 7), [], "the control");
-    let cases: [(Fault, Is, &str); 11] = [
+    let cases: [(Fault, IsExpected, &str); 11] = [
         (
             Fault::RowMissing,
             |f| matches!(f, Finding::Shape { found, expected, .. } if found == &[3, 1] && expected == &[4, 1]),
             "[3, 1]",
         ),
-        (Fault::Narrow, |f| matches!(f, Finding::Outside { column, .. } if column == "place/x"), "place/x"),
-        (Fault::Restless, |f| matches!(f, Finding::Seed(apart) if apart.when == "after the reset"), "the same seed"),
-        (Fault::MaskIgnored, |f| matches!(f, Finding::Mask(apart) if apart.env % 2 == 0), "a reset of other"),
-        (Fault::Neighbours, |f| matches!(f, Finding::Neighbours(apart) if apart.env == 0), "actions of another"),
-        (Fault::BeyondBounds, |f| matches!(f, Finding::Bounds(apart) if apart.what == "reward"), "beyond their bounds"),
-        (Fault::NeverBeginsAnew, |f| matches!(f, Finding::NoAutoReset { .. }), "no other began"),
-        (Fault::FinalIsZero, |f| matches!(f, Finding::FinalObservation { .. }), "final_observations"),
-        (Fault::NoReward, |f| matches!(f, Finding::Reward { env: 2, value, .. } if value.is_nan()), "reward"),
-        (Fault::Refuses, |f| matches!(f, Finding::Refused { what, .. } if what == "step 4"), "step 4"),
-        (Fault::TakesAnyMask, |f| matches!(f, Finding::Accepted { .. }), "mask"),
+        (Fault::NarrowSpace, |f| matches!(f, Finding::OutOfSpace { column, .. } if column == "place/x"), "place/x"),
+        (
+            Fault::NotReproducible,
+            |f| matches!(f, Finding::NotReproducible(apart) if apart.when == "after the reset"),
+            "the same seed",
+        ),
+        (Fault::MaskIgnored, |f| matches!(f, Finding::MaskedReset(apart) if apart.env % 2 == 0), "a reset of other"),
+        (
+            Fault::NeighborDependent,
+            |f| matches!(f, Finding::Interference(apart) if apart.env == 0),
+            "actions of another",
+        ),
+        (
+            Fault::ActionsNotClamped,
+            |f| matches!(f, Finding::ActionClamping(apart) if apart.what == "reward"),
+            "beyond their bounds",
+        ),
+        (Fault::NeverRestarts, |f| matches!(f, Finding::NoAutoReset { .. }), "no other began"),
+        (Fault::WrongFinalObservations, |f| matches!(f, Finding::FinalObservation { .. }), "final_observations"),
+        (Fault::NanReward, |f| matches!(f, Finding::Reward { env: 2, value, .. } if value.is_nan()), "reward"),
+        (Fault::StepFails, |f| matches!(f, Finding::UnexpectedError { what, .. } if what == "step 4"), "step 4"),
+        (Fault::AcceptsWrongMask, |f| matches!(f, Finding::MissingError { .. }), "mask"),
     ];
     for (fault, is_it, word) in cases {
         let found = check(&mut Broken::new(fault), 7);

@@ -34,7 +34,7 @@ fn pushed_cart() {
         if k == 60 {
             assert_eq!(step.info.ended.len(), 3);
             for ended in &step.info.ended {
-                assert_number("sum of the rewards", ended.total(), sums[ended.env.0], ROUNDING * 60.0);
+                assert_number("sum of the rewards", ended.total_reward(), sums[ended.env.0], ROUNDING * 60.0);
                 assert_eq!((ended.steps, ended.reward_sums.len()), (60, 1));
             }
         }
@@ -79,7 +79,7 @@ fn clamped_actions() {
     let mut run = |force: f64| {
         env.reset(None, None).unwrap();
         let seen = (0..10).map(|_| env.step(&array![[force]]).unwrap().observations[(0, 0)].to_bits()).collect();
-        let now = env.now();
+        let now = env.context();
         (seen, now.actions()[(0, 0)])
     };
     for sign in [1.0, -1.0] {

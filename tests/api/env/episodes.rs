@@ -1,13 +1,13 @@
 //! Starts and ends of episodes, and the observations at them.
 
-use super::tasks::{cart_env, cart_task, cfg, everything, idle, policy, world};
+use super::tasks::{all_terms_task, cart_env, cart_task, cfg, idle, policy, world};
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::tasks::{
-    ActionTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, Now, ObservationTerm, RewardTerm, Space, TermResult,
-    TerminationTerm, When,
+    ActionTerm, EndReason, Env, EnvBuilder, EnvCfg, EventMode, EventTerm, ObservationTerm, RewardTerm, Space,
+    TermContext, TermResult, TerminationTerm,
 };
-use kinetoscope::viewer::{Command, Viewing, Wants};
+use kinetoscope::viewer::{Command, SnapshotRequest, ViewerExt};
 use kinetoscope_testkit::bits::bits;
 use std::sync::{Arc, Mutex};
 
@@ -46,7 +46,7 @@ fn time_limit() {
 fn two_ends_at_once() {
     let (sim, robot) = world(cfg(3, 1), false);
     let at = |step: u64| {
-        move |now: &Now<'_>| -> TermResult<Array1<bool>> {
+        move |now: &TermContext<'_>| -> TermResult<Array1<bool>> {
             Ok(now.episode_steps().iter().enumerate().map(|(env, &k)| env > 0 && k == step).collect())
         }
     };
@@ -83,20 +83,21 @@ fn seeds() {
         }
         all
     };
-    let (mut env, mut other) = (everything(cfg(4, 2)), everything(cfg(4, 2)));
+    let (mut env, mut other) = (all_terms_task(cfg(4, 2)), all_terms_task(cfg(4, 2)));
     let first = run(&mut env, Some(5));
     assert_ne!(run(&mut env, None), first, "the next episodes");
     assert_ne!(run(&mut env, Some(6)), first, "another seed");
     assert_eq!(run(&mut env, Some(5)), first, "again");
     assert_eq!(run(&mut other, Some(5)), first, "another batch");
     // At first the seed is the simulation's.
-    assert_eq!(run(&mut everything(cfg(4, 2)), None), run(&mut env, Some(cfg(4, 2).seed)));
+    assert_eq!(run(&mut all_terms_task(cfg(4, 2)), None), run(&mut env, Some(cfg(4, 2).seed)));
 }
 
 #[test]
 fn masks() {
-    let (mut env, mut calm) = (everything(cfg(5, 2)), everything(cfg(5, 2)));
-    let (mut seen, mut undisturbed) = (env.reset(None, Some(5)).unwrap(), calm.reset(None, Some(5)).unwrap());
+    let (mut env, mut undisturbed_env) = (all_terms_task(cfg(5, 2)), all_terms_task(cfg(5, 2)));
+    let (mut seen, mut undisturbed) =
+        (env.reset(None, Some(5)).unwrap(), undisturbed_env.reset(None, Some(5)).unwrap());
     for k in 0..60 {
         if k == 17 {
             let again = env.reset(Some(&[false, true, false, false, true]), Some(9)).unwrap();
@@ -104,16 +105,16 @@ fn masks() {
                 assert_eq!(again.row(e) == seen.row(e), ![1, 4].contains(&e), "environment {e}");
             }
             seen = again;
-            assert_eq!(env.now().episode_steps(), [17, 0, 17, 17, 0]);
+            assert_eq!(env.context().episode_steps(), [17, 0, 17, 17, 0]);
         }
         seen = env.step(&policy(seen.view())).unwrap().observations;
-        undisturbed = calm.step(&policy(undisturbed.view())).unwrap().observations;
+        undisturbed = undisturbed_env.step(&policy(undisturbed.view())).unwrap().observations;
         for e in [0, 2, 3] {
             assert_eq!(bits(seen.row(e)), bits(undisturbed.row(e)), "step {k}, environment {e}");
         }
     }
     // The reset environments are in the state of a batch with that seed.
-    let mut with_seed = everything(cfg(5, 2));
+    let mut with_seed = all_terms_task(cfg(5, 2));
     let mut expected = with_seed.reset(None, Some(9)).unwrap();
     for _ in 17..60 {
         expected = with_seed.step(&policy(expected.view())).unwrap().observations;
@@ -126,7 +127,7 @@ type Log = Arc<Mutex<Vec<(usize, u64, u64)>>>;
 
 #[test]
 fn events() {
-    let log = |times: &Log, name: &'static str, when: When| {
+    let log = |times: &Log, name: &'static str, when: EventMode| {
         let times = Arc::clone(times);
         EventTerm::new(name, when, move |_, dice| {
             let mut times = times.lock().unwrap();
@@ -141,10 +142,10 @@ fn events() {
         .observation(ObservationTerm::new("k", ["k"], |now| {
             Ok(Array2::from_shape_fn((now.num_envs(), 1), |(env, _)| now.episode_steps()[env] as f64))
         }))
-        .event(log(&startup, "startup", When::Startup))
-        .event(log(&reset, "reset", When::Reset))
-        .event(log(&fixed, "fixed", When::Interval { steps: [4, 4] }))
-        .event(log(&drawn, "drawn", When::Interval { steps: [1, 6] }))
+        .event(log(&startup, "startup", EventMode::Startup))
+        .event(log(&reset, "reset", EventMode::Reset))
+        .event(log(&fixed, "fixed", EventMode::Interval { steps: [4, 4] }))
+        .event(log(&drawn, "drawn", EventMode::Interval { steps: [1, 6] }))
         .build()
         .unwrap();
     let taken = |log: &Log| std::mem::take(&mut *log.lock().unwrap());
@@ -178,9 +179,9 @@ fn events() {
 
 #[test]
 fn commands() {
-    let mut env = everything(cfg(4, 2));
+    let mut env = all_terms_task(cfg(4, 2));
     let mut seen = env.reset(None, Some(1)).unwrap();
-    let goal = env.observation_space().column("goal/x").unwrap();
+    let goal = env.observation_space().column_index("goal/x").unwrap();
     let mut of_episode = seen.column(goal).to_owned();
     assert!(of_episode.iter().all(|x| (-0.5..0.5).contains(x)) && of_episode[0] != of_episode[1]);
     let mut changes = 0;
@@ -199,8 +200,8 @@ fn commands() {
 }
 
 /// Steps two equal tasks; after 10 steps, `act` applies an external reset to the first.
-fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
-    let (mut env, mut calm) = (everything(cfg(3, 2)), everything(cfg(3, 2)));
+fn with_external_reset(act: impl FnOnce(&mut Env)) -> (Env, Env) {
+    let (mut env, mut calm) = (all_terms_task(cfg(3, 2)), all_terms_task(cfg(3, 2)));
     let (mut seen, mut same) = (env.reset(None, Some(5)).unwrap(), calm.reset(None, Some(5)).unwrap());
     for _ in 0..10 {
         seen = env.step(&policy(seen.view())).unwrap().observations;
@@ -213,7 +214,7 @@ fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
     assert_eq!((ended.env, &ended.reason, ended.steps), (EnvId(1), &EndReason::Reset, 11));
     assert_eq!((step.truncated, step.terminated), (array![false, true, false], array![false, false, false]));
     assert!(other.info.ended.is_empty());
-    assert_eq!(env.now().episode_steps(), [11, 0, 11]);
+    assert_eq!(env.context().episode_steps(), [11, 0, 11]);
     for e in [0, 2] {
         assert_eq!(step.observations.row(e), other.observations.row(e), "the others do not notice");
     }
@@ -225,7 +226,7 @@ fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
 
 #[test]
 fn reset_by_program() {
-    let (mut env, mut calm) = disturbed(|env| env.sim_mut().reset(Some(&[EnvId(1)])).unwrap());
+    let (mut env, mut calm) = with_external_reset(|env| env.sim_mut().reset(Some(&[EnvId(1)])).unwrap());
     // It continues undisturbed.
     let (mut a, mut b) = (env.observations().to_owned(), calm.observations().to_owned());
     for _ in 0..20 {
@@ -242,8 +243,8 @@ fn reset_by_program() {
 #[test]
 fn reset_by_viewer() {
     let mut viewer = None;
-    disturbed(|env| {
-        let watching = env.sim_mut().viewer(Wants { rate: 1.0, ..Wants::default() });
+    with_external_reset(|env| {
+        let watching = env.sim_mut().viewer(SnapshotRequest { rate: 1.0, ..SnapshotRequest::default() });
         watching.send(Command::Reset(Some(EnvId(1))));
         viewer = Some(watching);
     });
@@ -312,7 +313,7 @@ fn diverged() {
     // The revived episode is 29 steps old; the others end now.
     let step = env.step(&actions(50, false)).unwrap();
     assert_eq!(step.truncated.iter().filter(|t| **t).count(), 7);
-    assert!(!step.truncated[5] && env.now().episode_steps()[5] == 30);
+    assert!(!step.truncated[5] && env.context().episode_steps()[5] == 30);
 }
 
 /// A state that is written between steps and diverges ends the episode in the same way.

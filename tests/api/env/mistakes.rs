@@ -3,10 +3,10 @@
 use super::tasks::{cart_task, cfg, idle, world};
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::tasks::{
-    ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EnvError, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
-    TermKind, TerminationTerm, When, terms,
+    ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EnvError, EventMode, EventTerm, Noise, ObservationTerm,
+    RewardTerm, Space, TermKind, TerminationTerm, terms,
 };
-use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::refusal::assert_errors;
 
 fn empty() -> EnvBuilder {
     EnvBuilder::new(world(cfg(2, 1), false).0, EnvCfg::default())
@@ -26,7 +26,7 @@ fn cart(num_envs: usize, cfg: EnvCfg) -> EnvBuilder {
     cart_task(sim, robot, cfg)
 }
 
-fn event(when: When) -> EventTerm {
+fn event(when: EventMode) -> EventTerm {
     EventTerm::new("event", when, |_, _| Ok(()))
 }
 
@@ -34,12 +34,12 @@ fn event(when: When) -> EventTerm {
 fn building() {
     let command = || CommandTerm::new("goal", ["x"], |_| [0.0]);
     let end = || TerminationTerm::new("end", |now| Ok(Array1::from_elem(now.num_envs(), false)));
-    let alive = |weight| terms::alive("alive", weight);
+    let alive = |weight| terms::is_alive("alive", weight);
     let noisy = |noise| builder().observation(ones("other").with_noise(noise));
     let scaled = |scale| builder().observation(ones("other").scaled(scale));
     let clipped = builder().observation(ones("other").clipped([1.0, 0.0]));
     let two_a = ObservationTerm::new("twice", ["a", "a"], |now| Ok(Array2::ones((now.num_envs(), 2))));
-    let fails = EventTerm::new("e", When::Startup, |_, _| Err("no idea".into()));
+    let fails = EventTerm::new("e", EventMode::Startup, |_, _| Err("no idea".into()));
     let rows = [
         (cart(1, EnvCfg { decimation: 0, episode_steps: None }), "Config { field: \"decimation\""),
         (cart(1, EnvCfg { decimation: 1, episode_steps: Some(0) }), "Config { field: \"episode_steps\""),
@@ -48,24 +48,24 @@ fn building() {
         (builder().action(idle()), "RepeatedTerm { kind: Action"),
         (builder().observation(ones("one")), "RepeatedTerm { kind: Observation"),
         (builder().command(command()).command(command()), "RepeatedTerm { kind: Command"),
-        (builder().event(event(When::Reset)).event(event(When::Startup)), "RepeatedTerm { kind: Event"),
+        (builder().event(event(EventMode::Reset)).event(event(EventMode::Startup)), "RepeatedTerm { kind: Event"),
         (builder().reward(alive(1.0)).reward(alive(1.0)), "RepeatedTerm { kind: Reward"),
         (builder().termination(end()).termination(end()), "RepeatedTerm { kind: Termination"),
-        (builder().reward(terms::alive("", 1.0)), "TermName { kind: Reward"),
-        (builder().reward(terms::alive("a/b", 1.0)), "TermName { kind: Reward"),
+        (builder().reward(terms::is_alive("", 1.0)), "TermName { kind: Reward"),
+        (builder().reward(terms::is_alive("a/b", 1.0)), "TermName { kind: Reward"),
         (noisy(Noise::Normal { std: -1.0 }), "Config { field: \"noise of"),
         (noisy(Noise::Normal { std: f64::NAN }), "Config { field: \"noise of"),
         (noisy(Noise::Uniform { low: 1.0, high: 0.0 }), "Config { field: \"noise of"),
         (scaled(0.0), "Config { field: \"scale of"),
         (scaled(f64::INFINITY), "Config { field: \"scale of"),
         (builder().reward(alive(f64::NAN)), "Config { field: \"the weight of"),
-        (builder().event(event(When::Interval { steps: [0, 3] })), "Config { field: \"the interval of"),
-        (builder().event(event(When::Interval { steps: [4, 3] })), "Config { field: \"the interval of"),
+        (builder().event(event(EventMode::Interval { steps: [0, 3] })), "Config { field: \"the interval of"),
+        (builder().event(event(EventMode::Interval { steps: [4, 3] })), "Config { field: \"the interval of"),
         (clipped, "Bounds { column: \"a\", low: 1.0, high: 0.0"),
         (builder().observation(two_a), "RepeatedColumn { column: \"a\""),
         (builder().event(fails), "Term { kind: Event"),
     ];
-    assert_refused(rows.into_iter().enumerate().map(|(row, (builder, variant))| (row, builder.build(), variant, [])));
+    assert_errors(rows.into_iter().enumerate().map(|(row, (builder, variant))| (row, builder.build(), variant, [])));
 }
 
 #[test]
@@ -87,14 +87,14 @@ fn actions_and_masks() {
     }
     let error = env.reset(Some(&[true; 3]), None).unwrap_err();
     assert!(matches!(&error, EnvError::Shape { found, .. } if *found == [3]), "{error}");
-    assert_eq!((env.sim().time(), env.now().episode_steps()), (vec![0.0; 2], &[0, 0][..]), "nothing happened");
+    assert_eq!((env.sim().time(), env.context().episode_steps()), (vec![0.0; 2], &[0, 0][..]), "nothing happened");
     env.step(&array![[1.0], [1.0]]).unwrap();
 }
 
 #[test]
 fn unknown_names() {
     let (sim, robot) = world(cfg(1, 1), true);
-    let error = terms::joint_positions(&sim, "positions", robot, &["slidr"]).unwrap_err();
+    let error = terms::joint_pos_rel(&sim, "positions", robot, &["slidr"]).unwrap_err();
     assert!(error.to_string().contains("slide"), "{error}");
     let asks = RewardTerm::new("asks", 1.0, |now| Ok(now.command("gaol")?.column(0).to_owned()));
     let mut env = builder().command(CommandTerm::new("goal", ["x"], |_| [0.0])).reward(asks).build().unwrap();
@@ -103,7 +103,7 @@ fn unknown_names() {
     let EnvError::Term { kind: TermKind::Reward, name, error: inner } = &error else { panic!("{error}") };
     assert_eq!(name, "asks");
     assert!(inner.to_string().contains("\"gaol\"") && inner.to_string().contains("goal"), "{inner}");
-    let error = env.action_space().column("idle/b").unwrap_err();
+    let error = env.action_space().column_index("idle/b").unwrap_err();
     assert!(matches!(&error, EnvError::UnknownName { candidates, .. } if *candidates == ["idle/a"]), "{error}");
 }
 
@@ -114,7 +114,7 @@ fn terms_in_steps() {
         builder().reward(RewardTerm::new("r", weight, move |now| Ok(value(now.num_envs()))))
     };
     let action = ActionTerm::new("b", Space::uniform(["b"], [0.0, 1.0]).unwrap(), |_, _| Err("no idea".into()));
-    let event = EventTerm::new("e", When::Interval { steps: [1, 1] }, |_, _| Err("no idea".into()));
+    let event = EventTerm::new("e", EventMode::Interval { steps: [1, 1] }, |_, _| Err("no idea".into()));
     for (what, wrong) in [
         ("shape", reward(1.0, |_| Array1::zeros(5))),
         ("shape", builder().termination(TerminationTerm::new("t", |_| Ok(Array1::from_elem(1, false))))),

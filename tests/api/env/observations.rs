@@ -41,8 +41,8 @@ fn spaces() {
     ] {
         assert_eq!(space.contains(row.view()), inside, "{row}");
     }
-    assert_eq!(space.column("b").ok(), Some(1));
-    let Err(EnvError::UnknownName { candidates, .. }) = space.column("c") else { panic!("there is no column c") };
+    assert_eq!(space.column_index("b").ok(), Some(1));
+    let Err(EnvError::UnknownName { candidates, .. }) = space.column_index("c") else { panic!("there is no column c") };
     assert_eq!(candidates, ["a", "b"]);
     // Column names are prefixed by the names of their terms, and columns keep their bounds.
     let terms = [twos("one", ["x", "y"]).clipped([-1.0, 1.0]), twos("two", ["x", "z"]).clipped([0.0, 3.0])];

@@ -4,8 +4,8 @@ use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::WrenchFrame;
 use kinetoscope::tasks::{
-    ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
-    TerminationTerm, When, terms,
+    ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventMode, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
+    TerminationTerm, terms,
 };
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
@@ -50,18 +50,18 @@ pub(crate) fn cart_env(num_envs: usize, episode_steps: Option<u64>) -> Env {
 }
 
 /// A task with every kind of term: a pole on a cart with noise, commands, pushes, randomized masses and random starts.
-pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
+pub(crate) fn all_terms_task(cfg: SimulationManagerCfg) -> Env {
     let (sim, robot) = world(cfg, true);
     let push = terms::joint_efforts(&sim, "push", robot, &["slide"], 10.0).unwrap();
-    let positions = terms::joint_positions(&sim, "positions", robot, &[".*"]).unwrap();
-    let velocities = terms::joint_velocities(&sim, "velocities", robot, &["hinge", "slide"]).unwrap();
+    let positions = terms::joint_pos_rel(&sim, "positions", robot, &[".*"]).unwrap();
+    let velocities = terms::joint_vel(&sim, "velocities", robot, &["hinge", "slide"]).unwrap();
     let pole = sim.robot(robot).link_id("pole").unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: 2, episode_steps: Some(40) })
         .action(push)
-        .command(CommandTerm::new("goal", ["x"], |dice| [dice.between(-0.5, 0.5)]))
-        .event(EventTerm::new("masses", When::Startup, |sim, dice| {
+        .command(CommandTerm::new("goal", ["x"], |dice| [dice.uniform_range(-0.5, 0.5)]))
+        .event(EventTerm::new("masses", EventMode::Startup, |sim, dice| {
             for die in dice {
-                let mass = die.between(0.5, 2.0);
+                let mass = die.uniform_range(0.5, 2.0);
                 sim.properties_mut().randomize_with(Some(&[die.env()]), |_, _, properties| {
                     properties.set(Property::Mass, "cart/cart", &[mass])?;
                     Ok(())
@@ -71,12 +71,12 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
         }))
         .event(EventTerm::on_reset("start", move |sim, dice| {
             for die in dice {
-                let start = array![[die.between(-0.2, 0.2), die.between(-0.1, 0.1)]];
+                let start = array![[die.uniform_range(-0.2, 0.2), die.uniform_range(-0.1, 0.1)]];
                 sim.robot_mut(robot).write_qpos(&start, None, Some(&[die.env()]))?;
             }
             Ok(())
         }))
-        .event(EventTerm::new("gust", When::Interval { steps: [5, 15] }, move |sim, dice| {
+        .event(EventTerm::new("gust", EventMode::Interval { steps: [5, 15] }, move |sim, dice| {
             for die in dice {
                 let force = array![[[0.2 * die.normal(), 0.0, 0.0]]];
                 let (none, world) = (Array3::zeros((1, 1, 3)), WrenchFrame::World);
@@ -86,9 +86,9 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
         }))
         .observation(positions.with_noise(Noise::Normal { std: 0.01 }))
         .observation(velocities.with_noise(Noise::Uniform { low: -0.1, high: 0.1 }).clipped([-5.0, 5.0]).scaled(0.1))
-        .observation(terms::commanded("goal", "goal", ["x"]))
-        .observation(terms::last_actions("action", ["slide"]))
-        .reward(terms::alive("alive", 1.0))
+        .observation(terms::generated_commands("goal", "goal", ["x"]))
+        .observation(terms::last_action("action", ["slide"]))
+        .reward(terms::is_alive("alive", 1.0))
         .reward(RewardTerm::new("near", -0.5, move |now| {
             let (qpos, goal) = (now.sim().robot(robot).qpos(), now.command("goal")?);
             Ok((&qpos.column(0) - &goal.column(0)).mapv(f64::abs))

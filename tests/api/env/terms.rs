@@ -32,7 +32,7 @@ fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
 fn task(sim: SimulationManager, robot: RobotId) -> EnvBuilder {
     let height =
         ObservationTerm::new("z", ["z"], move |now| Ok(now.sim().robot(robot).root_pose().slice_move(s![.., 2..3])));
-    EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::alive("alive", 1.0))
+    EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::is_alive("alive", 1.0))
 }
 
 /// Builds a task and begins its episodes.
@@ -72,7 +72,7 @@ fn low_and_lying_roots() {
         [0.0, 0.0, 0.502, 1.0, 0.0, 0.0, 0.0],
         [0.0, 0.0, 0.499, 1.0, 0.0, 0.0, 0.0],
     ];
-    assert_eq!(ended_at(|_, robot| terms::base_below("low", robot, 0.5), &poses), [false, false, true]);
+    assert_eq!(ended_at(|_, robot| terms::root_height_below_minimum("low", robot, 0.5), &poses), [false, false, true]);
     // Rotated about x by 0.5, about y by 0.7 and about z by 3 rad: only the first two tilt, the second beyond 0.6.
     let turned = |axis: usize, angle: f64| {
         let mut row = vec![0.0, 0.0, 1.0, (0.5 * angle).cos(), 0.0, 0.0, 0.0];
@@ -105,7 +105,7 @@ fn time_and_joint_limits() {
 #[test]
 fn illegal_contact() {
     let (mut sim, robot) = floater(2, true);
-    let sensor = sim.add_sensor("touch", ContactSensorCfg::of("floater/trunk")).unwrap();
+    let sensor = sim.add_sensor("touch", ContactSensorCfg::for_bodies("floater/trunk")).unwrap();
     let touched = terms::illegal_contact("touched", sensor, 5.0);
     let mut env = begin(task(sim, robot).termination(touched));
     // One robot rests on the ground at a depth of a tenth of a millimeter, which carries its 2.1 kg; the other is a
@@ -122,7 +122,7 @@ fn illegal_contact() {
 }
 
 /// Poses and velocities of roots, positions and velocities of joints, at the start of an episode with this event.
-fn begun(event: EventTerm, robot: RobotId, sim: SimulationManager) -> [Array2<f64>; 4] {
+fn initial_state(event: EventTerm, robot: RobotId, sim: SimulationManager) -> [Array2<f64>; 4] {
     let mut env = task(sim, robot).event(event).build().unwrap();
     env.reset(None, Some(5)).unwrap();
     let robot = env.sim().robot(robot);
@@ -139,7 +139,7 @@ fn root_ranges() {
         angular: [[0.0; 2], [0.0; 2], [2.0, 3.0]],
     };
     let (sim, robot) = floater(N, false);
-    let [poses, speeds, ..] = begun(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let [poses, speeds, ..] = initial_state(terms::reset_root_uniform("start", robot, ranges), robot, sim);
     let yaw = poses.rows().into_iter().map(|row| 2.0 * row[6].atan2(row[3])).collect::<Vec<f64>>();
     let column = |table: &Array2<f64>, k: usize| table.column(k).to_vec();
     for (name, values, [low, high]) in [
@@ -169,7 +169,7 @@ fn root_ranges() {
     let lying = Pose::rotation([FRAC_PI_2, 0.0, 0.0].into());
     let robot = RobotCfg { fix_base: false, init_pose: lying, ..passive(mjcf_robot("floater", FLOATER)) };
     let robot = sim.add_robot(robot).unwrap();
-    let [poses, ..] = begun(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let [poses, ..] = initial_state(terms::reset_root_uniform("start", robot, ranges), robot, sim);
     let turned = |row: ArrayView1<'_, f64>| from_row(&std::array::from_fn(|k| row[k])).rotation;
     let axes: Vec<_> = poses.rows().into_iter().map(|row| turned(row) * Vector3::z()).collect();
     assert!(axes.iter().all(|z| (z + Vector3::y()).norm() < 1e-12), "{axes:?}");
@@ -182,7 +182,7 @@ fn joint_ranges() {
     const N: usize = 300;
     let (sim, robot) = floater(N, false);
     let event = terms::reset_joints_by_offset(&sim, "start", robot, &["hinge"], [-3.0, 0.5], [1.0, 1.5]).unwrap();
-    let [_, _, places, speeds] = begun(event, robot, sim);
+    let [_, _, places, speeds] = initial_state(event, robot, sim);
     // From -3 to 0.5 about the start at 0; positions below the limit of -1 are clamped to it: 2 of 3.5 of them.
     let at_limit = places.iter().filter(|x| **x == -1.0).count() as f64 / N as f64;
     // Five standard deviations of a share p of N, sqrt(p (1 - p) / N).
@@ -243,7 +243,7 @@ fn root_state() {
 fn effort_squares() {
     let (mut sim, _) = floater(1, false);
     let cart = sim.add_robot(mjcf_robot("cart", &super::tasks::cart(true))).unwrap();
-    let squares = terms::joint_effort_squares(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
+    let squares = terms::joint_torques_l2(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
     let mut env = begin(task(sim, cart).reward(squares));
     env.sim_mut().robot_mut(cart).set_qpos_target(&array![[0.1, -0.2]], None, None).unwrap();
     let step = env.step(&Array2::zeros((1, 1))).unwrap();

@@ -18,6 +18,6 @@ fn passes_checks() {
     let findings = check(&mut env, 7);
     assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
     // Control: NaN rewards are found.
-    let findings = check(&mut Broken::around(env, Fault::NoReward), 7);
+    let findings = check(&mut Broken::around(env, Fault::NanReward), 7);
     assert!(findings.iter().any(|finding| matches!(finding, Finding::Reward { .. })), "{findings:?}");
 }

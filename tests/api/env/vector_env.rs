@@ -2,7 +2,7 @@
 
 use super::tasks::{cart_env, cart_task, cfg, world};
 use kinetoscope::ndarray::{Array1, Array2, ArrayView2, Axis, array};
-use kinetoscope::tasks::{EnvCfg, EnvError, Info, Space, Step, VectorEnv};
+use kinetoscope::tasks::{EnvCfg, EnvError, Space, Step, StepInfo, VectorEnv};
 
 /// The time step of the tests' worlds \[s\].
 const DT: f64 = 0.01;
@@ -98,7 +98,7 @@ struct Log {
 }
 
 /// A training loop for any type of environment. The middle cart restarts after 13 steps.
-fn drive<E: VectorEnv>(env: &mut E, steps: usize) -> Result<Log, E::Error> {
+fn run_loop<E: VectorEnv>(env: &mut E, steps: usize) -> Result<Log, E::Error> {
     let mut log = Log::default();
     let n = env.num_envs();
     let mut seen = env.reset(None, Some(1))?;
@@ -123,7 +123,7 @@ fn one_loop() {
     let mut carts = Carts::new(3, 1.0, 20);
     assert_eq!(VectorEnv::observation_space(&task), VectorEnv::observation_space(&carts));
     assert_eq!(VectorEnv::action_space(&task), VectorEnv::action_space(&carts));
-    let (of_task, by_hand) = (drive(&mut task, 50).unwrap(), drive(&mut carts, 50).unwrap());
+    let (of_task, by_hand) = (run_loop(&mut task, 50).unwrap(), run_loop(&mut carts, 50).unwrap());
     assert_eq!(of_task.ends, by_hand.ends);
     assert_eq!(by_hand.ends[..3], [(19, 0), (19, 2), (32, 1)]);
     assert_eq!(of_task.numbers.len(), 50 * 9);
@@ -132,7 +132,7 @@ fn one_loop() {
     let apart = |a: &Log, b: &Log| a.numbers.iter().zip(&b.numbers).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart(&of_task, &by_hand) < 1e-12, "{}", apart(&of_task, &by_hand));
     // Control: carts with 0.1 % more mass move differently.
-    let heavy = drive(&mut Carts::new(3, 1.001, 20), 50).unwrap();
+    let heavy = run_loop(&mut Carts::new(3, 1.001, 20), 50).unwrap();
     assert!(apart(&of_task, &heavy) > 1e-5);
 }
 
@@ -144,7 +144,7 @@ fn errors() {
     // The type of environment can be chosen at run time.
     let (sim, robot) = world(cfg(2, 1), false);
     let task = cart_task(sim, robot, EnvCfg::default()).build().unwrap();
-    let mut chosen: Box<dyn VectorEnv<Error = EnvError, Info = Info>> = Box::new(task);
+    let mut chosen: Box<dyn VectorEnv<Error = EnvError, Info = StepInfo>> = Box::new(task);
     assert!(matches!(chosen.step(array![[1.0], [1.0]].view()), Err(EnvError::ResetFirst { env: 0 })));
     chosen.reset(None, None).unwrap();
     assert!(matches!(chosen.step(array![[1.0]].view()), Err(EnvError::Shape { .. })));

@@ -31,19 +31,19 @@ fn world() -> World {
 #[test]
 fn in_order() {
     let World { sim, robots, camera } = world();
-    assert_eq!(sim.entities().jointed_uids(), ["left", "right"]);
+    assert_eq!(sim.entities().articulated_uids(), ["left", "right"]);
     assert_eq!(sim.entities().robot_ids(), [("left", robots[0]), ("right", robots[1])]);
-    assert_eq!(sim.entities().jointed_id("right").unwrap(), robots[1]);
-    let error = sim.entities().jointed_id("rigth").unwrap_err().to_string();
+    assert_eq!(sim.entities().articulated_id("right").unwrap(), robots[1]);
+    let error = sim.entities().articulated_id("rigth").unwrap_err().to_string();
     assert!(error.contains("right"), "{error}");
     assert_eq!(sim.entities().rigid_object_uids(), ["ball", "cube"]);
     assert!(sim.entities().mjcf_uids().is_empty());
     assert_eq!(sim.entities().sensor_uids(), ["imu", "eye"]);
     assert_eq!(sim.entities().sensor_ids::<Camera>(), [("eye".to_string(), camera)]);
     assert!(sim.entities().sensor_ids::<RayCaster>().is_empty());
-    let imu: &dyn Any = sim.entities().sensor_called("imu").unwrap();
+    let imu: &dyn Any = sim.entities().sensor_by_uid("imu").unwrap();
     assert!(imu.is::<Imu>() && !imu.is::<Camera>());
-    let error = sim.entities().sensor_called("ey").err().unwrap().to_string();
+    let error = sim.entities().sensor_by_uid("ey").err().unwrap().to_string();
     assert!(error.contains("eye"), "{error}");
     assert!((0..6).all(|joint| sim.robot(robots[0]).is_driven(JointIndex(joint)).unwrap()));
 }

@@ -4,8 +4,8 @@ use super::worlds::{all_bits, arm, cfg, cube};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
-use kinetoscope::sim::{Error, Look};
-use kinetoscope_testkit::worlds::pose_in;
+use kinetoscope::sim::{EnvVisualState, Error};
+use kinetoscope_testkit::worlds::pose_of_row;
 use nalgebra::Vector3;
 
 const G: f64 = 9.81;
@@ -40,14 +40,14 @@ fn contacts() {
 
 /// Every field of the snapshot agrees with MuJoCo's arrays and with the getters of robots and objects.
 #[test]
-fn look() {
+fn env_snapshot() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     let robot = sim.add_robot(arm()).unwrap();
     let id = sim.add_rigid_object(cube("cube", 0.5, [1.0, 0.0, 2.0])).unwrap();
     sim.robot_mut(robot).set_qpos_target(&array![[0.2, 0.4, -0.6, 0.1, 0.3, 0.0]], None, Some(&[EnvId(1)])).unwrap();
     sim.update(20);
-    let mut look = Look::default();
-    sim.scene_mut().look(EnvId(1), &mut look).unwrap();
+    let mut look = EnvVisualState::default();
+    sim.scene_mut().read_visual_state(EnvId(1), &mut look).unwrap();
     assert_eq!((look.time, look.diverged.clone()), (sim.time()[1], None));
     let names = sim.entities().body_names();
     assert_eq!(look.bodies.len(), names.len());
@@ -64,31 +64,40 @@ fn look() {
         assert_eq!(look.joints.len(), 6, "the free joint of the cube has no axis");
         for (joint, axis) in look.joints.iter().enumerate() {
             let row = |of: &[f64]| std::array::from_fn(|k| of[3 * joint + k]);
-            assert_eq!((axis.anchor, axis.axis, axis.slides), (row(data.xanchor()), row(data.xaxis()), false));
+            assert_eq!((axis.anchor, axis.axis, axis.is_slide), (row(data.xanchor()), row(data.xaxis()), false));
         }
-        let total: f64 = look.masses.iter().map(|(_, mass)| mass).sum();
+        let total: f64 = look.mass_points.iter().map(|(_, mass)| mass).sum();
         assert!((total - model.body_mass().iter().sum::<f64>()).abs() < 1e-12);
-        let moment: f64 = look.masses.iter().map(|(at, mass)| at[2] * mass).sum();
+        let moment: f64 = look.mass_points.iter().map(|(at, mass)| at[2] * mass).sum();
         assert!((moment / total - data.subtree_com()[2]).abs() < 1e-12);
     });
-    let instance =
-        sim.scene_mut().visible().scene().instances().iter().position(|instance| &*instance.name == "cube").unwrap();
-    let expected = PoseF32::from(&pose_in(&sim.rigid_object(id).pose(), 1));
+    let instance = sim
+        .scene_mut()
+        .visual_scene()
+        .scene()
+        .instances()
+        .iter()
+        .position(|instance| &*instance.name == "cube")
+        .unwrap();
+    let expected = PoseF32::from(&pose_of_row(&sim.rigid_object(id).pose(), 1));
     assert_eq!(look.instances[instance].translation, expected.translation);
-    assert!(matches!(sim.scene_mut().look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
+    assert!(matches!(
+        sim.scene_mut().read_visual_state(EnvId(2), &mut look),
+        Err(Error::UnknownIndex { index: 2, .. })
+    ));
 }
 
 /// A force F at r from the middle of a cube: after a step v = h F / m and w = h r x F / I, I = m a²/6; the same in the
 /// next step; no more after release.
 #[test]
-fn pull() {
+fn external_force() {
     let settings = SimulationManagerCfg { gravity: [0.0; 3].into(), ground: None, ..cfg(2, 1) };
     let mut sim = SimulationManager::new(settings).unwrap();
     let mass = 2.0;
     let id = sim.add_rigid_object(cube("cube", mass, [1.0, 2.0, 3.0])).unwrap();
     let (force, arm) = ([0.3, -0.2, 0.5], [0.05, 0.0, -0.02]);
     let point = [1.0 + arm[0], 2.0 + arm[1], 3.0 + arm[2]];
-    sim.scene_mut().pull(EnvId(1), 0, &[(point, force)]).unwrap();
+    sim.scene_mut().set_point_forces(EnvId(1), 0, &[(point, force)]).unwrap();
     let h = sim.cfg().physics_dt;
     let turn = Vector3::from(arm).cross(&Vector3::from(force)) / (mass * 0.01 / 6.0);
     let mut step = || {
@@ -101,15 +110,18 @@ fn pull() {
     }
     assert!((0..3).all(|k| (second[(1, k)] - 2.0 * first[(1, k)]).abs() < 1e-14), "{second}");
     assert!(second.row(0).iter().all(|v| *v == 0.0), "the other environment");
-    sim.scene_mut().pull(EnvId(1), 0, &[]).unwrap();
+    sim.scene_mut().set_point_forces(EnvId(1), 0, &[]).unwrap();
     sim.update(1);
     let third = sim.rigid_object(id).velocity();
     assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
-    let refused = sim.scene_mut().pull(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
+    let refused = sim.scene_mut().set_point_forces(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
     assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");
-    let body = sim.scene_mut().pull(EnvId(0), 1, &[(point, force)]);
+    let body = sim.scene_mut().set_point_forces(EnvId(0), 1, &[(point, force)]);
     assert!(matches!(body, Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })), "{body:?}");
-    assert!(matches!(sim.scene_mut().pull(EnvId(2), 0, &[(point, force)]), Err(Error::UnknownIndex { index: 2, .. })));
+    assert!(matches!(
+        sim.scene_mut().set_point_forces(EnvId(2), 0, &[(point, force)]),
+        Err(Error::UnknownIndex { index: 2, .. })
+    ));
 }
 
 #[test]
@@ -145,5 +157,5 @@ fn bad_configurations() {
         ("lights.color", SimulationManagerCfg { lights, ..good() }),
     ];
     let variant = |field| format!("Config {{ field: {field:?}");
-    kinetoscope_testkit::refusal::assert_refused(rows.map(|(field, cfg)| (field, cfg.validate(), variant(field), [])));
+    kinetoscope_testkit::refusal::assert_errors(rows.map(|(field, cfg)| (field, cfg.validate(), variant(field), [])));
 }

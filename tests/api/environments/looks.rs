@@ -4,7 +4,7 @@
 //! scene: images and motions must have the same bits.
 
 use super::worlds::{ALL, get, set};
-use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, ObjectKind, SupportedVersion};
 use kinetoscope::ndarray::{Array3, Array4, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_wxyz;
@@ -12,9 +12,9 @@ use kinetoscope::scene::shape::Shape;
 use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCaster, RayCasterCameraCfg};
-use kinetoscope::sim::{Error, RandomizationError, Still};
-use kinetoscope_testkit::refusal::assert_refused;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope::sim::{Error, OffscreenScene, RandomizationError};
+use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{sr5, text_robot};
 
 /// Position of the camera, above all objects and looking straight down \[m\].
@@ -35,7 +35,7 @@ fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
 
 /// Sizes and colors of the scene's objects.
 #[derive(Clone, Copy)]
-struct Look {
+struct Appearance {
     cube: [f64; 3],
     ball: f64,
     post: [f64; 2],
@@ -43,14 +43,19 @@ struct Look {
     color: [f64; 4],
 }
 
-const NOMINAL: Look =
-    Look { cube: [0.2, 0.2, 0.2], ball: 0.1, post: [0.1, 0.3], pill: [0.08, 0.2], color: [0.6, 0.6, 0.6, 1.0] };
-const OWN: Look =
-    Look { cube: [0.3, 0.14, 0.26], ball: 0.17, post: [0.06, 0.5], pill: [0.11, 0.1], color: [0.9, 0.2, 0.1, 1.0] };
+const NOMINAL: Appearance =
+    Appearance { cube: [0.2, 0.2, 0.2], ball: 0.1, post: [0.1, 0.3], pill: [0.08, 0.2], color: [0.6, 0.6, 0.6, 1.0] };
+const CHANGED: Appearance = Appearance {
+    cube: [0.3, 0.14, 0.26],
+    ball: 0.17,
+    post: [0.06, 0.5],
+    pill: [0.11, 0.1],
+    color: [0.9, 0.2, 0.1, 1.0],
+};
 
 /// Objects of every kind with sizes, above the ground and far enough apart for both appearances; and a mesh without
 /// sizes.
-fn world(look: Look) -> SimulationManager {
+fn world(look: Appearance) -> SimulationManager {
     let mut sim = SimulationManager::new(cfg()).unwrap();
     let cube = object("cube", ObjectShape::Box { size: look.cube }, [0.0, 0.0, 0.3]);
     let post = ObjectShape::Cylinder { radius: look.post[0], length: look.post[1] };
@@ -68,7 +73,7 @@ fn world(look: Look) -> SimulationManager {
 }
 
 /// Applies an appearance to one environment.
-fn dress(sim: &mut SimulationManager, env: usize, look: Look) {
+fn set_appearance(sim: &mut SimulationManager, env: usize, look: Appearance) {
     let values: [(usize, Property, &str, &[f64]); 5] = [
         (env, Property::Size, "cube", &look.cube.map(|length| length / 2.0)),
         // Numbers that a ball does not use are ignored.
@@ -114,20 +119,20 @@ fn same(one: &Images, a: usize, other: &Images, b: usize) -> bool {
 
 #[test]
 fn as_built() {
-    let (mut sim, mut built) = (world(NOMINAL), world(OWN));
+    let (mut sim, mut built) = (world(NOMINAL), world(CHANGED));
     let mut plain = world(NOMINAL);
     // One camera is created before the change, one after.
     let before = sim.add_sensor("before", above()).unwrap();
     let nominal = images(&sim, before);
-    dress(&mut sim, 1, OWN);
+    set_appearance(&mut sim, 1, CHANGED);
     let after = sim.add_sensor("after", above()).unwrap();
-    let judge = built.add_sensor("camera", above()).unwrap();
+    let reference = built.add_sensor("camera", above()).unwrap();
     let control = plain.add_sensor("camera", above()).unwrap();
     for steps in [0, 20, 300] {
         for sim in [&mut sim, &mut built, &mut plain] {
             sim.update(steps);
         }
-        let (expected, others) = (images(&built, judge), images(&plain, control));
+        let (expected, others) = (images(&built, reference), images(&plain, control));
         for camera in [before, after] {
             let seen = images(&sim, camera);
             assert!(same(&seen, 1, &expected, 1), "after {steps} steps it looks as if built so");
@@ -222,7 +227,7 @@ fn mujoco_rays() {
         ..Default::default()
     };
     let id = sim.add_sensor("rays", rays).unwrap();
-    dress(&mut sim, 1, OWN);
+    set_appearance(&mut sim, 1, CHANGED);
     set(&mut sim, &[(2, Property::Color, "cube", &[1.0, 0.0, 0.0, 0.0])]);
     sim.update(30);
     let rays = sim.sensor(id).unwrap();
@@ -265,13 +270,13 @@ fn arm(scale: f64) -> String {
 fn robot_links() {
     let build = |scale: f64| {
         let mut sim = SimulationManager::new(cfg()).unwrap();
-        sim.add_robot(text_robot(&Files::default(), "arm", &arm(scale))).unwrap();
+        sim.add_robot(text_robot(&TempFiles::default(), "arm", &arm(scale))).unwrap();
         let camera = sim.add_sensor("camera", above()).unwrap();
         (sim, camera)
     };
     let ((mut sim, camera), (built, judge)) = (build(1.0), build(1.5));
     let nominal = images(&sim, camera);
-    let larger = Randomization::new().with(Property::Size, "arm/fore", Draw::Scale([1.5, 1.5]));
+    let larger = Randomization::new().with(Property::Size, "arm/fore", RandomizationOp::Scale([1.5, 1.5]));
     sim.properties_mut().randomize(&larger, Some(&[EnvId(2)])).unwrap();
     let (seen, expected) = (images(&sim, camera), images(&built, judge));
     assert!(same(&seen, 2, &expected, 2) && same(&seen, 0, &nominal, 0) && !same(&seen, 2, &nominal, 2));
@@ -319,9 +324,9 @@ fn names() {
     let cone = sim.rigid_object(sim.entities().rigid_object_id("cone").unwrap()).mask_id();
     let seen = |p: &Images, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
     // Randomized colors keep the opacity of 1, although a factor of 1.5 would exceed it.
-    let black = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0]));
+    let black = Randomization::new().with(Property::Color, "cone", RandomizationOp::Set([0.0, 0.0]));
     sim.properties_mut()
-        .randomize(&black.with(Property::Color, "cube", Draw::Scale([1.5, 1.5])), Some(&[EnvId(0)]))
+        .randomize(&black.with(Property::Color, "cube", RandomizationOp::Scale([1.5, 1.5])), Some(&[EnvId(0)]))
         .unwrap();
     assert_eq!(get(&sim, 0, Property::Color, "cone"), [0.0, 0.0, 0.0, 1.0]);
     let brighter = f64::from(0.6_f32) * 1.5;
@@ -335,8 +340,8 @@ fn names() {
 
 #[test]
 fn draws() {
-    let sizes = Randomization::new().with(Property::Size, "cube|ball", Draw::Scale([0.5, 1.5]));
-    let draw = sizes.with(Property::Color, "cube", Draw::Set([0.2, 0.8]));
+    let sizes = Randomization::new().with(Property::Size, "cube|ball", RandomizationOp::Scale([0.5, 1.5]));
+    let draw = sizes.with(Property::Color, "cube", RandomizationOp::Set([0.2, 0.8]));
     let mut sim = world(NOMINAL);
     let camera = sim.add_sensor("camera", above()).unwrap();
     sim.properties_mut().randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
@@ -351,7 +356,7 @@ fn draws() {
     let own: Vec<(&str, usize)> = sim.batch().read(0, |env| env.data().model().own_arrays().collect());
     let geoms = base.ngeom();
     let mut expected = vec![("geom_size", 24 * geoms), ("geom_rbound", 8 * geoms), ("geom_rgba", 16 * geoms)];
-    if TARGET == Target::V4 {
+    if BUILD_VERSION == SupportedVersion::V4 {
         expected.push(("geom_aabb", 48 * geoms));
     }
     for array in &expected {
@@ -359,10 +364,10 @@ fn draws() {
     }
     // 4.x also updates the bounding boxes of bodies and the reach of joints.
     let rest: Vec<&str> = own.iter().filter(|array| !expected.contains(array)).map(|(name, _)| *name).collect();
-    let follows = |name: &&str| TARGET == Target::V4 && ["bvh_aabb", "dof_length"].contains(name);
+    let follows = |name: &&str| BUILD_VERSION == SupportedVersion::V4 && ["bvh_aabb", "dof_length"].contains(name);
     assert!(rest.iter().all(follows), "{rest:?}");
     assert_eq!(sim.properties().bytes(EnvId(1)).unwrap(), 0);
-    assert!(sim.batch().read(1, |env| env.data().model().arrays_apart(&base).is_empty()));
+    assert!(sim.batch().read(1, |env| env.data().model().unshared_arrays(&base).is_empty()));
     // Adding an entity keeps the appearance, also in images.
     let before = images(&sim, camera);
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
@@ -373,10 +378,10 @@ fn draws() {
 
 /// Scene snapshots for viewers show the same.
 #[test]
-fn stills() {
+fn offscreen_scenes() {
     let mut sim = world(NOMINAL);
-    dress(&mut sim, 1, OWN);
-    let half = |still: &Still| {
+    set_appearance(&mut sim, 1, CHANGED);
+    let half = |still: &OffscreenScene| {
         let boxes = still.visible().scene().instances().iter().filter_map(|instance| match &instance.shape {
             Shape::Box(shape) => Some((shape.half, instance.material.rgba)),
             _ => None,
@@ -385,9 +390,9 @@ fn stills() {
     };
     let (grey, red) = ([0.6, 0.6, 0.6, 1.0_f32], [0.9, 0.2, 0.1, 1.0_f32]);
     let (small, large) = (([0.1_f32; 3], grey), ([0.15_f32, 0.07, 0.13], red));
-    let of_env = |sim: &mut SimulationManager, env| half(&Still::of_env(sim, EnvId(env)).unwrap());
+    let of_env = |sim: &mut SimulationManager, env| half(&OffscreenScene::of_env(sim, EnvId(env)).unwrap());
     assert_eq!((of_env(&mut sim, 0), of_env(&mut sim, 1)), (vec![small], vec![large]));
-    let overview = Still::overview(&mut sim, None, &[]).unwrap();
+    let overview = OffscreenScene::overview(&mut sim, None, &[]).unwrap();
     assert_eq!(half(&overview), [small, large, small]);
 }
 
@@ -409,7 +414,7 @@ fn mistakes() {
         (Property::Size, "cube", &[0.1; 2], &["3 numbers"]),
         (Property::Color, "ground", &[0.1; 4], &["body or terrain"]),
     ];
-    assert_refused(rows.map(|(property, name, value, parts)| {
+    assert_errors(rows.map(|(property, name, value, parts)| {
         let done = sim.properties_mut().randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, name, value));
         (format!("{name} {value:?}"), done, "", parts)
     }));
@@ -423,10 +428,10 @@ fn invisible_patterns() {
     let mut sim = world(NOMINAL);
     let ghost = object("ghost", ObjectShape::cube(0.3), [-0.6, 0.6, 0.8]);
     sim.add_rigid_object(RigidObjectCfg { rgba: [1.0, 1.0, 1.0, 0.0], ..ghost }).unwrap();
-    let draw = |pattern: &str| Randomization::new().with(Property::Color, pattern, Draw::Set([0.2, 0.8]));
-    let said = sim.properties_mut().randomize(&draw("ghost"), ALL).unwrap_err();
-    assert!(matches!(&said, Error::Randomization(RandomizationError::Pattern { property: "color", .. })), "{said}");
-    assert!(said.to_string().contains("\"ghost\"") && said.to_string().contains("\"post\""), "{said}");
+    let draw = |pattern: &str| Randomization::new().with(Property::Color, pattern, RandomizationOp::Set([0.2, 0.8]));
+    let error = sim.properties_mut().randomize(&draw("ghost"), ALL).unwrap_err();
+    assert!(matches!(&error, Error::Randomization(RandomizationError::Pattern { property: "color", .. })), "{error}");
+    assert!(error.to_string().contains("\"ghost\"") && error.to_string().contains("\"post\""), "{error}");
     let rays = |name: &str| RayCasterCfg {
         pattern: Grid { resolution: 0.1, size: [0.2, 0.2], ..Grid::default() }.into(),
         offset: Pose::translation(-0.587, 0.613, 2.0),
@@ -439,8 +444,8 @@ fn invisible_patterns() {
     sim.properties_mut().randomize(&draw("ghost|cube"), ALL).unwrap();
     let both = sim.add_sensor("both", rays("ghost|cube")).unwrap();
     assert_eq!(get(&sim, 1, Property::Color, "ghost")[3], 0.0);
-    let show = |sim: &mut SimulationManager| set(sim, &[(1, Property::Color, "ghost", &[0.5, 0.5, 0.5, 1.0])]);
-    show(&mut sim);
+    let set_visible = |sim: &mut SimulationManager| set(sim, &[(1, Property::Color, "ghost", &[0.5, 0.5, 0.5, 1.0])]);
+    set_visible(&mut sim);
     let ghost = sim.add_sensor("ghost_rays", rays("ghost")).unwrap();
     let hit = |sim: &SimulationManager, id: SensorId<RayCaster>| {
         let distances = sim.sensor(id).unwrap().distances().to_owned();
@@ -457,7 +462,7 @@ fn invisible_patterns() {
     sim.properties_mut().reset(ALL).unwrap();
     sim.add_rigid_object(object("second", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 0, 0]));
-    show(&mut sim);
+    set_visible(&mut sim);
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
     // Control: a new sensor is refused while the ghost is invisible.
     sim.properties_mut().reset(ALL).unwrap();

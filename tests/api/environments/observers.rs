@@ -3,34 +3,34 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::Imu;
-use kinetoscope::sim::{Error, Moment, ObjectId, Observer, ObserverId};
+use kinetoscope::sim::{Error, Observer, ObserverId, RigidObjectId, SimEvent};
 use kinetoscope_testkit::worlds::{add_ball, object, row};
 use std::sync::{Arc, Mutex};
 
 /// The received events, with the step of the first environment.
-type Diary = Arc<Mutex<Vec<(u64, Moment)>>>;
+type EventLog = Arc<Mutex<Vec<(u64, SimEvent)>>>;
 
 /// An observer that is due at every `every`-th step of the first environment and runs `act`.
-struct Watch {
+struct TestObserver {
     every: u64,
-    diary: Diary,
-    act: fn(&mut SimulationManager, &Moment),
+    log: EventLog,
+    act: fn(&mut SimulationManager, &SimEvent),
 }
 
-impl Watch {
-    fn new(every: u64, act: fn(&mut SimulationManager, &Moment)) -> (Self, Diary) {
-        let diary = Diary::default();
-        (Self { every, diary: Arc::clone(&diary), act }, diary)
+impl TestObserver {
+    fn new(every: u64, act: fn(&mut SimulationManager, &SimEvent)) -> (Self, EventLog) {
+        let diary = EventLog::default();
+        (Self { every, log: Arc::clone(&diary), act }, diary)
     }
 }
 
-impl Observer for Watch {
+impl Observer for TestObserver {
     fn due_in(&self, sim: &SimulationManager) -> u64 {
         self.every - steps(sim) % self.every
     }
 
-    fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
-        self.diary.lock().unwrap().push((steps(sim), moment.clone()));
+    fn on_event(&mut self, sim: &mut SimulationManager, moment: &SimEvent) {
+        self.log.lock().unwrap().push((steps(sim), moment.clone()));
         (self.act)(sim, moment);
     }
 }
@@ -39,16 +39,16 @@ fn steps(sim: &SimulationManager) -> u64 {
     (sim.time()[0] / sim.cfg().physics_dt).round() as u64
 }
 
-fn entries(diary: &Diary) -> Vec<(u64, Moment)> {
+fn read_log(diary: &EventLog) -> Vec<(u64, SimEvent)> {
     diary.lock().unwrap().clone()
 }
 
-fn every(period: u64, up_to: u64) -> Vec<(u64, Moment)> {
-    (1..=up_to / period).map(|k| (period * k, Moment::Stepped)).collect()
+fn every(period: u64, up_to: u64) -> Vec<(u64, SimEvent)> {
+    (1..=up_to / period).map(|k| (period * k, SimEvent::Stepped)).collect()
 }
 
 /// A tumbling box with a sensor on it.
-fn scene() -> (SimulationManager, ObjectId, SensorId<Imu>) {
+fn scene() -> (SimulationManager, RigidObjectId, SensorId<Imu>) {
     let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
     let cfg = object("box", ObjectShape::Box { size: [0.1, 0.2, 0.3] }, [0.0, 0.0, 0.4]);
     let object = sim.add_rigid_object(RigidObjectCfg { mass: Some(1.0), ..cfg }).unwrap();
@@ -62,13 +62,13 @@ fn steps_of_their_own() {
     alone.update(100);
     for blocks in [vec![100], vec![1; 100], vec![33, 67]] {
         let (mut sim, same_object, same_imu) = scene();
-        let (three, threes) = Watch::new(3, |_, _| {});
-        let (seven, sevens) = Watch::new(7, |_, _| {});
+        let (three, threes) = TestObserver::new(3, |_, _| {});
+        let (seven, sevens) = TestObserver::new(7, |_, _| {});
         sim.observers_mut().add(three);
         sim.observers_mut().add(seven);
         blocks.into_iter().for_each(|block| sim.update(block));
-        assert_eq!(entries(&threes), every(3, 100));
-        assert_eq!(entries(&sevens), every(7, 100));
+        assert_eq!(read_log(&threes), every(3, 100));
+        assert_eq!(read_log(&sevens), every(7, 100));
         assert_eq!(sim.rigid_object(same_object).pose(), alone.rigid_object(object).pose());
         let (here, there) = (sim.sensor(same_imu).unwrap(), alone.sensor(imu).unwrap());
         assert_eq!(here.lin_acc_b(), there.lin_acc_b());
@@ -85,13 +85,14 @@ fn by_type() {
             1000
         }
 
-        fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
+        fn on_event(&mut self, _: &mut SimulationManager, _: &SimEvent) {}
     }
     let (mut sim, ..) = scene();
-    let watches = [3, 7].map(|every| sim.observers_mut().add(Watch::new(every, |_, _| {}).0));
+    let watches = [3, 7].map(|every| sim.observers_mut().add(TestObserver::new(every, |_, _| {}).0));
     let other = sim.observers_mut().add(Other);
-    let same =
-        |found: Vec<ObserverId<Watch>>, expected: &[ObserverId<Watch>]| format!("{found:?}") == format!("{expected:?}");
+    let same = |found: Vec<ObserverId<TestObserver>>, expected: &[ObserverId<TestObserver>]| {
+        format!("{found:?}") == format!("{expected:?}")
+    };
     assert!(same(sim.observers().ids(), &watches));
     assert_eq!(format!("{:?}", sim.observers().ids::<Other>()), format!("{:?}", [other]));
     assert_eq!(sim.observers().get(watches[1]).unwrap().every, 7);
@@ -106,7 +107,7 @@ fn by_type() {
 #[test]
 fn resets_and_writes() {
     let (mut sim, object, _) = scene();
-    let (watch, diary) = Watch::new(1000, |_, _| {});
+    let (watch, diary) = TestObserver::new(1000, |_, _| {});
     sim.observers_mut().add(watch);
     sim.update(2);
     sim.reset(Some(&[EnvId(1)])).unwrap();
@@ -114,47 +115,47 @@ fn resets_and_writes() {
     sim.rigid_object_mut(object).write_velocity(&velocities, Some(&[EnvId(1)])).unwrap();
     sim.rigid_object_mut(object).write_velocity(&velocities, Some(&[EnvId(0)])).unwrap();
     let snapshot = sim.snapshot(None).unwrap();
-    assert_eq!(entries(&diary), [(2, Moment::Reset { env_ids: vec![EnvId(1)] })]);
+    assert_eq!(read_log(&diary), [(2, SimEvent::Reset { env_ids: vec![EnvId(1)] })]);
     sim.update(1);
-    let written = Moment::Written { env_ids: vec![EnvId(0), EnvId(1)] };
-    assert_eq!(entries(&diary)[1..], [(2, written.clone())], "told once, before the step");
+    let written = SimEvent::Written { env_ids: vec![EnvId(0), EnvId(1)] };
+    assert_eq!(read_log(&diary)[1..], [(2, written.clone())], "told once, before the step");
     sim.update(1);
-    assert_eq!(entries(&diary).len(), 2, "and not again");
+    assert_eq!(read_log(&diary).len(), 2, "and not again");
     sim.restore(&snapshot, None).unwrap();
     sim.update(1);
-    assert_eq!(entries(&diary)[2..], [(2, written)]);
+    assert_eq!(read_log(&diary)[2..], [(2, written)]);
     sim.add_sensor("another", ImuCfg::on("box")).unwrap();
     add_ball(&mut sim, "ball", [0.0; 3]);
-    assert_eq!(entries(&diary)[3..], [(3, Moment::Compiled)], "a sensor changes no model");
+    assert_eq!(read_log(&diary)[3..], [(3, SimEvent::Compiled)], "a sensor changes no model");
 }
 
 #[test]
 fn acts_of_others() {
     let (mut sim, ..) = scene();
-    let (doer, doers) = Watch::new(5, |sim, moment| {
-        if *moment == Moment::Stepped {
+    let (doer, doers) = TestObserver::new(5, |sim, moment| {
+        if *moment == SimEvent::Stepped {
             sim.reset(None).unwrap();
             sim.update(3);
         }
     });
-    let (hearer, hearers) = Watch::new(1, |_, _| {});
+    let (other_observer, hearers) = TestObserver::new(1, |_, _| {});
     let doer = sim.observers_mut().add(doer);
-    let hearer = sim.observers_mut().add(hearer);
+    let hearer = sim.observers_mut().add(other_observer);
     sim.update(5);
-    assert_eq!(entries(&doers), [(5, Moment::Stepped)]);
-    let reset = (0, Moment::Reset { env_ids: vec![EnvId(0), EnvId(1)] });
+    assert_eq!(read_log(&doers), [(5, SimEvent::Stepped)]);
+    let reset = (0, SimEvent::Reset { env_ids: vec![EnvId(0), EnvId(1)] });
     let mut all = every(1, 4);
     all.push(reset);
     all.extend(every(1, 3));
     // The fifth step itself is reported after the steps that the other observer took during its call.
-    all.push((3, Moment::Stepped));
-    assert_eq!(entries(&hearers), all);
+    all.push((3, SimEvent::Stepped));
+    assert_eq!(read_log(&hearers), all);
     assert_eq!(sim.observers().get(hearer).unwrap().every, 1);
     sim.observers_mut().get(hearer).unwrap().every = 2;
     assert_eq!(sim.observers_mut().remove(hearer).unwrap().every, 2);
-    assert!(matches!(sim.observers().get(hearer), Err(Error::NoObserver)));
-    assert!(matches!(sim.observers_mut().remove(hearer), Err(Error::NoObserver)));
+    assert!(matches!(sim.observers().get(hearer), Err(Error::ObserverUnavailable)));
+    assert!(matches!(sim.observers_mut().remove(hearer), Err(Error::ObserverUnavailable)));
     assert_eq!(sim.observers_mut().remove(doer).unwrap().every, 5);
     sim.update(10);
-    assert_eq!(entries(&hearers), all, "no observer is left");
+    assert_eq!(read_log(&hearers), all, "no observer is left");
 }

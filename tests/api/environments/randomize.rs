@@ -2,13 +2,13 @@
 //! by name.
 
 use super::worlds::{ALL, all_bits, all_properties, all_values, arm, cfg, cube, get, set, values, world};
-use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, ObjectKind, SupportedVersion};
 use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{Cone, DriveType, Error, RandomizationError};
+use kinetoscope::sim::{DriveType, Error, FrictionCone, RandomizationError};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{gains, passive, text_robot};
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ fn pendulums() {
         <inertial pos="0 0 -0.5" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody></mujoco>"#;
     let settings = SimulationManagerCfg { physics_dt: 0.001, ground: None, ..cfg(6, 2) };
     let mut sim = SimulationManager::new(settings).unwrap();
-    let id = sim.add_mjcf(MjcfCfg::text("p", text)).unwrap();
+    let id = sim.add_mjcf(MjcfPartCfg::text("p", text)).unwrap();
     let envs: [(usize, Property, &str, &[f64]); 5] = [
         (1, Property::Gravity, "gravity", &[0.0, 0.0, -3.7]),
         (2, Property::CenterOfMass, "p/rod", &[0.0, 0.0, -0.7]),
@@ -69,7 +69,7 @@ fn pendulums() {
 /// bounces. MuJoCo's friction creeps slightly instead of being exactly at its limit: 1 %.
 #[test]
 fn sliding_boxes() {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(3, 2) }).unwrap();
+    let mut sim = SimulationManager::new(SimulationManagerCfg { cone: FrictionCone::Elliptic, ..cfg(3, 2) }).unwrap();
     let id = sim.add_rigid_object(cube("cube", 1.0, [0.0, 0.0, 0.05])).unwrap();
     for (env, mu) in [(1, [0.1]), (2, [0.25])] {
         set(&mut sim, &["cube", "ground"].map(|name| (env, Property::Friction, name, &mu[..])));
@@ -90,7 +90,7 @@ fn sliding_boxes() {
 }
 
 /// An undriven wheel about its center.
-fn wheel(files: &Files) -> RobotCfg {
+fn wheel(files: &TempFiles) -> RobotCfg {
     let dynamics = r#"<dynamics damping="0.2" friction="0.05"/>"#;
     let spin = urdf::joint("spin", "continuous", ["post", "disc"], [0.0; 3], "0 1 0", dynamics);
     let disc = urdf::link("disc", 1.0, 0.5, [0.0; 3], "");
@@ -101,7 +101,7 @@ fn wheel(files: &Files) -> RobotCfg {
 #[test]
 fn wheels() {
     let mut sim = SimulationManager::new(cfg(4, 1)).unwrap();
-    let id = sim.add_robot(wheel(&Files::default())).unwrap();
+    let id = sim.add_robot(wheel(&TempFiles::default())).unwrap();
     let values: [(usize, Property, &str, &[f64]); 4] = [
         (1, Property::JointDamping, "wheel/spin", &[0.7]),
         (2, Property::DryFriction, "wheel/spin", &[0.11]),
@@ -130,7 +130,7 @@ fn lever(num_envs: usize, drive_type: DriveType) -> (SimulationManager, RobotId)
     let text = urdf::robot("lever", &format!("<link name=\"post\"/>{hinge}{bar}"));
     let drive = DriveCfg { drive_type, ..gains(500.0, 100.0) };
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(num_envs, 1) }).unwrap();
-    let id = sim.add_robot(RobotCfg { drive, ..text_robot(&Files::default(), "lever", &text) }).unwrap();
+    let id = sim.add_robot(RobotCfg { drive, ..text_robot(&TempFiles::default(), "lever", &text) }).unwrap();
     (sim, id)
 }
 
@@ -164,12 +164,12 @@ fn gains_per_environment() {
 /// and gains set at run time come from the snapshot. For the horizontal bar the drive gives kp q, the torque of the
 /// weight.
 #[test]
-fn drawn_gains_restored() {
+fn randomized_gains_after_restore() {
     for drive_type in [DriveType::Force, DriveType::Acceleration] {
         let (mut sim, id) = lever(3, drive_type);
         sim.robot_mut(id).set_damping(&array![[90.0]], None, ALL).unwrap();
         let start = sim.snapshot(ALL).unwrap();
-        let drawn = Randomization::new().with(Property::Stiffness, "lever/hinge", Draw::Scale([0.3, 0.6]));
+        let drawn = Randomization::new().with(Property::Stiffness, "lever/hinge", RandomizationOp::Scale([0.3, 0.6]));
         sim.properties_mut().randomize(&drawn, Some(&[EnvId(1), EnvId(2)])).unwrap();
         let kp: Vec<f64> = (0..3).map(|env| get(&sim, env, Property::Stiffness, "lever/hinge")[0]).collect();
         assert!(kp[1] < 0.7 * kp[0] && kp[2] < 0.7 * kp[0] && kp[1] != kp[2], "{kp:?}");
@@ -212,7 +212,7 @@ fn drawn_gains_restored() {
 /// restored, before and after it was itself restored. A gain that is set does not count as randomized, even if it is
 /// set to the randomized value.
 #[test]
-fn drawn_equal_to_set() {
+fn randomized_equal_to_set() {
     let (mut sim, id) = lever(2, DriveType::default());
     let start = sim.snapshot(ALL).unwrap();
     let [stiffness, damping, effort] = [200.0, 40.0, 30.0];
@@ -226,7 +226,7 @@ fn drawn_equal_to_set() {
         robot.set_damping(&array![[damping]], None, ALL).unwrap();
         robot.set_qf_limits(&array![[effort]], None, ALL).unwrap();
     };
-    let draw = |property, value| Randomization::new().with(property, "lever/hinge", Draw::Set([value; 2]));
+    let draw = |property, value| Randomization::new().with(property, "lever/hinge", RandomizationOp::Set([value; 2]));
     let draw_all = |sim: &mut SimulationManager| {
         let all = [(Property::Stiffness, stiffness), (Property::DriveDamping, damping), (Property::MaxEffort, effort)];
         for (property, value) in all {
@@ -261,12 +261,12 @@ fn drawn_equal_to_set() {
 /// Randomization is tracked by a record, not by value: it persists if the value is nominal, and through drive types in
 /// which the gain has no effect or another unit.
 #[test]
-fn drawn_across_drive_types() {
+fn randomized_across_drive_types() {
     let (mut sim, id) = lever(2, DriveType::default());
     let start = sim.snapshot(ALL).unwrap();
     sim.robot_mut(id).set_stiffness(&array![[200.0]], None, ALL).unwrap();
     let set = sim.snapshot(ALL).unwrap();
-    let draw = |value| Randomization::new().with(Property::Stiffness, "lever/hinge", Draw::Set([value; 2]));
+    let draw = |value| Randomization::new().with(Property::Stiffness, "lever/hinge", RandomizationOp::Set([value; 2]));
     let kp = |sim: &SimulationManager| [0, 1].map(|env| get(sim, env, Property::Stiffness, "lever/hinge")[0]);
     // 500 is nominal.
     for value in [500.0, 501.0] {
@@ -357,7 +357,7 @@ fn seeds() {
     assert_ne!(values(&eight, 1), values(&three, 1));
     eight.properties_mut().randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
     assert_eq!(values(&eight, 1), values(&three, 1));
-    let only = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]));
+    let only = Randomization::new().with(Property::Mass, "cube", RandomizationOp::Scale([0.8, 1.2]));
     three.properties_mut().randomize(&only, Some(&[EnvId(0)])).unwrap();
     assert_eq!(get(&three, 0, Property::Mass, "cube"), get(&eight, 0, Property::Mass, "cube"));
     // By a function: one random stream for each environment and call.
@@ -378,16 +378,16 @@ fn seeds() {
 #[test]
 fn memory() {
     let (mut sim, _) = world(cfg(4, 1));
-    let masses = Randomization::new().with(Property::Mass, "arm/.*", Draw::Scale([0.8, 1.2]));
-    let random = masses.with(Property::Friction, "ground", Draw::Set([0.5, 1.5]));
+    let masses = Randomization::new().with(Property::Mass, "arm/.*", RandomizationOp::Scale([0.8, 1.2]));
+    let random = masses.with(Property::Friction, "ground", RandomizationOp::Set([0.5, 1.5]));
     sim.properties_mut().randomize(&random, Some(&[EnvId(1)])).unwrap();
     let base = sim.batch().model().clone();
     let model = |sim: &SimulationManager, env| sim.batch().read(env, |env| env.data().model().clone());
     for env in [0, 2, 3] {
-        assert!(model(&sim, env).arrays_apart(&base).is_empty() && sim.properties().bytes(EnvId(env)).unwrap() == 0);
+        assert!(model(&sim, env).unshared_arrays(&base).is_empty() && sim.properties().bytes(EnvId(env)).unwrap() == 0);
     }
     let own = model(&sim, 1);
-    let mut apart = own.arrays_apart(&base);
+    let mut apart = own.unshared_arrays(&base);
     assert_eq!(own.own_arrays().map(|(name, _)| name).collect::<Vec<_>>(), apart);
     apart.retain(|name| !["tendon_invweight0", "actuator_acc0", "light_poscom0"].contains(name));
     let (bodies, others) = (
@@ -414,7 +414,7 @@ fn memory() {
 
     // Nominal again: everything is shared, and the simulation continues as without the randomization.
     sim.properties_mut().reset(ALL).unwrap();
-    assert!(model(&sim, 1).arrays_apart(&base).is_empty() && sim.properties().bytes(EnvId(1)).unwrap() == 0);
+    assert!(model(&sim, 1).unshared_arrays(&base).is_empty() && sim.properties().bytes(EnvId(1)).unwrap() == 0);
     let (mut other, _) = world(cfg(4, 1));
     sim.update(200);
     other.update(200);
@@ -436,7 +436,10 @@ fn growing_buffers() {
     assert!(arrays.len() > 8);
     let gravity = get(&sim, 0, Property::Gravity, "gravity");
     sim.update(150);
-    assert!(sim.warnings().buffer_growths() > growths || TARGET == Target::V4, "the arena of 4.x is large enough");
+    assert!(
+        sim.warnings().buffer_growths() > growths || BUILD_VERSION == SupportedVersion::V4,
+        "the arena of 4.x is large enough"
+    );
     sim.reset(None).unwrap();
     assert_eq!(all_values(&sim), drawn);
     assert_eq!(own(&sim, 0), arrays);
@@ -499,7 +502,7 @@ fn snapshots_and_rollouts() {
     }
     let end = all_bits(&sim);
     let (mut fresh, _) = build();
-    fresh.restore(&rollout.end, ALL).unwrap();
+    fresh.restore(&rollout.final_states, ALL).unwrap();
     assert!(all_bits(&fresh) == end);
     fresh.restore(&snapshot, ALL).unwrap();
     let again = fresh.rollout(&controls, None, ALL).unwrap();
@@ -514,15 +517,15 @@ fn mistakes() {
     let (mut sim, _) = world(cfg(2, 1));
     let before = all_bits(&sim);
     for (property, name, draw, expected) in [
-        (Property::Mass, "cube", Draw::Add([-2.0, -1.0]), "kg"),
-        (Property::Mass, "cube", Draw::Set([5e-16, 5e-16]), "at least 1e-15 kg"),
+        (Property::Mass, "cube", RandomizationOp::Add([-2.0, -1.0]), "kg"),
+        (Property::Mass, "cube", RandomizationOp::Set([5e-16, 5e-16]), "at least 1e-15 kg"),
         // Such a mass is allowed, but not the moments that scale with it here.
-        (Property::Mass, "cube", Draw::Set([2e-15, 2e-15]), "moments of inertia must be positive"),
-        (Property::Inertia, "cube", Draw::Add([-1.0, -1.0]), "positive"),
-        (Property::Friction, "ground", Draw::Set([-0.1, -0.1]), ">= 0"),
-        (Property::JointDamping, "machine/hinge", Draw::Set([-1.0, -1.0]), ">= 0"),
-        (Property::Armature, "arm/JOINT1", Draw::Set([-1.0, -1.0]), ">= 0"),
-        (Property::MaxEffort, "arm/JOINT1", Draw::Set([-1.0, -1.0]), ">= 0"),
+        (Property::Mass, "cube", RandomizationOp::Set([2e-15, 2e-15]), "moments of inertia must be positive"),
+        (Property::Inertia, "cube", RandomizationOp::Add([-1.0, -1.0]), "positive"),
+        (Property::Friction, "ground", RandomizationOp::Set([-0.1, -0.1]), ">= 0"),
+        (Property::JointDamping, "machine/hinge", RandomizationOp::Set([-1.0, -1.0]), ">= 0"),
+        (Property::Armature, "arm/JOINT1", RandomizationOp::Set([-1.0, -1.0]), ">= 0"),
+        (Property::MaxEffort, "arm/JOINT1", RandomizationOp::Set([-1.0, -1.0]), ">= 0"),
     ] {
         let done = sim.properties_mut().randomize(&Randomization::new().with(property, name, draw), ALL);
         let Err(Error::Randomization(fault)) = done else { panic!("{property:?}: {done:?}") };
@@ -530,7 +533,7 @@ fn mistakes() {
         assert!(fault.to_string().contains(expected), "{fault}");
     }
     let mass = |pattern: &str, draw| Randomization::new().with(Property::Mass, pattern, draw);
-    let [range, reach] = [Draw::Scale([1.0, 1.0]), Draw::Add([0.0, 1.0])];
+    let [range, reach] = [RandomizationOp::Scale([1.0, 1.0]), RandomizationOp::Add([0.0, 1.0])];
     assert_error(sim.properties_mut().randomize(&mass("cub", range), ALL), "Randomization(Pattern", &["\"cube\""]);
     assert_error(
         sim.properties_mut().randomize(&mass("cube", range).with(Property::Mass, "c.*", reach), ALL),
@@ -538,10 +541,15 @@ fn mistakes() {
         &["both"],
     );
     for range in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
-        assert_error(sim.properties_mut().randomize(&mass("cube", Draw::Set(range)), ALL), "Randomization(Range", &[]);
+        assert_error(
+            sim.properties_mut().randomize(&mass("cube", RandomizationOp::Set(range)), ALL),
+            "Randomization(Range",
+            &[],
+        );
     }
     // Joints whose implicit drive uses the friction row, and the free joint of an object, do not have this property.
-    let none = Randomization::new().with(Property::DryFriction, "arm/JOINT1|cube/free", Draw::Set([1.0, 1.0]));
+    let none =
+        Randomization::new().with(Property::DryFriction, "arm/JOINT1|cube/free", RandomizationOp::Set([1.0, 1.0]));
     assert_error(sim.properties_mut().randomize(&none, ALL), "Randomization(Pattern { property: \"dry_friction\"", &[]);
     type Set = (Property, &'static str, &'static [f64]);
     let mut set = |(property, name, values): Set| {
@@ -575,16 +583,16 @@ fn mistakes() {
 /// 4.x keeps only the diagonal of the inertia matrix of a free body whose center of mass is at its origin, unless the
 /// file disables this; the objects of the scene disable it.
 #[test]
-fn centred_body_of_file() {
+fn centered_body_of_file() {
     let (mut sim, _) = world(cfg(2, 1));
     let text = r#"<mujoco><worldbody><body name="ball" pos="3 3 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("file", text)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("file", text)).unwrap();
     let set = |sim: &mut SimulationManager, name: &str| {
         sim.properties_mut()
             .randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::CenterOfMass, name, &[0.03, 0.0, 0.0]))
     };
     let moved = set(&mut sim, "file/ball");
-    if TARGET == Target::V4 {
+    if BUILD_VERSION == SupportedVersion::V4 {
         let Err(Error::Randomization(fault)) = moved else { panic!("{moved:?}") };
         assert!(matches!(&fault, RandomizationError::DiagonalInertia { env: 1, name } if name == "file/ball"));
     } else {
@@ -594,7 +602,7 @@ fn centred_body_of_file() {
 }
 
 #[test]
-fn centred_object() {
+fn centered_object() {
     let (mut sim, ids) = world(cfg(2, 1));
     set(&mut sim, &[(1, Property::CenterOfMass, "cube", &[0.03, 0.0, 0.0])]);
     // Free fall without spin: a force at the center of mass causes no rotation, and the origin rotates about the
@@ -616,8 +624,8 @@ fn centred_object() {
 /// The forward pass after a randomization is delayed until the next read or step; the delay does not change a bit.
 #[test]
 fn lazy_forward_pass() {
-    let masses = Randomization::new().with(Property::Mass, ".*", Draw::Scale([0.5, 2.0]));
-    let drawn = masses.with(Property::Friction, ".*", Draw::Scale([0.5, 1.5]));
+    let masses = Randomization::new().with(Property::Mass, ".*", RandomizationOp::Scale([0.5, 2.0]));
+    let drawn = masses.with(Property::Friction, ".*", RandomizationOp::Scale([0.5, 1.5]));
     let run = |draws: bool, read: bool, reset: bool| {
         let (mut sim, ids) = world(cfg(3, 2));
         sim.update(50);

@@ -44,24 +44,24 @@ fn steps_by_hand() {
         assert_eq!((sim.warnings().counts(), sim.mjcf_part(ids.machine).actuator_force()), (warnings, forces));
         assert!(rollout.diverged.is_empty());
 
-        let present = sim.snapshot(ALL).unwrap();
+        let current = sim.snapshot(ALL).unwrap();
         for t in 0..STEPS {
             step(&mut sim, ids, &controls, t);
             assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
         }
         let end = all_bits(&sim);
         // The end is a state that can be restored.
-        sim.restore(&rollout.end, ALL).unwrap();
+        sim.restore(&rollout.final_states, ALL).unwrap();
         assert_eq!(all_bits(&sim), end);
 
         // From a snapshot, independent of the current state; and many rows in one environment.
-        let again = sim.rollout(&controls, Some(&present), ALL).unwrap();
+        let again = sim.rollout(&controls, Some(&current), ALL).unwrap();
         assert!(again.states == rollout.states);
-        sim.restore(&present, ALL).unwrap();
+        sim.restore(&current, ALL).unwrap();
         let many = sim.rollout(&controls, None, Some(&[EnvId(1); 3])).unwrap();
         assert!(many.states.index_axis(Axis(0), 1) == rollout.states.index_axis(Axis(0), 1));
         assert!(many.states.index_axis(Axis(0), 0) != rollout.states.index_axis(Axis(0), 0), "another start");
-        assert_eq!(many.end.env_ids(), [EnvId(1); 3]);
+        assert_eq!(many.final_states.env_ids(), [EnvId(1); 3]);
         // One row of controls for all.
         let one = sim.rollout(controls.slice(s![..1, .., ..]), None, ALL).unwrap();
         assert!(one.states.index_axis(Axis(0), 0) == rollout.states.index_axis(Axis(0), 0));
@@ -93,7 +93,7 @@ fn names() {
 fn clamped_targets() {
     let (mut sim, ids) = world(cfg(1, 1));
     let rollout = sim.rollout(&Array3::from_elem((1, 5, 7), 100.0), None, ALL).unwrap();
-    sim.restore(&rollout.end, ALL).unwrap();
+    sim.restore(&rollout.final_states, ALL).unwrap();
     let limits = sim.robot(ids.arm).qpos_limits();
     assert_eq!(sim.robot(ids.arm).qpos_target().row(0), limits.slice(s![0, .., 1]));
 }
@@ -118,12 +118,12 @@ fn limits_of_start() {
             assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
         }
         let end = all_bits(&sim);
-        sim.restore(&rollout.end, ALL).unwrap();
+        sim.restore(&rollout.final_states, ALL).unwrap();
         assert_eq!(all_bits(&sim), end);
         let (targets, limits) = (sim.robot(ids.arm).qpos_target(), sim.robot(ids.arm).qpos_limits());
         for ((env, joint), target) in targets.indexed_iter() {
-            let asked = controls[(env, STEPS - 1, joint)];
-            assert_eq!(*target, asked.clamp(limits[(env, joint, 0)], limits[(env, joint, 1)]));
+            let requested = controls[(env, STEPS - 1, joint)];
+            assert_eq!(*target, requested.clamp(limits[(env, joint, 0)], limits[(env, joint, 1)]));
         }
         // The limits matter here: the last controls exceed the tight limits of environment 1.
         let is_tight = start.is_none_or(|start| std::ptr::eq(start, &narrow));
@@ -144,7 +144,7 @@ fn diverged_row() {
     let text = r#"<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body>
         </worldbody><actuator><motor name="push" joint="x" gear="1000000"/></actuator></mujoco>"#;
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(2, 2) }).unwrap();
-    sim.add_mjcf(MjcfCfg::text("slider", text)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("slider", text)).unwrap();
     let mut controls = Array3::from_elem((2, 6, 1), 1e-6);
     controls[(0, 3, 0)] = 1e6;
     let rollout = sim.rollout(&controls, None, ALL).unwrap();
@@ -157,7 +157,7 @@ fn diverged_row() {
     assert!((rollout.states[(1, 5, 1)] - 0.06).abs() < 1e-12);
     assert!((rollout.states[(1, 5, 0)] - 21.0 * 1e-4).abs() < 1e-12);
     assert!(sim.diverged().is_empty());
-    sim.restore(&rollout.end, ALL).unwrap();
+    sim.restore(&rollout.final_states, ALL).unwrap();
     assert_eq!(sim.diverged().len(), 1);
 }
 

@@ -14,9 +14,9 @@ fn run(num_envs: usize, shard: Shard, first: usize) -> Vec<(Vec<u64>, Vec<u64>)>
     let sampling = SamplingCfg { noise, ..SamplingCfg::every(0.03) };
     let sensor = sim.add_sensor("joints", JointStateCfg { sampling, ..Default::default() }).unwrap();
     let random = Randomization::new()
-        .with(Property::Mass, "arm/.*|cube", Draw::Scale([0.7, 1.3]))
-        .with(Property::Friction, "cube|ground", Draw::Set([0.3, 1.0]))
-        .with(Property::Gravity, "gravity", Draw::Add([-0.3, 0.3]));
+        .with(Property::Mass, "arm/.*|cube", RandomizationOp::Scale([0.7, 1.3]))
+        .with(Property::Friction, "cube|ground", RandomizationOp::Set([0.3, 1.0]))
+        .with(Property::Gravity, "gravity", RandomizationOp::Add([-0.3, 0.3]));
     sim.properties_mut().randomize(&random, None).unwrap();
     sim.update(50);
     // The environments with the global indices 1 and 6 are reset and randomized again.
@@ -26,9 +26,9 @@ fn run(num_envs: usize, shard: Shard, first: usize) -> Vec<(Vec<u64>, Vec<u64>)>
     sim.properties_mut().randomize(&random, Some(&again)).unwrap();
     sim.update(70);
     let read = sim.sensor(sensor).unwrap();
-    let said = |env| bits(read.positions().row(env));
+    let measured = |env| bits(read.positions().row(env));
     assert!(sim.rigid_object(ids.cube).nominal_mass() > 0.0);
-    all_bits(&sim).into_iter().enumerate().map(|(env, state)| (state, said(env))).collect()
+    all_bits(&sim).into_iter().enumerate().map(|(env, state)| (state, measured(env))).collect()
 }
 
 /// The world of these tests with the same commands in every environment.

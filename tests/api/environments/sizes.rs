@@ -26,7 +26,7 @@ fn world() -> SimulationManager {
     let init_pose = Pose::translation(-9.0, 0.0, 0.0);
     let hills = TerrainCfg { uid: "hills".into(), heights, size: [2.0; 2], init_pose, ..Default::default() };
     sim.add_terrain(hills).unwrap();
-    sim.add_mjcf(MjcfCfg::text("part", PART)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("part", PART)).unwrap();
     sim
 }
 
@@ -47,24 +47,24 @@ fn without_size() {
     ];
     for (name, parts) in cases {
         let properties = sim.properties().of(EnvId(1)).unwrap();
-        let drawn = Randomization::new().with(Property::Size, name, Draw::Scale([0.9, 1.1]));
+        let randomization = Randomization::new().with(Property::Size, name, RandomizationOp::Scale([0.9, 1.1]));
         let errors = [
             properties.get(Property::Size, name).unwrap_err(),
             properties.nominal(Property::Size, name).unwrap_err(),
-            sim.properties_mut().randomize(&drawn, None).unwrap_err(),
+            sim.properties_mut().randomize(&randomization, None).unwrap_err(),
             sim.properties_mut()
                 .randomize_with(None, |_, _, all| all.set(Property::Size, name, &[0.1; 3]))
                 .unwrap_err(),
         ];
         for error in errors {
-            let Error::Randomization(RandomizationError::Unsized { name: of, .. }) = &error else {
+            let Error::Randomization(RandomizationError::NoSizeProperty { name: of, .. }) = &error else {
                 panic!("{error:?}")
             };
             assert!(of == name && parts.iter().all(|part| error.to_string().contains(part)), "{error}");
         }
     }
     // An unknown name is a different error.
-    let typo = Randomization::new().with(Property::Size, "cubes", Draw::Scale([0.9, 1.1]));
+    let typo = Randomization::new().with(Property::Size, "cubes", RandomizationOp::Scale([0.9, 1.1]));
     let error = sim.properties_mut().randomize(&typo, None).unwrap_err();
     assert!(matches!(error, Error::Randomization(RandomizationError::Pattern { .. })), "{error:?}");
     assert!(sim.properties().of(EnvId(0)).unwrap().get(Property::Size, "cubes").is_err());
@@ -74,7 +74,7 @@ fn without_size() {
 #[test]
 fn mixed_patterns() {
     let mut sim = world();
-    let drawn = Randomization::new().with(Property::Size, "c.*|part/both", Draw::Scale([1.2, 1.2]));
+    let drawn = Randomization::new().with(Property::Size, "c.*|part/both", RandomizationOp::Scale([1.2, 1.2]));
     sim.properties_mut().randomize(&drawn, Some(&[EnvId(1)])).unwrap();
     // Half lengths of 0.05 and 0.1 m, times the factor.
     for (name, half) in [("cube", 0.05), ("part/both", 0.1)] {

@@ -5,10 +5,10 @@ use super::worlds::{ALL, all_bits, all_properties, all_values, arm, bits_of, cfg
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::JointStateCfg;
-use kinetoscope::sim::{Cone, DelayedPd, DriveType, Error, Integrator, Snapshot, SnapshotError, WrenchFrame};
+use kinetoscope::sim::{DelayedPd, DriveType, Error, FrictionCone, Integrator, Snapshot, SnapshotError, WrenchFrame};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::text_robot;
 
 /// A snapshot after 500 steps, with the bits at that time and 300 steps later.
@@ -25,7 +25,7 @@ fn run(settings: SimulationManagerCfg) -> (SimulationManager, Snapshot, Vec<Vec<
 
 #[test]
 fn same_bits() {
-    for settings in [cfg(3, 2), SimulationManagerCfg { cone: Cone::Elliptic, substeps: 2, ..cfg(3, 1) }] {
+    for settings in [cfg(3, 2), SimulationManagerCfg { cone: FrictionCone::Elliptic, substeps: 2, ..cfg(3, 1) }] {
         let (mut sim, snapshot, there, end) = run(settings.clone());
         sim.restore(&snapshot, ALL).unwrap();
         assert!(all_bits(&sim) == there, "the state is back");
@@ -103,7 +103,7 @@ fn bad_files() {
         }
     };
     assert!(matches!(fault(&good[..good.len() / 2]), SnapshotError::Truncated { .. }));
-    assert!(matches!(fault(b"{\"json\": true}"), SnapshotError::Foreign { .. }));
+    assert!(matches!(fault(b"{\"json\": true}"), SnapshotError::NotASnapshot { .. }));
     let mut bytes = good.clone();
     bytes[good.len() / 2] ^= 0x10;
     assert!(matches!(fault(&bytes), SnapshotError::Damaged { .. }));
@@ -126,7 +126,7 @@ fn other_scenes() {
     assert_error(other.restore(&snapshot, ALL), "Snapshot(OtherScene", &["arm/", "leg/"]);
     let two = Some(&[EnvId(0), EnvId(1)][..]);
     let count = sim.restore(&snapshot, two);
-    assert!(matches!(count, Err(Error::Snapshot(SnapshotError::Count { held: 3, wanted: 2 }))), "{count:?}");
+    assert!(matches!(count, Err(Error::Snapshot(SnapshotError::EnvCount { saved: 3, requested: 2 }))), "{count:?}");
     let unknown = sim.snapshot(Some(&[EnvId(3)]));
     assert!(matches!(unknown, Err(Error::UnknownIndex { index: 3, .. })));
     let mut few = SimulationManager::new(cfg(2, 1)).unwrap();
@@ -155,7 +155,7 @@ fn other_settings() {
         // The same MuJoCo steps, but two of them per update.
         (SimulationManagerCfg { physics_dt: 0.02, substeps: 2, ..cfg(1, 1) }, "2 substeps"),
         (SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg(1, 1) }, "RK4"),
-        (SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(1, 1) }, "elliptic"),
+        (SimulationManagerCfg { cone: FrictionCone::Elliptic, ..cfg(1, 1) }, "elliptic"),
     ];
     for (settings, what) in others {
         assert_error(build(settings).restore(&snapshot, ALL), "Snapshot(OtherScene", &[what]);
@@ -167,7 +167,7 @@ fn other_settings() {
 
 #[test]
 fn diverged() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let spin = urdf::joint("spin", "continuous", ["post", "disc"], [0.0; 3], "0 1 0", "");
     let disc = urdf::link("disc", 1.0, 0.01, [0.1, 0.0, 0.0], "");
     let wheel = urdf::robot("wheel", &format!("<link name=\"post\"/>{spin}{disc}"));
@@ -284,14 +284,14 @@ fn with_properties() {
     sim.properties_mut().randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
     sim.robot_mut(ids.arm).set_damping(&array![[77.0, 78.0, 79.0, 80.0, 81.0, 82.0]], None, Some(&[EnvId(2)])).unwrap();
     sim.update(120);
-    let (snapshot, there, had) = (sim.snapshot(ALL).unwrap(), all_bits(&sim), all_values(&sim));
+    let (snapshot, there, properties_at_snapshot) = (sim.snapshot(ALL).unwrap(), all_bits(&sim), all_values(&sim));
     snapshot.save(&path).unwrap();
     let stiffness = sim.robot(ids.arm).stiffness();
     sim.update(80);
     let end = all_bits(&sim);
     sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
     let next = all_values(&sim);
-    assert!(had != next && (0..3).all(|env| had[env] != next[env]));
+    assert!(properties_at_snapshot != next && (0..3).all(|env| properties_at_snapshot[env] != next[env]));
     // In the same manager, from memory, after other properties; in another manager, from the file, after another
     // randomization.
     let (mut fresh, _) = world(cfg(3, 1));
@@ -299,7 +299,7 @@ fn with_properties() {
     let loaded = Snapshot::load(&path).unwrap();
     for (sim, snapshot) in [(&mut sim, &snapshot), (&mut fresh, &loaded)] {
         sim.properties_mut().restore(snapshot, ALL).unwrap();
-        assert!(all_bits(sim) == there && all_values(sim) == had, "back, in every bit");
+        assert!(all_bits(sim) == there && all_values(sim) == properties_at_snapshot, "back, in every bit");
         assert_eq!(sim.properties().bytes(EnvId(1)).unwrap(), 0, "what was nominal is shared again");
         sim.update(80);
         assert!(all_bits(sim) == end, "and goes on as before");
@@ -313,21 +313,27 @@ fn with_properties() {
     // Control: a plain restore leaves properties unchanged, and the states differ.
     sim.properties_mut().reset(ALL).unwrap();
     sim.restore(&snapshot, ALL).unwrap();
-    assert!(all_values(&sim) != had);
+    assert!(all_values(&sim) != properties_at_snapshot);
     sim.update(80);
     assert!(all_bits(&sim) != end);
     // Into other environments: each gets the properties of the snapshot's row.
     let now = sim.snapshot(ALL).unwrap();
     sim.properties_mut().restore(&now, ALL).unwrap();
     fresh.properties_mut().restore(&loaded, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
-    assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
+    assert_eq!(
+        all_values(&fresh),
+        [properties_at_snapshot[2].clone(), properties_at_snapshot[1].clone(), properties_at_snapshot[0].clone()]
+    );
     fresh.update(80);
     assert!(all_bits(&fresh) == [end[2].clone(), end[1].clone(), end[0].clone()]);
     // The end of a rollout includes the properties of the rollout.
     let rollout = fresh.rollout(&Array3::zeros((1, 5, 7)), None, ALL).unwrap();
     fresh.properties_mut().reset(ALL).unwrap();
-    fresh.properties_mut().restore(&rollout.end, ALL).unwrap();
-    assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
+    fresh.properties_mut().restore(&rollout.final_states, ALL).unwrap();
+    assert_eq!(
+        all_values(&fresh),
+        [properties_at_snapshot[2].clone(), properties_at_snapshot[1].clone(), properties_at_snapshot[0].clone()]
+    );
 }
 
 /// A scene with the same states in which an entity lacks the property is refused as another scene, and nothing changes.

@@ -2,8 +2,8 @@
 
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::env::Env;
-use kinetoscope::sim::{MjcfId, ObjectId};
+use kinetoscope::sim::env::SimEnv;
+use kinetoscope::sim::{MjcfId, RigidObjectId};
 use kinetoscope_testkit::bits::bits;
 pub(crate) use kinetoscope_testkit::worlds::cfg;
 
@@ -29,7 +29,7 @@ const MACHINE: &str = r#"<mujoco><worldbody>
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ids {
     pub(crate) arm: RobotId,
-    pub(crate) cube: ObjectId,
+    pub(crate) cube: RigidObjectId,
     pub(crate) machine: MjcfId,
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) 
     let ids = Ids {
         arm: sim.add_robot(arm()).unwrap(),
         cube: sim.add_rigid_object(cube("cube", 0.5, [0.3, 0.5, 0.4])).unwrap(),
-        machine: sim.add_mjcf(MjcfCfg::text("machine", MACHINE)).unwrap(),
+        machine: sim.add_mjcf(MjcfPartCfg::text("machine", MACHINE)).unwrap(),
     };
     for k in 0..4 {
         sim.add_rigid_object(cube(&format!("pile{k}"), 0.2, [-1.0, 0.2 * f64::from(k), 0.06])).unwrap();
@@ -61,7 +61,7 @@ pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) 
 }
 
 /// Bits of everything that determines the next step, and of the efforts of the drives.
-pub(crate) fn bits_of(env: &Env) -> Vec<u64> {
+pub(crate) fn bits_of(env: &SimEnv) -> Vec<u64> {
     let (data, drives) = (env.data(), &env.drives);
     let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart()];
     let inputs = [data.ctrl(), data.xfrc_applied(), data.mocap_pos(), data.mocap_quat()];
@@ -103,18 +103,18 @@ pub(crate) fn fewest_contacts(sim: &SimulationManager) -> usize {
 /// A randomization of every property that can differ between environments.
 pub(crate) fn all_properties() -> Randomization {
     Randomization::new()
-        .with(Property::Mass, "arm/.*|cube|machine/.*", Draw::Scale([0.8, 1.2]))
-        .with(Property::CenterOfMass, "arm/link[1-6]|machine/tip", Draw::Add([-0.01, 0.01]))
-        .with(Property::Inertia, "arm/.*", Draw::Scale([0.9, 1.1]))
-        .with(Property::Friction, "cube|pile.|ground", Draw::Set([0.4, 1.1]))
-        .with(Property::JointDamping, "arm/.*|machine/hinge", Draw::Set([0.1, 2.0]))
-        .with(Property::DryFriction, "machine/hinge", Draw::Set([0.01, 0.05]))
-        .with(Property::Armature, "arm/.*", Draw::Set([0.0, 0.1]))
-        .with(Property::Gravity, "gravity", Draw::Add([-0.2, 0.2]))
-        .with(Property::Stiffness, "arm/JOINT[1-3]", Draw::Scale([0.7, 1.3]))
-        .with(Property::MaxEffort, "arm/JOINT4", Draw::Scale([0.5, 1.0]))
-        .with(Property::Size, "pile.", Draw::Scale([0.8, 1.0]))
-        .with(Property::Color, "cube", Draw::Set([0.1, 0.9]))
+        .with(Property::Mass, "arm/.*|cube|machine/.*", RandomizationOp::Scale([0.8, 1.2]))
+        .with(Property::CenterOfMass, "arm/link[1-6]|machine/tip", RandomizationOp::Add([-0.01, 0.01]))
+        .with(Property::Inertia, "arm/.*", RandomizationOp::Scale([0.9, 1.1]))
+        .with(Property::Friction, "cube|pile.|ground", RandomizationOp::Set([0.4, 1.1]))
+        .with(Property::JointDamping, "arm/.*|machine/hinge", RandomizationOp::Set([0.1, 2.0]))
+        .with(Property::DryFriction, "machine/hinge", RandomizationOp::Set([0.01, 0.05]))
+        .with(Property::Armature, "arm/.*", RandomizationOp::Set([0.0, 0.1]))
+        .with(Property::Gravity, "gravity", RandomizationOp::Add([-0.2, 0.2]))
+        .with(Property::Stiffness, "arm/JOINT[1-3]", RandomizationOp::Scale([0.7, 1.3]))
+        .with(Property::MaxEffort, "arm/JOINT4", RandomizationOp::Scale([0.5, 1.0]))
+        .with(Property::Size, "pile.", RandomizationOp::Scale([0.8, 1.0]))
+        .with(Property::Color, "cube", RandomizationOp::Set([0.1, 0.9]))
 }
 
 /// Names and bits of all properties of an environment.

@@ -3,7 +3,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::robot::kinematics::{IkCfg, Posture, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, NullSpacePosture, TipFrame};
 use kinetoscope_testkit::urdf::joint;
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};
@@ -25,17 +25,17 @@ fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
     let start = sim.robot(id).default_qpos();
     let mut solved = 0;
     for at in 0..targets {
-        let target = placed(&mut sim, id, &reachable.select(Axis(0), &[at]), link);
+        let target = mujoco_link_poses(&mut sim, id, &reachable.select(Axis(0), &[at]), link);
         // The start is the robot's state, or given explicitly.
         if !at_limits {
-            placed(&mut sim, id, &start, link);
+            mujoco_link_poses(&mut sim, id, &start, link);
         }
-        let (tip, initial) = (Tip::of_part("arm").at(link), at_limits.then_some(start.view()));
+        let (tip, initial) = (TipFrame::of_part("arm").at(link), at_limits.then_some(start.view()));
         let found = sim.robot(id).compute_ik(&target, tip, &IkCfg::default(), initial, None).unwrap();
         for (joint, &q) in found.qpos.iter().enumerate() {
             assert!(q >= limits[(0, joint, 0)] && q <= limits[(0, joint, 1)], "{name}: joint {joint} at {q}");
         }
-        let (far, turned) = apart(&placed(&mut sim, id, &found.qpos, link), &target);
+        let (far, turned) = max_pose_difference(&mujoco_link_poses(&mut sim, id, &found.qpos, link), &target);
         assert!((far - found.position_error[0]).abs() < 1e-12 && (turned - found.rotation_error[0]).abs() < 1e-12);
         assert_eq!(reaches((far, turned)), found.success[0], "{name}, target {at}: {far} m, {turned} rad");
         solved += usize::from(found.success[0]);
@@ -43,8 +43,8 @@ fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
     println!("{name}: {solved} of {targets} solved");
     assert!(solved >= targets * 99 / 100, "{name}: {solved} of {targets}");
     // Control: the default position itself is not a solution.
-    let first = placed(&mut sim, id, &reachable.select(Axis(0), &[0]), link);
-    let (far, _) = apart(&placed(&mut sim, id, &start, link), &first);
+    let first = mujoco_link_poses(&mut sim, id, &reachable.select(Axis(0), &[0]), link);
+    let (far, _) = max_pose_difference(&mujoco_link_poses(&mut sim, id, &start, link), &first);
     assert!(far > 0.01, "{name}: {far}");
 }
 
@@ -102,13 +102,13 @@ fn followers() {
     ];
     let (mut sim, id) = built(1, &["root", "1", "2", "3", "4"], &joints);
     for there in random_qpos(&sim, id, 30, 5).rows() {
-        let target = placed(&mut sim, id, &there.to_owned().insert_axis(Axis(0)), "4");
+        let target = mujoco_link_poses(&mut sim, id, &there.to_owned().insert_axis(Axis(0)), "4");
         sim.reset(None).unwrap();
         let found = sim.robot(id).compute_ik(&target, "arm", &IkCfg::default(), None, None).unwrap();
         assert!(found.success[0], "{there}: {found:?}");
         assert_eq!(found.qpos[(0, 1)], 0.8 * found.qpos[(0, 0)] + 0.1);
         assert!(found.qpos.iter().take(3).all(|q| q.abs() <= 1.5 + 1e-12));
-        let off = apart(&placed(&mut sim, id, &found.qpos, "4"), &target);
+        let off = max_pose_difference(&mujoco_link_poses(&mut sim, id, &found.qpos, "4"), &target);
         assert!(reaches(off), "{off:?}");
     }
 }
@@ -134,7 +134,7 @@ fn batch_order() {
     let (sim, id) = simulation(8, seven_axes());
     let robot = sim.robot(id);
     let targets = robot.compute_fk(&random_qpos(&sim, id, 8, 51), "arm", None).unwrap();
-    let cfg = IkCfg { posture: Some(Posture::at([0.1; 7])), ..Default::default() };
+    let cfg = IkCfg { posture: Some(NullSpacePosture::at([0.1; 7])), ..Default::default() };
     let whole = robot.compute_ik(&targets, "arm", &cfg, None, None).unwrap();
     assert_eq!(whole, robot.compute_ik(&targets, "arm", &cfg, None, None).unwrap());
     let order = [5, 0, 7, 3];
@@ -144,7 +144,7 @@ fn batch_order() {
         assert_eq!(some.position_error[k].to_bits(), whole.position_error[env].to_bits());
         // Another environment, in a simulation with only this one, and a typed pose.
         let (alone, id) = simulation(1, seven_axes());
-        let one = alone.robot(id).compute_ik(&[pose_in(&targets, env)], "arm", &cfg, None, None).unwrap();
+        let one = alone.robot(id).compute_ik(&[pose_of_row(&targets, env)], "arm", &cfg, None, None).unwrap();
         let expected = (whole.qpos.row(env), whole.seed[env], whole.iterations[env]);
         assert_eq!((one.qpos.row(0), one.seed[0], one.iterations[0]), expected);
     }
@@ -171,10 +171,13 @@ fn moving_roots() {
     assert!(found.success.iter().all(|success| *success), "{found:?}");
     assert!(found.qpos.row(0) != found.qpos.row(1));
     let all = target.select(Axis(0), &[0, 0, 0]);
-    let off = apart(&placed(&mut sim, id, &found.qpos, "link8"), &all);
+    let off = max_pose_difference(&mujoco_link_poses(&mut sim, id, &found.qpos, "link8"), &all);
     assert!(reaches(off), "{off:?}");
     // Control: the solution for one root is wrong for another.
-    assert!(apart(&placed(&mut sim, id, &found.qpos.select(Axis(0), &[0, 0, 0]), "link8"), &all).0 > 0.05);
+    assert!(
+        max_pose_difference(&mujoco_link_poses(&mut sim, id, &found.qpos.select(Axis(0), &[0, 0, 0]), "link8"), &all).0
+            > 0.05
+    );
 }
 
 /// Computations do not change the state.
@@ -198,7 +201,7 @@ fn distance(qpos: &Array2<f64>) -> f64 {
 
 /// The null-space motion of the joints: the singular vector of the vanishing singular value of the Jacobian; and the
 /// smallest remaining singular value.
-fn self_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec<f64>, f64) {
+fn null_space_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec<f64>, f64) {
     let jacobian = sim.robot(id).jacobian("arm", Some(qpos.view()), None).unwrap();
     let svd = DMatrix::from_fn(7, 7, |row, k| if row < 6 { jacobian[(0, row, k)] } else { 0.0 }).svd(false, true);
     let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
@@ -212,16 +215,16 @@ fn self_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec
 #[test]
 fn posture() {
     let (mut sim, id) = simulation(1, seven_axes());
-    let with = IkCfg { posture: Some(Posture::at(READY)), max_iterations: 1000, ..Default::default() };
+    let with = IkCfg { posture: Some(NullSpacePosture::at(READY)), max_iterations: 1000, ..Default::default() };
     let limits = sim.robot(id).qpos_limits();
     let (mut nearer, mut still, mut stuck) = (0, 0, 0);
     for there in random_qpos(&sim, id, 100, 41).rows() {
-        let target = placed(&mut sim, id, &there.to_owned().insert_axis(Axis(0)), "link8");
+        let target = mujoco_link_poses(&mut sim, id, &there.to_owned().insert_axis(Axis(0)), "link8");
         sim.reset(None).unwrap();
         let [a, b] =
             [&IkCfg::default(), &with].map(|cfg| sim.robot(id).compute_ik(&target, "arm", cfg, None, None).unwrap());
         assert!(a.success[0] && b.success[0], "{a:?} {b:?}");
-        let off = apart(&placed(&mut sim, id, &b.qpos, "link8"), &target);
+        let off = max_pose_difference(&mujoco_link_poses(&mut sim, id, &b.qpos, "link8"), &target);
         assert!(reaches(off), "the posture costs the target: {off:?}");
         assert!(distance(&b.qpos) <= distance(&a.qpos) + 1e-3, "{} {}", distance(&b.qpos), distance(&a.qpos));
         nearer += usize::from(distance(&b.qpos) < distance(&a.qpos) - 0.05);
@@ -229,10 +232,10 @@ fn posture() {
         let room = |k: usize, q: f64| (q - limits[(0, k, 0)]).min(limits[(0, k, 1)] - q);
         let at_limit = b.qpos.iter().enumerate().any(|(k, &q)| room(k, q) < 1e-3);
         let [before, slope] = [&a.qpos, &b.qpos].map(|qpos| {
-            let (along, _) = self_motion(&sim, id, qpos);
+            let (along, _) = null_space_motion(&sim, id, qpos);
             (0..7).map(|k| along[k] * (READY[k] - qpos[(0, k)])).sum::<f64>()
         });
-        if at_limit || self_motion(&sim, id, &b.qpos).1 < 5e-3 {
+        if at_limit || null_space_motion(&sim, id, &b.qpos).1 < 5e-3 {
             stuck += 1;
         } else {
             assert!(slope.abs() < 1e-3, "it could go on: {slope} (without a posture {before})");
@@ -247,7 +250,7 @@ fn posture() {
 fn posture_gains() {
     let (sim, id) = simulation(1, seven_axes());
     let target = sim.robot(id).compute_fk(&random_qpos(&sim, id, 1, 41), "arm", None).unwrap();
-    let gain = |gain| Some(Posture { gain, ..Posture::at(READY) });
+    let gain = |gain| Some(NullSpacePosture { gain, ..NullSpacePosture::at(READY) });
     let [none, small, whole] = [None, gain(1e-3), gain(1.0)].map(|posture| {
         let cfg = IkCfg { posture, ..Default::default() };
         let found = sim.robot(id).compute_ik(&target, "arm", &cfg, None, None).unwrap();
@@ -258,7 +261,7 @@ fn posture_gains() {
 
     let (sim, id) = simulation(1, six_axes());
     let target = sim.robot(id).compute_fk(&random_qpos(&sim, id, 1, 3), "arm", None).unwrap();
-    let [a, b] = [None, Some(Posture::at([0.0; 6]))].map(|posture| {
+    let [a, b] = [None, Some(NullSpacePosture::at([0.0; 6]))].map(|posture| {
         let cfg = IkCfg { posture, ..Default::default() };
         sim.robot(id).compute_ik(&target, "arm", &cfg, None, None).unwrap().qpos
     });

@@ -8,7 +8,7 @@ use super::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array3, s};
-use kinetoscope::robot::kinematics::Tip;
+use kinetoscope::robot::kinematics::TipFrame;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::joint;
 use nalgebra::Vector3;
@@ -45,7 +45,7 @@ fn mj_jac(data: &Data, body: usize, at: [f64; 3], joints: &[String], drivers: &[
 }
 
 /// [`mj_jac`] at the origin of a frame on a body in every environment.
-fn judge(sim: &SimulationManager, id: RobotId, body: &str, point: &Array2<f64>) -> Array3<f64> {
+fn reference_jacobian(sim: &SimulationManager, id: RobotId, body: &str, point: &Array2<f64>) -> Array3<f64> {
     let (robot, model) = (sim.robot(id), sim.batch().model());
     let body = model.id(ObjectKind::Body, &format!("{}/{body}", robot.uid())).unwrap();
     let joints: Vec<String> = robot.joint_names().iter().map(|name| format!("{}/{name}", robot.uid())).collect();
@@ -60,7 +60,7 @@ fn judge(sim: &SimulationManager, id: RobotId, body: &str, point: &Array2<f64>) 
 
 /// Columns as central differences of poses over 2 h = 2e-4. Their error is h² / 6 times third derivatives, which are
 /// about 1 for arms of a meter, so 2e-9, and 1e-16 / h of rounding.
-fn differences(sim: &SimulationManager, id: RobotId, tip: Tip<'_>, qpos: &Array2<f64>) -> Array3<f64> {
+fn differences(sim: &SimulationManager, id: RobotId, tip: TipFrame<'_>, qpos: &Array2<f64>) -> Array3<f64> {
     const H: f64 = 1e-4;
     let mut slopes = Array3::zeros((sim.num_envs(), 6, qpos.ncols()));
     for joint in 0..qpos.ncols() {
@@ -70,7 +70,7 @@ fn differences(sim: &SimulationManager, id: RobotId, tip: Tip<'_>, qpos: &Array2
             sim.robot(id).compute_fk(&qpos, tip, None).unwrap()
         });
         for env in 0..sim.num_envs() {
-            let (a, b) = (pose_in(&after, env), pose_in(&before, env));
+            let (a, b) = (pose_of_row(&after, env), pose_of_row(&before, env));
             let linear = (a.translation.vector - b.translation.vector) / (2.0 * H);
             let angular = (a.rotation * b.rotation.inverse()).scaled_axis() / (2.0 * H);
             for axis in 0..3 {
@@ -119,7 +119,7 @@ impl Reader {
 
     fn pose(&self, body: usize) -> Pose {
         let (p, q) = (&self.0.xpos()[3 * body..], &self.0.xquat()[4 * body..]);
-        pose_in(&row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0)
+        pose_of_row(&row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0)
     }
 }
 
@@ -151,29 +151,29 @@ fn followed(urdf: &Path, names: &[String]) -> Vec<Driver> {
 fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&str; 2], urdf: Option<&Path>) {
     let qpos = random_qpos(sim, id, sim.num_envs(), 9);
     let links = sim.robot(id).compute_link_fk(&qpos, None).unwrap();
-    let tip = Tip::of_link(link).with_tcp(tool());
+    let tip = TipFrame::of_link(link).with_tcp(tool());
     let jacobian = sim.robot(id).jacobian(tip, Some(qpos.view()), None).unwrap();
     // Nothing was written: the links are at other poses. This is the control of everything below.
     let last = *sim.robot(id).link_names().last().unwrap();
     let before = sim.robot(id).link_pose(last).unwrap();
-    let (far, turned) = apart(&before, &links.index_axis(Axis(1), links.len_of(Axis(1)) - 1).to_owned());
+    let (far, turned) = max_pose_difference(&before, &links.index_axis(Axis(1), links.len_of(Axis(1)) - 1).to_owned());
     assert!(far + turned > 0.01, "{name}: {last} moved by {far} m, {turned} rad");
 
     sim.robot_mut(id).write_qpos(&qpos, None, None).unwrap();
     let robot = sim.robot(id);
     let names = robot.link_names();
     for (k, link) in names.iter().enumerate() {
-        let fk = robot.compute_fk(&qpos, Tip::of_link(link), None).unwrap();
+        let fk = robot.compute_fk(&qpos, TipFrame::of_link(link), None).unwrap();
         for ours in [fk, links.index_axis(Axis(1), k).to_owned()] {
-            let (far, turned) = apart(&ours, &robot.link_pose(link).unwrap());
+            let (far, turned) = max_pose_difference(&ours, &robot.link_pose(link).unwrap());
             assert_close(&format!("{name}, {link}"), [far, turned], [0.0; 2], BOUND);
         }
     }
     assert_eq!(robot.jacobian(tip, None, None).unwrap(), jacobian, "{name}: where the joints are");
-    let mujoco = largest(&jacobian, &judge(sim, id, body, &robot.compute_fk(&qpos, tip, None).unwrap()));
+    let mujoco = largest(&jacobian, &reference_jacobian(sim, id, body, &robot.compute_fk(&qpos, tip, None).unwrap()));
     let slopes = largest(&jacobian, &differences(sim, id, tip, &qpos));
     // Control: at another point the Jacobian differs.
-    let elsewhere = largest(&jacobian, &judge(sim, id, body, &robot.link_pose(link).unwrap()));
+    let elsewhere = largest(&jacobian, &reference_jacobian(sim, id, body, &robot.link_pose(link).unwrap()));
     assert_number(name, mujoco, 0.0, BOUND);
     assert!(slopes < 1e-7 && elsewhere > 1e-3, "{name}: {slopes} {elsewhere}");
 
@@ -183,16 +183,16 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
     let body = reader.body(link, names[0]);
     let (start, mut moved, mut elsewhere) = (reader.pose(body), 0.0_f64, 0.0_f64);
     for env in 0..sim.num_envs() {
-        let base = pose_in(&roots, env);
+        let base = pose_of_row(&roots, env);
         let there = drivers.iter().map(|&(driver, ratio, offset)| ratio * qpos[(env, driver.0)] + offset);
         reader.put(joints, &there.collect::<Vec<f64>>());
         for (k, link) in names.iter().enumerate() {
             let theirs = base * reader.pose(reader.body(link, names[0]));
-            let (far, turned) = errors(&pose(links.index_axis(Axis(0), env).row(k)), &theirs);
+            let (far, turned) = pose_error(&pose(links.index_axis(Axis(0), env).row(k)), &theirs);
             assert_close(&format!("{name}, {link}, MuJoCo's reader"), [far, turned], [0.0; 2], BOUND);
         }
         let frame = reader.pose(body);
-        moved = moved.max(errors(&frame, &start).0);
+        moved = moved.max(pose_error(&frame, &start).0);
         for (at, is_there) in [(tool(), true), (Pose::identity(), false)] {
             let theirs = mj_jac(&reader.0, body, (frame * at).translation.vector.into(), joints, &drivers);
             for (joint, first) in (0..joints.len()).flat_map(|joint| [(joint, 0), (joint, 3)]) {
@@ -263,7 +263,7 @@ fn planar_joint() {
     let (mut sim, id) = built(2, &["root", "plate", "arm"], &joints);
     let start = sim.robot(id).link_pose("plate").unwrap();
     sim.update(30);
-    let (fell, _) = apart(&start, &sim.robot(id).link_pose("plate").unwrap());
+    let (fell, _) = max_pose_difference(&start, &sim.robot(id).link_pose("plate").unwrap());
     assert!(fell > 0.1, "{fell}");
     check("planar", &mut sim, id, ["arm"; 2], None);
 }
@@ -289,23 +289,23 @@ fn slides_and_followers() {
 fn tips() {
     let (mut sim, id) = simulation(3, arm_and_hand());
     let qpos = random_qpos(&sim, id, 3, 5);
-    let judge = placed(&mut sim, id, &qpos, "ee_link");
+    let judge = mujoco_link_poses(&mut sim, id, &qpos, "ee_link");
     let robot = sim.robot(id);
     let (hand, arm) = (robot.joint_ids("hand").unwrap(), robot.joint_ids("arm").unwrap());
     let of_part = |ids: &[JointIndex]| qpos.select(Axis(1), &ids.iter().map(|id| id.0).collect::<Vec<_>>());
     let near = |what: &str, ours: &Array2<f64>, judge: &Array2<f64>| {
-        let (far, turned) = apart(ours, judge);
+        let (far, turned) = max_pose_difference(ours, judge);
         assert_close(what, [far, turned], [0.0; 2], BOUND);
     };
     // The arm ends at the link on its flange; a name may denote a part or a link.
-    for tip in [Tip::of_part("arm"), Tip::of_part("arm").at("ee_link"), "arm".into()] {
+    for tip in [TipFrame::of_part("arm"), TipFrame::of_part("arm").at("ee_link"), "arm".into()] {
         near(&format!("{tip:?}"), &robot.compute_fk(&of_part(&arm), tip, None).unwrap(), &judge);
     }
     near("a link by its name", &robot.compute_fk(&qpos, "ee_link", None).unwrap(), &judge);
 
     // A finger with the joints of the hand as columns: the arm keeps its positions, and the columns of followers are
     // ignored.
-    let finger = Tip::of_part("hand").at("left_index_dist");
+    let finger = TipFrame::of_part("hand").at("left_index_dist");
     let mut columns = of_part(&hand);
     let found = robot.compute_fk(&columns, finger, None).unwrap();
     near("finger", &found, &robot.link_pose("left_index_dist").unwrap());
@@ -318,10 +318,10 @@ fn tips() {
     // A tool, one row for two environments.
     let tcp = Pose::new(Vector3::new(0.1, 0.0, 0.2), Vector3::new(0.0, 0.7, 0.0));
     let row = of_part(&arm).slice(s![1..2, ..]).to_owned();
-    let tool = robot.compute_fk(&row, Tip::of_part("arm").with_tcp(tcp), Some(&[EnvId(2), EnvId(0)])).unwrap();
+    let tool = robot.compute_fk(&row, TipFrame::of_part("arm").with_tcp(tcp), Some(&[EnvId(2), EnvId(0)])).unwrap();
     assert_eq!(tool.dim(), (2, 7));
     for row in tool.rows() {
-        let (far, turned) = errors(&pose(row), &(pose_in(&judge, 1) * tcp));
+        let (far, turned) = pose_error(&pose(row), &(pose_of_row(&judge, 1) * tcp));
         assert_close("tool", [far, turned], [0.0; 2], BOUND);
     }
 }

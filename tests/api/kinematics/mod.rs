@@ -8,9 +8,9 @@ mod singular;
 
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
-use kinetoscope_testkit::urdf::{Files, limit, link};
-use kinetoscope_testkit::worlds::{errors, pose_in};
+use kinetoscope::scene::KeyedRng;
+use kinetoscope_testkit::urdf::{TempFiles, limit, link};
+use kinetoscope_testkit::worlds::{pose_error, pose_of_row};
 use std::path::{Path, PathBuf};
 
 fn simulation(num_envs: usize, robot: RobotCfg) -> (SimulationManager, RobotId) {
@@ -56,7 +56,7 @@ fn arm_and_hand() -> RobotCfg {
 
 /// A robot of links, each a ball of 1 kg, and joints, which form the part `arm`.
 fn built(num_envs: usize, links: &[&str], joints: &[String]) -> (SimulationManager, RobotId) {
-    let files = Files::default();
+    let files = TempFiles::default();
     let links: String = links.iter().map(|name| link(name, 1.0, 0.01, [0.0; 3], "")).collect();
     simulation(num_envs, arm(files.write("r.urdf", kinetoscope_testkit::urdf::robot("r", &(links + &joints.concat())))))
 }
@@ -74,7 +74,7 @@ fn random_qpos(sim: &SimulationManager, robot: RobotId, rows: usize, seed: u64) 
         let (low, high) = (limits[(0, joint, 0)], limits[(0, joint, 1)]);
         let bounded = low.is_finite() && high.is_finite();
         let (low, high) = if bounded { (low, high) } else { (low.max(-3.2), high.min(3.2)) };
-        low + (high - low) * Random::keyed(seed, row as u64, &joint.to_string()).uniform()
+        low + (high - low) * KeyedRng::keyed(seed, row as u64, &joint.to_string()).uniform()
     });
     for (joint, (driver, ratio, offset)) in robot.mimic_drivers().into_iter().enumerate() {
         if driver.0 != joint {
@@ -85,7 +85,7 @@ fn random_qpos(sim: &SimulationManager, robot: RobotId, rows: usize, seed: u64) 
 }
 
 fn pose(row: ArrayView1<'_, f64>) -> Pose {
-    pose_in(&row.insert_axis(Axis(0)).to_owned(), 0)
+    pose_of_row(&row.insert_axis(Axis(0)).to_owned(), 0)
 }
 
 fn row(q: &[f64]) -> Array2<f64> {
@@ -93,14 +93,14 @@ fn row(q: &[f64]) -> Array2<f64> {
 }
 
 /// Largest distance \[m\] and angle \[rad\] between rows of poses.
-fn apart(a: &Array2<f64>, b: &Array2<f64>) -> (f64, f64) {
+fn max_pose_difference(a: &Array2<f64>, b: &Array2<f64>) -> (f64, f64) {
     assert_eq!(a.dim(), b.dim());
-    let each = (0..a.nrows()).map(|row| errors(&pose_in(a, row), &pose_in(b, row)));
+    let each = (0..a.nrows()).map(|row| pose_error(&pose_of_row(a, row), &pose_of_row(b, row)));
     each.fold((0.0, 0.0), |most, one| (f64::max(most.0, one.0), f64::max(most.1, one.1)))
 }
 
 /// MuJoCo's poses of a link at these joint positions.
-fn placed(sim: &mut SimulationManager, id: RobotId, qpos: &Array2<f64>, link: &str) -> Array2<f64> {
+fn mujoco_link_poses(sim: &mut SimulationManager, id: RobotId, qpos: &Array2<f64>, link: &str) -> Array2<f64> {
     sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
     sim.robot(id).link_pose(link).unwrap()
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::robot::kinematics::{Chain, IkSolver};
-use kinetoscope::robot::kinematics::{IkCfg, IkTask, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, IkTask, TipFrame};
 use kinetoscope_testkit::urdf::joint;
 
 const L1: f64 = 0.5;
@@ -16,8 +16,8 @@ fn two_links(elbow: [f64; 2]) -> (SimulationManager, RobotId) {
     built(1, &["root", "upper", "lower"], &joints)
 }
 
-fn hand() -> Tip<'static> {
-    Tip::of_part("arm").with_tcp(Pose::translation(L2, 0.0, 0.0))
+fn hand() -> TipFrame<'static> {
+    TipFrame::of_part("arm").with_tcp(Pose::translation(L2, 0.0, 0.0))
 }
 
 fn position() -> IkCfg {
@@ -146,14 +146,14 @@ fn chains() {
     assert!((far(0.0) - chain.reach()).abs() < 1e-15);
 
     // Held joints keep their positions, and the remaining variables are renumbered.
-    let held = chain.clone().held(&[2], &[0.7, 0.2, 0.5]);
+    let held = chain.clone().reduced(&[2], &[0.7, 0.2, 0.5]);
     assert_eq!(held.variables(), 1);
     assert!([-1.0, 0.0, 2.0].into_iter().all(|elbow| is_hand(&held.pose(&[elbow]), 0.7, elbow)));
-    assert!(is_hand(&chain.clone().held(&[2, 0], &[0.0; 3]).pose(&[-0.6, 1.2]), 1.2, -0.6), "the other way round");
-    let all = chain.clone().held(&[], &[0.7, 0.2, 0.5]);
+    assert!(is_hand(&chain.clone().reduced(&[2, 0], &[0.0; 3]).pose(&[-0.6, 1.2]), 1.2, -0.6), "the other way round");
+    let all = chain.clone().reduced(&[], &[0.7, 0.2, 0.5]);
     assert!(all.variables() == 0 && is_hand(&all.pose(&[]), 0.7, 0.5));
 
-    let bound = chain.held(&[0, 2], &[0.0; 3]);
+    let bound = chain.reduced(&[0, 2], &[0.0; 3]);
     let mut solver = IkSolver::new(bound.clone(), vec![[-2.0, 2.0]; 2], IkCfg::default()).unwrap();
     assert_eq!(solver.chain(), &bound);
     let found = solver.solve(&bound.pose(&[0.3, 0.9]), &[0.0, 0.5]).unwrap();

@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::ArrayView2;
-use kinetoscope::robot::kinematics::{IkCfg, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
 use kinetoscope::scene::pose::to_row;
 use kinetoscope::sim::Robot;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
@@ -19,20 +19,20 @@ fn solvers() -> [IkCfg; 2] {
 }
 
 /// The solution for a target from these positions.
-fn solve(robot: &Robot<'_>, tip: Tip<'_>, cfg: &IkCfg, target: &Pose, from: &[f64]) -> kinetoscope::sim::IkResult {
+fn solve(robot: &Robot<'_>, tip: TipFrame<'_>, cfg: &IkCfg, target: &Pose, from: &[f64]) -> kinetoscope::sim::IkResult {
     robot.compute_ik(target, tip, cfg, Some(row(from).view()), None).unwrap()
 }
 
 /// The pose of the tip at these positions.
-fn frame(robot: &Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Pose {
-    pose_in(&robot.compute_fk(&row(q), tip, None).unwrap(), 0)
+fn frame(robot: &Robot<'_>, tip: TipFrame<'_>, q: &[f64]) -> Pose {
+    pose_of_row(&robot.compute_fk(&row(q), tip, None).unwrap(), 0)
 }
 
 fn largest(a: ArrayView2<'_, f64>, b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn jacobian(robot: &Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Matrix6<f64> {
+fn jacobian(robot: &Robot<'_>, tip: TipFrame<'_>, q: &[f64]) -> Matrix6<f64> {
     let jacobian = robot.jacobian(tip, Some(row(q).view()), None).unwrap();
     Matrix6::from_fn(|i, k| jacobian[(0, i, k)])
 }
@@ -66,7 +66,7 @@ fn spherical_wrist() -> (SimulationManager, RobotId) {
 fn spherical_wrist_turn() {
     let (sim, id) = spherical_wrist();
     let robot = sim.robot(id);
-    let tip = Tip::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
+    let tip = TipFrame::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
     let delta = AWAY.1;
     for near in NEAR {
         let q = [0.3, 0.4, 1.1, 0.5, near, -0.4];
@@ -111,7 +111,7 @@ fn bent(near: f64) -> [f64; 6] {
 
 /// A neighbor at joint positions `from + s * way`, with the largest `s` up to 0.3 for which the frame stays within the
 /// distance [`AWAY`].
-fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) -> (Vec<f64>, Pose) {
+fn neighbor(robot: &Robot<'_>, tip: TipFrame<'_>, from: &[f64], way: &Vector6<f64>) -> (Vec<f64>, Pose) {
     let fk = |s: f64| {
         let q: Vec<f64> = from.iter().zip(way).map(|(q, w)| q + s * w).collect();
         let at = frame(robot, tip, &q);
@@ -119,7 +119,7 @@ fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) 
     };
     let (_, start) = fk(0.0);
     let is_near = |s: f64| {
-        let (far, turned) = errors(&fk(s).1, &start);
+        let (far, turned) = pose_error(&fk(s).1, &start);
         far <= AWAY.0 && turned <= AWAY.1
     };
     let (mut low, mut high) = (0.0, 0.3);
@@ -138,7 +138,7 @@ fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) 
 fn nearby_solutions() {
     let (sim, id) = simulation(1, sr5());
     let robot = sim.robot(id);
-    let tip = Tip::of_part("arm").at("ee_link");
+    let tip = TipFrame::of_part("arm").at("ee_link");
     let svd = jacobian(&robot, tip, &bent(0.0)).svd(false, true);
     // In meters and radians per radian: exactly one direction is lost.
     assert!(svd.singular_values[5] < 1e-9 && svd.singular_values[4] > 0.05, "{:?}", svd.singular_values);
@@ -147,13 +147,13 @@ fn nearby_solutions() {
     for near in NEAR {
         let q = bent(near);
         for k in 0..40_u64 {
-            let random = |j: usize| 2.0 * Random::keyed(5, k, &j.to_string()).uniform() - 1.0;
+            let random = |j: usize| 2.0 * KeyedRng::keyed(5, k, &j.to_string()).uniform() - 1.0;
             let way = match k {
                 0 => least,
                 1 => -least,
                 _ => (Vector6::from_fn(|j, _| random(j)) * 0.01 + least * random(7)).normalize(),
             };
-            let (there, target) = neighbour(&robot, tip, &q, &way);
+            let (there, target) = neighbor(&robot, tip, &q, &way);
             let away = largest(row(&there).view(), &q);
             farthest = farthest.max(away);
             for cfg in solvers() {
@@ -176,7 +176,7 @@ fn nearby_solutions() {
 fn far_solutions() {
     let (sim, id) = simulation(1, sr5());
     let robot = sim.robot(id);
-    let tip = Tip::of_part("arm").at("ee_link");
+    let tip = TipFrame::of_part("arm").at("ee_link");
     let (mut nearby, mut far_away) = (0, 0);
     for near in NEAR {
         let q = bent(near);
@@ -202,7 +202,7 @@ fn far_solutions() {
 
 /// Solves poses between two ends one after the other, each from the previous solution; returns the longest step of a
 /// joint.
-fn follow(robot: &Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
+fn longest_step(robot: &Robot<'_>, tip: TipFrame<'_>, ends: [&[f64]; 2]) -> f64 {
     let [from, to] = ends.map(|q| frame(robot, tip, q));
     let (mut q, mut longest) = (ends[0].to_vec(), 0.0_f64);
     for step in 1..=100 {
@@ -221,16 +221,16 @@ fn follow(robot: &Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
 #[test]
 fn lines() {
     let (sim, id) = simulation(1, sr5());
-    let tip = Tip::of_part("arm").at("ee_link");
+    let tip = TipFrame::of_part("arm").at("ee_link");
     for [from, to] in [[-0.3, 0.3], [0.3, -0.3]] {
-        let longest = follow(&sim.robot(id), tip, [&bent(from), &bent(to)]);
+        let longest = longest_step(&sim.robot(id), tip, [&bent(from), &bent(to)]);
         assert!((0.006..0.018).contains(&longest), "{longest}");
     }
     let (sim, id) = spherical_wrist();
-    let tip = Tip::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
+    let tip = TipFrame::of_part("arm").with_tcp(Pose::translation(0.0, 0.0, 0.1));
     for j4 in [0.5, 0.55] {
         let ends = [&[0.3, 0.4, 1.1, 0.5, -0.3, -0.4][..], &[0.3, 0.4, 1.1, j4, 0.3, -0.4]];
-        let longest = follow(&sim.robot(id), tip, ends);
+        let longest = longest_step(&sim.robot(id), tip, ends);
         assert!(longest < PI - 1.3 + 0.01, "{longest}");
     }
 }
@@ -240,7 +240,7 @@ fn lines() {
 #[test]
 fn half_a_turn() {
     let (mut sim, id) = simulation(1, sr5());
-    let tip = Tip::of_part("arm").at("ee_link");
+    let tip = TipFrame::of_part("arm").at("ee_link");
     let q = [0.3, 0.3, -1.5, 0.2, 0.6, 0.4];
     let start = frame(&sim.robot(id), tip, &q);
     for joint in [0, 3, 4, 5] {
@@ -250,7 +250,7 @@ fn half_a_turn() {
         assert!((start.rotation.angle_to(&target.rotation) - PI).abs() < 1e-6);
         let found = solve(&sim.robot(id), tip, &IkCfg::default(), &target, &q);
         assert!(found.success[0], "joint {joint}: {found:?}");
-        let off = apart(&placed(&mut sim, id, &found.qpos, "ee_link"), &row(&to_row(&target)));
+        let off = max_pose_difference(&mujoco_link_poses(&mut sim, id, &found.qpos, "ee_link"), &row(&to_row(&target)));
         assert!(reaches(off), "joint {joint}: {off:?}");
         assert!(largest(found.qpos.view(), &q) > 1.0, "the control: it went somewhere");
     }

@@ -1,17 +1,17 @@
 //! Files that are refused, settings that are ignored, scene files, and exported files.
 
 use super::*;
-use kinetoscope::mujoco::{TARGET, Target, compile_file};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, compile_file};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sensors::{MujocoSensor, MujocoSensorCfg};
 use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::refusal::assert_error;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::count_diagnostics;
 
 /// The error of a refused part; asserts that the scene is unchanged.
-fn refused(cfg: MjcfCfg) -> String {
+fn refused(cfg: MjcfPartCfg) -> String {
     let mut sim = empty(1);
     let before = sim.scene().mjcf().to_string();
     let error = sim.add_mjcf(cfg).unwrap_err().to_string();
@@ -22,8 +22,8 @@ fn refused(cfg: MjcfCfg) -> String {
 /// Files refused by MuJoCo are named with element and line; invalid XML with the line of the faulty element.
 #[test]
 fn bad_files() {
-    let files = Files::default();
-    let text = refused(MjcfCfg::file("part", files.folder().join("none.xml")));
+    let files = TempFiles::default();
+    let text = refused(MjcfPartCfg::file("part", files.folder().join("none.xml")));
     assert!(text.contains("none.xml"), "{text}");
     for (file, text, parts) in [
         (
@@ -43,7 +43,7 @@ fn bad_files() {
         ("end.xml", "<mujoco>\n <worldbody/>\n </body>\n</mujoco>\n", &["^1: "]),
     ] {
         let path = files.write(file, text);
-        let text = refused(MjcfCfg::file("part", &path));
+        let text = refused(MjcfPartCfg::file("part", &path));
         for part in parts {
             match part.strip_prefix('^') {
                 Some(line) => assert!(text.starts_with(&format!("{}:{line}", path.display())), "{file}: {text}"),
@@ -52,8 +52,8 @@ fn bad_files() {
         }
     }
     for text in ["", "no xml", "<mujoco><asset><mesh file=\"none.obj\"/></asset></mujoco>"] {
-        let said = refused(MjcfCfg::text("part", text));
-        assert!(said.contains("part \"part\": text: MuJoCo refuses"), "{said}");
+        let reported = refused(MjcfPartCfg::text("part", text));
+        assert!(reported.contains("part \"part\": text: MuJoCo refuses"), "{reported}");
     }
 }
 
@@ -62,7 +62,7 @@ fn bad_files() {
 /// precede theirs in the scene.
 #[test]
 fn left_out_sensors() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let text = r#"<mujoco><worldbody><site name="s"/><geom size="1" contype="0" conaffinity="0"/>
     <body name="b"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/><site name="t"/></body></worldbody>
     <sensor>
@@ -76,7 +76,7 @@ fn left_out_sensors() {
     let path = files.write("odd.xml", text);
     let mut sim = empty(2);
     let uids = ["first", "second"];
-    let parts = uids.map(|uid| sim.add_mjcf(MjcfCfg::file(uid, &path)).unwrap());
+    let parts = uids.map(|uid| sim.add_mjcf(MjcfPartCfg::file(uid, &path)).unwrap());
     for uid in uids {
         for (line, name, what) in [
             (5, "all", "subtreecom of the world, which holds the whole scene"),
@@ -109,7 +109,7 @@ fn unique_names() {
     for (uid, kind) in
         [("m", "DuplicateUid"), ("world", "DuplicateUid"), ("ground", "DuplicateUid"), ("a/b", "InvalidUid")]
     {
-        assert_error(sim.add_mjcf(MjcfCfg::text(uid, MACHINE)), kind, &[]);
+        assert_error(sim.add_mjcf(MjcfPartCfg::text(uid, MACHINE)), kind, &[]);
     }
     let object = RigidObjectCfg { uid: "m".into(), ..Default::default() };
     assert_error(sim.add_rigid_object(object), "DuplicateUid", &[]);
@@ -125,10 +125,10 @@ fn newer_elements() {
              </worldbody>{after}</mujoco>"
         );
         let mut sim = empty(1);
-        sim.add_mjcf(MjcfCfg::text("part", text)).map(|_| sim.diagnostics().to_vec())
+        sim.add_mjcf(MjcfPartCfg::text("part", text)).map(|_| sim.diagnostics().to_vec())
     };
     assert_eq!(part("stiffness=\"1\"", "").unwrap(), []);
-    if TARGET == Target::V2 {
+    if BUILD_VERSION == SupportedVersion::V2 {
         return;
     }
     let delayed = "<actuator><motor name=\"a\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/></actuator>";
@@ -156,13 +156,13 @@ fn newer_elements() {
 /// line.
 #[test]
 fn ignored_settings() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let text = "<mujoco>\n<include file=\"more.xml\"/>\n<option timestep=\"0.004\" gravity=\"0 0 -1.62\"\n integrator=\"RK4\">\n\
                 <flag contact=\"disable\"/></option>\n<visual/>\n<worldbody><body><joint/><geom size=\"0.1\"/></body></worldbody>\n\
                 <keyframe><key qpos=\"1\"/></keyframe></mujoco>";
     files.write("more.xml", "<mujoco>\n\n<option cone=\"elliptic\"/></mujoco>");
     let mut sim = empty(1);
-    sim.add_mjcf(MjcfCfg::file("set", files.write("set.xml", text))).unwrap();
+    sim.add_mjcf(MjcfPartCfg::file("set", files.write("set.xml", text))).unwrap();
     for words in [
         &["set.xml:3", "timestep is 0.004", "0.002 holds", "[setting-ignored]"][..],
         &["set.xml:3", "gravity is 0 0 -1.62", "0 0 -9.81 holds"],
@@ -178,14 +178,14 @@ fn ignored_settings() {
     assert_eq!(settings, 5, "{:#?}", sim.diagnostics());
     // A setting that the file leaves at MuJoCo's default, and that differs in the scene, is reported too.
     let mut other = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() }).unwrap();
-    other.add_mjcf(MjcfCfg::text("plain", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>")).unwrap();
+    other.add_mjcf(MjcfPartCfg::text("plain", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>")).unwrap();
     let said = count_diagnostics(&other, &["timestep is 0.002, MuJoCo's default; the scene's 0.01 holds"]);
     assert_eq!((said, other.diagnostics().len()), (1, 1), "{:#?}", other.diagnostics());
 }
 
 #[test]
 fn scene_files() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let machine_file = files.write("machine.xml", MACHINE);
     let text = "[entities.m]\ntype = \"mjcf\"\npath = \"machine.xml\"\ninit_pose = [0, 0, 1, 1, 0, 0, 0]\n\
                 [entities.own]\ntype = \"mujoco_sensor\"\nsensors = [\"m/acc\"]\n";
@@ -215,14 +215,16 @@ fn scene_files() {
 #[test]
 fn exported() {
     let (mut sim, _) = with(1, MACHINE);
-    let looks = r#"<mujoco><asset><texture name="t" type="2d" builtin="flat" rgb1="1 0 0" width="2" height="2"/>
+    let textured = r#"<mujoco><asset><texture name="t" type="2d" builtin="flat" rgb1="1 0 0" width="2" height="2"/>
         <material name="t" texture="t"/><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>
         <worldbody><geom type="box" size="1 1 1" material="t"/><geom type="hfield" hfield="h"/></worldbody></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("looks", looks)).unwrap();
-    let files = Files::default();
+    sim.add_mjcf(MjcfPartCfg::text("looks", textured)).unwrap();
+    let files = TempFiles::default();
     assert_eq!(sim.dump(files.folder()).unwrap(), []);
     let ours = sim.batch().model();
-    for file in [if TARGET == Target::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" }, "run.mjcf.xml"] {
+    for file in
+        [if BUILD_VERSION == SupportedVersion::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" }, "run.mjcf.xml"]
+    {
         let model = compile_file(&files.folder().join(file)).unwrap().into_model();
         assert_eq!((model.nq(), model.nu(), model.nsensor()), (ours.nq(), ours.nu(), ours.nsensor()), "{file}");
         assert_eq!(model.body_mass(), ours.body_mass(), "{file}");
@@ -238,15 +240,15 @@ const NEWER: &str = include_str!("../../data/mjcf/newer.xml");
 /// else is left out.
 #[test]
 fn exported_for_2_2_2() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let read = |file: &str| std::fs::read_to_string(files.folder().join(file)).unwrap();
     let mut sim = empty(1);
-    if TARGET == Target::V2 {
+    if BUILD_VERSION == SupportedVersion::V2 {
         // Reference for the list below: 2.2.2 supports none of them.
-        assert_error(sim.add_mjcf(MjcfCfg::text("new", NEWER)), "", &["metallic"]);
+        assert_error(sim.add_mjcf(MjcfPartCfg::text("new", NEWER)), "", &["metallic"]);
         return;
     }
-    sim.add_mjcf(MjcfCfg::text("new", NEWER)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("new", NEWER)).unwrap();
     let left_out = sim.dump(files.folder()).unwrap();
     let mut said: Vec<&str> = left_out.iter().map(|d| d.message.as_str()).collect();
     for what in [

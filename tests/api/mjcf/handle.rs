@@ -14,7 +14,7 @@ fn reads_and_writes() {
     assert_eq!(read.joint_names()[..4], ["shoulder", "wrist", "rail", "free"]);
     assert_eq!(read.actuator_names(), ["servo", "pull", "push"]);
     let model = alone(MACHINE);
-    assert_eq!((read.uid(), read.cfg()), ("m", &MjcfCfg::text("m", MACHINE)));
+    assert_eq!((read.uid(), read.cfg()), ("m", &MjcfPartCfg::text("m", MACHINE)));
     assert_eq!((read.model().nq(), read.model().body_mass()), (model.nq(), model.body_mass()));
     let sites = (0..model.nsite()).map(|site| model.name(ObjectKind::Site, site).unwrap());
     assert_eq!(read.site_names().to_vec(), sites.collect::<Vec<_>>());
@@ -64,7 +64,7 @@ fn reads_and_writes() {
 fn mocap_bodies() {
     let text = MACHINE.replace("</equality>", "<weld body1=\"target\" body2=\"ball\"/></equality>");
     let (mut sim, part) = with(2, text);
-    let frames = FrameTransformerCfg::from("m/target", vec![TargetFrameCfg::of("m/ball")]);
+    let frames = FrameTransformerCfg::new("m/target", vec![TargetFrameCfg::for_bodies("m/ball")]);
     let id = sim.add_sensor("frames", frames).unwrap();
     let place = array![[0.6, 0.4, 0.5, 2.0, 0.0, 0.0, 0.0]];
     sim.mjcf_part_mut(part).write_mocap_pose("target", &place, Some(&[EnvId(1)])).unwrap();

@@ -21,7 +21,7 @@ pub(crate) fn empty(num_envs: usize) -> SimulationManager {
 /// [`empty`] with a part `m`.
 fn with(num_envs: usize, text: impl Into<String>) -> (SimulationManager, MjcfId) {
     let mut sim = empty(num_envs);
-    let part = sim.add_mjcf(MjcfCfg::text("m", text.into())).unwrap();
+    let part = sim.add_mjcf(MjcfPartCfg::text("m", text.into())).unwrap();
     (sim, part)
 }
 

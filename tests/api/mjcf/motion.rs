@@ -5,8 +5,8 @@ use kinetoscope::mujoco::{ObjectKind, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
-use kinetoscope_testkit::urdf::Files;
-use kinetoscope_testkit::worlds::{errors, pose_in, row, sr5};
+use kinetoscope_testkit::urdf::TempFiles;
+use kinetoscope_testkit::worlds::{pose_error, pose_of_row, row, sr5};
 
 /// A double pendulum and a free block without contacts.
 const SWING: &str = r#"<mujoco><worldbody>
@@ -21,7 +21,7 @@ const SWING: &str = r#"<mujoco><worldbody>
 fn copies() {
     let (mut sim, first) = with(1, SWING);
     let turn = from_xyz_rpy([3.0, -1.0, 0.4], [0.0, 0.0, 0.7]);
-    let second = sim.add_mjcf(MjcfCfg { init_pose: turn, ..MjcfCfg::text("second", SWING) }).unwrap();
+    let second = sim.add_mjcf(MjcfPartCfg { init_pose: turn, ..MjcfPartCfg::text("second", SWING) }).unwrap();
     let model = alone(SWING);
     let mut data = Data::new(&model).unwrap();
     assert_eq!(sim.batch().model().nq(), 2 * model.nq());
@@ -43,8 +43,8 @@ fn copies() {
     assert_close("first", &a, data.qpos(), rounding);
     assert_close("second", &b[..2], &data.qpos()[..2], rounding);
     for body in ["block", "body1", "body2"] {
-        let [first, second] = [first, second].map(|part| pose_in(&sim.mjcf_part(part).body_pose(body).unwrap(), 0));
-        let (far, angle) = errors(&(turn * first), &second);
+        let [first, second] = [first, second].map(|part| pose_of_row(&sim.mjcf_part(part).body_pose(body).unwrap(), 0));
+        let (far, angle) = pose_error(&(turn * first), &second);
         assert_close(body, [far, angle], [0.0; 2], rounding);
     }
     assert!((a[0] - model.qpos0()[0]).abs() > 0.05, "it swings");
@@ -55,7 +55,7 @@ fn copies() {
 fn numbers() {
     let file = alone(MACHINE);
     let (mut sim, _) = with(1, SWING);
-    sim.add_mjcf(MjcfCfg::text("machine", MACHINE)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("machine", MACHINE)).unwrap();
     let scene = sim.batch().model();
     let mut compared = 0;
     let same_number = |x: f64, y: f64| (x - y).abs() <= 1e-14 * x.abs().max(1.0);
@@ -133,7 +133,7 @@ fn corners(model: &Model) -> Vec<([f64; 3], [f32; 2])> {
     let mesh = model.mesh(0);
     let geom = (0..model.ngeom()).find(|&g| model.geom_dataid()[g] == 0).unwrap();
     let (p, q) = (&model.geom_pos()[3 * geom..], &model.geom_quat()[4 * geom..]);
-    let pose = pose_in(&row([p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0);
+    let pose = pose_of_row(&row([p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), 0);
     let corner = |(face, texture): (&[i32; 3], &[i32; 3])| {
         [0, 1, 2].map(|k| {
             let at = nalgebra::Point3::from(mesh.positions[face[k] as usize].map(f64::from));
@@ -146,7 +146,7 @@ fn corners(model: &Model) -> Vec<([f64; 3], [f32; 2])> {
 /// A mesh of a file keeps its pose and its texture, and falls as alone.
 #[test]
 fn meshes() {
-    let files = Files::default();
+    let files = TempFiles::default();
     files.write("wedge.obj", WEDGE);
     let file = files.write(
         "wedge.xml",
@@ -155,7 +155,7 @@ fn meshes() {
     );
     let alone = compile_file(&file).unwrap().into_model();
     let mut sim = empty(1);
-    let part = sim.add_mjcf(MjcfCfg::file("part", &file)).unwrap();
+    let part = sim.add_mjcf(MjcfPartCfg::file("part", &file)).unwrap();
     let (here, there) = (corners(sim.batch().model()), corners(&alone));
     assert_eq!((here.len(), there.len()), (12, 12));
     for ((at, texture), (expected_at, expected_texture)) in here.iter().zip(&there) {
@@ -185,13 +185,13 @@ fn drives_beside_parts() {
     let run = |with_parts: bool| {
         let mut sim = empty(1);
         if with_parts {
-            sim.add_mjcf(MjcfCfg::text("a", MACHINE)).unwrap();
+            sim.add_mjcf(MjcfPartCfg::text("a", MACHINE)).unwrap();
         }
         let robot = sim.add_robot(far_arm()).unwrap();
         sim.robot_mut(robot).set_qpos_target(&array![[0.1, 0.4, -0.9, 0.2, -0.5, 0.3]], None, None).unwrap();
         if with_parts {
             let init_pose = Pose::translation(0.0, 3.0, 0.0);
-            sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("b", MACHINE) }).unwrap();
+            sim.add_mjcf(MjcfPartCfg { init_pose, ..MjcfPartCfg::text("b", MACHINE) }).unwrap();
         }
         sim.update(250);
         assert!(sim.diverged().is_empty());
@@ -221,7 +221,7 @@ fn additions() {
     // On 2.2.2 actuators with an activation follow those of the later part.
     let stateless = r#"<mujoco><worldbody><body pos="9 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
         <actuator><motor joint="j"/></actuator></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("late", stateless)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("late", stateless)).unwrap();
     assert_eq!(state(&sim), before);
     sim.update(10);
     assert!(sim.diverged().is_empty());

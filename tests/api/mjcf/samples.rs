@@ -2,15 +2,19 @@
 
 use super::*;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco::{TARGET, Target, words};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, words};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::sim::Error;
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::path::Path;
 
 /// The file compiled by MuJoCo alone, with the options of [`empty`] after its own.
-fn plainly(file: &Path) -> Model {
-    let flags = if TARGET == Target::V2 { r#"passive="enable""# } else { r#"spring="enable" damper="enable""# };
+fn compiled_alone(file: &Path) -> Model {
+    let flags = if BUILD_VERSION == SupportedVersion::V2 {
+        r#"passive="enable""#
+    } else {
+        r#"spring="enable" damper="enable""#
+    };
     let name = file.file_name().unwrap().to_str().unwrap();
     let text = format!(
         r#"<mujoco><include file="{name}"/>
@@ -37,7 +41,7 @@ fn copy(from: &Path, to: &Path) {
 }
 
 /// Largest difference between two rows, relative to the larger of 1 and their largest number.
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     let scale = a.iter().fold(1.0_f64, |s, x| s.max(x.abs()));
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max) / scale
 }
@@ -75,7 +79,7 @@ fn every_sample() {
     for file in &files {
         let name = file.strip_prefix(&dir).unwrap().display().to_string();
         let mut sim = empty(1);
-        let part = match sim.add_mjcf(MjcfCfg::file("part", file)) {
+        let part = match sim.add_mjcf(MjcfPartCfg::file("part", file)) {
             Ok(part) => part,
             Err(error) => {
                 let text = error.to_string();
@@ -84,7 +88,7 @@ fn every_sample() {
                 continue;
             }
         };
-        let plain = plainly(file);
+        let plain = compiled_alone(file);
         let model = sim.batch().model();
         assert_eq!(plain.option_differences(model), [], "{name}: the judge has other options");
         assert_eq!((model.nq(), model.nv(), model.nu()), (plain.nq(), plain.nv(), plain.nu()), "{name}");
@@ -104,15 +108,16 @@ fn every_sample() {
             assert_eq!(data.take_warnings().overflow(), None, "{name}");
         }
         let (qpos, qvel) = (sim.mjcf_part(part).qpos(), sim.mjcf_part(part).qvel());
-        let far = apart(data.qpos(), qpos.as_slice().unwrap()).max(apart(data.qvel(), qvel.as_slice().unwrap()));
-        let travelled = apart(plain.qpos0(), data.qpos());
+        let far = relative_difference(data.qpos(), qpos.as_slice().unwrap())
+            .max(relative_difference(data.qvel(), qvel.as_slice().unwrap()));
+        let travelled = relative_difference(plain.qpos0(), data.qpos());
         assert!(far <= 1e-9, "{name} is {far} from the file alone after {steps} steps");
         assert!(travelled > 1e-6 || plain.nv() == 0, "{name} does not move: {travelled}");
         assert!((0..plain.nsensor()).all(|s| words::sensor(plain.sensor_type()[s]).is_some()), "{name}");
         parts.push(name);
     }
     let (good, bad): (Vec<_>, Vec<_>) =
-        SAMPLES.into_iter().partition(|(_, reason)| TARGET == Target::V2 || reason.is_empty());
+        SAMPLES.into_iter().partition(|(_, reason)| BUILD_VERSION == SupportedVersion::V2 || reason.is_empty());
     assert_eq!(parts, good.iter().map(|(name, _)| *name).collect::<Vec<_>>(), "models that are parts");
     let names: Vec<&str> = refused.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, bad.iter().map(|(name, _)| *name).collect::<Vec<_>>(), "refused: {refused:#?}");

@@ -12,7 +12,7 @@ use kinetoscope::sim::MjcfId;
 use kinetoscope_testkit::bits::bits;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
-use kinetoscope_testkit::worlds::{count_diagnostics, pose_in, sr5};
+use kinetoscope_testkit::worlds::{count_diagnostics, pose_of_row, sr5};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// A machine with all of MuJoCo's sensors.
@@ -53,11 +53,11 @@ fn bit_for_bit() {
             let now = data.sensordata();
             for (one, name) in sensor.sensors().iter().zip(sensor.names()) {
                 let range = one.first..one.first + one.width;
-                let (expected, other) = if one.solved { (&then[..], now) } else { (now, &then[..]) };
-                let values: Vec<f64> = sensor.columns(name).unwrap().map(|c| sensor.values()[(env, c)]).collect();
+                let (expected, other) = if one.force_stage { (&then[..], now) } else { (now, &then[..]) };
+                let values: Vec<f64> = sensor.columns_of(name).unwrap().map(|c| sensor.values()[(env, c)]).collect();
                 let expected = &expected[range.clone()];
                 assert_eq!(bits(&values), bits(expected), "{name} after {step}: {values:?} {expected:?}");
-                checked[usize::from(one.solved)] += 1;
+                checked[usize::from(one.force_stage)] += 1;
                 differs += usize::from(bits(&values) != bits(&other[range]));
             }
         }
@@ -214,7 +214,7 @@ fn wrench_at_a_site() {
     let mut sim = empty(2);
     // The part is rotated about the vertical, which changes nothing in the axes of its bodies.
     let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.0, 0.0, 0.5]);
-    let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", crane) }).unwrap();
+    let part = sim.add_mjcf(MjcfPartCfg { init_pose, ..MjcfPartCfg::text("m", crane) }).unwrap();
     let cfg = JointWrenchCfg { links: vec!["m/arm".into()], frames: vec!["m/palm".into()], ..Default::default() };
     let id = sim.add_sensor("wrench", cfg).unwrap();
     let omegas = [0.0, 3.0];
@@ -257,10 +257,10 @@ fn sites() {
     const SITES: [&str; 6] = ["hook", "elbow", "plate.site", "palm", "axle", "inside"];
     let mut sim = empty(2);
     let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.1, 0.2, -0.4]);
-    let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", MACHINE) }).unwrap();
+    let part = sim.add_mjcf(MjcfPartCfg { init_pose, ..MjcfPartCfg::text("m", MACHINE) }).unwrap();
     assert!(count_diagnostics(&sim, &["the site \"plate\" is called as a body"]) > 0);
-    let targets = SITES.iter().map(|site| TargetFrameCfg::of(format!("m/{site}"))).collect();
-    let frames = sim.add_sensor("frames", FrameTransformerCfg::from("m/elbow", targets)).unwrap();
+    let targets = SITES.iter().map(|site| TargetFrameCfg::for_bodies(format!("m/{site}"))).collect();
+    let frames = sim.add_sensor("frames", FrameTransformerCfg::new("m/elbow", targets)).unwrap();
     let extrinsics = Extrinsics { parent: Some("m/palm".into()), ..Default::default() };
     let camera = CameraCfg { width: 8, height: 8, extrinsics, ..Default::default() };
     let camera = sim.add_sensor("camera", camera).unwrap();
@@ -289,14 +289,14 @@ fn sites() {
                 let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::World);
                 assert!((0..3).all(|k| (at[(env, k)] - position[k]).abs() < 1e-12), "the camera stands on the site");
                 let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::Ros).to_owned();
-                is_there("camera", pose_in(&at, env), rotation);
-                is_there("handle", pose_in(&sim.mjcf_part(part).site_pose("palm").unwrap(), env), rotation);
+                is_there("camera", pose_of_row(&at, env), rotation);
+                is_there("handle", pose_of_row(&sim.mjcf_part(part).site_pose("palm").unwrap(), env), rotation);
             }
         }
         assert_ne!(transformer.target_pos_w()[(env, 1, 0)], transformer.target_pos_w()[(env, 3, 0)]);
     }
     // Another site has another pose, so the comparison above can fail.
-    let hook = pose_in(&sim.mjcf_part(part).site_pose("hook").unwrap(), 0);
+    let hook = pose_of_row(&sim.mjcf_part(part).site_pose("hook").unwrap(), 0);
     assert!(hook.rotation.angle_to(&UnitQuaternion::identity()) > 0.1);
     let expected = init_pose.transform_point(&nalgebra::Point3::new(0.1, -0.2, 0.9));
     assert!((hook.translation.vector - expected.coords).norm() < 1e-12);
@@ -313,6 +313,6 @@ fn welded_frames() {
         assert_error(sim.add_sensor("w", wrench(link)), "", &[link, carrier]);
     }
     sim.add_sensor("w", wrench("m/arm")).unwrap();
-    let unknown = FrameTransformerCfg::from("m/elbwo", vec![]);
+    let unknown = FrameTransformerCfg::new("m/elbwo", vec![]);
     assert_error(sim.add_sensor("f", unknown), "", &["known are \"m/elbow\""]);
 }

@@ -5,20 +5,21 @@ use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::scene::Pose;
 use kinetoscope::scene::pose::from_wxyz;
-use kinetoscope::sim::Visible;
+use kinetoscope::sim::VisualScene;
 use kinetoscope_testkit::worlds::{cube, sr5};
 
 /// A textured, lit world with a mesh, a height field and a cube texture.
-const LOOKS: &str = include_str!("../../data/mjcf/looks.xml");
+const TEXTURED_WORLD: &str = include_str!("../../data/mjcf/looks.xml");
 
 /// A part is rendered like the file alone.
 #[test]
-fn looks_of_the_file() {
-    let file = Visible::of_model(&alone(LOOKS));
+fn rendered_like_the_file() {
+    let file = VisualScene::of_model(&alone(TEXTURED_WORLD));
     let mut sim = empty(1);
-    sim.add_mjcf(MjcfCfg { semantic_class: Some("toy".into()), ..MjcfCfg::text("looks", LOOKS) }).unwrap();
-    let part = sim.scene_mut().visible();
-    assert_eq!(part.left_out(), [""; 0]);
+    sim.add_mjcf(MjcfPartCfg { semantic_class: Some("toy".into()), ..MjcfPartCfg::text("looks", TEXTURED_WORLD) })
+        .unwrap();
+    let part = sim.scene_mut().visual_scene();
+    assert_eq!(part.omitted(), [""; 0]);
     let (here, there) = (part.scene().instances(), file.scene().instances());
     assert_eq!(here.len(), there.len());
     for (a, b) in here.iter().zip(there) {
@@ -63,7 +64,7 @@ const WINCH: &str = r#"<mujoco><worldbody><site name="hook" pos="0 0 1"/>
 fn tendons() {
     let images = |num_envs: usize, threads: usize, renderer: Renderer| {
         let mut sim = sim(SimulationManagerCfg { physics_dt: 0.002, threads: Some(threads), ..empty_cfg(num_envs) });
-        let part = sim.add_mjcf(MjcfCfg::text("winch", WINCH)).unwrap();
+        let part = sim.add_mjcf(MjcfPartCfg::text("winch", WINCH)).unwrap();
         // The next entity has ids after those of the part's tendon.
         sim.add_rigid_object(cube("cube", 0.1, 1.0, [0.0, 3.0, 0.0])).unwrap();
         let placement = Placement::LookAt { eye: [1.0, 0.0, 0.8], target: [0.0, 0.0, 0.8], up: [0.0, 0.0, 1.0] };
@@ -140,7 +141,7 @@ fn collisions_with_robots() {
             <geom size="0.1" contype="{contype}" mass="0.1"/></body></worldbody></mujoco>"#,
             z + 0.4
         );
-        sim.add_mjcf(MjcfCfg::text("part", ball)).unwrap();
+        sim.add_mjcf(MjcfPartCfg::text("part", ball)).unwrap();
         let cfg =
             ContactSensorCfg { bodies: vec!["part/ball".into()], filters: vec!["sr5/.*".into()], ..Default::default() };
         let id = sim.add_sensor("contact", cfg).unwrap();
@@ -162,9 +163,9 @@ fn contacts() {
     let with_floor = block.replace("<worldbody>", "<worldbody><geom type=\"plane\" size=\"1 1 1\"/>");
     for (text, ground) in [(block.to_string(), Some(GroundCfg::default())), (with_floor, None)] {
         let mut sim = sim(SimulationManagerCfg { ground, physics_dt: 0.002, ..Default::default() });
-        sim.add_mjcf(MjcfCfg::text("part", &text)).unwrap();
+        sim.add_mjcf(MjcfPartCfg::text("part", &text)).unwrap();
         sim.add_rigid_object(cube("cube", 0.1, 1.0, [0.0, 0.0, 0.25])).unwrap();
-        let id = sim.add_sensor("contact", ContactSensorCfg::of("part/block")).unwrap();
+        let id = sim.add_sensor("contact", ContactSensorCfg::for_bodies("part/block")).unwrap();
         sim.update(1000);
         let force = sim.sensor(id).unwrap().net_forces_w();
         assert!((force[(0, 0, 2)] - 2.0 * 9.81).abs() < 1e-3, "{force}");
@@ -175,19 +176,19 @@ fn contacts() {
 /// does not support them.
 #[test]
 fn metals() {
-    let looks = |more: &str| {
+    let textured = |more: &str| {
         let text = format!(
             r#"<mujoco><asset><material name="steel" rgba="0.6 0.6 0.6 1" {more}/></asset><worldbody>
                <body name="ball"><freejoint/><geom size="0.1" material="steel"/></body></worldbody></mujoco>"#
         );
         let mut sim = empty(1);
-        sim.add_mjcf(MjcfCfg::text("ball", text)).map(|_| {
-            let material = sim.scene_mut().visible().scene().instances()[0].material.clone();
+        sim.add_mjcf(MjcfPartCfg::text("ball", text)).map(|_| {
+            let material = sim.scene_mut().visual_scene().scene().instances()[0].material.clone();
             (material.metallic, material.roughness)
         })
     };
-    assert_eq!(looks("").unwrap(), (0.0, None));
-    match looks(r#"metallic="0.75" roughness="0.25""#) {
+    assert_eq!(textured("").unwrap(), (0.0, None));
+    match textured(r#"metallic="0.75" roughness="0.25""#) {
         Ok(metal) => assert_eq!(metal, (0.75, Some(0.25))),
         Err(error) => {
             assert!(mj::version_string().starts_with("2.") && error.to_string().contains("metallic"), "{error}")

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
-use kinetoscope::robot::kinematics::{IkCfg, KinematicsError, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, KinematicsError, TipFrame};
 use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
@@ -160,9 +160,9 @@ fn starts_beyond_limits() {
         let mut sim = empty(1);
         let init_qpos = vec![("crank".into(), at)];
         sim.add_robot(RobotCfg { init_qpos, ..robot("hand", &unlimited) }).map(|id| {
-            let mut said = sim.diagnostics().to_vec();
-            said.retain(|d| d.kind == DiagnosticKind::FollowerStartsBeyondLimits);
-            (sim.robot(id).qpos()[(0, 1)], said.into_iter().map(|d| d.message.clone()).collect::<Vec<String>>())
+            let mut messages = sim.diagnostics().to_vec();
+            messages.retain(|d| d.kind == DiagnosticKind::FollowerStartsBeyondLimits);
+            (sim.robot(id).qpos()[(0, 1)], messages.into_iter().map(|d| d.message.clone()).collect::<Vec<String>>())
         })
     };
     assert_error(starts(1e100), "", &["\"left\" is inf"]);
@@ -182,11 +182,11 @@ fn inverse_kinematics() {
     let robot = sim.robot(id);
     let ik = |link: &str| {
         let target = robot.link_pose(link).unwrap();
-        robot.compute_ik(&target, Tip::of_link(link), &IkCfg::default(), None, None)
+        robot.compute_ik(&target, TipFrame::of_link(link), &IkCfg::default(), None, None)
     };
     let Err(Error::Kinematics { error, .. }) = ik("left") else { panic!("accepted") };
     let is_named = |joint: &str, link: &str| joint == "left" && link == "left";
-    assert!(matches!(&*error, KinematicsError::CurveFollower { joint, link } if is_named(joint, link)), "{error}");
+    assert!(matches!(&*error, KinematicsError::PolynomialCoupling { joint, link } if is_named(joint, link)), "{error}");
     // Controls: the follower moves neither its driver's own link nor the link of another joint.
     assert!(ik("crank").unwrap().success[0] && ik("other").unwrap().success[0]);
 }

@@ -10,7 +10,7 @@ use kinetoscope_testkit::worlds::{count_diagnostics, empty_cfg, gains};
 /// the last two actuators act on one joint.
 const MACHINE: &str = include_str!("../../data/mjcf/actuators.xml");
 
-fn is_said(sim: &SimulationManager, words: &[&str]) {
+fn assert_reported(sim: &SimulationManager, words: &[&str]) {
     assert!(count_diagnostics(sim, words) > 0, "{words:?}: {:#?}", sim.diagnostics());
 }
 
@@ -29,8 +29,8 @@ fn gains_and_limits() {
     assert_eq!((of.armature()[(0, 0)], of.friction()[(0, 5)]), (0.1, 0.3));
     let types = of.drive_types();
     assert_eq!((types[(0, 4)], types[(0, 5)]), (DriveType::Force, DriveType::None));
-    is_said(&sim, &["the place of the actuators \"p\", \"m\", \"v\", \"m2\""]);
-    is_said(&sim, &["actuator \"t\" acts on the tendon \"both\""]);
+    assert_reported(&sim, &["the place of the actuators \"p\", \"m\", \"v\", \"m2\""]);
+    assert_reported(&sim, &["actuator \"t\" acts on the tendon \"both\""]);
 
     // The configuration overrides the named joints; a named joint without an actuator is driven too.
     let drive = DriveCfg {
@@ -75,7 +75,7 @@ fn followers() {
     let b = of.joint_id("b").unwrap();
     assert_eq!((of.stiffness(), of.damping()), (array![[0.0, 122.5, 0.0]], array![[0.0, 9.0, 0.0]]));
     assert_eq!((of.qf_limits()[(0, 1)], of.drive_types()[(0, 1)]), (60.0, DriveType::Force));
-    is_said(&sim, &["actuator \"pa\"", "\"a\" follows \"b\""]);
+    assert_reported(&sim, &["actuator \"pa\"", "\"a\" follows \"b\""]);
     sim.robot_mut(id).set_qpos_target(&array![[0.3]], Some(&[b]), None).unwrap();
     sim.update(2000);
     let qpos = sim.robot(id).qpos();
@@ -86,7 +86,7 @@ fn followers() {
     let (sim, id) = with(1, robot("r", &CHAIN.replace("0 -0.5 0 0 0", "0 -0.5 0.1 0 0")));
     assert!(sim.robot(id).drive_types().iter().all(|kind| *kind == DriveType::None));
     for name in ["pa", "pc"] {
-        is_said(&sim, &[&format!("actuator {name:?}"), "an equality holds"]);
+        assert_reported(&sim, &[&format!("actuator {name:?}"), "an equality holds"]);
     }
 }
 
@@ -117,7 +117,7 @@ fn gripper() {
         assert_eq!(of.joint_id("left").unwrap(), JointIndex(0));
         let numbers = [of.stiffness(), of.damping()].map(|gains| gains[(0, 0)]);
         assert_eq!((numbers, of.qf_limits()[(0, 0)]), ([100.0, 10.0], 100.0));
-        is_said(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
+        assert_reported(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
         assert_eq!(count_diagnostics(&sim, &["ctrlrange"]), 0, "it is all that the fingers can do");
         if scale != 1.0 {
             sim.robot_mut(id).set_stiffness(&row([100.0 * scale]), Some(&[JointIndex(0)]), None).unwrap();
@@ -140,7 +140,7 @@ fn gripper() {
     let (sim, id) = with(1, robot("r", &GRIPPER.replace('%', "-1")));
     assert_eq!(sim.robot(id).drive_types()[(0, 0)], DriveType::None);
     assert_eq!(sim.robot(id).stiffness(), Array2::<f64>::zeros((1, 2)));
-    is_said(&sim, &["actuator \"grip\"", "never moves \"left\""]);
+    assert_reported(&sim, &["actuator \"grip\"", "never moves \"left\""]);
 }
 
 /// The scale of a control is not part of the gains, and each difference between a drive and the actuator is reported.

@@ -1,13 +1,13 @@
 //! Names and control parts, dumps, and MuJoCo's own sample models as robots.
 
 use super::*;
-use kinetoscope::mujoco::{TARGET, Target, compile_file};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
-use kinetoscope_testkit::urdf::Files;
-use kinetoscope_testkit::worlds::{errors, gains, pose_in, urdf_robot};
+use kinetoscope_testkit::urdf::TempFiles;
+use kinetoscope_testkit::worlds::{gains, pose_error, pose_of_row, urdf_robot};
 
 /// Unnamed elements are named by their number.
 #[test]
@@ -56,9 +56,9 @@ fn control_parts() {
 #[test]
 fn dumps() {
     let (mut sim, id) = with(1, RobotCfg { drive: gains(300.0, 30.0), ..robot("odd", ODD) });
-    let files = Files::default();
+    let files = TempFiles::default();
     sim.dump(files.folder()).unwrap();
-    let file = if TARGET == Target::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
+    let file = if BUILD_VERSION == SupportedVersion::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
     let model = compile_file(&files.folder().join(file)).unwrap().into_model();
     assert_eq!((model.nv(), model.nu()), (7, 7));
     assert!((model.body_mass().iter().sum::<f64>() - 7.2).abs() < 1e-12);
@@ -68,14 +68,15 @@ fn dumps() {
     let qpos = array![[0.3, -0.4, 0.5, 0.1, 0.2, -0.6, 0.7]];
     sim.robot_mut(id).write_qpos(&qpos, None, None).unwrap();
     other.robot_mut(again).write_qpos(&qpos, None, None).unwrap();
-    let [base, tip] = ["base", "tip"].map(|link| pose_in(&sim.robot(id).link_pose(link).unwrap(), 0));
-    let (far, angle) = errors(&(base.inverse() * tip), &pose_in(&other.robot(again).link_pose("tip").unwrap(), 0));
+    let [base, tip] = ["base", "tip"].map(|link| pose_of_row(&sim.robot(id).link_pose(link).unwrap(), 0));
+    let (far, angle) =
+        pose_error(&(base.inverse() * tip), &pose_of_row(&other.robot(again).link_pose("tip").unwrap(), 0));
     assert!(far < 1e-9 && angle < 1e-7, "{far} {angle}");
 
     // A slide without limits and efforts can be read again, and is then unlimited.
     let text = r#"<mujoco><worldbody><body name="base"><geom size="0.1" mass="1"/><body name="cart">
         <joint name="rail" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body></body></worldbody></mujoco>"#;
-    let ((sim, id), files) = (with(1, robot("cart", text)), Files::default());
+    let ((sim, id), files) = (with(1, robot("cart", text)), TempFiles::default());
     sim.dump(files.folder()).unwrap();
     let (other, again) = with(1, urdf_robot("robot", files.folder().join("robot.urdf")));
     assert_eq!(other.robot(again).qpos_limits(), sim.robot(id).qpos_limits());

@@ -4,12 +4,12 @@ use super::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Axis, s};
-use kinetoscope::robot::kinematics::{IkCfg, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy, to_row};
-use kinetoscope_testkit::worlds::{errors, pose_in};
+use kinetoscope_testkit::worlds::{pose_error, pose_of_row};
 
 /// MuJoCo's pose of a body or a site.
-fn place(data: &Data, name: &str) -> [f64; 7] {
+fn mujoco_pose(data: &Data, name: &str) -> [f64; 7] {
     let model = data.model();
     match model.id(ObjectKind::Body, name) {
         Some(body) => {
@@ -53,11 +53,12 @@ fn links() {
         sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
         let read = sim.robot(id).link_poses();
         for env in 0..2 {
-            let judge = file_at(&joints, &qpos.row(env).to_vec());
+            let reference = file_at(&joints, &qpos.row(env).to_vec());
             for (link, name) in links.iter().enumerate() {
-                let theirs = init_pose * from_row(&place(&judge, name));
+                let theirs = init_pose * from_row(&mujoco_pose(&reference, name));
                 for ours in [&computed, &read] {
-                    let (far, turned) = errors(&pose_in(&ours.slice(s![env, link..=link, ..]).to_owned(), 0), &theirs);
+                    let (far, turned) =
+                        pose_error(&pose_of_row(&ours.slice(s![env, link..=link, ..]).to_owned(), 0), &theirs);
                     assert!(far < 1e-9 && turned < 1e-9, "{name}: {far} m, {turned} rad");
                 }
                 farthest = farthest.max((theirs.translation.x - computed[(0, 0, 0)]).abs());
@@ -69,7 +70,7 @@ fn links() {
     assert!(farthest > 0.2, "{farthest}");
     // The root has its pose from the file.
     let [root, now] = [sim.robot(id).default_root_pose(), sim.robot(id).root_pose()];
-    assert!(errors(&pose_in(&root, 0), &pose_in(&now, 0)).0 < 1e-12);
+    assert!(pose_error(&pose_of_row(&root, 0), &pose_of_row(&now, 0)).0 < 1e-12);
 }
 
 /// Jacobians equal `mj_jac` of the file alone at the tip.
@@ -82,7 +83,7 @@ fn jacobians() {
         let judge = file_at(&joints, &row.to_vec());
         let (model, nv) = (judge.model(), judge.model().nv());
         let (mut linear, mut angular) = (vec![0.0; 3 * nv], vec![0.0; 3 * nv]);
-        let (tip, hand) = (place(&judge, "tip"), model.id(ObjectKind::Body, "hand").unwrap());
+        let (tip, hand) = (mujoco_pose(&judge, "tip"), model.id(ObjectKind::Body, "hand").unwrap());
         judge.jacobian(hand, [tip[0], tip[1], tip[2]], &mut linear, &mut angular).unwrap();
         for (joint, name) in joints.iter().enumerate() {
             let dof = model.jnt_dofadr()[model.id(ObjectKind::Joint, name).unwrap()] as usize;
@@ -107,16 +108,16 @@ fn reachable_poses() {
     let start = sim.robot(id).default_qpos();
     let at = |sim: &mut SimulationManager, qpos: &Array2<f64>| {
         sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
-        sim.batch().read(0, |env| from_row(&place(env.data(), "odd/tip")))
+        sim.batch().read(0, |env| from_row(&mujoco_pose(env.data(), "odd/tip")))
     };
     let mut solved = 0;
     for k in 0..TARGETS {
         let target = at(&mut sim, &rows.select(Axis(0), &[k]));
-        let far_away = errors(&at(&mut sim, &start), &target).0;
+        let far_away = pose_error(&at(&mut sim, &start), &target).0;
         // The only site on the hand is the tip of the part.
         let wanted = row(to_row(&target));
-        let found = sim.robot(id).compute_ik(&wanted, Tip::of_part("arm"), &IkCfg::default(), None, None).unwrap();
-        let (far, turned) = errors(&at(&mut sim, &found.qpos), &target);
+        let found = sim.robot(id).compute_ik(&wanted, TipFrame::of_part("arm"), &IkCfg::default(), None, None).unwrap();
+        let (far, turned) = pose_error(&at(&mut sim, &found.qpos), &target);
         assert_eq!(far <= 1e-4 && turned <= 1e-3, found.success[0], "{far} m, {turned} rad");
         solved += usize::from(found.success[0]);
         assert!(k + 1 < TARGETS || far_away > 0.01, "the control: the start is not a solution of the last one");

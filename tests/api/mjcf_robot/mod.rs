@@ -15,7 +15,7 @@ use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Random;
+use kinetoscope::scene::KeyedRng;
 use kinetoscope_testkit::worlds::{mjcf_robot as robot, passive, row};
 
 /// A robot in an empty scene.
@@ -34,7 +34,7 @@ fn alone(text: &str) -> Model {
 /// `count` rows of positions between the limits of the robot's joints, all of which have limits.
 fn random_qpos(sim: &SimulationManager, id: RobotId, count: usize) -> Array2<f64> {
     let limits = sim.robot(id).qpos_limits();
-    let mut random = Random::keyed(7, 0, "positions");
+    let mut random = KeyedRng::keyed(7, 0, "positions");
     Array2::from_shape_fn((count, sim.robot(id).dof()), |(_, joint)| {
         let (low, high) = (limits[(0, joint, 0)], limits[(0, joint, 1)]);
         low + (high - low) * random.uniform()

@@ -4,7 +4,7 @@ use super::*;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::sim::{DriveModel, PerJoint};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{gains, text_robot, urdf_robot};
 
 /// Names, masses, limits and the start are those of the file.
@@ -34,7 +34,7 @@ fn names_and_numbers() {
 fn bias_and_mass_matrix() {
     let (mut sim, id) = with(1, passive(robot("odd", ODD)));
     let mut data = Data::new(&alone(ODD)).unwrap();
-    let mut random = Random::keyed(3, 0, "velocities");
+    let mut random = KeyedRng::keyed(3, 0, "velocities");
     let mut most = 0.0f64;
     for qpos in random_qpos(&sim, id, 50).axis_iter(Axis(0)) {
         let qvel = Array2::from_shape_fn((1, 7), |_| 4.0 * random.uniform() - 2.0);
@@ -171,7 +171,7 @@ fn steps(cfg: RobotCfg) -> (SimulationManager, RobotId, Vec<Sample>) {
 /// do not grow: 1e-9 in positions of 1 rad, and in efforts of 100 N m that times the stiffness.
 #[test]
 fn same_as_urdf() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let [mjcf, urdf] = arm();
     for model in [DriveModel::Implicit, DriveModel::Actuator] {
         let of_mjcf = RobotCfg { drive: DriveCfg { model, ..Default::default() }, ..robot("arm", &mjcf) };
@@ -248,7 +248,7 @@ fn quadruped() {
 #[test]
 fn quadruped_stands() {
     for (mut sim, id) in quadrupeds() {
-        let feet = sim.add_sensor("feet", ContactSensorCfg::of(".*_FOOT")).unwrap();
+        let feet = sim.add_sensor("feet", ContactSensorCfg::for_bodies(".*_FOOT")).unwrap();
         sim.update((2.0 / sim.cfg().physics_dt).round() as u32);
         assert!(sim.diverged().is_empty());
         let weight: f64 = sim.sensor(feet).unwrap().net_forces_w().index_axis(Axis(2), 2).row(0).iter().sum();

@@ -13,7 +13,7 @@ const SLED: &str = include_str!("../../data/mjcf/sled.xml");
 
 /// A scene with the moving sled. The ground has almost no friction, because MuJoCo uses the larger friction of two
 /// geoms.
-fn sledding(text: &str, envs: usize) -> (SimulationManager, RobotId) {
+fn moving_sled(text: &str, envs: usize) -> (SimulationManager, RobotId) {
     let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg {
         physics_dt: 0.002,
         ..kinetoscope_testkit::worlds::cfg(envs, 1)
@@ -61,11 +61,11 @@ fn as_another_file() {
         (Property::Size, "sled", &[0.2, 0.15, 0.07], [r#"size="0.2 0.15 0.1""#, r#"size="0.2 0.15 0.07""#]),
     ];
     for (property, name, value, edit) in changes {
-        let (mut sim, id) = sledding(SLED, 2);
+        let (mut sim, id) = moving_sled(SLED, 2);
         let of = format!("r/{name}");
         sim.properties_mut().randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, &of, value)).unwrap();
         assert_eq!(SLED.matches(edit[0]).count(), 1, "{edit:?}");
-        let (mut judge, of_judge) = sledding(&SLED.replace(edit[0], edit[1]), 1);
+        let (mut judge, of_judge) = moving_sled(&SLED.replace(edit[0], edit[1]), 1);
         let (mine, expected) = (slide(&mut sim, id), slide(&mut judge, of_judge));
         let (apart, control) = (far(&mine[1], &expected[0]), far(&mine[0], &mine[1]));
         assert!(apart < 1e-9, "{property:?} of {name}: {apart}");
@@ -76,7 +76,7 @@ fn as_another_file() {
 /// The setters of a robot write these properties, also for followers.
 #[test]
 fn setters() {
-    let (mut sim, id) = sledding(SLED, 3);
+    let (mut sim, id) = moving_sled(SLED, 3);
     let env = Some(&[EnvId(2)][..]);
     let mut robot = sim.robot_mut(id);
     robot.set_armature(&array![[0.2, 0.05]], None, env).unwrap();
@@ -150,7 +150,7 @@ fn coupled_drives() {
         let name = format!("r/{driver}");
         assert_eq!(sim.robot(id).stiffness().column(column.0), array![nominal, nominal, nominal, nominal]);
         sim.robot_mut(id).set_stiffness(&array![[spring]], Some(&[column]), Some(&[EnvId(1)])).unwrap();
-        let stiff = Randomization::new().with(Property::Stiffness, &name, Draw::Scale([3.0, 3.0]));
+        let stiff = Randomization::new().with(Property::Stiffness, &name, RandomizationOp::Scale([3.0, 3.0]));
         sim.properties_mut().randomize(&stiff, Some(&[EnvId(2)])).unwrap();
         sim.robot_mut(id).set_qf_limits(&array![[0.1 * spring * target]], Some(&[column]), Some(&[EnvId(3)])).unwrap();
         // Joint damping, to settle quickly: a saturated drive has no damping.
@@ -171,19 +171,19 @@ fn coupled_drives() {
 #[test]
 fn draws_in_snapshots() {
     let draw = Randomization::new()
-        .with(Property::Mass, "r/.*", Draw::Scale([0.7, 1.4]))
-        .with(Property::Inertia, "r/arm", Draw::Scale([0.9, 1.1]))
-        .with(Property::CenterOfMass, "r/arm", Draw::Add([-0.01, 0.01]))
-        .with(Property::Friction, "r/sled|ground", Draw::Set([0.1, 0.9]))
-        .with(Property::JointDamping, "r/.*", Draw::Scale([0.5, 2.0]))
-        .with(Property::Armature, "r/.*", Draw::Add([0.0, 0.1]))
-        .with(Property::DryFriction, "r/lift", Draw::Set([0.0, 0.5]))
-        .with(Property::Stiffness, "r/lift", Draw::Scale([0.5, 2.0]))
-        .with(Property::DriveDamping, "r/lift", Draw::Add([0.0, 2.0]))
-        .with(Property::MaxEffort, "r/lift", Draw::Scale([0.5, 1.0]))
-        .with(Property::Size, "r/sled", Draw::Scale([0.8, 1.0]))
-        .with(Property::Color, "r/.*", Draw::Set([0.1, 0.9]));
-    let (mut sim, id) = sledding(SLED, 3);
+        .with(Property::Mass, "r/.*", RandomizationOp::Scale([0.7, 1.4]))
+        .with(Property::Inertia, "r/arm", RandomizationOp::Scale([0.9, 1.1]))
+        .with(Property::CenterOfMass, "r/arm", RandomizationOp::Add([-0.01, 0.01]))
+        .with(Property::Friction, "r/sled|ground", RandomizationOp::Set([0.1, 0.9]))
+        .with(Property::JointDamping, "r/.*", RandomizationOp::Scale([0.5, 2.0]))
+        .with(Property::Armature, "r/.*", RandomizationOp::Add([0.0, 0.1]))
+        .with(Property::DryFriction, "r/lift", RandomizationOp::Set([0.0, 0.5]))
+        .with(Property::Stiffness, "r/lift", RandomizationOp::Scale([0.5, 2.0]))
+        .with(Property::DriveDamping, "r/lift", RandomizationOp::Add([0.0, 2.0]))
+        .with(Property::MaxEffort, "r/lift", RandomizationOp::Scale([0.5, 1.0]))
+        .with(Property::Size, "r/sled", RandomizationOp::Scale([0.8, 1.0]))
+        .with(Property::Color, "r/.*", RandomizationOp::Set([0.1, 0.9]));
+    let (mut sim, id) = moving_sled(SLED, 3);
     sim.properties_mut().randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
     let values = |sim: &SimulationManager| {
         let of = |env| {
@@ -219,7 +219,7 @@ fn draws_in_snapshots() {
     // Control: with nominal properties the motion differs.
     sim.properties_mut().reset(None).unwrap();
     assert!(values(&sim)[0] == drawn[1], "nominal again");
-    let (mut plain, plain_id) = sledding(SLED, 3);
+    let (mut plain, plain_id) = moving_sled(SLED, 3);
     plain.restore(&snapshot, None).unwrap();
     plain.update(100);
     assert!(plain.robot(plain_id).qpos().row(0) != end.1.row(0));

@@ -2,10 +2,10 @@
 //! of a file that a robot leaves out; and files that only MuJoCo 4.x reads.
 
 use super::*;
-use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope::sim::{DriveModel, Error, RobotFileError};
-use kinetoscope_testkit::refusal::assert_refused;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::count_diagnostics;
 use std::path::PathBuf;
 
@@ -23,11 +23,11 @@ fn of_file(path: impl AsRef<std::path::Path>) -> RobotCfg {
 }
 
 /// The reason for refusing a text; asserts that the message begins with the line if there is one.
-fn reason(text: &str) -> (RobotFileError, String) {
+fn refusal_reason(text: &str) -> (RobotFileError, String) {
     let error = refused(robot("r", text));
     let said = error.to_string();
-    let lined = said.strip_prefix("text:").and_then(|rest| rest.split_once(": robot \"r\": "));
-    let is_lined = lined.is_some_and(|(line, _)| line.parse::<usize>().is_ok());
+    let starts_with_line = said.strip_prefix("text:").and_then(|rest| rest.split_once(": robot \"r\": "));
+    let is_lined = starts_with_line.is_some_and(|(line, _)| line.parse::<usize>().is_ok());
     assert!(is_lined || said.starts_with("robot \"r\": text: "), "{said}");
     let Error::RobotFile { error, .. } = error else { panic!("{said}") };
     (*error, said)
@@ -35,7 +35,7 @@ fn reason(text: &str) -> (RobotFileError, String) {
 
 #[test]
 fn unreadable_files() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let bad = "<mujoco>\n<worldbody>\n<body>\n<geom sise=\"1\"/></body></worldbody></mujoco>";
     let rows = [
         (files.folder().join("none.xml"), "File {", &["none.xml"][..]),
@@ -44,9 +44,9 @@ fn unreadable_files() {
         (files.write("bytes.xml", [0xff, 0xfe, 0x00]), "File {", &[]),
     ];
     let refused_file = |path: PathBuf| Err::<(), _>(refused(of_file(path)));
-    assert_refused(rows.map(|(path, variant, parts)| (path.display().to_string(), refused_file(path), variant, parts)));
+    assert_errors(rows.map(|(path, variant, parts)| (path.display().to_string(), refused_file(path), variant, parts)));
     for text in ["", "no xml", "<mujoco><worldbody/><nothing/></mujoco>"] {
-        assert!(matches!(reason(text).0, RobotFileError::Compile(_)));
+        assert!(matches!(refusal_reason(text).0, RobotFileError::Compile(_)));
     }
     let both = RobotCfg { urdf: UrdfCfg::single("a.urdf"), ..robot("r", "<mujoco/>") };
     assert!(matches!(refused(both), Error::Config { field: "mjcf", .. }));
@@ -62,7 +62,7 @@ fn no_robots() {
         ("<body><freejoint/><geom size='1'/></body>", "NoJoint", "such a file is a scene"),
         ("<body mocap='true' name='m'><body><joint/><geom size='1'/></body></body>", "MocapBody", "\"m\""),
     ] {
-        let (error, said) = reason(&format!("<mujoco><worldbody>{inside}</worldbody></mujoco>"));
+        let (error, said) = refusal_reason(&format!("<mujoco><worldbody>{inside}</worldbody></mujoco>"));
         assert!(format!("{error:?}").starts_with(kind) && said.contains(says), "{error:?}: {said}");
     }
 }
@@ -70,7 +70,7 @@ fn no_robots() {
 /// Joints and actuators without an equivalent drive are named with their line, in the main file and in included files.
 #[test]
 fn named_elements() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let tree = "<worldbody>\n<body name='a'><geom size='1'/>\n<body name='b'><joint name='j' axis='0 0 1'/><geom size='1'/>\n\
                 <site name='s'/>%</body></body><site name='w'/></worldbody>";
     let string = |to: &str| format!("<tendon><spatial name='t'><site site='s'/><site site='{to}'/></spatial></tendon>");
@@ -89,7 +89,7 @@ fn named_elements() {
         (site, actuator("<general name='m' cranksite='s' slidersite='s2' cranklength='1'/>"), &acts, "a cranksite"),
         ("", string("w"), &["robot.xml:3: robot \"robot\": tendon \"t\" needs \"w\" in the file's world"], ""),
     ];
-    assert_refused(rows.map(|(inside, after, parts, target)| {
+    assert_errors(rows.map(|(inside, after, parts, target)| {
         files.write("tree.xml", format!("<mujocoinclude>\n{}</mujocoinclude>", tree.replace('%', inside)));
         let path = files.write("robot.xml", format!("<mujoco><include file='tree.xml'/>\n\n{after}</mujoco>"));
         (after, Err::<(), _>(refused(of_file(path))), "RobotFile {", [parts, &[target]].concat())
@@ -172,11 +172,11 @@ fn newer(cfg: RobotCfg) -> Option<(SimulationManager, RobotId)> {
     let mut sim = empty(1);
     match sim.add_robot(cfg) {
         Ok(id) => {
-            assert_eq!(TARGET, Target::V4);
+            assert_eq!(BUILD_VERSION, SupportedVersion::V4);
             Some((sim, id))
         }
         Err(error) => {
-            assert!(TARGET == Target::V2 && matches!(error, Error::RobotFile { .. }), "{error}");
+            assert!(BUILD_VERSION == SupportedVersion::V2 && matches!(error, Error::RobotFile { .. }), "{error}");
             assert!(error.to_string().contains("XML"), "{error}");
             None
         }

@@ -51,7 +51,7 @@ fn sensors() {
         if with_part {
             let part = r#"<mujoco><worldbody><body pos="3 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
                 <sensor><clock name="clock"/><jointvel name="v" joint="j"/></sensor></mujoco>"#;
-            sim.add_mjcf(MjcfCfg::text("part", part)).unwrap();
+            sim.add_mjcf(MjcfPartCfg::text("part", part)).unwrap();
         }
         let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("leg", LEG) }).unwrap();
         let bodies = vec!["leg/foot".into(), "leg/body".into()];

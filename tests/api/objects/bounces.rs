@@ -1,16 +1,16 @@
 //! Bounces compared with the closed form; collision exclusions.
 
 use super::*;
-use kinetoscope::sim::{Cone, ObjectId};
+use kinetoscope::sim::{FrictionCone, RigidObjectId};
 use kinetoscope_testkit::refusal::assert_error;
 
-fn bouncy(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {
+fn bouncing_ball(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {
     RigidObjectCfg { restitution, ..ball(uid, 0.1, mass, [0.0; 3]) }
 }
 
 /// Velocities of two balls after a collision of the left one with 1 m/s; the surfaces meet at the fraction `phase` of a
 /// step.
-fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f64) -> [f64; 2] {
+fn collide(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f64) -> [f64; 2] {
     let at = |cfg, x| RigidObjectCfg { init_pose: Pose::translation(x, 0.0, 0.0), ..cfg };
     let left = sim.add_rigid_object(at(left, -0.15 - 1e-3 * phase)).unwrap();
     let right = sim.add_rigid_object(at(right, 0.1)).unwrap();
@@ -45,8 +45,9 @@ fn two_balls() {
     for masses in [[1.0, 1.0], [0.2, 5.0]] {
         for wanted in [0.14, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0] {
             for phase in (0..11).map(|k| (f64::from(k) + 0.03) / 11.0) {
-                let balls = [("left", masses[0]), ("right", masses[1])].map(|(uid, m)| bouncy(uid, m, Some(wanted)));
-                let [a, b] = meet(weightless(1), balls, phase);
+                let balls =
+                    [("left", masses[0]), ("right", masses[1])].map(|(uid, m)| bouncing_ball(uid, m, Some(wanted)));
+                let [a, b] = collide(weightless(1), balls, phase);
                 assert!(is_near(b - a, wanted), "{masses:?} {wanted} {phase}: {}", b - a);
                 assert!((masses[0] * a + masses[1] * b - masses[0]).abs() < 1e-9);
             }
@@ -60,16 +61,17 @@ fn two_balls() {
 /// times 1e-4: a thousandth of the force.
 #[test]
 fn friction() {
-    let parted = |cone, mu: f64, wanted| {
+    let relative_velocity = |cone, mu: f64, wanted| {
         let sim = sim(SimulationManagerCfg { cone, physics_dt: 1e-3, ..weightless_cfg(1) });
-        let rubs = |uid| RigidObjectCfg { friction: Some([mu, 0.005, 0.0001]), ..bouncy(uid, 1.0, Some(wanted)) };
-        let [a, b] = meet(sim, [rubs("left"), rubs("right")], 0.3);
+        let rubs =
+            |uid| RigidObjectCfg { friction: Some([mu, 0.005, 0.0001]), ..bouncing_ball(uid, 1.0, Some(wanted)) };
+        let [a, b] = collide(sim, [rubs("left"), rubs("right")], 0.3);
         b - a
     };
     for wanted in [0.2, 0.5, 0.8, 1.0] {
-        let expected = parted(Cone::Elliptic, 1.0, wanted);
+        let expected = relative_velocity(FrictionCone::Elliptic, 1.0, wanted);
         for mu in [0.3, 1.0, 2.0] {
-            let found = parted(Cone::Pyramidal, mu, wanted);
+            let found = relative_velocity(FrictionCone::Pyramidal, mu, wanted);
             assert!((found - expected).abs() < 2e-3, "{wanted} {mu}: {found} {expected}");
         }
     }
@@ -79,7 +81,8 @@ fn friction() {
 #[test]
 fn combinations() {
     let parted = |[left, right]: [Option<f64>; 2]| {
-        let [a, b] = meet(weightless(1), [bouncy("left", 1.0, left), bouncy("right", 2.0, right)], 0.3);
+        let [a, b] =
+            collide(weightless(1), [bouncing_ball("left", 1.0, left), bouncing_ball("right", 2.0, right)], 0.3);
         b - a
     };
     let (low, high) = (Some(0.3), Some(0.9));
@@ -92,7 +95,7 @@ fn combinations() {
 }
 
 /// A ball above a block on the ground.
-fn stack() -> (SimulationManager, [ObjectId; 2]) {
+fn stack() -> (SimulationManager, [RigidObjectId; 2]) {
     let mut sim = sim(SimulationManagerCfg { num_envs: 2, physics_dt: 2e-3, ..Default::default() });
     let block = sim.add_rigid_object(object("block", ObjectShape::cube(0.4), [0.0, 0.0, 0.2])).unwrap();
     let ball = sim.add_rigid_object(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 0.52])).unwrap();
@@ -106,7 +109,7 @@ fn contacts(sim: &SimulationManager) -> usize {
 /// Excluded objects pass through each other, or through the world, from the call on.
 #[test]
 fn excluded_objects() {
-    let stand = |sim: &mut SimulationManager, ids: [ObjectId; 2], expected: [f64; 2]| {
+    let stand = |sim: &mut SimulationManager, ids: [RigidObjectId; 2], expected: [f64; 2]| {
         sim.update(500);
         let z = ids.map(|id| sim.rigid_object(id).pose()[(1, 2)]);
         let lies = |k: usize| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0;
@@ -127,7 +130,7 @@ fn excluded_objects() {
     sim.exclude_collision("ball", "block").unwrap();
     let model = sim.batch().model().clone();
     sim.exclude_collision("block", "ball").unwrap();
-    assert!(sim.batch().model().is(&model), "known already: nothing is compiled");
+    assert!(sim.batch().model().ptr_eq(&model), "known already: nothing is compiled");
     stand(&mut sim, ids, [0.2, 0.1]);
 }
 

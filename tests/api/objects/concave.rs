@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::scene::mesh::PiecesCfg;
+use kinetoscope::scene::mesh::ConvexDecompositionCfg;
 use kinetoscope::sim::MeshCollision;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
@@ -54,7 +54,7 @@ fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
 }
 
 /// A ball of radius R with damping.
-fn marble(at: [f64; 3]) -> RigidObjectCfg {
+fn damped_ball(at: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { linear_damping: 2.0, angular_damping: 0.01, ..ball("ball", R, 0.5, at) }
 }
 
@@ -63,20 +63,20 @@ fn collides(mesh: RigidObjectCfg, mesh_collision: MeshCollision) -> RigidObjectC
 }
 
 /// The position of a ball after three seconds in a static mesh, without ground.
-fn lies(mesh: &TriMesh, collision: MeshCollision, from: [f64; 3]) -> [f64; 3] {
-    let files = Files::default();
+fn resting_position(mesh: &TriMesh, collision: MeshCollision, from: [f64; 3]) -> [f64; 3] {
+    let files = TempFiles::default();
     let mut sim = empty(1);
     let cfg = object("mesh", ObjectShape::mesh(obj(&files, "m.obj", mesh)), [0.0; 3]);
     sim.add_rigid_object(collides(fixed(cfg), collision)).unwrap();
     assert_eq!(sim.diagnostics(), []);
-    let ball = sim.add_rigid_object(marble(from)).unwrap();
+    let ball = sim.add_rigid_object(damped_ball(from)).unwrap();
     sim.update(3000);
     let pose = sim.rigid_object(ball).pose();
     [0, 1, 2].map(|k| pose[(0, k)])
 }
 
 fn pieces(max_pieces: usize, tolerance: f64) -> MeshCollision {
-    MeshCollision::Pieces(PiecesCfg { max_pieces, tolerance })
+    MeshCollision::Pieces(ConvexDecompositionCfg { max_pieces, tolerance })
 }
 
 fn triangles(thickness: f64) -> MeshCollision {
@@ -92,20 +92,20 @@ fn triangles(thickness: f64) -> MeshCollision {
 #[test]
 fn balls_on_pieces() {
     let from = [0.6, 0.0, 0.9];
-    let found = lies(&ell(), pieces(4, 1e-3), from);
+    let found = resting_position(&ell(), pieces(4, 1e-3), from);
     assert_number("height on the foot", found[2], 0.25 + R, SOFT);
     assert!((found[0] - 0.6).abs() < 1e-2, "{found:?}");
-    let hull = lies(&ell(), MeshCollision::Hull, from);
+    let hull = resting_position(&ell(), MeshCollision::Hull, from);
     assert!(hull[2] < -1.0, "the control: it falls off the hull: {hull:?}");
 
     let mesh = bowl(0.2, 0.23, 12, 48);
     assert!(mesh.is_closed() && mesh.signed_volume() > 0.0);
-    let found = lies(&mesh, pieces(200, 4e-3), [0.06, -0.03, 0.1]);
+    let found = resting_position(&mesh, pieces(200, 4e-3), [0.06, -0.03, 0.1]);
     let gap = 0.2 - R - found.iter().map(|x| x * x).sum::<f64>().sqrt();
     assert!(gap > -SOFT.absolute && gap < 4e-3 + 0.43e-3, "{found:?} {gap}");
     // The ball rests low: a flat facet of a piece is 2 sqrt(2 · 0.2 · 0.004) = 8 cm wide, 4 cm from its middle.
     assert!(found[2] < -0.15 + 4.5e-3 && found[0].hypot(found[1]) < 0.05, "{found:?}");
-    let hull = lies(&mesh, MeshCollision::Hull, [0.0, 0.0, 0.1]);
+    let hull = resting_position(&mesh, MeshCollision::Hull, [0.0, 0.0, 0.1]);
     assert_number("the control: it lies on the rim", hull[2], R, SOFT);
 }
 
@@ -122,7 +122,7 @@ fn balls_on_triangles() {
         ("channel", channel(), triangles(0.02), [0.1, 0.0, 0.3], 0.1 + R, SOFT, 1.0),
         ("bowl", bowl(0.2, 0.23, 12, 24), triangles(0.01), [0.06, -0.03, 0.1], R - 0.2, chords, 0.02),
     ] {
-        let found = lies(&mesh, collision, from);
+        let found = resting_position(&mesh, collision, from);
         let off = if what == "bowl" { found[0].hypot(found[1]) } else { found[0].abs() };
         assert_number(what, found[2], height, within);
         assert!(off < across, "{what}: {found:?}");
@@ -133,7 +133,7 @@ fn balls_on_triangles() {
 /// nor stops, but every edge slows it slightly, as documented at `MeshCollision::Triangles`.
 #[test]
 fn sliding_over_edges() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut sim = empty(1);
     let smooth = |cfg| RigidObjectCfg { friction: Some([0.0; 3]), ..cfg };
     let cfg = object("mesh", ObjectShape::mesh(obj(&files, "m.obj", &valley(20))), [0.0; 3]);
@@ -157,7 +157,7 @@ fn sliding_over_edges() {
 /// scene is valid.
 #[test]
 fn slivers() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut corners = vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
     corners.extend([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0], [5e-4, 2e-10, 0.0]]);
     let mesh = TriMesh::from_triangles(corners, vec![[0, 1, 2], [3, 4, 5]]);
@@ -167,7 +167,7 @@ fn slivers() {
     for words in ["1 triangles are too thin", "not all that is behind it"] {
         assert!(count_diagnostics(&sim, &[words]) > 0, "{:?}", sim.diagnostics());
     }
-    let ball = sim.add_rigid_object(marble([0.0, -0.2, 0.1])).unwrap();
+    let ball = sim.add_rigid_object(damped_ball([0.0, -0.2, 0.1])).unwrap();
     sim.update(1000);
     assert_number("height", sim.rigid_object(ball).pose()[(0, 2)], R, SOFT);
 }
@@ -175,12 +175,12 @@ fn slivers() {
 /// A moving L collides in pieces too, with the mass of the enclosed volume.
 #[test]
 fn moving_pieces() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut sim = sim(SimulationManagerCfg { physics_dt: 1e-3, ..Default::default() });
     let cfg = object("ell", ObjectShape::mesh(obj(&files, "l.obj", &ell())), [0.0, 0.0, 0.001]);
     let id = sim.add_rigid_object(collides(cfg, pieces(4, 1e-3))).unwrap();
     assert!((sim.rigid_object(id).nominal_mass() / (1000.0 * (0.25 + 0.75 * 0.25)) - 1.0).abs() < 1e-6);
-    let ball = sim.add_rigid_object(marble([0.7, 0.1, 0.4])).unwrap();
+    let ball = sim.add_rigid_object(damped_ball([0.7, 0.1, 0.4])).unwrap();
     sim.update(2000);
     let (lies, stands) = (sim.rigid_object(ball).pose(), sim.rigid_object(id).pose());
     assert_number("the ball", lies[(0, 2)], 0.25 + R, SOFT * 2.0);
@@ -199,7 +199,7 @@ fn moving_pieces() {
 
 #[test]
 fn refusals() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut sim = empty(1);
     let mesh = object("o", ObjectShape::mesh(obj(&files, "m.obj", &valley(1))), [0.0; 3]);
     let many = object("o", ObjectShape::mesh(obj(&files, "many.obj", &valley(300))), [0.0; 3]);
@@ -218,6 +218,6 @@ fn refusals() {
     // A limit of too few pieces gives a diagnostic.
     let round = ObjectShape::mesh(obj(&files, "bowl.obj", &bowl(0.2, 0.23, 6, 24)));
     sim.add_rigid_object(collides(object("o", round, [0.0; 3]), pieces(3, 1e-4))).unwrap();
-    let said = count_diagnostics(&sim, &["3 convex pieces"]);
-    assert_eq!((said, sim.diagnostics().len()), (1, 1), "{:?}", sim.diagnostics());
+    let reported = count_diagnostics(&sim, &["3 convex pieces"]);
+    assert_eq!((reported, sim.diagnostics().len()), (1, 1), "{:?}", sim.diagnostics());
 }

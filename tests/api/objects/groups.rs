@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::{Array3, Axis};
-use kinetoscope::sim::{Error, GroupId, ObjectId, RigidObjectGroupCfg};
+use kinetoscope::sim::{Error, RigidObjectGroupCfg, RigidObjectGroupId, RigidObjectId};
 use kinetoscope_testkit::refusal::assert_error;
 
 fn blocks() -> RigidObjectGroupCfg {
@@ -10,7 +10,7 @@ fn blocks() -> RigidObjectGroupCfg {
     RigidObjectGroupCfg { uid: "blocks".into(), objects: vec![at("red", 0.0), at("green", 1.0), at("blue", 2.0)] }
 }
 
-fn objects(sim: &SimulationManager, id: GroupId) -> Vec<ObjectId> {
+fn objects(sim: &SimulationManager, id: RigidObjectGroupId) -> Vec<RigidObjectId> {
     sim.rigid_object_group(id).names().iter().map(|name| sim.entities().rigid_object_id(name).unwrap()).collect()
 }
 

@@ -2,9 +2,9 @@
 //! by the motion of objects.
 
 use super::*;
-use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::sim::{ObjectId, WrenchFrame};
+use kinetoscope::sim::{RigidObjectId, WrenchFrame};
 use kinetoscope_testkit::refusal::assert_error;
 
 /// F t / m in each environment; moments scale with the mass, T t / I, for a cube m a²/6.
@@ -16,7 +16,7 @@ fn mass() {
     sim.rigid_object_mut(id).set_mass(&array![0.5, 8.0], Some(&[EnvId(2), EnvId(0)])).unwrap();
     let masses = [8.0, 2.0, 0.5];
     assert_eq!(sim.rigid_object(id).mass().to_vec(), masses);
-    pull(&mut sim, id, [4.0, 0.0, 0.0], [0.0, 0.0, 0.01]);
+    set_wrench(&mut sim, id, [4.0, 0.0, 0.0], [0.0, 0.0, 0.01]);
     assert_eq!(sim.rigid_object(id).external_wrench().row(1).to_vec(), [4.0, 0.0, 0.0, 0.0, 0.0, 0.01]);
     sim.update(500);
     let v = sim.rigid_object(id).velocity();
@@ -40,9 +40,9 @@ fn mass() {
 /// With the center of mass at rest and a spin w about z the origin circles it: after half a turn the origin has moved
 /// by 2 d.
 #[test]
-fn centre_of_mass() {
+fn center_of_mass() {
     let (d, w) = (0.04, 2.0);
-    let half_a_turn = |sim: &mut SimulationManager, id: ObjectId| {
+    let half_a_turn = |sim: &mut SimulationManager, id: RigidObjectId| {
         sim.rigid_object_mut(id).write_velocity(&row([0.0, -w * d, 0.0, 0.0, 0.0, w]), None).unwrap();
         sim.update((std::f64::consts::PI / w / 1e-3).round() as u32);
         let pose = sim.rigid_object(id).pose();
@@ -53,7 +53,7 @@ fn centre_of_mass() {
     let id = sim.add_rigid_object(cfg).unwrap();
     assert_eq!(sim.rigid_object(id).center_of_mass(), array![[d, 0.0, 0.0]]);
     // A force at the center of mass for a second: F t / m, and no spin.
-    pull(&mut sim, id, [0.0, 3.0, 0.0], [0.0; 3]);
+    set_wrench(&mut sim, id, [0.0, 3.0, 0.0], [0.0; 3]);
     sim.update(1000);
     let v = sim.rigid_object(id).velocity();
     assert!((v[(0, 1)] - 1.5).abs() < 1e-9 && v.row(0).iter().skip(3).all(|w| w.abs() < 1e-9), "{v}");
@@ -119,10 +119,10 @@ fn damping() {
     let id = sim.add_rigid_object(RigidObjectCfg { shape: ObjectShape::Box { size: sides }, ..cfg }).unwrap();
     let stands = sim.add_rigid_object(fixed(object("fixed", ObjectShape::cube(0.1), [9.0, 0.0, 0.0]))).unwrap();
     assert_eq!(sim.rigid_object(stands).damping(), Array2::<f64>::zeros((4, 2)));
-    let drawn = Randomization::new().with(Property::LinearDamping, "object", Draw::Scale([2.0, 4.0])).with(
+    let drawn = Randomization::new().with(Property::LinearDamping, "object", RandomizationOp::Scale([2.0, 4.0])).with(
         Property::AngularDamping,
         "object",
-        Draw::Add([0.01, 0.02]),
+        RandomizationOp::Add([0.01, 0.02]),
     );
     sim.properties_mut().randomize(&drawn, Some(&[EnvId(3)])).unwrap();
     sim.rigid_object_mut(id).set_damping(&array![[3.0, 0.0]], Some(SECOND)).unwrap();
@@ -225,6 +225,6 @@ fn margins() {
     });
     sim.update(1500);
     let z = [low, high].map(|id| sim.rigid_object(id).pose()[(0, 2)]);
-    let between = if TARGET == Target::V2 { 0.02 } else { 0.03 };
+    let between = if BUILD_VERSION == SupportedVersion::V2 { 0.02 } else { 0.03 };
     assert!((z[0] - 0.11).abs() < 1e-3 && (z[1] - z[0] - 0.2 - between).abs() < 1e-3, "{z:?}");
 }

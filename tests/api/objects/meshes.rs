@@ -1,16 +1,16 @@
 //! Mesh objects and cones: mass, sensors, collision and export.
 
 use super::*;
-use kinetoscope::mujoco::{ObjectKind, TARGET, Target, compile_file};
+use kinetoscope::mujoco::{BUILD_VERSION, ObjectKind, SupportedVersion, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::mesh::write_binary_stl;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
-use kinetoscope::sim::ObjectId;
+use kinetoscope::sim::RigidObjectId;
 use nalgebra::{Matrix3, Vector3};
 
 /// MuJoCo's mass, center of mass and inertia tensor about it, in the object's frame.
-fn body(sim: &SimulationManager, id: ObjectId) -> (f64, Vector3<f64>, Matrix3<f64>) {
+fn body(sim: &SimulationManager, id: RigidObjectId) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let uid = sim.rigid_object(id).uid();
     sim.batch().read(0, |env| {
         let model = env.data().model();
@@ -27,7 +27,7 @@ fn body(sim: &SimulationManager, id: ObjectId) -> (f64, Vector3<f64>, Matrix3<f6
 /// rounding.
 #[test]
 fn box_mesh() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let size = [0.25_f32, 0.5, 0.125];
     let mesh = ObjectShape::mesh(obj(&files, "b.obj", &brick(size, size.map(|s| -s / 2.0))));
     let mut sim = weightless(1);
@@ -45,7 +45,7 @@ fn box_mesh() {
 /// twice as long and mirrored downward. The same triangles from STL have the same mass, to the last bit.
 #[test]
 fn frame_and_format() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let path = obj(&files, "b.obj", &brick([0.5, 0.25, 0.25], [0.0; 3]));
     let mut sim = weightless(1);
     let shape = ObjectShape::Mesh { path, scale: [2.0, 1.0, -1.0], hull: Default::default() };
@@ -82,7 +82,7 @@ fn scanner(x: f64, y: f64, resolution: f64, side: f64, target: &str) -> RayCaste
 /// comes to rest.
 #[test]
 fn hollow_and_hull() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut sim = empty(2);
     let cfg = object("channel", ObjectShape::mesh(obj(&files, "c.obj", &channel())), [0.2, 0.1, 0.0]);
     let channel = sim.add_rigid_object(fixed(cfg)).unwrap();
@@ -156,7 +156,7 @@ fn cone() {
 /// and down to 0.25 m.
 #[test]
 fn open_meshes() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut open = brick([0.5, 0.5, 0.25], [0.0; 3]);
     open.triangles.truncate(10);
     let (mut odd, other) = (brick([0.5; 3], [0.0; 3]), brick([0.5, 0.5, 0.25], [1.0, 0.0, 0.0]));
@@ -183,21 +183,25 @@ fn open_meshes() {
 /// The exported model has the hull for collisions and the mesh as visual, and the same mass.
 #[test]
 fn exported() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut sim = empty(1);
     let mesh = ObjectShape::mesh(obj(&files, "c.obj", &channel()));
     sim.add_rigid_object(object("channel", mesh, [0.0; 3])).unwrap();
     let cone = ObjectShape::Cone { radius: 0.1, height: 0.2 };
     sim.add_rigid_object(object("cone", cone, [3.0, 0.0, 0.0])).unwrap();
-    let dump = Files::default();
+    let dump = TempFiles::default();
     assert_eq!(sim.dump(dump.folder()).unwrap(), []);
     let (v2, v4) = (dump.folder().join("robot.mjcf2.xml"), dump.folder().join("robot.mjcf4.xml"));
-    let (exported, other) = if TARGET == Target::V2 { (v2, v4) } else { (v4, v2) };
+    let (exported, other) = if BUILD_VERSION == SupportedVersion::V2 { (v2, v4) } else { (v4, v2) };
     let model = compile_file(&exported).unwrap().into_model();
     assert_eq!(model.body_mass(), sim.batch().model().body_mass());
     assert_eq!((model.nmesh(), sim.batch().model().nmesh()), (3, 2));
     let seen = (0..model.ngeom()).filter(|&g| model.geom_group()[g] < 3).count();
     assert_eq!((model.ngeom(), seen), (3, 2), "the hull of the channel is not shown, its mesh and the cone are");
     let text = std::fs::read_to_string(other).unwrap();
-    assert_eq!(text.contains("simple=\"false\""), TARGET == Target::V2, "2.2.2 does not know the attribute");
+    assert_eq!(
+        text.contains("simple=\"false\""),
+        BUILD_VERSION == SupportedVersion::V2,
+        "2.2.2 does not know the attribute"
+    );
 }

@@ -11,9 +11,9 @@ mod welds;
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::{TriMesh, write_obj};
-use kinetoscope::sim::{ObjectId, WrenchFrame};
+use kinetoscope::sim::{RigidObjectId, WrenchFrame};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{ball, cube, empty_cfg, fixed, object, row, sim, weightless_cfg};
 use std::path::PathBuf;
 
@@ -37,11 +37,11 @@ fn kinematic(cfg: RigidObjectCfg) -> RigidObjectCfg {
 }
 
 /// Sets a force \[N\] and a torque \[N m\] in world axes, in all environments.
-fn pull(sim: &mut SimulationManager, id: ObjectId, force: [f64; 3], torque: [f64; 3]) {
+fn set_wrench(sim: &mut SimulationManager, id: RigidObjectId, force: [f64; 3], torque: [f64; 3]) {
     sim.rigid_object_mut(id).set_external_wrench(&row(force), &row(torque), WrenchFrame::World, None).unwrap();
 }
 
-fn obj(files: &Files, name: &str, mesh: &TriMesh) -> PathBuf {
+fn obj(files: &TempFiles, name: &str, mesh: &TriMesh) -> PathBuf {
     let mut text = Vec::new();
     write_obj(mesh, 0..mesh.triangles.len(), &mut text).unwrap();
     files.write(name, text)

@@ -5,7 +5,7 @@ use super::*;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::sensors::ray::pattern::Custom;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
-use kinetoscope::sim::ObjectId;
+use kinetoscope::sim::RigidObjectId;
 
 fn paddle() -> RigidObjectCfg {
     kinematic(object("paddle", ObjectShape::Box { size: [0.1, 1.0, 1.0] }, [0.0; 3]))
@@ -90,7 +90,7 @@ fn rays_see_it() {
 }
 
 /// A shelf of 4 cm thickness and a ball above it.
-pub(super) fn shelf(num_envs: usize, height: f64) -> (SimulationManager, ObjectId, ObjectId) {
+pub(super) fn shelf(num_envs: usize, height: f64) -> (SimulationManager, RigidObjectId, RigidObjectId) {
     let mut sim = empty(num_envs);
     let size = ObjectShape::Box { size: [0.4, 0.4, 0.04] };
     let shelf = sim.add_rigid_object(fixed(object("shelf", size, [0.0, 0.0, height]))).unwrap();
@@ -118,7 +118,7 @@ fn shelves() {
     }
     // The environment that was not named shares everything; the others have two own arrays and those derived from them.
     let base = sim.batch().model().clone();
-    assert!(sim.batch().read(0, |env| env.data().model().arrays_apart(&base).is_empty()));
+    assert!(sim.batch().read(0, |env| env.data().model().unshared_arrays(&base).is_empty()));
     let own: Vec<&str> = sim.batch().read(1, |env| env.data().model().own_arrays().map(|(name, _)| name).collect());
     assert!(own.contains(&"body_pos") && own.len() <= 4, "{own:?}");
     // The pose persists through a reset and an addition, until properties are nominal again.
@@ -160,12 +160,12 @@ fn ramp() {
 
 /// Randomized poses by name, as for any property; rays hit the shelf where MuJoCo's rays do.
 #[test]
-fn drawn_places() {
+fn randomized_poses() {
     let (mut sim, shelf_id, _) = shelf(2, 0.5);
     // Off edges, where rounding decides.
     let rays = RayCasterCfg { offset: Pose::translation(0.013, 0.007, 3.0), ..Default::default() };
     let rays = sim.add_sensor("rays", rays).unwrap();
-    let draw = Randomization::new().with(Property::Position, "shelf", Draw::Add([-0.05, 0.05]));
+    let draw = Randomization::new().with(Property::Position, "shelf", RandomizationOp::Add([-0.05, 0.05]));
     sim.properties_mut().randomize(&draw, Some(SECOND)).unwrap();
     let place = sim.rigid_object(shelf_id).pose();
     let moved: Vec<f64> = (0..3).map(|k| place[(1, k)] - place[(0, k)]).collect();

@@ -6,7 +6,7 @@ use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::mesh::HullCfg;
 use kinetoscope::sim::{Error, Result, WrenchFrame};
-use kinetoscope_testkit::refusal::{assert_error, assert_refused, assert_refused_unchanged};
+use kinetoscope_testkit::refusal::{assert_error, assert_errors, assert_errors_unchanged};
 
 #[test]
 fn configurations() {
@@ -41,7 +41,7 @@ fn configurations() {
         ("rgba", RigidObjectCfg { rgba: [2.0, 0.0, 0.0, 1.0], ..cube() }),
     ];
     let variant = |field| format!("Config {{ field: {field:?}");
-    assert_refused(rows.map(|(field, cfg)| (field, sim.add_rigid_object(cfg), variant(field), [])));
+    assert_errors(rows.map(|(field, cfg)| (field, sim.add_rigid_object(cfg), variant(field), [])));
     for uid in ["world", "a/b"] {
         assert!(sim.add_rigid_object(object(uid, ObjectShape::cube(0.1), [0.0; 3])).is_err(), "{uid}");
     }
@@ -51,7 +51,7 @@ fn configurations() {
 
 #[test]
 fn mesh_files() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let good = obj(&files, "b.obj", &brick([0.5, 0.5, 0.5], [0.0; 3]));
     let (text, absent) = (files.write("t.obj", "v 0 0 0\nf 1 2 3\n"), files.folder().join("none.stl"));
     let few = HullCfg { max_vertices: 3, ..Default::default() };
@@ -61,7 +61,7 @@ fn mesh_files() {
         sim.add_rigid_object(object("o", shape, [0.0; 3]))
     };
     let (mesh, hull) = ("ObjectMesh { object: \"o\"", HullCfg::default());
-    assert_refused([
+    assert_errors([
         ("absent", add(&absent, [1.0; 3], hull), mesh, &["none.stl"][..]),
         ("no index", add(&text, [1.0; 3], hull), mesh, &["t.obj"]),
         ("no solid", add(&good, [1.0; 3], few), mesh, &["max_vertices"]),
@@ -87,13 +87,13 @@ fn writes() {
         ("set_external_wrench", wrench),
     ];
     let variant = |argument| format!("NotDynamic {{ argument: {argument:?}");
-    assert_refused(results.map(|(argument, result)| (argument, result, variant(argument), [])));
+    assert_errors(results.map(|(argument, result)| (argument, result, variant(argument), [])));
     assert_error(sim.rigid_object_mut(stands).write_velocity(&velocity, None), "FixedBody(\"fixed\")", &[]);
     // Poses of objects of every type; the wrench error names one of its two tables.
     let twice = Some(&[EnvId(2), EnvId(0), EnvId(2)][..]);
     let rows = |columns| Array2::from_elem((3, columns), 1.0);
     let repeated = |result: Result<()>, called: &str| match result {
-        Err(Error::Repeated { argument, of, first: 0, second: 2 }) => {
+        Err(Error::RepeatedItem { argument, item: of, first: 0, second: 2 }) => {
             assert_eq!((argument, of.as_str()), (called, "environment 2"));
         }
         other => panic!("{called}: {other:?}"),
@@ -114,7 +114,7 @@ fn writes() {
         ("sliding", object.set_friction(&array![[-0.1, 0.0, 0.0]], None)),
         ("rolling", object.set_friction(&array![[0.1, 0.0, -1.0]], None)),
     ];
-    assert_refused(results.map(|(what, result)| (what, result, "Randomization(Value {", [])));
+    assert_errors(results.map(|(what, result)| (what, result, "Randomization(Value {", [])));
     let mass = object.read().nominal_mass();
     assert_eq!(object.read().mass().to_vec(), [mass; 3]);
     assert_eq!(object.read().friction().row(0).to_vec(), [1.0, 0.005, 0.0001]);
@@ -133,7 +133,7 @@ fn places() {
         ("moves", (Property::Position, "ball", &[0.0; 3]), "", ["static object called"]),
     ];
     let pose = |sim: &SimulationManager| sim.rigid_object(shelf).pose();
-    assert_refused_unchanged(&mut sim, pose, rows, |sim, (property, name, value)| {
+    assert_errors_unchanged(&mut sim, pose, rows, |sim, (property, name, value)| {
         sim.properties_mut().randomize_with(None, |_, _, p| p.set(property, name, value))
     });
     let model = sim.batch().model();

@@ -2,9 +2,9 @@
 
 use super::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
-use kinetoscope::sim::{Error, ObjectId, Snapshot, WeldCfg, WeldId};
+use kinetoscope::sim::{Error, RigidObjectId, Snapshot, WeldCfg, WeldId};
 use kinetoscope_testkit::refusal::assert_error;
-use kinetoscope_testkit::worlds::{errors, pose_in, sr5};
+use kinetoscope_testkit::worlds::{pose_error, pose_of_row, sr5};
 
 fn weld(first: &str, second: &str) -> WeldCfg {
     WeldCfg { uid: "weld".into(), first: first.into(), second: second.into() }
@@ -15,28 +15,28 @@ fn small(uid: &str, x: f64) -> RigidObjectCfg {
 }
 
 /// Two cubes of 1 and 3 kg half a meter apart, the second rotated, and a detached weld between them.
-fn cubes(num_envs: usize) -> (SimulationManager, [ObjectId; 2], WeldId) {
+fn cubes(num_envs: usize) -> (SimulationManager, [RigidObjectId; 2], WeldId) {
     let mut sim = weightless(num_envs);
     let first = sim.add_rigid_object(cube("first", 0.1, 1.0, [0.0; 3])).unwrap();
     let init_pose = kinetoscope::scene::pose::from_xyz_rpy([0.5, 0.0, 0.0], [0.3, -0.4, 0.5]);
     let second = sim.add_rigid_object(RigidObjectCfg { init_pose, ..cube("second", 0.1, 3.0, [0.0; 3]) }).unwrap();
-    let held = sim.add_weld(weld("first", "second")).unwrap();
-    (sim, [first, second], held)
+    let weld_id = sim.add_weld(weld("first", "second")).unwrap();
+    (sim, [first, second], weld_id)
 }
 
 /// Pose of the second object in the frame of the first.
-fn relative(sim: &SimulationManager, [first, second]: [ObjectId; 2], env: usize) -> Pose {
-    let [a, b] = [first, second].map(|id| pose_in(&sim.rigid_object(id).pose(), env));
+fn relative(sim: &SimulationManager, [first, second]: [RigidObjectId; 2], env: usize) -> Pose {
+    let [a, b] = [first, second].map(|id| pose_of_row(&sim.rigid_object(id).pose(), env));
     a.inverse() * b
 }
 
 fn apart(a: &Pose, b: &Pose) -> f64 {
-    let (far, turned) = errors(a, b);
+    let (far, turned) = pose_error(a, b);
     far + turned
 }
 
-fn push(sim: &mut SimulationManager, id: ObjectId, x: f64) {
-    pull(sim, id, [x, 0.0, 0.0], [0.0; 3]);
+fn push(sim: &mut SimulationManager, id: RigidObjectId, x: f64) {
+    set_wrench(sim, id, [x, 0.0, 0.0], [0.0; 3]);
 }
 
 fn attached(sim: &SimulationManager, weld: WeldId) -> Vec<bool> {
@@ -103,7 +103,8 @@ fn links_and_world() {
         sim.weld_mut(id).attach(Some(SECOND)).unwrap();
     }
     let in_link = |sim: &SimulationManager| {
-        pose_in(&sim.robot(arm).link_pose(&tip).unwrap(), 1).inverse() * pose_in(&sim.rigid_object(ids[0]).pose(), 1)
+        pose_of_row(&sim.robot(arm).link_pose(&tip).unwrap(), 1).inverse()
+            * pose_of_row(&sim.rigid_object(ids[0]).pose(), 1)
     };
     let before = in_link(&sim);
     let start = sim.robot(arm).link_pose(&tip).unwrap();
@@ -126,7 +127,7 @@ fn snapshots() {
     push(&mut sim, ids[0], 2.0);
     sim.update(50);
     let snapshot = sim.snapshot(None).unwrap();
-    let files = Files::default();
+    let files = TempFiles::default();
     let path = files.folder().join("state");
     snapshot.save(&path).unwrap();
     let run = |sim: &mut SimulationManager| {
@@ -188,7 +189,7 @@ fn far_and_fixed() {
         // Without the weld the cube would rotate by a quarter of a turn in the meantime.
         sim.rigid_object_mut(id).write_velocity(&row([0.0, 0.0, 0.0, 0.0, 0.0, 1.5]), None).unwrap();
         sim.update(500);
-        let (off, angle) = errors(&pose_in(&sim.rigid_object(id).pose(), 0), &Pose::translation(0.0, 0.0, 1.0));
+        let (off, angle) = pose_error(&pose_of_row(&sim.rigid_object(id).pose(), 0), &Pose::translation(0.0, 0.0, 1.0));
         // Twice the motion of one step at 1.5 rad/s before the weld stops the cube; 1e-4 of the weight.
         assert!(off < 1e-5 && angle < 1e-2, "{body_type:?} {pair:?}: {off} {angle}");
     }
@@ -225,8 +226,8 @@ fn rollouts() {
     let tight = sim.snapshot(Some(SECOND)).unwrap();
     let controls = Array3::zeros((1, 40, 0));
     let rows = [EnvId(1); 3];
-    for (here, start) in [(&tight, &loose), (&loose, &tight), (&tight, &tight), (&loose, &loose)] {
-        sim.restore(here, Some(SECOND)).unwrap();
+    for (current, start) in [(&tight, &loose), (&loose, &tight), (&tight, &tight), (&loose, &loose)] {
+        sim.restore(current, Some(SECOND)).unwrap();
         let rollout = sim.rollout(&controls, Some(start), Some(&rows)).unwrap();
         sim.restore(start, Some(SECOND)).unwrap();
         for step in 0..40 {
@@ -240,7 +241,7 @@ fn rollouts() {
         let expected = sim.weld(held).is_attached()[1];
         let moved = sim.rigid_object(ids[1]).velocity()[(1, 0)] != 0.0;
         assert!(moved == expected && expected == std::ptr::eq(start, &tight));
-        sim.restore(&rollout.end, Some(&rows)).unwrap();
+        sim.restore(&rollout.final_states, Some(&rows)).unwrap();
         assert_eq!(attached(&sim, held), [false, expected]);
     }
 }
@@ -252,11 +253,11 @@ fn refusals() {
     sim.add_rigid_object(fixed(object("wall", ObjectShape::cube(0.1), [9.0; 3]))).unwrap();
     let text = r#"<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
         <body name="tail" pos="0.3 0 0"><geom size="0.1"/></body></body></worldbody></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("part", text)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("part", text)).unwrap();
     let taken = WeldCfg { uid: "first".into(), ..weld("first", "second") };
     let other = |first: &str, second: &str| WeldCfg { uid: "other".into(), ..weld(first, second) };
     let field = "Config { field: \"weld\"";
-    for (cfg, kind, says) in [
+    for (cfg, kind, part) in [
         (other("first", "secnd"), "candidates: [\"second\"", ""),
         (other("first", "first"), field, "different bodies"),
         (other("part/trunk", "part/tail"), field, "different bodies"),
@@ -265,11 +266,11 @@ fn refusals() {
         (taken, "DuplicateUid(\"first\")", ""),
         (weld("first", "second"), "DuplicateUid(", ""),
     ] {
-        assert_error(sim.add_weld(cfg), kind, &[says]);
+        assert_error(sim.add_weld(cfg), kind, &[part]);
     }
     let far = sim.weld_mut(held).attach(Some(&[EnvId(1), EnvId(2)]));
     assert!(matches!(far, Err(Error::UnknownIndex { index: 2, .. })));
     let twice = sim.weld_mut(held).release(Some(&[EnvId(1), EnvId(1)]));
-    assert!(matches!(twice, Err(Error::Repeated { argument: "release", .. })));
+    assert!(matches!(twice, Err(Error::RepeatedItem { argument: "release", .. })));
     assert_eq!(attached(&sim, held), [false, false]);
 }

@@ -4,7 +4,7 @@ use super::ENVS;
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
-use kinetoscope_testkit::worlds::{cfg, count_diagnostics, empty_cfg, mjcf_robot, pose_in, sim};
+use kinetoscope_testkit::worlds::{cfg, count_diagnostics, empty_cfg, mjcf_robot, pose_of_row, sim};
 use nalgebra::{UnitQuaternion, Vector3};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1");
@@ -73,7 +73,7 @@ fn closed_forms_and_contacts() {
             assert_number(shape, standing.robot(robot).lowest_heights()[1], 0.02, tolerance);
             assert_number(shape, standing.robot(robot).default_root_pose()[(0, 2)], below + 0.02, tolerance);
             assert_number(shape, standing.robot(robot).root_pose()[(2, 0)], 0.5, EXACT);
-            let turned = pose_in(&standing.robot(robot).root_pose(), 0).rotation.angle_to(&rotation);
+            let turned = pose_of_row(&standing.robot(robot).root_pose(), 0).rotation.angle_to(&rotation);
             assert_number(shape, turned, 0.0, Tolerance::absolute(1e-7, "an angle from a cosine of 1 - 1e-16"));
         }
     }

@@ -4,7 +4,7 @@ use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::needs;
 use kinetoscope_testkit::refusal::assert_error;
-use kinetoscope_testkit::worlds::{gains, pose_in, sim, urdf_robot};
+use kinetoscope_testkit::worlds::{gains, pose_of_row, sim, urdf_robot};
 
 const LEGS: [&str; 4] = ["LF", "RF", "LH", "RH"];
 
@@ -45,7 +45,7 @@ fn numbers_of_the_tutorial() {
     }
     // The tutorial's pose: the lowest point of each foot is 0.549 m below the base.
     for leg in LEGS {
-        let foot = pose_in(&robot.link_pose(&format!("{leg}_FOOT")).unwrap(), 0);
+        let foot = pose_of_row(&robot.link_pose(&format!("{leg}_FOOT")).unwrap(), 0);
         let ball = foot * nalgebra::Point3::new(0.0, 0.0, 0.0225);
         assert!((0.6 - (ball.z - 0.03) - 0.549).abs() < 1e-3, "{leg}: {ball}");
     }
@@ -65,7 +65,7 @@ fn feet_of_anymal() {
             sim.robot_mut(id).write_qpos(&Array2::from_shape_fn((1, 12), angle), None, None).unwrap();
         }
         for leg in LEGS {
-            let [a, b] = ids.map(|id| pose_in(&sim.robot(id).link_pose(&format!("{leg}_FOOT")).unwrap(), 0));
+            let [a, b] = ids.map(|id| pose_of_row(&sim.robot(id).link_pose(&format!("{leg}_FOOT")).unwrap(), 0));
             // The vendor's file contains mounting angles of 12 digits.
             assert!((a.translation.vector - b.translation.vector).amax() < 1e-9, "{leg}: {a} {b}");
         }
@@ -73,21 +73,21 @@ fn feet_of_anymal() {
 }
 
 /// Measurements of 60 s of standing on the ground.
-struct Stood {
+struct StandingResult {
     /// Range of the height of the base in the last 30 s \[m\].
     drift: f64,
     /// Ratio of the sum of the vertical forces on the feet to the weight, mean over the last second.
-    carried: f64,
+    weight_ratio: f64,
     /// Number of feet that carried more than 1 N throughout the last second.
-    feet: usize,
+    loaded_feet: usize,
     /// Largest contact force on other bodies than the feet in the last 30 s \[N\].
-    elsewhere: f64,
+    max_other_force: f64,
 }
 
-fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> Stood {
+fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> StandingResult {
     let (uid, dt, mut sim) = (robot.uid.clone(), cfg.physics_dt, sim(cfg));
     let robot = sim.add_robot(robot).unwrap();
-    let all = sim.add_sensor("all", ContactSensorCfg::of(format!("{uid}/.*"))).unwrap();
+    let all = sim.add_sensor("all", ContactSensorCfg::for_bodies(format!("{uid}/.*"))).unwrap();
     let steps = |seconds: f64| (seconds / dt).round() as u32;
     sim.update(steps(30.0));
     let foot: Vec<bool> = sim.sensor(all).unwrap().body_names().iter().map(|name| name.ends_with("_FOOT")).collect();
@@ -110,11 +110,17 @@ fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> Stood {
         }
     }
     let feet = (0..foot.len()).filter(|&b| foot[b] && least[b] > 1.0).count();
-    Stood { drift: high - low, carried: carried / (9.81 * sim.robot(robot).total_mass()), feet, elsewhere }
+    StandingResult {
+        drift: high - low,
+        weight_ratio: carried / (9.81 * sim.robot(robot).total_mass()),
+        loaded_feet: feet,
+        max_other_force: elsewhere,
+    }
 }
 
 fn check(name: &str, robot: RobotCfg) {
-    let Stood { drift, carried, feet, elsewhere } = stand(robot, SimulationManagerCfg::legged());
+    let StandingResult { drift, weight_ratio: carried, loaded_feet: feet, max_other_force: elsewhere } =
+        stand(robot, SimulationManagerCfg::legged());
     assert!(drift < 5e-3, "{name}: the base drifts by {drift} m");
     assert!((carried - 1.0).abs() < 0.01, "{name}: the feet carry {carried} of the weight");
     assert!(feet == 4 && elsewhere == 0.0, "{name}: {feet} feet, {elsewhere} N elsewhere");
@@ -137,7 +143,7 @@ fn standing_of_anymal() {
 #[test]
 fn standing_without_the_preset() {
     let stood = stand(bundled(), SimulationManagerCfg { physics_dt: 0.005, ..Default::default() });
-    assert!(stood.drift > 5e-3 || stood.elsewhere > 0.0, "drift {} m", stood.drift);
+    assert!(stood.drift > 5e-3 || stood.max_other_force > 0.0, "drift {} m", stood.drift);
 }
 
 #[test]

@@ -11,8 +11,8 @@ use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
-use kinetoscope_testkit::urdf::{Files, joint, link, robot};
-use kinetoscope_testkit::worlds::{empty_cfg, errors, gains, no_drive, pose_in, text_robot};
+use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
+use kinetoscope_testkit::worlds::{empty_cfg, gains, no_drive, pose_error, pose_of_row, text_robot};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1 to 10");
@@ -41,7 +41,7 @@ fn sim(gravity: f64) -> SimulationManager {
 }
 
 fn sim_with(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
-    let (files, mut sim) = (Files::default(), sim(gravity));
+    let (files, mut sim) = (TempFiles::default(), sim(gravity));
     let control_parts = vec![("all".into(), vec![".*".into()])];
     let robot = RobotCfg { control_parts, drive: gains(50.0, 5.0), fix_base, ..text_robot(&files, "robot", ROBOT) };
     let id = sim.add_robot(robot).unwrap();
@@ -50,7 +50,7 @@ fn sim_with(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
 
 /// Two balls of 2 kg with one center, connected by a passive hinge: neither ball can move the other.
 fn two_balls(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
-    let (files, mut sim) = (Files::default(), sim(gravity));
+    let (files, mut sim) = (TempFiles::default(), sim(gravity));
     let ball = |name| link(name, 2.0, 0.02, [0.0; 3], "");
     let spin = joint("spin", "continuous", ["outer", "inner"], [0.0; 3], "0 0 1", "");
     let text = robot("r", &format!("{}{}{spin}", ball("outer"), ball("inner")));
@@ -112,8 +112,8 @@ fn links() {
         let turn = UnitQuaternion::from_euler_angles(1.0, 0.5, -0.3);
         let mount = Pose::from_parts(Translation3::new(0.35, 0.02, -0.1), turn);
         for env in 0..ENVS {
-            let [arm, tool] = ["arm", "tool"].map(|name| pose_in(&view.link_pose(name).unwrap(), env));
-            let (distance, angle) = errors(&(arm * mount), &tool);
+            let [arm, tool] = ["arm", "tool"].map(|name| pose_of_row(&view.link_pose(name).unwrap(), env));
+            let (distance, angle) = pose_error(&(arm * mount), &tool);
             assert_number("distance from the mount", distance, 0.0, EXACT);
             assert!(angle < 1e-7, "{angle}");
         }
@@ -132,14 +132,14 @@ fn root() {
         let (linear, angular) = (view.root_lin_vel_b(), view.root_ang_vel_b());
         let (gravity, heading) = (view.projected_gravity_b(), view.root_heading());
         for env in 0..ENVS {
-            let root = pose_in(&pose, env);
+            let root = pose_of_row(&pose, env);
             assert_eq!(state.row(env).to_vec(), [pose.row(env).to_vec(), velocity.row(env).to_vec()].concat());
             // The center of mass of the file.
             let center = root * nalgebra::Point3::new(0.1, -0.05, 0.2);
             let at_frame = by_jacobian(&sim, env, "robot/base", root.translation.vector.into());
             let at_com = by_jacobian(&sim, env, "robot/base", center.into());
-            let apart = (0..3).fold(0.0_f64, |apart, k| apart.max((at_com[k] - at_frame[k]).abs()));
-            assert!(apart > 1e-3, "the control: the two differ");
+            let difference = (0..3).fold(0.0_f64, |apart, k| apart.max((at_com[k] - at_frame[k]).abs()));
+            assert!(difference > 1e-3, "the control: the two differ");
             // In the root's axes: the columns of the rotation matrix are the rows of its transpose.
             let axes = root.rotation.to_rotation_matrix();
             let in_axes = |v: &[f64]| -> [f64; 3] {
@@ -206,7 +206,7 @@ fn written_root() {
     let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 2.0)
         * UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
     let expected = Pose::from_parts(Translation3::new(1.5, 2.0, 2.0), turned);
-    let (distance, angle) = errors(&pose_in(&sim.robot(id).root_pose(), 0), &expected);
+    let (distance, angle) = pose_error(&pose_of_row(&sim.robot(id).root_pose(), 0), &expected);
     assert!(distance < 1e-9 && angle < 1e-9, "{distance} {angle}");
 
     let (mut sim, id) = tumbling();
@@ -231,16 +231,16 @@ fn accelerations_of_a_step() {
     let (mut sim, id) = sim_with(G, true);
     assert_eq!(sim.robot(id).qacc(), Array2::<f64>::zeros((ENVS, 2)));
     sim.robot_mut(id).set_qpos_target(&array![[1.0, 0.0]], None, Some(&[EnvId(1)])).unwrap();
-    let mut apart = 0.0_f64;
+    let mut difference = 0.0_f64;
     for _ in 0..5 {
         let before = sim.robot(id).qvel();
         sim.update(1);
         let (after, acceleration) = (sim.robot(id).qvel(), sim.robot(id).qacc());
         let limit = Tolerance::absolute(1e-11, "differences of velocities of size 1 lose 1e-16 / h");
         assert_close("acceleration", &acceleration, &((after - before) / 0.01), limit);
-        apart = apart.max((acceleration[(0, 0)] - acceleration[(1, 0)]).abs());
+        difference = difference.max((acceleration[(0, 0)] - acceleration[(1, 0)]).abs());
     }
-    assert!(apart > 10.0, "the control: the drive of environment 1 pushes: {apart}");
+    assert!(difference > 10.0, "the control: the drive of environment 1 pushes: {difference}");
     // A write keeps the accelerations; a reset zeroes them.
     let last = sim.robot(id).qacc();
     sim.robot_mut(id).write_qvel(&array![[0.5, -0.5]], None, None).unwrap();

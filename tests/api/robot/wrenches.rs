@@ -10,8 +10,8 @@ use kinetoscope::robot::description::LinkId;
 use kinetoscope::sim::WrenchFrame;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
-use kinetoscope_testkit::urdf::{Files, joint, link, robot};
-use kinetoscope_testkit::worlds::{add_ball, empty_cfg, no_drive, pose_in, text_robot};
+use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
+use kinetoscope_testkit::worlds::{add_ball, empty_cfg, no_drive, pose_of_row, text_robot};
 use nalgebra::Vector3;
 
 const EXACT: Tolerance =
@@ -20,7 +20,7 @@ const H: f64 = 0.01;
 const G: f64 = 9.81;
 
 fn sim_of(urdf: &str, gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
-    let (files, gravity) = (Files::default(), [0.0, 0.0, -gravity].into());
+    let (files, gravity) = (TempFiles::default(), [0.0, 0.0, -gravity].into());
     let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { gravity, ..empty_cfg(ENVS) });
     let robot = RobotCfg { fix_base, drive: no_drive(), ..text_robot(&files, "robot", &robot("r", urdf)) };
     let id = sim.add_robot(robot).unwrap();
@@ -101,7 +101,7 @@ fn force_in_axes_of_a_link() {
             assert_close(&format!("environment {env}, step {k}"), v.row(env), [*x, *y, 0.0, 0.0, 0.0, w], EXACT);
         }
     }
-    let in_world = pose_in(&sim.robot(id).link_pose("grip").unwrap(), 1).rotation * Vector3::new(5.0, 0.0, 0.0);
+    let in_world = pose_of_row(&sim.robot(id).link_pose("grip").unwrap(), 1).rotation * Vector3::new(5.0, 0.0, 0.0);
     let read = sim.robot(id).external_wrenches();
     assert_close("what is read is in world axes", [0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT);
 }
@@ -166,7 +166,7 @@ fn gravity_compensation() {
 /// A falling robot with compensation for half of its mass falls at g / 2. A reset ends wrenches and keeps the
 /// compensation; a new model keeps both.
 #[test]
-fn changes_of_the_world() {
+fn model_rebuilds_and_resets() {
     let (mut sim, id, [outer, inner, grip]) = balls(G);
     let push = array![[[2.0, 0.0, 0.0]]];
     let mut robot = sim.robot_mut(id);

@@ -132,12 +132,12 @@ fn sensors() {
         &ImuCfg { gravity_bias: Some([0.0; 3].into()), sampling, ..ImuCfg::on("base") },
     );
     let (name, offset) = (Some("tool".into()), Pose::translation(0.0, 0.0, 1.0));
-    let tool = TargetFrameCfg { name, offset, ..TargetFrameCfg::of("tip") };
+    let tool = TargetFrameCfg { name, offset, ..TargetFrameCfg::for_bodies("tip") };
     assert_sensor(
         "frame_transformer",
         "source = \"base\"\n\
          targets = [{ bodies = \".*_FOOT\" }, { bodies = \"tip\", name = \"tool\", offset = { pos = [0, 0, 1] } }]",
-        &FrameTransformerCfg::from("base", vec![TargetFrameCfg::of(".*_FOOT"), tool]),
+        &FrameTransformerCfg::new("base", vec![TargetFrameCfg::for_bodies(".*_FOOT"), tool]),
     );
     let joints = JointStateCfg { joints: Some(vec!["a".into()]), ..Default::default() };
     assert_sensor("joint_state", "joints = [\"a\"]", &joints);
@@ -224,7 +224,7 @@ fn cameras() {
 }
 
 #[test]
-fn own_sensor() {
+fn user_defined_sensor() {
     let types = EntityTypes::default().with_sensor::<SpeedCfg>("speedometer");
     let text = "[entities.ball]\ntype = \"rigid_object\"\nshape.sphere.radius = 0.1\ninit_pose.pos = [0, 0, 5]\n\
                 [entities.speed]\ntype = \"speedometer\"\nbody = \"{ENV}/ball\"\nlevel = 1\n";

@@ -13,7 +13,7 @@ fn cube(x: f64) -> RigidObjectCfg {
 fn two_cubes() -> SceneCfg {
     // The sensor is listed before the body that it measures.
     SceneCfg::new(SimulationManagerCfg { num_envs: 3, ..Default::default() })
-        .with("touch", ContactSensorCfg::of("{ENV_REGEX_NS}/zebra"))
+        .with("touch", ContactSensorCfg::for_bodies("{ENV_REGEX_NS}/zebra"))
         .with("zebra", cube(0.0))
         .with("{ENV}/apple", cube(1.0))
 }
@@ -35,11 +35,11 @@ fn names_in_order() {
 /// A handle of a sensor of unknown type names the type, and converts to a handle of that type only.
 #[test]
 fn sensor_handles() {
-    use kinetoscope::sim::SensorEntity;
+    use kinetoscope::sim::AnySensorCfg;
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
     sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), ..cube(0.0) }).unwrap();
-    let kinds: [(&str, Box<dyn SensorEntity>); 2] =
-        [("ContactSensor", Box::new(ContactSensorCfg::of("cube"))), ("Imu", Box::new(ImuCfg::on("cube")))];
+    let kinds: [(&str, Box<dyn AnySensorCfg>); 2] =
+        [("ContactSensor", Box::new(ContactSensorCfg::for_bodies("cube"))), ("Imu", Box::new(ImuCfg::on("cube")))];
     let handles = kinds.map(|(name, cfg)| (name, cfg.add_to(&mut sim, name).unwrap()));
     for (name, handle) in &handles {
         assert_eq!(handle.type_name(), *name);
@@ -72,7 +72,7 @@ fn mistakes() {
     for cfg in [two_cubes().with("zebra", cube(2.0)), two_cubes().with("{ENV}/touch", cube(2.0))] {
         assert!(matches!(InteractiveScene::new(cfg), Err(Error::DuplicateUid(_))));
     }
-    let cfg = SceneCfg::default().with("touch", ContactSensorCfg::of("{ENV}/cube"));
+    let cfg = SceneCfg::default().with("touch", ContactSensorCfg::for_bodies("{ENV}/cube"));
     let message = InteractiveScene::new(cfg).unwrap_err().to_string();
     assert!(message.contains("\"touch\"") && message.contains("\"cube\""), "{message}");
 }

@@ -193,12 +193,12 @@ fn in_building() {
         ("30: ", text("\"blue\"", "\"red\""), "\"cubes\"|cubes.red"),
         ("1: ", "[entities.g]\ntype = \"rigid_object_group\"".into(), "\"g\"|at least 1 object"),
     ];
-    for (place, text, parts) in rows {
+    for (location, text, parts) in rows {
         let error = InteractiveScene::new(toml(&text).unwrap()).unwrap_err();
         let message = error.to_string();
-        assert!(message.starts_with(&format!("dir/scene.toml:{place}")), "{text}\n{message}");
+        assert!(message.starts_with(&format!("dir/scene.toml:{location}")), "{text}\n{message}");
         assert!(parts.split('|').all(|part| message.contains(part)), "{text}\n{message}");
-        assert!(matches!(error, Error::Entity { .. }) || !place.ends_with("entity "), "{error:?}");
+        assert!(matches!(error, Error::Entity { .. }) || !location.ends_with("entity "), "{error:?}");
     }
     let message = SceneCfg::from_file("no/such/scene.toml").unwrap_err().to_string();
     assert!(message.starts_with("no/such/scene.toml: "), "{message}");
@@ -212,11 +212,11 @@ fn any_text() {
     assert!(toml(&file).is_ok());
     type Format<'a> = (fn(&str) -> Result<SceneCfg>, &'a str, usize, &'a [&'a str]);
     let formats: [Format<'_>; 2] = [(toml, &file, 7, &["]", "9"]), (yaml, QUADRUPED, 1, &["]", ": ", "*a"])];
-    for (read, good, step, signs) in formats {
+    for (read, good, step, insertions) in formats {
         let (mut wrong, mut tried) = (0, 0);
         for (at, _) in good.char_indices().step_by(step) {
             let (before, after) = good.split_at(at);
-            let with = signs.iter().map(|sign| format!("{before}{sign}{after}"));
+            let with = insertions.iter().map(|sign| format!("{before}{sign}{after}"));
             for text in with.chain([before.to_owned()]) {
                 tried += 1;
                 match read(&text) {

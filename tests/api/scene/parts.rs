@@ -47,7 +47,7 @@ objects = [
 
 fn declared() -> SceneCfg {
     let cube = |uid, x| object(uid, ObjectShape::cube(0.1), [x, 0.0, 1.0]);
-    let touch = ContactSensorCfg { filters: vec!["block".into()], ..ContactSensorCfg::of("ball") };
+    let touch = ContactSensorCfg { filters: vec!["block".into()], ..ContactSensorCfg::for_bodies("ball") };
     SceneCfg::new(SimulationManagerCfg { num_envs: 2, physics_dt: 2e-3, ..Default::default() })
         .with("nail", WeldCfg { first: "cubes.red".into(), second: "world".into(), ..Default::default() })
         .with("touch", touch)
@@ -72,9 +72,9 @@ fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     scene.weld_mut("nail").unwrap().attach(Some(&[EnvId(1)])).unwrap();
     scene.update_for(1.0).unwrap();
     let height = |name: &str| scene.rigid_object(name).unwrap().pose()[(1, 2)];
-    let felt = scene.sensor::<ContactSensor>("touch").unwrap().force_matrix_w();
+    let ball_on_block = scene.sensor::<ContactSensor>("touch").unwrap().force_matrix_w();
     let cubes = scene.rigid_object_group("cubes").unwrap().pose();
-    ([height("ball"), height("block")], cubes, felt.iter().any(|f| *f != 0.0))
+    ([height("ball"), height("block")], cubes, ball_on_block.iter().any(|f| *f != 0.0))
 }
 
 /// An excluded pair falls through to the ground, the welded cube hangs, and the others have landed. Controls: the scene

@@ -40,7 +40,7 @@ pub(crate) fn declared() -> SceneCfg {
     };
     let contacts = ContactSensorCfg {
         sampling: SamplingCfg { history_length: 6, ..Default::default() },
-        ..ContactSensorCfg::of("robot/.*_FOOT")
+        ..ContactSensorCfg::for_bodies("robot/.*_FOOT")
     };
     let simulation = SimulationManagerCfg {
         lights: vec![LightCfg::dome(1.0, [0.75; 3])],
@@ -57,7 +57,7 @@ pub(crate) fn declared() -> SceneCfg {
 }
 
 /// Bits of the robot state and of all sensor readings after `steps` steps.
-pub(crate) fn says(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
+pub(crate) fn state_bits(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
     // Different starts of the environments, so that a mix-up is detected.
     let mut start = scene.robot("robot").unwrap().qpos();
     start.row_mut(1).iter_mut().for_each(|angle| *angle += 0.05);
@@ -81,13 +81,13 @@ pub(crate) fn bundled() -> SceneCfg {
 fn same_bits() {
     let mut from_file = InteractiveScene::new(bundled()).unwrap();
     let mut from_rust = InteractiveScene::new(declared()).unwrap();
-    let expected = says(&mut from_rust, 100);
-    assert_eq!(says(&mut from_file, 100), expected);
+    let expected = state_bits(&mut from_rust, 100);
+    assert_eq!(state_bits(&mut from_file, 100), expected);
     // Control: a slightly softer drive changes every number that moves.
     let mut softer = declared();
     let Some((_, EntityCfg::Robot(robot))) = softer.entities.first_mut() else { panic!("the robot is first") };
     robot.drive.stiffness = 79.0.into();
-    let found = says(&mut InteractiveScene::new(softer).unwrap(), 100);
+    let found = state_bits(&mut InteractiveScene::new(softer).unwrap(), 100);
     assert!(found.iter().zip(&expected).filter(|(found, expected)| found != expected).count() >= 6);
 }
 

@@ -61,7 +61,7 @@ fn every_kind() -> SceneCfg {
         .with("imu", ImuCfg { offset, sampling, gravity_bias: Some([0.0, third, 0.0].into()), ..ImuCfg::on("base") })
         .with(
             "frames",
-            FrameTransformerCfg::from("base", vec![TargetFrameCfg { offset, ..TargetFrameCfg::of("object") }]),
+            FrameTransformerCfg::new("base", vec![TargetFrameCfg { offset, ..TargetFrameCfg::for_bodies("object") }]),
         )
         .with("joints", JointStateCfg { joints: Some(vec!["LF.*".into()]), ..Default::default() })
         .with("wrench", JointWrenchCfg { links: vec!["LF_SHANK".into()], ..Default::default() })
@@ -86,7 +86,7 @@ fn every_kind() -> SceneCfg {
         )
 }
 
-fn again(cfg: &SceneCfg) -> SceneCfg {
+fn round_trip(cfg: &SceneCfg) -> SceneCfg {
     let types = EntityTypes::default();
     SceneCfg::from_toml(&cfg.to_toml(&types).unwrap(), "elsewhere/scene.toml", &types).unwrap()
 }
@@ -95,8 +95,8 @@ fn again(cfg: &SceneCfg) -> SceneCfg {
 #[test]
 fn every_field() {
     for cfg in [SceneCfg::default(), declared(), every_kind()] {
-        let read = again(&cfg);
-        assert_eq!(format!("{read:#?}"), format!("{:#?}", again(&read)));
+        let read = round_trip(&cfg);
+        assert_eq!(format!("{read:#?}"), format!("{:#?}", round_trip(&read)));
         assert_eq!(read.simulation, cfg.simulation);
         assert_eq!(read.keys().collect::<Vec<_>>(), cfg.keys().collect::<Vec<_>>());
         for ((name, read), (_, cfg)) in read.entities.iter().zip(&cfg.entities) {
@@ -158,7 +158,7 @@ fn in_yaml() {
         let read =
             SceneCfg::from_yaml(&in_yaml, "elsewhere/scene.yaml", &types).unwrap_or_else(|e| panic!("{e}\n{in_yaml}"));
         let without_places = |cfg: SceneCfg| format!("{:#?}", SceneCfg { sources: Default::default(), ..cfg });
-        assert_eq!(without_places(read), without_places(again(&cfg)));
+        assert_eq!(without_places(read), without_places(round_trip(&cfg)));
     }
 }
 

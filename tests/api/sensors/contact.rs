@@ -1,10 +1,10 @@
 //! Contact forces, points and times in a running simulation, against Newton's laws and closed forms.
 
-use super::worlds::{G, ball, cfg, cube, fixed, pose_in, row, sim};
+use super::worlds::{G, ball, cfg, cube, fixed, pose_of_row, row, sim};
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope::sim::{Integrator, ObjectId};
+use kinetoscope::sim::{Integrator, RigidObjectId};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::worlds;
 use nalgebra::Vector3;
@@ -28,7 +28,7 @@ fn strings(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_string()).collect()
 }
 
-fn velocity(sim: &SimulationManager, object: ObjectId) -> Vector3<f64> {
+fn velocity(sim: &SimulationManager, object: RigidObjectId) -> Vector3<f64> {
     row(&sim.rigid_object(object).velocity(), 0, 0)
 }
 
@@ -39,7 +39,7 @@ fn newtons_second_law() {
     let mut sim = sim(1);
     let (mass, dt) = (2.5, sim.cfg().physics_dt);
     let box_ = sim.add_rigid_object(cube("box", 0.2, mass, [0.0, 0.0, 0.3])).unwrap();
-    let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+    let id = sim.add_sensor("contact", ContactSensorCfg::for_bodies("box")).unwrap();
     let mut before = velocity(&sim, box_);
     let (mut touched, mut flying) = (0, 0);
     for _ in 0..600 {
@@ -67,7 +67,7 @@ fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
         filters,
         track_friction_forces: true,
         track_contact_points: true,
-        ..ContactSensorCfg::of(bodies)
+        ..ContactSensorCfg::for_bodies(bodies)
     }
 }
 
@@ -107,7 +107,7 @@ fn leaning_plank() {
         assert_close("normal force", &normal_force, (weight * cos * normal).as_slice(), REST * weight);
         assert_close("friction", &friction, (weight * sin * up_the_slope).as_slice(), REST * weight);
         assert_eq!(counts[(0, 0, 0)], 4.0, "the corners of the face");
-        let pose = pose_in(&sim.rigid_object(box_).pose(), 0);
+        let pose = pose_of_row(&sim.rigid_object(box_).pose(), 0);
         let face = pose * nalgebra::Point3::new(0.0, 0.0, -0.1);
         assert_close("contact point", &point, face.coords.as_slice(), OVERLAP);
         assert!((point - pose.translation.vector).norm() > 0.09, "the control: not the middle of the box");
@@ -182,7 +182,7 @@ fn action_and_reaction() {
 fn forces_after_a_write() {
     let mut sim = sim(2);
     let box_ = sim.add_rigid_object(cube("box", 0.2, 1.0, [0.0, 0.0, 5.0])).unwrap();
-    let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+    let id = sim.add_sensor("contact", ContactSensorCfg::for_bodies("box")).unwrap();
     let stamps = |sim: &SimulationManager| sim.sensor(id).unwrap().force_stamps().to_owned();
     sim.update(10);
     assert_close("stamps of the steps", stamps(&sim), [0.045, 0.045], STAMP);
@@ -206,7 +206,7 @@ fn forces_of_rk4() {
     let first = |integrator| {
         let mut sim = worlds::sim(SimulationManagerCfg { integrator, ..cfg(1) });
         sim.add_rigid_object(cube("box", 0.2, 2.0, [0.0, 0.0, 0.0995])).unwrap();
-        let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+        let id = sim.add_sensor("contact", ContactSensorCfg::for_bodies("box")).unwrap();
         sim.update(1);
         let sensor = sim.sensor(id).unwrap();
         (sensor.total_forces_w()[(0, 0, 2)], sensor.force_stamps()[0])
@@ -219,25 +219,25 @@ fn forces_of_rk4() {
 /// A diverged environment keeps its last measurement until it is reset, without an effect on the other environments.
 #[test]
 fn diverged_environment() {
-    let forces = |blow_up: bool| {
+    let forces = |diverge: bool| {
         let mut sim = sim(2);
         let box_ = sim.add_rigid_object(cube("box", 0.2, 1.0, [0.0, 0.0, 0.0995])).unwrap();
-        let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+        let id = sim.add_sensor("contact", ContactSensorCfg::for_bodies("box")).unwrap();
         let imu = sim.add_sensor("imu", ImuCfg::on("box")).unwrap();
         sim.update(10);
         let before = sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)];
-        if blow_up {
+        if diverge {
             let huge = array![[1e9, 0.0, 1e9, 1e9, 1e9, 1e9]];
             sim.rigid_object_mut(box_).write_velocity(&huge, Some(&[EnvId(1)])).unwrap();
         }
-        let mut told = Vec::new();
+        let mut readings = Vec::new();
         for _ in 0..40 {
             sim.update(1);
-            told.push(sim.sensor(id).unwrap().net_forces_w()[(0, 0, 2)].to_bits());
-            told.push(sim.sensor(imu).unwrap().lin_acc_b()[(0, 2)].to_bits());
+            readings.push(sim.sensor(id).unwrap().net_forces_w()[(0, 0, 2)].to_bits());
+            readings.push(sim.sensor(imu).unwrap().lin_acc_b()[(0, 2)].to_bits());
         }
-        assert_eq!(sim.diverged().len(), usize::from(blow_up));
-        if blow_up {
+        assert_eq!(sim.diverged().len(), usize::from(diverge));
+        if diverge {
             let values = |sim: &SimulationManager| {
                 let (contact, imu) = (sim.sensor(id).unwrap(), sim.sensor(imu).unwrap());
                 let mut values: Vec<f64> = contact.net_forces_w().index_axis(Axis(0), 1).iter().copied().collect();
@@ -259,7 +259,7 @@ fn diverged_environment() {
             sim.update(10);
             assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], before, "alive again");
         }
-        told
+        readings
     };
     assert_eq!(forces(true), forces(false));
 }
@@ -271,10 +271,10 @@ fn history_and_reset() {
     let mut sim = sim(3);
     sim.add_rigid_object(cube("box", 0.2, 2.0, [0.0, 0.0, 0.0995])).unwrap();
     let sampling = SamplingCfg { history_length: T, ..SamplingCfg::every(0.01) };
-    let watch = ContactSensorCfg { sampling, filters: strings(&["ground"]), ..ContactSensorCfg::of("box") };
+    let watch = ContactSensorCfg { sampling, filters: strings(&["ground"]), ..ContactSensorCfg::for_bodies("box") };
     let id = sim.add_sensor("contact", watch).unwrap();
     // Vertical forces and stamps since the reset, newest first.
-    let mut told: [Vec<(f64, f64)>; 3] = Default::default();
+    let mut expected: [Vec<(f64, f64)>; 3] = Default::default();
     let check = |sim: &SimulationManager, told: &[Vec<(f64, f64)>; 3]| {
         let sensor = sim.sensor(id).unwrap();
         let (net, pairs) = (sensor.net_forces_w_history(), sensor.force_matrix_w_history());
@@ -290,12 +290,12 @@ fn history_and_reset() {
     for step in 1..=40 {
         sim.update(1);
         let sensor = sim.sensor(id).unwrap();
-        for (env, told) in told.iter_mut().enumerate() {
+        for (env, told) in expected.iter_mut().enumerate() {
             if sensor.sample_counts()[env] as usize > told.len() {
                 told.insert(0, (sensor.net_forces_w()[(env, 0, 2)], sensor.stamps()[env]));
             }
         }
-        check(&sim, &told);
+        check(&sim, &expected);
         // A reset in the middle of a period, then a reset of two other environments.
         let reset: &[EnvId] = match step {
             13 => &[EnvId(1)],
@@ -303,11 +303,11 @@ fn history_and_reset() {
             _ => continue,
         };
         sim.reset(Some(reset)).unwrap();
-        reset.iter().for_each(|env| told[env.0].clear());
-        check(&sim, &told);
+        reset.iter().for_each(|env| expected[env.0].clear());
+        check(&sim, &expected);
     }
-    assert_eq!(told.each_ref().map(Vec::len), [7, 13, 7], "27 steps since a reset are 13 periods, 14 are 7");
-    assert!(told[1].iter().all(|(force, _)| *force > G), "there was something to remember");
+    assert_eq!(expected.each_ref().map(Vec::len), [7, 13, 7], "27 steps since a reset are 13 periods, 14 are 7");
+    assert!(expected[1].iter().all(|(force, _)| *force > G), "there was something to remember");
 }
 
 /// Two balls bounce from different heights. A fall from `z` is at `z - g dt² k (k + 1) / 2` after k steps
@@ -327,10 +327,10 @@ fn bounces() {
             (sim, ball)
         };
         // Reference: the same world without a sensor, step by step.
-        let ((mut sim, ball), (mut judge, other)) = (world(), world());
+        let ((mut sim, ball), (mut reference, other)) = (world(), world());
         let dt = sim.cfg().physics_dt;
         let sampling = SamplingCfg::every(f64::from(period) * dt);
-        let watch = ContactSensorCfg { track_air_time: true, sampling, ..ContactSensorCfg::of("ball") };
+        let watch = ContactSensorCfg { track_air_time: true, sampling, ..ContactSensorCfg::for_bodies("ball") };
         let id = sim.add_sensor("contact", watch).unwrap();
         let first = heights.map(|height| {
             let fall = |k: u32| height - G * dt * dt * f64::from(k) * f64::from(k + 1) / 2.0;
@@ -341,14 +341,14 @@ fn bounces() {
         // contact\].
         let mut phases = [(false, 0_u32, [0_u32; 2]); 2];
         let mut measured = phases;
-        let (mut begun, mut told) = ([[0_u32; 2]; 2], [[0_u32; 2]; 2]);
-        let (mut told_at, mut step) = ([const { Vec::new() }; 2], 0_u32);
+        let (mut begun, mut reported) = ([[0_u32; 2]; 2], [[0_u32; 2]; 2]);
+        let (mut reported_at, mut step) = ([const { Vec::new() }; 2], 0_u32);
         while step < 600 {
             sim.update(stride);
             for _ in 0..stride {
                 step += 1;
-                judge.update(1);
-                let now = judge.rigid_object(other).velocity();
+                reference.update(1);
+                let now = reference.rigid_object(other).velocity();
                 for (env, (touches, since, last)) in phases.iter_mut().enumerate() {
                     // One newton on one kilogram.
                     let pushed = (now[(env, 2)] - speed[(env, 2)]) / dt + G > 1.0;
@@ -377,10 +377,10 @@ fn bounces() {
                 let found = [sensor.last_air_time(), sensor.last_contact_time()].map(at);
                 assert_eq!(found, last.map(|n| f64::from(n) * dt), "step {step}");
                 if flags[1][(env, 0)] {
-                    told_at[env].push(step);
+                    reported_at[env].push(step);
                 }
                 if step.is_multiple_of(period) {
-                    (0..2).for_each(|kind| told[env][kind] += u32::from(flags[kind][(env, 0)]));
+                    (0..2).for_each(|kind| reported[env][kind] += u32::from(flags[kind][(env, 0)]));
                 }
             }
         }
@@ -389,15 +389,15 @@ fn bounces() {
             // Each beginning is reported once. Several within one period are reported together; some are reported
             // between strides.
             if (period, stride) == (1, 1) {
-                assert_eq!(told[env], begun[env]);
+                assert_eq!(reported[env], begun[env]);
             } else if (period, stride) == (5, 1) {
-                assert!(told[env][1] > 3 && told[env][1] <= begun[env][1], "{told:?} of {begun:?}");
+                assert!(reported[env][1] > 3 && reported[env][1] <= begun[env][1], "{reported:?} of {begun:?}");
             }
             // The step that begins at `first` is reported by the next measurement, until the one after it.
             let due = (first[env] + 1).div_ceil(period) * period;
             let expected: Vec<u32> =
                 (1..).map(|n| n * stride).take_while(|s| *s < due + period).filter(|s| *s >= due).collect();
-            assert_eq!(told_at[env][..expected.len()], expected, "period {period}, stride {stride}");
+            assert_eq!(reported_at[env][..expected.len()], expected, "period {period}, stride {stride}");
         }
         let last = sim.sensor(id).unwrap().last_air_time().unwrap();
         assert_ne!(last[(0, 0)], last[(1, 0)], "the control: environments bounce differently");

@@ -3,9 +3,9 @@
 use super::worlds::{ball, sim, sr5};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::scene::Requires;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{Channel, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::scene::StateFields;
+use kinetoscope::sensors::{SampleChannel, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -24,8 +24,8 @@ struct Height(Vec<f64>, Arc<AtomicUsize>);
 impl SensorCfg for HeightCfg {
     type Sensor = Height;
 
-    fn requires(&self) -> Requires {
-        Requires::POSES
+    fn requires(&self) -> StateFields {
+        StateFields::POSES
     }
 
     fn lazy(&self, dt: f64) -> Option<Schedule> {
@@ -48,7 +48,7 @@ impl Sensor for Height {
     }
 
     fn refresh(&mut self, _env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        let missing = SensorError::MissingFields { sensor: "height", missing: Requires::POSES };
+        let missing = SensorError::MissingFields { sensor: "height", missing: StateFields::POSES };
         let poses = state.body_poses.as_ref().ok_or(missing)?;
         self.0.iter_mut().enumerate().for_each(|(env, height)| *height = poses[(env, poses.dim().1 - 1, 2)]);
         Ok(())
@@ -102,12 +102,12 @@ pub(crate) struct Speed {
 impl SensorCfg for SpeedCfg {
     type Sensor = Speed;
 
-    fn requires(&self) -> Requires {
-        Requires::VELOCITIES
+    fn requires(&self) -> StateFields {
+        StateFields::VELOCITIES
     }
 
     fn build(&self, context: &SensorContext) -> Result<Speed, SensorError> {
-        let channels = [Channel::new("speed", 1)];
+        let channels = [SampleChannel::new("speed", 1)];
         let sampler = Sampler::new("speed", self.requires(), context, &self.sampling, &channels)?;
         Ok(Speed { body: context.body(&self.body)?, level: self.level, sampler })
     }

@@ -20,7 +20,7 @@ fn world() -> SimulationManager {
 }
 
 /// Returns the markers of one sensor in environment 1; checks that `debug_vis: false` gives no markers.
-fn shown<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> {
+fn markers_of<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> {
     let mut sim = world();
     sim.add_sensor("quiet", cfg(false)).unwrap();
     sim.update(4);
@@ -39,10 +39,10 @@ fn wrench_of_load(debug_vis: bool) -> JointWrenchCfg {
 /// Returns the tail of an arrow and its vector.
 fn arrow(marker: &Marker) -> (Vector3<f64>, Vector3<f64>) {
     let MarkerKind::Arrow { length, .. } = marker.kind else { panic!("{marker:?} is no arrow") };
-    (place(marker), marker.pose.rotation * (Vector3::z() * f64::from(length)))
+    (position(marker), marker.pose.rotation * (Vector3::z() * f64::from(length)))
 }
 
-fn place(marker: &Marker) -> Vector3<f64> {
+fn position(marker: &Marker) -> Vector3<f64> {
     marker.pose.translation.vector
 }
 
@@ -54,17 +54,17 @@ fn is_axes(marker: &Marker) -> bool {
 #[track_caller]
 fn assert_arrow(marker: &Marker, at: [f64; 3], expected: [f64; 3], tolerance: f64) {
     let (tail, vector) = arrow(marker);
-    let apart = (tail - Vector3::from(at)).norm().max((vector - Vector3::from(expected)).norm());
-    assert!(apart < tolerance, "{tail} {vector}, not {at:?} {expected:?}");
+    let error = (tail - Vector3::from(at)).norm().max((vector - Vector3::from(expected)).norm());
+    assert!(error < tolerance, "{tail} {vector}, not {at:?} {expected:?}");
 }
 
 #[test]
 fn imu_and_wrench() {
     let offset = Pose::translation(0.1, 0.2, 0.3);
-    let markers = shown(|debug_vis| ImuCfg { offset, debug_vis, ..ImuCfg::on("base") });
+    let markers = markers_of(|debug_vis| ImuCfg { offset, debug_vis, ..ImuCfg::on("base") });
     assert!(markers.len() == 2 && is_axes(&markers[0]), "{markers:?}");
     assert_arrow(&markers[1], [0.1, 0.2, 0.3], [0.0, 0.0, G / 20.0], 1e-6);
-    let markers = shown(wrench_of_load);
+    let markers = markers_of(wrench_of_load);
     // The load hangs: the pivot carries its weight, without a torque except for rounding.
     assert_arrow(&markers[0], [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
     assert!(markers[1..].iter().all(|torque| arrow(torque).1.norm() < 1e-6), "{markers:?}");
@@ -73,13 +73,13 @@ fn imu_and_wrench() {
 /// The load has no contact: its ball is green. The ball of the box is red, with an arrow.
 #[test]
 fn contacts() {
-    let markers = shown(|debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box|load") });
+    let markers = markers_of(|debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::for_bodies("box|load") });
     let (balls, arrows): (Vec<&Marker>, Vec<&Marker>) =
         markers.iter().partition(|m| matches!(m.kind, MarkerKind::Sphere { .. }));
     let ball = |red: bool| {
         let found: Vec<_> = balls.iter().filter(|m| (m.rgba[0] > m.rgba[1]) == red).collect();
         assert_eq!(found.len(), 1, "{markers:?}");
-        place(found[0])
+        position(found[0])
     };
     // The box has sunk into its soft contact by less than a millimeter; the force is its weight to within a thousandth.
     assert!((ball(true) - Vector3::new(1.0, 0.5, 0.1)).norm() < 1e-3, "{markers:?}");
@@ -90,14 +90,16 @@ fn contacts() {
 
 #[test]
 fn frames_and_rays() {
-    let targets = || vec![TargetFrameCfg::of("box"), TargetFrameCfg::of("load")];
-    let frames = shown(|debug_vis| FrameTransformerCfg { debug_vis, ..FrameTransformerCfg::from("base", targets()) });
+    let targets = || vec![TargetFrameCfg::for_bodies("box"), TargetFrameCfg::for_bodies("load")];
+    let frames =
+        markers_of(|debug_vis| FrameTransformerCfg { debug_vis, ..FrameTransformerCfg::new("base", targets()) });
     assert_eq!(frames.iter().filter(|marker| is_axes(marker)).count(), 3);
-    assert!((place(&frames[2]) - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-9);
+    assert!((position(&frames[2]) - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-9);
     let pattern = RayPattern::from(Grid { resolution: 0.5, size: [0.5; 2], ..Grid::default() });
     let offset = Pose::translation(5.0, 5.0, 1.0);
-    let rays = shown(|debug_vis| RayCasterCfg { offset, pattern: pattern.clone(), debug_vis, ..Default::default() });
-    let mut places: Vec<[f64; 3]> = rays.iter().map(|m| place(m).map(|x| (x * 1e6).round() / 1e6).into()).collect();
+    let rays =
+        markers_of(|debug_vis| RayCasterCfg { offset, pattern: pattern.clone(), debug_vis, ..Default::default() });
+    let mut places: Vec<[f64; 3]> = rays.iter().map(|m| position(m).map(|x| (x * 1e6).round() / 1e6).into()).collect();
     places.sort_by(|a, b| a.partial_cmp(b).unwrap());
     assert_eq!(places, [[4.75, 4.75, 0.0], [4.75, 5.25, 0.0], [5.25, 4.75, 0.0], [5.25, 5.25, 0.0]]);
 }
@@ -109,7 +111,7 @@ fn cameras() {
     let extrinsics = || look_at([1.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
     let (width, height) = (40, 30);
     let intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 40.0, cx: 20.0, cy: 15.0 };
-    let raster = shown(|debug_vis| CameraCfg {
+    let raster = markers_of(|debug_vis| CameraCfg {
         width,
         height,
         intrinsics,
@@ -117,7 +119,7 @@ fn cameras() {
         debug_vis,
         ..Default::default()
     });
-    let rays = shown(|debug_vis| RayCasterCameraCfg {
+    let rays = markers_of(|debug_vis| RayCasterCameraCfg {
         width,
         height,
         intrinsics,
@@ -137,7 +139,7 @@ fn cameras() {
 #[test]
 fn switch() {
     let mut sim = world();
-    let contact = |debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box") };
+    let contact = |debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::for_bodies("box") };
     let (off, on) = (sim.add_sensor("off", contact(false)).unwrap(), sim.add_sensor("on", contact(true)).unwrap());
     let load = sim.add_sensor("load", wrench_of_load(false)).unwrap();
     assert_eq!([sim.scene().debug_vis(off).unwrap(), sim.scene().debug_vis(on).unwrap()], [false, true]);
@@ -150,13 +152,13 @@ fn switch() {
     sim.scene_mut().set_debug_vis(off, true).unwrap();
     assert_eq!(sim.scene().markers(), of_on, "the same, of a sensor that was built without");
     // Markers of all sensors but one.
-    assert_eq!(sim.scene().markers_beside(off), []);
-    assert_eq!(sim.scene().markers_beside(load), of_on);
+    assert_eq!(sim.scene().markers_except(off), []);
+    assert_eq!(sim.scene().markers_except(load), of_on);
     sim.scene_mut().set_debug_vis(load, true).unwrap();
-    let (of_load, all) = (sim.scene().markers_beside(off), sim.scene().markers());
+    let (of_load, all) = (sim.scene().markers_except(off), sim.scene().markers());
     assert!(!of_load.is_empty() && all.len() == of_on.len() + of_load.len());
     assert!(of_load.iter().all(|marker| all.contains(marker) && !of_on.contains(marker)));
-    assert_eq!(sim.scene().markers_beside(load), of_on);
+    assert_eq!(sim.scene().markers_except(load), of_on);
     sim.scene_mut().set_debug_vis(off, false).unwrap();
     assert_eq!(sim.scene().markers(), of_load);
     assert_eq!(of_load[0].0, EnvId(0));

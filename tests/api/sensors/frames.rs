@@ -1,6 +1,6 @@
 //! Frame transformers, against the poses of the links; and handles of sensors.
 
-use super::worlds::{cube, pose_in, sim, sr5};
+use super::worlds::{cube, pose_of_row, sim, sr5};
 use kinetoscope::ndarray::{ArrayView3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::to_wxyz;
@@ -17,11 +17,11 @@ fn targets_from_the_source() {
     let arm = sim.add_robot(sr5("arm")).unwrap();
     sim.add_rigid_object(cube("cube", 0.1, 1.0, [0.5, 0.4, 0.05])).unwrap();
     let offset = Pose::from_parts([0.1, -0.2, 0.3].into(), UnitQuaternion::from_euler_angles(0.1, 0.2, 0.3));
-    let tool = TargetFrameCfg { name: Some("tool".into()), offset, ..TargetFrameCfg::of("ee_link") };
-    let targets = vec![TargetFrameCfg::of("cube"), tool, TargetFrameCfg::of("arm/link[23]")];
-    let cfg = FrameTransformerCfg { source_offset: offset, ..FrameTransformerCfg::from("link2", targets.clone()) };
+    let tool = TargetFrameCfg { name: Some("tool".into()), offset, ..TargetFrameCfg::for_bodies("ee_link") };
+    let targets = vec![TargetFrameCfg::for_bodies("cube"), tool, TargetFrameCfg::for_bodies("arm/link[23]")];
+    let cfg = FrameTransformerCfg { source_offset: offset, ..FrameTransformerCfg::new("link2", targets.clone()) };
     let id = sim.add_sensor("frames", cfg).unwrap();
-    let bare = sim.add_sensor("bare", FrameTransformerCfg::from("link3", targets)).unwrap();
+    let bare = sim.add_sensor("bare", FrameTransformerCfg::new("link3", targets)).unwrap();
     let qpos = array![[0.3, 0.5, -0.4, 0.2, 0.7, -0.1], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]];
     sim.robot_mut(arm).set_qpos_target(&qpos, None, None).unwrap();
     sim.update(50);
@@ -29,7 +29,7 @@ fn targets_from_the_source() {
     assert_eq!(sensor.target_frame_names(), ["cube", "tool", "arm/link2", "arm/link3"]);
     let text = sensor.to_string();
     assert!(text.contains("arm/link2\n") && text.ends_with("cube, tool, arm/link2, arm/link3"), "{text}");
-    let link = |name: &str, env: usize| pose_in(&sim.robot(arm).link_pose(name).unwrap(), env);
+    let link = |name: &str, env: usize| pose_of_row(&sim.robot(arm).link_pose(name).unwrap(), env);
     for env in 0..2 {
         // Both come from MuJoCo's body quaternion, with one sign.
         let found: Vec<f64> =

@@ -1,7 +1,7 @@
 //! Accelerations against closed forms and against the change of the velocities. For a turntable and a pendulum with a
 //! sensor on a fused link see the laws of `physics::contacts`.
 
-use super::worlds::{G, cube, fixed, pose_in, row, sim};
+use super::worlds::{G, cube, fixed, pose_of_row, row, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::Imu;
@@ -42,7 +42,7 @@ fn tumbling_corner() {
     let id = sim.add_sensor("imu", ImuCfg { offset, ..ImuCfg::on("box") }).unwrap();
     sim.rigid_object_mut(object).write_velocity(&array![[0.3, -0.1, 0.2, 3.0, 5.0, -4.0]], None).unwrap();
     let dt = sim.cfg().physics_dt;
-    let rotation = |sim: &SimulationManager| pose_in(&sim.rigid_object(object).pose(), 0).rotation;
+    let rotation = |sim: &SimulationManager| pose_of_row(&sim.rigid_object(object).pose(), 0).rotation;
     let spin = |sim: &SimulationManager| row(&sim.rigid_object(object).velocity(), 0, 3);
     for _ in 0..100 {
         let world_from_body = rotation(&sim);

@@ -23,13 +23,13 @@ fn world() -> SimulationManager {
     sim.add_rigid_object(cube("cube", 0.1, 1.0, [1.0, 0.0, 0.05])).unwrap();
     let pendulum = "<mujoco><worldbody><body name='rod' pos='0 0 1'><joint name='hinge'/><geom size='.1'/></body></worldbody>
         <actuator><motor name='motor' joint='hinge'/></actuator><sensor><jointpos name='angle' joint='hinge'/></sensor></mujoco>";
-    sim.add_mjcf(MjcfCfg::text("m", pendulum)).unwrap();
+    sim.add_mjcf(MjcfPartCfg::text("m", pendulum)).unwrap();
     sim
 }
 
 /// Returns the error of a rejected sensor; the error names the sensor.
 #[track_caller]
-fn refused<C: SensorCfg + Clone + Send + 'static>(sim: &mut SimulationManager, cfg: &C) -> SensorError {
+fn rejected<C: SensorCfg + Clone + Send + 'static>(sim: &mut SimulationManager, cfg: &C) -> SensorError {
     let error = sim.add_sensor("mine", cfg.clone()).map(|_| ()).unwrap_err();
     let text = error.to_string();
     assert!(text.starts_with("sensor \"mine\": "), "{text}");
@@ -40,7 +40,7 @@ fn refused<C: SensorCfg + Clone + Send + 'static>(sim: &mut SimulationManager, c
 /// Asserts that each configuration is rejected with an error of the pattern.
 macro_rules! refuses {
     ($sim:expr, $pattern:pat if $guard:expr => $cfg:expr) => {
-        let error = refused($sim, &$cfg);
+        let error = rejected($sim, &$cfg);
         assert!(matches!(&error, $pattern if $guard), "{}: {error:?}", stringify!($cfg));
     };
     ($sim:expr, $pattern:pat => $($cfg:expr),+ $(,)?) => {
@@ -62,7 +62,7 @@ macro_rules! unknown {
 macro_rules! nothing {
     ($sim:expr, $(($cfg:expr, $chosen:expr, $near:expr)),+ $(,)?) => {
         $(
-            refuses!($sim, SensorError::NothingChosen { field, candidates, .. }
+            refuses!($sim, SensorError::EmptySelection { field, candidates, .. }
                 if *field == $chosen && candidates.iter().any(|name| name == $near) => $cfg);
         )+
     };
@@ -78,7 +78,7 @@ fn wrench(links: &[&str], frames: &[&str]) -> JointWrenchCfg {
 }
 
 fn frames(source: &str, targets: &[&str]) -> FrameTransformerCfg {
-    FrameTransformerCfg::from(source, targets.iter().map(|target| TargetFrameCfg::of(*target)).collect())
+    FrameTransformerCfg::new(source, targets.iter().map(|target| TargetFrameCfg::for_bodies(*target)).collect())
 }
 
 /// A raster camera and a ray-cast camera.
@@ -96,9 +96,9 @@ fn names() {
     let (camera, of_rays) = cameras(Extrinsics { parent: Some("lnk6".into()), ..Default::default() });
     unknown!(
         sim,
-        (ContactSensorCfg::of("arm/lnk6"), "arm/lnk6", "arm/link6"),
-        (ContactSensorCfg::of(".*_FOOT"), ".*_FOOT", "cube"),
-        (ContactSensorCfg { filters: one("cub"), ..ContactSensorCfg::of("link6") }, "cub", "cube"),
+        (ContactSensorCfg::for_bodies("arm/lnk6"), "arm/lnk6", "arm/link6"),
+        (ContactSensorCfg::for_bodies(".*_FOOT"), ".*_FOOT", "cube"),
+        (ContactSensorCfg { filters: one("cub"), ..ContactSensorCfg::for_bodies("link6") }, "cub", "cube"),
         (ImuCfg::on("lnk6"), "lnk6", "arm/link6"),
         (frames("lnk6", &["cube"]), "lnk6", "arm/link6"),
         (frames("link6", &["cub"]), "cub", "cube"),
@@ -114,20 +114,20 @@ fn names() {
         (of_rays, "lnk6", "arm/link6"),
     );
     // The message texts of two errors.
-    let text = refused(sim, &JointStateCfg { joints: some("JOINT7"), ..Default::default() }).to_string();
+    let text = rejected(sim, &JointStateCfg { joints: some("JOINT7"), ..Default::default() }).to_string();
     assert!(text.contains("no joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
-    let text = refused(sim, &frames("cub", &["cube"])).to_string();
+    let text = rejected(sim, &frames("cub", &["cube"])).to_string();
     assert!(text.contains("no body \"cub\"; known are \"cube\""), "{text}");
     let same = frames("cube", &["cube", "cube"]);
-    refuses!(sim, SensorError::NameTaken { what: "target frame", name } if name == "cube" => same);
+    refuses!(sim, SensorError::DuplicateName { what: "target frame", name } if name == "cube" => same);
     // A fused link has no joint to measure.
-    refuses!(sim, SensorError::FusedLink { link, carrier } if link == "arm/ee_link" && carrier == "arm/link6" =>
+    refuses!(sim, SensorError::FusedLink { link, moving_link } if link == "arm/ee_link" && moving_link == "arm/link6" =>
         wrench(&["ee_link"], &[]));
     // Two bodies of the same name, and invalid patterns.
     sim.add_robot(sr5("other")).unwrap();
     refuses!(sim, SensorError::AmbiguousName { candidates, .. } if *candidates == ["arm/link6", "other/link6"] =>
         ImuCfg::on("link6"));
-    refuses!(sim, SensorError::Pattern(_) => ContactSensorCfg::of("("), ContactSensorCfg::of("(?=a)b"));
+    refuses!(sim, SensorError::Pattern(_) => ContactSensorCfg::for_bodies("("), ContactSensorCfg::for_bodies("(?=a)b"));
     assert!(sim.add_sensor("mine", ImuCfg::on("arm/link6")).is_ok(), "the name is still free");
     assert!(matches!(sim.add_sensor("mine", JointStateCfg::default()), Err(Error::DuplicateUid(_))));
 }
@@ -154,9 +154,9 @@ fn empty_selections() {
 #[test]
 fn contact_filters() {
     let sim = &mut world();
-    let of = || ContactSensorCfg::of("cube");
+    let of = || ContactSensorCfg::for_bodies("cube");
     for filter in ["cube", "cub.", "{ENV}/cube"] {
-        refuses!(sim, SensorError::OwnFilter { body, .. } if body == "cube" =>
+        refuses!(sim, SensorError::SelfFilter { body, .. } if body == "cube" =>
             ContactSensorCfg { filters: vec![filter.into()], ..of() });
     }
     refuses!(sim, SensorError::NoFilters { .. } => ContactSensorCfg { track_friction_forces: true, ..of() });
@@ -205,7 +205,7 @@ fn offsets() {
     let moved = |x, y| Pose::translation(x, y, 0.0);
     let long = rotated(1.0, 1.0);
     for offset in [moved(NAN, 0.0), moved(0.0, INFINITY), rotated(NAN, 0.0), rotated(0.0, 0.0), long] {
-        let of_target = TargetFrameCfg { offset, ..TargetFrameCfg::of("cube") };
+        let of_target = TargetFrameCfg { offset, ..TargetFrameCfg::for_bodies("cube") };
         refuses!(sim, SensorError::OutOfRange { .. } | SensorError::Ray(RayError::Number { .. }) =>
             ImuCfg { offset, ..ImuCfg::on("cube") },
             FrameTransformerCfg { source_offset: offset, ..frames("cube", &["cube"]) },
@@ -242,15 +242,15 @@ fn numbers_of_cameras() {
 fn with_sampling(sim: &mut SimulationManager, sampling: &SamplingCfg) -> Vec<SensorError> {
     let sampling = || sampling.clone();
     vec![
-        refused(sim, &ContactSensorCfg { sampling: sampling(), ..ContactSensorCfg::of("cube") }),
-        refused(sim, &ImuCfg { sampling: sampling(), ..ImuCfg::on("cube") }),
-        refused(sim, &FrameTransformerCfg { sampling: sampling(), ..frames("cube", &["cube"]) }),
-        refused(sim, &JointStateCfg { sampling: sampling(), ..Default::default() }),
-        refused(sim, &ActuatorStateCfg { sampling: sampling(), ..Default::default() }),
-        refused(sim, &JointWrenchCfg { sampling: sampling(), ..wrench(&["link6"], &[]) }),
-        refused(sim, &MujocoSensorCfg { sampling: sampling(), ..Default::default() }),
-        refused(sim, &RayCasterCfg { sampling: sampling(), ..Default::default() }),
-        refused(sim, &RayCasterCameraCfg { sampling: sampling(), ..Default::default() }),
+        rejected(sim, &ContactSensorCfg { sampling: sampling(), ..ContactSensorCfg::for_bodies("cube") }),
+        rejected(sim, &ImuCfg { sampling: sampling(), ..ImuCfg::on("cube") }),
+        rejected(sim, &FrameTransformerCfg { sampling: sampling(), ..frames("cube", &["cube"]) }),
+        rejected(sim, &JointStateCfg { sampling: sampling(), ..Default::default() }),
+        rejected(sim, &ActuatorStateCfg { sampling: sampling(), ..Default::default() }),
+        rejected(sim, &JointWrenchCfg { sampling: sampling(), ..wrench(&["link6"], &[]) }),
+        rejected(sim, &MujocoSensorCfg { sampling: sampling(), ..Default::default() }),
+        rejected(sim, &RayCasterCfg { sampling: sampling(), ..Default::default() }),
+        rejected(sim, &RayCasterCameraCfg { sampling: sampling(), ..Default::default() }),
     ]
 }
 
@@ -261,7 +261,7 @@ fn samplings() {
     // Steps of 5 ms.
     for (period, whole) in [(0.012, Some(0.01)), (0.001, Some(0.005)), (-0.01, None), (NAN, None), (INFINITY, None)] {
         let mut errors = with_sampling(sim, &SamplingCfg::every(period));
-        errors.push(refused(sim, &CameraCfg { update_period: period, ..Default::default() }));
+        errors.push(rejected(sim, &CameraCfg { update_period: period, ..Default::default() }));
         for error in errors {
             match (&error, whole) {
                 (SensorError::PeriodNotMultiple { nearest, .. }, Some(whole)) => {
@@ -291,7 +291,7 @@ fn samplings() {
     for std in [-1.0, NAN, INFINITY] {
         let sampling = SamplingCfg { noise: noise("net_forces_w", std), ..good() };
         refuses!(sim, SensorError::OutOfRange { .. } =>
-            ContactSensorCfg { sampling: sampling.clone(), ..ContactSensorCfg::of("cube") });
+            ContactSensorCfg { sampling: sampling.clone(), ..ContactSensorCfg::for_bodies("cube") });
     }
     let mut other = world();
     let [asked, other] = [sim, &mut other].map(|sim| {

@@ -51,7 +51,7 @@ fn world(settings: SimulationManagerCfg, with_arm: bool) -> (SimulationManager, 
     for k in 0..5 {
         sim.add_rigid_object(cube(&format!("pile{k}"), 0.2, 1.0, [-1.0 - 0.5 * f64::from(k), 0.0, 0.11])).unwrap();
     }
-    let part = sim.add_mjcf(MjcfCfg::text("m", PENDULUM)).unwrap();
+    let part = sim.add_mjcf(MjcfPartCfg::text("m", PENDULUM)).unwrap();
     sim.mjcf_part_mut(part).write_qvel(&Array2::from_shape_fn((n, 1), |(env, _)| env as f64), None).unwrap();
     if let Some(arm) = arm {
         let targets = Array2::from_shape_fn((n, 6), |(env, joint)| 0.3 * (env as f64 - 2.0) + 0.1 * joint as f64);
@@ -64,9 +64,9 @@ fn world(settings: SimulationManagerCfg, with_arm: bool) -> (SimulationManager, 
 type Readings = BTreeMap<&'static str, Vec<u64>>;
 
 /// Bits of one environment of several batches. The first axis of a batch is the environment.
-struct Words(usize, Vec<u64>);
+struct EnvBits(usize, Vec<u64>);
 
-impl Words {
+impl EnvBits {
     fn add<T: Bits, S: Data<Elem = T>, D: RemoveAxis>(&mut self, batch: &ArrayBase<S, D>) {
         self.1.extend(batch.index_axis(Axis(0), self.0).iter().map(|x| x.bits()));
     }
@@ -85,14 +85,14 @@ impl Words {
     }
 }
 
-type Reader = Box<dyn Fn(&SimulationManager, &mut Words)>;
+type Reader = Box<dyn Fn(&SimulationManager, &mut EnvBits)>;
 
 /// Sensors, by the name of their type in scene files, each with its reader.
 #[derive(Default)]
 struct Readers(Vec<(&'static str, Reader)>);
 
 impl Readers {
-    fn add<C>(&mut self, sim: &mut SimulationManager, kind: &'static str, cfg: C, read: fn(&C::Sensor, &mut Words))
+    fn add<C>(&mut self, sim: &mut SimulationManager, kind: &'static str, cfg: C, read: fn(&C::Sensor, &mut EnvBits))
     where
         C: SensorCfg + Send + 'static,
         C::Sensor: 'static,
@@ -100,7 +100,7 @@ impl Readers {
         let id = sim.add_sensor(kind, cfg).unwrap();
         self.0.push((
             kind,
-            Box::new(move |sim: &SimulationManager, words: &mut Words| {
+            Box::new(move |sim: &SimulationManager, words: &mut EnvBits| {
                 read(sim.sensor(id).unwrap(), words);
             }),
         ));
@@ -110,7 +110,7 @@ impl Readers {
     fn read(&self, sim: &SimulationManager, readings: &mut [Readings]) {
         for (env, readings) in readings.iter_mut().enumerate() {
             for (kind, read) in &self.0 {
-                let mut words = Words(env, Vec::new());
+                let mut words = EnvBits(env, Vec::new());
                 read(sim, &mut words);
                 readings.entry(kind).or_default().extend(words.1);
             }
@@ -163,11 +163,11 @@ fn add_sensors(sim: &mut SimulationManager, sampling: Sampling) -> Readers {
         track_contact_points: true,
         track_friction_forces: true,
         sampling: sampling("net_forces_w", 0.01),
-        ..ContactSensorCfg::of("box.*")
+        ..ContactSensorCfg::for_bodies("box.*")
     };
-    let targets = vec![TargetFrameCfg::of("box.*"), TargetFrameCfg::of("m/tip")];
+    let targets = vec![TargetFrameCfg::for_bodies("box.*"), TargetFrameCfg::for_bodies("m/tip")];
     let sampling_of_frames = sampling("target_pos_source", 0.01);
-    let frames = FrameTransformerCfg { sampling: sampling_of_frames, ..FrameTransformerCfg::from("ee_link", targets) };
+    let frames = FrameTransformerCfg { sampling: sampling_of_frames, ..FrameTransformerCfg::new("ee_link", targets) };
     let wrench = JointWrenchCfg {
         links: vec!["link[36]".into()],
         frames: vec!["m/tip".into()],
@@ -257,9 +257,9 @@ fn threads_environments_and_strides() {
         assert!((0..5).all(|env| one[env][kind] == other[env][kind]) == (*kind == "camera"), "{kind}");
     }
     // A new sensor type must be added here, too.
-    let things = ["robot", "articulation", "rigid_object", "rigid_object_group", "terrain", "mjcf", "weld"];
+    let entity_types = ["robot", "articulation", "rigid_object", "rigid_object_group", "terrain", "mjcf", "weld"];
     let types = EntityTypes::default();
-    let mut kinds: Vec<&str> = types.names().filter(|name| !things.contains(name)).collect();
+    let mut kinds: Vec<&str> = types.names().filter(|name| !entity_types.contains(name)).collect();
     kinds.sort_unstable();
     assert!(one[0].keys().eq(&kinds), "{kinds:?}");
 }
@@ -306,7 +306,7 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
         let sampling = || noisy("lin_acc_b", 0.0);
         sim.add_sensor("imu", ImuCfg { sampling: sampling(), ..ImuCfg::on("box1") }).unwrap();
         let filters = vec!["ground".into()];
-        sim.add_sensor("contact", ContactSensorCfg { filters, ..ContactSensorCfg::of("box.*") }).unwrap();
+        sim.add_sensor("contact", ContactSensorCfg { filters, ..ContactSensorCfg::for_bodies("box.*") }).unwrap();
     }
     let boxes = ["box0", "box1"].map(|name| sim.entities().rigid_object_id(name).unwrap());
     let mut states = Vec::new();
@@ -327,7 +327,10 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
         sim.update(7);
         states.extend(kinetoscope_testkit::worlds::all_bits(&sim));
     }
-    assert!(sim.warnings().buffer_growths() > 0 || mj::TARGET == mj::Target::V4, "the arena of 4.x is large enough");
+    assert!(
+        sim.warnings().buffer_growths() > 0 || mj::BUILD_VERSION == mj::SupportedVersion::V4,
+        "the arena of 4.x is large enough"
+    );
     states
 }
 

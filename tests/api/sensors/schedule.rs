@@ -7,7 +7,7 @@ use kinetoscope::sensors::{FrameTransformerCfg, JointStateCfg, TargetFrameCfg};
 
 const LENGTH: usize = 3;
 
-fn remembering(sampling: SamplingCfg) -> SamplingCfg {
+fn with_history(sampling: SamplingCfg) -> SamplingCfg {
     SamplingCfg { history_length: LENGTH, ..sampling }
 }
 
@@ -28,7 +28,7 @@ fn joint_state() {
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(2, 2));
     let robot = sim.add_robot(sr5("robot")).unwrap();
     sim.robot_mut(robot).set_qpos_target(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
-    let slow = JointStateCfg { sampling: remembering(SamplingCfg::every(0.05)), ..Default::default() };
+    let slow = JointStateCfg { sampling: with_history(SamplingCfg::every(0.05)), ..Default::default() };
     let id = sim.add_sensor("joints", slow).unwrap();
     let always = sim.add_sensor("always", JointStateCfg::default()).unwrap();
     let mut sampled = Vec::new();
@@ -66,8 +66,8 @@ fn contact_history() {
     let cube = sim.add_rigid_object(cube).unwrap();
     let pose = [0.2_f64, 0.5].map(|half| [0.0, 0.0, 0.16, half.cos(), half.sin(), 0.0, 0.0]);
     sim.rigid_object_mut(cube).write_pose(&Array2::from(pose.to_vec()), None).unwrap();
-    let sampling = remembering(SamplingCfg::default());
-    let id = sim.add_sensor("contact", ContactSensorCfg { sampling, ..ContactSensorCfg::of("cube") }).unwrap();
+    let sampling = with_history(SamplingCfg::default());
+    let id = sim.add_sensor("contact", ContactSensorCfg { sampling, ..ContactSensorCfg::for_bodies("cube") }).unwrap();
     let (mut total, mut friction) = (Vec::new(), Vec::new());
     for _ in 0..20 {
         sim.update(1);
@@ -99,9 +99,9 @@ fn million_steps() {
     let object = sim.add_rigid_object(cube("cube", 0.1, 1.0, [0.0; 3])).unwrap();
     sim.rigid_object_mut(object).write_velocity(&array![[1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
     let ids = RATES.map(|(period, latency_steps)| {
-        let sampling = SamplingCfg { latency_steps, ..remembering(SamplingCfg::every(period as f64 * dt)) };
-        let targets = vec![TargetFrameCfg::of("cube")];
-        let frames = FrameTransformerCfg { sampling, ..FrameTransformerCfg::from("cube", targets) };
+        let sampling = SamplingCfg { latency_steps, ..with_history(SamplingCfg::every(period as f64 * dt)) };
+        let targets = vec![TargetFrameCfg::for_bodies("cube")];
+        let frames = FrameTransformerCfg { sampling, ..FrameTransformerCfg::new("cube", targets) };
         sim.add_sensor(format!("every {period}, {latency_steps} late"), frames).unwrap()
     });
     let (mut step, mut block) = (0, 1);
@@ -122,8 +122,8 @@ fn million_steps() {
                 let rounding = tick as f64 * time * f64::EPSILON / 2.0;
                 assert!((stamp - time).abs() <= rounding, "period {period}, step {step}: {stamp} s, not {time} s");
                 // The position is also a sum of small numbers, up to 5 m: 6e-10.
-                let place = sensor.sampler().history("source_pos_w")[(0, age, 0)];
-                assert!((place - 1e-3 * tick as f64 * dt).abs() < 1e-9, "{place} m at tick {tick}");
+                let position = sensor.sampler().history("source_pos_w")[(0, age, 0)];
+                assert!((position - 1e-3 * tick as f64 * dt).abs() < 1e-9, "{position} m at tick {tick}");
             }
         }
     }

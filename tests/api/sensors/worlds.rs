@@ -3,9 +3,9 @@
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::urdf;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 pub(crate) use kinetoscope_testkit::urdf::link;
-pub(crate) use kinetoscope_testkit::worlds::{ball, cube, fixed, look_at, pose_in, sr5};
+pub(crate) use kinetoscope_testkit::worlds::{ball, cube, fixed, look_at, pose_of_row, sr5};
 use nalgebra::Vector3;
 
 pub(crate) const G: f64 = 9.81;
@@ -27,7 +27,7 @@ pub(crate) fn add_robot(
     content: &str,
     change: impl FnOnce(&mut RobotCfg),
 ) -> RobotId {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut robot = kinetoscope_testkit::worlds::passive(kinetoscope_testkit::worlds::text_robot(
         &files,
         uid,

@@ -1,14 +1,14 @@
 //! Terrain in a simulation: heights measured by rays, against the array and against `mj_ray`; objects at rest on it;
 //! exports; and invalid terrains.
 
-use kinetoscope::mujoco::{TARGET, Target, compile_file};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, compile_file};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
-use kinetoscope::sim::ObjectId;
-use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope::sim::RigidObjectId;
+use kinetoscope_testkit::refusal::assert_errors;
 use kinetoscope_testkit::worlds::{ball, cfg, sim};
 use nalgebra::Point3;
 
@@ -34,11 +34,11 @@ fn empty() -> SimulationManager {
 }
 
 /// Adds a ball beside the middle of the pit, above the surface.
-fn add_ball(sim: &mut SimulationManager) -> ObjectId {
+fn add_ball(sim: &mut SimulationManager) -> RigidObjectId {
     sim.add_rigid_object(ball("ball", RADIUS, 0.5, [0.13, -0.08, 0.8])).unwrap()
 }
 
-fn height_of(sim: &SimulationManager, ball: ObjectId) -> f64 {
+fn height_of(sim: &SimulationManager, ball: RigidObjectId) -> f64 {
     sim.rigid_object(ball).pose()[(0, 2)]
 }
 
@@ -97,8 +97,9 @@ fn rays() {
             let local = cfg.init_pose.inverse() * Point3::new(x, y, 0.0);
             let own = terrain.height_at([local.x, local.y]);
             assert_eq!(own.is_some(), expected.is_some());
-            let apart = own.zip(expected).map_or(0.0, |(a, b)| (a - (b - cfg.init_pose.translation.z)).abs());
-            assert!(apart < 1e-12, "height_at is off by {apart}");
+            let height_difference =
+                own.zip(expected).map_or(0.0, |(a, b)| (a - (b - cfg.init_pose.translation.z)).abs());
+            assert!(height_difference < 1e-12, "height_at is off by {height_difference}");
             let ray = sim.batch().read(at.0, |env| env.data().ray([x, y, 5.0], [0.0, 0.0, -1.0], 0b111)).unwrap();
             assert_eq!(ray.is_some(), seen, "mj_ray at ({x}, {y})");
             worst = expected.zip(ray).map_or(worst, |(height, ray)| worst.max((5.0 - ray.distance - height).abs()));
@@ -116,8 +117,8 @@ fn rays() {
 fn ball_at_rest() {
     let mut sim = empty();
     let (terrain, ball) = (sim.add_terrain(pit()).unwrap(), add_ball(&mut sim));
-    let feel = ContactSensorCfg { filters: vec!["world".into()], ..ContactSensorCfg::of("ball") };
-    let sensor = sim.add_sensor("contact", feel).unwrap();
+    let contact_cfg = ContactSensorCfg { filters: vec!["world".into()], ..ContactSensorCfg::for_bodies("ball") };
+    let sensor = sim.add_sensor("contact", contact_cfg).unwrap();
     assert_eq!((sim.entities().terrain(terrain).uid(), sim.entities().terrain(terrain).cfg()), ("pit", &pit()));
     sim.update(1000);
     let (pose, velocity) = (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
@@ -125,8 +126,11 @@ fn ball_at_rest() {
     for env in 0..2 {
         let center = [0, 1, 2].map(|k| pose[(env, k)]);
         assert!(velocity.row(env).iter().all(|v| v.abs() < 1e-3), "{velocity}");
-        let place = [0.0, 0.0, 2.0_f64.sqrt() * RADIUS];
-        assert!(center.iter().zip(place).all(|(a, b)| (a - b).abs() < 2e-3), "{center:?}, not {place:?}");
+        let expected_center = [0.0, 0.0, 2.0_f64.sqrt() * RADIUS];
+        assert!(
+            center.iter().zip(expected_center).all(|(a, b)| (a - b).abs() < 2e-3),
+            "{center:?}, not {expected_center:?}"
+        );
         for (k, weight) in [0.0, 0.0, 0.5 * 9.81].into_iter().enumerate() {
             // The remaining motion, below 1e-3 m/s, decelerates within some 0.01 s: below 0.05 N.
             let total = sensor.total_forces_w()[(env, 0, k)];
@@ -163,7 +167,7 @@ fn export() {
     sim.add_terrain(bumps()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     assert_eq!(sim.dump(dir.path()).unwrap(), []);
-    let exported = if TARGET == Target::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
+    let exported = if BUILD_VERSION == SupportedVersion::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
     for file in [exported, "run.mjcf.xml"] {
         let model = compile_file(&dir.path().join(file)).unwrap().into_model();
         let (found, ours) = (model.height_field(0), sim.batch().model().height_field(0));
@@ -199,7 +203,7 @@ fn mistakes() {
         ("other", TerrainCfg { init_pose: Pose::translation(f64::NAN, 0.0, 0.0), ..bumps() }, "init_pose"),
     ];
     let mut add = |uid: &str, cfg| sim.add_terrain(TerrainCfg { uid: uid.into(), ..cfg });
-    assert_refused(rows.map(|(uid, cfg, part)| (part, add(uid, cfg), "", [part])));
+    assert_errors(rows.map(|(uid, cfg, part)| (part, add(uid, cfg), "", [part])));
     assert_eq!(sim.scene().mask_ids().len(), 1);
     // A name with XML special characters, and equal heights.
     let flat = TerrainCfg { uid: "<\"flat\" & wide>".into(), heights: Array2::from_elem((2, 2), 0.3), ..bumps() };

@@ -2,7 +2,7 @@
 
 use kinetoscope::ndarray::{Array, Dimension, arr1, arr2, arr3};
 use kinetoscope::record::npy;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 
 #[path = "../../../examples/launcher/cloud.rs"]
 #[allow(dead_code, reason = "examples use the rest")]
@@ -17,7 +17,7 @@ fn ply_bytes() {
     let points = [([0.5, -1.0, 2.0], [1, 2, 3]), ([0.0, 0.25, -4.0], [255, 0, 128])];
     let data = b"\x00\x00\x00\x3f\x00\x00\x80\xbf\x00\x00\x00\x40\x01\x02\x03\
                  \x00\x00\x00\x00\x00\x00\x80\x3e\x00\x00\x80\xc0\xff\x00\x80";
-    let folder = Files::default();
+    let folder = TempFiles::default();
     for count in [2, 1, 0] {
         let header = format!(
             "ply\nformat binary_little_endian 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
@@ -34,7 +34,7 @@ fn ply_bytes() {
 /// Compares an array with the bytes of `numpy.save` (2.x): the dictionary is padded with spaces to byte 127 and ends
 /// with a line feed.
 #[track_caller]
-fn check_npy<S: npy::Number, D: Dimension>(array: &Array<S, D>, [kind, shape]: [&str; 2], data: &[u8]) {
+fn check_npy<S: npy::NpyElement, D: Dimension>(array: &Array<S, D>, [kind, shape]: [&str; 2], data: &[u8]) {
     let dictionary = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     let mut expected = b"\x93NUMPY\x01\x00v\x00".to_vec();
     expected.extend_from_slice(format!("{dictionary:<117}\n").as_bytes());

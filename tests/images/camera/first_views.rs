@@ -2,20 +2,20 @@
 
 use super::view;
 use kinetoscope::prelude::*;
-use kinetoscope::render::Rasterizer;
+use kinetoscope::render::ImageRenderer;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::{FreeCamera, Still};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope::sim::{FreeCamera, OffscreenScene};
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{sr5, text_robot, urdf_robot};
 
 /// The width and height of the bounding box of all objects but the ground, as shares of the image; and true if the box
 /// touches the border.
-fn filled(still: &Still, view: &View) -> ([f64; 2], bool) {
+fn bounding_box_share(still: &OffscreenScene, view: &View) -> ([f64; 2], bool) {
     let [width, height] = [view.width, view.height];
     let mut frame = Frame::new(width, height, Channels { mask: true, ..Channels::NONE });
-    Rasterizer::new(RasterCfg::default()).render_shot(&still.shot(view), &mut frame.as_mut()).unwrap();
+    ImageRenderer::new(RasterCfg::default()).render_request(&still.render_request(view), &mut frame.as_mut()).unwrap();
     let ground = still.mask_ids().iter().find(|id| id.class == "ground").map_or(0, |id| id.id);
     let mask = frame.mask.unwrap();
     let seen =
@@ -32,12 +32,12 @@ fn filled(still: &Still, view: &View) -> ([f64; 2], bool) {
     ([0, 1].map(|k| (high[k] + 1 - low[k]) as f64 / size[k] as f64), cut)
 }
 
-fn of_free(size: [usize; 2], free: FreeCamera) -> View {
+fn view_of(size: [usize; 2], free: FreeCamera) -> View {
     view(size, free.fovy, &look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap(), free.clip)
 }
 
 /// A body with a visual mesh and no collision shape: MuJoCo's model represents it by a ball of a millimeter.
-fn mesh_alone(files: &Files) -> RobotCfg {
+fn mesh_alone(files: &TempFiles) -> RobotCfg {
     files.write("mesh.obj", "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
     let text = r#"<robot name="r"><link name="a"><visual><geometry><mesh filename="mesh.obj"/></geometry></visual></link></robot>"#;
     text_robot(files, "robot", text)
@@ -48,7 +48,7 @@ fn mesh_alone(files: &Files) -> RobotCfg {
 /// front were cut off.
 #[test]
 fn fill_the_image() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let asset = |file| urdf_robot("robot", assets::path(file).unwrap());
     let robots = [
         ("arm", sr5("robot"), 1),
@@ -63,11 +63,11 @@ fn fill_the_image() {
             let mut sim = kinetoscope_testkit::worlds::sim(cfg);
             // Objects below the ground would be hidden.
             sim.add_robot(RobotCfg { ground_clearance: Some(0.0), ..robot.clone() }).unwrap();
-            let still = Still::overview(&mut sim, None, &[]).unwrap();
+            let still = OffscreenScene::overview(&mut sim, None, &[]).unwrap();
             for size in [[320, 180], [120, 160], [200, 50]] {
-                let views = [of_free(size, still.first_view(size)), sim.overview_eye(size).view(size[0], size[1])];
+                let views = [view_of(size, still.first_view(size)), sim.overview_camera(size).view(size[0], size[1])];
                 for view in views {
-                    let (shares, cut) = filled(&still, &view);
+                    let (shares, cut) = bounding_box_share(&still, &view);
                     let share = f64::max(shares[0], shares[1]);
                     assert!((0.6..=0.95).contains(&share) && !cut, "{name} at {size:?}: {shares:?}, cut off: {cut}");
                 }
@@ -75,7 +75,7 @@ fn fill_the_image() {
             // Control: at twice the distance the scene is too small.
             let near = still.first_view([320, 180]);
             let eye = [0, 1, 2].map(|k| 2.0 * near.eye[k] - near.target[k]);
-            let (shares, _) = filled(&still, &of_free([320, 180], FreeCamera { eye, ..near }));
+            let (shares, _) = bounding_box_share(&still, &view_of([320, 180], FreeCamera { eye, ..near }));
             assert!(f64::max(shares[0], shares[1]) < 0.6, "{name}: {shares:?}");
         }
     }
@@ -85,12 +85,12 @@ fn fill_the_image() {
 /// walls.
 #[test]
 fn of_mjcf() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let text = r#"<mujoco><visual><global azimuth="30" elevation="-20"/></visual><worldbody>
       <geom type="plane" size="0 0 1"/><geom type="box" size="20 0.1 5" pos="0 30 5"/>
       <geom type="box" size="0.5 0.5 0.2" pos="0 0 0.2"/>
       <body pos="0 0 0.7"><joint axis="0 1 0"/><geom type="box" size="0.5 0.2 0.3" mass="1"/></body></worldbody></mujoco>"#;
-    let still = Still::of_mjcf(files.write("room.xml", text), None).unwrap();
+    let still = OffscreenScene::of_mjcf(files.write("room.xml", text), None).unwrap();
     let free = still.first_view([160, 120]);
     let way: Vec<f64> = (0..3).map(|k| free.target[k] - free.eye[k]).collect();
     let (azimuth, elevation) = (way[1].atan2(way[0]).to_degrees(), way[2].atan2(way[0].hypot(way[1])).to_degrees());

@@ -3,7 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::render::frame::Channels;
 use kinetoscope::render::{RasterCfg, Renderer, Shutter};
-use kinetoscope::scene::Requires;
+use kinetoscope::scene::StateFields;
 use kinetoscope::scene::{Marker, SceneState};
 use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::{Sensor, SensorCfg, SensorContext, SensorError};
@@ -36,8 +36,8 @@ const RISING: Ball = Ball { rise: 0.03, step: 0 };
 impl SensorCfg for Ball {
     type Sensor = Self;
 
-    fn requires(&self) -> Requires {
-        Requires::POSES
+    fn requires(&self) -> StateFields {
+        StateFields::POSES
     }
 
     fn build(&self, _: &SensorContext) -> Result<Self, SensorError> {
@@ -92,7 +92,7 @@ fn world() -> SimulationManager {
 /// The ray's direction in the camera frame is ((u - cx) / f, (v - cy) / f, 1). It meets the ball if its angle to the
 /// center is at most asin(r / d). The angular width of a pixel is at least 1 / f (1 + tan²), which is 0.78 / f in the
 /// corners.
-fn beyond_the_edge(center: [f64; 3], u: usize, v: usize) -> f64 {
+fn distance_to_outline(center: [f64; 3], u: usize, v: usize) -> f64 {
     let ray = [u, v].map(|k| (k as f64 + 0.5 - SIDE as f64 / 2.0) / FOCAL);
     let ray = nalgebra::Vector3::new(ray[0], ray[1], 1.0);
     // The camera looks along -x with z up: right in the image is +y, down is -z.
@@ -114,10 +114,10 @@ fn is_red([r, g, b]: [u8; 3]) -> bool {
 /// Asserts that all pixels inside the outline show the ball. Pixels outside must be unchanged, or not red if
 /// `same_elsewhere` is false.
 #[track_caller]
-fn covers(center: [f64; 3], with: &[[u8; 3]], without: &[[u8; 3]], same_elsewhere: bool) {
+fn assert_covers(center: [f64; 3], with: &[[u8; 3]], without: &[[u8; 3]], same_elsewhere: bool) {
     let (mut inside, mut outside) = (0, 0);
     for k in 0..SIDE * SIDE {
-        let beyond = beyond_the_edge(center, k % SIDE, k / SIDE);
+        let beyond = distance_to_outline(center, k % SIDE, k / SIDE);
         if beyond < -1.0 {
             inside += 1;
             assert!(is_red(with[k]), "pixel {k}, {beyond} pixels inside, is {:?}", with[k]);
@@ -145,7 +145,7 @@ fn every_renderer() {
         for steps in [0, 1] {
             sim.update(steps);
             bare.update(steps);
-            covers(STILL.at(0), &colors(&sim, on, 1), &colors(&bare, reference, 1), exact);
+            assert_covers(STILL.at(0), &colors(&sim, on, 1), &colors(&bare, reference, 1), exact);
             if exact {
                 assert_eq!(colors(&sim, on, 0), colors(&bare, reference, 0), "the other environment");
             }
@@ -184,10 +184,10 @@ fn instant_of_the_image() {
         });
         assert_eq!(sim.cfg().physics_dt, 0.01);
         sim.update(14);
-        covers(RISING.at(seen_at), &colors(&sim, on, 1), &colors(&sim, off, 1), true);
+        assert_covers(RISING.at(seen_at), &colors(&sim, on, 1), &colors(&sim, off, 1), true);
         // A write to the state refreshes the image and its markers at once.
         sim.reset(None).unwrap();
-        covers(RISING.at(0), &colors(&sim, on, 1), &colors(&sim, off, 1), true);
+        assert_covers(RISING.at(0), &colors(&sim, on, 1), &colors(&sim, off, 1), true);
     }
 }
 
@@ -203,7 +203,7 @@ fn shutter() {
         sim.add_sensor(format!("{draw}"), cfg).unwrap()
     });
     sim.update(10);
-    covers(RISING.at(10), &colors(&sim, on, 1), &colors(&sim, off, 1), false);
+    assert_covers(RISING.at(10), &colors(&sim, on, 1), &colors(&sim, off, 1), false);
     assert_eq!(sim.sensor(on).unwrap().depth().unwrap(), sim.sensor(off).unwrap().depth().unwrap());
 }
 

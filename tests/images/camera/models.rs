@@ -3,20 +3,20 @@
 use super::view;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::render::Rasterizer;
+use kinetoscope::render::ImageRenderer;
 use kinetoscope::render::frame::Frame;
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::{Result, Still};
+use kinetoscope::sim::{OffscreenScene, Result};
 use kinetoscope_testkit::needs::{files_below, sample_model};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 
 /// Renders a scene from the free camera of MuJoCo's viewers; returns the share of pixels with an object.
-fn seen(still: &Still) -> f64 {
+fn covered_share(still: &OffscreenScene) -> f64 {
     let free = still.free_camera();
     let pose = look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap();
     let view = view([64, 48], free.fovy, &pose, free.clip);
     let mut frame = Frame::new(64, 48, Channels { color: true, mask: true, ..Channels::default() });
-    Rasterizer::new(RasterCfg::default()).render_shot(&still.shot(&view), &mut frame.as_mut()).unwrap();
+    ImageRenderer::new(RasterCfg::default()).render_request(&still.render_request(&view), &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap();
     assert!(color.as_chunks::<4>().0.iter().any(|c| c != &color[..4]), "an image of one colour");
     let mask = frame.mask.unwrap();
@@ -32,14 +32,16 @@ fn sample_models() {
         if std::fs::read_to_string(path).unwrap().contains("<mujocoinclude") {
             continue;
         }
-        match Still::of_mjcf(path, None) {
+        match OffscreenScene::of_mjcf(path, None) {
             Ok(still) => {
-                let share = seen(&still);
+                let share = covered_share(&still);
                 assert!(share > 0.01, "{}: {share} of the image", path.display());
                 drawn += 1;
             }
             // The samples are of 2.2.2; later versions have dropped some elements.
-            Err(error) if mj::TARGET == mj::Target::V4 => println!("not on MuJoCo 4: {}: {error}", path.display()),
+            Err(error) if mj::BUILD_VERSION == mj::SupportedVersion::V4 => {
+                println!("not on MuJoCo 4: {}: {error}", path.display())
+            }
             Err(error) => panic!("{}: {error}", path.display()),
         }
     }
@@ -57,13 +59,13 @@ fn vendor_robots() {
         let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
         sim.add_robot(kinetoscope_testkit::worlds::urdf_robot("robot", kinetoscope_testkit::needs::robot(file)))
             .unwrap();
-        let still = Still::of_env(&mut sim, EnvId(0)).unwrap();
+        let still = OffscreenScene::of_env(&mut sim, EnvId(0)).unwrap();
         let scene = still.visible().scene();
         let textures_of = scene.instances().iter().filter_map(|i| i.material.texture.as_ref());
         let distinct: std::collections::BTreeSet<_> = textures_of.map(std::sync::Arc::as_ptr).collect();
         assert_eq!(distinct.len(), textures, "{file}");
         assert!(scene.triangle_count() > 5000, "{file}: {} triangles", scene.triangle_count());
-        assert!(seen(&still) > 0.005, "{file}");
+        assert!(covered_share(&still) > 0.005, "{file}");
     }
 }
 
@@ -71,10 +73,10 @@ fn vendor_robots() {
 /// camera axes, rotated by half a turn about x. A hinge at 0.5 rad about z rotates its camera.
 #[test]
 fn cameras_of_a_file() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let text = "<mujoco><worldbody><camera name='fixed' pos='1 2 3' fovy='30'/><body pos='0 0 1'><joint axis='0 0 1'/>\
                 <geom size='.1'/><camera pos='0.2 0 0'/></body></worldbody></mujoco>";
-    let still = Still::of_mjcf(files.write("model.xml", text), Some(&[0.5])).unwrap();
+    let still = OffscreenScene::of_mjcf(files.write("model.xml", text), Some(&[0.5])).unwrap();
     let names: Vec<&str> = still.cameras().iter().map(|camera| camera.name.as_str()).collect();
     assert_eq!(names, ["fixed", ""]);
     let [fixed, moved] = still.cameras() else { panic!("{:?}", still.cameras()) };
@@ -95,14 +97,14 @@ fn cameras_of_a_file() {
 
 #[test]
 fn refused() {
-    let text = |result: Result<Still>| result.unwrap_err().to_string();
-    assert!(text(Still::of_mjcf("no/such.xml", None)).contains("no/such.xml"));
-    let files = Files::default();
+    let text = |result: Result<OffscreenScene>| result.unwrap_err().to_string();
+    assert!(text(OffscreenScene::of_mjcf("no/such.xml", None)).contains("no/such.xml"));
+    let files = TempFiles::default();
     let model = "<mujoco><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>";
     let path = files.write("model.xml", model);
-    assert!(text(Still::of_mjcf(&path, Some(&[0.0, 0.0]))).contains("[1]"));
-    assert!(text(Still::of_mjcf(&path, Some(&[f64::NAN]))).contains("finite"));
-    let still = Still::of_mjcf(&path, Some(&[0.5])).unwrap();
+    assert!(text(OffscreenScene::of_mjcf(&path, Some(&[0.0, 0.0]))).contains("[1]"));
+    assert!(text(OffscreenScene::of_mjcf(&path, Some(&[f64::NAN]))).contains("finite"));
+    let still = OffscreenScene::of_mjcf(&path, Some(&[0.5])).unwrap();
     assert!(still.camera("front").unwrap_err().to_string().contains("there are none"));
-    assert!(Still::of_mjcf(files.write("broken.xml", "<mujoco><worldbody><geom size="), None).is_err());
+    assert!(OffscreenScene::of_mjcf(files.write("broken.xml", "<mujoco><worldbody><geom size="), None).is_err());
 }

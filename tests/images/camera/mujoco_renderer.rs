@@ -10,12 +10,12 @@ use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::prelude::*;
 use kinetoscope::render::frame::Frame;
-use kinetoscope::render::{Rasterizer, Shot};
+use kinetoscope::render::{ImageRenderer, RenderRequest};
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::Visible;
+use kinetoscope::sim::VisualScene;
 use kinetoscope_testkit::needs::{python_renderer, robot, sample_model};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use nalgebra::Vector3;
 use std::path::Path;
 use std::process::Command;
@@ -31,7 +31,7 @@ struct Images {
     color: Vec<[u8; 3]>,
 }
 
-fn theirs(model: &Path, folder: &Path) -> Images {
+fn mujoco_images(model: &Path, folder: &Path) -> Images {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/camera/mujoco_renderer.py");
     let [width, height] = SIZE.map(|n| n.to_string());
     let mut command = Command::new(python_renderer());
@@ -50,43 +50,43 @@ fn theirs(model: &Path, folder: &Path) -> Images {
 /// Mask ids of the elements: of geoms by index; of tendons, skins and flexes by class.
 struct MaskIds {
     geoms: Vec<i32>,
-    others: [Vec<i32>; 3],
+    deformables: [Vec<i32>; 3],
 }
 
 impl MaskIds {
     fn of(&self, element: usize) -> i32 {
         let (multiple, number) = (element / 1_000_000, element % 1_000_000);
-        let list = multiple.checked_sub(1).map_or(&self.geoms, |kind| &self.others[kind]);
+        let list = multiple.checked_sub(1).map_or(&self.geoms, |kind| &self.deformables[kind]);
         list[number]
     }
 }
 
 /// Our images of the same file, with the mask ids of its elements.
-fn ours(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, MaskIds) {
+fn our_images(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, MaskIds) {
     let model = mj::compile_file(model).unwrap().into_model();
     let mut data = mj::Data::new(&model).unwrap();
     data.forward().unwrap();
-    let visible = Visible::of_model(&model);
+    let visible = VisualScene::of_model(&model);
     let scene = &visible.scene_at(&data);
     let (mut poses, mut lights) = (vec![PoseF32::IDENTITY; scene.instances().len()], scene.lights.clone());
-    visible.read(&data, &mut poses, &mut lights);
+    visible.read_poses(&data, &mut poses, &mut lights);
     let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0]).unwrap();
-    let view = view(SIZE, FOVY_DEG.to_radians(), &pose, model.clip());
+    let view = view(SIZE, FOVY_DEG.to_radians(), &pose, model.clip_distances());
     let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
     let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
     let cfg = RasterCfg { shadows: false, samples: 1, lod: false, ..RasterCfg::default() };
-    let shot = Shot { scene, poses: &poses, view: &view, lights: Some(&lights), lens: None, before: None };
-    Rasterizer::new(cfg).render_shot(&shot, &mut frame.as_mut()).unwrap();
+    let shot = RenderRequest { scene, poses: &poses, view: &view, lights: Some(&lights), lens: None, previous: None };
+    ImageRenderer::new(cfg).render_request(&shot, &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap().as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
     let images = Images { depth: frame.depth.unwrap(), ids: frame.mask.unwrap(), color };
     let mask_of = |geom: usize| {
         let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| format!("geom {geom}"));
-        visible.ids().iter().find(|id| id.geoms.contains(&name)).map_or(0, |id| id.id)
+        visible.mask_ids().iter().find(|id| id.geoms.contains(&name)).map_or(0, |id| id.id)
     };
     // In MuJoCo's order; the model renders all of them.
-    let of_class = |class: &str| visible.ids().iter().filter(|id| id.class == class).map(|id| id.id).collect();
+    let of_class = |class: &str| visible.mask_ids().iter().filter(|id| id.class == class).map(|id| id.id).collect();
     let others = ["tendon", "skin", "flex"].map(of_class);
-    (images, MaskIds { geoms: (0..model.ngeom()).map(mask_of).collect(), others })
+    (images, MaskIds { geoms: (0..model.ngeom()).map(mask_of).collect(), deformables: others })
 }
 
 /// The MJCF with a camera named "judge" in its world body.
@@ -102,19 +102,19 @@ fn with_camera(mjcf: &str, eye: [f64; 3], target: [f64; 3]) -> String {
 }
 
 /// Colors of one pixel in two images.
-type Pair = ([f64; 3], [f64; 3]);
+type ColorPair = ([f64; 3], [f64; 3]);
 
 /// Agreement of two images of one scene.
 #[derive(Debug)]
 struct Agreement {
     /// Number of pixels with an object, and of those the number off silhouettes.
-    seen: usize,
+    covered: usize,
     compared: usize,
-    /// Share of the compared pixels with the same mask and a relative depth difference below [`DEPTH`].
+    /// Share of the compared pixels with the same mask and a relative depth difference below [`DEPTH_TOLERANCE`].
     same: f64,
     /// Correlation of the brightness of the compared pixels.
     brightness: f64,
-    /// Mean color distance at equal brightness, 0..=1, over the pixels that are not nearly black ([`DARK`]).
+    /// Mean color distance at equal brightness, 0..=1, over the pixels that are not nearly black ([`MIN_BRIGHTNESS`]).
     hue: f64,
 }
 
@@ -123,16 +123,16 @@ struct Agreement {
 /// MuJoCo renders a circle as a polygon of 256 corners, which is up to r (1 - cos(pi / 256)) = 7.5e-5 r inside of the
 /// circle: 0.02 mm for the largest shapes here. On a slanted surface the depth error grows by a factor of at most 20,
 /// where the neighbors still agree with a plane: 0.4 mm, for depths above 1 m.
-const DEPTH: f64 = 5e-4;
+const DEPTH_TOLERANCE: f64 = 5e-4;
 
 /// Brightness below which the hue of a pixel is ignored: rounding to integers changes a channel by up to 0.5, which is
 /// more than 3 % of the brightness there.
-const DARK: f64 = 16.0;
+const MIN_BRIGHTNESS: f64 = 16.0;
 
 fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
     let [width, height] = SIZE;
     let (mut seen, mut compared, mut same) = (0, 0, 0);
-    let mut pairs: Vec<Pair> = Vec::new();
+    let mut pairs: Vec<ColorPair> = Vec::new();
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let k = y * width + x;
@@ -157,35 +157,41 @@ fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
                 continue;
             }
             compared += 1;
-            let near = (f64::from(ours.depth[k]) / f64::from(theirs.depth[k]) - 1.0).abs() < DEPTH;
+            let near = (f64::from(ours.depth[k]) / f64::from(theirs.depth[k]) - 1.0).abs() < DEPTH_TOLERANCE;
             same += usize::from(ours.ids[k] == mask_of.of(element) && near);
             pairs.push((theirs.color[k].map(f64::from), ours.color[k].map(f64::from)));
         }
     }
     let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
     let n = pairs.len() as f64;
-    let mean = |f: &dyn Fn(&Pair) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+    let mean = |f: &dyn Fn(&ColorPair) -> f64| pairs.iter().map(f).sum::<f64>() / n;
     let (a, b) = (mean(&|p| luma(p.0)), mean(&|p| luma(p.1)));
     let covariance = mean(&|p| (luma(p.0) - a) * (luma(p.1) - b));
     let (va, vb) = (mean(&|p| (luma(p.0) - a).powi(2)), mean(&|p| (luma(p.1) - b).powi(2)));
-    let hues = pairs.iter().filter(|p| luma(p.0) >= DARK && luma(p.1) >= DARK).map(|p| {
+    let hues = pairs.iter().filter(|p| luma(p.0) >= MIN_BRIGHTNESS && luma(p.1) >= MIN_BRIGHTNESS).map(|p| {
         let [t, o] = [p.0, p.1].map(|c| c.map(|x| x / luma(c)));
         (0..3).map(|i| (t[i] - o[i]).powi(2)).sum::<f64>().sqrt()
     });
     let hues: Vec<f64> = hues.collect();
     assert!(4 * hues.len() > pairs.len(), "a quarter of the pixels is not black: {} of {}", hues.len(), pairs.len());
     let hue = hues.iter().sum::<f64>() / hues.len() as f64;
-    Agreement { seen, compared, same: same as f64 / compared as f64, brightness: covariance / (va * vb).sqrt(), hue }
+    Agreement {
+        covered: seen,
+        compared,
+        same: same as f64 / compared as f64,
+        brightness: covariance / (va * vb).sqrt(),
+        hue,
+    }
 }
 
 /// Checks one scene; `files` holds the assets of the model.
-fn check(name: &str, files: &Files, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
+fn check(name: &str, files: &TempFiles, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
     let file = files.write("judged.xml", with_camera(mjcf, eye, target));
-    let theirs = theirs(&file, files.folder());
-    let (images, mask_of) = ours(&file, eye, target);
+    let theirs = mujoco_images(&file, files.folder());
+    let (images, mask_of) = our_images(&file, eye, target);
     let agreement = compare(&theirs, &images, &mask_of);
     println!("{name}: {agreement:?}");
-    assert!(agreement.seen > 20_000 && agreement.compared > SIZE[0] * SIZE[1] / 2, "{name}: {agreement:?}");
+    assert!(agreement.covered > 20_000 && agreement.compared > SIZE[0] * SIZE[1] / 2, "{name}: {agreement:?}");
     assert!(agreement.same >= 0.999, "{name}: {agreement:?}");
     // Lighting differs: our renderer tone-maps highlights, and shades per pixel instead of per vertex. Bright and dark
     // areas and hues must agree.
@@ -194,7 +200,7 @@ fn check(name: &str, files: &Files, mjcf: &str, eye: [f64; 3], target: [f64; 3])
     let wrong = compare(&theirs, &exchanged, &mask_of);
     assert!(wrong.hue > 1.5 * agreement.hue, "{name}: exchanged colours go unnoticed: {wrong:?}");
     // Control: a camera that looks 5 mm past the target.
-    let aside = ours(&file, eye, [target[0] + 0.005, target[1], target[2] + 0.005]).0;
+    let aside = our_images(&file, eye, [target[0] + 0.005, target[1], target[2] + 0.005]).0;
     let wrong = compare(&theirs, &aside, &mask_of);
     assert!(wrong.same < 0.99, "{name}: a turned camera goes unnoticed: {wrong:?}");
 }
@@ -203,7 +209,7 @@ fn check(name: &str, files: &Files, mjcf: &str, eye: [f64; 3], target: [f64; 3])
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
 fn humanoid() {
     let mjcf = std::fs::read_to_string(sample_model("humanoid/humanoid.xml")).unwrap();
-    check("humanoid", &Files::default(), &mjcf, [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
+    check("humanoid", &TempFiles::default(), &mjcf, [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
 }
 
 /// The vendor's arm with its original meshes, as exported.
@@ -212,7 +218,7 @@ fn humanoid() {
 fn arm() {
     let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg::default());
     sim.add_robot(kinetoscope_testkit::worlds::urdf_robot("robot", robot("rokae_description/urdf/SR5.urdf"))).unwrap();
-    let files = Files::default();
+    let files = TempFiles::default();
     sim.dump(files.folder()).unwrap();
     let mjcf = std::fs::read_to_string(files.folder().join("robot.mjcf4.xml")).unwrap();
     check("vendor SR5", &files, &mjcf, [1.5, -1.1, 1.1], [0.1, 0.0, 0.5]);
@@ -255,5 +261,5 @@ const DEFORMING: &str = r#"<mujoco>
 #[test]
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
 fn tendons_skins_and_flexes() {
-    check("deforming", &Files::default(), DEFORMING, [0.3, -3.0, 2.2], [0.0, 0.0, 0.5]);
+    check("deforming", &TempFiles::default(), DEFORMING, [0.3, -3.0, 2.2], [0.0, 0.0, 0.5]);
 }

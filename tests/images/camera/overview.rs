@@ -4,10 +4,10 @@ use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
-use kinetoscope::render::{ParallelRasterizer, RasterCfg, Rasterizer};
+use kinetoscope::render::{ImageRenderer, ParallelRenderer, RasterCfg};
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::Still;
+use kinetoscope::sim::OffscreenScene;
 use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];
@@ -27,12 +27,12 @@ fn above() -> View {
 }
 
 /// Mask and position image from above.
-struct Seen(Vec<i32>, Vec<[f32; 3]>);
+struct TopView(Vec<i32>, Vec<[f32; 3]>);
 
-impl Seen {
-    fn of(still: &Still) -> Self {
+impl TopView {
+    fn of(still: &OffscreenScene) -> Self {
         let mut frame = Frame::new(SIZE[0], SIZE[1], Channels { mask: true, position: true, ..Channels::default() });
-        Rasterizer::default().render_shot(&still.shot(&above()), &mut frame.as_mut()).unwrap();
+        ImageRenderer::default().render_request(&still.render_request(&above()), &mut frame.as_mut()).unwrap();
         Self(frame.mask.unwrap(), frame.position.unwrap().as_chunks().0.to_vec())
     }
 
@@ -52,7 +52,7 @@ impl Seen {
 fn environments_and_markers() {
     let mut sim = balls(5);
     let marker = Marker::sphere([-0.5, 0.3, 0.5], 0.1, [1.0, 0.0, 0.0, 1.0]);
-    let seen = Seen::of(&Still::overview(&mut sim, None, &[(EnvId(2), marker)]).unwrap());
+    let seen = TopView::of(&OffscreenScene::overview(&mut sim, None, &[(EnvId(2), marker)]).unwrap());
     let (id, origins) = (mask_id(&sim, "ball"), sim.cfg().env_origins());
     let mut of_balls = 0;
     for env in 0..5 {
@@ -73,38 +73,38 @@ fn environments_and_markers() {
 #[test]
 fn selection_and_refusals() {
     let mut sim = balls(4);
-    let two = Seen::of(&Still::overview(&mut sim, Some(&[EnvId(1), EnvId(3)]), &[]).unwrap());
+    let two = TopView::of(&OffscreenScene::overview(&mut sim, Some(&[EnvId(1), EnvId(3)]), &[]).unwrap());
     let (id, origins) = (mask_id(&sim, "ball"), sim.cfg().env_origins());
     for env in 0..4 {
         let place = [origins[(env, 0)] + 0.4, origins[(env, 1)] - 0.2];
         assert_eq!(two.near(id, place) > 0, env % 2 == 1, "environment {env}");
     }
-    assert!(Still::overview(&mut sim, Some(&[EnvId(4)]), &[]).is_err());
+    assert!(OffscreenScene::overview(&mut sim, Some(&[EnvId(4)]), &[]).is_err());
     let marker = Marker::sphere([0.0; 3], 0.1, [1.0; 4]);
-    assert!(Still::overview(&mut sim, None, &[(EnvId(9), marker)]).is_err());
+    assert!(OffscreenScene::overview(&mut sim, None, &[(EnvId(9), marker)]).is_err());
 }
 
 /// Persistent worker threads render the same images as a single thread, and continue after another pool was dropped.
 #[test]
 fn persistent_threads() {
     let mut sim = balls(5);
-    let still = Still::overview(&mut sim, None, &[]).unwrap();
+    let still = OffscreenScene::overview(&mut sim, None, &[]).unwrap();
     let channels = Channels { depth: true, mask: true, position: true, ..Channels::default() };
-    let draw = |rasterizer: &mut ParallelRasterizer| {
+    let draw = |rasterizer: &mut ParallelRenderer| {
         let views = [0.0, 0.4, 0.8, 1.2].map(|shift| View { cx: 200.0 + 100.0 * shift, ..above() });
         let mut frames = [(); 4].map(|()| Frame::new(SIZE[0], SIZE[1], channels));
-        let shots = views.iter().map(|view| still.shot(view)).zip(&mut frames);
+        let shots = views.iter().map(|view| still.render_request(view)).zip(&mut frames);
         let mut jobs: Vec<_> = shots.map(|(shot, frame)| (shot, frame.as_mut())).collect();
         rasterizer.render(&mut jobs).unwrap();
         drop(jobs);
         frames
     };
-    let alone = draw(&mut ParallelRasterizer::new(RasterCfg::default(), 1));
+    let alone = draw(&mut ParallelRenderer::new(RasterCfg::default(), 1));
     let ball = mask_id(&sim, "ball");
     assert!(alone.iter().all(|frame| frame.mask.as_ref().unwrap().contains(&ball)));
-    let mut staying = ParallelRasterizer::new(RasterCfg::default(), 3).with_pool(ThreadPool::new());
+    let mut staying = ParallelRenderer::new(RasterCfg::default(), 3).with_pool(ThreadPool::new());
     assert_eq!(draw(&mut staying), alone);
-    let mut other = ParallelRasterizer::new(RasterCfg::default(), 2).with_pool(ThreadPool::new());
+    let mut other = ParallelRenderer::new(RasterCfg::default(), 2).with_pool(ThreadPool::new());
     assert_eq!(draw(&mut other), alone);
     drop(other);
     assert_eq!(draw(&mut staying), alone);

@@ -4,10 +4,10 @@ use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
 use kinetoscope::sensors::camera::CameraConvention;
-use kinetoscope::sim::ObjectId;
-use kinetoscope_testkit::worlds::{cfg, cube, pose_in, sr5, urdf_robot};
+use kinetoscope::sim::RigidObjectId;
+use kinetoscope_testkit::worlds::{cfg, cube, pose_of_row, sr5, urdf_robot};
 
-fn sim(num_envs: usize, threads: usize) -> (SimulationManager, RobotId, ObjectId) {
+fn sim(num_envs: usize, threads: usize) -> (SimulationManager, RobotId, RigidObjectId) {
     let mut sim = kinetoscope_testkit::worlds::sim(cfg(num_envs, threads));
     let robot = sim.add_robot(sr5("sr5")).unwrap();
     let cube = sim.add_rigid_object(cube("cube", 0.05, 1.0, [1.2, -0.2, 0.025])).unwrap();
@@ -41,7 +41,7 @@ fn camera_on_a_link() {
     let on_link = sim.add_sensor("on link", CameraCfg { extrinsics, ..above() }).unwrap();
     let free = sim.add_sensor("free", above()).unwrap();
     sim.update(50);
-    let world_from_camera = pose_in(&sim.robot(robot).link_pose("ee_link").unwrap(), 0) * link_from_camera;
+    let world_from_camera = pose_of_row(&sim.robot(robot).link_pose("ee_link").unwrap(), 0) * link_from_camera;
     sim.sensor_mut(free).unwrap().set_local_pose(&world_from_camera, None, CameraConvention::Ros).unwrap();
     let (a, b) = (sim.sensor(on_link).unwrap(), sim.sensor(free).unwrap());
     let apart = a.pose_w(CameraConvention::Ros) - b.pose_w(CameraConvention::Ros);

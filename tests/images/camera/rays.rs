@@ -5,16 +5,16 @@
 //! pixels for which a ray half a pixel away from the center hits another geom or leaves the tangent plane.
 
 use super::view;
-use crate::rays::judge::{Dice, FAN, GROUPS, at_rest, data_of, data_with, height_field, mask_of};
+use crate::rays::judge::{GROUPS, MESH_WITH_INNER_EDGES, TestRng, at_rest, data_of, data_with, height_field, mask_of};
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
 use kinetoscope::prelude::*;
-use kinetoscope::render::Rasterizer;
+use kinetoscope::render::ImageRenderer;
 use kinetoscope::render::View;
 use kinetoscope::render::frame::Frame;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::look_at_pose;
-use kinetoscope::sim::Visible;
+use kinetoscope::sim::VisualScene;
 use nalgebra::Vector3;
 
 const SIZE: [usize; 2] = [160, 120];
@@ -67,17 +67,17 @@ fn images<'a>(
     eye: [f64; 3],
     target: [f64; 3],
     clip: [f64; 2],
-) -> (RayCamera<'a>, Frame, Visible) {
+) -> (RayCamera<'a>, Frame, VisualScene) {
     let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0]).unwrap();
     let view = view(SIZE, 0.8, &pose, clip);
-    let visible = Visible::of_model(seen.model());
+    let visible = VisualScene::of_model(seen.model());
     let scene = visible.scene();
     let mut poses = vec![PoseF32::IDENTITY; scene.instances().len()];
-    visible.read(seen, &mut poses, &mut scene.lights.clone());
+    visible.read_poses(seen, &mut poses, &mut scene.lights.clone());
     let channels = Channels { depth: true, mask: true, normal: true, position: true, ..Channels::default() };
     let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
     let cfg = RasterCfg { groups: GROUPS, ..RasterCfg::default() };
-    Rasterizer::new(cfg).render(scene, &poses, &view, &mut frame).unwrap();
+    ImageRenderer::new(cfg).render(scene, &poses, &view, &mut frame).unwrap();
     (RayCamera { data: rays, view, pose }, frame, visible)
 }
 
@@ -134,10 +134,10 @@ fn check(name: &str, data: &Data, eye: [f64; 3], target: [f64; 3], clip: [f64; 2
 /// All primitives at random poses, with cameras outside and inside of shapes, and widely spaced near and far planes.
 #[test]
 fn random_scenes() {
-    let mut dice = Dice(12345);
+    let mut rng = TestRng(12345);
     for scene in 0..6 {
-        let data = dice.primitives(12, 1, [0.08, 0.3]);
-        let eye = dice.numbers([[-3.0, 3.0], [-3.0, -1.5], [0.5, 2.5]]);
+        let data = rng.primitives(12, 1, [0.08, 0.3]);
+        let eye = rng.numbers([[-3.0, 3.0], [-3.0, -1.5], [0.5, 2.5]]);
         check(&format!("scene {scene}"), &data, eye, [0.0, 0.0, 0.5], [0.01, 50.0], 8000);
         check(&format!("scene {scene}, far apart"), &data, eye, [0.0, 0.0, 0.5], [1e-4, 1e5], 8000);
         // Inside of the first shape, whose center is the origin of its body.
@@ -153,7 +153,7 @@ fn sample_models() {
     for name in ["humanoid/humanoid.xml", "slider_crank/slider_crank.xml", "tendon_arm/arm26.xml", "mug/mug.xml"] {
         // The samples are of 2.2.2; later versions have dropped some elements.
         let Ok(compiled) = mj::compile_file(&kinetoscope_testkit::needs::sample_model(name)) else {
-            assert!(mj::TARGET == mj::Target::V4, "{name}");
+            assert!(mj::BUILD_VERSION == mj::SupportedVersion::V4, "{name}");
             continue;
         };
         let data = at_rest(compiled);
@@ -169,7 +169,7 @@ fn sample_models() {
 #[test]
 fn height_fields_and_meshes() {
     let elevation = |k: i32| (((k % 17) as f32 * 0.7).sin() * ((k / 17) as f32 * 0.5).cos() + 1.0) / 2.0;
-    let assets = format!("<hfield name='h' file='terrain.bin' size='1 1 .4 .1'/>{FAN}");
+    let assets = format!("<hfield name='h' file='terrain.bin' size='1 1 .4 .1'/>{MESH_WITH_INNER_EDGES}");
     let world = "<geom type='hfield' hfield='h'/><body pos='.2 .1 1'><freejoint/><geom type='mesh' mesh='fan'/></body>";
     let data = data_with(&assets, world, &[height_field(17, elevation)]);
     for eye in [[1.8, 1.2, 1.4], [-1.6, 0.4, 1.0], [0.3, -2.0, 0.6]] {

@@ -2,11 +2,11 @@
 
 use super::view;
 use kinetoscope::prelude::*;
-use kinetoscope::render::ParallelRasterizer;
+use kinetoscope::render::ParallelRenderer;
 use kinetoscope::render::frame::Frame;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
 use kinetoscope::sensors::camera::{Camera, CameraConvention, look_at_pose};
-use kinetoscope::sim::Still;
+use kinetoscope::sim::OffscreenScene;
 use kinetoscope_testkit::worlds::{cfg, look_at, object, sr5};
 use std::f64::consts::FRAC_PI_2;
 
@@ -65,7 +65,7 @@ fn images(extrinsics: &Extrinsics, renderers: [Renderer; 4]) -> [Frame; 4] {
 }
 
 /// True if a pixel and its neighbors show the same surface, so that the pixel is not at a silhouette.
-fn is_whole(frame: &Frame, [x, y]: [usize; 2]) -> bool {
+fn is_off_silhouette(frame: &Frame, [x, y]: [usize; 2]) -> bool {
     let (mask, depth) = (frame.mask.as_ref().unwrap(), frame.depth.as_ref().unwrap());
     let here = y * SIZE[0] + x;
     (0..9).map(|n| (y + n / 3 - 1) * SIZE[0] + x + n % 3 - 1).all(|at| {
@@ -83,7 +83,7 @@ fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) -
     let (a, b) = (raster, other);
     let (mut compared, mut different, mut turned, mut hits) = (0, 0, 0, 0);
     for (y, x) in (1..SIZE[1] - 1).flat_map(|y| (1..SIZE[0] - 1).map(move |x| (y, x))) {
-        if !is_whole(a, [x, y]) || !is_whole(b, [x, y]) {
+        if !is_off_silhouette(a, [x, y]) || !is_off_silhouette(b, [x, y]) {
             continue;
         }
         let here = y * SIZE[0] + x;
@@ -135,10 +135,10 @@ fn example_create_sensor() {
 /// A file with glass, mirrors and area lights, and a robot.
 #[test]
 fn example_render_model() {
-    let still_life = Still::of_mjcf(assets::path("scenes/still_life.xml").unwrap(), None).unwrap();
+    let still_life = OffscreenScene::of_mjcf(assets::path("scenes/still_life.xml").unwrap(), None).unwrap();
     let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
     sim.add_robot(sr5("robot")).unwrap();
-    let robot = Still::of_env(&mut sim, EnvId(0)).unwrap();
+    let robot = OffscreenScene::of_env(&mut sim, EnvId(0)).unwrap();
     let front = still_life.camera("front").unwrap();
     let free = robot.free_camera();
     let aside = look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap();
@@ -150,10 +150,10 @@ fn example_render_model() {
         let view = view(SIZE, radians, &pose, still.free_camera().clip);
         let draw = |renderer| {
             let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
-            let mut rasterizer = ParallelRasterizer::new(RasterCfg { lod: false, ..RasterCfg::default() }, 2);
+            let mut rasterizer = ParallelRenderer::new(RasterCfg { lod: false, ..RasterCfg::default() }, 2);
             rasterizer.set_renderer(renderer);
             let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
-            rasterizer.render(&mut [(still.shot(&view), frame.as_mut())]).unwrap();
+            rasterizer.render(&mut [(still.render_request(&view), frame.as_mut())]).unwrap();
             frame
         };
         let raster = draw(Renderer::Raster);

@@ -31,7 +31,7 @@ fn below(update_period: f64) -> CameraCfg {
 ///
 /// The ball's center is c above the camera: after n steps of MuJoCo's semi-implicit Euler c = 2.9 - g h² n (n + 1) / 2.
 /// The ray t (a, a, 1) with a = 0.5 / f meets the sphere of radius r where |t (a, a, 1) - (0, 0, c)| = r.
-fn gap(step: u64) -> f64 {
+fn expected_depth(step: u64) -> f64 {
     let (h, n, r) = (0.01, step as f64, 0.1);
     let c = 2.9 - 9.81 * h * h * n * (n + 1.0) / 2.0;
     let a = 0.5 / (16.0 / 0.3f64.tan());
@@ -40,8 +40,8 @@ fn gap(step: u64) -> f64 {
 }
 
 /// True if `found` is the depth at a step, to the renderer's single precision.
-fn is_of(found: f64, step: u64) -> bool {
-    (found / gap(step) - 1.0).abs() < 1e-5
+fn is_depth_at(found: f64, step: u64) -> bool {
+    (found / expected_depth(step) - 1.0).abs() < 1e-5
 }
 
 fn middle(sim: &SimulationManager, id: SensorId<Camera>) -> [f64; 2] {
@@ -54,25 +54,25 @@ fn middle(sim: &SimulationManager, id: SensorId<Camera>) -> [f64; 2] {
 #[test]
 fn due_instant_and_reset() {
     let (mut sim, id) = world(2, below(0.05));
-    assert!(is_of(middle(&sim, id)[1], 0));
+    assert!(is_depth_at(middle(&sim, id)[1], 0));
     sim.update(7);
-    assert!(is_of(middle(&sim, id)[1], 5), "{:?} {}", middle(&sim, id), gap(5));
-    assert!(!is_of(gap(7), 5), "the control: seven steps differ from five");
+    assert!(is_depth_at(middle(&sim, id)[1], 5), "{:?} {}", middle(&sim, id), expected_depth(5));
+    assert!(!is_depth_at(expected_depth(7), 5), "the control: seven steps differ from five");
     let camera = sim.sensor(id).unwrap();
     assert!((camera.stamps()[0] - 0.05).abs() < 1e-12 && camera.frame_counts()[0] == 1);
-    let draws = camera.draws();
+    let draws = camera.render_count();
     sim.update(2);
     middle(&sim, id);
-    assert_eq!(sim.sensor(id).unwrap().draws(), draws, "nothing new to draw");
+    assert_eq!(sim.sensor(id).unwrap().render_count(), draws, "nothing new to draw");
     sim.update(40);
-    assert_eq!(sim.sensor(id).unwrap().draws(), draws, "no read");
-    assert!(is_of(middle(&sim, id)[1], 45));
-    assert_eq!(sim.sensor(id).unwrap().draws(), draws + 2);
+    assert_eq!(sim.sensor(id).unwrap().render_count(), draws, "no read");
+    assert!(is_depth_at(middle(&sim, id)[1], 45));
+    assert_eq!(sim.sensor(id).unwrap().render_count(), draws + 2);
     assert_eq!(sim.sensor(id).unwrap().frame_counts()[0], 9);
     sim.update(4);
     sim.reset(Some(&[EnvId(0)])).unwrap();
     let [of_reset, other] = middle(&sim, id);
-    assert!(is_of(of_reset, 0) && is_of(other, 50));
+    assert!(is_depth_at(of_reset, 0) && is_depth_at(other, 50));
     assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [0, 10]);
     sim.update(5);
     assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [1, 11]);
@@ -108,18 +108,18 @@ fn strides() {
 fn latency() {
     let (mut sim, id) = world(2, CameraCfg { latency_steps: 3, history_length: 4, ..below(0.02) });
     sim.update(20);
-    assert!(is_of(middle(&sim, id)[1], 16), "{:?}", middle(&sim, id));
-    assert!(!is_of(gap(20), 16), "the control: a ball without delay is elsewhere");
+    assert!(is_depth_at(middle(&sim, id)[1], 16), "{:?}", middle(&sim, id));
+    assert!(!is_depth_at(expected_depth(20), 16), "the control: a ball without delay is elsewhere");
     let camera = sim.sensor(id).unwrap();
     assert!((camera.stamps()[1] - 0.16).abs() < 1e-12);
     let history = camera.history::<Depth>().unwrap();
     assert_eq!(history.dim(), (2, 4, 32, 32));
     for (age, step) in [16, 14, 12, 10].into_iter().enumerate() {
-        assert!(is_of(f64::from(history[(1, age, 15, 15)]), step), "{age}");
+        assert!(is_depth_at(f64::from(history[(1, age, 15, 15)]), step), "{age}");
     }
     assert_eq!(camera.frame_counts().to_vec(), [8, 8]);
     sim.reset(Some(&[EnvId(0)])).unwrap();
     let [of_reset, other] = middle(&sim, id);
-    assert!(is_of(of_reset, 0) && is_of(other, 16));
+    assert!(is_depth_at(of_reset, 0) && is_depth_at(other, 16));
     assert_eq!([0, 1].map(|env| sim.sensor(id).unwrap().history_filled(env).unwrap()), [0, 4]);
 }

@@ -2,8 +2,8 @@
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::sensors::camera::{Box3d, Camera, SegmentLevel, SegmentationCfg, Thing};
-use kinetoscope_testkit::worlds::{cfg, look_at, object, pose_in, sr5};
+use kinetoscope::sensors::camera::{Box3d, Camera, SegmentLevel, SegmentationCfg, SegmentedEntity};
+use kinetoscope_testkit::worlds::{cfg, look_at, object, pose_of_row, sr5};
 use nalgebra::Point3;
 
 fn world() -> (SimulationManager, RobotId, SensorId<Camera>) {
@@ -61,7 +61,7 @@ fn classes() {
     }
     let error = sim.scene().segmentation(&SegmentationCfg::labeled(&[("tabl", "x")])).unwrap_err().to_string();
     assert!(error.starts_with("labels: there is no object or link \"tabl\"; known are \"table\""), "{error}");
-    assert!(Thing::from(&sim.scene().mask_ids()[0]).name() == "ground");
+    assert!(SegmentedEntity::from(&sim.scene().mask_ids()[0]).name() == "ground");
 }
 
 /// 3D boxes are in the frames of the links: they do not change with the motion of the arm, and contain every visible
@@ -88,7 +88,7 @@ fn boxes() {
                 None if entry.object == "ground" => continue,
                 None => sim.rigid_object(sim.entities().rigid_object_id(&entry.object).unwrap()).pose(),
             };
-            let expected = pose_in(&expected, env);
+            let expected = pose_of_row(&expected, env);
             // Render poses are in single precision.
             let apart = (of_box.translation.vector - expected.translation.vector).norm();
             let angle = of_box.rotation.angle_to(&expected.rotation);

@@ -4,7 +4,7 @@ use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{CameraConvention, StereoCamera, StereoCameraCfg};
 use kinetoscope::sim::EntityTypes;
-use kinetoscope_testkit::worlds::{cfg, pose_in, sr5};
+use kinetoscope_testkit::worlds::{cfg, pose_of_row, sr5};
 use nalgebra::Point3;
 
 const SCENE: &str = r#"
@@ -47,8 +47,8 @@ fn disparity() {
     let ball = scene.rigid_object("ball").unwrap();
     let (mut of_ball, mut judged) = (0, 0);
     for env in 0..3 {
-        let world_from_camera = pose_in(&poses, env);
-        let middle = Point3::from(pose_in(&ball.pose(), env).translation.vector);
+        let world_from_camera = pose_of_row(&poses, env);
+        let middle = Point3::from(pose_of_row(&ball.pose(), env).translation.vector);
         for ((v, u), &d) in disparity.index_axis(Axis(0), env).indexed_iter() {
             if mask[(env, v, u)] == 0 {
                 assert_eq!(d, 0.0);
@@ -86,7 +86,8 @@ fn on_a_link() {
     for (camera, x) in [(stereo.left(), -0.03), (stereo.right(), 0.03)] {
         let poses = camera.pose_w(CameraConvention::Ros);
         for env in 0..2 {
-            let (found, expected) = (pose_in(&poses, env), pose_in(&link, env) * Pose::translation(x, 0.0, 0.0));
+            let (found, expected) =
+                (pose_of_row(&poses, env), pose_of_row(&link, env) * Pose::translation(x, 0.0, 0.0));
             let apart = (found.translation.vector - expected.translation.vector).norm();
             assert!(apart < 1e-9 && found.rotation.angle_to(&expected.rotation) < 1e-6, "{found} is not {expected}");
         }

@@ -3,7 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::scene::decode_srgb;
 use kinetoscope::scene::{LightKind, Material};
-use kinetoscope::sim::{EntityTypes, Error, LampKind, SurfaceCfg};
+use kinetoscope::sim::{EntityTypes, Error, LightKindCfg, SurfaceCfg};
 use kinetoscope_testkit::worlds::{cfg, object, sim, sr5};
 use std::sync::Arc;
 
@@ -22,23 +22,23 @@ fn on_ground(surface: SurfaceCfg) -> SimulationManagerCfg {
     SimulationManagerCfg { ground: Some(GroundCfg { surface, ..Default::default() }), ..cfg(2, 2) }
 }
 
-fn part(surfaces: Vec<(String, SurfaceCfg)>) -> MjcfCfg {
-    MjcfCfg { surfaces, ..MjcfCfg::text("part", PART) }
+fn part(surfaces: Vec<(String, SurfaceCfg)>) -> MjcfPartCfg {
+    MjcfPartCfg { surfaces, ..MjcfPartCfg::text("part", PART) }
 }
 
-fn of(name: &str, surface: SurfaceCfg) -> (String, SurfaceCfg) {
+fn named(name: &str, surface: SurfaceCfg) -> (String, SurfaceCfg) {
     (name.into(), surface)
 }
 
 fn materials(sim: &mut SimulationManager, name: &str) -> Vec<Material> {
-    let visible = sim.scene_mut().visible();
+    let visible = sim.scene_mut().visual_scene();
     let found: Vec<_> = visible.scene().instances().iter().filter(|instance| &*instance.name == name).collect();
     found.into_iter().map(|instance| instance.material.clone()).collect()
 }
 
 fn scene() -> SceneCfg {
-    let surfaces = vec![of("link[12]", SurfaceCfg::metal(0.25)), of("base_link", SurfaceCfg::glass())];
-    let bell = vec![of("bell", surface!(metallic: 0.5)), of("world", surface!(emission: 2.0))];
+    let surfaces = vec![named("link[12]", SurfaceCfg::metal(0.25)), named("base_link", SurfaceCfg::glass())];
+    let bell = vec![named("bell", surface!(metallic: 0.5)), named("world", surface!(emission: 2.0))];
     let water = surface!(refractive_index: 1.33, transmission: 0.75);
     SceneCfg::new(on_ground(surface!(reflectance: 0.5)))
         .with("robot", RobotCfg { surfaces, ..sr5("robot") })
@@ -86,14 +86,14 @@ fn surfaces_of_everything() {
 
 /// An environment with its own color keeps the shared surface.
 #[test]
-fn own_colour() {
+fn own_color() {
     let mut sim = sim(cfg(2, 2));
     let metal = object("object", ObjectShape::cube(0.1), [0.0; 3]);
     sim.add_rigid_object(RigidObjectCfg { surface: SurfaceCfg::metal(0.5), ..metal }).unwrap();
     sim.properties_mut()
         .randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "object", &[1.0, 0.0, 0.0, 1.0]))
         .unwrap();
-    let own = sim.scene_mut().scene_of(EnvId(1)).unwrap();
+    let own = sim.scene_mut().env_scene(EnvId(1)).unwrap();
     let ball = own.instances().iter().find(|instance| &*instance.name == "object").unwrap();
     assert_eq!((ball.material.rgba, ball.material.metallic), ([1.0, 0.0, 0.0, 1.0], 1.0));
 }
@@ -112,7 +112,7 @@ fn refused_surfaces() {
         ("surface.refractive_index", surface!(refractive_index: 0.9)),
     ];
     for (expected, surface) in fields {
-        let surfaces = || vec![of(".*", surface)];
+        let surfaces = || vec![named(".*", surface)];
         let urdf = sr5("robot").urdf;
         let errors = [
             sim.add_rigid_object(RigidObjectCfg { surface, ..Default::default() }).unwrap_err(),
@@ -126,9 +126,9 @@ fn refused_surfaces() {
             assert!(matches!(error, Error::Config { field, .. } if field == expected), "{expected}: {error}");
         }
     }
-    let error = sim.add_mjcf(part(vec![of("bel", SurfaceCfg::glass())])).unwrap_err().to_string();
+    let error = sim.add_mjcf(part(vec![named("bel", SurfaceCfg::glass())])).unwrap_err().to_string();
     assert!(error.contains("part \"part\", surfaces") && error.contains("bell"), "{error}");
-    let surfaces = vec![of("lefthand", SurfaceCfg::glass())];
+    let surfaces = vec![named("lefthand", SurfaceCfg::glass())];
     let error = sim.add_robot(RobotCfg { surfaces, ..sr5("robot") }).unwrap_err().to_string();
     assert!(error.contains("robot \"robot\", surfaces") && error.contains("lefthand"), "{error}");
 }
@@ -145,16 +145,16 @@ fn lights() {
     };
     let lights = vec![
         LightCfg { radius: 0.00465, ..Default::default() },
-        LightCfg { kind: LampKind::Point, ..light.clone() },
-        LightCfg { kind: LampKind::Spot { cutoff_deg: 30.0, exponent: 5.0 }, cast_shadow: false, ..light },
+        LightCfg { kind: LightKindCfg::Point, ..light.clone() },
+        LightCfg { kind: LightKindCfg::Spot { cutoff_deg: 30.0, exponent: 5.0 }, cast_shadow: false, ..light },
     ];
     let cfg = SceneCfg::new(SimulationManagerCfg { lights, ..Default::default() });
     let types = EntityTypes::default();
     let again = SceneCfg::from_toml(&cfg.to_toml(&types).unwrap(), "scene.toml", &types).unwrap();
     assert_eq!(again.simulation, cfg.simulation);
     let mut scene = InteractiveScene::new(cfg).unwrap();
-    let mut look = kinetoscope::sim::Look::default();
-    scene.sim_mut().scene_mut().look(EnvId(0), &mut look).unwrap();
+    let mut look = kinetoscope::sim::EnvVisualState::default();
+    scene.sim_mut().scene_mut().read_visual_state(EnvId(0), &mut look).unwrap();
     let [sun, bulb, spot] = look.lights[..] else { panic!("{:?}", look.lights) };
     assert_eq!((sun.kind, sun.radius, sun.cast_shadow), (LightKind::Directional, 0.00465, true));
     assert_eq!((bulb.kind, bulb.radius, bulb.cast_shadow), (LightKind::Point, 0.0625, true));
@@ -172,7 +172,7 @@ fn lights() {
 fn dome() {
     let ambient = |lights: Vec<LightCfg>| {
         let mut sim = SimulationManager::new(SimulationManagerCfg { lights, ..cfg(1, 1) }).unwrap();
-        let scene = Arc::clone(sim.scene_mut().visible().scene());
+        let scene = Arc::clone(sim.scene_mut().visual_scene().scene());
         (scene.ambient, scene.lights.len())
     };
     let (first, second) = (LightCfg::dome(0.5, [1.0, 0.75, 0.0]), LightCfg::dome(2.0, [0.25; 3]));
@@ -189,7 +189,8 @@ fn dome() {
 
 #[test]
 fn refused_lights() {
-    let spot = |cutoff_deg, exponent| LightCfg { kind: LampKind::Spot { cutoff_deg, exponent }, ..Default::default() };
+    let spot =
+        |cutoff_deg, exponent| LightCfg { kind: LightKindCfg::Spot { cutoff_deg, exponent }, ..Default::default() };
     let bad = [
         ("lights.kind.spot.cutoff_deg", spot(0.0, 1.0)),
         ("lights.kind.spot.cutoff_deg", spot(90.5, 1.0)),

@@ -1,6 +1,6 @@
 //! Agreement of ray-cast cameras and rasterized cameras with the same placement and the same intrinsics.
 
-use crate::rays::scanner::tumbling;
+use crate::rays::scanner::tumbling_box;
 use kinetoscope::ndarray::{Axis, s};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{CameraConvention, PointFrame};
@@ -15,7 +15,7 @@ const LENSES: [Intrinsics; 2] = [
 /// Numbers of compared pixels, of pixels that differ in mask, depth or point, and of pixels that differ in normals,
 /// over both environments. The rasterizer has the intrinsics `lens` in environment 1.
 fn compare(lens: Intrinsics) -> [usize; 3] {
-    let (mut sim, _) = tumbling(2, 2);
+    let (mut sim, _) = tumbling_box(2, 2);
     let (width, height) = (120, 90);
     let rays = RayCasterCameraCfg { width, height, ..Default::default() };
     let channels = Channels::from_names(&["depth", "mask", "normal"]).unwrap();

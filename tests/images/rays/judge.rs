@@ -2,21 +2,21 @@
 
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
-use kinetoscope::render::geometry::{RayAssets, RayHit, RayTargets, RayWorld};
+use kinetoscope::render::geometry::{RayAssetCache, RayHit, RayTargets, RayWorld};
 use kinetoscope::scene::PoseF64;
 use kinetoscope::scene::Ray;
-use kinetoscope::sim::Visible;
+use kinetoscope::sim::VisualScene;
 use std::sync::Arc;
 
 /// Bit mask of the visible geom groups.
 pub(crate) const GROUPS: u32 = 0b111;
 /// Largest difference of distances \[m\].
-pub(crate) const EXACT: f64 = 1e-6;
+pub(crate) const DISTANCE_TOLERANCE: f64 = 1e-6;
 
 /// Pseudo-random numbers, the same in every run.
-pub(crate) struct Dice(pub(crate) u64);
+pub(crate) struct TestRng(pub(crate) u64);
 
-impl Dice {
+impl TestRng {
     /// A number between `low` and `high`.
     pub(crate) fn number(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -71,7 +71,7 @@ pub(crate) fn ray_through(origin: [f64; 3], target: [f64; 3]) -> Ray {
 }
 
 /// A mesh with inner edges.
-pub(crate) const FAN: &str = "<mesh name='fan' vertex='0 0 0  .5 0 0  0 .5 0  0 0 .5  .3 .3 .4' face='0 2 1  0 1 3  0 3 2  1 2 4  2 3 4  3 1 4'/>";
+pub(crate) const MESH_WITH_INNER_EDGES: &str = "<mesh name='fan' vertex='0 0 0  .5 0 0  0 .5 0  0 0 .5  .3 .3 .4' face='0 2 1  0 1 3  0 3 2  1 2 4  2 3 4  3 1 4'/>";
 
 /// A height field file for MuJoCo: rows, columns, then elevations.
 pub(crate) fn height_field(rows: i32, elevation: impl FnMut(i32) -> f32) -> mj::Asset {
@@ -97,34 +97,35 @@ pub(crate) fn at_rest(compiled: mj::Compiled) -> Data {
 }
 
 /// The mask id of a geom of `data` in a scene.
-pub(crate) fn mask_of(visible: &Visible, data: &Data, geom: usize) -> i32 {
+pub(crate) fn mask_of(visible: &VisualScene, data: &Data, geom: usize) -> i32 {
     let name = data.model().name(mj::ObjectKind::Geom, geom).unwrap_or_else(|| format!("geom {geom}"));
-    visible.ids().iter().find(|id| id.geoms.contains(&name)).unwrap().id
+    visible.mask_ids().iter().find(|id| id.geoms.contains(&name)).unwrap().id
 }
 
 /// Hits of our rays in the scene of `data`.
-fn ours(data: &Data, rays: &[Ray], max_distance: f64) -> Vec<RayHit> {
-    let visible = Visible::of_model(data.model());
+fn our_hits(data: &Data, rays: &[Ray], max_distance: f64) -> Vec<RayHit> {
+    let visible = VisualScene::of_model(data.model());
     let seen = |i: &kinetoscope::scene::Instance| i.visible && GROUPS >> i.group & 1 == 1;
     let wanted = visible.scene().instances().iter().enumerate().filter(|(_, i)| seen(i)).map(|(k, _)| k);
-    let mut world = RayWorld::new(&Arc::new(RayTargets::new(visible.scene(), wanted, &RayAssets::default())));
+    let mut world = RayWorld::new(&Arc::new(RayTargets::new(visible.scene(), wanted, &RayAssetCache::default())));
     let mut poses = vec![PoseF64::IDENTITY; visible.scene().instances().len()];
-    visible.read_exact(data, &mut poses);
+    visible.read_poses_f64(data, &mut poses);
     world.place(&poses);
     let mut hits = vec![RayHit::MISS; rays.len()];
     world.cast(rays, max_distance, &mut hits);
     hits
 }
 
-/// Number of hits of `mj_ray` in `judge`, and number of rays for which our hit in `seen` differs.
-pub(crate) fn compare(seen: &Data, judge: &Data, rays: &[Ray]) -> (usize, usize) {
-    let visible = Visible::of_model(seen.model());
+/// Number of hits of `mj_ray` in `reference`, and number of rays for which our hit in `seen` differs.
+pub(crate) fn compare(seen: &Data, reference: &Data, rays: &[Ray]) -> (usize, usize) {
+    let visible = VisualScene::of_model(seen.model());
     let (mut hits, mut differing) = (0, 0);
-    for (ray, hit) in rays.iter().zip(ours(seen, rays, 1e6)) {
-        let theirs = judge.ray(ray.origin, ray.direction, GROUPS).unwrap();
+    for (ray, hit) in rays.iter().zip(our_hits(seen, rays, 1e6)) {
+        let theirs = reference.ray(ray.origin, ray.direction, GROUPS).unwrap();
         hits += usize::from(theirs.is_some());
         let same = theirs.map_or(!hit.is_hit(), |theirs| {
-            hit.mask_id == mask_of(&visible, judge, theirs.geom) && (hit.distance - theirs.distance).abs() <= EXACT
+            hit.mask_id == mask_of(&visible, reference, theirs.geom)
+                && (hit.distance - theirs.distance).abs() <= DISTANCE_TOLERANCE
         });
         differing += usize::from(!same);
     }

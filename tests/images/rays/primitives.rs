@@ -1,6 +1,8 @@
 //! Random scenes of every kind of geom: distances and geoms agree with `mj_ray`.
 
-use crate::rays::judge::{Dice, FAN, check, compare, data_of, data_with, height_field, ray_through};
+use crate::rays::judge::{
+    MESH_WITH_INNER_EDGES, TestRng, check, compare, data_of, data_with, height_field, ray_through,
+};
 use kinetoscope::scene::Ray;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
@@ -8,7 +10,7 @@ const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
 /// Rays from 20 m away, from close by, and from inside of shapes. Half of the bodies are welded to the world.
 #[test]
 fn shapes() {
-    let mut dice = Dice(1);
+    let mut dice = TestRng(1);
     for scene in 0..6 {
         let data = dice.primitives(24, 2, [0.05, 0.25]);
         let mut rays = Vec::new();
@@ -26,7 +28,7 @@ fn shapes() {
 /// the upper ends of the field's walls apart from its triangles.
 #[test]
 fn terrain_and_meshes() {
-    let mut dice = Dice(2);
+    let mut dice = TestRng(2);
     let terrain = height_field(33, |_| dice.number(0.0, 1.0) as f32);
     let vertices: Vec<String> = (0..30).map(|_| dice.point(0.3).map(|x| format!("{x}")).join(" ")).collect();
     // Without faces MuJoCo uses the convex hull.
@@ -37,7 +39,7 @@ fn terrain_and_meshes() {
             format!("<geom name='m{k}' type='mesh' mesh='{}'/>", ["hull", "fan"][k % 2])
         });
     }
-    let assets = format!("<hfield name='h' file='terrain.bin' size='2.3 1.7 .4 .1'/>{hull}{FAN}");
+    let assets = format!("<hfield name='h' file='terrain.bin' size='2.3 1.7 .4 .1'/>{hull}{MESH_WITH_INNER_EDGES}");
     let data = data_with(&assets, &world, &[terrain]);
     let mut rays = Vec::new();
     for k in 0..8000 {
@@ -53,7 +55,7 @@ fn terrain_and_meshes() {
 
 /// Control: the test detects shapes that are displaced by ten micrometers.
 #[test]
-fn ten_micrometres() {
+fn ten_micrometers() {
     let at = |z: f64| {
         data_of(&format!(
             "<geom name='floor' type='plane' size='5 5 .1'/><body pos='0 0 {z}'><geom name='a' type='box' size='.3 .2 .1'/>
@@ -61,7 +63,7 @@ fn ten_micrometres() {
         ))
     };
     let (data, moved) = (at(0.5), at(0.500_01));
-    let mut dice = Dice(3);
+    let mut dice = TestRng(3);
     let mut down = Vec::new();
     for _ in 0..2000 {
         let [x, y] = dice.numbers([[-0.3, 0.8], [-0.2, 0.2]]);

@@ -1,16 +1,16 @@
 //! Ray casters on moving bodies.
 
-use crate::rays::judge::{EXACT, GROUPS};
+use crate::rays::judge::{DISTANCE_TOLERANCE, GROUPS};
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::ray::pattern::{Grid, Lidar};
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment};
-use kinetoscope::sim::ObjectId;
-use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object, pose_in, sr5};
+use kinetoscope::sim::RigidObjectId;
+use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object, pose_of_row, sr5};
 
 /// A box that tumbles over a static wall and a ball, at another pose in every environment.
-pub(crate) fn tumbling(num_envs: usize, threads: usize) -> (SimulationManager, ObjectId) {
+pub(crate) fn tumbling_box(num_envs: usize, threads: usize) -> (SimulationManager, RigidObjectId) {
     let mut sim = kinetoscope_testkit::worlds::sim(cfg(num_envs, threads));
     let trunk = sim.add_rigid_object(object("trunk", ObjectShape::cube(0.3), [0.0, 0.0, 1.0])).unwrap();
     let wall = fixed(object("wall", ObjectShape::cube(0.4), [0.0; 3]));
@@ -38,7 +38,7 @@ fn height_scanner(targets: HitTargets) -> RayCasterCfg {
 /// 187 vertical rays keep their direction on a tumbling body, and hit the plane exactly.
 #[test]
 fn height_scan() {
-    let (mut sim, trunk) = tumbling(3, 1);
+    let (mut sim, trunk) = tumbling_box(3, 1);
     let sampling = SamplingCfg::every(0.02);
     let cfg = RayCasterCfg { sampling, ..height_scanner(HitTargets::Named(vec!["ground".into()])) };
     let id = sim.add_sensor("scanner", cfg).unwrap();
@@ -48,7 +48,7 @@ fn height_scan() {
         let scan = sim.sensor(id).unwrap();
         assert_eq!(scan.hits().dim(), (3, 187, 3));
         for env in 0..3 {
-            let x = pose_in(&poses, env).rotation * nalgebra::Vector3::x();
+            let x = pose_of_row(&poses, env).rotation * nalgebra::Vector3::x();
             // The yaw of a body is that of its x axis.
             let (cos, sin) = (x.x / x.x.hypot(x.y), x.y / x.x.hypot(x.y));
             for k in 0..187 {
@@ -69,7 +69,7 @@ fn height_scan() {
 /// A lidar on the tumbling body agrees with `mj_ray` in every environment.
 #[test]
 fn lidar() {
-    let (mut sim, trunk) = tumbling(3, 1);
+    let (mut sim, trunk) = tumbling_box(3, 1);
     let fov =
         Lidar { channels: 8, vertical_fov_deg: [-60.0, 30.0], horizontal_resolution_deg: 5.0, ..Lidar::default() };
     let cfg = RayCasterCfg {
@@ -98,7 +98,11 @@ fn lidar() {
                     Some(hit) => {
                         hits += 1;
                         selves += usize::from(lidar.hit_ids()[(env, k)] == own);
-                        assert!((distance - hit.distance).abs() < EXACT, "{env} {k}: {distance} {}", hit.distance);
+                        assert!(
+                            (distance - hit.distance).abs() < DISTANCE_TOLERANCE,
+                            "{env} {k}: {distance} {}",
+                            hit.distance
+                        );
                     }
                 }
             }

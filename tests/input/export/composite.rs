@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// Mass, first moment and inertia about the origin.
 #[derive(Default)]
-struct Sum {
+struct CompositeInertia {
     mass: f64,
     moment: Vector3<f64>,
     inertia: Matrix3<f64>,
@@ -23,7 +23,7 @@ fn point(mass: f64, at: Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * at.norm_squared() - at * at.transpose()) * mass
 }
 
-impl Sum {
+impl CompositeInertia {
     /// Adds a body with this inertia about its center of mass, in axes rotated by `turn`.
     fn add(&mut self, mass: f64, com: Vector3<f64>, inertia: Matrix3<f64>, turn: UnitQuaternion<f64>) {
         let turn = turn.to_rotation_matrix();
@@ -42,10 +42,10 @@ impl Sum {
     }
 }
 
-fn of_description(robot: &RobotDescription, base: Pose, qpos: &[f64]) -> Sum {
+fn of_description(robot: &RobotDescription, base: Pose, qpos: &[f64]) -> CompositeInertia {
     let position: std::collections::BTreeMap<_, _> =
         robot.drivable_joints().map(|(id, _)| id).zip(qpos.iter().copied()).collect();
-    let mut sum = Sum::default();
+    let mut sum = CompositeInertia::default();
     let mut stack = vec![(robot.root, base)];
     while let Some((link, world_from_link)) = stack.pop() {
         if let Some(inertial) = &robot.link(link).inertial {
@@ -71,9 +71,9 @@ fn of_description(robot: &RobotDescription, base: Pose, qpos: &[f64]) -> Sum {
     sum
 }
 
-fn of_mujoco(data: &Data) -> Sum {
+fn of_mujoco(data: &Data) -> CompositeInertia {
     let model = data.model();
-    let mut sum = Sum::default();
+    let mut sum = CompositeInertia::default();
     for body in 1..model.nbody() {
         let quat = |q: &[f64]| UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
         let turn = quat(&data.xquat()[4 * body..4 * body + 4]) * quat(&model.body_iquat()[4 * body..4 * body + 4]);

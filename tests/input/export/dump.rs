@@ -141,7 +141,7 @@ fn anymal_c() {
 
 /// Meshes with equal file names do not overwrite each other.
 #[test]
-fn alike_names_of_meshes() {
+fn equal_mesh_names() {
     let dir = tempfile::tempdir().unwrap();
     let mtl = "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n";
     std::fs::write(dir.path().join("two.mtl"), mtl).unwrap();

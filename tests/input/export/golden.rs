@@ -3,7 +3,7 @@
 //! `KINETOSCOPE_BLESS=1` rewrites the files (`cargo xtask bless`).
 
 use super::robots::{bundled_robots, dump, simulation};
-use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use std::path::Path;
 
 /// Compares a text with `tests/data/<name>`; writes the actual text next to a file that differs.
@@ -37,9 +37,9 @@ fn mjcf() {
     for cfg in bundled_robots() {
         let name = cfg.uid.clone();
         let dir = dump(&simulation(cfg).0);
-        let run = match TARGET {
-            Target::V2 => "run2",
-            Target::V4 => "run4",
+        let run = match BUILD_VERSION {
+            SupportedVersion::V2 => "run2",
+            SupportedVersion::V4 => "run4",
         };
         // Every build writes the exports for both versions, and the running model for its own version.
         for (file, golden) in [("robot.mjcf2.xml", "mjcf2"), ("robot.mjcf4.xml", "mjcf4"), ("run.mjcf.xml", run)] {

@@ -5,13 +5,13 @@ use kinetoscope::robot::description::RobotDescription;
 use kinetoscope::robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope::robot::urdf::{NameCase, NameCaseCfg, UrdfError, assemble, parse_str, write_urdf, write_urdf_with};
 use kinetoscope_testkit::refusal::assert_error;
-use kinetoscope_testkit::urdf::{Files, joint, limit};
+use kinetoscope_testkit::urdf::{TempFiles, joint, limit};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
 
 /// Writes a URDF of `parent joint child` triples; joints that start with `r` are revolute. The first parent is the
 /// first link.
-fn write(files: &Files, name: &str, tree: &str) -> PathBuf {
+fn write(files: &TempFiles, name: &str, tree: &str) -> PathBuf {
     let (mut links, mut joints) = (Vec::<&str>::new(), String::new());
     for edge in tree.split(',') {
         let words: Vec<&str> = edge.split_whitespace().collect();
@@ -30,11 +30,11 @@ fn write(files: &Files, name: &str, tree: &str) -> PathBuf {
     files.write(&format!("{name}.urdf"), format!("<robot name=\"{name}\">\n{links}{joints}</robot>"))
 }
 
-fn arm(files: &Files) -> PathBuf {
+fn arm(files: &TempFiles) -> PathBuf {
     write(files, "arm", "base_link r1 link1, link1 r2 link2, link1 camera_mount camera, link2 tool ee_link")
 }
 
-fn hand(files: &Files) -> PathBuf {
+fn hand(files: &TempFiles) -> PathBuf {
     write(files, "hand", "base_link palm_joint palm, palm r_thumb thumb, palm r_thumb_m finger")
 }
 
@@ -86,7 +86,7 @@ fn clashes(diagnostics: &[Diagnostic]) -> Vec<String> {
 /// The caller sets the file name of each mesh and texture.
 #[test]
 fn file_names() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let names = ["seen.obj", "wood.png", "hit.stl"];
     let text = r#"<robot name="m"><link name="a"><visual><geometry><mesh filename="seen.obj"/></geometry>
         <material name="wood"><texture filename="wood.png"/></material></visual>
@@ -112,7 +112,7 @@ fn file_names() {
 
 #[test]
 fn one_component() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let (robot, diagnostics) = merged(&UrdfCfg::single(arm(&files)));
     assert_eq!(link_names(&robot), ["base_link", "link1", "link2", "camera", "ee_link"]);
     assert_eq!(joint_names(&robot), ["r1", "r2", "camera_mount", "tool"]);
@@ -130,16 +130,16 @@ fn one_component() {
     assert_eq!(link_names(&robot)[..2], ["base_link_2", "base_link"]);
     assert_eq!(clashes(&diagnostics).len(), 1);
 
-    let twins = write(&files, "twins", "Base R1 base, base r1 BASE, BASE R_1 x_base, x_base f x_base_2");
+    let case_twins = write(&files, "twins", "Base R1 base, base r1 BASE, BASE R_1 x_base, x_base f x_base_2");
     let name_case = NameCaseCfg { joint: NameCase::Lower, link: NameCase::Lower };
-    let (robot, diagnostics) = merged(&UrdfCfg { name_case, ..cfg(vec![ComponentCfg::new("x", twins)]) });
+    let (robot, diagnostics) = merged(&UrdfCfg { name_case, ..cfg(vec![ComponentCfg::new("x", case_twins)]) });
     assert_eq!(link_names(&robot), ["base", "x_base", "x_base_2", "x_x_base", "x_x_base_2"]);
     assert_eq!(clashes(&diagnostics).len(), 5);
 }
 
 #[test]
 fn hand_on_arm() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let hand = ComponentCfg { transform: moved(), ..ComponentCfg::new("hand", hand(&files)) };
     let arm = ComponentCfg::new("arm", arm(&files));
     for components in [vec![arm.clone(), hand.clone()], vec![hand, arm]] {
@@ -158,7 +158,7 @@ fn hand_on_arm() {
 
 #[test]
 fn two_arms_and_hands() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let torso = write(&files, "torso", "base r_waist chest, chest left left_mount, chest right right_mount");
     let part = |name: &str, urdf: PathBuf| ComponentCfg::new(name, urdf);
     let on = |link: &str, c: ComponentCfg| ComponentCfg { parent_link: Some(link.to_owned()), ..c };
@@ -190,7 +190,7 @@ fn two_arms_and_hands() {
 
 #[test]
 fn usual_parents() {
-    let files = Files::default();
+    let files = TempFiles::default();
     type Parent<'a> = (&'a str, Option<&'a str>);
     let rows: [(&[&str], &[Parent<'_>]); 6] = [
         (
@@ -222,7 +222,7 @@ fn usual_parents() {
 
 #[test]
 fn links_by_name() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let tool = write(&files, "tool", "flange f blade");
     let with = |link: Option<&str>, child: Option<&str>| {
         let tool = ComponentCfg {
@@ -252,7 +252,7 @@ fn links_by_name() {
 
 #[test]
 fn refusals() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let part = |name: &str| ComponentCfg::new(name, arm(&files));
     let under = |name: &str, parent: &str| ComponentCfg { parent: Some(parent.to_owned()), ..part(name) };
     let link = ComponentCfg { parent_link: Some("x".to_owned()), ..part("arm") };

@@ -4,8 +4,8 @@ use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::{
     Strictness, UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str, parse_str_with,
 };
-use kinetoscope_testkit::refusal::assert_refused;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::urdf::TempFiles;
 use std::path::Path;
 
 fn parse(text: &str) -> Result<UrdfFile, UrdfError> {
@@ -163,12 +163,12 @@ fn mistakes() {
         ("entity", "<robot name=\"&undefined;\"/>".to_owned(), "Xml", &["robot.urdf:1: column"]),
     ];
     let named = |needles: &[&'static str]| [needles, &["robot.urdf"]].concat();
-    assert_refused(cases.iter().map(|(what, text, kind, needles)| (what, parse_strictly(text), kind, named(needles))));
+    assert_errors(cases.iter().map(|(what, text, kind, needles)| (what, parse_strictly(text), kind, named(needles))));
 }
 
 #[test]
 fn unreadable_files() {
-    let files = Files::default();
+    let files = TempFiles::default();
     files.write("arm.urdf", "<robot/>");
     type Row<'a> = (&'a str, Option<&'a [u8]>, &'a str, &'a [&'a str]);
     let rows: [Row<'_>; 5] = [
@@ -181,14 +181,14 @@ fn unreadable_files() {
     let read = |name: &str, content: Option<&[u8]>| {
         parse_file(&content.map_or_else(|| files.folder().join(name), |content| files.write(name, content)))
     };
-    assert_refused(rows.map(|(name, content, kind, needles)| (name, read(name, content), kind, needles)));
+    assert_errors(rows.map(|(name, content, kind, needles)| (name, read(name, content), kind, needles)));
     let bom = files.write("bom.urdf", b"\xef\xbb\xbf<robot name=\"r\"><link name=\"a\"/></robot>");
     assert!(parse_file(&bom).is_ok());
 }
 
 #[test]
 fn missing_meshes() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let assemble_with = |element: &str, uri: &str| {
         let mesh = format!("<{element}><geometry><mesh filename=\"{uri}\"/></geometry></{element}>");
         assemble(&UrdfCfg::single(files.write("robot.urdf", link(&mesh))))
@@ -203,7 +203,7 @@ fn missing_meshes() {
     ];
     for (uri, kind, needles) in rows {
         let needles = [needles, &["robot.urdf:2: link \"l\":"]].concat();
-        assert_refused([(uri, assemble_with("collision", uri), kind, needles)]);
+        assert_errors([(uri, assemble_with("collision", uri), kind, needles)]);
         let diagnostics = assemble_with("visual", uri).expect(uri).diagnostics;
         assert_eq!(diagnostics.len(), 1);
         assert_eq!(diagnostics[0].kind, DiagnosticKind::VisualMeshMissing);
@@ -427,7 +427,7 @@ fn lenient_reading() {
         ("no density", inertial("<density value=\"0\"/>"), "Value", "kg/m³"),
         ("many prefixes", link(&(0..40).map(|i| format!("<p{i}:a/>")).collect::<String>()), "Xml", "robot.urdf:2"),
     ];
-    assert_refused(rows.map(|(what, text, kind, needle)| (what, parse(&text), kind, [needle, "robot.urdf"])));
+    assert_errors(rows.map(|(what, text, kind, needle)| (what, parse(&text), kind, [needle, "robot.urdf"])));
 }
 
 #[test]

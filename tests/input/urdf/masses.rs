@@ -10,9 +10,9 @@ use kinetoscope::robot::description::Inertial;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::MissingInertia;
 use kinetoscope::robot::urdf::write_urdf;
-use kinetoscope::sim::Still;
-use kinetoscope_testkit::refusal::assert_refused;
-use kinetoscope_testkit::urdf::{Files, collision, joint, limit, robot};
+use kinetoscope::sim::OffscreenScene;
+use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::urdf::{TempFiles, collision, joint, limit, robot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// A fixed base with a hinged link of this content; the link is in line 3.
@@ -22,7 +22,7 @@ fn hinged(link: &str) -> String {
 }
 
 fn loaded(urdf: &str, missing_inertia: MissingInertia) -> (SimulationManager, RobotId) {
-    let files = Files::default();
+    let files = TempFiles::default();
     files.write("brick.obj", BRICK);
     let mut cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", urdf);
     cfg.urdf.missing_inertia = missing_inertia;
@@ -182,13 +182,13 @@ fn links_without_inertial() {
     assert!(sim.robot(id).description().total_mass() > 4.0);
 
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::empty_cfg(1));
-    let files = Files::default();
+    let files = TempFiles::default();
     let rows = [0.0, -1.0, f64::NAN, f64::INFINITY].map(|density| {
         let mut cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", &hinged(&shape));
         cfg.urdf.missing_inertia = MissingInertia::Density(density);
         (density, sim.add_robot(cfg), "Config { field: \"missing_inertia\"", ["positive and finite"])
     });
-    assert_refused(rows);
+    assert_errors(rows);
 }
 
 /// Regression: `<inertial>` without `<mass>` or without `<inertia>` was refused, although Isaac Gym's cubes have
@@ -211,7 +211,7 @@ fn partial_inertials() {
         ("inertia".to_owned(), inertia.to_owned(), (8.0, Vector3::zeros(), given)),
         ("inertia at an origin".to_owned(), format!("{origin}{inertia}"), (8.0, z, turned)),
     ];
-    let files = Files::default();
+    let files = TempFiles::default();
     for (what, content, expected) in rows {
         let urdf = hinged(&format!("<inertial>{content}</inertial>{shape}"));
         let (sim, id) = loaded(&urdf, DENSITY);
@@ -251,7 +251,7 @@ fn absurd_inertias() {
         robot("r", &format!("<link name=\"l\">{inertial}{shape}</link>"))
     };
     let load = |urdf: &str| {
-        let files = Files::default();
+        let files = TempFiles::default();
         let cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", urdf);
         let turned = kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.3], [0.4, 0.3, 0.0]);
         let cfg = RobotCfg { fix_base: false, init_pose: turned, ..cfg };
@@ -261,7 +261,7 @@ fn absurd_inertias() {
     };
     // m (y² + z²) / 12 of the box.
     let of_box = |mass: f64| Matrix3::from_diagonal(&(Vector3::new(0.0125, 0.0125, 0.02) * mass / 12.0));
-    for (what, mass, moments, said) in [
+    for (what, mass, moments, moments_text) in [
         ("(1, 1, 0)", 0.1, [1.0, 1.0, 0.0], "(1, 1, 0)"),
         ("zero", 0.1, [0.0; 3], "(0, 0, 0)"),
         ("no triangle", 0.1, [1.0, 0.1, 0.1], "(1, 0.1, 0.1)"),
@@ -276,7 +276,7 @@ fn absurd_inertias() {
         assert_eq!(warnings(&sim), ["inertia-from-shapes"], "{what}");
         let warning = sim.diagnostics()[0].to_string();
         let new = if mass < 1.0 { "(1.667e-4, 1.042e-4, 1.042e-4)" } else { "(0.001667, 0.001042, 0.001042)" };
-        for part in [&format!("{said} kg m² were replaced by {new} kg m²"), "r.urdf:2"] {
+        for part in [&format!("{moments_text} kg m² were replaced by {new} kg m²"), "r.urdf:2"] {
             assert!(warning.contains(part), "{what}: {warning}");
         }
         sim.update(1000);
@@ -323,9 +323,9 @@ fn nothing_to_draw() {
         (ball, vec![]),
     ] {
         let (mut sim, _) = loaded(&robot("r", &link.replace("</link>", content)), DENSITY);
-        let pictures = 2;
-        for _ in 0..pictures {
-            Still::of_env(&mut sim, EnvId(0)).unwrap();
+        let images = 2;
+        for _ in 0..images {
+            OffscreenScene::of_env(&mut sim, EnvId(0)).unwrap();
         }
         assert_eq!(warnings(&sim), kinds, "{content}");
     }
@@ -337,6 +337,6 @@ fn missing_visual_mesh() {
     let mesh = |name: &str| format!("<visual><geometry><mesh filename=\"{name}\"/></geometry></visual></link>");
     let link = kinetoscope_testkit::urdf::link("l", 1.0, 0.01, [0.0; 3], "");
     let (mut sim, _) = loaded(&robot("r", &link.replace("</link>", &mesh("none.obj"))), DENSITY);
-    Still::of_env(&mut sim, EnvId(0)).unwrap();
+    OffscreenScene::of_env(&mut sim, EnvId(0)).unwrap();
     assert_eq!(warnings(&sim), ["visual-mesh-missing"]);
 }

@@ -6,7 +6,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::description::RobotDescription;
 use kinetoscope::robot::description::{Geometry, JointKind, Material};
 use kinetoscope::robot::diagnostic::DiagnosticKind;
-use kinetoscope::robot::urdf::{Assembly, assemble, parse_file, write_urdf};
+use kinetoscope::robot::urdf::{MergedRobot, assemble, parse_file, write_urdf};
 use kinetoscope_testkit::needs::{files_below, robot, robots_dir};
 use kinetoscope_testkit::worlds::{cfg, sim, urdf_robot};
 
@@ -14,7 +14,7 @@ const SR5: &str = "rokae_description/urdf/SR5.urdf";
 const HAND: &str = "inspire_hand/DFQ_left_hand.urdf";
 const ANYMAL: &str = "anymal_c_simple_description/urdf/anymal.urdf";
 
-fn load(name: &str) -> Assembly {
+fn load(name: &str) -> MergedRobot {
     assemble(&UrdfCfg::single(robot(name))).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -36,7 +36,8 @@ fn mesh_scales(robot: &RobotDescription) -> Vec<f64> {
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendors() {
     let [sr5, hand, anymal] = [SR5, HAND, ANYMAL].map(load);
-    let said = |of: &Assembly| of.diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    let diagnostics_text =
+        |of: &MergedRobot| of.diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     for (of, joints, mass, root, parts) in [
         (&sr5, (6, None), (13.622, 1e-12), "world", ["SR5.urdf:64: ", "xMateSR5_joint_7"]),
         (&anymal, (12, Some(65)), (52.135, 5e-4), "base", ["anymal.urdf:430: ", "material \"orange\""]),
@@ -46,7 +47,7 @@ fn vendors() {
         assert!(joints.1.is_none_or(|fixed| count(robot, JointKind::Fixed) == fixed), "{}", robot.name);
         assert!((robot.total_mass() - mass.0).abs() < mass.1, "{}", robot.total_mass());
         assert_eq!((robot.link(robot.root).name.as_str(), of.diagnostics.len()), (root, 1));
-        assert!(parts.iter().all(|part| said(of).contains(part)), "{}", said(of));
+        assert!(parts.iter().all(|part| diagnostics_text(of).contains(part)), "{}", diagnostics_text(of));
     }
     let (robot, fingers) = (&sr5.description, &hand.description);
     let efforts: Vec<_> = robot.drivable_joints().map(|(_, j)| j.limit.as_ref().unwrap().effort.unwrap()).collect();
@@ -55,7 +56,7 @@ fn vendors() {
     let rgba = robot.links[1].visuals[0].material.as_ref().unwrap().rgba;
     assert_eq!(rgba, Some([1.0; 4]), "the material \"white\" is defined at the top of the file");
     let followers = fingers.joints.iter().filter(|j| j.mimic.is_some()).count();
-    assert_eq!((count(fingers, JointKind::Revolute), followers, said(&hand).as_str()), (12, 6, ""));
+    assert_eq!((count(fingers, JointKind::Revolute), followers, diagnostics_text(&hand).as_str()), (12, 6, ""));
     let (driver, multiplier, _) = fingers.mimic_driver(fingers.joint_id("L_thumb_distal_joint").unwrap());
     assert_eq!((fingers.joint(driver).name.as_str(), multiplier), ("L_thumb_proximal_pitch_joint", 2.4));
     assert!(fingers.link(fingers.root).inertial.is_none(), "the mount is empty");
@@ -73,7 +74,7 @@ fn vendors() {
 }
 
 /// Materials and meshes without the URIs of the meshes, for exact comparison.
-fn looks(robot: &RobotDescription) -> Vec<(Option<Material>, Geometry)> {
+fn materials_and_meshes(robot: &RobotDescription) -> Vec<(Option<Material>, Geometry)> {
     let shape = |geometry: &Geometry| match geometry.clone() {
         Geometry::Mesh { path, scale, .. } => Geometry::Mesh { uri: String::new(), path, scale },
         other => other,
@@ -89,14 +90,14 @@ fn looks(robot: &RobotDescription) -> Vec<(Option<Material>, Geometry)> {
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendor_written_and_read() {
     for name in [SR5, HAND, ANYMAL] {
-        let Assembly { description: robot, diagnostics } = load(name);
-        let files = kinetoscope_testkit::urdf::Files::default();
+        let MergedRobot { description: robot, diagnostics } = load(name);
+        let files = kinetoscope_testkit::urdf::TempFiles::default();
         let text = write_urdf(&robot);
         assert_eq!(text, write_urdf(&robot));
         let again = assemble(&UrdfCfg::single(files.write("written.urdf", text)));
         let again = again.unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_same(&robot, &again.description);
-        assert_eq!(looks(&robot), looks(&again.description));
+        assert_eq!(materials_and_meshes(&robot), materials_and_meshes(&again.description));
         let unknown = diagnostics.iter().filter(|d| d.kind == DiagnosticKind::ReferenceUnknown).count();
         assert_eq!(again.diagnostics.len(), diagnostics.len() - unknown, "{name}: transmissions are not written");
     }

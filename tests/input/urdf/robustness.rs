@@ -3,7 +3,7 @@
 
 use kinetoscope::robot::description::JointId;
 use kinetoscope::robot::urdf::{UrdfCfg, UrdfError, assemble, parse_file, parse_str, write_urdf};
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -26,7 +26,7 @@ const SMALL: &str = r#"<?xml version="1.0"?>
 </robot>
 "#;
 
-fn parse_bytes(bytes: &[u8], files: &Files) -> bool {
+fn parse_bytes(bytes: &[u8], files: &TempFiles) -> bool {
     match std::str::from_utf8(bytes) {
         Ok(text) => parse_str(text, Path::new("robot.urdf")).is_ok(),
         Err(_) => {
@@ -39,7 +39,7 @@ fn parse_bytes(bytes: &[u8], files: &Files) -> bool {
 
 #[test]
 fn prefixes() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let whole = SMALL.trim_end().len();
     for end in 0..SMALL.len() {
         assert_eq!(parse_bytes(&SMALL.as_bytes()[..end], &files), end >= whole, "prefix of {end} bytes");
@@ -48,7 +48,7 @@ fn prefixes() {
 
 #[test]
 fn damaged_bytes() {
-    let files = Files::default();
+    let files = TempFiles::default();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move |below: usize| {
         state ^= state << 13;
@@ -87,7 +87,7 @@ fn long_chain() {
         );
     }
     text.push_str("</robot>");
-    let files = Files::default();
+    let files = TempFiles::default();
     let path = files.write("chain.urdf", &text);
     let start = Instant::now();
     let robot = assemble(&UrdfCfg::single(&path)).unwrap().description;
@@ -115,7 +115,7 @@ fn deep_nesting() {
     for (open, close) in [("<link name=\"a\">", "</link>"), ("<gazebo>", "</gazebo>"), ("<x>", "</x>")] {
         let text = format!("<robot name=\"r\"><link name=\"base\"/>{}{}</robot>", open.repeat(n), close.repeat(n));
         let result = parse_str(&text, Path::new("robot.urdf"));
-        assert!(result.is_ok() || matches!(result, Err(UrdfError::SeveralRoots { .. })), "{:?}", result.err());
+        assert!(result.is_ok() || matches!(result, Err(UrdfError::MultipleRoots { .. })), "{:?}", result.err());
         let unclosed = format!("<robot name=\"r\">{}", open.repeat(n));
         assert!(matches!(parse_str(&unclosed, Path::new("robot.urdf")), Err(UrdfError::Xml { .. })));
     }

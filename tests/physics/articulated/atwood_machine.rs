@@ -8,7 +8,7 @@
 use crate::lab::*;
 
 /// Velocities of both masses after half a second.
-fn fell(masses: [f64; 2], coupled: bool) -> [f64; 2] {
+fn velocities(masses: [f64; 2], coupled: bool) -> [f64; 2] {
     let links = [base(), Link::new("left", masses[0], [0.01; 3]), Link::new("right", masses[1], [0.01; 3])];
     let down = [0.0, 0.0, -1.0];
     let right = Joint::slide("right_joint", ["base", "right"], down);
@@ -25,7 +25,7 @@ fn holds() {
     law(module_path!(), "a = g (m₁ - m₂)/(m₁ + m₂)", |m| {
         let masses = [3.0, 2.0];
         let speed = 0.5 * G * (masses[0] - masses[1]) / (masses[0] + masses[1]);
-        let (together, apart) = (fell(masses, true), fell(masses, false));
+        let (together, apart) = (velocities(masses, true), velocities(masses, false));
         for (k, (name, sign)) in [("heavy side", 1.0), ("light side", -1.0)].into_iter().enumerate() {
             let quantity = format!("velocity after 0.5 s, {name}");
             m.row(&quantity, "m/s", sign * speed, together[k], (1e-12, "rounding of 500 steps"));

@@ -3,22 +3,22 @@
 //!
 //! Tolerance: as for the mass matrix, rounding of v/h and the condition of M; 1e-9.
 
-use super::subjects::{KINDS, Kind, Subject, apart};
-use crate::law::{law, worse};
+use super::subjects::{KINDS, Kind, TestRobot, max_difference};
+use crate::law::{law, max_or_nan};
 use nalgebra::Vector3;
 
 /// The largest acceleration with the share `part` of the efforts applied.
-fn accelerated(kind: Kind, part: f64) -> f64 {
-    let mut subject = Subject::new(kind, Vector3::zeros());
+fn largest_acceleration(kind: Kind, part: f64) -> f64 {
+    let mut subject = TestRobot::new(kind, Vector3::zeros());
     let still = vec![0.0; subject.dof()];
     (0..10)
         .map(|k| {
-            let (q, v) = (subject.spread(0.5, k), subject.spread(2.0, k + 50));
+            let (q, v) = (subject.sample_values(0.5, k), subject.sample_values(2.0, k + 50));
             let bias: Vec<f64> =
                 subject.efforts(&q, &v, &still, Vector3::zeros()).iter().map(|tau| part * tau).collect();
-            apart(&subject.accelerations(&q, &v, &bias), &still)
+            max_difference(&subject.accelerations(&q, &v, &bias), &still)
         })
-        .fold(0.0, worse)
+        .fold(0.0, max_or_nan)
 }
 
 #[test]
@@ -26,8 +26,14 @@ fn holds() {
     law(module_path!(), "τ = c(q, q̇) gives q̈ = 0", |m| {
         for (kind, name) in KINDS {
             let quantity = format!("largest acceleration, {name}");
-            m.row(&quantity, "rad/s²", 0.0, accelerated(kind, 1.0), (1e-9, "rounding times the condition of M"));
-            m.control(&quantity, "without these efforts", accelerated(kind, 0.0));
+            m.row(
+                &quantity,
+                "rad/s²",
+                0.0,
+                largest_acceleration(kind, 1.0),
+                (1e-9, "rounding times the condition of M"),
+            );
+            m.control(&quantity, "without these efforts", largest_acceleration(kind, 0.0));
         }
     });
 }

@@ -14,7 +14,7 @@ const ARM: f64 = 0.3;
 const MOMENT: f64 = 0.012;
 
 /// Angle of the pole from its start (hanging at 0, upright at π) and position of the cart after `seconds`.
-fn moved(upright: bool, small: f64, seconds: f64, cart: f64) -> [f64; 2] {
+fn angle_and_position(upright: bool, small: f64, seconds: f64, cart: f64) -> [f64; 2] {
     let links = [
         base(),
         Link::new("cart", cart, [0.1; 3]),
@@ -38,21 +38,27 @@ fn holds() {
         let omega = (POLE * G * ARM / (MOMENT + POLE * ARM * ARM - (POLE * ARM).powi(2) / all)).sqrt();
         let (small, tiny) = (1e-3, 1e-5);
         let third_order = |size: f64| (1e-5 * size, "terms of third order");
-        let [swing, cart] = moved(false, small, 2.0, CART);
+        let [swing, cart] = angle_and_position(false, small, 2.0, CART);
         let angle = small * (2.0 * omega).cos();
         m.row("angle after 2 s, hanging", "rad", angle, swing, third_order(small));
         // The hinge turns about y: below the hinge a positive angle points to -x, and the cart moves the other way.
         let reaction = POLE * ARM / all * (angle - small);
         m.row("place of the cart after 2 s", "m", reaction, cart, third_order(small));
         let grown = tiny * (0.8 * omega).cosh();
-        m.row("angle after 0.8 s, upright", "rad", grown, moved(true, tiny, 0.8, CART)[0], third_order(grown));
-        let nailed = moved(false, small, 2.0, 1e6 * CART);
+        m.row(
+            "angle after 0.8 s, upright",
+            "rad",
+            grown,
+            angle_and_position(true, tiny, 0.8, CART)[0],
+            third_order(grown),
+        );
+        let nailed = angle_and_position(false, small, 2.0, 1e6 * CART);
         m.control("angle after 2 s, hanging", "with a cart that does not move", nailed[0]);
         m.control("place of the cart after 2 s", "with a cart that does not move", nailed[1]);
         m.control(
             "angle after 0.8 s, upright",
             "with a cart that does not move",
-            moved(true, tiny, 0.8, 1e6 * CART)[0],
+            angle_and_position(true, tiny, 0.8, 1e6 * CART)[0],
         );
     });
 }

@@ -10,7 +10,7 @@ const LENGTH: f64 = 0.8;
 const ANGLE: f64 = 0.9;
 
 /// Angle about the vertical and angle of the cone after 3 s, started with the share `part` of the steady velocity.
-fn swung(part: f64) -> [f64; 2] {
+fn final_angles(part: f64) -> [f64; 2] {
     let omega = part * (G / (LENGTH * ANGLE.cos())).sqrt();
     let mut lab = Lab::new(rk4(earth()));
     let links = [base(), Link::point("ring", 1e-6, [0.0; 3]), Link::point("bob", 1.3, [0.0, 0.0, -LENGTH])];
@@ -26,7 +26,7 @@ fn swung(part: f64) -> [f64; 2] {
 fn holds() {
     law(module_path!(), "Ω² = g/(L cos θ)", |m| {
         let omega = (G / (LENGTH * ANGLE.cos())).sqrt();
-        let ([round, cone], [slow, low]) = (swung(1.0), swung(0.95));
+        let ([round, cone], [slow, low]) = (final_angles(1.0), final_angles(0.95));
         let rounding = (1e-11, "rounding of 3000 steps");
         m.row("angle gone round in 3 s", "rad", 3.0 * omega, round, rounding);
         m.row("angle of the cone after 3 s", "rad", ANGLE, cone, rounding);

@@ -8,7 +8,7 @@
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
 use crate::lab::*;
-use crate::numerical::double_pendulum::{Rods, Steps};
+use crate::numerical::double_pendulum::{Method, RodState};
 use std::f64::consts::FRAC_PI_2;
 
 const START: ([f64; 2], [f64; 2]) = ([FRAC_PI_2, 0.0], [0.0, 0.0]);
@@ -35,9 +35,9 @@ fn change(cfg: SimulationManagerCfg) -> (f64, Vec<[f64; 2]>) {
     };
     let start = energy(&lab.sim);
     let (mut worst, mut curve) = (0.0_f64, Vec::new());
-    lab.watch(STEPS, |t, sim| {
+    lab.run_with(STEPS, |t, sim| {
         let change = (energy(sim) - start).abs();
-        worst = worse(worst, change);
+        worst = max_or_nan(worst, change);
         if ((t * 1e3).round() as u32).is_multiple_of(20) {
             curve.push([t, change.max(1e-12)]);
         }
@@ -47,10 +47,10 @@ fn change(cfg: SimulationManagerCfg) -> (f64, Vec<[f64; 2]>) {
 
 /// Largest energy change of the rods over as many steps \[J\]: explicit RK4 steps, and rounding.
 fn bound() -> f64 {
-    let mut rods = Rods::of_joints(START.0, START.1);
+    let mut rods = RodState::from_joints(START.0, START.1);
     let mut bound = 0.0;
     for _ in 0..STEPS {
-        let next = rods.after(Steps::RungeKutta, 1e-3);
+        let next = rods.step(Method::RungeKutta, 1e-3);
         bound += (next.energy() - rods.energy()).abs() + next.rounding_of_energy();
         rods = next;
     }

@@ -6,13 +6,13 @@
 //! (3 n + 1) ε |M| |q̈| (Higham, Accuracy and Stability of Numerical Algorithms, § 10.1), both multiplied by the
 //! reference's mass matrix.
 
-use super::subjects::{EARTH, KINDS, Subject, apart};
-use crate::law::{law, worse};
+use super::subjects::{EARTH, KINDS, TestRobot, max_difference};
+use crate::law::{law, max_or_nan};
 use nalgebra::Vector3;
 
 /// The effort error from rounding of the velocities and of the solved accelerations \[N m\], the largest over the
 /// joints.
-fn rounding(subject: &Subject, [q, v, a]: [&[f64]; 3]) -> f64 {
+fn rounding(subject: &TestRobot, [q, v, a]: [&[f64]; 3]) -> f64 {
     let none = vec![0.0; q.len()];
     let mut efforts = vec![0.0; q.len()];
     for k in 0..q.len() {
@@ -29,21 +29,25 @@ fn rounding(subject: &Subject, [q, v, a]: [&[f64]; 3]) -> f64 {
 fn holds() {
     law(module_path!(), "M q̈ + c(q, q̇) + g(q) = τ", |m| {
         for (kind, name) in KINDS {
-            let mut subject = Subject::new(kind, EARTH);
-            let mut weightless = Subject::new(kind, Vector3::zeros());
+            let mut subject = TestRobot::new(kind, EARTH);
+            let mut weightless = TestRobot::new(kind, Vector3::zeros());
             let (mut worst, mut unloaded, mut off) = (0.0_f64, 0.0_f64, 0.0_f64);
             for k in 0..10 {
-                let (q, v, tau) = (subject.spread(0.5, k), subject.spread(1.5, k + 50), subject.spread(8.0, k + 90));
+                let (q, v, tau) = (
+                    subject.sample_values(0.5, k),
+                    subject.sample_values(1.5, k + 50),
+                    subject.sample_values(8.0, k + 90),
+                );
                 let a = subject.accelerations(&q, &v, &tau);
-                worst = worse(worst, apart(&subject.efforts(&q, &v, &a, EARTH), &tau));
+                worst = max_or_nan(worst, max_difference(&subject.efforts(&q, &v, &a, EARTH), &tau));
                 off = off.max(rounding(&subject, [&q, &v, &a]));
                 let floating = weightless.accelerations(&q, &v, &tau);
-                unloaded = worse(unloaded, apart(&subject.efforts(&q, &v, &floating, EARTH), &tau));
+                unloaded = max_or_nan(unloaded, max_difference(&subject.efforts(&q, &v, &floating, EARTH), &tau));
             }
             let quantity = format!("largest error of an effort, {name}");
             m.row(&quantity, "N m", 0.0, worst, (off, "rounding of v/h and of the solution"));
             m.control(&quantity, "in a world without gravity", unloaded);
         }
-        m.lines_differ("rounding: the lines add up in another order");
+        m.versions_differ("rounding: the lines add up in another order");
     });
 }

@@ -10,7 +10,7 @@ use crate::lab::*;
 const LENGTH: f64 = 1.4;
 
 /// Acceleration of the tip in the first step, and angle and velocity after 0.4 s.
-fn fell(moment: f64) -> [f64; 3] {
+fn fall(moment: f64) -> [f64; 3] {
     let text = {
         let rod = Link::new("rod", 0.6, [1e-4, moment, moment]).at([LENGTH / 2.0, 0.0, 0.0]);
         let links = [base(), rod, Link::new("tip", 0.0, [0.0; 3])];
@@ -50,13 +50,13 @@ fn runge_kutta() -> f64 {
 fn holds() {
     law(module_path!(), "tip: a = 3/2 g; ω² = 3 g sin θ/L", |m| {
         let moment = 0.6 * LENGTH * LENGTH / 12.0;
-        let [tip, angle, velocity] = fell(moment);
+        let [tip, angle, velocity] = fall(moment);
         m.row("acceleration of the tip", "m/s²", -1.5 * G, tip, (10.0 * f64::EPSILON * 1.5 * G, "rounding"));
         let of_law = |angle: f64, velocity: f64| velocity / (3.0 * G * angle.sin() / LENGTH).sqrt();
         let steps = runge_kutta().abs() + 400.0 * 4.0 * f64::EPSILON / 2.0;
         m.row("velocity after 0.4 s, of √(3 g sin θ/L)", "", 1.0, of_law(angle, velocity), (steps, "RK4"));
         // A point mass at the middle: the angular acceleration is g/(L/2), and the tip falls with 2 g.
-        let [light, point_angle, point_velocity] = fell(1e-3 * moment);
+        let [light, point_angle, point_velocity] = fall(1e-3 * moment);
         m.control("acceleration of the tip", "with the mass in the middle", light);
         let other = of_law(point_angle, point_velocity);
         m.control("velocity after 0.4 s, of √(3 g sin θ/L)", "with the mass in the middle", other);

@@ -11,7 +11,7 @@ const RATIO: f64 = -3.0;
 const EFFORT: f64 = 1.3;
 
 /// Velocities of both wheels after half a second.
-fn turned(coupled: bool) -> [f64; 2] {
+fn velocities(coupled: bool) -> [f64; 2] {
     let wheel = |name, moment| Link::new(name, 1.0, [moment; 3]);
     let z = [0.0, 0.0, 1.0];
     let second = Joint::hinge("second_joint", ["base", "second"], z).at([0.5, 0.0, 0.0]);
@@ -19,7 +19,7 @@ fn turned(coupled: bool) -> [f64; 2] {
     let mut lab = Lab::new(weightless());
     let links = [base(), wheel("first", MOMENTS[0]), wheel("second", MOMENTS[1])];
     let robot = lab.mechanism(&urdf(&links, &[Joint::hinge("first_joint", ["base", "first"], z), second]));
-    lab.push_joints(robot, &[EFFORT, 0.0]);
+    lab.set_joint_efforts(robot, &[EFFORT, 0.0]);
     lab.run(0.5);
     let v = lab.v(robot);
     [v[0], v[1]]
@@ -28,7 +28,7 @@ fn turned(coupled: bool) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "τ = (I₁ + n² I₂) q̈", |m| {
-        let ([first, second], [alone, idle]) = (turned(true), turned(false));
+        let ([first, second], [alone, idle]) = (velocities(true), velocities(false));
         let speed = 0.5 * EFFORT / (MOMENTS[0] + RATIO * RATIO * MOMENTS[1]);
         let rounding = (1e-12, "rounding of 500 steps");
         m.row("velocity of the first wheel after 0.5 s", "rad/s", speed, first, rounding);

@@ -12,7 +12,7 @@ const YAW: f64 = 1.5;
 const SPIN: f64 = 40.0;
 
 /// Efforts of the yaw and the pitch drive after `seconds`, and the spin of the rotor.
-fn held(yaw: f64, spin: f64, seconds: f64) -> [f64; 3] {
+fn efforts_and_spin(yaw: f64, spin: f64, seconds: f64) -> [f64; 3] {
     let across = 0.6 * ROTOR;
     let links = [
         base(),
@@ -42,15 +42,15 @@ fn held(yaw: f64, spin: f64, seconds: f64) -> [f64; 3] {
 #[test]
 fn holds() {
     law(module_path!(), "τ = I ω Ω across yaw and spin", |m| {
-        let [yaw, pitch, spin] = held(YAW, SPIN, 2.0);
+        let [yaw, pitch, spin] = efforts_and_spin(YAW, SPIN, 2.0);
         let torque = ROTOR * SPIN * YAW;
         m.row("effort of the pitch drive", "N m", torque, pitch, (1e-5, "I Ω² times the sag"));
         m.row("effort of the yaw drive", "N m", 0.0, yaw, (1e-6, "what is left of the start"));
         m.row("spin of the rotor", "rad/s", SPIN, spin, (1e-3, "the pitch sags by 1e-4 rad while it turns"));
-        m.control("effort of the yaw drive", "5 ms after the start", held(YAW, SPIN, 5e-3)[0]);
-        let still = held(YAW, 0.0, 2.0);
+        m.control("effort of the yaw drive", "5 ms after the start", efforts_and_spin(YAW, SPIN, 5e-3)[0]);
+        let still = efforts_and_spin(YAW, 0.0, 2.0);
         m.control("effort of the pitch drive", "without spin", still[1]);
         m.control("spin of the rotor", "without spin", still[2]);
-        m.control("effort of the pitch drive", "turned the other way", held(-YAW, SPIN, 2.0)[1]);
+        m.control("effort of the pitch drive", "turned the other way", efforts_and_spin(-YAW, SPIN, 2.0)[1]);
     });
 }

@@ -20,16 +20,21 @@ fn largest(cfg: SimulationManagerCfg) -> [f64; 3] {
     let targets: Vec<f64> = (0..dof).map(|k| 0.3 * (1.0 + 2.0 * k as f64).sin()).collect();
     lab.sim.robot_mut(robot).set_qpos_target(&row(&targets), None, None).unwrap();
     let mut worst = [0.0_f64; 3];
-    lab.watch(1_000, |_, sim| {
+    lab.run_with(1_000, |_, sim| {
         let body = root(sim, robot);
         let robot = sim.robot(robot);
         let (q, v) = (robot.qpos().row(0).to_vec(), robot.qvel().row(0).to_vec());
         let pose = Pose::from_parts(body.position.into(), body.rotation);
-        let motion = Motion { pose, velocity: body.velocity, spin: body.spin, ..Motion::rest(Vector3::zeros()) };
+        let motion = Motion {
+            pose,
+            velocity: body.velocity,
+            angular_velocity: body.angular_velocity,
+            ..Motion::rest(Vector3::zeros())
+        };
         let still = vec![0.0; q.len()];
         let (p, l) = tree.momentum(&joints(robot.joint_names(), &q, &v, &still), motion);
-        let fastest = v.iter().fold(0.0, |m, v: &f64| worse(m, v.abs()));
-        worst = [worse(worst[0], p.norm()), worse(worst[1], l.norm()), worse(worst[2], fastest)];
+        let fastest = v.iter().fold(0.0, |m, v: &f64| max_or_nan(m, v.abs()));
+        worst = [max_or_nan(worst[0], p.norm()), max_or_nan(worst[1], l.norm()), max_or_nan(worst[2], fastest)];
     });
     worst
 }

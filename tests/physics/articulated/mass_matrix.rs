@@ -4,23 +4,23 @@
 //! Tolerance: rounding of the factorization, 1e-16 times the condition of M, up to 1e5 with fingers of 50 g on an arm
 //! of 4 kg: 1e-9.
 
-use super::subjects::{KINDS, Kind, Subject, apart};
-use crate::law::{law, worse};
+use super::subjects::{KINDS, Kind, TestRobot, max_difference};
+use crate::law::{law, max_or_nan};
 use nalgebra::Vector3;
 
 /// The largest error of an acceleration, with efforts computed at joint positions that are off by `shift`.
 fn error(kind: Kind, shift: f64) -> f64 {
-    let mut subject = Subject::new(kind, Vector3::zeros());
+    let mut subject = TestRobot::new(kind, Vector3::zeros());
     let still = vec![0.0; subject.dof()];
     let mut worst = 0.0_f64;
     for k in 0..3 {
-        let q = subject.spread(0.5, k);
+        let q = subject.sample_values(0.5, k);
         let other: Vec<f64> = q.iter().map(|q| q + shift).collect();
         for j in 0..subject.dof() {
             let mut unit = still.clone();
             unit[j] = 1.0;
             let column = subject.efforts(&other, &still, &unit, Vector3::zeros());
-            worst = worse(worst, apart(&subject.accelerations(&q, &still, &column), &unit));
+            worst = max_or_nan(worst, max_difference(&subject.accelerations(&q, &still, &column), &unit));
         }
     }
     worst

@@ -41,16 +41,22 @@ pub(super) struct Tree {
 pub(super) struct Motion {
     pub(super) pose: Isometry3<f64>,
     pub(super) velocity: Vector3<f64>,
-    pub(super) spin: Vector3<f64>,
+    pub(super) angular_velocity: Vector3<f64>,
     pub(super) acceleration: Vector3<f64>,
-    pub(super) spin_up: Vector3<f64>,
+    pub(super) angular_acceleration: Vector3<f64>,
 }
 
 impl Motion {
     /// At rest at the origin, under `gravity`.
     pub(super) fn rest(gravity: Vector3<f64>) -> Self {
         let zero = Vector3::zeros();
-        Self { pose: Isometry3::identity(), velocity: zero, spin: zero, acceleration: -gravity, spin_up: zero }
+        Self {
+            pose: Isometry3::identity(),
+            velocity: zero,
+            angular_velocity: zero,
+            acceleration: -gravity,
+            angular_acceleration: zero,
+        }
     }
 }
 
@@ -157,16 +163,16 @@ impl Tree {
         pose.translation.vector += slide * q * axis;
         pose.rotation *= UnitQuaternion::from_axis_angle(&Unit::new_normalize(joint.axis), hinge * q);
         let r = pose.translation.vector - parent.pose.translation.vector;
-        let w = parent.spin;
+        let w = parent.angular_velocity;
         Motion {
             pose,
             velocity: parent.velocity + w.cross(&r) + slide * v * axis,
-            spin: w + hinge * v * axis,
+            angular_velocity: w + hinge * v * axis,
             acceleration: parent.acceleration
-                + parent.spin_up.cross(&r)
+                + parent.angular_acceleration.cross(&r)
                 + w.cross(&w.cross(&r))
                 + slide * (2.0 * v * w.cross(&axis) + a * axis),
-            spin_up: parent.spin_up + hinge * (a * axis + w.cross(&(v * axis))),
+            angular_acceleration: parent.angular_acceleration + hinge * (a * axis + w.cross(&(v * axis))),
         }
     }
 
@@ -187,11 +193,11 @@ impl Tree {
     ) -> (Vector3<f64>, Vector3<f64>) {
         let body = &self.bodies[link];
         let turn = motion.pose.rotation.to_rotation_matrix();
-        let (c, w) = (turn * body.com, motion.spin);
+        let (c, w) = (turn * body.com, motion.angular_velocity);
         let inertia = turn.matrix() * body.inertia * turn.matrix().transpose();
-        let of_com = motion.acceleration + motion.spin_up.cross(&c) + w.cross(&w.cross(&c));
+        let of_com = motion.acceleration + motion.angular_acceleration.cross(&c) + w.cross(&w.cross(&c));
         let mut force = body.mass * of_com;
-        let mut moment = inertia * motion.spin_up + w.cross(&(inertia * w)) + c.cross(&force);
+        let mut moment = inertia * motion.angular_acceleration + w.cross(&(inertia * w)) + c.cross(&force);
         for joint in self.below(link) {
             let state = joints.get(&joint.name).copied().unwrap_or_default();
             let child = Self::outward(joint, motion, state);
@@ -223,9 +229,9 @@ impl Tree {
     pub(super) fn momentum(&self, joints: &Joints, root: Motion) -> (Vector3<f64>, Vector3<f64>) {
         let (mut linear, mut angular) = (Vector3::zeros(), Vector3::zeros());
         for (body, motion) in self.motions(joints, root) {
-            let (place, velocity, turned) = of_com(body, &motion);
+            let (place, velocity, turned) = com_state(body, &motion);
             linear += body.mass * velocity;
-            angular += body.mass * place.cross(&velocity) + turned * motion.spin;
+            angular += body.mass * place.cross(&velocity) + turned * motion.angular_velocity;
         }
         (linear, angular)
     }
@@ -233,8 +239,9 @@ impl Tree {
     /// Kinetic plus potential energy \[J\].
     pub(super) fn energy(&self, joints: &Joints, root: Motion, gravity: Vector3<f64>) -> f64 {
         let of_body = |(body, motion): (&Body, Motion)| {
-            let (place, velocity, turned) = of_com(body, &motion);
-            let kinetic = 0.5 * body.mass * velocity.norm_squared() + 0.5 * motion.spin.dot(&(turned * motion.spin));
+            let (place, velocity, turned) = com_state(body, &motion);
+            let kinetic = 0.5 * body.mass * velocity.norm_squared()
+                + 0.5 * motion.angular_velocity.dot(&(turned * motion.angular_velocity));
             kinetic - body.mass * gravity.dot(&place)
         };
         self.motions(joints, root).into_iter().map(of_body).sum()
@@ -242,9 +249,13 @@ impl Tree {
 }
 
 /// Position and velocity of a center of mass, and the inertia in world axes.
-fn of_com(body: &Body, motion: &Motion) -> (Vector3<f64>, Vector3<f64>, Matrix3<f64>) {
+fn com_state(body: &Body, motion: &Motion) -> (Vector3<f64>, Vector3<f64>, Matrix3<f64>) {
     let turn = motion.pose.rotation.to_rotation_matrix();
     let c = turn * body.com;
     let place = motion.pose.translation.vector + c;
-    (place, motion.velocity + motion.spin.cross(&c), turn.matrix() * body.inertia * turn.matrix().transpose())
+    (
+        place,
+        motion.velocity + motion.angular_velocity.cross(&c),
+        turn.matrix() * body.inertia * turn.matrix().transpose(),
+    )
 }

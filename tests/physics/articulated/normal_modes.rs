@@ -10,7 +10,7 @@ const LENGTH: f64 = 0.5;
 const SMALL: f64 = 1e-4;
 
 /// Angles from the vertical after 2 s, started with the lower angle at `ratio` times the upper.
-fn swung(ratio: f64) -> [f64; 2] {
+fn final_angles(ratio: f64) -> [f64; 2] {
     let bob = |name| Link::point(name, 0.7, [0.0, 0.0, -LENGTH]);
     let upper = Joint::hinge("upper", ["base", "a"], [0.0, 1.0, 0.0]);
     let lower = Joint::hinge("lower", ["a", "b"], [0.0, 1.0, 0.0]).at([0.0, 0.0, -LENGTH]);
@@ -28,12 +28,12 @@ fn holds() {
         let root = 2.0_f64.sqrt();
         for (name, sign) in [("slow", 1.0), ("fast", -1.0)] {
             let omega = ((2.0 - sign * root) * G / LENGTH).sqrt();
-            let [upper, lower] = swung(sign * root);
+            let [upper, lower] = final_angles(sign * root);
             let swing = SMALL * (2.0 * omega).cos();
             let linear = (1e-6 * SMALL, "terms of third order, ε² ω t");
             m.row(&format!("upper angle after 2 s, {name} mode"), "rad", swing, upper, linear);
             m.row(&format!("lower angle after 2 s, {name} mode"), "rad", sign * root * swing, lower, linear);
-            let [off_upper, off_lower] = swung(sign * 1.4);
+            let [off_upper, off_lower] = final_angles(sign * 1.4);
             m.control(&format!("upper angle after 2 s, {name} mode"), "started 1 % off the mode", off_upper);
             m.control(&format!("lower angle after 2 s, {name} mode"), "started 1 % off the mode", off_lower);
         }

@@ -66,7 +66,7 @@ struct Moved {
 }
 
 /// One step with a force at the center of mass and a torque.
-fn moved(kind: Robot, parts: &[(Link, [f64; 3], [f64; 3])], force: [f64; 3], torque: [f64; 3]) -> Moved {
+fn step(kind: Robot, parts: &[(Link, [f64; 3], [f64; 3])], force: [f64; 3], torque: [f64; 3]) -> Moved {
     let start = Vector3::new(1.0, 2.0, 3.0);
     let mut lab = Lab::new(weightless());
     let robot = match kind {
@@ -97,10 +97,10 @@ fn moved(kind: Robot, parts: &[(Link, [f64; 3], [f64; 3])], force: [f64; 3], tor
     };
     let com = lab.sim.robot(robot).root_com_position();
     let com = Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)]) - start;
-    lab.push_link(robot, "trunk", force.into(), torque.into());
+    lab.set_link_wrench(robot, "trunk", force.into(), torque.into());
     lab.run(1e-3);
     let root = lab.root(robot);
-    Moved { mass: lab.sim.robot(robot).total_mass(), com, velocity: root.velocity, spin: root.spin }
+    Moved { mass: lab.sim.robot(robot).total_mass(), com, velocity: root.velocity, spin: root.angular_velocity }
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn holds() {
             .collect::<Vec<_>>();
         let rounding = (1e-12, "rounding of principal axes");
         for (kind, name) in [(Robot::OneFile, "one file"), (Robot::Merged, "merged files")] {
-            let pushed = |parts: &[_], force, torque| moved(kind, parts, force, torque);
+            let pushed = |parts: &[_], force, torque| step(kind, parts, force, torque);
             let (turned, driven) = (pushed(&parts(), [0.0; 3], TORQUE), pushed(&parts(), FORCE, [0.0; 3]));
             let trunk = pushed(&parts()[..1], FORCE, [0.0; 3]);
             let no_arms = pushed(&concentric, [0.0; 3], TORQUE);

@@ -24,7 +24,7 @@ fn holds() {
     law(module_path!(), "T = 4 K(sin θ₀/2) √(I/(m g l))", |m| {
         for degrees in [10.0_f64, 90.0, 150.0] {
             let angle = degrees.to_radians();
-            let pendulum = ((LENGTH * LENGTH + POINT) / (G * LENGTH)).sqrt();
+            let pendulum = ((LENGTH * LENGTH + POINT_MOMENT) / (G * LENGTH)).sqrt();
             let expected = 4.0 * complete_elliptic((0.5 * angle).sin()) * pendulum;
             let quantity = format!("period at {degrees}°");
             let found = period(rk4(earth()), angle);

@@ -13,7 +13,7 @@ const PLATFORM: f64 = 0.2;
 const MASS: f64 = 1.5;
 
 /// Angular velocity and radius after 10 s; the mass starts at 0.5 m with 2 rad/s, with its target at 0.1 m.
-fn drawn(stiffness: f64) -> [f64; 2] {
+fn pulled_in(stiffness: f64) -> [f64; 2] {
     let links = [base(), Link::new("platform", 2.0, [0.1, 0.1, PLATFORM]), Link::point("mass", MASS, [0.0; 3])];
     let turn = Joint::hinge("turn", ["base", "platform"], [0.0, 0.0, 1.0]);
     let rail = Joint::slide("rail", ["platform", "mass"], [1.0, 0.0, 0.0]);
@@ -34,13 +34,13 @@ fn drawn(stiffness: f64) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "ω (I + m r²) = const", |m| {
-        let [omega, radius] = drawn(300.0);
+        let [omega, radius] = pulled_in(300.0);
         let momentum = 2.0 * (PLATFORM + MASS * 0.25);
         let spin = |r: f64| momentum / (PLATFORM + MASS * r * r);
         // The right side changes by a fifth of the change of r, so the iteration converges.
         let end = (0..200).fold(0.1, |r, _| 300.0 * 0.1 / (300.0 - MASS * spin(r).powi(2)));
         let expected = spin(end);
-        let left = drawn(0.0);
+        let left = pulled_in(0.0);
         m.row("radius, drawn in", "m", end, radius, (1e-8 * end, "RK4: (ω h)⁴ per radian"));
         m.control("radius, drawn in", "with the mass left where it is", left[1]);
         m.row("angular velocity, drawn in", "rad/s", expected, omega, (1e-8 * expected, "RK4: (ω h)⁴ per radian"));

@@ -44,11 +44,11 @@ fn errors(closed: bool) -> [f64; 2] {
         lab.sim.weld_mut(weld).attach(None).unwrap();
     }
     let mut worst = [0.0_f64; 2];
-    lab.watch(2_000, |_, sim| {
+    lab.run_with(2_000, |_, sim| {
         let robot = sim.robot(robot);
         let (q, v) = (robot.qpos(), robot.qvel());
-        worst[0] = worse(worst[0], (q[(0, 3)] - place(q[(0, 0)])).abs());
-        worst[1] = worse(worst[1], (v[(0, 3)] - speed(q[(0, 0)], v[(0, 0)])).abs());
+        worst[0] = max_or_nan(worst[0], (q[(0, 3)] - place(q[(0, 0)])).abs());
+        worst[1] = max_or_nan(worst[1], (v[(0, 3)] - speed(q[(0, 0)], v[(0, 0)])).abs());
     });
     worst
 }

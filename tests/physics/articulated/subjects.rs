@@ -3,13 +3,13 @@
 
 use super::newton_euler::{Joints, Motion, Tree, joints};
 use crate::lab::*;
-use crate::law::worse;
+use crate::law::max_or_nan;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use nalgebra::{Matrix3, Vector3};
 
 /// A robot in a simulation, with its reference model.
 #[derive(Debug)]
-pub(super) struct Subject {
+pub(super) struct TestRobot {
     pub(super) lab: Lab,
     pub(super) robot: RobotId,
     pub(super) tree: Tree,
@@ -72,7 +72,7 @@ fn gripper() -> String {
     urdf(&links, &joints)
 }
 
-impl Subject {
+impl TestRobot {
     /// A passive robot with a fixed base and a time step of a millisecond.
     pub(super) fn new(kind: Kind, gravity: Vector3<f64>) -> Self {
         let mut lab = Lab::new(SimulationManagerCfg { gravity, ..earth() });
@@ -102,7 +102,7 @@ impl Subject {
     }
 
     /// Deterministic numbers between -`size` and `size`, different for each `k`.
-    pub(super) fn spread(&self, size: f64, k: usize) -> Vec<f64> {
+    pub(super) fn sample_values(&self, size: f64, k: usize) -> Vec<f64> {
         (0..self.dof()).map(|j| size * (1.7 * k as f64 + 2.3 * j as f64 + size).sin()).collect()
     }
 
@@ -119,7 +119,7 @@ impl Subject {
     /// Accelerations over one step from this state under these efforts, from the change of the velocities.
     pub(super) fn accelerations(&mut self, q: &[f64], v: &[f64], efforts: &[f64]) -> Vec<f64> {
         self.lab.write_joints(self.robot, q, v);
-        self.lab.push_joints(self.robot, efforts);
+        self.lab.set_joint_efforts(self.robot, efforts);
         self.lab.run(1e-3);
         let after = self.lab.v(self.robot);
         after.iter().zip(v).map(|(after, before)| (after - before) / 1e-3).collect()
@@ -127,8 +127,8 @@ impl Subject {
 }
 
 /// The largest difference between two lists.
-pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, worse)
+pub(super) fn max_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, max_or_nan)
 }
 
 pub(super) const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -G);

@@ -10,7 +10,7 @@ const DAMPING: f64 = 0.1;
 const START: f64 = 7.0;
 
 /// Angular velocity after a second.
-fn slowed(damping: f64) -> f64 {
+fn final_velocity(damping: f64) -> f64 {
     let joint = Joint::hinge("bearing", ["base", "wheel"], [0.0, 0.0, 1.0]).dynamics(damping, 0.0);
     let mut lab = Lab::new(earth());
     let robot = lab.mechanism(&urdf(&[base(), Link::new("wheel", 1.0, [MOMENT; 3])], &[joint]));
@@ -22,9 +22,9 @@ fn slowed(damping: f64) -> f64 {
 #[test]
 fn holds() {
     law(module_path!(), "ω = ω₀ (1 + h c/I)^(-t/h)", |m| {
-        let found = slowed(DAMPING);
+        let found = final_velocity(DAMPING);
         let stepped = START * (1.0 + 1e-3 * DAMPING / MOMENT).powi(-1000);
         m.row("angular velocity after 1 s", "rad/s", stepped, found, (1e-11, "rounding of 1000 divisions"));
-        m.control("angular velocity after 1 s", "without oil", slowed(0.0));
+        m.control("angular velocity after 1 s", "without oil", final_velocity(0.0));
     });
 }

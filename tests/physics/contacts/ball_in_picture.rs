@@ -15,11 +15,11 @@ use std::f64::consts::PI;
 /// Image size, focal length and principal point \[pixels\].
 pub(super) const SIZE: [usize; 2] = [320, 240];
 pub(super) const FOCAL: f64 = 280.0;
-pub(super) const MIDDLE: [f64; 2] = [160.0, 120.0];
+pub(super) const PRINCIPAL_POINT: [f64; 2] = [160.0, 120.0];
 
 /// Image moments of one object.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct ImageMoments {
     /// Area \[pixels\].
     pub(super) area: f64,
     /// Mean of its pixel centers \[pixels\].
@@ -27,14 +27,14 @@ pub(super) struct Seen {
 }
 
 /// The closed form.
-pub(super) fn expected([x, y, z]: [f64; 3], radius: f64) -> Seen {
+pub(super) fn expected_moments([x, y, z]: [f64; 3], radius: f64) -> ImageMoments {
     let s = z * z - radius * radius;
     let area = PI * FOCAL * FOCAL * radius * radius * (x * x + y * y + s).sqrt() / s.powf(1.5);
-    Seen { area, centroid: [MIDDLE[0] + FOCAL * x * z / s, MIDDLE[1] + FOCAL * y * z / s] }
+    ImageMoments { area, centroid: [PRINCIPAL_POINT[0] + FOCAL * x * z / s, PRINCIPAL_POINT[1] + FOCAL * y * z / s] }
 }
 
 /// Moments of the pixels with a mask id.
-pub(super) fn found(mask: &ArrayView3<'_, i32>, id: i32) -> Seen {
+pub(super) fn measured_moments(mask: &ArrayView3<'_, i32>, id: i32) -> ImageMoments {
     let mask: ArrayView2<'_, i32> = mask.index_axis(Axis(0), 0);
     let (mut area, mut sum) = (0.0, [0.0; 2]);
     for ((v, u), _) in mask.indexed_iter().filter(|(_, found)| **found == id) {
@@ -42,5 +42,5 @@ pub(super) fn found(mask: &ArrayView3<'_, i32>, id: i32) -> Seen {
         sum[0] += u as f64 + 0.5;
         sum[1] += v as f64 + 0.5;
     }
-    Seen { area, centroid: sum.map(|x| x / area) }
+    ImageMoments { area, centroid: sum.map(|x| x / area) }
 }

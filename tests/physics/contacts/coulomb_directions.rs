@@ -10,7 +10,7 @@
 //! numbers.
 
 use crate::lab::*;
-use kinetoscope::sim::Cone;
+use kinetoscope::sim::FrictionCone;
 use kinetoscope_testkit::worlds::ball;
 use nalgebra::{Rotation2, Vector2};
 
@@ -23,15 +23,15 @@ const STEPS: u32 = 194;
 const ROUNDING: f64 = STEPS as f64 * 20.0 * f64::EPSILON / 2.0;
 
 /// Ratio of friction to normal force, as a vector, for a ball that slides at this angle to x.
-fn slid(angle: f64, cone: Cone, coefficient: f64) -> Vector2<f64> {
+fn friction_ratio(angle: f64, cone: FrictionCone, coefficient: f64) -> Vector2<f64> {
     let mut lab = Lab::new(SimulationManagerCfg { cone, ..slope(0.0, coefficient) });
     let ball = lab.object(ball("ball", 0.2, 1.5, [0.0, 0.0, 0.2]));
-    let id = lab.sim.add_sensor("contact", ContactSensorCfg::of("ball")).unwrap();
+    let id = lab.sim.add_sensor("contact", ContactSensorCfg::for_bodies("ball")).unwrap();
     lab.run(0.5);
     let way = Rotation2::new(angle) * Vector2::x();
     lab.write_velocity(ball, [SPEED * way.x, SPEED * way.y, 0.0], [0.0; 3]);
     let (mut friction, mut normal) = (Vector2::zeros(), 0.0);
-    lab.watch(STEPS, |_, sim| {
+    lab.run_with(STEPS, |_, sim| {
         let sensor = sim.sensor(id).unwrap();
         let force = sensor.friction_forces_w();
         friction += Vector2::new(force[(0, 0, 0)], force[(0, 0, 1)]);
@@ -41,7 +41,7 @@ fn slid(angle: f64, cone: Cone, coefficient: f64) -> Vector2<f64> {
 }
 
 /// Components along the direction at this angle to x, and across it.
-fn parts(friction: Vector2<f64>, angle: f64) -> [f64; 2] {
+fn components(friction: Vector2<f64>, angle: f64) -> [f64; 2] {
     let way = Rotation2::new(angle) * Vector2::x();
     [friction.dot(&way), way.perp(&friction)]
 }
@@ -52,23 +52,23 @@ fn holds() {
         let rounding = (ROUNDING, "rounding of sums");
         for degrees in [0.0_f64, 22.5, 45.0, 70.0] {
             let angle = degrees.to_radians();
-            let [along, across] = parts(slid(angle, Cone::Elliptic, FRICTION), angle);
-            let [weak, beside] = parts(slid(angle + 0.1, Cone::Elliptic, 0.5 * FRICTION), angle);
+            let [along, across] = components(friction_ratio(angle, FrictionCone::Elliptic, FRICTION), angle);
+            let [weak, beside] = components(friction_ratio(angle + 0.1, FrictionCone::Elliptic, 0.5 * FRICTION), angle);
             m.row(&format!("along the motion, {degrees}°"), "", -FRICTION, along, rounding);
             m.control(&format!("along the motion, {degrees}°"), "with half the friction", weak);
             m.row(&format!("across the motion, {degrees}°"), "", 0.0, across, rounding);
             m.control(&format!("across the motion, {degrees}°"), "of a motion 0.1 rad beside", beside);
         }
         let skew = 22.5_f64.to_radians();
-        let [between, skewed] = parts(slid(skew, Cone::Pyramidal, FRICTION), skew);
+        let [between, skewed] = components(friction_ratio(skew, FrictionCone::Pyramidal, FRICTION), skew);
         m.control("along the motion, 22.5°", "with a pyramid", between);
         m.control("across the motion, 22.5°", "with a pyramid", skewed);
         let half = 45.0_f64.to_radians();
-        let [edge, _] = parts(slid(half, Cone::Pyramidal, FRICTION), half);
+        let [edge, _] = components(friction_ratio(half, FrictionCone::Pyramidal, FRICTION), half);
         m.control("along the motion, 45°", "with a pyramid", edge);
         let least = -FRICTION / 2.0_f64.sqrt();
         m.row("along the motion, 45°, pyramid", "", least, edge, rounding);
-        let [round, _] = parts(slid(half, Cone::Elliptic, FRICTION), half);
+        let [round, _] = components(friction_ratio(half, FrictionCone::Elliptic, FRICTION), half);
         m.control("along the motion, 45°, pyramid", "with a cone", round);
     });
 }

@@ -12,7 +12,7 @@ const START: f64 = 1.0;
 
 /// Largest and smallest reading along the rod and largest across it, for a swing from `angle`. The IMU is at the
 /// fraction `part` of the rod's length.
-fn felt(angle: f64, part: f64) -> [f64; 3] {
+fn imu_readings(angle: f64, part: f64) -> [f64; 3] {
     let mut lab = Lab::new(with_dt(1e-4, earth()));
     let joint = Joint::hinge("pivot", ["base", "bob"], [0.0, 1.0, 0.0]);
     let robot = lab.mechanism(&urdf(&[base(), Link::point("bob", 1.0, [0.0, 0.0, -LENGTH])], &[joint]));
@@ -21,7 +21,7 @@ fn felt(angle: f64, part: f64) -> [f64; 3] {
     lab.write_joints(robot, &[angle], &[0.0]);
     let mut felt = [0.0_f64, f64::INFINITY, 0.0];
     // From here, half a swing takes 1.07 s.
-    lab.watch(11_500, |_, sim| {
+    lab.run_with(11_500, |_, sim| {
         let a = sim.sensor(id).unwrap().lin_acc_b();
         felt = [felt[0].max(a[(0, 2)]), felt[1].min(a[(0, 2)]), felt[2].max(a[(0, 0)].abs())];
     });
@@ -31,7 +31,8 @@ fn felt(angle: f64, part: f64) -> [f64; 3] {
 #[test]
 fn holds() {
     law(module_path!(), "along: g (3 cos θ - 2 cos θ₀); across: 0", |m| {
-        let (bob, middle, lower) = (felt(START, 1.0), felt(START, 0.5), felt(0.99 * START, 1.0));
+        let (bob, middle, lower) =
+            (imu_readings(START, 1.0), imu_readings(START, 0.5), imu_readings(0.99 * START, 1.0));
         let order = (1e-6 * G, "(ω₀ h)², and a step at the extremum");
         m.row("along the rod at the bottom", "m/s²", G * (3.0 - 2.0 * START.cos()), bob[0], order);
         m.row("along the rod at the ends", "m/s²", G * START.cos(), bob[1], order);

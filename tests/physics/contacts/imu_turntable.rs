@@ -19,7 +19,7 @@ fn read(cfg: SimulationManagerCfg, place: [f64; 2], spin: f64, torque: f64) -> [
     let robot = lab.mechanism(&text);
     let id = lab.sim.add_sensor("imu", ImuCfg::on("tip")).unwrap();
     lab.write_joints(robot, &[0.3], &[spin]);
-    lab.push_joints(robot, &[torque]);
+    lab.set_joint_efforts(robot, &[torque]);
     lab.run(1.0);
     let imu = lab.sim.sensor(id).unwrap();
     let (a, w, up, v) = (imu.lin_acc_b(), imu.ang_vel_b(), imu.ang_acc_b(), imu.lin_vel_b());

@@ -15,7 +15,7 @@ const SPIN: f64 = 8.0;
 const SKEW: [f64; 2] = [0.01, -0.006];
 
 /// Force and torque on the load, in its axes, after 0.2 s.
-fn carried(skew: [f64; 2], spin: f64, mass: f64, effort: f64) -> [f64; 6] {
+fn load_wrench(skew: [f64; 2], spin: f64, mass: f64, effort: f64) -> [f64; 6] {
     let mut lab = Lab::new(earth());
     let inertia = Matrix3::new(0.05, 0.0, skew[0], 0.0, 0.06, skew[1], skew[0], skew[1], 0.04);
     let load = Link { inertia, ..Link::new("load", mass, [0.0; 3]).at([RADIUS, 0.0, 0.0]) };
@@ -24,7 +24,7 @@ fn carried(skew: [f64; 2], spin: f64, mass: f64, effort: f64) -> [f64; 6] {
     let links = vec!["load".into()];
     let id = lab.sim.add_sensor("wrench", JointWrenchCfg { links, ..JointWrenchCfg::default() }).unwrap();
     lab.write_joints(robot, &[0.0], &[spin]);
-    lab.push_joints(robot, &[effort]);
+    lab.set_joint_efforts(robot, &[effort]);
     lab.run(0.2);
     let wrench = lab.sim.sensor(id).unwrap();
     let (force, torque) = (wrench.forces(), wrench.torques());
@@ -50,12 +50,12 @@ fn holds() {
                 SKEW[1] * alpha + SKEW[0] * square - RADIUS * MASS * G,
                 effort,
             ];
-            let found = carried(SKEW, spin, MASS, effort);
+            let found = load_wrench(SKEW, spin, MASS, effort);
             // Controls: for each row, one cause is changed at a time.
-            let slower = ("that turns by 0.5 rad/s less", carried(SKEW, spin - 0.5, MASS, effort));
-            let pushed = ("that is driven with 0.1 N m more", carried(SKEW, spin, MASS, effort + 0.1));
-            let heavier = ("that is 10 % heavier", carried(SKEW, spin, 1.1 * MASS, effort));
-            let straight = ("whose axis is principal", carried([0.0; 2], spin, MASS, effort));
+            let slower = ("that turns by 0.5 rad/s less", load_wrench(SKEW, spin - 0.5, MASS, effort));
+            let pushed = ("that is driven with 0.1 N m more", load_wrench(SKEW, spin, MASS, effort + 0.1));
+            let heavier = ("that is 10 % heavier", load_wrench(SKEW, spin, 1.1 * MASS, effort));
+            let straight = ("whose axis is principal", load_wrench([0.0; 2], spin, MASS, effort));
             let (about_x, about_y) = if spin == 0.0 { (&slower, &heavier) } else { (&straight, &straight) };
             let others = [&slower, &pushed, &heavier, about_x, about_y, &pushed];
             for (k, axis) in names.into_iter().enumerate() {

@@ -12,7 +12,7 @@ const MASS: f64 = 3.0;
 const STIFFNESS: f64 = 1e4;
 
 /// Force on the load and on the plate, effort of the scale, and its displacement.
-fn weighed(mass: f64, drive: DriveCfg, force: f64) -> [f64; 4] {
+fn scale_readings(mass: f64, drive: DriveCfg, force: f64) -> [f64; 4] {
     let mut lab = Lab::new(earth());
     let joint = Joint::slide("spring", ["base", "plate"], [0.0, 0.0, 1.0]);
     let text = urdf(&[base(), Link::brick("plate", PLATE, [0.6, 0.6, 0.05])], &[joint]);
@@ -20,7 +20,7 @@ fn weighed(mass: f64, drive: DriveCfg, force: f64) -> [f64; 4] {
     lab.object(cube("load", 0.2, mass, [0.05, -0.02, 0.125]));
     let bodies = vec!["load".into(), "scale/plate".into()];
     let id = lab.sim.add_sensor("contact", ContactSensorCfg { bodies, ..ContactSensorCfg::default() }).unwrap();
-    lab.push_joints(scale, &[force]);
+    lab.set_joint_efforts(scale, &[force]);
     lab.run(2.0);
     let forces = lab.sim.sensor(id).unwrap().net_forces_w();
     let [load, plate] = [forces[(0, 0, 2)], forces[(0, 1, 2)]];
@@ -33,7 +33,7 @@ fn holds() {
         let total = MASS + PLATE;
         let damping = 2.0 * (STIFFNESS * total).sqrt();
         let scale = implicit(STIFFNESS, damping);
-        let (found, heavier) = (weighed(MASS, scale.clone(), 0.0), weighed(1.01 * MASS, scale, 0.0));
+        let (found, heavier) = (scale_readings(MASS, scale.clone(), 0.0), scale_readings(1.01 * MASS, scale, 0.0));
         let rows = [
             ("force on the load", "N", MASS * G),
             ("force on the plate", "N", -MASS * G),
@@ -46,7 +46,7 @@ fn holds() {
         }
         let force = 60.0;
         let expected = MASS * force / total;
-        let lifted = weighed(MASS, passive(), force)[0];
+        let lifted = scale_readings(MASS, passive(), force)[0];
         m.row("force on the load in a lift", "N", expected, lifted, (1e-6 * expected, "tolerance of the solver"));
         m.control("force on the load in a lift", "in a lift that stands", found[0]);
     });

@@ -6,7 +6,7 @@
 //! Tolerance: ω is constant to rounding. The centroid of 1000 pixels is accurate to 0.1 pixels, the area to 4 √(2 π r)
 //! pixels (law `sphere_depth`).
 
-use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
+use super::ball_in_picture::{FOCAL, ImageMoments, PRINCIPAL_POINT, SIZE, expected_moments, measured_moments};
 use crate::lab::*;
 use kinetoscope::sim::MaskId;
 use kinetoscope_testkit::worlds::{fixed, object};
@@ -26,7 +26,7 @@ enum Turns {
 }
 
 /// Moments of the ball in the camera's image after `seconds`.
-fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
+fn ball_moments(turns: Turns, spin: f64, seconds: f64) -> ImageMoments {
     let mut lab = Lab::new(earth());
     let turn = Joint::hinge("turn", ["base", "table"], [0.0, 0.0, 1.0]);
     let table = Link::new("table", 2.0, [0.1; 3]);
@@ -52,7 +52,7 @@ fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
     let camera = CameraCfg {
         width,
         height,
-        intrinsics: Intrinsics::Pixels { fx: FOCAL, fy: FOCAL, cx: MIDDLE[0], cy: MIDDLE[1] },
+        intrinsics: Intrinsics::Pixels { fx: FOCAL, fy: FOCAL, cx: PRINCIPAL_POINT[0], cy: PRINCIPAL_POINT[1] },
         extrinsics: Extrinsics { parent, placement, ..Extrinsics::default() },
         channels: Channels { mask: true, ..Channels::default() },
         ..CameraCfg::default()
@@ -62,7 +62,7 @@ fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
     lab.run(seconds);
     let is_ball = |id: &&MaskId| id.object == "ball" || id.link.as_deref() == Some("ball");
     let id = lab.sim.scene().mask_ids().iter().find(is_ball).unwrap().id;
-    found(&lab.sim.sensor(camera).unwrap().mask().unwrap(), id)
+    measured_moments(&lab.sim.sensor(camera).unwrap().mask().unwrap(), id)
 }
 
 #[test]
@@ -72,10 +72,10 @@ fn holds() {
         for ((turns, way, name), seconds) in
             cases.into_iter().flat_map(|case| [0.25, 0.6, 1.1, 1.9, 2.7].map(|seconds| (case, seconds)))
         {
-            let still = seen(turns, 0.0, 0.25);
+            let still = ball_moments(turns, 0.0, 0.25);
             let (sin, cos) = (SPIN * seconds).sin_cos();
-            let form = expected([-way * BALL[0] * sin, EYE - BALL[1], RIM - BALL[0] * cos], RADIUS);
-            let ball = seen(turns, SPIN, seconds);
+            let form = expected_moments([-way * BALL[0] * sin, EYE - BALL[1], RIM - BALL[0] * cos], RADIUS);
+            let ball = ball_moments(turns, SPIN, seconds);
             let of = |what: &str| format!("{what} after {seconds} s, {name}");
             let edge = 4.0 * (TAU * (form.area / PI).sqrt()).sqrt();
             let within = (0.1, "pixels of the silhouette");

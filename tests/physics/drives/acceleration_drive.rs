@@ -16,7 +16,7 @@ const AIM: f64 = 0.4;
 fn wheel(drive_type: DriveType, moment: f64) -> f64 {
     let drive = DriveCfg { drive_type, ..implicit(STIFFNESS, DAMPING) };
     let mut wheel = Wheel::on(weightless(), drive, hinge(), moment);
-    wheel.aim(AIM);
+    wheel.set_target_position(AIM);
     wheel.lab.run(0.1);
     wheel.q()
 }
@@ -24,7 +24,8 @@ fn wheel(drive_type: DriveType, moment: f64) -> f64 {
 /// Acceleration of joint `which` of two levers in the first step, with a target for this joint only.
 fn lever(drive_type: DriveType, which: usize) -> f64 {
     let y = [0.0, 1.0, 0.0];
-    let rod = |name: &str, mass: f64| Link::brick(name, mass, [0.4, 0.05, 0.05]).at([0.2, 0.0, 0.0]).ghost();
+    let rod =
+        |name: &str, mass: f64| Link::brick(name, mass, [0.4, 0.05, 0.05]).at([0.2, 0.0, 0.0]).without_collision();
     let elbow = Joint::hinge("b", ["upper", "lower"], y).at([0.4, 0.0, 0.0]);
     let text = urdf(&[base(), rod("upper", 2.0), rod("lower", 1.0)], &[Joint::hinge("a", ["base", "upper"], y), elbow]);
     let mut lab = Lab::new(weightless());

@@ -23,9 +23,9 @@ fn with_rotor(rotor: f64, drive: DriveCfg) -> DriveCfg {
 }
 
 /// Acceleration of one wheel, and of two coupled wheels of which only the second has a rotor.
-fn turned(rotor: f64) -> [f64; 3] {
+fn accelerations(rotor: f64) -> [f64; 3] {
     let mut wheel = Wheel::new(weightless(), with_rotor(rotor, passive()));
-    wheel.effort(TORQUE);
+    wheel.set_effort(TORQUE);
     wheel.lab.run(0.1);
     let z = [0.0, 0.0, 1.0];
     let links = [base(), Link::new("first", 1.0, [MOMENT; 3]), Link::new("second", 1.0, [SECOND; 3])];
@@ -33,7 +33,7 @@ fn turned(rotor: f64) -> [f64; 3] {
     let mut lab = Lab::new(weightless());
     let drive = DriveCfg { armature: [("b", rotor)].into(), ..passive() };
     let robot = lab.robot(&urdf(&links, &joints), RobotCfg { drive, ..RobotCfg::default() });
-    lab.push_joints(robot, &[0.0, TORQUE]);
+    lab.set_joint_efforts(robot, &[0.0, TORQUE]);
     lab.run(0.1);
     let v = lab.v(robot);
     [wheel.v(), v[0], v[1]].map(|v| v / 0.1)
@@ -54,7 +54,7 @@ fn sag(rotor: f64, mass: f64) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "τ = (I + J) q''; m g l cos q = k (q* - q)", |m| {
-        let ([alone, first, second], [bare, bare_first, bare_second]) = (turned(ROTOR), turned(0.0));
+        let ([alone, first, second], [bare, bare_first, bare_second]) = (accelerations(ROTOR), accelerations(0.0));
         let rounding = (1e-10, "rounding of 100 sums over 0.1 s");
         m.row("acceleration of a wheel", "rad/s²", TORQUE / (MOMENT + ROTOR), alone, rounding);
         let felt = (SECOND + ROTOR) * (MOMENT + SECOND) - SECOND * SECOND;

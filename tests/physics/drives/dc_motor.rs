@@ -14,7 +14,7 @@ const LIMIT: f64 = 0.6;
 const FREE: f64 = 10.0;
 
 /// Velocities after 20 ms, 1 s and 10 s.
-fn spun(stall: f64, load: f64) -> [f64; 3] {
+fn velocities(stall: f64, load: f64) -> [f64; 3] {
     let drive = DriveCfg {
         actuators: vec![(".*".into(), DcMotor { saturation_effort: stall }.into())],
         max_effort: Some(LIMIT.into()),
@@ -22,8 +22,8 @@ fn spun(stall: f64, load: f64) -> [f64; 3] {
         ..implicit(0.0, 0.0)
     };
     let mut wheel = Wheel::new(weightless(), drive);
-    wheel.effort(100.0);
-    wheel.load(load);
+    wheel.set_effort(100.0);
+    wheel.set_external_torque(load);
     [0.02, 0.98, 9.0].map(|seconds| {
         wheel.lab.run(seconds);
         wheel.v()
@@ -34,7 +34,7 @@ fn spun(stall: f64, load: f64) -> [f64; 3] {
 fn holds() {
     law(module_path!(), "τ = min(s (1 - v/v₀), L)", |m| {
         for (name, load) in [("without load", 0.0), ("under a load", -0.2)] {
-            let ([early, later, end], [_, other, _]) = (spun(STALL, load), spun(1.5 * STALL, load));
+            let ([early, later, end], [_, other, _]) = (velocities(STALL, load), velocities(1.5 * STALL, load));
             let of = |what: &str| format!("{what} {name}");
             let rounding = (1e-10, "rounding of 1000 steps");
             m.row(&of("velocity after 20 ms"), "rad/s", (LIMIT + load) / MOMENT * 0.02, early, rounding);
@@ -45,7 +45,7 @@ fn holds() {
             m.row(&of("velocity after 1 s"), "rad/s", smooth, later, late);
             m.row(&of("velocity at the end"), "rad/s", free, end, (1e-7, "e^-19 of it is left"));
             m.control(&of("velocity after 1 s"), "with a stall effort half as large again", other);
-            let [pulled, _, fast] = spun(STALL, load - 0.1);
+            let [pulled, _, fast] = velocities(STALL, load - 0.1);
             m.control(&of("velocity after 20 ms"), "under 0.1 N m more", pulled);
             m.control(&of("velocity at the end"), "under 0.1 N m more", fast);
         }

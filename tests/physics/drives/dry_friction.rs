@@ -15,7 +15,7 @@ const FRICTION: f64 = 1.0;
 const START: f64 = 2.0;
 
 /// Velocity after 60 ms, and velocity and distance after 0.3 s, three times the stopping time.
-fn stopped(drive: DriveCfg, friction: f64) -> [f64; 3] {
+fn stopping_motion(drive: DriveCfg, friction: f64) -> [f64; 3] {
     let mut wheel = Wheel::on(weightless(), drive, hinge().dynamics(0.0, friction), MOMENT);
     wheel.lab.write_joints(wheel.robot, &[0.0], &[START]);
     wheel.lab.run(0.06);
@@ -27,7 +27,7 @@ fn stopped(drive: DriveCfg, friction: f64) -> [f64; 3] {
 /// Velocity after 1 s under a load.
 fn creep(drive: DriveCfg, load: f64) -> f64 {
     let mut wheel = Wheel::on(weightless(), drive, hinge().dynamics(0.0, FRICTION), MOMENT);
-    wheel.load(load);
+    wheel.set_external_torque(load);
     wheel.lab.run(1.0);
     wheel.v()
 }
@@ -36,7 +36,7 @@ fn creep(drive: DriveCfg, load: f64) -> f64 {
 fn holds() {
     law(module_path!(), "v = v₀ - f t/I; way = I v₀²/2f", |m| {
         for (name, drive) in [("row", passive()), ("joint", DriveCfg { model: DriveModel::Actuator, ..passive() })] {
-            let (found, smooth) = (stopped(drive.clone(), FRICTION), stopped(drive.clone(), 0.0));
+            let (found, smooth) = (stopping_motion(drive.clone(), FRICTION), stopping_motion(drive.clone(), 0.0));
             let of = |what: &str| format!("{what}, {name}");
             let slowed = START - FRICTION * 0.06 / MOMENT;
             m.row(&of("velocity after 60 ms"), "rad/s", slowed, found[0], (1e-9, "rounding of 60 sums"));

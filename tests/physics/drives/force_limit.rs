@@ -14,16 +14,16 @@ const STEPS: u32 = 200;
 const LOAD: f64 = 3.0;
 
 /// Smallest effort of the drive, position and velocity after 0.2 s, and velocity under a load after the same time.
-fn pushed(of: &Variant, limit: f64) -> [f64; 4] {
+fn limited_motion(of: &Variant, limit: f64) -> [f64; 4] {
     let drive = DriveCfg { max_effort: Some(limit.into()), ..of.drive(100.0, 1.0) };
     let run = |load: f64| {
         let mut wheel = Wheel::new(weightless(), drive.clone());
-        wheel.aim(100.0);
+        wheel.set_target_position(100.0);
         // Until the delayed target arrives, the drive holds the wheel in place.
-        wheel.lab.watch(of.delay(), |_, _| ());
-        wheel.load(load);
+        wheel.lab.run_with(of.delay(), |_, _| ());
+        wheel.set_external_torque(load);
         let (robot, mut least) = (wheel.robot, f64::INFINITY);
-        wheel.lab.watch(STEPS, |_, sim| least = least.min(sim.robot(robot).qf()[(0, 0)]));
+        wheel.lab.run_with(STEPS, |_, sim| least = least.min(sim.robot(robot).qf()[(0, 0)]));
         (least, wheel.q(), wheel.v())
     };
     let ((least, q, v), (_, _, loaded)) = (run(0.0), run(-LOAD));
@@ -36,7 +36,7 @@ fn holds() {
         let (h, n) = (1e-3, f64::from(STEPS));
         let acceleration = LIMIT / MOMENT;
         for variant in variants::all() {
-            let (found, weak) = (pushed(&variant, LIMIT), pushed(&variant, 0.99 * LIMIT));
+            let (found, weak) = (limited_motion(&variant, LIMIT), limited_motion(&variant, 0.99 * LIMIT));
             let rounding = |x: f64| n * f64::EPSILON * x.abs();
             let [position, velocity] = [acceleration * h * h * n * (n + 1.0) / 2.0, acceleration * h * n];
             let loaded = (LIMIT - LOAD) / MOMENT * h * n;

@@ -15,8 +15,8 @@ const START: [f64; 2] = [0.4, -0.9];
 fn arm(cfg: SimulationManagerCfg, drive: DriveCfg, compensated: bool) -> (Lab, RobotId) {
     let links = [
         base(),
-        Link::brick("upper", 3.0, [0.5, 0.1, 0.1]).at([0.25, 0.0, 0.02]).ghost(),
-        Link::brick("lower", 1.5, [0.4, 0.06, 0.06]).at([0.2, 0.01, 0.0]).ghost(),
+        Link::brick("upper", 3.0, [0.5, 0.1, 0.1]).at([0.25, 0.0, 0.02]).without_collision(),
+        Link::brick("lower", 1.5, [0.4, 0.06, 0.06]).at([0.2, 0.01, 0.0]).without_collision(),
     ];
     let y = [0.0, 1.0, 0.0];
     let elbow = Joint::hinge("elbow", ["upper", "lower"], y).at([0.5, 0.0, 0.0]);
@@ -32,7 +32,7 @@ fn arm(cfg: SimulationManagerCfg, drive: DriveCfg, compensated: bool) -> (Lab, R
 const ROUNDING: f64 = 12.0 * f64::EPSILON / 2.0 * 18.0 / 0.015;
 
 /// Drift of the undriven arm in a second, and error of a soft drive.
-fn moved(compensated: bool) -> [f64; 2] {
+fn drift_and_error(compensated: bool) -> [f64; 2] {
     [passive(), implicit(200.0, 20.0)].map(|drive| {
         let (mut lab, robot) = arm(earth(), drive, compensated);
         lab.run(1.0);
@@ -41,9 +41,9 @@ fn moved(compensated: bool) -> [f64; 2] {
 }
 
 /// Acceleration of the elbow in the first step under an effort of 2 N m.
-fn pushed(cfg: SimulationManagerCfg, compensated: bool) -> f64 {
+fn elbow_acceleration(cfg: SimulationManagerCfg, compensated: bool) -> f64 {
     let (mut lab, robot) = arm(cfg, passive(), compensated);
-    lab.push_joints(robot, &[0.0, 2.0]);
+    lab.set_joint_efforts(robot, &[0.0, 2.0]);
     lab.run(1e-3);
     lab.v(robot)[1] / 1e-3
 }
@@ -51,15 +51,15 @@ fn pushed(cfg: SimulationManagerCfg, compensated: bool) -> f64 {
 #[test]
 fn holds() {
     law(module_path!(), "Σ τ = τ_gravity(q) + Jᵀ (-m g) = 0", |m| {
-        let ([free, held], [fallen, sagged]) = (moved(true), moved(false));
+        let ([free, held], [fallen, sagged]) = (drift_and_error(true), drift_and_error(false));
         let rounding = (0.5 * ROUNDING, "rounding of the torques, for a second");
         m.row("motion of an arm without drives", "rad", 0.0, free, rounding);
         m.row("error of its drives", "rad", 0.0, held, rounding);
         m.control("motion of an arm without drives", "without compensation", fallen);
         m.control("error of its drives", "without compensation", sagged);
-        let expected = pushed(weightless(), false);
+        let expected = elbow_acceleration(weightless(), false);
         let sums = (ROUNDING + f64::EPSILON * expected.abs(), "rounding of the torques and of the velocity");
-        m.row("acceleration under an effort", "rad/s²", expected, pushed(earth(), true), sums);
-        m.control("acceleration under an effort", "without compensation", pushed(earth(), false));
+        m.row("acceleration under an effort", "rad/s²", expected, elbow_acceleration(earth(), true), sums);
+        m.control("acceleration under an effort", "without compensation", elbow_acceleration(earth(), false));
     });
 }

@@ -22,15 +22,15 @@ const H: f64 = 1e-3;
 const START: f64 = 0.01;
 
 /// Positions before and after the last of `steps` steps at this ω h.
-fn swung(rate: f64, explicit: bool, steps: u32) -> [f64; 2] {
+fn last_positions(rate: f64, explicit: bool, steps: u32) -> [f64; 2] {
     let stiffness = MOMENT * (rate / H) * (rate / H);
     let actuators = if explicit { vec![(".*".into(), IdealPd {}.into())] } else { Vec::new() };
     let mut wheel = Wheel::new(weightless(), DriveCfg { actuators, ..implicit(stiffness, 0.0) });
     wheel.lab.write_joints(wheel.robot, &[START], &[0.0]);
-    wheel.aim(0.0);
+    wheel.set_target_position(0.0);
     let robot = wheel.robot;
     let mut last = [0.0; 2];
-    wheel.lab.watch(steps, |_, sim| last = [last[1], sim.robot(robot).qpos()[(0, 0)]]);
+    wheel.lab.run_with(steps, |_, sim| last = [last[1], sim.robot(robot).qpos()[(0, 0)]]);
     last
 }
 
@@ -41,16 +41,16 @@ fn holds() {
             let theta = (1.0 - 0.5 * rate * rate).acos();
             let (sin, cos) = (500.0 * theta).sin_cos();
             let quantity = format!("position after 500 steps, ω h = {rate}");
-            let found = swung(rate, true, 500)[1];
+            let found = last_positions(rate, true, 500)[1];
             let expected = START * (cos - (0.5 * theta).tan() * sin);
             let size = START / (0.5 * theta).cos() * (1.0 + rate * rate);
             let off = (500.0 * 3.0 * f64::EPSILON * size / theta.sin(), "rounding of 500 steps");
             m.row(&quantity, "rad", expected, found, off);
-            m.control(&quantity, "with the law at the end of the step", swung(rate, false, 500)[1]);
+            m.control(&quantity, "with the law at the end of the step", last_positions(rate, false, 500)[1]);
         }
         let square: f64 = 2.1 * 2.1;
         let c = 0.5 * square - 1.0;
-        let growth = |rate: f64| swung(rate, true, 15).map(f64::abs);
+        let growth = |rate: f64| last_positions(rate, true, 15).map(f64::abs);
         let [before, after] = growth(2.1);
         let z = c + (c * c - 1.0).sqrt();
         // Coefficients of the two roots, from q(0) = 1 and q(1) = 1 - (ω h)².

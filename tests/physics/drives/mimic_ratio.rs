@@ -20,12 +20,12 @@ const AIM: f64 = 0.3;
 const LOAD: f64 = 0.5;
 
 /// Both positions under the load at rest, and the largest |q₂ - n q₁ - b| during the motion.
-fn followed(coupled: bool) -> [f64; 3] {
+fn coupled_positions(coupled: bool) -> [f64; 3] {
     let wheel = |name, moment| Link::new(name, 1.0, [moment; 3]);
     let z = [0.0, 0.0, 1.0];
     let follower = Joint::hinge("second_joint", ["base", "second"], z).at([0.5, 0.0, 0.0]);
     let mimic = format!("<mimic joint=\"first_joint\" multiplier=\"{RATIO}\" offset=\"{OFFSET}\"/>");
-    let follower = if coupled { Joint { more: mimic, ..follower } } else { follower };
+    let follower = if coupled { Joint { extra_elements: mimic, ..follower } } else { follower };
     let links = [base(), wheel("first", MOMENTS[0]), wheel("second", MOMENTS[1])];
     let text = urdf(&links, &[Joint::hinge("first_joint", ["base", "first"], z), follower]);
     let mut lab = Lab::new(weightless());
@@ -33,11 +33,11 @@ fn followed(coupled: bool) -> [f64; 3] {
     // Without the coupling, the second joint has its own drive, which holds it in place.
     lab.sim.robot_mut(robot).set_qpos_target(&row(&[AIM, 0.0]), None, None).unwrap();
     let mut worst = 0.0_f64;
-    lab.watch(1_000, |_, sim| {
+    lab.run_with(1_000, |_, sim| {
         let q = sim.robot(robot).qpos();
         worst = worst.max((q[(0, 1)] - RATIO * q[(0, 0)] - OFFSET).abs());
     });
-    lab.push_link(robot, "second", Vector3::zeros(), Vector3::new(0.0, 0.0, LOAD));
+    lab.set_link_wrench(robot, "second", Vector3::zeros(), Vector3::new(0.0, 0.0, LOAD));
     lab.run(4.0);
     let q = lab.q(robot);
     [q[0], q[1], worst]
@@ -46,7 +46,7 @@ fn followed(coupled: bool) -> [f64; 3] {
 #[test]
 fn holds() {
     law(module_path!(), "q₂ = n q₁ + b; q₁ = q* + n τ/k", |m| {
-        let ([first, second, worst], [alone, idle, apart]) = (followed(true), followed(false));
+        let ([first, second, worst], [alone, idle, apart]) = (coupled_positions(true), coupled_positions(false));
         let rest = AIM + RATIO * LOAD / STIFFNESS;
         let inverse = 1.0 / MOMENTS[0] + 1.0 / MOMENTS[1];
         let yields = |load: f64| 1e-4 * inverse * load * 4e-6;

@@ -20,8 +20,8 @@
 //! that over m; the relative error of the creep is that of f.
 
 use crate::lab::*;
-use crate::rigid_body::soft_contact::{LARGEST, TIME, depth, impedance};
-use kinetoscope::mujoco::{TARGET, Target};
+use crate::rigid_body::soft_contact::{MAX_IMPEDANCE, TIME_CONSTANT, depth, impedance};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope::sim::DriveModel;
 use kinetoscope_testkit::worlds::cube;
 
@@ -61,11 +61,12 @@ fn pinch(drive: DriveCfg, limit: f64, friction: f64) -> Pinch {
     let hand = lab.robot(&urdf(&[base(), finger("left"), finger("right")], &joints), hand);
     let block = lab.object(cube("block", GRIP, MASS, [0.0; 3]));
     let filters = vec!["hand/left".into(), "hand/right".into()];
-    let touch = lab.sim.add_sensor("touch", ContactSensorCfg { filters, ..ContactSensorCfg::of("block") }).unwrap();
+    let touch =
+        lab.sim.add_sensor("touch", ContactSensorCfg { filters, ..ContactSensorCfg::for_bodies("block") }).unwrap();
     lab.sim.robot_mut(hand).set_qpos_target(&row(&[0.02, 0.02]), None, None).unwrap();
-    lab.push(block, Vector3::new(0.0, 0.0, MASS * G), Vector3::zeros());
+    lab.set_object_wrench(block, Vector3::new(0.0, 0.0, MASS * G), Vector3::zeros());
     lab.sim.update(120);
-    lab.push(block, Vector3::zeros(), Vector3::zeros());
+    lab.set_object_wrench(block, Vector3::zeros(), Vector3::zeros());
     let (before, fingers) = (lab.body(block).velocity.z, lab.v(hand));
     lab.sim.update(10);
     let acceleration = (lab.body(block).velocity.z - before) / 0.1;
@@ -94,13 +95,13 @@ fn holds() {
         m.row("force of the left finger", "N", LIMIT, held.left, rest);
         m.row("force of the right finger", "N", LIMIT, held.right, rest);
         m.row("friction of both", "N", MASS * G, held.friction, rest);
-        let of_finger = if TARGET == Target::V4 { 1.0 / FINGER } else { 1.0 / (3.0 * FINGER) };
+        let of_finger = if BUILD_VERSION == SupportedVersion::V4 { 1.0 / FINGER } else { 1.0 / (3.0 * FINGER) };
         let inverse = 1.0 / MASS + of_finger;
         let (d, carried) = (impedance(depth(inverse * LIMIT / 4.0)), MASS * G / 8.0);
-        let creep = (1.0 - d) / d * inverse * carried * LARGEST * TIME / (2.0 * IMPRATIO);
+        let creep = (1.0 - d) / d * inverse * carried * MAX_IMPEDANCE * TIME_CONSTANT / (2.0 * IMPRATIO);
         let share = (creep * MASS * solver / carried, "tolerance of the solver");
         m.row("velocity of the block", "m/s", -creep, held.velocity, share);
-        m.lines_differ_in(
+        m.versions_differ_in(
             "velocity of the block",
             "creep goes with MuJoCo's estimate of a finger's inverse inertia: 1/M in 4.x, 1/3M in 2.2.2",
         );

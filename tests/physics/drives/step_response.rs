@@ -61,10 +61,10 @@ fn drive(of: &Variant, stiffer: f64) -> DriveCfg {
 
 fn response(drive: DriveCfg) -> Response {
     let mut wheel = Wheel::new(with_dt(H, weightless()), drive);
-    wheel.aim(AIM);
+    wheel.set_target_position(AIM);
     let (mut rise, mut highest, mut settling, mut before) = (f64::NAN, 0.0_f64, f64::NAN, [0.0, 0.0]);
     let (robot, mut curve) = (wheel.robot, Vec::new());
-    wheel.lab.watch(7_500, |t, sim| {
+    wheel.lab.run_with(7_500, |t, sim| {
         let part = sim.robot(robot).qpos()[(0, 0)] / AIM;
         let crossed = |level: f64| before[0] + (t - before[0]) * (level - before[1]) / (part - before[1]);
         if rise.is_nan() && part >= 1.0 {
@@ -79,7 +79,7 @@ fn response(drive: DriveCfg) -> Response {
             curve.push([t, part]);
         }
     });
-    wheel.load(-LOAD);
+    wheel.set_external_torque(-LOAD);
     wheel.lab.run(1.5);
     Response { rise, overshoot: highest - 1.0, settling, error: AIM - wheel.q(), curve }
 }

@@ -12,7 +12,7 @@ const DELAY: u32 = 40;
 #[derive(Clone, Debug)]
 enum Kind {
     Mode(DriveType, DriveModel),
-    Law(ActuatorModel),
+    Actuator(ActuatorModel),
 }
 
 /// A kind of drive.
@@ -43,7 +43,7 @@ pub(super) fn all() -> Vec<Variant> {
             ActuatorModel::DelayedPd(_) => DelayedPd { delay: DELAY, max_delay: DELAY }.into(),
             other => other,
         };
-        Variant { name, kind: Kind::Law(model) }
+        Variant { name, kind: Kind::Actuator(model) }
     });
     modes.chain(laws).collect()
 }
@@ -57,11 +57,11 @@ impl Variant {
                     DriveType::Force => 1.0,
                     // Gains of acceleration drives are per unit of inertia.
                     DriveType::Acceleration => MOMENT,
-                    other => other.mode().unit(&JointInfo { effective_inertia: MOMENT }).unwrap(),
+                    other => other.mode().gain_scale(&JointInfo { effective_inertia: MOMENT }).unwrap(),
                 };
                 DriveCfg { drive_type: *mode, model: *model, ..implicit(stiffness / unit, damping / unit) }
             }
-            Kind::Law(law) => {
+            Kind::Actuator(law) => {
                 let [max_effort, max_velocity] = [Some(1e3.into()), Some(1e3.into())];
                 let actuators = vec![(".*".into(), *law)];
                 DriveCfg { actuators, max_effort, max_velocity, ..implicit(stiffness, damping) }
@@ -72,7 +72,7 @@ impl Variant {
     /// Target delay \[steps\].
     pub(super) fn delay(&self) -> u32 {
         match &self.kind {
-            Kind::Law(ActuatorModel::DelayedPd(model)) => model.delay,
+            Kind::Actuator(ActuatorModel::DelayedPd(model)) => model.delay,
             _ => 0,
         }
     }

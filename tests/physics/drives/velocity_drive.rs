@@ -12,14 +12,14 @@ const SPEED: f64 = 3.0;
 const LOAD: f64 = -0.4;
 
 /// Velocities after 50 ms and 1 s under the load, and the effort after 1 s.
-fn driven(drive: DriveCfg, load: f64) -> [f64; 3] {
+fn velocities_and_effort(drive: DriveCfg, load: f64) -> [f64; 3] {
     let mut wheel = Wheel::new(weightless(), drive);
-    wheel.speed(SPEED);
-    wheel.load(load);
+    wheel.set_target_velocity(SPEED);
+    wheel.set_external_torque(load);
     wheel.lab.run(0.05);
     let early = wheel.v();
     wheel.lab.run(0.95);
-    [early, wheel.v(), wheel.given()]
+    [early, wheel.v(), wheel.drive_effort()]
 }
 
 #[test]
@@ -31,8 +31,8 @@ fn holds() {
             ("actuator", explicit(0.0, DAMPING), explicit(0.0, 2.0 * DAMPING), (1.0 - a).powi(50)),
         ];
         for (name, drive, harder, left) in models {
-            let (found, free) = (driven(drive.clone(), LOAD), driven(drive, 0.0));
-            let hard = driven(harder, LOAD);
+            let (found, free) = (velocities_and_effort(drive.clone(), LOAD), velocities_and_effort(drive, 0.0));
+            let hard = velocities_and_effort(harder, LOAD);
             let of = |what: &str| format!("{what}, {name}");
             let rounding = (1e-11, "rounding of 200 sums");
             m.row(&of("velocity after 50 ms"), "rad/s", end * (1.0 - left), found[0], rounding);

@@ -14,17 +14,17 @@ const EFFORT: f64 = 0.8;
 const DRIVE: f64 = 1.5;
 
 /// Distance to rest, velocity under an effort, and velocity of a drive with the target v₀.
-fn damped(model: DriveModel, damping: f64) -> [f64; 3] {
+fn damped_motion(model: DriveModel, damping: f64) -> [f64; 3] {
     let wheel =
         |drive: DriveCfg| Wheel::on(weightless(), DriveCfg { model, ..drive }, hinge().dynamics(damping, 0.0), MOMENT);
     let mut coasting = wheel(passive());
     coasting.lab.write_joints(coasting.robot, &[0.0], &[START]);
     coasting.lab.run(2.0);
     let mut pushed = wheel(passive());
-    pushed.effort(EFFORT);
+    pushed.set_effort(EFFORT);
     pushed.lab.run(2.0);
     let mut driven = wheel(implicit(0.0, DRIVE));
-    driven.speed(START);
+    driven.set_target_velocity(START);
     driven.lab.run(2.0);
     [coasting.q(), pushed.v(), driven.v()]
 }
@@ -33,7 +33,7 @@ fn damped(model: DriveModel, damping: f64) -> [f64; 3] {
 fn holds() {
     law(module_path!(), "way = I v₀/B; v = τ/B; v = d v*/(d + B)", |m| {
         for (name, model) in [("implicit", DriveModel::Implicit), ("actuator", DriveModel::Actuator)] {
-            let (found, more) = (damped(model, DAMPING), damped(model, 1.01 * DAMPING));
+            let (found, more) = (damped_motion(model, DAMPING), damped_motion(model, 1.01 * DAMPING));
             let rows = [
                 ("way to rest", "rad", MOMENT * START / DAMPING),
                 ("velocity under an effort", "rad/s", EFFORT / DAMPING),

@@ -31,24 +31,24 @@ impl Wheel {
     }
 
     /// Sets the target position \[rad\].
-    pub(super) fn aim(&mut self, position: f64) {
+    pub(super) fn set_target_position(&mut self, position: f64) {
         self.lab.sim.robot_mut(self.robot).set_qpos_target(&row(&[position]), None, None).unwrap();
     }
 
     /// Sets the target velocity \[rad/s\].
-    pub(super) fn speed(&mut self, velocity: f64) {
+    pub(super) fn set_target_velocity(&mut self, velocity: f64) {
         self.lab.sim.robot_mut(self.robot).set_qvel_target(&row(&[velocity]), None, None).unwrap();
     }
 
     /// Sets the joint effort, which adds to that of the drive \[N m\].
-    pub(super) fn effort(&mut self, effort: f64) {
-        self.lab.push_joints(self.robot, &[effort]);
+    pub(super) fn set_effort(&mut self, effort: f64) {
+        self.lab.set_joint_efforts(self.robot, &[effort]);
     }
 
     /// Sets an external torque \[N m\].
-    pub(super) fn load(&mut self, torque: f64) {
+    pub(super) fn set_external_torque(&mut self, torque: f64) {
         let [zero, torque] = [0.0, torque].map(|z| nalgebra::Vector3::new(0.0, 0.0, z));
-        self.lab.push_link(self.robot, "wheel", zero, torque);
+        self.lab.set_link_wrench(self.robot, "wheel", zero, torque);
     }
 
     pub(super) fn q(&self) -> f64 {
@@ -60,7 +60,7 @@ impl Wheel {
     }
 
     /// Effort of the drive in the last step \[N m\].
-    pub(super) fn given(&self) -> f64 {
+    pub(super) fn drive_effort(&self) -> f64 {
         self.lab.effort(self.robot)[0]
     }
 }

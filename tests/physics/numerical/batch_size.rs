@@ -12,7 +12,7 @@ fn holds() {
         let mut alone = Fall::new(legged(1, 1), 0.0);
         let (mut many, mut nudged) = (Fall::new(legged(64, 2), 0.0), Fall::new(legged(64, 2), 1e-12));
         let mut pushed = Fall::new(legged(64, 2), 0.0);
-        pushed.hasten(1, 0.5);
+        pushed.add_joint_velocity(1, 0.5);
         for fall in [&mut alone, &mut many, &mut nudged, &mut pushed] {
             fall.update(120);
             assert!(fall.has_landed());

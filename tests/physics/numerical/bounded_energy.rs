@@ -18,15 +18,15 @@ fn changes(cfg: SimulationManagerCfg) -> ([f64; 2], Vec<[f64; 2]>) {
     lab.write_joints(robot, &[START], &[0.0]);
     let (mut first, mut last, mut curve) = (0.0_f64, 0.0_f64, Vec::new());
     let steps = (200.0 / lab.dt()).round() as u32;
-    lab.watch(steps, |t, sim| {
+    lab.run_with(steps, |t, sim| {
         let robot = sim.robot(robot);
         let (q, v) = (robot.qpos()[(0, 0)], robot.qvel()[(0, 0)]);
         let change = 0.5 * v * v / G - q.cos() + START.cos();
         if t < 10.0 {
-            first = worse(first, change.abs());
+            first = max_or_nan(first, change.abs());
             curve.push([t, change]);
         } else if t > 190.0 {
-            last = worse(last, change.abs());
+            last = max_or_nan(last, change.abs());
         }
     });
     ([first, last], curve)
@@ -38,7 +38,7 @@ fn holds() {
         let swing = (0..10_000)
             .map(|k| START * f64::from(k) / 1e4)
             .map(|q| 0.5 * STEP * (2.0 * G * (q.cos() - START.cos())).sqrt() * q.sin())
-            .fold(0.0, worse);
+            .fold(0.0, max_or_nan);
         let ([first, last], curve) = changes(with_dt(STEP, earth()));
         let next = (0.02 * swing, "the next term, h ω");
         m.row("largest change in the first 10 s, of m g l", "", swing, first, next);

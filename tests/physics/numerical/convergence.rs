@@ -22,9 +22,9 @@ pub(super) fn double_pendulum(integrator: Integrator, dt: f64) -> Vec<f64> {
     lab.q(robot)
 }
 
-/// Errors (h, e) of the solutions `of(h)` against the reference solution `answer`.
-pub(super) fn errors(steps: &[f64], answer: &[f64], of: impl Fn(f64) -> Vec<f64>) -> Vec<[f64; 2]> {
-    let error = |h: f64| of(h).iter().zip(answer).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+/// Errors (h, e) of the solutions `of(h)` against the reference solution `reference`.
+pub(super) fn errors(steps: &[f64], reference: &[f64], of: impl Fn(f64) -> Vec<f64>) -> Vec<[f64; 2]> {
+    let error = |h: f64| of(h).iter().zip(reference).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     steps.iter().map(|&h| [h, error(h)]).collect()
 }
 
@@ -36,10 +36,10 @@ pub(super) fn order(errors: &[[f64; 2]]) -> f64 {
 
 /// Tolerance of the order `of_law`: the deviation of the order of an explicitly written integrator, and the effect of
 /// rounding on the errors.
-pub(super) fn off(written_out: &[[f64; 2]], of_law: f64, rounding: f64) -> f64 {
+pub(super) fn order_tolerance(explicit_steps: &[[f64; 2]], of_law: f64, rounding: f64) -> f64 {
     // log₂(e₁/e₂): the relative error of the larger error is smaller.
-    let smallest = written_out[written_out.len() - 1][1];
-    (order(written_out) - of_law).abs() + 2.0 * rounding / smallest / LN_2
+    let smallest = explicit_steps[explicit_steps.len() - 1][1];
+    (order(explicit_steps) - of_law).abs() + 2.0 * rounding / smallest / LN_2
 }
 
 /// The reference solution: RK4 in steps of an eighth of a millisecond, with an error of 1e-12.

@@ -16,7 +16,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Integrator of the steps.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Steps {
+pub(crate) enum Method {
     Euler,
     Implicit,
     RungeKutta,
@@ -33,11 +33,11 @@ fn accelerations(q: Vector2<f64>, v: Vector2<f64>, h: f64) -> Vector2<f64> {
 
 /// State: the angles of the rods \[rad\], and their velocities \[rad/s\].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rods(Vector4<f64>);
+pub(crate) struct RodState(Vector4<f64>);
 
-impl Rods {
+impl RodState {
     /// Converts the angles \[rad\] and velocities \[rad/s\] of the joints.
-    pub(crate) fn of_joints([q, r]: [f64; 2], [v, w]: [f64; 2]) -> Self {
+    pub(crate) fn from_joints([q, r]: [f64; 2], [v, w]: [f64; 2]) -> Self {
         Self(Vector4::new(q, q + r, v, v + w))
     }
 
@@ -48,7 +48,7 @@ impl Rods {
     }
 
     /// The state after a step of `h` \[s\], which may be negative.
-    pub(crate) fn after(self, steps: Steps, h: f64) -> Self {
+    pub(crate) fn step(self, steps: Method, h: f64) -> Self {
         let x = self.0;
         let velocity = |x: Vector4<f64>| Vector2::new(x.z, x.w);
         let rate = |x: Vector4<f64>| {
@@ -56,15 +56,15 @@ impl Rods {
             Vector4::new(x.z, x.w, a.x, a.y)
         };
         Self(match steps {
-            Steps::RungeKutta => {
+            Method::RungeKutta => {
                 let a = rate(x);
                 let b = rate(x + 0.5 * h * a);
                 let c = rate(x + 0.5 * h * b);
                 let d = rate(x + h * c);
                 x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
             }
-            Steps::Euler | Steps::Implicit => {
-                let by_velocity = if matches!(steps, Steps::Implicit) { h } else { 0.0 };
+            Method::Euler | Method::Implicit => {
+                let by_velocity = if matches!(steps, Method::Implicit) { h } else { 0.0 };
                 let v = velocity(x) + h * accelerations(x.xy(), velocity(x), by_velocity);
                 let q = x.xy() + h * v;
                 Vector4::new(q.x, q.y, v.x, v.y)
@@ -91,12 +91,12 @@ impl Rods {
     }
 
     /// Jacobian of a step with respect to the state.
-    fn growth(self, steps: Steps, h: f64) -> Matrix4<f64> {
+    fn step_jacobian(self, steps: Method, h: f64) -> Matrix4<f64> {
         // A third of the digits: the optimal step of a central difference of numbers with full precision.
         let small = f64::EPSILON.cbrt();
         let column = |i: usize| {
             let by = Vector4::ith(i, small);
-            let [up, down] = [self.0 + by, self.0 - by].map(|x| Self(x).after(steps, h).0);
+            let [up, down] = [self.0 + by, self.0 - by].map(|x| Self(x).step(steps, h).0);
             (up - down) / (2.0 * small)
         };
         Matrix4::from_columns(&[0, 1, 2, 3].map(column))
@@ -106,31 +106,31 @@ impl Rods {
 /// State after steps of `sizes` \[s\] (negative: backward), and the bound of its rounding error. The bound adds half a
 /// digit of each state variable in each step, propagated to the end: the larger angle \[rad\] and velocity \[rad/s\]
 /// error of the joints.
-pub(crate) fn swing(start: Rods, steps: Steps, sizes: &[f64]) -> (Rods, [f64; 2]) {
-    let mut way = vec![start];
+pub(crate) fn integrate(start: RodState, steps: Method, sizes: &[f64]) -> (RodState, [f64; 2]) {
+    let mut states = vec![start];
     for (k, &h) in sizes.iter().enumerate() {
-        way.push(way[k].after(steps, h));
+        states.push(states[k].step(steps, h));
     }
     let mut grown = Matrix4::<f64>::identity();
     let mut rounding = Vector4::zeros();
-    for (pair, &h) in way.windows(2).zip(sizes).rev() {
+    for (pair, &h) in states.windows(2).zip(sizes).rev() {
         rounding += grown.abs() * pair[1].0.abs() * (f64::EPSILON / 2.0);
-        grown *= pair[0].growth(steps, h);
+        grown *= pair[0].step_jacobian(steps, h);
     }
     // The angle of the lower joint is the difference of the angles of two rods.
     let [a, b, v, w] = rounding.into();
-    (way[sizes.len()], [a + b, v + w])
+    (states[sizes.len()], [a + b, v + w])
 }
 
 /// Angles of the joints after [`TIME`], in steps of `h`.
-pub(super) fn angles(steps: Steps, h: f64) -> Vec<f64> {
+pub(super) fn angles(steps: Method, h: f64) -> Vec<f64> {
     let count = (TIME / h).round() as u32;
-    (0..count).fold(Rods::of_joints(START.0, START.1), |rods, _| rods.after(steps, h)).joints().0.to_vec()
+    (0..count).fold(RodState::from_joints(START.0, START.1), |rods, _| rods.step(steps, h)).joints().0.to_vec()
 }
 
 /// Errors at these steps, by the equations above.
-pub(super) fn errors(steps: &[f64], integrator: Steps) -> Vec<[f64; 2]> {
-    convergence::errors(steps, &angles(Steps::RungeKutta, convergence::FINE), |h| angles(integrator, h))
+pub(super) fn errors(steps: &[f64], integrator: Method) -> Vec<[f64; 2]> {
+    convergence::errors(steps, &angles(Method::RungeKutta, convergence::FINE), |h| angles(integrator, h))
 }
 
 /// Bound of the angles' rounding error \[rad\] at steps of `h` or more: half a digit of angles of up to 3 rad in each

@@ -8,7 +8,7 @@ use crate::lab::*;
 use kinetoscope_testkit::worlds::object;
 
 /// Velocities after half a second, minus the common initial velocity.
-fn parted(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {
+fn final_velocities(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(weightless());
     let mut ball = |uid: &str, at: [f64; 3]| {
         let ball = object(uid, ObjectShape::Sphere { radius: 0.1 }, at);
@@ -25,7 +25,8 @@ fn parted(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {
 fn holds() {
     law(module_path!(), "v' - u = v'(u = 0)", |m| {
         let along = [7.0, -3.0, 5.0];
-        let (here, there, faster) = (parted([0.0; 3], 0.0), parted(along, 0.0), parted(along, 0.001));
+        let (here, there, faster) =
+            (final_velocities([0.0; 3], 0.0), final_velocities(along, 0.0), final_velocities(along, 0.001));
         for (k, name) in ["left", "right"].into_iter().enumerate() {
             for (axis, letter) in ["x", "y"].into_iter().enumerate() {
                 let quantity = format!("velocity of the {name} ball, {letter}");

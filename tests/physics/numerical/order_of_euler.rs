@@ -4,8 +4,8 @@
 //! [`double_pendulum`](super::double_pendulum), and rounding. The error itself equals that of these steps up to
 //! rounding. Control: Runge-Kutta.
 
-use super::convergence::{double_pendulum, errors, off, order, reference};
-use super::double_pendulum::{self as written_out, Steps, rounding};
+use super::convergence::{double_pendulum, errors, order, order_tolerance, reference};
+use super::double_pendulum::{self as written_out, Method, rounding};
 use crate::law::law;
 use kinetoscope::sim::Integrator;
 
@@ -17,8 +17,8 @@ fn holds() {
         let implicit = errors(&steps, &answer, |h| double_pendulum(Integrator::Implicit, h));
         let coarse = [1.6e-2, 8e-3, 4e-3, 2e-3];
         let runge_kutta = errors(&coarse, &answer, |h| double_pendulum(Integrator::Rk4, h));
-        let expected = written_out::errors(&steps, Steps::Euler);
-        let next = (off(&expected, 1.0, rounding(5e-4)), "the next terms of the error");
+        let expected = written_out::errors(&steps, Method::Euler);
+        let next = (order_tolerance(&expected, 1.0, rounding(5e-4)), "the next terms of the error");
         m.row("order", "", 1.0, order(&euler), next);
         m.control("order", "with Runge-Kutta", order(&runge_kutta));
         m.row("error at 0.5 ms", "rad", expected[3][1], euler[3][1], (rounding(5e-4), "rounding of its steps"));

@@ -4,10 +4,10 @@
 //! Tolerance: the next terms of the error, from the explicit steps of [`free_rotation`](super::free_rotation) for
 //! either version, and rounding of half a digit of a quaternion in each step.
 
-use super::convergence::{errors, off, order};
+use super::convergence::{errors, order, order_tolerance};
 use super::free_rotation;
 use crate::lab::*;
-use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope::sim::Integrator;
 
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.025];
@@ -29,7 +29,7 @@ fn orientation(integrator: Integrator, dt: f64) -> Vec<f64> {
 #[test]
 fn holds() {
     law(module_path!(), "e(h) = C h⁴ (4.x), C h² (2.2.2)", |m| {
-        let (of_law, corrected) = if TARGET == Target::V4 { (4.0, true) } else { (2.0, false) };
+        let (of_law, corrected) = if BUILD_VERSION == SupportedVersion::V4 { (4.0, true) } else { (2.0, false) };
         let answer = orientation(Integrator::Rk4, FINE);
         let steps = [6.4e-2, 3.2e-2, 1.6e-2, 8e-3];
         let found = errors(&steps, &answer, |h| orientation(Integrator::Rk4, h));
@@ -37,7 +37,7 @@ fn holds() {
         let written_out = |h| free_rotation::orientation(MOMENTS, SPIN, TIME, h, corrected);
         let expected = errors(&steps, &written_out(FINE), written_out);
         let rounding = (TIME / 8e-3 + TIME / FINE) * f64::EPSILON / 2.0;
-        let next = (off(&expected, of_law, rounding), "the next terms of the error");
+        let next = (order_tolerance(&expected, of_law, rounding), "the next terms of the error");
         m.row("order", "", of_law, order(&found), next);
         m.control("order", "with Euler", order(&euler));
         let (is, was) = (found[3][1], expected[3][1]);
@@ -45,6 +45,6 @@ fn holds() {
         m.control("error at 8 ms", "at 16 ms", found[2][1]);
         let curves = [("RK4", found), ("Euler", euler)];
         m.plot("Torque-free top after 1.024 s", ["step [s]", "error of the quaternion"], true, &curves);
-        m.lines_differ("4.x integrates orientations with order 4 since its RK4 was mended; 2.2.2 has order 2");
+        m.versions_differ("4.x integrates orientations with order 4 since its RK4 was mended; 2.2.2 has order 2");
     });
 }

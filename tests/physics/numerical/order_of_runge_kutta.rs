@@ -3,8 +3,8 @@
 //! Tolerance: the next terms of the error, from the explicit steps of [`double_pendulum`](super::double_pendulum), and
 //! rounding. The error itself equals that of these steps up to rounding. Control: Euler.
 
-use super::convergence::{double_pendulum, errors, off, order, reference};
-use super::double_pendulum::{self as written_out, Steps, rounding};
+use super::convergence::{double_pendulum, errors, order, order_tolerance, reference};
+use super::double_pendulum::{self as written_out, Method, rounding};
 use crate::law::law;
 use kinetoscope::sim::Integrator;
 
@@ -13,8 +13,8 @@ fn holds() {
     law(module_path!(), "e(h) = C h⁴", |m| {
         let (steps, answer) = ([4e-3, 2e-3], reference());
         let found = errors(&steps, &answer, |h| double_pendulum(Integrator::Rk4, h));
-        let expected = written_out::errors(&steps, Steps::RungeKutta);
-        let next = (off(&expected, 4.0, rounding(2e-3)), "the next terms of the error");
+        let expected = written_out::errors(&steps, Method::RungeKutta);
+        let next = (order_tolerance(&expected, 4.0, rounding(2e-3)), "the next terms of the error");
         m.row("order", "", 4.0, order(&found), next);
         let euler = errors(&steps, &answer, |h| double_pendulum(Integrator::Euler, h));
         m.control("order", "with Euler", order(&euler));

@@ -1,7 +1,7 @@
 //! Scenes for comparisons of different runs: quadrupeds with drives that fall on the ground.
 
 use crate::lab::*;
-use crate::law::worse;
+use crate::law::max_or_nan;
 
 /// A quadruped in each environment that falls from half a meter, with its own rotation and push.
 #[derive(Debug)]
@@ -37,7 +37,7 @@ impl Fall {
     }
 
     /// Adds to the velocity of the first joint of an environment \[rad/s\].
-    pub(super) fn hasten(&mut self, env: usize, faster: f64) {
+    pub(super) fn add_joint_velocity(&mut self, env: usize, faster: f64) {
         let mut robot = self.sim.robot_mut(self.robot);
         let mut v = robot.read().qvel().row(env).to_vec();
         v[0] += faster;
@@ -48,7 +48,7 @@ impl Fall {
     #[track_caller]
     pub(super) fn update(&mut self, steps: u32) {
         self.sim.update(steps);
-        assert_well(&self.sim);
+        assert_healthy(&self.sim);
     }
 
     /// The complete state of one environment.
@@ -77,5 +77,5 @@ pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
         let apart = (a - b).abs();
         if a.to_bits() != b.to_bits() && apart == 0.0 { f64::INFINITY } else { apart }
     };
-    a.iter().zip(b).map(apart).fold(0.0, worse)
+    a.iter().zip(b).map(apart).fold(0.0, max_or_nan)
 }

@@ -7,7 +7,7 @@
 use crate::lab::*;
 
 /// Angle and velocity after 2000 steps.
-fn swung(length: f64, dt: f64) -> [f64; 2] {
+fn final_state(length: f64, dt: f64) -> [f64; 2] {
     let mut lab = Lab::new(with_dt(dt, earth()));
     let joint = Joint::hinge("pivot", ["base", "rod"], [0.0, 1.0, 0.0]);
     let moment = length * length / 12.0;
@@ -15,7 +15,7 @@ fn swung(length: f64, dt: f64) -> [f64; 2] {
     let robot = lab.mechanism(&urdf(&[base(), rod], &[joint]));
     lab.write_joints(robot, &[1.1], &[0.0]);
     lab.sim.update(2000);
-    assert_well(&lab.sim);
+    assert_healthy(&lab.sim);
     [lab.q(robot)[0], lab.v(robot)[0]]
 }
 
@@ -23,11 +23,11 @@ fn swung(length: f64, dt: f64) -> [f64; 2] {
 fn holds() {
     law(module_path!(), "q(3 L, √3 t) = q(L, t), q̇(3 L, √3 t) = q̇(L, t)/√3", |m| {
         let root = 3.0_f64.sqrt();
-        let ([q, v], [long_q, long_v]) = (swung(0.6, 1e-3), swung(1.8, root * 1e-3));
+        let ([q, v], [long_q, long_v]) = (final_state(0.6, 1e-3), final_state(1.8, root * 1e-3));
         let rounding = (1e-10, "rounding of 2000 steps");
         m.row("angle of the long one", "rad", q, long_q, rounding);
         m.row("velocity of the long one", "rad/s", v / root, long_v, rounding);
-        let [same_q, same_v] = swung(1.8, 1e-3);
+        let [same_q, same_v] = final_state(1.8, 1e-3);
         m.control("angle of the long one", "at the same time", same_q);
         m.control("velocity of the long one", "at the same time", same_v);
     });

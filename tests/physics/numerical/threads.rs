@@ -7,7 +7,7 @@ use crate::law::law;
 
 const ENVS: usize = 16;
 
-fn fallen(threads: usize, nudge: f64) -> Vec<f64> {
+fn final_states(threads: usize, nudge: f64) -> Vec<f64> {
     let mut fall = Fall::new(legged(ENVS, threads), nudge);
     fall.update(150);
     assert!(fall.has_landed());
@@ -17,8 +17,8 @@ fn fallen(threads: usize, nudge: f64) -> Vec<f64> {
 #[test]
 fn holds() {
     law(module_path!(), "x(8 threads) = x(1 thread), bit for bit", |m| {
-        let one = fallen(1, 0.0);
-        m.row("largest difference", "", 0.0, difference(&one, &fallen(8, 0.0)), (0.0, "the same bits"));
-        m.control("largest difference", "with a nudge of 1e-9 rad/s", difference(&one, &fallen(8, 1e-9)));
+        let one = final_states(1, 0.0);
+        m.row("largest difference", "", 0.0, difference(&one, &final_states(8, 0.0)), (0.0, "the same bits"));
+        m.control("largest difference", "with a nudge of 1e-9 rad/s", difference(&one, &final_states(8, 1e-9)));
     });
 }

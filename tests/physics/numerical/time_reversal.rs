@@ -6,7 +6,7 @@
 //! so the backward step cancels the first error term of the forward step. Rounding adds half a digit of each state
 //! variable in each step, propagated to the end. Control: Euler, whose error is not canceled.
 
-use super::double_pendulum::{Rods, Steps, swing};
+use super::double_pendulum::{Method, RodState, integrate};
 use crate::articulated::double_pendulum_energy;
 use crate::lab::*;
 
@@ -16,11 +16,11 @@ const STEPS: usize = 1_000;
 
 /// Largest errors of the angles and of the velocities.
 fn errors((q, v): ([f64; 2], [f64; 2])) -> [f64; 2] {
-    [worse((q[0] - START[0]).abs(), (q[1] - START[1]).abs()), worse(v[0].abs(), v[1].abs())]
+    [max_or_nan((q[0] - START[0]).abs(), (q[1] - START[1]).abs()), max_or_nan(v[0].abs(), v[1].abs())]
 }
 
 /// Angles and velocities of the joints after the way forth and back.
-fn returned(cfg: SimulationManagerCfg) -> ([f64; 2], [f64; 2]) {
+fn final_state(cfg: SimulationManagerCfg) -> ([f64; 2], [f64; 2]) {
     let mut lab = Lab::new(with_dt(STEP, cfg));
     let robot = lab.mechanism(&double_pendulum_energy::text());
     let pair = |of: Vec<f64>| [of[0], of[1]];
@@ -34,10 +34,10 @@ fn returned(cfg: SimulationManagerCfg) -> ([f64; 2], [f64; 2]) {
 
 /// The same with explicit steps: errors of the angles \[rad\] and velocities \[rad/s\], including the bound of
 /// rounding.
-fn written_out() -> [f64; 2] {
+fn error_bound() -> [f64; 2] {
     // A backward step equals a forward step of the pendulum with reversed velocities.
     let sizes = [[STEP; STEPS], [-STEP; STEPS]].concat();
-    let (end, rounding) = swing(Rods::of_joints(START, [0.0; 2]), Steps::RungeKutta, &sizes);
+    let (end, rounding) = integrate(RodState::from_joints(START, [0.0; 2]), Method::RungeKutta, &sizes);
     let left = errors(end.joints());
     [left[0] + rounding[0], left[1] + rounding[1]]
 }
@@ -45,8 +45,8 @@ fn written_out() -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "x(t, -v(t)) after t = x(0)", |m| {
-        let ([q, v], [euler_q, euler_v]) = (errors(returned(rk4(earth()))), errors(returned(earth())));
-        let [left_q, left_v] = written_out();
+        let ([q, v], [euler_q, euler_v]) = (errors(final_state(rk4(earth()))), errors(final_state(earth())));
+        let [left_q, left_v] = error_bound();
         let why = "what 2000 steps of RK4 leave, and rounding";
         m.row("largest error of an angle", "rad", 0.0, q, (left_q, why));
         m.row("largest error of a velocity", "rad/s", 0.0, v, (left_v, why));

@@ -12,7 +12,7 @@ use kinetoscope_testkit::worlds::ball;
 const RADIUS: f64 = 0.1;
 
 /// Velocities after the hit; only the second ball has the drag `drag` \[N s/m\].
-fn hit(impact: f64, restitution: f64, drag: f64) -> [Vector3<f64>; 2] {
+fn collide(impact: f64, restitution: f64, drag: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(SimulationManagerCfg { friction: [0.0; 3], ..with_dt(1e-4, weightless()) });
     let mut ball = |uid: &str, at: [f64; 3], linear_damping: f64| {
         let ball = ball(uid, RADIUS, 0.17, at);
@@ -29,9 +29,9 @@ fn holds() {
     law(module_path!(), "v₂ = v cos α along the centres, v₁ = v sin α across", |m| {
         let impact = RADIUS;
         let alpha = (impact / (2.0 * RADIUS)).asin();
-        let [cue, other] = hit(impact, 1.0, 0.0);
-        let [dull_cue, dull_other] = hit(impact, 0.3, 0.0);
-        let [full_cue, full_other] = hit(0.0, 1.0, 0.0);
+        let [cue, other] = collide(impact, 1.0, 0.0);
+        let [dull_cue, dull_other] = collide(impact, 0.3, 0.0);
+        let [full_cue, full_other] = collide(0.0, 1.0, 0.0);
         let turn = |v: &Vector3<f64>| v.y.atan2(v.x);
         let solver = (2e-8 * alpha.cos(), "the solver's 1e-8 of the impulse, on each ball");
         let bounce = (0.01, "the line of centres turns while they touch");
@@ -43,12 +43,12 @@ fn holds() {
         m.row("momentum across the way, of m v", "", 0.0, cue.y + other.y, solver);
         m.row("energy, of m v²/2", "", 1.0, cue.norm_squared() + other.norm_squared(), bounce);
         m.row("speed of the cue ball, full hit", "m/s", 0.0, full_cue.norm(), bounce);
-        let [held_cue, held_other] = hit(impact, 1.0, 0.1);
+        let [held_cue, held_other] = collide(impact, 1.0, 0.1);
         let [along, across] = [held_cue.x + held_other.x, held_cue.y + held_other.y];
         m.control("momentum along the way, of m v", "with a drag on the second", along);
         m.control("momentum across the way, of m v", "with a drag on the second", across);
         for quantity in ["momentum along the way, of m v", "momentum across the way, of m v"] {
-            m.lines_differ_in(quantity, "what each line's solver leaves, below its 1e-8");
+            m.versions_differ_in(quantity, "what each line's solver leaves, below its 1e-8");
         }
         m.control("speed of the struck ball", "with a restitution of 0.3", dull_other.norm());
         m.control("angle between them", "with a restitution of 0.3", turn(&dull_cue) - turn(&dull_other));
@@ -59,7 +59,7 @@ fn holds() {
         );
         m.control("direction of the struck ball", "hit in the middle", turn(&full_other));
         m.control("speed of the cue ball", "hit in the middle", full_cue.norm());
-        let alone = hit(3.0 * RADIUS, 1.0, 0.0)[0];
+        let alone = collide(3.0 * RADIUS, 1.0, 0.0)[0];
         m.control("speed of the cue ball, full hit", "past the other", alone.norm());
     });
 }

@@ -17,7 +17,7 @@ const START: f64 = 1.0;
 const FRICTION: f64 = 0.1;
 
 /// Mean deceleration from 0.1 s to 0.2 s, mean upward acceleration in that time, and the velocity after 1 s.
-fn bowled(friction: f64) -> [f64; 3] {
+fn roll_out(friction: f64) -> [f64; 3] {
     let mut lab = Lab::new(slope(0.0, friction));
     let robot = lab.free(&urdf(&[Link::ball("ball", 3.0, RADIUS)], &[]), [0.0, 0.0, RADIUS - depth(G)]);
     lab.write_root_velocity(robot, [START, 0.0, 0.0], [0.0; 3]);
@@ -33,7 +33,7 @@ fn bowled(friction: f64) -> [f64; 3] {
 fn holds() {
     law(module_path!(), "v' = -μ (g + c) until t = 2 v₀/(7 μ g), then v = 5/7 v₀", |m| {
         let arm = START * depth(G) / (2.0 * RADIUS);
-        let ([slowed, risen, rolling], [_, _, rough], slippery) = (bowled(FRICTION), bowled(0.3), bowled(0.0));
+        let ([slowed, risen, rolling], [_, _, rough], slippery) = (roll_out(FRICTION), roll_out(0.3), roll_out(0.0));
         let sliding = "deceleration while it slides, less μ c";
         m.row(sliding, "m/s²", FRICTION * G, slowed - FRICTION * risen, (SOLVER, "tolerance of the solver"));
         m.row("velocity in the end", "m/s", 5.0 / 7.0 * START, rolling, (arm, "the arm is half of the depth shorter"));

@@ -11,7 +11,7 @@ const MASS: f64 = 0.5;
 const FORCE: f64 = 300.0;
 
 /// Velocities across the rod at the struck end and at two thirds of it; both points are frames of fixed links.
-fn struck(off_centre: bool) -> [f64; 2] {
+fn velocities(off_centre: bool) -> [f64; 2] {
     let moment = MASS * LENGTH * LENGTH / 12.0;
     let mut lab = Lab::new(weightless());
     let frame = |name| Link::new(name, 0.0, [0.0; 3]);
@@ -20,7 +20,7 @@ fn struck(off_centre: bool) -> [f64; 2] {
     let joints = [at("a", "end", -LENGTH / 2.0), at("b", "percussion", LENGTH / 6.0)];
     let robot = lab.free(&urdf(&links, &joints), [1.0, 2.0, 3.0]);
     let torque = if off_centre { -FORCE * LENGTH / 2.0 } else { 0.0 };
-    lab.push_link(robot, "rod", Vector3::new(0.0, FORCE, 0.0), Vector3::new(0.0, 0.0, torque));
+    lab.set_link_wrench(robot, "rod", Vector3::new(0.0, FORCE, 0.0), Vector3::new(0.0, 0.0, torque));
     lab.run(1e-3);
     // The rod has rotated by 2.5e-3 rad: world velocities of its points are transformed to its axes.
     ["end", "percussion"].map(|link| {
@@ -33,8 +33,8 @@ fn struck(off_centre: bool) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "v(x) = P/m (1 - 6 x/L): 4 P/m at the struck end, 0 at 2 L/3 from it", |m| {
-        let [end, percussion] = struck(true);
-        let central = struck(false);
+        let [end, percussion] = velocities(true);
+        let central = velocities(false);
         let impulse = FORCE * 1e-3;
         // The axes have rotated by ω h = 2.5 mrad since the velocity was P/m along the old y, which adds a cosine.
         let spin = impulse * (LENGTH / 2.0) / (MASS * LENGTH * LENGTH / 12.0);

@@ -16,7 +16,7 @@
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
 use crate::lab::*;
-use kinetoscope::sim::ObjectId;
+use kinetoscope::sim::RigidObjectId;
 use kinetoscope_testkit::worlds::ball;
 
 const BOARD: f64 = 10.0;
@@ -33,7 +33,7 @@ const FROM: f64 = 0.8;
 const UNTIL: f64 = 1.6;
 
 /// Mean accelerations between [`FROM`] and [`UNTIL`] \[m/s²\].
-struct Pulled {
+struct MeanAccelerations {
     /// Of the board, along the pull.
     board: f64,
     /// Mean over the balls, along the pull and upward.
@@ -44,12 +44,12 @@ fn drag() -> f64 {
     FRICTION[0] * (BOARD + BALLS as f64 * BALL) * G
 }
 
-fn pulled(friction_of_balls: f64) -> Pulled {
+fn pulled(friction_of_balls: f64) -> MeanAccelerations {
     let along = Vector3::new(0.5, 0.75_f64.sqrt(), 0.0);
     let mut lab = Lab::new(SimulationManagerCfg { ground: None, ..slope(0.0, 0.0) });
     let rail = Joint::slide("rail", ["base", "board"], along.into()).at([0.0, 0.0, 0.25]).dynamics(0.0, drag());
     let board = lab.mechanism(&urdf(&[base(), Link::brick("board", BOARD, [16.0, 16.0, 0.5])], &[rail]));
-    let balls: Vec<ObjectId> = (0..BALLS)
+    let balls: Vec<RigidObjectId> = (0..BALLS)
         .map(|k| {
             let side = |bit: usize| if k >> bit & 1 == 1 { 2.0 } else { -2.0 };
             let ball = ball(&format!("ball {k}"), RADIUS, BALL, [side(0), side(1), 0.5 + RADIUS]);
@@ -62,13 +62,13 @@ fn pulled(friction_of_balls: f64) -> Pulled {
         let mean = balls.sum::<Vector3<f64>>() / BALLS as f64;
         [lab.v(board)[0], mean.dot(&along), mean.z]
     };
-    lab.push_link(board, "board", PULL * along, Vector3::zeros());
+    lab.set_link_wrench(board, "board", PULL * along, Vector3::zeros());
     lab.run(FROM);
     let before = all(&lab);
     lab.run(UNTIL - FROM);
     let after = all(&lab);
     let [board, ball, up] = [0, 1, 2].map(|k: usize| (after[k] - before[k]) / (UNTIL - FROM));
-    Pulled { board, ball: [ball, up] }
+    MeanAccelerations { board, ball: [ball, up] }
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn holds() {
             m.control(of_board, "without friction of the balls", none.board);
             m.control(of_ball, "without friction of the balls", none.ball[0]);
 
-            let force = |p: &Pulled| p.board + n * BALL / BOARD * p.ball[0];
+            let force = |p: &MeanAccelerations| p.board + n * BALL / BOARD * p.ball[0];
             let pull = (PULL - drag()) / BOARD;
             for (quantity, found) in [("a + n m b/M", &rolling), ("a + n m b/M, balls slip", &slipping)] {
                 m.row(quantity, "m/s²", pull, force(found), solver);
@@ -99,7 +99,7 @@ fn holds() {
                 m.control(quantity, "without a tenth of the balls", other);
             }
 
-            let with_hops = |p: &Pulled| p.ball[0] - SLIPPERY * p.ball[1];
+            let with_hops = |p: &MeanAccelerations| p.ball[0] - SLIPPERY * p.ball[1];
             let quantity = "b - μ₂ c of balls that slip";
             m.row(quantity, "m/s²", SLIPPERY * G, with_hops(&slipping), solver);
             m.control(quantity, "with balls that roll", with_hops(&rolling));

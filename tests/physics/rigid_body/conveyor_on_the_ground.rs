@@ -29,9 +29,9 @@
 //! the pull. An impulse that changes the corner's velocity by 2 w, 7 J/M, moves it by 3 μ₁ J/M across, ε = 6/7 μ₁ w/V
 //! of its path, and friction is low by ε²/2 = 4e-4 of itself. For this reason `conveyor` uses a rail.)
 
-use super::soft_contact::{LARGEST, TIME};
+use super::soft_contact::{MAX_IMPEDANCE, TIME_CONSTANT};
 use crate::lab::*;
-use kinetoscope::sim::ObjectId;
+use kinetoscope::sim::RigidObjectId;
 use kinetoscope_testkit::worlds::{ball, object};
 use nalgebra::{Vector2, Vector3};
 
@@ -52,7 +52,7 @@ fn expected() -> [f64; 2] {
 }
 
 /// Root mean squares of the velocity errors of box and balls \[m/s\].
-fn off(friction_of_balls: f64) -> [f64; 2] {
+fn rms_errors(friction_of_balls: f64) -> [f64; 2] {
     let mut lab = Lab::new(slope(0.0, FRICTION[0]));
     let board = object("board", ObjectShape::Box { size: [20.0, 20.0, 0.5] }, [0.0, 0.0, 0.25]);
     let board = lab.object(RigidObjectCfg { friction: Some([0.0; 3]), mass: Some(BOX), ..board });
@@ -61,15 +61,15 @@ fn off(friction_of_balls: f64) -> [f64; 2] {
         let ball = ball(&format!("ball {k}"), RADIUS, BALL, [place(k / ROWS), place(k % ROWS), 0.5 + RADIUS]);
         lab.object(RigidObjectCfg { friction: Some([friction_of_balls, 0.0, 0.0]), ..ball })
     };
-    let balls: Vec<ObjectId> = (0..ROWS * ROWS).map(&mut add).collect();
+    let balls: Vec<RigidObjectId> = (0..ROWS * ROWS).map(&mut add).collect();
     lab.run(0.5);
     let along = Vector2::new(0.5, 0.75_f64.sqrt());
-    lab.push(board, PULL * Vector3::new(along.x, along.y, 0.0), Vector3::zeros());
+    lab.set_object_wrench(board, PULL * Vector3::new(along.x, along.y, 0.0), Vector3::zeros());
     let [a, b] = expected();
     let steps = (SECONDS / lab.dt()).round() as u32;
     let mut squares = [0.0; 2];
-    lab.watch(steps, |t, sim| {
-        let apart = |id: ObjectId, rate: f64| (body(sim, id).velocity.xy() - rate * t * along).norm_squared();
+    lab.run_with(steps, |t, sim| {
+        let apart = |id: RigidObjectId, rate: f64| (body(sim, id).velocity.xy() - rate * t * along).norm_squared();
         squares[0] += apart(board, a);
         squares[1] += balls.iter().map(|&ball| apart(ball, b)).sum::<f64>() / balls.len() as f64;
     });
@@ -79,12 +79,12 @@ fn off(friction_of_balls: f64) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "V = a t, v = b t; b = (F - μ₁ (M + n m) g)/(7/2 M + n m), a = 7/2 b", |m| {
-        let ([board, ball], [alone, left]) = (off(FRICTION[1]), off(0.0));
+        let ([board, ball], [alone, left]) = (rms_errors(FRICTION[1]), rms_errors(0.0));
         let [a, _] = expected();
         let others = (ROWS * ROWS) as f64 * BALL;
         // The root mean square of a t over the time.
         let fast = a * SECONDS / 3.0_f64.sqrt();
-        let hops = 2.0 * 1e-3 * FRICTION[0] * 2.0 / (LARGEST * TIME) * fast;
+        let hops = 2.0 * 1e-3 * FRICTION[0] * 2.0 / (MAX_IMPEDANCE * TIME_CONSTANT) * fast;
         let on_board = FRICTION[0] * hops * (BOX + others) / (BOX + 2.0 / 7.0 * others);
         let on_ball = 2.0 / 7.0 * on_board + 2.0 * hops / G * a;
         let why = "momentum of hops, of two steps on a contact that slips";
@@ -94,7 +94,7 @@ fn holds() {
         let quantity = "root mean square error of the balls";
         m.row(quantity, "m/s", 0.0, ball, (on_ball, why));
         m.control(quantity, "without friction of the balls", left);
-        m.lines_differ(
+        m.versions_differ(
             "hops are chaotic: each line's solver rounds in its own way; what they can do is in the tolerance",
         );
     });

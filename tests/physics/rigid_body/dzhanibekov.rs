@@ -45,7 +45,7 @@ fn flips(w: [f64; 3]) -> Vec<f64> {
     let robot = lab.free(&urdf(&[Link::new("body", 1.0, MOMENTS)], &[]), [0.0; 3]);
     lab.write_root_velocity(robot, [0.0; 3], w);
     let (mut before, mut times) = ([0.0, w[1]], Vec::new());
-    lab.watch(12_000, |t, sim: &SimulationManager| {
+    lab.run_with(12_000, |t, sim: &SimulationManager| {
         let now = [t, sim.robot(robot).root_ang_vel_b()[(0, 1)]];
         if now[1] * before[1] < 0.0 {
             times.push(before[0] + (t - before[0]) * before[1] / (before[1] - now[1]));

@@ -5,7 +5,7 @@
 //! error x of one bounce is (1 + x)^10 - 1 after ten. The height after one fall is predicted by the recursion, up to
 //! the error of MuJoCo's impedance.
 
-use crate::bounce::{apex, apex_off, apex_rest};
+use crate::bounce::{apex, apex_error, apex_impedance_error};
 use crate::lab::*;
 use kinetoscope_testkit::worlds::ball;
 
@@ -22,7 +22,7 @@ fn apexes(restitution: Option<f64>, bounces: usize) -> (Vec<f64>, Vec<[f64; 2]>)
     let ball = lab.object(RigidObjectCfg { restitution, ..ball });
     let (mut apexes, mut rising, mut curve) = (Vec::new(), false, Vec::new());
     let steps = 6_400 * (bounces as u32 + 1);
-    lab.watch(steps, |t, sim| {
+    lab.run_with(steps, |t, sim| {
         let ball = body(sim, ball);
         let height = ball.position.z - RADIUS;
         if rising && ball.velocity.z <= 0.0 {
@@ -42,14 +42,14 @@ fn holds() {
         let (mut curves, mut soft) = (Vec::new(), f64::NAN);
         for (e, name) in [(1.0, "e = 1"), (0.8, "e = 0.8"), (0.5, "e = 0.5")] {
             let (found, curve) = apexes(Some(e), 2);
-            let tolerance = (apex_off(e, HEIGHT, H, G), "the steps of a contact, wherever it begins in one");
+            let tolerance = (apex_error(e, HEIGHT, H, G), "the steps of a contact, wherever it begins in one");
             m.row(&format!("apex, {name}"), "m", e * e * HEIGHT, found[0], tolerance);
-            let rest = (apex_rest(e, HEIGHT), "what the impedance leaves");
+            let rest = (apex_impedance_error(e, HEIGHT), "what the impedance leaves");
             m.row(&format!("apex, {name}, by its steps"), "m", apex(e, HEIGHT, H, G), found[0], rest);
             curves.push((name, curve));
         }
         let (ten, _) = apexes(Some(1.0), 10);
-        let in_ten = HEIGHT * ((1.0 + apex_off(1.0, HEIGHT, H, G) / HEIGHT).powi(10) - 1.0);
+        let in_ten = HEIGHT * ((1.0 + apex_error(1.0, HEIGHT, H, G) / HEIGHT).powi(10) - 1.0);
         m.row("apex after ten bounces, e = 1", "m", HEIGHT, ten[9], (in_ten, "the steps of ten contacts"));
         for name in ["e = 1", "e = 0.8", "e = 0.5"] {
             if soft.is_nan() {

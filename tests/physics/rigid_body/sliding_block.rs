@@ -18,21 +18,21 @@
 //! between two velocities.
 
 use super::incline::{Descent, FROM, UNTIL, descent};
-use super::soft_contact::{LARGEST, TIME, depth};
+use super::soft_contact::{MAX_IMPEDANCE, TIME_CONSTANT, depth};
 use crate::lab::*;
-use kinetoscope::sim::Cone;
+use kinetoscope::sim::FrictionCone;
 
 /// The solver stops when a step gains less than this \[m/s²\].
 pub(crate) const SOLVER: f64 = 1e-6;
 
-fn sliding(friction: f64, cone: Cone) -> Descent {
+fn sliding(friction: f64, cone: FrictionCone) -> Descent {
     let cfg = SimulationManagerCfg { cone, ..slope(30.0_f64.to_radians(), friction) };
     descent(cfg, Link::brick("block", 1.2, [0.4, 0.4, 0.1]), Pose::translation(0.0, 0.0, 0.05))
 }
 
 /// Mean friction deficit of pyramids \[m/s²\] while the velocity grows from `a` [`FROM`] to `a` [`UNTIL`].
-fn lacking(friction: f64, a: f64, across_gravity: f64) -> f64 {
-    let [stiffness, damping] = [1.0 / (LARGEST * TIME).powi(2), 2.0 / (LARGEST * TIME)];
+fn friction_deficit(friction: f64, a: f64, across_gravity: f64) -> f64 {
+    let [stiffness, damping] = [1.0 / (MAX_IMPEDANCE * TIME_CONSTANT).powi(2), 2.0 / (MAX_IMPEDANCE * TIME_CONSTANT)];
     let at_one = 2.0 * stiffness * depth(across_gravity / 4.0) / (damping * friction);
     at_one * (UNTIL / FROM).ln() / (a * (UNTIL - FROM))
 }
@@ -48,12 +48,12 @@ fn holds() {
             along + FRICTION * across
         };
         let quantity = "a + μ c on 30°, elliptic cones";
-        let elliptic = with_hops(FRICTION, Cone::Elliptic);
+        let elliptic = with_hops(FRICTION, FrictionCone::Elliptic);
         m.row(quantity, "m/s²", a, elliptic, (SOLVER, "tolerance of the solver"));
-        m.control(quantity, "without friction", with_hops(0.0, Cone::Elliptic));
+        m.control(quantity, "without friction", with_hops(0.0, FrictionCone::Elliptic));
         let quantity = "a + μ c on 30°, pyramids";
-        let edges = FRICTION * G * cos * lacking(FRICTION, a, G * cos) + SOLVER;
-        m.row(quantity, "m/s²", a, with_hops(FRICTION, Cone::Pyramidal), (edges, "edges beside the motion"));
-        m.control(quantity, "with twice the friction", with_hops(0.6, Cone::Pyramidal));
+        let edges = FRICTION * G * cos * friction_deficit(FRICTION, a, G * cos) + SOLVER;
+        m.row(quantity, "m/s²", a, with_hops(FRICTION, FrictionCone::Pyramidal), (edges, "edges beside the motion"));
+        m.control(quantity, "with twice the friction", with_hops(0.6, FrictionCone::Pyramidal));
     });
 }

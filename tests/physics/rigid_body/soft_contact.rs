@@ -10,12 +10,12 @@
 //! Source: MuJoCo, "Computation: Solver parameters" (solref, solimp), with its defaults.
 
 /// Time constant of `solref` \[s\]; its damping ratio is 1.
-pub(crate) const TIME: f64 = 0.02;
+pub(crate) const TIME_CONSTANT: f64 = 0.02;
 /// Impedances at the surface and at full depth, and the depth of full impedance \[m\].
 const IMPEDANCE: [f64; 2] = [0.9, 0.95];
 const WIDTH: f64 = 1e-3;
 /// The largest impedance: MuJoCo scales damping and stiffness by it.
-pub(crate) const LARGEST: f64 = IMPEDANCE[1];
+pub(crate) const MAX_IMPEDANCE: f64 = IMPEDANCE[1];
 
 /// `solimp` at `depth` \[m\]: two parabolas that join in the middle.
 pub(crate) fn impedance(depth: f64) -> f64 {
@@ -28,7 +28,7 @@ pub(crate) fn impedance(depth: f64) -> f64 {
 pub(crate) fn depth(load: f64) -> f64 {
     let of = |r: f64| {
         let d = impedance(r);
-        (1.0 - d) / (d * d) * load * (LARGEST * TIME).powi(2)
+        (1.0 - d) / (d * d) * load * (MAX_IMPEDANCE * TIME_CONSTANT).powi(2)
     };
     // The right side decreases with the depth, so the root is between 0 and its value there.
     let [mut low, mut high] = [0.0, of(0.0)];

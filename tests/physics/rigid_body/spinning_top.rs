@@ -16,7 +16,7 @@ const PRECESSION: f64 = 2.0;
 const MOMENTS: [f64; 2] = [1.2e-3, 2e-3];
 
 /// Precession angle and tilt after 2 s of a top with the fraction `share` of the steady spin.
-fn spun(share: f64) -> [f64; 2] {
+fn precession_and_tilt(share: f64) -> [f64; 2] {
     let across = MOMENTS[0] + MASS * ARM * ARM;
     let steady = (MASS * G * ARM / PRECESSION + across * PRECESSION * LEAN.cos()) / MOMENTS[1];
     let ring = |name| Link::point(name, 1e-6, [0.0; 3]);
@@ -39,7 +39,7 @@ fn spun(share: f64) -> [f64; 2] {
 #[test]
 fn holds() {
     law(module_path!(), "m g l = Ω (I₃ ω₃ - I₁ Ω cos θ)", |m| {
-        let ([round, lean], [slow, falls]) = (spun(1.0), spun(0.5));
+        let ([round, lean], [slow, falls]) = (precession_and_tilt(1.0), precession_and_tilt(0.5));
         let rings = (1e-10, "rounding of 2000 steps");
         m.row("angle gone round in 2 s", "rad", PRECESSION * 2.0, round, rings);
         m.row("lean after 2 s", "rad", LEAN, lean, rings);

@@ -10,16 +10,16 @@
 
 use super::soft_contact::depth;
 use crate::lab::*;
-use kinetoscope::mujoco::{TARGET, Target};
-use kinetoscope::sim::ObjectId;
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
+use kinetoscope::sim::RigidObjectId;
 use kinetoscope_testkit::worlds::object;
 
 const EDGE: f64 = 0.1;
 
 /// Heights of the centers after 3 s.
-fn stacked(boxes: usize) -> Vec<f64> {
+fn heights(boxes: usize) -> Vec<f64> {
     let mut lab = Lab::new(slope(0.0, 1.0));
-    let ids: Vec<ObjectId> = (0..boxes)
+    let ids: Vec<RigidObjectId> = (0..boxes)
         .map(|k| {
             let width = 0.3 - 0.02 * k as f64;
             let shape = ObjectShape::Box { size: [width, width, EDGE] };
@@ -34,15 +34,15 @@ fn stacked(boxes: usize) -> Vec<f64> {
 #[test]
 fn holds() {
     law(module_path!(), "joint k sinks in by depth(A f) with f = m g (boxes above)/4", |m| {
-        let (five, four, six) = (stacked(5), stacked(4), stacked(6));
+        let (five, four, six) = (heights(5), heights(4), heights(6));
         let left = (1e-12, "rounding of heights");
         let joint = |z: &[f64], k: usize| if k == 0 { EDGE / 2.0 - z[0] } else { EDGE - (z[k] - z[k - 1]) };
         for k in 0..5 {
             let above = (5 - k) as f64;
-            let expected = match (k, TARGET) {
+            let expected = match (k, BUILD_VERSION) {
                 (0, _) => depth(above * G / 4.0),
-                (_, Target::V2) => 2.0 * depth(2.0 * above * G / 4.0),
-                (_, Target::V4) => depth(2.0 * above * G / 4.0),
+                (_, SupportedVersion::V2) => 2.0 * depth(2.0 * above * G / 4.0),
+                (_, SupportedVersion::V4) => depth(2.0 * above * G / 4.0),
             };
             m.row(&format!("depth of joint {k}"), "m", expected, joint(&five, k), left);
         }
@@ -51,7 +51,7 @@ fn holds() {
         }
         m.control("depth of joint 4", "with a box more", joint(&six, 4));
         for k in 1..5 {
-            m.lines_differ_in(
+            m.versions_differ_in(
                 &format!("depth of joint {k}"),
                 "boxes on boxes sink in twice as deep in 2.2.2 as the depths of their contacts say",
             );

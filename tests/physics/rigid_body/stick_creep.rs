@@ -9,7 +9,7 @@
 //! changes their d in one direction and that of the upper corners in the other: (1 %)² of the creep remains. The law
 //! checks that creep occurs, its magnitude, and that impratio divides it.
 
-use super::soft_contact::{LARGEST, TIME, depth, impedance};
+use super::soft_contact::{MAX_IMPEDANCE, TIME_CONSTANT, depth, impedance};
 use crate::lab::*;
 
 const ANGLE: f64 = 10.0;
@@ -30,7 +30,7 @@ pub(super) fn expected(angle: f64, impratio: f64, tipping: f64) -> f64 {
         d / (1.0 - d)
     };
     let damping = 0.5 * (damping(1.0 - tipping) + damping(1.0 + tipping));
-    G * sin / 4.0 / damping * LARGEST * TIME / (2.0 * impratio)
+    G * sin / 4.0 / damping * MAX_IMPEDANCE * TIME_CONSTANT / (2.0 * impratio)
 }
 
 #[test]

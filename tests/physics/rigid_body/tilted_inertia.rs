@@ -10,15 +10,15 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 const TORQUE: [f64; 3] = [0.7, -1.1, 0.4];
 
 /// Angular velocity and velocity of the origin after the step.
-fn twisted(link: &Link, turn: UnitQuaternion<f64>) -> (Vector3<f64>, Vector3<f64>) {
+fn step_with_torque(link: &Link, turn: UnitQuaternion<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let mut lab = Lab::new(weightless());
     let robot = lab.free(&urdf(std::slice::from_ref(link), &[]), [0.0; 3]);
     let pose = Pose::from_parts(nalgebra::Translation3::new(0.5, 0.6, 0.7), turn);
     lab.sim.robot_mut(robot).write_root_pose(&pose_row(&pose), None).unwrap();
-    lab.push_link(robot, "body", Vector3::zeros(), TORQUE.into());
+    lab.set_link_wrench(robot, "body", Vector3::zeros(), TORQUE.into());
     lab.run(1e-3);
     let root = lab.root(robot);
-    (root.spin, root.velocity)
+    (root.angular_velocity, root.velocity)
 }
 
 #[test]
@@ -33,9 +33,9 @@ fn holds() {
         let about = r.matrix() * q.matrix() * inertia * q.matrix().transpose() * r.matrix().transpose();
         let spin = 1e-3 * about.try_inverse().unwrap() * Vector3::from(TORQUE);
         let velocity = spin.cross(&-(r * Vector3::from(body.com)));
-        let (found, at_origin) = twisted(&body, turn);
-        let (untilted, _) = twisted(&Link { rpy: [0.0; 3], ..body.clone() }, turn);
-        let (_, central) = twisted(&Link { com: [0.0; 3], ..body.clone() }, turn);
+        let (found, at_origin) = step_with_torque(&body, turn);
+        let (untilted, _) = step_with_torque(&Link { rpy: [0.0; 3], ..body.clone() }, turn);
+        let (_, central) = step_with_torque(&Link { com: [0.0; 3], ..body.clone() }, turn);
         let rounding = (1e-12, "rounding of principal axes");
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
             m.row(&format!("angular velocity, {axis}"), "rad/s", spin[k], found[k], rounding);

@@ -8,7 +8,7 @@
 //! 0.1 m: 1e-8 m.
 
 use crate::lab::*;
-use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 /// Initial orientation, which must not matter: velocities are written in world axes.
@@ -17,7 +17,7 @@ fn start() -> UnitQuaternion<f64> {
 }
 
 /// Center of mass 2 s after the throw, in steps of `dt` \[m\].
-fn flown_in_steps(dt: f64, gravity: bool, com: [f64; 3]) -> Vector3<f64> {
+fn com_after_flight(dt: f64, gravity: bool, com: [f64; 3]) -> Vector3<f64> {
     let mut lab = Lab::new(rk4(with_dt(dt, if gravity { earth() } else { weightless() })));
     let link = Link { rpy: [0.3, 0.2, 0.1], ..Link::new("body", 2.0, [0.02, 0.05, 0.06]).at(com) };
     let robot = lab.free(&urdf(&[link], &[]), [0.0; 3]);
@@ -30,9 +30,9 @@ fn flown_in_steps(dt: f64, gravity: bool, com: [f64; 3]) -> Vector3<f64> {
     Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)])
 }
 
-/// As [`flown_in_steps`], extrapolated to steps of 0.
-fn flown(gravity: bool, com: [f64; 3]) -> Vector3<f64> {
-    let [whole, half] = [1e-3, 5e-4].map(|dt| flown_in_steps(dt, gravity, com));
+/// As [`com_after_flight`], extrapolated to steps of 0.
+fn extrapolated_com(gravity: bool, com: [f64; 3]) -> Vector3<f64> {
+    let [whole, half] = [1e-3, 5e-4].map(|dt| com_after_flight(dt, gravity, com));
     (4.0 * half - whole) / 3.0
 }
 
@@ -40,21 +40,21 @@ fn flown(gravity: bool, com: [f64; 3]) -> Vector3<f64> {
 fn holds() {
     law(module_path!(), "r_com = r0 + v t - g t²/2, whatever the spin", |m| {
         let com = [0.06, -0.05, 0.06];
-        let place = flown(true, com);
+        let place = extrapolated_com(true, com);
         let expected: Vector3<f64> =
             start() * Vector3::from(com) + 2.0 * Vector3::new(1.0, 2.0, 8.0) - Vector3::new(0.0, 0.0, G * 2.0);
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let tolerance = match TARGET {
-                Target::V2 => (4e-6, "ω h of what order 2 leaves at 1 ms"),
-                Target::V4 => (1e-8, "orientation of order 4, (ω h)⁴ ω t/120, times the offset"),
+            let tolerance = match BUILD_VERSION {
+                SupportedVersion::V2 => (4e-6, "ω h of what order 2 leaves at 1 ms"),
+                SupportedVersion::V4 => (1e-8, "orientation of order 4, (ω h)⁴ ω t/120, times the offset"),
             };
             m.row(&format!("centre of mass, {axis}"), "m", expected[k], place[k], tolerance);
         }
-        m.control("centre of mass, z", "without gravity", flown(false, com).z);
-        let central = flown(true, [0.0; 3]);
+        m.control("centre of mass, z", "without gravity", extrapolated_com(false, com).z);
+        let central = extrapolated_com(true, [0.0; 3]);
         m.control("centre of mass, x", "without the offset", central.x);
         m.control("centre of mass, y", "without the offset", central.y);
-        m.lines_differ(
+        m.versions_differ(
             "RK4 turns free bodies with order 2 in 2.2.2 and with order 4 in 4.x (law order_of_free_rotation)",
         );
     });

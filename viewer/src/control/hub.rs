@@ -1,6 +1,6 @@
 //! State shared by the simulation's thread and its viewers.
 
-use super::{Command, Wants};
+use super::{Command, SnapshotRequest};
 use crate::stage::Snapshot;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -8,9 +8,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Maximum number of queued commands. [`Viewer::send`] returns `false` beyond it.
-const WAITING: usize = 4096;
+const MAX_QUEUED_COMMANDS: usize = 4096;
 /// Reason for a command that could not be [sent](Viewer::send).
-pub(crate) const TAKES_NONE: &str = "the simulation takes no commands: the program does not step it";
+pub(crate) const NOT_STEPPING: &str = "the simulation takes no commands: the program does not step it";
 
 /// Shared command queue and newest snapshot. Locks are held only to move a pointer or a command, never to render or to
 /// step.
@@ -18,28 +18,28 @@ pub(crate) const TAKES_NONE: &str = "the simulation takes no commands: the progr
 pub(super) struct Hub {
     inbox: Mutex<Inbox>,
     /// Signals a new command, changed requests or a dropped viewer.
-    news: Condvar,
+    inbox_changed: Condvar,
     newest: Mutex<Option<Arc<Snapshot>>>,
     /// Signals a newer snapshot or the end of the simulation.
-    fresh: Condvar,
+    snapshot_published: Condvar,
     /// Number of viewers, readable without a lock.
     viewers: AtomicUsize,
-    over: AtomicBool,
+    ended: AtomicBool,
 }
 
 #[derive(Debug, Default)]
 struct Inbox {
     commands: VecDeque<(u64, Command)>,
-    viewers: BTreeMap<u64, Wants>,
+    viewers: BTreeMap<u64, SnapshotRequest>,
     next: u64,
 }
 
 /// Commands, viewers and combined requests since the last [`Hub::collect`].
 #[derive(Debug)]
-pub(super) struct Mail {
+pub(super) struct CollectedCommands {
     pub(super) commands: VecDeque<(u64, Command)>,
     pub(super) viewers: Vec<u64>,
-    pub(super) wants: Wants,
+    pub(super) wants: SnapshotRequest,
 }
 
 /// Locks a mutex. No code panics while holding one of these locks, so poisoning is ignored.
@@ -48,7 +48,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Hub {
-    pub(super) fn admit(self: &Arc<Self>, wants: Wants) -> Viewer {
+    pub(super) fn add_viewer(self: &Arc<Self>, wants: SnapshotRequest) -> Viewer {
         let mut inbox = lock(&self.inbox);
         let number = inbox.next;
         inbox.next += 1;
@@ -62,37 +62,37 @@ impl Hub {
     }
 
     /// Takes the queued commands. Also returns the current viewers and their combined requests.
-    pub(super) fn collect(&self) -> Mail {
+    pub(super) fn collect(&self) -> CollectedCommands {
         let mut inbox = lock(&self.inbox);
-        let wants = inbox.viewers.values().fold(Wants::NOTHING, |all, one| all.union(*one));
+        let wants = inbox.viewers.values().fold(SnapshotRequest::EMPTY, |all, one| all.union(*one));
         let viewers = inbox.viewers.keys().copied().collect();
-        Mail { commands: std::mem::take(&mut inbox.commands), viewers, wants }
+        CollectedCommands { commands: std::mem::take(&mut inbox.commands), viewers, wants }
     }
 
     /// Waits for a command, a changed request, a dropped viewer, or `timeout`.
-    pub(super) fn wait_for_news(&self, timeout: Duration) {
+    pub(super) fn wait_for_input(&self, timeout: Duration) {
         let inbox = lock(&self.inbox);
         if inbox.commands.is_empty() {
             // Spurious wakeups are harmless: the caller checks its conditions and waits again.
-            drop(self.news.wait_timeout(inbox, timeout));
+            drop(self.inbox_changed.wait_timeout(inbox, timeout));
         }
     }
 
     /// Publishes a snapshot. Returns `false` and drops the snapshot if a viewer is reading the current one at this
     /// moment.
-    pub(super) fn show(&self, snapshot: Arc<Snapshot>) -> bool {
+    pub(super) fn publish(&self, snapshot: Arc<Snapshot>) -> bool {
         let Ok(mut newest) = self.newest.try_lock() else { return false };
         *newest = Some(snapshot);
-        self.fresh.notify_all();
+        self.snapshot_published.notify_all();
         true
     }
 
     /// Marks the end of the simulation: no more snapshots will follow.
     pub(super) fn end(&self) {
-        self.over.store(true, Ordering::Release);
+        self.ended.store(true, Ordering::Release);
         // Holding the lock guarantees that no viewer is between its check and its wait.
         let _newest = lock(&self.newest);
-        self.fresh.notify_all();
+        self.snapshot_published.notify_all();
     }
 }
 
@@ -106,10 +106,10 @@ pub struct Viewer {
 
 impl Viewer {
     /// Creates a viewer of a simulation that has already ended.
-    pub(super) fn of_nothing() -> Self {
+    pub(super) fn ended() -> Self {
         let hub = Arc::new(Hub::default());
         hub.end();
-        hub.admit(Wants::default())
+        hub.add_viewer(SnapshotRequest::default())
     }
 
     /// Returns the newest snapshot, or `None` before the first. Snapshots come from a pool: holding more than one
@@ -128,10 +128,10 @@ impl Viewer {
                 return Some(Arc::clone(snapshot));
             }
             let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() || self.is_over() {
+            if left.is_zero() || self.has_ended() {
                 return None;
             }
-            newest = self.hub.fresh.wait_timeout(newest, left).unwrap_or_else(PoisonError::into_inner).0;
+            newest = self.hub.snapshot_published.wait_timeout(newest, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
@@ -139,32 +139,32 @@ impl Viewer {
     /// queued because `update` is not called.
     pub fn send(&self, command: Command) -> bool {
         let mut inbox = lock(&self.hub.inbox);
-        let last = inbox.commands.back_mut().filter(|(from, last)| *from == self.number && command.replaces(last));
+        let last = inbox.commands.back_mut().filter(|(from, last)| *from == self.number && command.supersedes(last));
         if let Some((_, last)) = last {
             *last = command;
-        } else if inbox.commands.len() < WAITING && !self.is_over() {
+        } else if inbox.commands.len() < MAX_QUEUED_COMMANDS && !self.has_ended() {
             inbox.commands.push_back((self.number, command));
         } else {
             return false;
         }
-        self.hub.news.notify_all();
-        !self.is_over()
+        self.hub.inbox_changed.notify_all();
+        !self.has_ended()
     }
 
     /// Replaces the snapshot contents that this viewer requests.
-    pub fn set_wants(&self, wants: Wants) {
+    pub fn set_request(&self, wants: SnapshotRequest) {
         lock(&self.hub.inbox).viewers.insert(self.number, wants);
-        self.hub.news.notify_all();
+        self.hub.inbox_changed.notify_all();
     }
 
     /// Adds another viewer of the same simulation.
-    pub fn another(&self, wants: Wants) -> Self {
-        self.hub.admit(wants)
+    pub fn add_viewer(&self, wants: SnapshotRequest) -> Self {
+        self.hub.add_viewer(wants)
     }
 
     /// True if the simulation was dropped: no more snapshots will follow.
-    pub fn is_over(&self) -> bool {
-        self.hub.over.load(Ordering::Acquire)
+    pub fn has_ended(&self) -> bool {
+        self.hub.ended.load(Ordering::Acquire)
     }
 }
 
@@ -173,6 +173,6 @@ impl Drop for Viewer {
         let mut inbox = lock(&self.hub.inbox);
         inbox.viewers.remove(&self.number);
         self.hub.viewers.store(inbox.viewers.len(), Ordering::Release);
-        self.hub.news.notify_all();
+        self.hub.inbox_changed.notify_all();
     }
 }

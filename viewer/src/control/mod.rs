@@ -8,12 +8,12 @@ mod spring;
 #[cfg(test)]
 mod tests;
 
-pub use conductor::{Conductor, Film, Play, PlayError};
-pub(crate) use hub::TAKES_NONE;
+pub use conductor::{Play, PlayError, PlaybackSource, ViewController};
+pub(crate) use hub::NOT_STEPPING;
 pub use hub::Viewer;
-pub use recording::{RecordButton, Recording, RecordingState};
+pub use recording::{RecordButton, RecordControl, RecordingState};
 
-use crate::stage::Shown;
+use crate::stage::EnvSelection;
 use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
 
 /// A request of a viewer to the simulation. Commands run between two steps, on the simulation's thread.
@@ -55,7 +55,7 @@ pub enum Command {
         /// Index of the body in [`Names::bodies`](crate::stage::Names::bodies).
         body: usize,
         /// Attachment point of the spring, in the body frame \[m\].
-        hold: [f64; 3],
+        anchor: [f64; 3],
         /// Target position of the spring's other end, in the environment frame \[m\].
         target: [f64; 3],
     },
@@ -70,7 +70,7 @@ pub enum Command {
 
 impl Command {
     /// True if this command makes an `earlier` queued command of the same viewer redundant.
-    fn replaces(&self, earlier: &Self) -> bool {
+    fn supersedes(&self, earlier: &Self) -> bool {
         match (self, earlier) {
             (Self::SetTarget { robot, joint, env, .. }, Self::SetTarget { robot: r, joint: j, env: e, .. }) => {
                 (robot, joint, env) == (r, j, e)
@@ -88,34 +88,34 @@ impl Command {
 pub enum Speed {
     /// As fast as the machine can step.
     #[default]
-    Free,
+    Unlimited,
     /// Simulated seconds per wall-clock second, or fewer if the machine is too slow: 1 is real time, 0.1 is slow
     /// motion.
-    Times(f64),
+    Factor(f64),
 }
 
 impl Speed {
     /// Real time.
-    pub const REAL: Self = Self::Times(1.0);
-    /// Smallest and largest factor of [`Speed::Times`].
-    pub const RANGE: [f64; 2] = [1e-3, 1e3];
+    pub const REAL_TIME: Self = Self::Factor(1.0);
+    /// Smallest and largest factor of [`Speed::Factor`].
+    pub const FACTOR_RANGE: [f64; 2] = [1e-3, 1e3];
 
-    /// True if the factor is inside [`Self::RANGE`].
+    /// True if the factor is inside [`Self::FACTOR_RANGE`].
     fn is_valid(self) -> bool {
         match self {
-            Self::Free => true,
-            Self::Times(factor) => (Self::RANGE[0]..=Self::RANGE[1]).contains(&factor),
+            Self::Unlimited => true,
+            Self::Factor(factor) => (Self::FACTOR_RANGE[0]..=Self::FACTOR_RANGE[1]).contains(&factor),
         }
     }
 }
 
 /// Optional snapshot contents that a viewer requests, in addition to poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wants {
+pub struct SnapshotRequest {
     /// Maximum number of snapshots per second of wall-clock time.
     pub rate: f64,
     /// Environments whose contacts and contact forces are included. Computing them costs as much as a simulation step.
-    pub contacts: Option<Shown>,
+    pub contacts: Option<EnvSelection>,
     /// Debug markers of sensors: see `debug_vis` in their configurations.
     pub markers: bool,
     /// Joint positions, targets and efforts.
@@ -124,15 +124,15 @@ pub struct Wants {
     pub cameras: bool,
 }
 
-impl Default for Wants {
+impl Default for SnapshotRequest {
     fn default() -> Self {
         Self { rate: 30.0, contacts: None, markers: true, joints: true, cameras: true }
     }
 }
 
-impl Wants {
+impl SnapshotRequest {
     /// Requests nothing.
-    pub(crate) const NOTHING: Self = Self { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
+    pub(crate) const EMPTY: Self = Self { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
 
     /// Combines the requests of two viewers.
     fn union(self, other: Self) -> Self {
@@ -140,7 +140,7 @@ impl Wants {
             rate: self.rate.max(other.rate),
             contacts: match (self.contacts, other.contacts) {
                 (None, one) | (one, None) => one,
-                (Some(one), Some(other)) => Some(if one == other { one } else { Shown::All }),
+                (Some(one), Some(other)) => Some(if one == other { one } else { EnvSelection::All }),
             },
             markers: self.markers || other.markers,
             joints: self.joints || other.joints,
@@ -150,40 +150,40 @@ impl Wants {
 }
 
 /// Access of viewers to a simulation.
-pub trait Viewing {
+pub trait ViewerExt {
     /// Adds a viewer. Its first snapshot is available at once; further snapshots follow with the steps. All viewers of
-    /// a simulation share one [`Conductor`], which the first viewer adds.
+    /// a simulation share one [`ViewController`], which the first viewer adds.
     ///
     /// The pause, speed and spring of a viewer end when the viewer is dropped. After the last viewer is dropped, the
     /// simulation runs freely and as fast as it can.
-    fn viewer(&mut self, wants: Wants) -> Viewer;
+    fn viewer(&mut self, wants: SnapshotRequest) -> Viewer;
 
     /// Sets the record button that all viewers show. A recording that the previous button was running is stopped.
     fn record_button(&mut self, button: RecordButton);
 }
 
-impl Viewing for SimulationManager {
-    fn viewer(&mut self, wants: Wants) -> Viewer {
-        let viewer = with_conductor(self, |conductor, sim| {
-            let viewer = conductor.admit(wants);
+impl ViewerExt for SimulationManager {
+    fn viewer(&mut self, wants: SnapshotRequest) -> Viewer {
+        let viewer = with_view_controller(self, |conductor, sim| {
+            let viewer = conductor.add_viewer(wants);
             conductor.publish(sim);
             viewer
         });
-        viewer.unwrap_or_else(Viewer::of_nothing)
+        viewer.unwrap_or_else(Viewer::ended)
     }
 
     fn record_button(&mut self, button: RecordButton) {
-        with_conductor(self, |conductor, sim| conductor.set_button(sim, button));
+        with_view_controller(self, |conductor, sim| conductor.set_button(sim, button));
     }
 }
 
 /// Calls `act` with the conductor of the simulation, which is added if missing.
-fn with_conductor<T>(
+fn with_view_controller<T>(
     sim: &mut SimulationManager,
-    act: impl FnOnce(&mut Conductor, &mut SimulationManager) -> T,
+    act: impl FnOnce(&mut ViewController, &mut SimulationManager) -> T,
 ) -> Option<T> {
-    let known = sim.observers().ids::<Conductor>().first().copied();
-    let id = known.unwrap_or_else(|| sim.observers_mut().add(Conductor::new()));
+    let known = sim.observers().ids::<ViewController>().first().copied();
+    let id = known.unwrap_or_else(|| sim.observers_mut().add(ViewController::new()));
     // The conductor is removed and added again, because `act` needs the whole simulation. No other code removes it.
     let mut conductor = sim.observers_mut().remove(id).ok()?;
     let done = act(&mut conductor, sim);

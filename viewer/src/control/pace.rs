@@ -4,33 +4,41 @@ use super::Speed;
 use std::time::{Duration, Instant};
 
 /// Lag beyond which lost time is dropped. A simulation that was paused does not rush to catch up.
-const GIVE_UP: Duration = Duration::from_millis(200);
+const MAX_LAG: Duration = Duration::from_millis(200);
 /// Duration of one speed measurement.
-const WINDOW: Duration = Duration::from_millis(500);
+const MEASURE_INTERVAL: Duration = Duration::from_millis(500);
 /// Approximate longest time between two checks for commands.
-const LOOK: Duration = Duration::from_millis(8);
+const CHECK_INTERVAL: Duration = Duration::from_millis(8);
 
 /// Clock of a simulation that has viewers.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct RealTimeClock {
     speed: Speed,
     dt: f64,
     /// A time and the step that was due at that time.
-    anchor: (Instant, u64),
+    schedule_start: (Instant, u64),
     /// Start of the speed measurement: time and step.
-    window: (Instant, u64),
+    measure_start: (Instant, u64),
     measured: Option<f64>,
     /// Approximate wall-clock duration of one step, without throttling.
     step_time: Duration,
     /// End of the last wait: time and step.
-    resumed: (Instant, u64),
+    last_wait_end: (Instant, u64),
 }
 
-impl Pace {
+impl RealTimeClock {
     pub(super) fn new(dt: f64, steps: u64, now: Instant) -> Self {
         let mark = (now, steps);
         let step_time = Duration::from_millis(4);
-        Self { speed: Speed::Free, dt, anchor: mark, window: mark, measured: None, step_time, resumed: mark }
+        Self {
+            speed: Speed::Unlimited,
+            dt,
+            schedule_start: mark,
+            measure_start: mark,
+            measured: None,
+            step_time,
+            last_wait_end: mark,
+        }
     }
 
     pub(super) fn speed(&self) -> Speed {
@@ -44,7 +52,8 @@ impl Pace {
 
     /// Restarts the schedule and the measurement, after a pause, a reset or a speed change.
     pub(super) fn restart(&mut self, steps: u64, now: Instant) {
-        (self.anchor, self.window, self.resumed, self.measured) = ((now, steps), (now, steps), (now, steps), None);
+        (self.schedule_start, self.measure_start, self.last_wait_end, self.measured) =
+            ((now, steps), (now, steps), (now, steps), None);
     }
 
     /// Returns simulated seconds per second over the last half second, or `None` before the first measurement.
@@ -53,44 +62,44 @@ impl Pace {
     }
 
     /// Updates the measurements after steps were done.
-    pub(super) fn note(&mut self, steps: u64, now: Instant) {
-        let (since, first) = self.resumed;
+    pub(super) fn record_steps(&mut self, steps: u64, now: Instant) {
+        let (since, first) = self.last_wait_end;
         let done = steps.saturating_sub(first);
         if done > 0 {
             let each = now.saturating_duration_since(since) / u32::try_from(done).unwrap_or(u32::MAX);
             self.step_time = (self.step_time * 3 + each) / 4;
         }
-        self.resumed = (now, steps);
-        let (began, first) = self.window;
+        self.last_wait_end = (now, steps);
+        let (began, first) = self.measure_start;
         let long = now.saturating_duration_since(began);
-        if long >= WINDOW {
+        if long >= MEASURE_INTERVAL {
             self.measured = Some(steps.saturating_sub(first) as f64 * self.dt / long.as_secs_f64());
-            self.window = (now, steps);
+            self.measure_start = (now, steps);
         }
     }
 
     /// Returns the time to wait before the next step; zero if the simulation lags behind.
-    pub(super) fn ahead(&mut self, steps: u64, now: Instant) -> Duration {
-        let Speed::Times(factor) = self.speed else { return Duration::ZERO };
-        let (began, first) = self.anchor;
+    pub(super) fn time_ahead(&mut self, steps: u64, now: Instant) -> Duration {
+        let Speed::Factor(factor) = self.speed else { return Duration::ZERO };
+        let (began, first) = self.schedule_start;
         let due = began + Duration::from_secs_f64(steps.saturating_sub(first) as f64 * self.dt / factor);
-        if now.saturating_duration_since(due) > GIVE_UP {
-            self.anchor = (now, steps);
+        if now.saturating_duration_since(due) > MAX_LAG {
+            self.schedule_start = (now, steps);
         }
         due.saturating_duration_since(now)
     }
 
     /// Marks the end of a wait.
-    pub(super) fn waited(&mut self, steps: u64, now: Instant) {
-        self.resumed = (now, steps);
+    pub(super) fn end_wait(&mut self, steps: u64, now: Instant) {
+        self.last_wait_end = (now, steps);
     }
 
     /// Returns the number of steps until the next check for commands.
-    pub(super) fn block(&self) -> u64 {
-        let by_work = LOOK.as_secs_f64() / self.step_time.as_secs_f64().max(1e-9);
+    pub(super) fn steps_until_check(&self) -> u64 {
+        let by_work = CHECK_INTERVAL.as_secs_f64() / self.step_time.as_secs_f64().max(1e-9);
         let by_pace = match self.speed {
-            Speed::Free => f64::INFINITY,
-            Speed::Times(factor) => LOOK.as_secs_f64() * factor / self.dt,
+            Speed::Unlimited => f64::INFINITY,
+            Speed::Factor(factor) => CHECK_INTERVAL.as_secs_f64() * factor / self.dt,
         };
         (by_work.min(by_pace) as u64).clamp(1, 100_000)
     }
@@ -106,16 +115,17 @@ mod tests {
     fn waits() {
         let start = Instant::now();
         let millis = Duration::from_millis;
-        let mut pace = Pace::new(DT, 5, start);
-        assert_eq!(pace.ahead(50, start), Duration::ZERO, "free speed never waits");
+        let mut pace = RealTimeClock::new(DT, 5, start);
+        assert_eq!(pace.time_ahead(50, start), Duration::ZERO, "free speed never waits");
         for (what, speed, steps, passed, expected) in [
-            ("ten steps are 100 ms, 30 ms are gone", Speed::REAL, [5, 15].as_slice(), 30, 70),
-            ("slow motion", Speed::Times(0.1), &[5, 15], 0, 1000),
+            ("ten steps are 100 ms, 30 ms are gone", Speed::REAL_TIME, [5, 15].as_slice(), 30, 70),
+            ("slow motion", Speed::Factor(0.1), &[5, 15], 0, 1000),
             // One second behind: no wait, and the schedule restarts here.
-            ("lost time is given up", Speed::REAL, &[0, 1, 2], 1000, 10),
+            ("lost time is given up", Speed::REAL_TIME, &[0, 1, 2], 1000, 10),
         ] {
             pace.set_speed(speed, steps[0], start);
-            let waits: Vec<_> = steps[1..].iter().map(|&steps| pace.ahead(steps, start + millis(passed))).collect();
+            let waits: Vec<_> =
+                steps[1..].iter().map(|&steps| pace.time_ahead(steps, start + millis(passed))).collect();
             let (last, before) = waits.split_last().expect("a step");
             assert!(last.abs_diff(millis(expected)) < Duration::from_micros(1), "{what}: {last:?}");
             assert!(before.iter().all(Duration::is_zero), "{what}: {before:?}");
@@ -126,20 +136,20 @@ mod tests {
     #[test]
     fn measured_speed() {
         let start = Instant::now();
-        let mut pace = Pace::new(DT, 0, start);
-        pace.note(10, start + Duration::from_millis(100));
+        let mut pace = RealTimeClock::new(DT, 0, start);
+        pace.record_steps(10, start + Duration::from_millis(100));
         assert_eq!(pace.measured(), None);
-        pace.note(100, start + Duration::from_millis(500));
+        pace.record_steps(100, start + Duration::from_millis(500));
         assert!(pace.measured().is_some_and(|speed| (speed - 2.0).abs() < 1e-9), "{:?}", pace.measured());
 
-        let mut pace = Pace::new(0.001, 0, start);
+        let mut pace = RealTimeClock::new(0.001, 0, start);
         // Repeated steps of 20 µs.
         for k in 1..40u32 {
-            pace.note(u64::from(k) * 100, start + Duration::from_millis(2) * k);
+            pace.record_steps(u64::from(k) * 100, start + Duration::from_millis(2) * k);
         }
-        let block = pace.block();
+        let block = pace.steps_until_check();
         assert!((300..=400).contains(&block), "8 ms are 400 steps: {block}");
-        pace.set_speed(Speed::REAL, 0, start);
-        assert_eq!(pace.block(), 8);
+        pace.set_speed(Speed::REAL_TIME, 0, start);
+        assert_eq!(pace.steps_until_check(), 8);
     }
 }

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 ///
 /// The methods run on the simulation's thread, between two steps. They may read the whole simulation and add observers
 /// such as a recorder. They must not call `update`.
-pub trait Recording: Send {
+pub trait RecordControl: Send {
     /// Starts (`on`) or stops the recording. Does nothing if the recording is already in that state.
     ///
     /// # Errors
@@ -29,27 +29,27 @@ pub struct RecordingState {
 }
 
 /// A record button for [`WindowCfg`](crate::WindowCfg), [`ServeCfg`](crate::ServeCfg) or
-/// [`Viewing::record_button`](super::Viewing::record_button). Clones refer to the same button.
+/// [`ViewerExt::record_button`](super::ViewerExt::record_button). Clones refer to the same button.
 ///
 /// A simulation has one button, which all its windows and browser views show. A button that is set later replaces it. A
 /// recording started by a viewer stops when that viewer is dropped; a recording started by the program continues.
 #[derive(Clone)]
-pub struct RecordButton(Arc<Mutex<dyn Recording>>);
+pub struct RecordButton(Arc<Mutex<dyn RecordControl>>);
 
 impl RecordButton {
     /// Creates a button from its implementation.
-    pub fn new(recording: impl Recording + 'static) -> Self {
+    pub fn new(recording: impl RecordControl + 'static) -> Self {
         Self::shared(Arc::new(Mutex::new(recording)))
     }
 
     /// Creates a button whose implementation is shared with other code. If that code holds the lock when the button is
     /// pressed, the press is refused instead of blocking the simulation; hold the lock only briefly.
-    pub fn shared<R: Recording + 'static>(recording: Arc<Mutex<R>>) -> Self {
+    pub fn shared<R: RecordControl + 'static>(recording: Arc<Mutex<R>>) -> Self {
         Self(recording)
     }
 
     /// Starts or stops the recording. Refused with a reason while the lock is held elsewhere.
-    pub(super) fn set(&self, sim: &mut SimulationManager, on: bool) -> Result<(), String> {
+    pub(super) fn set_recording(&self, sim: &mut SimulationManager, on: bool) -> Result<(), String> {
         match self.0.try_lock() {
             Ok(mut recording) => recording.set(sim, on),
             Err(_) => Err("the recording is busy just now: press again".into()),

@@ -2,11 +2,11 @@
 
 use super::spring::Spring;
 use super::*;
-use crate::sample::{MASS, Running, Sample, sample};
-use crate::stage::{Run, Snapshot};
+use crate::sample::{MASS, Sample, SteppingThread, sample};
+use crate::stage::{RunState, Snapshot};
 use kinetoscope_scene::Pose;
-use kinetoscope_sim::{BodyMotion, ObjectId, ObjectShape, RigidObjectCfg, SimulationManagerCfg};
-use kinetoscope_testkit::wait::PATIENCE;
+use kinetoscope_sim::{BodyMotion, ObjectShape, RigidObjectCfg, RigidObjectId, SimulationManagerCfg};
+use kinetoscope_testkit::wait::TIMEOUT;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 #[track_caller]
 fn wait_for(viewer: &Viewer, is: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
     let (start, mut after) = (Instant::now(), 0);
-    while start.elapsed() < PATIENCE {
+    while start.elapsed() < TIMEOUT {
         if let Some(snapshot) = viewer.wait(after, Duration::from_millis(100)) {
             if is(&snapshot) {
                 return snapshot;
@@ -30,20 +30,20 @@ fn wait_for(viewer: &Viewer, is: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
 fn step_until(sim: &mut SimulationManager, is: impl Fn(&SimulationManager) -> bool) {
     let start = Instant::now();
     while !is(sim) {
-        assert!(start.elapsed() < PATIENCE, "it never comes");
+        assert!(start.elapsed() < TIMEOUT, "it never comes");
         sim.update(1);
     }
 }
 
-fn run(viewer: &Viewer) -> Run {
+fn run(viewer: &Viewer) -> RunState {
     viewer.newest().unwrap().run.clone()
 }
 
 #[test]
 fn pause_and_steps() {
     let mut sim = sample(2).sim;
-    let viewer = sim.viewer(Wants::default());
-    let running = Running::start(sim);
+    let viewer = sim.viewer(SnapshotRequest::default());
+    let running = SteppingThread::start(sim);
     assert!(viewer.send(Command::Pause));
     let held = wait_for(&viewer, |s| s.run.paused).run.steps;
     // The pause is inside `update`: the step it holds at is done, and `update` has not returned.
@@ -55,9 +55,9 @@ fn pause_and_steps() {
     let after = wait_for(&viewer, |s| s.run.paused && s.run.steps > held);
     assert_eq!(after.run.steps, held + 7);
     // The simulated time agrees: steps of 10 ms.
-    assert!((after.envs[1].look.time - (held + 7) as f64 * 0.01).abs() < 1e-9);
+    assert!((after.envs[1].snapshot.time - (held + 7) as f64 * 0.01).abs() < 1e-9);
     assert!(viewer.send(Command::Resume));
-    running.goes_on_beyond(held + 100);
+    running.wait_for_steps_beyond(held + 100);
     drop(viewer);
     running.end();
 }
@@ -66,58 +66,58 @@ fn pause_and_steps() {
 #[test]
 fn pause_ends_with_viewer() {
     let mut sim = sample(1).sim;
-    let viewer = sim.viewer(Wants::default());
-    let other = viewer.another(Wants::default());
-    let running = Running::start(sim);
-    viewer.send(Command::SetSpeed(Speed::Times(0.5)));
+    let viewer = sim.viewer(SnapshotRequest::default());
+    let other = viewer.add_viewer(SnapshotRequest::default());
+    let running = SteppingThread::start(sim);
+    viewer.send(Command::SetSpeed(Speed::Factor(0.5)));
     viewer.send(Command::Pause);
-    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Times(0.5));
+    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Factor(0.5));
     other.send(Command::Pause);
     // A viewer that requests a step does not hold the pause.
-    let stepper = other.another(Wants::default());
+    let stepper = other.add_viewer(SnapshotRequest::default());
     let held = run(&other).steps;
     stepper.send(Command::Step(1));
     let held = wait_for(&other, |s| s.run.paused && s.run.steps == held + 1).run.steps;
     drop(viewer);
     // The other viewer paused it as well, so the pause stays. The speed ended with the viewer that set it.
-    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Free);
+    wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Unlimited);
     std::thread::sleep(Duration::from_millis(250));
     assert!(running.steps() <= held);
     // A viewer that only watches does not hold the pause.
     drop(other);
     wait_for(&stepper, |s| !s.run.paused && s.run.steps > held);
     drop(stepper);
-    running.goes_on_beyond(held + 200);
+    running.wait_for_steps_beyond(held + 200);
     let mut sim = running.end();
     // A new viewer finds a running simulation, at free speed, with snapshots.
-    let viewer = sim.viewer(Wants::default());
-    assert!(!run(&viewer).paused && run(&viewer).speed == Speed::Free);
+    let viewer = sim.viewer(SnapshotRequest::default());
+    assert!(!run(&viewer).paused && run(&viewer).speed == Speed::Unlimited);
     drop(sim);
-    assert!(viewer.is_over() && !viewer.send(Command::Pause));
-    assert!(viewer.wait(u64::MAX - 1, PATIENCE).is_none(), "a wait ends with the simulation");
+    assert!(viewer.has_ended() && !viewer.send(Command::Pause));
+    assert!(viewer.wait(u64::MAX - 1, TIMEOUT).is_none(), "a wait ends with the simulation");
 }
 
 #[test]
 fn speed_ends_with_viewer() {
     let mut sim = sample(1).sim;
-    let below = sim.viewer(Wants::default());
-    let above = below.another(Wants::default());
-    let running = Running::start(sim);
+    let below = sim.viewer(SnapshotRequest::default());
+    let above = below.add_viewer(SnapshotRequest::default());
+    let running = SteppingThread::start(sim);
     let set = |viewer: &Viewer, speed| {
         viewer.send(Command::SetSpeed(speed));
         wait_for(&below, |s| s.run.speed == speed);
     };
-    set(&below, Speed::Times(20.0));
-    set(&above, Speed::REAL);
+    set(&below, Speed::Factor(20.0));
+    set(&above, Speed::REAL_TIME);
     drop(above);
-    wait_for(&below, |s| s.run.speed == Speed::Times(20.0));
+    wait_for(&below, |s| s.run.speed == Speed::Factor(20.0));
     // The latest speed applies, and a dropped viewer leaves no setting behind.
-    let above = below.another(Wants::default());
-    set(&above, Speed::REAL);
-    set(&below, Speed::Times(30.0));
+    let above = below.add_viewer(SnapshotRequest::default());
+    set(&above, Speed::REAL_TIME);
+    set(&below, Speed::Factor(30.0));
     drop(above);
     let gone = wait_for(&below, |_| true).run.steps;
-    wait_for(&below, |s| s.run.steps > gone && s.run.speed == Speed::Times(30.0));
+    wait_for(&below, |s| s.run.steps > gone && s.run.speed == Speed::Factor(30.0));
     drop(below);
     running.end();
 }
@@ -125,10 +125,10 @@ fn speed_ends_with_viewer() {
 #[test]
 fn target_and_reset() {
     let Sample { mut sim, robot, .. } = sample(2);
-    let viewer = sim.viewer(Wants::default());
+    let viewer = sim.viewer(SnapshotRequest::default());
     let names = Arc::clone(&viewer.newest().unwrap().names);
     assert_eq!(names.joints.len(), 1);
-    assert!(names.joints[0].name == "arm/turn" && names.joints[0].driven && names.joints[0].robot == robot);
+    assert!(names.joints[0].name == "arm/turn" && names.joints[0].accepts_target && names.joints[0].robot == robot);
     let joint = names.joints[0].joint;
     viewer.send(Command::SetTarget { robot, joint, env: Some(EnvId(1)), value: 0.8 });
     sim.update(300);
@@ -148,13 +148,13 @@ fn target_and_reset() {
 fn refusals() {
     let Sample { mut sim, robot, .. } = sample(1);
     let other = sample(1).robot;
-    let viewer = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
-    assert_eq!((run(&viewer).refused, run(&viewer).refusals), (None, 0));
-    let drag = |env, body, target: f64| Command::Drag { env: EnvId(env), body, hold: [0.0; 3], target: [target; 3] };
+    let viewer = sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
+    assert_eq!((run(&viewer).last_refusal, run(&viewer).refusal_count), (None, 0));
+    let drag = |env, body, target: f64| Command::Drag { env: EnvId(env), body, anchor: [0.0; 3], target: [target; 3] };
     let target = |robot, joint, env, value| Command::SetTarget { robot, joint: JointIndex(joint), env, value };
     let nonsense = [
-        Command::SetSpeed(Speed::Times(0.0)),
-        Command::SetSpeed(Speed::Times(f64::NAN)),
+        Command::SetSpeed(Speed::Factor(0.0)),
+        Command::SetSpeed(Speed::Factor(f64::NAN)),
         Command::Reset(Some(EnvId(9))),
         target(other, 0, None, 0.0),
         target(robot, 7, None, 0.0),
@@ -169,18 +169,21 @@ fn refusals() {
     ];
     for (count, command) in (1..).zip(nonsense) {
         assert!(viewer.send(command));
-        step_until(&mut sim, |_| run(&viewer).refusals == count);
-        assert!(run(&viewer).refused.is_some_and(|why| count < 11 || why.contains("record button")), "{command:?}");
+        step_until(&mut sim, |_| run(&viewer).refusal_count == count);
+        assert!(
+            run(&viewer).last_refusal.is_some_and(|why| count < 11 || why.contains("record button")),
+            "{command:?}"
+        );
     }
     assert!(sim.diverged().is_empty());
     // A successful spring command does not clear the refusal; another successful command does.
     viewer.send(drag(0, 0, 0.0));
     viewer.send(Command::Release);
     sim.update(100);
-    assert!(run(&viewer).refused.is_some());
-    viewer.send(Command::SetSpeed(Speed::Free));
-    step_until(&mut sim, |_| run(&viewer).refused.is_none());
-    assert_eq!(run(&viewer).refusals, nonsense.len() as u64);
+    assert!(run(&viewer).last_refusal.is_some());
+    viewer.send(Command::SetSpeed(Speed::Unlimited));
+    step_until(&mut sim, |_| run(&viewer).last_refusal.is_none());
+    assert_eq!(run(&viewer).refusal_count, nonsense.len() as u64);
 }
 
 /// With steps of 10 ms, step s ends (s - s0) 10 ms after the step s0 at which the speed was set; lost time is caught up
@@ -189,7 +192,7 @@ fn refusals() {
 #[test]
 fn real_time() {
     let mut sim = sample(1).sim;
-    let viewer = sim.viewer(Wants::default());
+    let viewer = sim.viewer(SnapshotRequest::default());
     // The time starts before the request: afterwards the simulation may already be late and would catch up.
     let mut took = |speed: Option<Speed>, steps| {
         let start = Instant::now();
@@ -203,7 +206,7 @@ fn real_time() {
     // Control: without a speed the simulation does not wait. (40 steps of one box take some milliseconds; the best of
     // several runs counts, because the machine may be busy.)
     let free = (0..20).map(|_| took(None, 40)).min().unwrap();
-    let (real, fast) = (took(Some(Speed::REAL), 40), took(Some(Speed::Times(4.0)), 200));
+    let (real, fast) = (took(Some(Speed::REAL_TIME), 40), took(Some(Speed::Factor(4.0)), 200));
     assert!(real >= Duration::from_millis(380), "{real:?}");
     assert!(fast >= Duration::from_millis(490), "{fast:?}");
     assert!(free < real, "{free:?} {real:?}");
@@ -214,7 +217,7 @@ fn real_time() {
 fn spring_force() {
     let pose = Pose::translation(1.0, 2.0, 3.0);
     let motion = BodyMotion { pose, linear: [0.0; 3], angular: [0.0; 3], carried_mass: 2.0, is_fixed: false };
-    let spring = Spring { env: EnvId(0), body: 0, hold: [0.1, 0.0, 0.0], target: [1.1, 2.0, 3.5] };
+    let spring = Spring { env: EnvId(0), body: 0, anchor: [0.1, 0.0, 0.0], target: [1.1, 2.0, 3.5] };
     let (point, force) = spring.force(&motion);
     // 2 kg (8 rad/s)² 0.5 m = 64 N, straight up.
     assert!((0..3).all(|k| (point[k] - [1.1, 2.0, 3.0][k]).abs() < 1e-12));
@@ -225,7 +228,7 @@ fn spring_force() {
 }
 
 /// A free cube without gravity, with edges of 0.2 m and steps of 1 ms.
-fn floating_cube() -> (SimulationManager, ObjectId) {
+fn floating_cube() -> (SimulationManager, RigidObjectId) {
     let cfg = SimulationManagerCfg { gravity: [0.0; 3].into(), physics_dt: 1e-3, ground: None, ..Default::default() };
     let mut sim = SimulationManager::new(cfg).unwrap();
     let shape = ObjectShape::cube(0.2);
@@ -234,14 +237,14 @@ fn floating_cube() -> (SimulationManager, ObjectId) {
 }
 
 fn drag(hold: [f64; 3], target: [f64; 3]) -> Command {
-    Command::Drag { env: EnvId(0), body: 0, hold, target }
+    Command::Drag { env: EnvId(0), body: 0, anchor: hold, target }
 }
 
 /// A free body pulled at its center of mass is a critically damped oscillator: x(t) = 1 - (1 + w t) e^-wt.
 #[test]
 fn spring_in_closed_form() {
     let (mut sim, id) = floating_cube();
-    let viewer = sim.viewer(Wants::default());
+    let viewer = sim.viewer(SnapshotRequest::default());
     viewer.send(drag([0.0; 3], [1.0, 0.0, 0.0]));
     // The command runs after the first step.
     sim.update(1);
@@ -276,7 +279,7 @@ fn spring_in_closed_form() {
 #[test]
 fn two_springs() {
     let (mut sim, id) = floating_cube();
-    let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
+    let (first, second) = (sim.viewer(SnapshotRequest::default()), sim.viewer(SnapshotRequest::default()));
     first.send(drag([0.0; 3], [1.0, 0.0, 0.0]));
     second.send(drag([0.0; 3], [0.0, 1.0, 0.0]));
     // The slower pole is (2 - √2) w = 4.7 s⁻¹: e^-14 of the distance is left after 3 s.
@@ -291,7 +294,7 @@ fn two_springs() {
     assert!(pose[(0, 0)].abs() < 1e-6 && (pose[(0, 1)] - 1.0).abs() < 1e-6, "{pose}");
 
     let (mut sim, id) = floating_cube();
-    let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
+    let (first, second) = (sim.viewer(SnapshotRequest::default()), sim.viewer(SnapshotRequest::default()));
     first.send(drag([0.0, 0.1, 0.0], [1.0, 0.1, 0.0]));
     second.send(drag([0.0, -0.1, 0.0], [-1.0, -0.1, 0.0]));
     // The command runs after the first step; the second step is the first with a force.
@@ -308,7 +311,7 @@ fn two_springs() {
 fn watching_changes_nothing() {
     let bits = |watch: bool| {
         let mut sim = sample(3).sim;
-        let wants = Wants { rate: 1000.0, contacts: Some(Shown::All), ..Wants::default() };
+        let wants = SnapshotRequest { rate: 1000.0, contacts: Some(EnvSelection::All), ..SnapshotRequest::default() };
         let mut held = Vec::new();
         let viewers: Vec<Viewer> = (0..3).filter(|_| watch).map(|_| sim.viewer(wants)).collect();
         for k in 0..50 {
@@ -336,7 +339,7 @@ fn watching_changes_nothing() {
 #[test]
 fn later_objects() {
     let mut sim = sample(1).sim;
-    let viewer = sim.viewer(Wants::default());
+    let viewer = sim.viewer(SnapshotRequest::default());
     let before = viewer.newest().unwrap();
     let init_pose = Pose::translation(0.0, 1.0, 0.5);
     sim.add_rigid_object(RigidObjectCfg { uid: "late".into(), init_pose, ..Default::default() }).unwrap();
@@ -344,7 +347,7 @@ fn later_objects() {
     assert!(after.number > before.number);
     assert!(after.names.bodies.iter().any(|name| name == "late"));
     assert_eq!(before.names.bodies.len() + 1, after.names.bodies.len(), "a snapshot never changes");
-    assert_eq!(after.envs[0].look.bodies.len(), after.names.bodies.len());
+    assert_eq!(after.envs[0].snapshot.bodies.len(), after.names.bodies.len());
 }
 
 /// A recording that counts its starts and stops.
@@ -355,7 +358,7 @@ struct Counter {
     ended: u32,
 }
 
-impl Recording for Counter {
+impl RecordControl for Counter {
     fn set(&mut self, _: &mut SimulationManager, on: bool) -> Result<(), String> {
         self.begun += u32::from(on && !self.on);
         self.ended += u32::from(self.on && !on);
@@ -383,7 +386,7 @@ fn counter() -> (Arc<Mutex<Counter>>, RecordButton, impl Fn() -> (bool, u32, u32
 #[test]
 fn record_button() {
     let mut sim = sample(1).sim;
-    let viewer = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
+    let viewer = sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
     assert_eq!(run(&viewer).recording, None);
     let (counter, button, counted) = counter();
     sim.record_button(button);
@@ -395,24 +398,24 @@ fn record_button() {
         run.recording.is_some_and(|recording| recording.on && recording.text == format!("step {}", run.steps))
     });
     // Another viewer may stop the recording.
-    let other = viewer.another(Wants::default());
+    let other = viewer.add_viewer(SnapshotRequest::default());
     other.send(Command::Record(false));
     step_until(&mut sim, |_| counted() == (false, 1, 1));
     // While its lock is held, the button refuses, and the simulation does not wait.
     let held = counter.lock().unwrap();
     viewer.send(Command::Record(true));
-    step_until(&mut sim, |_| run(&viewer).refused.is_some_and(|reason| reason.contains("busy")));
+    step_until(&mut sim, |_| run(&viewer).last_refusal.is_some_and(|reason| reason.contains("busy")));
     assert!(run(&viewer).recording.is_some(), "its last known state stays");
     drop(held);
     assert_eq!(counted(), (false, 1, 1));
     // The button also works while paused.
     viewer.send(Command::Pause);
     viewer.send(Command::Record(true));
-    let running = Running::start(sim);
+    let running = SteppingThread::start(sim);
     let paused = wait_for(&viewer, |s| s.run.paused && s.run.recording.as_ref().is_some_and(|r| r.on)).run.steps;
     assert_eq!(counted(), (true, 2, 1));
     viewer.send(Command::Resume);
-    running.goes_on_beyond(paused + 2);
+    running.wait_for_steps_beyond(paused + 2);
     drop((viewer, other));
     running.end();
 }
@@ -421,7 +424,7 @@ fn record_button() {
 #[test]
 fn recording_ends_with_viewer() {
     let mut sim = sample(1).sim;
-    let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
+    let (first, second) = (sim.viewer(SnapshotRequest::default()), sim.viewer(SnapshotRequest::default()));
     let (counter, button, counted) = counter();
     sim.record_button(button.clone());
     first.send(Command::Record(true));
@@ -436,7 +439,7 @@ fn recording_ends_with_viewer() {
     step_until(&mut sim, |_| counted() == (false, 1, 1));
     // A recording that the program started belongs to the program.
     counter.lock().unwrap().set(&mut sim, true).unwrap();
-    let viewer = sim.viewer(Wants::default());
+    let viewer = sim.viewer(SnapshotRequest::default());
     viewer.send(Command::Record(true));
     sim.update(200);
     drop(viewer);

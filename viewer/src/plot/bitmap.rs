@@ -6,53 +6,60 @@ use embedded_graphics::mono_font::iso_8859_1::FONT_7X13;
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
-use kinetoscope_plot::{Anchor, Curve, Drawing, Label};
+use kinetoscope_plot::{Anchor, Curve, Label, PlotLayout};
 
-const GREY: [u8; 3] = [221; 3];
+const GRAY: [u8; 3] = [221; 3];
 const BLACK: [u8; 3] = [0; 3];
 /// Half the width of a curve \[pixels\].
-const CURVE: f64 = 0.75;
+const CURVE_HALF_WIDTH: f64 = 0.75;
 
 /// Rasterizes a plot.
-pub(super) fn picture(drawing: &Drawing) -> Canvas {
-    let Drawing { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, keys } = drawing;
+pub(super) fn rasterize(drawing: &PlotLayout) -> Canvas {
+    let PlotLayout {
+        size: [width, height],
+        frame: [left, top, right, bottom],
+        grid,
+        labels,
+        curves,
+        legend_lines: keys,
+    } = drawing;
     let mut canvas = Canvas::new(*width, *height);
     canvas.bytes_mut().fill(255);
-    let mut pen = Pen { cover: vec![0; width * height], touched: Vec::new(), size: [*width, *height] };
+    let mut pen = LineRasterizer { coverage: vec![0; width * height], touched: Vec::new(), size: [*width, *height] };
     for [from, to] in grid {
-        pen.stroke(*from, *to, 0.5);
+        pen.add_line(*from, *to, 0.5);
     }
-    pen.ink(&mut canvas, GREY);
-    for Curve { color, pieces, marks } in curves {
+    pen.composite(&mut canvas, GRAY);
+    for Curve { color, polylines: pieces, markers: marks } in curves {
         for piece in pieces {
             for pair in piece.windows(2) {
-                pen.stroke(pair[0], pair[1], CURVE);
+                pen.add_line(pair[0], pair[1], CURVE_HALF_WIDTH);
             }
             if let [one] = piece[..] {
-                pen.stroke(one, one, 2.0);
+                pen.add_line(one, one, 2.0);
             }
         }
         for mark in marks {
-            pen.stroke(*mark, *mark, 3.0);
+            pen.add_line(*mark, *mark, 3.0);
         }
-        pen.ink(&mut canvas, *color);
+        pen.composite(&mut canvas, *color);
     }
     let corners = [[*left, *top], [*right, *top], [*right, *bottom], [*left, *bottom]];
     for k in 0..4 {
-        pen.stroke(corners[k], corners[(k + 1) % 4], 0.5);
+        pen.add_line(corners[k], corners[(k + 1) % 4], 0.5);
     }
-    pen.ink(&mut canvas, BLACK);
+    pen.composite(&mut canvas, BLACK);
     for ([from, to], color) in keys {
-        pen.stroke(*from, *to, 1.5);
-        pen.ink(&mut canvas, *color);
+        pen.add_line(*from, *to, 1.5);
+        pen.composite(&mut canvas, *color);
     }
     for label in labels {
-        write(&mut canvas, label);
+        draw_label(&mut canvas, label);
     }
     canvas
 }
 
-fn write(canvas: &mut Canvas, Label { text, at, anchor }: &Label) {
+fn draw_label(canvas: &mut Canvas, Label { text, at, anchor }: &Label) {
     let alignment = match anchor {
         Anchor::Start => Alignment::Left,
         Anchor::Middle => Alignment::Center,
@@ -66,16 +73,16 @@ fn write(canvas: &mut Canvas, Label { text, at, anchor }: &Label) {
 
 /// Draws antialiased lines. The coverage of all lines of one curve is collected first, so that crossings are not
 /// darker.
-struct Pen {
+struct LineRasterizer {
     /// Coverage of each pixel, 0 to 255.
-    cover: Vec<u8>,
+    coverage: Vec<u8>,
     touched: Vec<usize>,
     size: [usize; 2],
 }
 
-impl Pen {
+impl LineRasterizer {
     /// Adds a line of width 2 `half` \[pixels\]. Coverage falls off linearly over one pixel at the edges.
-    fn stroke(&mut self, from: [f64; 2], to: [f64; 2], half: f64) {
+    fn add_line(&mut self, from: [f64; 2], to: [f64; 2], half: f64) {
         let way = [to[0] - from[0], to[1] - from[1]];
         let length = way[0].hypot(way[1]);
         // Points of a plot are inside its frame, so a line is at most as long as the image.
@@ -98,30 +105,30 @@ impl Pen {
                         0.0
                     };
                     let off = (center[0] - along * way[0]).hypot(center[1] - along * way[1]);
-                    self.touch([x, y], (half + 0.5 - off).clamp(0.0, 1.0));
+                    self.cover_pixel([x, y], (half + 0.5 - off).clamp(0.0, 1.0));
                 }
             }
         }
     }
 
-    fn touch(&mut self, [x, y]: [i64; 2], share: f64) {
+    fn cover_pixel(&mut self, [x, y]: [i64; 2], share: f64) {
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
         let covered = (255.0 * share).round() as u8;
         if x >= self.size[0] || y >= self.size[1] || covered == 0 {
             return;
         }
         let at = y * self.size[0] + x;
-        if self.cover[at] == 0 {
+        if self.coverage[at] == 0 {
             self.touched.push(at);
         }
-        self.cover[at] = self.cover[at].max(covered);
+        self.coverage[at] = self.coverage[at].max(covered);
     }
 
     /// Blends the collected coverage onto the canvas and clears it.
-    fn ink(&mut self, canvas: &mut Canvas, color: [u8; 3]) {
+    fn composite(&mut self, canvas: &mut Canvas, color: [u8; 3]) {
         let (pixels, _) = canvas.bytes_mut().as_chunks_mut::<4>();
         for at in self.touched.drain(..) {
-            let a = u32::from(std::mem::take(&mut self.cover[at]));
+            let a = u32::from(std::mem::take(&mut self.coverage[at]));
             for (to, new) in pixels[at].iter_mut().zip(color) {
                 *to = ((u32::from(*to) * (255 - a) + u32::from(new) * a + 127) / 255) as u8;
             }

@@ -52,7 +52,7 @@ pub enum PlotError {
 /// # Errors
 /// [`PlotError::Size`].
 pub fn canvas(plot: &Plot) -> Result<Canvas, PlotError> {
-    Ok(bitmap::picture(&plot.drawing()?))
+    Ok(bitmap::rasterize(&plot.layout()?))
 }
 
 /// Writes a plot to a file in the format of its extension, `.svg` or `.png`. An existing file is replaced once the new

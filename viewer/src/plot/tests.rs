@@ -11,21 +11,21 @@ fn sine(points: u32) -> Plot {
 #[test]
 fn ink() {
     let plot = sine(300);
-    let (picture, drawing) = (canvas(&plot).unwrap(), plot.drawing().unwrap());
+    let (picture, drawing) = (canvas(&plot).unwrap(), plot.layout().unwrap());
     let blue = |x: f64, y: f64| {
         let [r, g, b] = picture.pixel(x.floor() as usize, y.floor() as usize).unwrap();
         r < 128 && g < 190 && b > 150
     };
-    for point in &drawing.curves[0].pieces[0] {
+    for point in &drawing.curves[0].polylines[0] {
         assert!(blue(point[0], point[1]), "{point:?}");
         // Control: twelve pixels above or below, the image has no line, except where the line is steep.
-        let flat = (point[1] - drawing.curves[0].pieces[0][15][1]).abs() < 20.0;
+        let flat = (point[1] - drawing.curves[0].polylines[0][15][1]).abs() < 20.0;
         assert!(flat || !blue(point[0], point[1] + 12.0) || !blue(point[0], point[1] - 12.0), "{point:?}");
     }
     // All colored pixels of the curve are near it: the line is 1.5 pixels wide, plus half a pixel of edge on both
     // sides.
     let [left, top, right, bottom] = drawing.frame.map(|x| x as usize);
-    let piece = &drawing.curves[0].pieces[0];
+    let piece = &drawing.curves[0].polylines[0];
     for y in top + 2..bottom - 2 {
         for x in (left + 2..right - 2).filter(|x| blue(*x as f64, y as f64)) {
             let [px, py] = [x as f64 + 0.5, y as f64 + 0.5];

@@ -5,9 +5,9 @@ use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 
 /// Default port.
-const PORT: u16 = 8080;
+const DEFAULT_PORT: u16 = 8080;
 /// Number of following ports that are tried as alternatives to a port in use.
-const NEXT: u16 = 64;
+const PORT_CANDIDATES: u16 = 64;
 
 /// Parses an address such as `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1` or `8080`. Host names other
 /// than `localhost` are not resolved.
@@ -18,13 +18,13 @@ pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
         return Ok(address);
     }
     if let Ok(ip) = text.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>() {
-        return Ok(SocketAddr::new(ip, PORT));
+        return Ok(SocketAddr::new(ip, DEFAULT_PORT));
     }
     if let Ok(port) = text.parse::<u16>() {
         return Ok(local(port));
     }
     let (host, port) = text.rsplit_once(':').unwrap_or((text, ""));
-    let wanted = if port.is_empty() { Some(PORT) } else { port.parse::<u16>().ok() };
+    let wanted = if port.is_empty() { Some(DEFAULT_PORT) } else { port.parse::<u16>().ok() };
     if let (true, Some(port)) = (host.is_empty() || host.eq_ignore_ascii_case("localhost"), wanted) {
         return Ok(local(port));
     }
@@ -32,7 +32,7 @@ pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
         None => format!("{port:?} is no port: ports are 0 to 65535"),
         Some(_) => format!("{host:?} is neither an IP address of this machine nor localhost"),
     };
-    let port = wanted.unwrap_or(PORT);
+    let port = wanted.unwrap_or(DEFAULT_PORT);
     let candidates = vec![local(port).to_string(), SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).to_string()];
     Err(ServeError::Address { given: given.into(), reason, candidates })
 }
@@ -47,7 +47,7 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     match error.kind() {
         ErrorKind::AddrInUse => Err(ServeError::PortInUse { address, next: next_free(address) }),
         ErrorKind::PermissionDenied => {
-            let next = next_free(SocketAddr::new(ip, PORT - 1));
+            let next = next_free(SocketAddr::new(ip, DEFAULT_PORT - 1));
             Err(ServeError::Address {
                 given: address.to_string(),
                 reason: format!("port {} needs rights that this program has not", address.port()),
@@ -67,13 +67,13 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
 
 /// Returns the next free port.
 fn next_free(address: SocketAddr) -> Option<SocketAddr> {
-    let ports = (1..=NEXT).filter_map(|k| address.port().checked_add(k));
+    let ports = (1..=PORT_CANDIDATES).filter_map(|k| address.port().checked_add(k));
     ports.map(|port| SocketAddr::new(address.ip(), port)).find(|address| TcpListener::bind(address).is_ok())
 }
 
 /// Returns the address under which other machines reach the server. For an unspecified address, this is the address of
 /// the default network interface.
-pub(super) fn reachable(address: SocketAddr) -> SocketAddr {
+pub(super) fn reachable_address(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;
     }

@@ -5,10 +5,10 @@ use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
 /// Timeout of writing a response.
-const WRITE_TIME: Duration = Duration::from_secs(5);
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Number of bytes and time for which remaining request data is read before closing. Closing a socket with unread data
 /// would reset the connection and lose the response.
-const LINGER: (usize, Duration) = (256 << 10, Duration::from_millis(300));
+const DRAIN_LIMIT: (usize, Duration) = (256 << 10, Duration::from_millis(300));
 
 /// Reason of a refused request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,30 +16,30 @@ pub(super) enum Status {
     BadRequest,
     Forbidden,
     NotFound,
-    WrongMethod,
+    MethodNotAllowed,
     Timeout,
     UpgradeRequired,
-    TooLarge,
-    Busy,
-    Broken,
+    HeadTooLarge,
+    ServiceUnavailable,
+    InternalError,
 }
 
 impl Status {
-    fn line(self) -> &'static str {
+    fn status_line(self) -> &'static str {
         match self {
             Self::BadRequest => "400 Bad Request",
             Self::Forbidden => "403 Forbidden",
             Self::NotFound => "404 Not Found",
-            Self::WrongMethod => "405 Method Not Allowed",
+            Self::MethodNotAllowed => "405 Method Not Allowed",
             Self::Timeout => "408 Request Timeout",
             Self::UpgradeRequired => "426 Upgrade Required",
-            Self::TooLarge => "431 Request Header Fields Too Large",
-            Self::Busy => "503 Service Unavailable",
-            Self::Broken => "500 Internal Server Error",
+            Self::HeadTooLarge => "431 Request Header Fields Too Large",
+            Self::ServiceUnavailable => "503 Service Unavailable",
+            Self::InternalError => "500 Internal Server Error",
         }
     }
 
-    fn says(self) -> &'static str {
+    fn explanation(self) -> &'static str {
         match self {
             Self::BadRequest => "This is no request that is understood here.",
             Self::Forbidden => {
@@ -47,18 +47,18 @@ impl Status {
                  sites may not come here."
             }
             Self::NotFound => "There is nothing here: the page is at /.",
-            Self::WrongMethod => "Only GET is answered here.",
+            Self::MethodNotAllowed => "Only GET is answered here.",
             Self::Timeout => "The request took too long.",
             Self::UpgradeRequired => "This is for WebSockets of version 13.",
-            Self::TooLarge => "The request is too large.",
-            Self::Busy => "There are as many viewers as may be: close one, and load this page again.",
-            Self::Broken => "Something is broken here.",
+            Self::HeadTooLarge => "The request is too large.",
+            Self::ServiceUnavailable => "There are as many viewers as may be: close one, and load this page again.",
+            Self::InternalError => "Something is broken here.",
         }
     }
 }
 
 /// Sends the page with status 200.
-pub(super) fn page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: bool) {
+pub(super) fn send_page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: bool) {
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src blob: \
          data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -68,15 +68,15 @@ pub(super) fn page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: b
 }
 
 /// Sends a status and an explanation.
-pub(super) fn refuse(stream: &mut TcpStream, status: Status) {
+pub(super) fn send_error(stream: &mut TcpStream, status: Status) {
     let more: &[(&str, &str)] = match status {
-        Status::WrongMethod => &[("Allow", "GET, HEAD")],
+        Status::MethodNotAllowed => &[("Allow", "GET, HEAD")],
         Status::UpgradeRequired => &[("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")],
-        Status::Busy => &[("Retry-After", "5")],
+        Status::ServiceUnavailable => &[("Retry-After", "5")],
         _ => &[],
     };
     let more: Vec<_> = more.iter().copied().chain([("Content-Type", "text/plain; charset=utf-8")]).collect();
-    send(stream, status.line(), &more, &format!("{}\n", status.says()), true);
+    send(stream, status.status_line(), &more, &format!("{}\n", status.explanation()), true);
 }
 
 fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, with_body: bool) {
@@ -87,15 +87,15 @@ fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, w
         body.len()
     );
     let body = if with_body { body } else { "" };
-    let sent = stream.set_write_timeout(Some(WRITE_TIME)).and_then(|()| stream.write_all((head + body).as_bytes()));
+    let sent = stream.set_write_timeout(Some(WRITE_TIMEOUT)).and_then(|()| stream.write_all((head + body).as_bytes()));
     if sent.is_ok() {
-        linger(stream);
+        drain(stream);
     }
 }
 
 /// Reads the remaining request data, within limits.
-pub(super) fn linger(stream: &mut TcpStream) {
-    let (most, time) = LINGER;
+pub(super) fn drain(stream: &mut TcpStream) {
+    let (most, time) = DRAIN_LIMIT;
     let start = Instant::now();
     let (mut seen, mut chunk) = (0, [0; 4096]);
     if stream.shutdown(Shutdown::Write).is_err() {

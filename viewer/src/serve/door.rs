@@ -1,19 +1,19 @@
 //! Access control: refuses requests from other websites and requests without the token.
 
 use super::answer::Status;
-use super::head::Head;
+use super::head::RequestHead;
 use super::token::Token;
 use std::net::{IpAddr, SocketAddr};
 
 /// Access policy of one view.
 #[derive(Clone, Debug)]
-pub(super) struct Door {
+pub(super) struct AccessPolicy {
     /// True if the server listens on loopback only.
     local: bool,
     token: Option<Token>,
 }
 
-impl Door {
+impl AccessPolicy {
     /// Creates the policy of an address, with a token if other machines can reach it.
     pub(super) fn new(address: SocketAddr, token: Option<Token>) -> Self {
         Self { local: address.ip().is_loopback(), token }
@@ -24,7 +24,7 @@ impl Door {
     /// Even on a loopback address, any website can make a local browser send requests to this server. The `Origin`
     /// header reveals such requests. With DNS rebinding the origin matches, but the `Host` header names the website, so
     /// a loopback view accepts only host names of this machine. The port may differ, because of tunnels.
-    pub(super) fn check(&self, head: &Head) -> Result<(), Status> {
+    pub(super) fn check(&self, head: &RequestHead) -> Result<(), Status> {
         let host = head.header("host")?.ok_or(Status::BadRequest)?;
         if self.local && !is_local(host) {
             return Err(Status::Forbidden);
@@ -37,7 +37,7 @@ impl Door {
         if head.header("origin")?.is_some_and(|origin| !same(origin)) {
             return Err(Status::Forbidden);
         }
-        let known = |token: &Token| head.query("token").is_some_and(|given| token.is(given));
+        let known = |token: &Token| head.query("token").is_some_and(|given| token.matches(given));
         if self.token.as_ref().is_some_and(|token| !known(token)) {
             return Err(Status::Forbidden);
         }

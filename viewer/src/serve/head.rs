@@ -10,11 +10,11 @@ const MAX_BYTES: usize = 16 << 10;
 /// Maximum number of headers.
 const MAX_HEADERS: usize = 96;
 /// Timeout of a complete request head. Clients that send a byte per second are refused.
-const MAX_TIME: Duration = Duration::from_secs(5);
+const READ_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A parsed HTTP request head.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Head {
+pub(super) struct RequestHead {
     pub(super) method: String,
     /// Path without the query.
     pub(super) path: String,
@@ -25,14 +25,14 @@ pub(super) struct Head {
     pub(super) rest: Vec<u8>,
 }
 
-impl Head {
+impl RequestHead {
     /// Reads a request head. Returns `None` if the client sent nothing, or if the connection failed.
     pub(super) fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
         let start = Instant::now();
         let mut bytes = Vec::new();
         let mut chunk = [0; 2048];
         loop {
-            let left = MAX_TIME.saturating_sub(start.elapsed());
+            let left = READ_TIMEOUT.saturating_sub(start.elapsed());
             if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
                 return Err(Status::Timeout);
             }
@@ -50,7 +50,7 @@ impl Head {
                 return Ok(Some(head));
             }
             if bytes.len() >= MAX_BYTES {
-                return Err(Status::TooLarge);
+                return Err(Status::HeadTooLarge);
             }
         }
     }
@@ -61,7 +61,9 @@ impl Head {
         let mut request = httparse::Request::new(&mut headers);
         let length = match request.parse(bytes) {
             Ok(httparse::Status::Complete(length)) if length <= MAX_BYTES => length,
-            Ok(httparse::Status::Complete(_)) | Err(httparse::Error::TooManyHeaders) => return Err(Status::TooLarge),
+            Ok(httparse::Status::Complete(_)) | Err(httparse::Error::TooManyHeaders) => {
+                return Err(Status::HeadTooLarge);
+            }
             Ok(httparse::Status::Partial) => return Ok(None),
             Err(_) => return Err(Status::BadRequest),
         };
@@ -90,7 +92,7 @@ impl Head {
     }
 
     /// True if a comma-separated header contains a word.
-    pub(super) fn lists(&self, name: &str, word: &str) -> bool {
+    pub(super) fn header_contains(&self, name: &str, word: &str) -> bool {
         let values = self.headers.iter().filter(|(n, _)| n == name);
         values.flat_map(|(_, value)| value.split(',')).any(|item| item.trim().eq_ignore_ascii_case(word))
     }
@@ -106,8 +108,8 @@ impl Head {
 mod tests {
     use super::*;
 
-    fn parsed(text: &str) -> Result<Option<Head>, Status> {
-        Head::parse(text.as_bytes())
+    fn parsed(text: &str) -> Result<Option<RequestHead>, Status> {
+        RequestHead::parse(text.as_bytes())
     }
 
     #[test]
@@ -118,13 +120,13 @@ mod tests {
         assert_eq!((head.method.as_str(), head.path.as_str(), head.query("token")), ("GET", "/live", Some("xyz")));
         assert_eq!(head.header("host"), Ok(Some("localhost:8080")));
         assert_eq!(head.header("origin"), Ok(None));
-        assert!(head.lists("connection", "upgrade") && !head.lists("connection", "close"));
+        assert!(head.header_contains("connection", "upgrade") && !head.header_contains("connection", "close"));
         assert_eq!(head.rest, b"more");
         // An incomplete request waits for more bytes.
         for end in 1..text.len() - "more".len() {
             assert_eq!(parsed(&text[..end]), Ok(None), "{:?}", &text[..end]);
         }
         let many: String = (0..=MAX_HEADERS).map(|k| format!("a{k}: b\r\n")).collect();
-        assert_eq!(parsed(&format!("GET / HTTP/1.1\r\n{many}\r\n")), Err(Status::TooLarge));
+        assert_eq!(parsed(&format!("GET / HTTP/1.1\r\n{many}\r\n")), Err(Status::HeadTooLarge));
     }
 }

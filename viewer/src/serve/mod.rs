@@ -15,7 +15,7 @@
 //! ```
 //!
 //! On a loopback address, every program and user of this machine can watch and control the simulation. On an address
-//! that other machines can reach, a token is required, which is part of [`Served::url`]. The connection is not
+//! that other machines can reach, a token is required, which is part of [`ServerHandle::url`]. The connection is not
 //! encrypted: over an untrusted network, listen on loopback and use a tunnel (`ssh -L 8080:localhost:8080 robot`).
 //!
 //! Each viewer has its own thread, which renders images of the newest [`Snapshot`](crate::Snapshot). Only one viewer of
@@ -37,11 +37,11 @@ mod viewer;
 
 pub use error::ServeError;
 
-use crate::control::{RecordButton, Speed, Viewing, Wants};
-use door::Door;
-use eyes::Theatre;
-use kinetoscope_sim::{Moment, Observer, ObserverId, SimulationManager};
-use server::{House, Server};
+use crate::control::{RecordButton, SnapshotRequest, Speed, ViewerExt};
+use door::AccessPolicy;
+use eyes::ViewerHub;
+use kinetoscope_sim::{Observer, ObserverId, SimEvent, SimulationManager};
+use server::{Server, ServerContext};
 use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
 use token::Token;
@@ -52,33 +52,33 @@ pub struct ServeCfg {
     /// Maximum number of simultaneous viewers. Further viewers are refused with status 503 (Service Unavailable).
     pub max_viewers: usize,
     /// Maximum number of images per second for each viewer.
-    pub rate: f64,
+    pub max_fps: f64,
     /// JPEG quality of the images, 1 to 100.
-    pub quality: u8,
+    pub jpeg_quality: u8,
     /// Speed of simulated time until a viewer changes it, and again after the last viewer has left. `None` keeps the
     /// current speed: that set by a window, otherwise as fast as the machine can step.
     pub speed: Option<Speed>,
     /// Record button of the simulation. `None` keeps the button that another view has set, if any.
-    pub recording: Option<RecordButton>,
+    pub record_button: Option<RecordButton>,
 }
 
 impl Default for ServeCfg {
     fn default() -> Self {
-        Self { max_viewers: 16, rate: 30.0, quality: 85, speed: None, recording: None }
+        Self { max_viewers: 16, max_fps: 30.0, jpeg_quality: 85, speed: None, record_button: None }
     }
 }
 
 /// Handle of a browser view. Dropping the handle has no effect: the view ends when it is [closed](Self::close) or the
 /// simulation is dropped.
 #[derive(Debug)]
-pub struct Served {
+pub struct ServerHandle {
     url: String,
     address: SocketAddr,
-    house: Weak<House>,
-    host: ObserverId<Host>,
+    context: Weak<ServerContext>,
+    host: ObserverId<ServerObserver>,
 }
 
-impl Served {
+impl ServerHandle {
     /// Address to open in a browser, with the token if one is required.
     pub fn url(&self) -> &str {
         &self.url
@@ -91,7 +91,7 @@ impl Served {
 
     /// Number of connected viewers.
     pub fn viewers(&self) -> usize {
-        self.house.upgrade().map_or(0, |house| house.viewers())
+        self.context.upgrade().map_or(0, |house| house.viewers())
     }
 
     /// Disconnects all viewers and stops listening.
@@ -113,7 +113,7 @@ pub trait Serve {
     ///
     /// # Errors
     /// The address is invalid, does not belong to this machine, or is in use; the error suggests alternatives.
-    fn serve(&mut self, address: &str) -> Result<Served, ServeError> {
+    fn serve(&mut self, address: &str) -> Result<ServerHandle, ServeError> {
         self.serve_with(address, ServeCfg::default())
     }
 
@@ -121,45 +121,45 @@ pub trait Serve {
     ///
     /// # Errors
     /// The errors of [`serve`](Self::serve).
-    fn serve_with(&mut self, address: &str, cfg: ServeCfg) -> Result<Served, ServeError>;
+    fn serve_with(&mut self, address: &str, cfg: ServeCfg) -> Result<ServerHandle, ServeError>;
 }
 
 impl Serve for SimulationManager {
-    fn serve_with(&mut self, address: &str, mut cfg: ServeCfg) -> Result<Served, ServeError> {
-        let (button, max_viewers) = (cfg.recording.take(), cfg.max_viewers);
+    fn serve_with(&mut self, address: &str, mut cfg: ServeCfg) -> Result<ServerHandle, ServeError> {
+        let (button, max_viewers) = (cfg.record_button.take(), cfg.max_viewers);
         let asked = address::parse(address)?;
         let listener = address::listen(asked)?;
         let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
         let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
-        let secret = token.as_ref().map_or_else(String::new, |token| format!("?token={}", token.as_str()));
-        let url = format!("http://{}/{secret}", address::reachable(address));
+        let token_query = token.as_ref().map_or_else(String::new, |token| format!("?token={}", token.as_str()));
+        let url = format!("http://{}/{token_query}", address::reachable_address(address));
         // Requests two snapshots per second. A new viewer thus starts with a state at most half a second old, even if
         // the program does not step then.
-        let usher = self.viewer(Wants { rate: 2.0, ..Wants::default() });
-        let theatre = Arc::new(Theatre::new(usher, cfg));
-        let server = Server::start(listener, Door::new(address, token), theatre, max_viewers)?;
+        let host_viewer = self.viewer(SnapshotRequest { rate: 2.0, ..SnapshotRequest::default() });
+        let backend = Arc::new(ViewerHub::new(host_viewer, cfg));
+        let server = Server::start(listener, AccessPolicy::new(address, token), backend, max_viewers)?;
         button.into_iter().for_each(|button| self.record_button(button));
-        let house = server.house();
-        let host = self.observers_mut().add(Host(server));
-        Ok(Served { url, address, house, host })
+        let house = server.context();
+        let host = self.observers_mut().add(ServerObserver(server));
+        Ok(ServerHandle { url, address, context: house, host })
     }
 }
 
 /// Observer that owns the server, which thus ends with its simulation.
-struct Host(Server);
+struct ServerObserver(Server);
 
-impl std::fmt::Debug for Host {
+impl std::fmt::Debug for ServerObserver {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Host").field("viewers", &self.0.viewers()).finish()
     }
 }
 
-impl Observer for Host {
+impl Observer for ServerObserver {
     fn due_in(&self, _: &SimulationManager) -> u64 {
         u64::MAX
     }
 
-    fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
+    fn on_event(&mut self, _: &mut SimulationManager, _: &SimEvent) {}
 }
 
 #[cfg(test)]
@@ -173,23 +173,23 @@ mod tests {
     #[test]
     fn speed() {
         let mut sim = sample(1).sim;
-        let window = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
-        window.send(Command::SetSpeed(Speed::REAL));
+        let window = sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
+        window.send(Command::SetSpeed(Speed::REAL_TIME));
         let until = |sim: &mut SimulationManager, speed: Speed| {
             kinetoscope_testkit::wait::until(&format!("{speed:?}"), || {
                 sim.update(1);
                 window.newest().unwrap().run.speed == speed
             });
         };
-        until(&mut sim, Speed::REAL);
+        until(&mut sim, Speed::REAL_TIME);
         let _served = sim.serve("127.0.0.1:0").unwrap();
         // Commands run within some milliseconds; steps take 10 ms.
         sim.update(10);
-        assert_eq!(window.newest().unwrap().run.speed, Speed::REAL);
-        let cfg = ServeCfg { speed: Some(Speed::Times(2.0)), ..ServeCfg::default() };
+        assert_eq!(window.newest().unwrap().run.speed, Speed::REAL_TIME);
+        let cfg = ServeCfg { speed: Some(Speed::Factor(2.0)), ..ServeCfg::default() };
         let other = sim.serve_with("127.0.0.1:0", cfg).unwrap();
-        until(&mut sim, Speed::Times(2.0));
+        until(&mut sim, Speed::Factor(2.0));
         other.close(&mut sim).unwrap();
-        until(&mut sim, Speed::REAL);
+        until(&mut sim, Speed::REAL_TIME);
     }
 }

@@ -1,10 +1,10 @@
 //! HTTP server with one thread per connection, and limits on the number of connections.
 
 use super::answer::{self, Status};
-use super::door::Door;
+use super::door::AccessPolicy;
 use super::error::ServeError;
-use super::head::Head;
-use super::show::Show;
+use super::head::RequestHead;
+use super::show::ViewBackend;
 use super::{page, viewer};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -16,19 +16,19 @@ use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
 /// Number of connections in addition to viewers: page loads, and silent connections until their timeout.
-const SPARE_CONNECTIONS: usize = 32;
+const MAX_OTHER_CONNECTIONS: usize = 32;
 /// Interval between two checks for new connections.
-const ACCEPT_EVERY: Duration = Duration::from_millis(15);
+const ACCEPT_INTERVAL: Duration = Duration::from_millis(15);
 /// Time without viewers after which the settings of the last viewer are undone. A viewer that lost its connection or
 /// reloads the page returns earlier.
-const DESERTED_AFTER: Duration = Duration::from_secs(10);
+const IDLE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Path of the WebSocket endpoint.
-const LIVE: &str = "/live";
+const WEBSOCKET_PATH: &str = "/live";
 
 /// State shared by all connections.
-pub(super) struct House {
-    door: Door,
-    show: Arc<dyn Show>,
+pub(super) struct ServerContext {
+    policy: AccessPolicy,
+    backend: Arc<dyn ViewBackend>,
     max_viewers: usize,
     viewers: AtomicUsize,
     stop: AtomicBool,
@@ -43,9 +43,9 @@ struct Connections {
     threads: Vec<JoinHandle<()>>,
 }
 
-impl House {
+impl ServerContext {
     /// True if the server is shutting down and all connections have to end.
-    pub(super) fn closes(&self) -> bool {
+    pub(super) fn is_closing(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }
 
@@ -61,7 +61,7 @@ impl House {
 
 /// A running server. Dropping the server closes every connection and joins all threads.
 pub(super) struct Server {
-    house: Arc<House>,
+    house: Arc<ServerContext>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -69,15 +69,15 @@ impl Server {
     /// Starts to accept connections.
     pub(super) fn start(
         listener: TcpListener,
-        door: Door,
-        show: Arc<dyn Show>,
+        door: AccessPolicy,
+        show: Arc<dyn ViewBackend>,
         max_viewers: usize,
     ) -> Result<Self, ServeError> {
         let no_thread = |error: std::io::Error| ServeError::System(format!("no thread for it: {error}"));
         listener.set_nonblocking(true).map_err(no_thread)?;
-        let house = Arc::new(House {
-            door,
-            show,
+        let house = Arc::new(ServerContext {
+            policy: door,
+            backend: show,
             max_viewers,
             viewers: AtomicUsize::new(0),
             stop: AtomicBool::new(false),
@@ -95,7 +95,7 @@ impl Server {
     }
 
     /// Returns the state shared by all connections.
-    pub(super) fn house(&self) -> Weak<House> {
+    pub(super) fn context(&self) -> Weak<ServerContext> {
         Arc::downgrade(&self.house)
     }
 }
@@ -122,27 +122,27 @@ impl Drop for Server {
     }
 }
 
-fn listen(listener: &TcpListener, house: &Arc<House>) {
+fn listen(listener: &TcpListener, house: &Arc<ServerContext>) {
     // Time at which a viewer was last connected; `None` if no settings have to be undone.
     let mut seen: Option<Instant> = None;
-    while !house.closes() {
+    while !house.is_closing() {
         // An error comes from the connecting client or from a temporary lack of file descriptors.
         match listener.accept() {
-            Ok((stream, _)) => welcome(stream, house),
-            Err(_) => std::thread::park_timeout(ACCEPT_EVERY),
+            Ok((stream, _)) => spawn_connection(stream, house),
+            Err(_) => std::thread::park_timeout(ACCEPT_INTERVAL),
         }
         house.connections().threads.retain(|thread| !thread.is_finished());
         if house.viewers() > 0 {
             seen = Some(Instant::now());
-        } else if seen.is_some_and(|seen| seen.elapsed() > DESERTED_AFTER) {
+        } else if seen.is_some_and(|seen| seen.elapsed() > IDLE_TIMEOUT) {
             seen = None;
-            house.show.deserted();
+            house.backend.on_idle();
         }
     }
 }
 
 /// Starts the thread of a connection.
-fn welcome(mut stream: TcpStream, house: &Arc<House>) {
+fn spawn_connection(mut stream: TcpStream, house: &Arc<ServerContext>) {
     // Accepted sockets may inherit the non-blocking mode of the listener on some systems (not on Linux).
     if stream.set_nonblocking(false).is_err() || stream.set_nodelay(true).is_err() {
         return;
@@ -150,7 +150,7 @@ fn welcome(mut stream: TcpStream, house: &Arc<House>) {
     let Ok(waker) = stream.try_clone() else { return };
     let number = {
         let mut connections = house.connections();
-        if connections.open.len() >= house.max_viewers + SPARE_CONNECTIONS {
+        if connections.open.len() >= house.max_viewers + MAX_OTHER_CONNECTIONS {
             drop(connections);
             // The connection is closed without a response, which could block. So many connections do not come from
             // browsers.
@@ -161,10 +161,10 @@ fn welcome(mut stream: TcpStream, house: &Arc<House>) {
         connections.open.insert(number, waker);
         number
     };
-    let entry = Entry { house: Arc::clone(house), number };
+    let entry = ConnectionEntry { house: Arc::clone(house), number };
     let thread = std::thread::Builder::new().name("view-talk".into());
     let talk = move || {
-        talk(&mut stream, &entry.house);
+        serve_connection(&mut stream, &entry.house);
         // Closes the connection for the client too, although `waker` still holds the socket.
         let _ = stream.shutdown(Shutdown::Both);
         drop(entry);
@@ -176,71 +176,71 @@ fn welcome(mut stream: TcpStream, house: &Arc<House>) {
 }
 
 /// Entry of a connection in the list of open sockets. Dropping it removes the entry, even if the thread panics.
-struct Entry {
-    house: Arc<House>,
+struct ConnectionEntry {
+    house: Arc<ServerContext>,
     number: u64,
 }
 
-impl Drop for Entry {
+impl Drop for ConnectionEntry {
     fn drop(&mut self) {
         self.house.connections().open.remove(&self.number);
     }
 }
 
 /// Reserved place of a viewer, released on drop.
-struct Seat<'a>(&'a House);
+struct ViewerSlot<'a>(&'a ServerContext);
 
-impl<'a> Seat<'a> {
-    fn take(house: &'a House) -> Option<Self> {
+impl<'a> ViewerSlot<'a> {
+    fn acquire(house: &'a ServerContext) -> Option<Self> {
         let free = |seated: usize| (seated < house.max_viewers).then_some(seated + 1);
         let taken = house.viewers.fetch_update(Ordering::AcqRel, Ordering::Acquire, free);
         taken.ok().map(|_| Self(house))
     }
 }
 
-impl Drop for Seat<'_> {
+impl Drop for ViewerSlot<'_> {
     fn drop(&mut self) {
         self.0.viewers.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
-fn talk(stream: &mut TcpStream, house: &House) {
-    let head = match Head::read(stream) {
+fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
+    let head = match RequestHead::read(stream) {
         Ok(Some(head)) => head,
         Ok(None) => return,
-        Err(status) => return answer::refuse(stream, status),
+        Err(status) => return answer::send_error(stream, status),
     };
-    if let Err(status) = house.door.check(&head) {
-        return answer::refuse(stream, status);
+    if let Err(status) = house.policy.check(&head) {
+        return answer::send_error(stream, status);
     }
     match (head.method.as_str(), head.path.as_str()) {
         ("GET" | "HEAD", "/" | "/index.html") => match super::token::random_hex() {
-            Ok(nonce) => answer::page(stream, &page::html(&nonce), &nonce, head.method == "GET"),
-            Err(_) => answer::refuse(stream, Status::Broken),
+            Ok(nonce) => answer::send_page(stream, &page::html(&nonce), &nonce, head.method == "GET"),
+            Err(_) => answer::send_error(stream, Status::InternalError),
         },
-        ("GET", LIVE) => live(stream, house, head),
-        ("GET" | "HEAD", _) => answer::refuse(stream, Status::NotFound),
-        _ => answer::refuse(stream, Status::WrongMethod),
+        ("GET", WEBSOCKET_PATH) => upgrade(stream, house, head),
+        ("GET" | "HEAD", _) => answer::send_error(stream, Status::NotFound),
+        _ => answer::send_error(stream, Status::MethodNotAllowed),
     }
 }
 
 /// Upgrades the connection to a WebSocket (RFC 6455, section 4.2).
-fn live(stream: &mut TcpStream, house: &House, head: Head) {
-    let asks = head.lists("connection", "upgrade") && head.lists("upgrade", "websocket");
+fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
+    let asks = head.header_contains("connection", "upgrade") && head.header_contains("upgrade", "websocket");
     let version = head.header("sec-websocket-version").ok().flatten();
     // Sixteen bytes in base64.
     let key = head.header("sec-websocket-key").ok().flatten().filter(|key| key.len() == 24);
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
-        return answer::refuse(stream, Status::UpgradeRequired);
+        return answer::send_error(stream, Status::UpgradeRequired);
     };
-    let Some(seat) = Seat::take(house) else { return answer::refuse(stream, Status::Busy) };
+    let Some(seat) = ViewerSlot::acquire(house) else { return answer::send_error(stream, Status::ServiceUnavailable) };
     let switch = format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {}\r\n\r\n",
         derive_accept_key(key.as_bytes())
     );
-    let sent = stream.set_write_timeout(Some(viewer::WRITE_TIME)).and_then(|()| stream.write_all(switch.as_bytes()));
+    let sent = stream.set_write_timeout(Some(viewer::WRITE_TIMEOUT)).and_then(|()| stream.write_all(switch.as_bytes()));
     if sent.is_ok() {
-        viewer::look(stream, head.rest, house, house.show.eyes());
+        viewer::run_session(stream, head.rest, house, house.backend.open_session());
     }
     drop(seat);
 }

@@ -4,16 +4,16 @@ use super::command::Command;
 use serde_json::Value;
 
 /// A view that serves several clients.
-pub(super) trait Show: Send + Sync {
+pub(super) trait ViewBackend: Send + Sync {
     /// Creates the session of a new client.
-    fn eyes(&self) -> Box<dyn Eyes>;
+    fn open_session(&self) -> Box<dyn ViewSession>;
 
     /// Called after all clients have been gone for a while.
-    fn deserted(&self);
+    fn on_idle(&self);
 }
 
 /// Session of one client. Its methods never wait for the simulation.
-pub(super) trait Eyes: Send {
+pub(super) trait ViewSession: Send {
     /// Returns the scene contents: robots and their joints, cameras, environments. `None` if unchanged since the last
     /// call.
     fn contents(&mut self) -> Option<Value>;
@@ -22,24 +22,24 @@ pub(super) trait Eyes: Send {
     fn state(&mut self) -> Option<Value>;
 
     /// Runs a command, or returns the reason of its refusal.
-    fn obey(&mut self, command: Command) -> Result<(), String>;
+    fn handle(&mut self, command: Command) -> Result<(), String>;
 
     /// Renders the images that are due; empty if nothing has changed.
-    fn pictures(&mut self) -> Vec<Picture>;
+    fn due_images(&mut self) -> Vec<EncodedImage>;
 }
 
 /// An encoded image with its description.
-pub(super) struct Picture {
+pub(super) struct EncodedImage {
     /// Description of the image for the page.
-    pub(super) about: Value,
+    pub(super) description: Value,
     /// Image file, JPEG or PNG.
     pub(super) file: Vec<u8>,
 }
 
-impl Picture {
-    /// Encodes the message: length of `about` as four bytes (little endian), `about` as JSON, image file.
-    pub(super) fn message(&self) -> Vec<u8> {
-        let about = self.about.to_string().into_bytes();
+impl EncodedImage {
+    /// Encodes the message: length of `description` as four bytes (little endian), `description` as JSON, image file.
+    pub(super) fn to_message(&self) -> Vec<u8> {
+        let about = self.description.to_string().into_bytes();
         let length = u32::try_from(about.len()).unwrap_or(u32::MAX).to_le_bytes();
         [&length[..], &about, &self.file].concat()
     }

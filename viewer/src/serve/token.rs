@@ -5,7 +5,7 @@ use std::fmt;
 use std::hint::black_box;
 
 /// Number of random bytes of a token: 128 bits cannot be guessed.
-const BYTES: usize = 16;
+const TOKEN_BYTES: usize = 16;
 
 /// A random secret that grants access to a view.
 #[derive(Clone, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl Token {
 
     /// True if `given` equals the token. The comparison takes constant time, so its duration reveals nothing about the
     /// token.
-    pub(super) fn is(&self, given: &str) -> bool {
+    pub(super) fn matches(&self, given: &str) -> bool {
         let (own, given) = (self.0.as_bytes(), given.as_bytes());
         // The length is not secret.
         own.len() == given.len()
@@ -40,7 +40,7 @@ impl Token {
 
 /// Returns 32 random hexadecimal digits.
 pub(super) fn random_hex() -> Result<String, ServeError> {
-    let mut bytes = [0; BYTES];
+    let mut bytes = [0; TOKEN_BYTES];
     getrandom::fill(&mut bytes).map_err(|error| ServeError::System(format!("no random numbers: {error}")))?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
@@ -55,14 +55,14 @@ mod tests {
     fn equality() {
         let [token, second] = [(); 2].map(|()| Token::random().unwrap());
         let text = token.as_str();
-        assert_eq!(text.len(), 2 * BYTES);
-        assert!(token.is(text) && token != second && !format!("{token:?}").contains(text));
+        assert_eq!(text.len(), 2 * TOKEN_BYTES);
+        assert!(token.matches(text) && token != second && !format!("{token:?}").contains(text));
         let changed = (0..text.len()).map(|k| {
             let digit = if &text[k..=k] == "0" { "1" } else { "0" };
             format!("{}{digit}{}", &text[..k], &text[k + 1..])
         });
         for other in changed.chain([String::new(), text[1..].into(), format!("{text}0")]) {
-            assert!(!token.is(&other), "{other}");
+            assert!(!token.matches(&other), "{other}");
         }
     }
 }

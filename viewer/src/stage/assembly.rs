@@ -1,35 +1,35 @@
 //! Merges the environments and markers into one render scene.
 
-use super::snapshot::{EnvStage, Shown, Snapshot};
+use super::snapshot::{EnvSelection, Snapshot, SnapshotEnv};
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use std::sync::Arc;
 
 /// Geom group of markers. MuJoCo uses the groups 0 to 5.
-pub(super) const MARKERS: u8 = 31;
+pub(super) const MARKER_GROUP: u8 = 31;
 
 /// The merged render scene, with the origin of each instance.
 #[derive(Debug, Default)]
-pub(super) struct Assembly {
-    /// Render scene. The mask id of an instance is its index in `parts` plus one; markers have [`Marker::MASK_ID`].
+pub(super) struct MergedScene {
+    /// Render scene. The mask id of an instance is its index in `instance_sources` plus one; markers have [`Marker::MASK_ID`].
     pub(super) scene: Option<RenderScene>,
     pub(super) poses: Vec<PoseF32>,
     /// Environment and instance index of each instance; markers come last and have no entry.
-    pub(super) parts: Vec<(usize, usize)>,
-    /// True for each instance of `parts` that is the ground. The ground is not moved to the origin of its environment.
+    pub(super) instance_sources: Vec<(usize, usize)>,
+    /// True for each instance of `instance_sources` that is the ground. The ground is not moved to the origin of its environment.
     is_ground: Vec<bool>,
     instances: Vec<Instance>,
     /// Sources of `instances`, which are rebuilt only when this key changes.
-    key: Option<Key>,
+    key: Option<SceneKey>,
 }
 
 #[derive(Debug)]
-struct Key {
-    shown: Shown,
+struct SceneKey {
+    shown: EnvSelection,
     scenes: Vec<Arc<RenderScene>>,
 }
 
-impl Key {
-    fn fits(&self, shown: Shown, scenes: &[Arc<RenderScene>]) -> bool {
+impl SceneKey {
+    fn matches(&self, shown: EnvSelection, scenes: &[Arc<RenderScene>]) -> bool {
         self.shown == shown
             && self.scenes.len() == scenes.len()
             && self.scenes.iter().zip(scenes).all(|(a, b)| Arc::ptr_eq(a, b))
@@ -37,23 +37,23 @@ impl Key {
 }
 
 /// Returns the shown environments with their indices.
-pub(super) fn chosen(snapshot: &Snapshot, shown: Shown) -> impl Iterator<Item = (usize, &EnvStage)> {
-    snapshot.envs.iter().enumerate().filter(move |(env, _)| shown.has(*env))
+pub(super) fn shown_envs(snapshot: &Snapshot, shown: EnvSelection) -> impl Iterator<Item = (usize, &SnapshotEnv)> {
+    snapshot.envs.iter().enumerate().filter(move |(env, _)| shown.contains(*env))
 }
 
-impl Assembly {
+impl MergedScene {
     /// Updates the merged scene from a snapshot. The ground is included once. `markers` are in the frames of their
     /// environments.
-    pub(super) fn set(&mut self, snapshot: &Snapshot, shown: Shown, markers: &[(usize, Marker)]) {
+    pub(super) fn update(&mut self, snapshot: &Snapshot, shown: EnvSelection, markers: &[(usize, Marker)]) {
         let scenes: Vec<Arc<RenderScene>> =
-            chosen(snapshot, shown).filter_map(|(_, env)| snapshot.scene_of(env)).collect();
+            shown_envs(snapshot, shown).filter_map(|(_, env)| snapshot.env_scene(env)).collect();
         let mut outdated = !markers.is_empty() || self.instances.len() != self.poses.len();
-        if !self.key.as_ref().is_some_and(|key| key.fits(shown, &scenes)) {
-            self.collect(snapshot, shown);
-            self.key = Some(Key { shown, scenes: scenes.clone() });
+        if !self.key.as_ref().is_some_and(|key| key.matches(shown, &scenes)) {
+            self.rebuild_instances(snapshot, shown);
+            self.key = Some(SceneKey { shown, scenes: scenes.clone() });
             outdated = true;
         }
-        self.place(snapshot);
+        self.update_poses(snapshot);
         if !(outdated || self.scene.is_none()) {
             return;
         }
@@ -61,46 +61,46 @@ impl Assembly {
         for (env, marker) in markers {
             let Some(origin) = snapshot.envs.get(*env).map(|env| env.origin) else { continue };
             for (instance, pose) in marker.instances() {
-                instances.push(Instance { group: MARKERS, ..instance });
-                self.poses.push(moved(&pose, origin));
+                instances.push(Instance { group: MARKER_GROUP, ..instance });
+                self.poses.push(translated(&pose, origin));
             }
         }
-        let lit = scenes.first().cloned().unwrap_or_else(|| Arc::new(RenderScene::empty()));
+        let base_scene = scenes.first().cloned().unwrap_or_else(|| Arc::new(RenderScene::empty()));
         // Each instance was renderable in its own scene, but the triangle count of all instances may exceed the limit.
-        self.scene = lit.with_instances(instances).ok();
+        self.scene = base_scene.with_instances(instances).ok();
     }
 
-    fn collect(&mut self, snapshot: &Snapshot, shown: Shown) {
-        self.parts.clear();
+    fn rebuild_instances(&mut self, snapshot: &Snapshot, shown: EnvSelection) {
+        self.instance_sources.clear();
         self.is_ground.clear();
         self.instances.clear();
-        for (index, (k, env)) in chosen(snapshot, shown).enumerate() {
-            let Some(scene) = snapshot.scene_of(env) else { continue };
+        for (index, (k, env)) in shown_envs(snapshot, shown).enumerate() {
+            let Some(scene) = snapshot.env_scene(env) else { continue };
             for (i, instance) in scene.instances().iter().enumerate() {
                 let is_ground = Some(instance.mask_id) == snapshot.names.ground;
                 if index > 0 && is_ground {
                     continue;
                 }
-                self.parts.push((k, i));
+                self.instance_sources.push((k, i));
                 self.is_ground.push(is_ground);
-                self.instances.push(Instance { mask_id: self.parts.len() as i32, ..instance.clone() });
+                self.instances.push(Instance { mask_id: self.instance_sources.len() as i32, ..instance.clone() });
             }
         }
     }
 
     /// Updates the poses of the instances.
-    fn place(&mut self, snapshot: &Snapshot) {
-        let Self { poses, parts, is_ground, .. } = self;
+    fn update_poses(&mut self, snapshot: &Snapshot) {
+        let Self { poses, instance_sources: parts, is_ground, .. } = self;
         poses.clear();
         poses.extend(parts.iter().zip(is_ground).map(|(&(env, i), is_ground)| {
             let env = &snapshot.envs[env];
-            let pose = env.look.instances.get(i).copied().unwrap_or_default();
-            if *is_ground { pose } else { moved(&pose, env.origin) }
+            let pose = env.snapshot.instances.get(i).copied().unwrap_or_default();
+            if *is_ground { pose } else { translated(&pose, env.origin) }
         }));
     }
 }
 
-fn moved(pose: &PoseF32, origin: [f64; 3]) -> PoseF32 {
+fn translated(pose: &PoseF32, origin: [f64; 3]) -> PoseF32 {
     let t = pose.translation;
     PoseF32 { translation: [0, 1, 2].map(|k| t[k] + origin[k] as f32), ..*pose }
 }

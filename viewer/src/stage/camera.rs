@@ -25,20 +25,21 @@ pub(super) enum CameraId {
     Camera(SensorId<Camera>),
     Left(SensorId<StereoCamera>),
     Right(SensorId<StereoCamera>),
-    Rays(SensorId<RayCasterCamera>),
+    RayCaster(SensorId<RayCasterCamera>),
 }
 
 /// Clip range of images from ray-caster cameras \[m\].
-const RAYS_SEE: [f32; 2] = [0.01, 1000.0];
+const RAY_CASTER_CLIP: [f32; 2] = [0.01, 1000.0];
 
 /// Returns all cameras with their names. The cameras of a stereo pair are named `NAME/left` and `NAME/right`.
 pub(super) fn cameras(sim: &SimulationManager) -> Vec<(String, CameraId)> {
     let cameras = sim.entities().sensor_ids::<Camera>().into_iter().map(|(name, id)| (name, CameraId::Camera(id)));
-    let eyes = sim.entities().sensor_ids::<StereoCamera>().into_iter().flat_map(|(name, id)| {
+    let stereo = sim.entities().sensor_ids::<StereoCamera>().into_iter().flat_map(|(name, id)| {
         [(format!("{name}/left"), CameraId::Left(id)), (format!("{name}/right"), CameraId::Right(id))]
     });
-    let rays = sim.entities().sensor_ids::<RayCasterCamera>().into_iter().map(|(name, id)| (name, CameraId::Rays(id)));
-    cameras.chain(eyes).chain(rays).collect()
+    let rays =
+        sim.entities().sensor_ids::<RayCasterCamera>().into_iter().map(|(name, id)| (name, CameraId::RayCaster(id)));
+    cameras.chain(stereo).chain(rays).collect()
 }
 
 /// Returns the number of cameras.
@@ -53,27 +54,30 @@ impl CameraId {
     pub(super) fn views(self, sim: &SimulationManager) -> Vec<Option<CameraView>> {
         let envs = sim.num_envs();
         match self {
-            Self::Camera(id) => sim
-                .sensor(id)
-                .map_or_else(|_| vec![None; envs], |camera| of_camera(camera, envs, || sim.scene().markers_beside(id))),
+            Self::Camera(id) => sim.sensor(id).map_or_else(
+                |_| vec![None; envs],
+                |camera| camera_views(camera, envs, || sim.scene().markers_except(id)),
+            ),
             Self::Left(id) => sim.sensor(id).map_or_else(
                 |_| vec![None; envs],
-                |pair| of_camera(pair.left(), envs, || sim.scene().markers_beside(id)),
+                |pair| camera_views(pair.left(), envs, || sim.scene().markers_except(id)),
             ),
             Self::Right(id) => sim.sensor(id).map_or_else(
                 |_| vec![None; envs],
-                |pair| of_camera(pair.right(), envs, || sim.scene().markers_beside(id)),
+                |pair| camera_views(pair.right(), envs, || sim.scene().markers_except(id)),
             ),
-            Self::Rays(id) => sim.sensor(id).map_or_else(|_| vec![None; envs], |camera| of_rays(camera, envs)),
+            Self::RayCaster(id) => {
+                sim.sensor(id).map_or_else(|_| vec![None; envs], |camera| ray_caster_views(camera, envs))
+            }
         }
     }
 }
 
-fn of_camera(camera: &Camera, envs: usize, markers: impl Fn() -> Vec<(EnvId, Marker)>) -> Vec<Option<CameraView>> {
+fn camera_views(camera: &Camera, envs: usize, markers: impl Fn() -> Vec<(EnvId, Marker)>) -> Vec<Option<CameraView>> {
     let lens = camera.lens();
     let view = |env: usize| Some(CameraView { view: camera.view(env).ok()?, lens, markers: Vec::new() });
     let mut views: Vec<Option<CameraView>> = (0..envs).map(view).collect();
-    if camera.draws_markers() {
+    if camera.renders_markers() {
         for (EnvId(env), marker) in markers() {
             views[env].iter_mut().for_each(|view| view.markers.push(marker));
         }
@@ -81,10 +85,10 @@ fn of_camera(camera: &Camera, envs: usize, markers: impl Fn() -> Vec<(EnvId, Mar
     views
 }
 
-fn of_rays(camera: &RayCasterCamera, envs: usize) -> Vec<Option<CameraView>> {
+fn ray_caster_views(camera: &RayCasterCamera, envs: usize) -> Vec<Option<CameraView>> {
     let (poses, lenses) = (camera.pose_w(CameraConvention::Ros), camera.intrinsic_matrices());
     let (height, width) = camera.image_shape();
-    let [near, far] = RAYS_SEE;
+    let [near, far] = RAY_CASTER_CLIP;
     let view = |env: usize| {
         let row: [f64; 7] = std::array::from_fn(|k| poses[(env, k)]);
         let world_from_camera = PoseF32::from(&row.iter().all(|x| x.is_finite()).then(|| from_row(&row))?);

@@ -95,7 +95,7 @@ impl Canvas {
 
     /// Draws a line from pixel to pixel, one pixel wide, clipped to the image.
     pub fn line(&mut self, from: [f32; 2], to: [f32; 2], color: [u8; 3]) {
-        let Some([from, to]) = clipped(from, to, self.size.map(|n| n as f32)) else { return };
+        let Some([from, to]) = clip_line(from, to, self.size.map(|n| n as f32)) else { return };
         let delta = [to[0] - from[0], to[1] - from[1]];
         let steps = delta[0].abs().max(delta[1].abs()).ceil().max(1.0);
         for k in 0..=steps as i32 {
@@ -116,7 +116,7 @@ impl Canvas {
     }
 
     /// Copies `picture` with its top left corner to a pixel, clipped to this image.
-    pub fn paste(&mut self, picture: &Self, [x, y]: [usize; 2]) {
+    pub fn draw_image(&mut self, picture: &Self, [x, y]: [usize; 2]) {
         let [width, height] = self.size;
         let [w, h] = picture.size;
         let columns = w.min(width.saturating_sub(x));
@@ -128,7 +128,7 @@ impl Canvas {
 }
 
 /// Clips a line to the image plus a margin of one pixel; `None` if the line is outside (Liang and Barsky 1984).
-fn clipped(from: [f32; 2], to: [f32; 2], size: [f32; 2]) -> Option<[[f32; 2]; 2]> {
+fn clip_line(from: [f32; 2], to: [f32; 2], size: [f32; 2]) -> Option<[[f32; 2]; 2]> {
     if from.iter().chain(&to).any(|x| !x.is_finite()) {
         return None;
     }
@@ -207,7 +207,7 @@ mod tests {
             canvas.text("Some words\nand more", [-5, -3], &FONT_6X10, [255; 3]);
             canvas.fill([i32::MAX - 1, 0], [i32::MAX, i32::MAX], [1, 2, 3], 255);
             canvas.line([0.0, 0.0], [9.0, 9.0], [9; 3]);
-            canvas.paste(&Canvas::new(4, 4), [3, 3]);
+            canvas.draw_image(&Canvas::new(4, 4), [3, 3]);
             assert_eq!(canvas.bytes().len(), 4 * size[0] * size[1]);
         }
     }

@@ -9,15 +9,15 @@ pub(super) const SLIDE: [f32; 4] = [0.85, 0.35, 0.85, 1.0];
 /// Centers of mass.
 pub(super) const MASS: [f32; 4] = [0.95, 0.9, 0.2, 1.0];
 /// Selected point and mouse spring.
-pub(super) const CHOSEN: [f32; 4] = [1.0, 0.2, 0.2, 1.0];
+pub(super) const SELECTION: [f32; 4] = [1.0, 0.2, 0.2, 1.0];
 /// Axes of frames.
 pub(super) const X: [f32; 4] = [0.85, 0.1, 0.1, 1.0];
 pub(super) const Y: [f32; 4] = [0.1, 0.65, 0.1, 1.0];
 pub(super) const Z: [f32; 4] = [0.1, 0.25, 0.9, 1.0];
 /// Dark quarters of the center-of-mass symbol.
-pub(super) const DARK: [u8; 3] = [20, 20, 20];
+pub(super) const MASS_DARK: [u8; 3] = [20, 20, 20];
 /// Names of bodies.
-pub(super) const NAME: [u8; 3] = [235, 235, 235];
+pub(super) const TEXT: [u8; 3] = [235, 235, 235];
 /// Newest part of a trail.
 pub(super) const TRAIL: [u8; 3] = [255, 210, 60];
 

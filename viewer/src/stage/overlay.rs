@@ -3,11 +3,11 @@
 //! Frames, axes and centers of mass are usually inside of bodies, so they are also drawn on top of the image as lines
 //! and dots.
 
-use super::assembly::chosen;
+use super::assembly::shown_envs;
 use super::canvas::Canvas;
 use super::color;
 use super::eye::project;
-use super::snapshot::{EnvStage, Shown, Snapshot};
+use super::snapshot::{EnvSelection, Snapshot, SnapshotEnv};
 use embedded_graphics::mono_font::ascii::FONT_6X10;
 use kinetoscope_render::View;
 use kinetoscope_scene::Contact;
@@ -27,7 +27,7 @@ pub struct Overlays {
     /// Joint axes.
     pub joints: bool,
     /// Centers of mass, as discs with four quarters.
-    pub masses: bool,
+    pub centers_of_mass: bool,
     /// Names of links and objects.
     pub names: bool,
     /// Trails of past positions of bodies.
@@ -45,7 +45,7 @@ impl Default for Overlays {
             contacts: false,
             frames: false,
             joints: false,
-            masses: false,
+            centers_of_mass: false,
             names: false,
             trails: false,
             visuals: true,
@@ -55,21 +55,21 @@ impl Default for Overlays {
 }
 
 /// Length of frame axes \[m\].
-const FRAME: f32 = 0.08;
+const FRAME_AXIS_LENGTH: f32 = 0.08;
 /// Length of joint axes \[m\].
-const AXIS: f64 = 0.16;
+const JOINT_AXIS_LENGTH: f64 = 0.16;
 
 impl Overlays {
     /// Bit mask of the drawn geom groups: bit k is group k.
-    pub fn groups(&self) -> u32 {
+    pub fn geom_groups(&self) -> u32 {
         let (visuals, collisions) = (if self.visuals { 0b111 } else { 0 }, if self.collisions { 0b11_1000 } else { 0 });
         visuals | collisions
     }
 
     /// Returns the markers of the shown environments, with the index of their environment.
-    pub(super) fn markers(&self, snapshot: &Snapshot, shown: Shown) -> Vec<(usize, Marker)> {
+    pub(super) fn markers(&self, snapshot: &Snapshot, shown: EnvSelection) -> Vec<(usize, Marker)> {
         let mut markers = Vec::new();
-        for (k, env) in chosen(snapshot, shown) {
+        for (k, env) in shown_envs(snapshot, shown) {
             let mut add = |marker: Marker| markers.push((k, marker));
             if self.sensors {
                 env.markers.iter().for_each(|marker| add(*marker));
@@ -78,12 +78,12 @@ impl Overlays {
                 env.contacts.iter().filter_map(force_arrow).for_each(&mut add);
             }
             if self.frames {
-                env.look.bodies.iter().for_each(|pose| add(Marker::axes(*pose, FRAME)));
+                env.snapshot.bodies.iter().for_each(|pose| add(Marker::axes(*pose, FRAME_AXIS_LENGTH)));
             }
             if self.joints {
-                env.look.joints.iter().for_each(|joint| {
-                    let (tail, way) = axis_of(joint);
-                    Marker::arrow(tail.into(), way.into(), color_of(joint)).into_iter().for_each(&mut add);
+                env.snapshot.joints.iter().for_each(|joint| {
+                    let (tail, way) = joint_arrow(joint);
+                    Marker::arrow(tail.into(), way.into(), joint_color(joint)).into_iter().for_each(&mut add);
                 });
             }
         }
@@ -91,8 +91,8 @@ impl Overlays {
     }
 
     /// Draws frames, joint axes, centers of mass and names on top of the image.
-    pub(super) fn draw_over(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
-        for (_, env) in chosen(snapshot, shown) {
+    pub(super) fn draw_on_top(&self, snapshot: &Snapshot, shown: EnvSelection, view: &View, canvas: &mut Canvas) {
+        for (_, env) in shown_envs(snapshot, shown) {
             let mut line = |from: Vector3<f64>, way: Vector3<f64>, rgba: [f32; 4]| {
                 let ends = [from, from + way].map(|end| project(view, in_overview(env, end.into())));
                 if let [Some(from), Some(to)] = ends {
@@ -100,42 +100,42 @@ impl Overlays {
                 }
             };
             if self.frames {
-                for pose in &env.look.bodies {
+                for pose in &env.snapshot.bodies {
                     let colors = [color::X, color::Y, color::Z];
                     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
                     for (axis, rgba) in axes.into_iter().zip(colors) {
-                        line(pose.translation.vector, pose.rotation * axis * f64::from(FRAME), rgba);
+                        line(pose.translation.vector, pose.rotation * axis * f64::from(FRAME_AXIS_LENGTH), rgba);
                     }
                 }
             }
             if self.joints {
-                for joint in &env.look.joints {
-                    let (tail, way) = axis_of(joint);
-                    line(tail, way, color_of(joint));
+                for joint in &env.snapshot.joints {
+                    let (tail, way) = joint_arrow(joint);
+                    line(tail, way, joint_color(joint));
                 }
             }
-            if self.masses {
-                for (at, _) in env.look.masses.iter().filter(|(_, mass)| *mass > 0.0) {
-                    dot(in_overview(env, *at), view, canvas);
+            if self.centers_of_mass {
+                for (at, _) in env.snapshot.mass_points.iter().filter(|(_, mass)| *mass > 0.0) {
+                    draw_center_of_mass(in_overview(env, *at), view, canvas);
                 }
             }
         }
-        self.write_names(snapshot, shown, view, canvas);
+        self.draw_names(snapshot, shown, view, canvas);
     }
 
     /// Draws the names of links and objects at their projected positions.
-    fn write_names(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
+    fn draw_names(&self, snapshot: &Snapshot, shown: EnvSelection, view: &View, canvas: &mut Canvas) {
         if !self.names {
             return;
         }
-        for (_, env) in chosen(snapshot, shown) {
-            for (name, pose) in snapshot.names.bodies.iter().zip(&env.look.bodies) {
+        for (_, env) in shown_envs(snapshot, shown) {
+            for (name, pose) in snapshot.names.bodies.iter().zip(&env.snapshot.bodies) {
                 let at = in_overview(env, pose.translation.vector.into());
                 let Some([x, y]) = project(view, at) else { continue };
                 let inside = (0.0..view.width as f32).contains(&x) && (0.0..view.height as f32).contains(&y);
                 if inside {
                     let short = name.rsplit('/').next().unwrap_or(name);
-                    canvas.text(short, [x as i32 + 3, y as i32 - 5], &FONT_6X10, color::NAME);
+                    canvas.text(short, [x as i32 + 3, y as i32 - 5], &FONT_6X10, color::TEXT);
                 }
             }
         }
@@ -143,7 +143,7 @@ impl Overlays {
 }
 
 /// Transforms a point from its environment to the overview.
-pub(super) fn in_overview(env: &EnvStage, point: [f64; 3]) -> [f64; 3] {
+pub(super) fn in_overview(env: &SnapshotEnv, point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| point[k] + env.origin[k])
 }
 
@@ -157,18 +157,18 @@ fn force_arrow(contact: &Contact) -> Option<Marker> {
 }
 
 /// Returns the start and the vector of a joint axis arrow \[m\]; the joint is at its center.
-fn axis_of(joint: &JointAxis) -> (Vector3<f64>, Vector3<f64>) {
+fn joint_arrow(joint: &JointAxis) -> (Vector3<f64>, Vector3<f64>) {
     let axis = Vector3::from(joint.axis);
-    (Vector3::from(joint.anchor) - axis * (0.5 * AXIS), axis * AXIS)
+    (Vector3::from(joint.anchor) - axis * (0.5 * JOINT_AXIS_LENGTH), axis * JOINT_AXIS_LENGTH)
 }
 
-fn color_of(joint: &JointAxis) -> [f32; 4] {
-    if joint.slides { color::SLIDE } else { color::HINGE }
+fn joint_color(joint: &JointAxis) -> [f32; 4] {
+    if joint.is_slide { color::SLIDE } else { color::HINGE }
 }
 
 /// Draws the center-of-mass symbol, a disc with dark and bright quarters. Its radius is that of a ball of 2 cm at that
 /// distance, limited to 1.5 to 7 pixels.
-fn dot(at: [f64; 3], view: &View, canvas: &mut Canvas) {
+fn draw_center_of_mass(at: [f64; 3], view: &View, canvas: &mut Canvas) {
     let Some([x, y]) = project(view, at) else { return };
     let z = view.world_from_camera.apply_inverse(at.map(|p| p as f32))[2];
     let radius = (view.fx * 0.02 / z).clamp(1.5, 7.0);
@@ -179,7 +179,7 @@ fn dot(at: [f64; 3], view: &View, canvas: &mut Canvas) {
     for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy))) {
         if ((dx * dx + dy * dy) as f32) <= radius * radius {
             let bright = (dx < 0) == (dy < 0);
-            canvas.set(x as i32 + dx, y as i32 + dy, if bright { color::bytes(color::MASS) } else { color::DARK });
+            canvas.set(x as i32 + dx, y as i32 + dy, if bright { color::bytes(color::MASS) } else { color::MASS_DARK });
         }
     }
 }
@@ -188,8 +188,8 @@ fn dot(at: [f64; 3], view: &View, canvas: &mut Canvas) {
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
-    use crate::control::{Viewing, Wants};
-    use crate::stage::Eye;
+    use crate::control::{SnapshotRequest, ViewerExt};
+    use crate::stage::OrbitCamera;
     use kinetoscope_scene::MarkerKind;
 
     #[test]
@@ -211,12 +211,12 @@ mod tests {
     /// A point two meters ahead is at the image center; its disc has `pi r^2` pixels, half of them bright.
     #[test]
     fn centre_of_mass() {
-        let view = Eye::looking([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
+        let view = OrbitCamera::look_at([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
         let disc = |at: [f64; 3]| {
             let mut canvas = Canvas::new(201, 201);
-            dot(at, &view, &mut canvas);
+            draw_center_of_mass(at, &view, &mut canvas);
             let all = (0..201).flat_map(|y| (0..201).map(move |x| [x, y]));
-            [color::bytes(color::MASS), color::DARK]
+            [color::bytes(color::MASS), color::MASS_DARK]
                 .map(|wanted| all.clone().filter(|[x, y]| canvas.pixel(*x, *y) == Some(wanted)).collect::<Vec<_>>())
         };
         let [bright, dark] = disc([0.0; 3]);
@@ -235,14 +235,14 @@ mod tests {
     #[test]
     fn axes() {
         let mut sample = crate::sample::sample(2);
-        let snapshot = sample.sim.viewer(Wants::default()).newest().unwrap();
+        let snapshot = sample.sim.viewer(SnapshotRequest::default()).newest().unwrap();
         // From nearby, so that axes from one origin are apart after a third of their length.
         let target = in_overview(&snapshot.envs[1], [0.5, 0.0, 0.3]);
         let eye = [target[0] + 0.7, target[1] + 1.3, target[2] + 0.9];
-        let view = Eye::looking(eye, target).unwrap().view(1600, 1200);
+        let view = OrbitCamera::look_at(eye, target).unwrap().view(1600, 1200);
         let colors_at = |overlays: Overlays, from: Vector3<f64>, to: Vector3<f64>, rgba: [f32; 4]| {
             let mut canvas = Canvas::new(1600, 1200);
-            overlays.draw_over(&snapshot, Shown::One(1), &view, &mut canvas);
+            overlays.draw_on_top(&snapshot, EnvSelection::One(1), &view, &mut canvas);
             let at = |part: f64| project(&view, in_overview(&snapshot.envs[1], (from + (to - from) * part).into()));
             // To one pixel: lines are rounded to whole pixels.
             (4..10).all(|k| {
@@ -254,13 +254,13 @@ mod tests {
             })
         };
         let none = Overlays { sensors: false, ..Overlays::default() };
-        let look = &snapshot.envs[1].look;
+        let look = &snapshot.envs[1].snapshot;
         let frames = Overlays { frames: true, ..none };
         let axes = [(Vector3::x(), color::X), (Vector3::y(), color::Y), (Vector3::z(), color::Z)];
         let pose = look.bodies[snapshot.names.bodies.iter().position(|name| name.contains("cube")).unwrap()];
         let origin = pose.translation.vector;
         for (k, (axis, rgba)) in axes.iter().enumerate() {
-            let end = origin + pose.rotation * axis * f64::from(FRAME);
+            let end = origin + pose.rotation * axis * f64::from(FRAME_AXIS_LENGTH);
             assert!(colors_at(frames, origin, end, *rgba), "axis {k}");
             assert!(!colors_at(frames, origin, end, axes[(k + 1) % 3].1), "axis {k} has another color");
             assert!(!colors_at(none, origin, end, *rgba));
@@ -268,8 +268,8 @@ mod tests {
         let joints = Overlays { joints: true, ..none };
         assert!(!look.joints.is_empty());
         for joint in &look.joints {
-            let (anchor, half) = (Vector3::from(joint.anchor), Vector3::from(joint.axis) * (0.5 * AXIS));
-            let rgba = if joint.slides { color::SLIDE } else { color::HINGE };
+            let (anchor, half) = (Vector3::from(joint.anchor), Vector3::from(joint.axis) * (0.5 * JOINT_AXIS_LENGTH));
+            let rgba = if joint.is_slide { color::SLIDE } else { color::HINGE };
             assert!(colors_at(joints, anchor - half, anchor + half, rgba), "{joint:?}");
             assert!(!colors_at(none, anchor - half, anchor + half, rgba));
         }
@@ -279,6 +279,6 @@ mod tests {
     fn groups() {
         let all = Overlays { collisions: true, ..Overlays::default() };
         let shapes = Overlays { visuals: false, ..all };
-        assert_eq!([Overlays::default(), all, shapes].map(|o| o.groups()), [0b111, 0b11_1111, 0b11_1000]);
+        assert_eq!([Overlays::default(), all, shapes].map(|o| o.geom_groups()), [0b111, 0b11_1111, 0b11_1000]);
     }
 }

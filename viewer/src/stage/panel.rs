@@ -1,13 +1,13 @@
 //! Live images of a camera sensor: color, depth, mask and normals in a 2 x 2 grid.
 
-use super::assembly::MARKERS;
+use super::assembly::MARKER_GROUP;
 use super::canvas::Canvas;
 use super::snapshot::Snapshot;
 use embedded_graphics::mono_font::ascii::FONT_6X10;
 use kinetoscope_render::View;
 use kinetoscope_render::frame::{Channels, Frame, FrameMut};
 use kinetoscope_render::lens::{Lens, LensRays, Optics};
-use kinetoscope_render::{ParallelRasterizer, PixelIntrinsics, RasterCfg, Renderer, Shot};
+use kinetoscope_render::{ParallelRenderer, PixelIntrinsics, RasterCfg, RenderRequest, Renderer};
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_color};
 
@@ -15,8 +15,8 @@ use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_colo
 /// the last measurement; everything else is current. With a bending lens, images are ray traced. Markers of other
 /// sensors appear in the color image of cameras that draw them.
 #[derive(Debug)]
-pub(crate) struct Panel {
-    rasterizer: ParallelRasterizer,
+pub(crate) struct CameraPanel {
+    rasterizer: ParallelRenderer,
     frame: Frame,
     size: [usize; 2],
     /// Rays of the most recently used lens.
@@ -28,10 +28,10 @@ fn cfg() -> RasterCfg {
     RasterCfg { samples: 1, ..RasterCfg::default() }
 }
 
-impl Panel {
+impl CameraPanel {
     /// Creates a panel with `threads` rendering threads.
     pub(crate) fn new(threads: usize) -> Self {
-        let rasterizer = ParallelRasterizer::new(cfg(), threads);
+        let rasterizer = ParallelRenderer::new(cfg(), threads);
         Self { rasterizer, frame: Frame::default(), size: [0; 2], rays: None }
     }
 
@@ -46,44 +46,44 @@ impl Panel {
         canvas: &mut Canvas,
     ) -> bool {
         let Some(stage) = snapshot.envs.get(env) else { return false };
-        let looks = stage.views.get(camera).and_then(Option::as_ref);
-        let Some((looks, scene)) = looks.zip(snapshot.scene_of(stage)) else {
+        let camera_view = stage.views.get(camera).and_then(Option::as_ref);
+        let Some((looks, scene)) = camera_view.zip(snapshot.env_scene(stage)) else {
             return false;
         };
-        let view = shrunk(&looks.view, width);
+        let view = downscaled(&looks.view, width);
         let size = [view.width, view.height];
         if self.size != size || self.frame.color.is_none() {
             let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
             (self.frame, self.size) = (Frame::new(size[0], size[1], channels), size);
         }
-        let bends = !looks.lens.is_pinhole();
-        if bends && !self.has_rays(looks.lens, &view) {
+        let has_distortion = !looks.lens.is_pinhole();
+        if has_distortion && !self.update_rays(looks.lens, &view) {
             return false;
         }
-        self.rasterizer.set_renderer(if bends { Renderer::FastRayTraced } else { Renderer::Raster });
+        self.rasterizer.set_renderer(if has_distortion { Renderer::FastRayTraced } else { Renderer::Raster });
         self.rasterizer.set_cfg(cfg());
-        let (poses, lights) = (stage.look.instances.as_slice(), Some(stage.look.lights.as_slice()));
-        let lens = self.rays.as_ref().filter(|_| bends);
-        let shot = Shot { scene: &scene, poses, view: &view, lights, lens, before: None };
+        let (poses, lights) = (stage.snapshot.instances.as_slice(), Some(stage.snapshot.lights.as_slice()));
+        let lens = self.rays.as_ref().filter(|_| has_distortion);
+        let shot = RenderRequest { scene: &scene, poses, view: &view, lights, lens, previous: None };
         if self.rasterizer.render(&mut [(shot, self.frame.as_mut())]).is_err() {
             return false;
         }
         if let Some((scene, poses)) = with_markers(&scene, poses, &looks.markers) {
-            self.rasterizer.set_cfg(RasterCfg { groups: cfg().groups | 1 << MARKERS, ..cfg() });
-            let shot = Shot { scene: &scene, poses: &poses, ..shot };
+            self.rasterizer.set_cfg(RasterCfg { groups: cfg().groups | 1 << MARKER_GROUP, ..cfg() });
+            let shot = RenderRequest { scene: &scene, poses: &poses, ..shot };
             let frame = FrameMut { color: self.frame.color.as_deref_mut(), ..FrameMut::default() };
             if self.rasterizer.render(&mut [(shot, frame)]).is_err() {
                 return false;
             }
         }
         canvas.resize(2 * size[0], 2 * size[1]);
-        self.compose(canvas);
+        self.draw_grid(canvas);
         true
     }
 
     /// Computes the rays of a lens for these pixels, unless they are cached. Returns `false` if the lens or its rays
     /// are invalid at this resolution.
-    fn has_rays(&mut self, lens: Lens, view: &View) -> bool {
+    fn update_rays(&mut self, lens: Lens, view: &View) -> bool {
         let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
         let Ok(optics) = Optics::new(lens, PixelIntrinsics { fx, fy, cx, cy }) else { return false };
         let size = [view.width, view.height];
@@ -93,7 +93,7 @@ impl Panel {
         self.rays.is_some()
     }
 
-    fn compose(&self, canvas: &mut Canvas) {
+    fn draw_grid(&self, canvas: &mut Canvas) {
         let Frame { color: Some(color), depth: Some(depth), mask: Some(mask), normal: Some(normal), .. } = &self.frame
         else {
             return;
@@ -127,7 +127,7 @@ fn with_markers(scene: &RenderScene, poses: &[PoseF32], markers: &[Marker]) -> O
     if added.is_empty() {
         return None;
     }
-    let added = added.into_iter().map(|instance| Instance { group: MARKERS, ..instance });
+    let added = added.into_iter().map(|instance| Instance { group: MARKER_GROUP, ..instance });
     let instances = scene.instances().iter().cloned().chain(added).collect();
     // The triangle count of all instances may exceed the limit.
     let scene = scene.with_instances(instances).ok()?;
@@ -138,7 +138,7 @@ fn with_markers(scene: &RenderScene, poses: &[PoseF32], markers: &[Marker]) -> O
 type PixelColor<'a> = &'a dyn Fn(usize) -> [u8; 3];
 
 /// Scales a view down to at most `width` pixels per row.
-fn shrunk(view: &View, width: usize) -> View {
+fn downscaled(view: &View, width: usize) -> View {
     let scale = (width.max(1) as f32 / view.width as f32).min(1.0);
     let side = |n: usize| ((n as f32 * scale).round() as usize).max(1);
     let (width, height) = (side(view.width), side(view.height));

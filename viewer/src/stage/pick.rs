@@ -1,13 +1,13 @@
 //! Selected points of objects.
 
 use super::overlay::Overlays;
-use super::snapshot::{Names, Shown, Snapshot};
+use super::snapshot::{EnvSelection, Names, Snapshot};
 use kinetoscope_scene::Pose;
 use nalgebra::{Point3, Vector3};
 
 /// A selected point on an object.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picked {
+pub struct Selection {
     /// Environment index.
     pub env: usize,
     /// `uid/link`, uid of an object, or name of a world geom.
@@ -19,30 +19,30 @@ pub struct Picked {
     /// Selected point in the environment frame \[m\], at the time of selection.
     pub point: [f64; 3],
     /// Selected point in the body frame \[m\]; in the environment frame for the world.
-    pub hold: [f64; 3],
+    pub point_in_body: [f64; 3],
 }
 
-impl Picked {
+impl Selection {
     /// Creates the selection from an instance of an environment and a hit point in the overview.
     pub(super) fn new(snapshot: &Snapshot, env: usize, instance: usize, position: [f32; 3]) -> Option<Self> {
         let stage = snapshot.envs.get(env)?;
-        let scene = snapshot.scene_of(stage)?;
+        let scene = snapshot.env_scene(stage)?;
         let hit = scene.instances().get(instance)?;
         let body = hit.body.and_then(|body| usize::try_from(body).ok());
         // The ground is shared by all environments, so the point is relative to the environment of its instance.
         let point = [0, 1, 2].map(|k| f64::from(position[k]) - stage.origin[k]);
-        let pose = body.and_then(|body| stage.look.bodies.get(body));
+        let pose = body.and_then(|body| stage.snapshot.bodies.get(body));
         let hold = pose.map_or(point, |pose| pose.inverse_transform_point(&Point3::from(point)).into());
-        Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, hold })
+        Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, point_in_body: hold })
     }
 
     /// Returns the current pose of the body, or `None` for the world and for bodies that no longer exist.
     pub fn pose(&self, snapshot: &Snapshot) -> Option<Pose> {
-        snapshot.envs.get(self.env)?.look.bodies.get(self.body?).copied()
+        snapshot.envs.get(self.env)?.snapshot.bodies.get(self.body?).copied()
     }
 
     /// Updates the body index after entities were added to the simulation.
-    pub(crate) fn renumber(&mut self, names: &Names) {
+    pub(crate) fn update_body_index(&mut self, names: &Names) {
         let is = |body: usize| names.bodies.get(body) == Some(&self.name);
         if self.body.is_some_and(|body| !is(body)) {
             self.body = names.bodies.iter().position(|name| *name == self.name);
@@ -53,7 +53,10 @@ impl Picked {
     /// Returns `None` for the world and if the snapshot has no contacts of the environment.
     pub fn contact_force(&self, snapshot: &Snapshot) -> Option<(usize, [f64; 3])> {
         let body = self.body?;
-        let env = snapshot.envs.get(self.env).filter(|_| snapshot.contacts_of.is_some_and(|of| of.has(self.env)))?;
+        let env = snapshot
+            .envs
+            .get(self.env)
+            .filter(|_| snapshot.contacts_included.is_some_and(|of| of.contains(self.env)))?;
         let of = |contact: &Option<u32>| contact.is_some_and(|contact| contact as usize == body);
         let (mut count, mut sum) = (0, Vector3::zeros());
         for contact in &env.contacts {
@@ -67,13 +70,13 @@ impl Picked {
     }
 
     /// Returns the current position of the point in the environment frame \[m\].
-    pub fn point_now(&self, snapshot: &Snapshot) -> [f64; 3] {
-        self.pose(snapshot).map_or(self.point, |pose| (pose * Point3::from(self.hold)).into())
+    pub fn current_point(&self, snapshot: &Snapshot) -> [f64; 3] {
+        self.pose(snapshot).map_or(self.point, |pose| (pose * Point3::from(self.point_in_body)).into())
     }
 }
 
 /// Returns the text lines about a selection: name, pose, and contact force.
-pub(crate) fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
+pub(crate) fn selection_text(picked: &Selection, snapshot: &Snapshot) -> Vec<String> {
     let mut lines = vec![format!("{}  (environment {}, mask id {})", picked.name, picked.env, picked.mask_id)];
     let Some(pose) = picked.pose(snapshot) else {
         let [x, y, z] = picked.point;
@@ -99,10 +102,14 @@ pub(crate) fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
 }
 
 /// Returns the environments whose contacts are needed, for the force overlay and for the selected body.
-pub(crate) fn contacts_wanted(shown: Shown, overlays: &Overlays, picked: Option<&Picked>) -> Option<Shown> {
-    let of_picked = picked.filter(|picked| picked.body.is_some()).map(|picked| Shown::One(picked.env));
+pub(crate) fn required_contacts(
+    shown: EnvSelection,
+    overlays: &Overlays,
+    picked: Option<&Selection>,
+) -> Option<EnvSelection> {
+    let of_picked = picked.filter(|picked| picked.body.is_some()).map(|picked| EnvSelection::One(picked.env));
     match (overlays.contacts.then_some(shown), of_picked) {
-        (Some(drawn), Some(said)) if drawn != said => Some(Shown::All),
+        (Some(drawn), Some(said)) if drawn != said => Some(EnvSelection::All),
         (drawn, said) => drawn.or(said),
     }
 }

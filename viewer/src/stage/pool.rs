@@ -1,28 +1,28 @@
 //! Reusable snapshot buffers.
 
-use super::snapshot::{Names, Run, Snapshot};
-use crate::control::Wants;
+use super::snapshot::{Names, RunState, Snapshot};
+use crate::control::SnapshotRequest;
 use kinetoscope_sim::SimulationManager;
 use std::sync::Arc;
 
 /// A limited number of snapshots. Snapshots that no viewer holds are filled again.
 #[derive(Debug, Default)]
-pub(crate) struct Pool {
+pub(crate) struct SnapshotPool {
     snapshots: Vec<Arc<Snapshot>>,
-    taken: u64,
+    last_number: u64,
     names: Option<Arc<Names>>,
 }
 
-impl Pool {
+impl SnapshotPool {
     /// Fills a snapshot of the current state and returns it, or `None` if all `size` snapshots are held by viewers.
-    pub(crate) fn take(
+    pub(crate) fn capture(
         &mut self,
         sim: &mut SimulationManager,
         size: usize,
-        wants: &Wants,
-        run: Run,
+        wants: &SnapshotRequest,
+        run: RunState,
     ) -> Option<Arc<Snapshot>> {
-        if self.names.as_ref().is_none_or(|names| !names.fit(sim)) {
+        if self.names.as_ref().is_none_or(|names| !names.apply_to(sim)) {
             self.names = Some(Arc::new(Names::of(sim)));
         }
         let names = Arc::clone(self.names.as_ref()?);
@@ -39,14 +39,14 @@ impl Pool {
             self.snapshots.push(Arc::default());
         }
         let snapshot = Arc::get_mut(&mut self.snapshots[place])?;
-        self.taken += 1;
-        snapshot.number = self.taken;
-        snapshot.fill(sim, &names, wants, run);
+        self.last_number += 1;
+        snapshot.number = self.last_number;
+        snapshot.capture(sim, &names, wants, run);
         Some(Arc::clone(&self.snapshots[place]))
     }
 
     /// Invalidates the names after entities were added to the simulation.
-    pub(crate) fn forget_names(&mut self) {
+    pub(crate) fn invalidate_names(&mut self) {
         self.names = None;
     }
 }

@@ -1,16 +1,16 @@
 //! Snapshots of all environments.
 
 use super::camera::{self, CameraId, CameraView};
-use crate::control::{RecordingState, Speed, Wants};
+use crate::control::{RecordingState, SnapshotRequest, Speed};
 use kinetoscope_robot::description::{Joint, JointKind};
 use kinetoscope_scene::Contact;
 use kinetoscope_scene::{Marker, RenderScene};
-use kinetoscope_sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager, Viewpoint};
+use kinetoscope_sim::{EnvId, EnvVisualState, JointIndex, MaskId, RobotId, SimulationManager, Viewpoint};
 use std::sync::Arc;
 
 /// Selection of environments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Shown {
+pub enum EnvSelection {
     /// All environments, in their grid.
     #[default]
     All,
@@ -18,9 +18,9 @@ pub enum Shown {
     One(usize),
 }
 
-impl Shown {
+impl EnvSelection {
     /// True if an environment is selected.
-    pub fn has(self, env: usize) -> bool {
+    pub fn contains(self, env: usize) -> bool {
         self == Self::All || self == Self::One(env)
     }
 
@@ -40,24 +40,24 @@ pub struct Snapshot {
     /// Sequence number, from 1, increasing.
     pub number: u64,
     /// Run state of the simulation.
-    pub run: Run,
+    pub run: RunState,
     /// Render scene shared by all environments, without poses.
     pub scene: Option<Arc<RenderScene>>,
     /// Object of each mask id.
-    pub ids: Arc<[MaskId]>,
+    pub mask_ids: Arc<[MaskId]>,
     /// Names of bodies, joints and cameras.
     pub names: Arc<Names>,
     /// Camera set by the program, if any.
     pub viewpoint: Option<Viewpoint>,
     /// State of each environment.
-    pub envs: Vec<EnvStage>,
+    pub envs: Vec<SnapshotEnv>,
     /// Environments whose contacts are included.
-    pub contacts_of: Option<Shown>,
+    pub contacts_included: Option<EnvSelection>,
 }
 
 /// Run state of a simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Run {
+pub struct RunState {
     /// Physics steps since the simulation was created. During playback: index of the frame.
     pub steps: u64,
     /// True while paused.
@@ -67,9 +67,9 @@ pub struct Run {
     /// Simulated seconds per wall-clock second, over the last half second; `None` before the first measurement.
     pub measured_speed: Option<f64>,
     /// Reason of the last refused command; `None` after a later command succeeded.
-    pub refused: Option<String>,
+    pub last_refusal: Option<String>,
     /// Number of refused commands so far. It distinguishes a repeated refusal with the same reason.
-    pub refusals: u64,
+    pub refusal_count: u64,
     /// State of the recording; `None` without a record button.
     pub recording: Option<RecordingState>,
     /// Playback position; `None` for a running simulation.
@@ -80,7 +80,7 @@ pub struct Run {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeline {
     /// Time of the shown frame.
-    pub now: f64,
+    pub time: f64,
     /// Time of the first frame.
     pub start: f64,
     /// Time of the last frame.
@@ -93,7 +93,7 @@ pub struct Names {
     /// Links (`uid/link`), objects, and bodies of MJCF files.
     pub bodies: Arc<[String]>,
     /// Joints of all robots, robot by robot.
-    pub joints: Vec<JointName>,
+    pub joints: Vec<JointEntry>,
     /// Camera sensors of every kind. The cameras of a stereo pair are named `NAME/left` and `NAME/right`.
     pub cameras: Vec<String>,
     /// Mask id of the ground, which is drawn once for all environments.
@@ -103,7 +103,7 @@ pub struct Names {
 
 /// Name and properties of a robot joint.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct JointName {
+pub struct JointEntry {
     /// The robot.
     pub robot: RobotId,
     /// Index of the joint in the robot.
@@ -111,18 +111,18 @@ pub struct JointName {
     /// `uid/joint`.
     pub name: String,
     /// True if the joint accepts targets: it has a drive and mimics no other joint.
-    pub driven: bool,
+    pub accepts_target: bool,
     /// True for a prismatic joint, whose positions are in meters.
-    pub slides: bool,
+    pub is_prismatic: bool,
 }
 
 /// State of one environment.
 #[derive(Clone, Debug, Default)]
-pub struct EnvStage {
+pub struct SnapshotEnv {
     /// Position of the environment's origin in the overview \[m\].
     pub origin: [f64; 3],
     /// Poses and other visible state.
-    pub look: Look,
+    pub snapshot: EnvVisualState,
     /// Contacts with their forces, if a viewer requested them. Bodies are indices into [`Names::bodies`].
     pub contacts: Vec<Contact>,
     /// Debug markers of sensors.
@@ -146,12 +146,13 @@ impl Names {
             let view = sim.robot(robot);
             let slides = |joint: &&Joint| joint.kind == JointKind::Prismatic;
             let prismatic: Vec<&String> = view.description().joints.iter().filter(slides).map(|j| &j.name).collect();
-            joints.extend(view.joint_names().iter().enumerate().map(|(k, name)| JointName {
+            joints.extend(view.joint_names().iter().enumerate().map(|(k, name)| JointEntry {
                 robot,
                 joint: JointIndex(k),
                 name: format!("{uid}/{name}"),
-                driven: view.is_driven(JointIndex(k)).unwrap_or(false) && view.mimic_drivers()[k].0 == JointIndex(k),
-                slides: prismatic.contains(&name),
+                accepts_target: view.is_driven(JointIndex(k)).unwrap_or(false)
+                    && view.mimic_drivers()[k].0 == JointIndex(k),
+                is_prismatic: prismatic.contains(&name),
             }));
         }
         let (cameras, camera_ids) = camera::cameras(sim).into_iter().unzip();
@@ -159,27 +160,33 @@ impl Names {
     }
 
     /// True if the names still apply to `sim`. Added sensors are detected by the number of cameras.
-    pub(super) fn fit(&self, sim: &SimulationManager) -> bool {
+    pub(super) fn apply_to(&self, sim: &SimulationManager) -> bool {
         camera::count(sim) == self.cameras.len()
     }
 }
 
 impl Snapshot {
     /// Copies the current state, with the contents that `wants` requests.
-    pub(super) fn fill(&mut self, sim: &mut SimulationManager, names: &Arc<Names>, wants: &Wants, run: Run) {
+    pub(super) fn capture(
+        &mut self,
+        sim: &mut SimulationManager,
+        names: &Arc<Names>,
+        wants: &SnapshotRequest,
+        run: RunState,
+    ) {
         self.run = run;
-        self.scene = Some(Arc::clone(sim.scene_mut().visible().scene()));
-        self.ids = Arc::clone(sim.scene_mut().visible().ids());
+        self.scene = Some(Arc::clone(sim.scene_mut().visual_scene().scene()));
+        self.mask_ids = Arc::clone(sim.scene_mut().visual_scene().mask_ids());
         self.names = Arc::clone(names);
         self.viewpoint = sim.scene().viewpoint();
-        self.envs.resize_with(sim.num_envs(), EnvStage::default);
+        self.envs.resize_with(sim.num_envs(), SnapshotEnv::default);
         let origins = sim.cfg().env_origins();
         for (k, env) in self.envs.iter_mut().enumerate() {
             env.origin = [0, 1, 2].map(|axis| origins[(k, axis)]);
             // The environment index is valid, so the result is never an error.
-            let _ = sim.scene_mut().look(EnvId(k), &mut env.look);
+            let _ = sim.scene_mut().read_visual_state(EnvId(k), &mut env.snapshot);
             if let Some(timeline) = self.run.timeline {
-                env.look.time = timeline.now;
+                env.snapshot.time = timeline.time;
             }
             env.contacts.clear();
             env.markers.clear();
@@ -192,9 +199,9 @@ impl Snapshot {
                 self.envs[env].markers.push(marker);
             }
         }
-        self.contacts_of = wants.contacts;
+        self.contacts_included = wants.contacts;
         if let Some(shown) = wants.contacts {
-            let chosen: Vec<EnvId> = (0..self.envs.len()).filter(|env| shown.has(*env)).map(EnvId).collect();
+            let chosen: Vec<EnvId> = (0..self.envs.len()).filter(|env| shown.contains(*env)).map(EnvId).collect();
             let contacts = sim.scene_mut().contacts(Some(&chosen)).unwrap_or_default();
             for (EnvId(env), contacts) in chosen.iter().zip(contacts) {
                 self.envs[*env].contacts = contacts;
@@ -222,12 +229,12 @@ impl Snapshot {
     }
 
     /// Returns a copy with a single environment, or with no environment if the index is invalid.
-    pub(crate) fn only(&self, env: usize) -> Self {
+    pub(crate) fn with_single_env(&self, env: usize) -> Self {
         Self { viewpoint: None, envs: self.envs.get(env).into_iter().cloned().collect(), ..self.clone() }
     }
 
     /// Returns the render scene of an environment: its own scene, or the shared one.
-    pub(crate) fn scene_of(&self, env: &EnvStage) -> Option<Arc<RenderScene>> {
-        env.look.own_scene.0.as_ref().or(self.scene.as_ref()).map(Arc::clone)
+    pub(crate) fn env_scene(&self, env: &SnapshotEnv) -> Option<Arc<RenderScene>> {
+        env.snapshot.env_scene.0.as_ref().or(self.scene.as_ref()).map(Arc::clone)
     }
 }

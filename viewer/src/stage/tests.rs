@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use super::*;
-use crate::control::{Viewing, Wants};
-use crate::sample::{HALF, MASS, Sample, sample, unlike};
+use crate::control::{SnapshotRequest, ViewerExt};
+use crate::sample::{CUBE_HALF_EDGE, MASS, Sample, differing_pixels, sample};
 use kinetoscope_render::View;
 use kinetoscope_render::frame::Channels;
 use kinetoscope_render::lens::Equidistant;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 fn stage(num_envs: usize) -> (Sample, Arc<Snapshot>) {
     let mut sample = sample(num_envs);
     sample.sim.update(100);
-    let viewer = sample.sim.viewer(Wants { contacts: Some(Shown::All), ..Wants::default() });
+    let viewer = sample.sim.viewer(SnapshotRequest { contacts: Some(EnvSelection::All), ..SnapshotRequest::default() });
     let snapshot = viewer.newest().unwrap();
     (sample, snapshot)
 }
@@ -26,7 +26,7 @@ fn stage(num_envs: usize) -> (Sample, Arc<Snapshot>) {
 impl Sample {
     /// Returns the newest snapshot.
     fn snapshot(&mut self) -> Arc<Snapshot> {
-        self.sim.viewer(Wants::default()).newest().unwrap()
+        self.sim.viewer(SnapshotRequest::default()).newest().unwrap()
     }
 
     fn put_cube(&mut self, [x, y, z]: [f64; 3]) {
@@ -36,7 +36,7 @@ impl Sample {
     }
 }
 
-fn painted(painter: &mut Painter, snapshot: &Snapshot, view: &View, look: &Look<'_>) -> Canvas {
+fn painted(painter: &mut SceneRenderer, snapshot: &Snapshot, view: &View, look: &ViewOptions<'_>) -> Canvas {
     let mut canvas = Canvas::default();
     painter.draw(snapshot, view, look, &mut canvas).unwrap();
     canvas
@@ -45,30 +45,30 @@ fn painted(painter: &mut Painter, snapshot: &Snapshot, view: &View, look: &Look<
 #[test]
 fn picking() {
     let (sample, snapshot) = stage(4);
-    let mut painter = Painter::new(1);
+    let mut painter = SceneRenderer::new(1);
     let origins = sample.sim.cfg().env_origins();
     for env in 0..4 {
         let origin = Vector3::from([0, 1, 2].map(|k| origins[(env, k)]));
         let above = |at: [f64; 3]| {
             let target = origin + Vector3::from(at);
-            Eye::looking((target + Vector3::new(0.3, 0.2, 1.5)).into(), target.into()).unwrap().view(201, 101)
+            OrbitCamera::look_at((target + Vector3::new(0.3, 0.2, 1.5)).into(), target.into()).unwrap().view(201, 101)
         };
-        let mut pick = |view: &View| painter.pick(&snapshot, view, &Look::default(), [100.5, 50.5]);
+        let mut pick = |view: &View| painter.pick(&snapshot, view, &ViewOptions::default(), [100.5, 50.5]);
         // The center of the upper face of the cube, and of the plate, at the image center.
-        for (name, at) in [("cube", [0.0, 0.0, 2.0 * HALF]), ("arm/plate", [1.0, 0.0, 0.525])] {
+        for (name, at) in [("cube", [0.0, 0.0, 2.0 * CUBE_HALF_EDGE]), ("arm/plate", [1.0, 0.0, 0.525])] {
             let picked = pick(&above(at)).unwrap();
             assert!(picked.name == name && picked.env == env, "{picked:?}");
             assert_eq!(snapshot.names.bodies[picked.body.unwrap()], name);
             // Half a pixel at 1.5 m is 6 mm. The face is flat, so its height is exact to single precision.
             let away = (Vector3::from(picked.point) - Vector3::from(at)).norm();
             assert!(away < 0.01 && (picked.point[2] - at[2]).abs() < 1e-3, "{picked:?}");
-            let back = picked.pose(&snapshot).unwrap() * Point3::from(picked.hold);
+            let back = picked.pose(&snapshot).unwrap() * Point3::from(picked.point_in_body);
             assert!((back.coords - Vector3::from(picked.point)).norm() < 1e-9);
         }
         // Beside both is the ground; above the horizon is the sky.
         let picked = pick(&above([0.0, -0.5, 0.0])).unwrap();
         assert!(picked.name == "ground" && picked.body.is_none(), "{picked:?}");
-        assert_eq!(pick(&Eye::looking([0.0, 0.0, 1.0], [1.0, 0.0, 3.0]).unwrap().view(201, 101)), None);
+        assert_eq!(pick(&OrbitCamera::look_at([0.0, 0.0, 1.0], [1.0, 0.0, 3.0]).unwrap().view(201, 101)), None);
     }
 }
 
@@ -77,11 +77,14 @@ fn picking() {
 #[test]
 fn selected_cube() {
     let (_, snapshot) = stage(1);
-    let mut painter = Painter::new(1);
+    let mut painter = SceneRenderer::new(1);
     for distance in [0.8, 3.0] {
-        let eye = Eye { distance, ..Eye::looking([0.3, 0.2, 1.5], [0.0, 0.0, 2.0 * HALF]).unwrap() };
+        let eye = OrbitCamera {
+            distance,
+            ..OrbitCamera::look_at([0.3, 0.2, 1.5], [0.0, 0.0, 2.0 * CUBE_HALF_EDGE]).unwrap()
+        };
         let view = eye.view(201, 101);
-        let picked = painter.pick(&snapshot, &view, &Look::default(), [100.5, 50.5]).unwrap();
+        let picked = painter.pick(&snapshot, &view, &ViewOptions::default(), [100.5, 50.5]).unwrap();
         let cube = picked.body.unwrap() as u32;
         let mut sum = Vector3::zeros();
         for contact in &snapshot.envs[0].contacts {
@@ -90,13 +93,13 @@ fn selected_cube() {
         }
         // At rest to 1e-3 m/s² after one second.
         assert!((sum - Vector3::new(0.0, 0.0, MASS * 9.81)).norm() < 0.01, "{sum}");
-        let text = describe(&picked, &snapshot).join("\n");
+        let text = selection_text(&picked, &snapshot).join("\n");
         assert!(text.starts_with("cube  (environment 0") && text.contains("+19.6"), "{text}");
-        let look = Look { picked: Some(&picked), ..Look::default() };
+        let look = ViewOptions { selection: Some(&picked), ..ViewOptions::default() };
         let with = painted(&mut painter, &snapshot, &view, &look);
         // A disc of radius 4 has 50 pixels. At least half of the marker is above the face; the tips of the axes add
         // some pixels.
-        let marked = unlike(&with, &painted(&mut painter, &snapshot, &view, &Look::default()));
+        let marked = differing_pixels(&with, &painted(&mut painter, &snapshot, &view, &ViewOptions::default()));
         assert!((25..90).contains(&marked), "{marked} pixels from {distance} m");
         assert_eq!(painter.pick(&snapshot, &view, &look, [100.5, 50.5]), Some(picked));
     }
@@ -106,24 +109,25 @@ fn selected_cube() {
 #[test]
 fn environments() {
     let (_, snapshot) = stage(4);
-    let mut painter = Painter::new(2);
-    let view = Eye::overview(&snapshot, [160, 120]).view(160, 120);
+    let mut painter = SceneRenderer::new(2);
+    let view = OrbitCamera::overview(&snapshot, [160, 120]).view(160, 120);
     let red =
         |canvas: &Canvas| canvas.bytes().chunks(4).filter(|p| p[0] > 100 && p[1] < p[0] / 2 && p[2] < p[0] / 2).count();
-    let all = painted(&mut painter, &snapshot, &view, &Look::default());
-    let one = painted(&mut painter, &snapshot, &view, &Look { shown: Shown::One(2), ..Look::default() });
+    let all = painted(&mut painter, &snapshot, &view, &ViewOptions::default());
+    let one =
+        painted(&mut painter, &snapshot, &view, &ViewOptions { envs: EnvSelection::One(2), ..ViewOptions::default() });
     assert_eq!(all.dimensions(), [160, 120]);
     // Four red cubes, or one of them.
     let (all_red, one_red) = (red(&all), red(&one));
     assert!(one_red > 0 && all_red > 2 * one_red && all_red < 8 * one_red, "{all_red} {one_red}");
     // Rendering again, also with one thread, gives the same bits.
-    for painter in [&mut painter, &mut Painter::new(1)] {
-        assert!(painted(painter, &snapshot, &view, &Look::default()) == all);
+    for painter in [&mut painter, &mut SceneRenderer::new(1)] {
+        assert!(painted(painter, &snapshot, &view, &ViewOptions::default()) == all);
     }
     let overlays = Overlays { names: true, contacts: true, frames: true, ..Overlays::default() };
     for [width, height] in [[1, 1], [1, 500], [2000, 3]] {
-        let view = Eye::default().view(width, height);
-        let canvas = painted(&mut painter, &snapshot, &view, &Look { overlays, ..Look::default() });
+        let view = OrbitCamera::default().view(width, height);
+        let canvas = painted(&mut painter, &snapshot, &view, &ViewOptions { overlays, ..ViewOptions::default() });
         assert_eq!(canvas.dimensions(), [width, height]);
     }
 }
@@ -132,11 +136,11 @@ fn environments() {
 #[test]
 fn overlays() {
     let (mut sample, snapshot) = stage(2);
-    let mut painter = Painter::new(1);
+    let mut painter = SceneRenderer::new(1);
     let [x, y, _] = snapshot.envs[0].origin;
-    let view = Eye { target: [x + 0.5, y, 0.3], distance: 1.5, ..Eye::default() }.view(200, 150);
+    let view = OrbitCamera { target: [x + 0.5, y, 0.3], distance: 1.5, ..OrbitCamera::default() }.view(200, 150);
     let mut draw = |snapshot: &Snapshot, overlays: Overlays, trails: Option<&Trails>| {
-        painted(&mut painter, snapshot, &view, &Look { overlays, trails, ..Look::default() })
+        painted(&mut painter, snapshot, &view, &ViewOptions { overlays, trails, ..ViewOptions::default() })
     };
     let none = Overlays { sensors: false, ..Overlays::default() };
     let plain = draw(&snapshot, none, None);
@@ -147,35 +151,35 @@ fn overlays() {
         (none, Overlays { joints: true, ..none }),
         (none, Overlays { names: true, ..none }),
         (none, bare),
-        (none, Overlays { masses: true, ..bare }),
-        (bare, Overlays { masses: true, ..bare }),
+        (none, Overlays { centers_of_mass: true, ..bare }),
+        (bare, Overlays { centers_of_mass: true, ..bare }),
         (none, Overlays { collisions: true, ..bare }),
     ] {
-        assert!(unlike(&draw(&snapshot, base, None), &draw(&snapshot, with, None)) > 5, "{with:?}");
+        assert!(differing_pixels(&draw(&snapshot, base, None), &draw(&snapshot, with, None)) > 5, "{with:?}");
     }
     assert_eq!(draw(&snapshot, none, None), plain, "and without them it is as before");
     // Markers of sensors, once they are enabled.
     sample.sim.scene_mut().set_debug_vis(sample.camera, true).unwrap();
     let shown = sample.snapshot();
-    assert!(unlike(&draw(&shown, none, None), &draw(&shown, Overlays::default(), None)) > 5);
+    assert!(differing_pixels(&draw(&shown, none, None), &draw(&shown, Overlays::default(), None)) > 5);
     // A trail of a moving body.
     let mut trails = Trails::default();
-    trails.add(&shown, Shown::All);
+    trails.add(&shown, EnvSelection::All);
     sample.sim.robot_mut(sample.robot).set_qpos_target(&ndarray::arr2(&[[1.5]]), None, None).unwrap();
     let trail = Overlays { trails: true, ..none };
     assert_eq!(draw(&shown, trail, Some(&trails)), draw(&shown, none, None), "nothing has moved yet");
     sample.put_cube([0.0, 0.0, 0.9]);
     for _ in 0..20 {
         sample.sim.update(1);
-        trails.add(&sample.snapshot(), Shown::All);
+        trails.add(&sample.snapshot(), EnvSelection::All);
     }
     let moved = sample.snapshot();
-    assert!(unlike(&draw(&moved, trail, Some(&trails)), &draw(&moved, none, None)) > 5);
+    assert!(differing_pixels(&draw(&moved, trail, Some(&trails)), &draw(&moved, none, None)) > 5);
 }
 
 /// Repeats the environments of a snapshot up to this number.
 fn many(snapshot: &Snapshot, envs: usize) -> Snapshot {
-    let envs = snapshot.envs.iter().cycle().take(envs).map(|env| EnvStage { origin: [0.0; 3], ..env.clone() });
+    let envs = snapshot.envs.iter().cycle().take(envs).map(|env| SnapshotEnv { origin: [0.0; 3], ..env.clone() });
     Snapshot { envs: envs.collect(), ..snapshot.clone() }
 }
 
@@ -184,11 +188,11 @@ fn many(snapshot: &Snapshot, envs: usize) -> Snapshot {
 #[test]
 fn limit_of_trails() {
     let (mut sample, first) = stage(2);
-    let view = Eye::default().view(400, 100);
+    let view = OrbitCamera::default().view(400, 100);
     let written = |envs: usize| {
         let (snapshot, mut trails, mut canvas) = (many(&first, envs), Trails::default(), Canvas::new(400, 100));
-        trails.add(&snapshot, Shown::All);
-        trails.draw(&snapshot, Shown::All, &view, &mut canvas);
+        trails.add(&snapshot, EnvSelection::All);
+        trails.draw(&snapshot, EnvSelection::All, &view, &mut canvas);
         let below = (86..96).flat_map(|y| (0..400).map(move |x| (x, y)));
         below.filter(|&(x, y)| canvas.pixel(x, y) == Some(color::TRAIL)).count()
     };
@@ -196,27 +200,27 @@ fn limit_of_trails() {
     assert_eq!(written(most), 0, "each has its own");
     assert!(written(most + 1) > 100, "some forty letters");
 
-    let view = Eye { target: [0.0, 0.0, 0.5], distance: 3.0, ..Eye::default() }.view(200, 150);
+    let view = OrbitCamera { target: [0.0, 0.0, 0.5], distance: 3.0, ..OrbitCamera::default() }.view(200, 150);
     let mut moments = vec![first];
     for k in 0..10 {
         sample.put_cube([0.0, -0.5 + 0.1 * f64::from(k), 0.9]);
         moments.push(sample.snapshot());
     }
-    let drawn = |envs: usize, kept: Shown, shown: Shown| {
+    let drawn = |envs: usize, kept: EnvSelection, shown: EnvSelection| {
         let mut trails = Trails::default();
         moments.iter().for_each(|moment| trails.add(&many(moment, envs), kept));
         let last = many(moments.last().unwrap(), envs);
         trails.add(&last, shown);
         let mut canvas = Canvas::new(200, 150);
         trails.draw(&last, shown, &view, &mut canvas);
-        unlike(&canvas, &Canvas::new(200, 150))
+        differing_pixels(&canvas, &Canvas::new(200, 150))
     };
     let far = 5000;
-    let of_two = drawn(2, Shown::All, Shown::One(1));
+    let of_two = drawn(2, EnvSelection::All, EnvSelection::One(1));
     assert!(of_two > 20, "{of_two}: kept from when both were shown");
-    let alone = drawn(far + 1, Shown::One(far), Shown::One(far));
-    assert!(alone > 20 && alone == drawn(2, Shown::One(0), Shown::One(0)), "{alone}");
-    assert_eq!(drawn(far + 1, Shown::All, Shown::One(far)), 0, "it had none: they begin now");
+    let alone = drawn(far + 1, EnvSelection::One(far), EnvSelection::One(far));
+    assert!(alone > 20 && alone == drawn(2, EnvSelection::One(0), EnvSelection::One(0)), "{alone}");
+    assert_eq!(drawn(far + 1, EnvSelection::All, EnvSelection::One(far)), 0, "it had none: they begin now");
 }
 
 /// Without motion since the measurement, the panel draws the pixels that the sensor measures.
@@ -225,7 +229,7 @@ fn panel() {
     let (sample, snapshot) = stage(2);
     assert_eq!(snapshot.names.cameras, ["eye"]);
     let camera = sample.sim.sensor(sample.camera).unwrap();
-    let (mut panel, mut canvas) = (Panel::new(1), Canvas::default());
+    let (mut panel, mut canvas) = (CameraPanel::new(1), Canvas::default());
     assert!(panel.draw(&snapshot, 0, 1, 64, &mut canvas));
     assert_eq!(canvas.dimensions(), [128, 96]);
     let (depth, mask, normal) = (camera.depth().unwrap(), camera.mask().unwrap(), camera.normal().unwrap());
@@ -300,7 +304,7 @@ fn panel_of_every_camera() {
     assert_eq!(snapshot.names.cameras, ["eye", "fish", "pair/left", "pair/right", "rays"]);
     // Masks below the title: in the panel, and of the sensors.
     let places = || (15..48).flat_map(|v| (0..64).map(move |u| (v, u)));
-    let (mut panel, mut canvas) = (Panel::new(1), Canvas::default());
+    let (mut panel, mut canvas) = (CameraPanel::new(1), Canvas::default());
     let [fisheye, left, right, cast] = [1, 2, 3, 4].map(|camera: usize| {
         assert!(panel.draw(&snapshot, camera, 0, 64, &mut canvas));
         places().map(|(v, u)| canvas.pixel(u, 48 + v).unwrap()).collect::<Vec<_>>()
@@ -336,7 +340,7 @@ fn panel_with_markers() {
     let snapshot = sample.snapshot();
     let [plain, marked] = [0, 1].map(|camera| {
         let mut canvas = Canvas::default();
-        assert!(Panel::new(1).draw(&snapshot, camera, 0, 64, &mut canvas));
+        assert!(CameraPanel::new(1).draw(&snapshot, camera, 0, 64, &mut canvas));
         canvas
     });
     let differs = |x: [usize; 2], y: [usize; 2]| {

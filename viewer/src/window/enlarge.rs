@@ -1,6 +1,6 @@
 //! Upscaling by the X server: a huge window is sent a coarse image, which the RENDER extension enlarges.
 
-use super::x11::Failure;
+use super::x11::DisplayError;
 use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::protocol::render::{
     ConnectionExt as _, CreatePictureAux, PictOp, Pictformat, Picture, Repeat, Transform, X11_EXTENSION_NAME,
@@ -13,7 +13,7 @@ const ONE: i32 = 1 << 16;
 
 /// A server-side image that is shown enlarged in a window.
 #[derive(Debug)]
-pub(super) struct Enlarged {
+pub(super) struct ScaledImage {
     pixmap: Pixmap,
     source: Picture,
     target: Picture,
@@ -24,7 +24,7 @@ pub(super) struct Enlarged {
 }
 
 /// Returns the RENDER format of a visual, or `None` if the server cannot scale images of it.
-pub(super) fn format(connection: &RustConnection, visual: Visualid) -> Result<Option<Pictformat>, Failure> {
+pub(super) fn render_format(connection: &RustConnection, visual: Visualid) -> Result<Option<Pictformat>, DisplayError> {
     if connection.extension_information(X11_EXTENSION_NAME)?.is_none() {
         return Ok(None);
     }
@@ -38,7 +38,7 @@ pub(super) fn format(connection: &RustConnection, visual: Visualid) -> Result<Op
     Ok(visuals.filter(|known| known.visual == visual).map(|known| known.format).next())
 }
 
-impl Enlarged {
+impl ScaledImage {
     /// Creates an image of `size` pixels on the server, for a window of this depth and format.
     pub(super) fn new(
         connection: &RustConnection,
@@ -47,7 +47,7 @@ impl Enlarged {
         format: Pictformat,
         size: [usize; 2],
         factor: usize,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, DisplayError> {
         let [width, height] = size.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let [pixmap, source, target] =
             [connection.generate_id()?, connection.generate_id()?, connection.generate_id()?];
@@ -70,7 +70,7 @@ impl Enlarged {
     }
 
     /// Shows the image enlarged over the whole window.
-    pub(super) fn show(&self, connection: &RustConnection, window: [usize; 2]) -> Result<(), Failure> {
+    pub(super) fn show(&self, connection: &RustConnection, window: [usize; 2]) -> Result<(), DisplayError> {
         let [width, height] = window.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let (op, mask) = (PictOp::SRC, x11rb::NONE);
         connection.render_composite(op, self.source, mask, self.target, 0, 0, 0, 0, 0, 0, width, height)?;
@@ -78,7 +78,7 @@ impl Enlarged {
     }
 
     /// Frees the resources on the server.
-    pub(super) fn free(self, connection: &RustConnection) -> Result<(), Failure> {
+    pub(super) fn free(self, connection: &RustConnection) -> Result<(), DisplayError> {
         connection.render_free_picture(self.source)?;
         connection.render_free_picture(self.target)?;
         connection.free_pixmap(self.pixmap)?;

@@ -1,7 +1,7 @@
 //! A window for images that a program computes, such as the channels of a camera.
 
-use super::x11::{Failure, Happened, Screened};
-use super::{Closed, LOOK, Shared, Window, WindowError, on_thread};
+use super::x11::{DisplayError, WindowEvent, XWindow};
+use super::{Closed, POLL_INTERVAL, Window, WindowError, WindowState, spawn_window};
 use crate::stage::Canvas;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -30,12 +30,12 @@ impl Default for ImageWindowCfg {
 #[derive(Debug)]
 pub struct ImageWindow {
     window: Window,
-    latest: Arc<Latest>,
+    latest: Arc<LatestImage>,
 }
 
 /// The most recent image, shared with the window's thread.
 #[derive(Debug, Default)]
-struct Latest {
+struct LatestImage {
     image: Mutex<(u64, Arc<Canvas>)>,
     changed: Condvar,
 }
@@ -46,10 +46,11 @@ impl ImageWindow {
     /// # Errors
     /// [`WindowError::NoDisplay`] if no display is available, [`WindowError::Thread`] if no thread can be started.
     pub fn open(cfg: ImageWindowCfg) -> Result<Self, WindowError> {
-        let latest = Arc::new(Latest::default());
+        let latest = Arc::new(LatestImage::default());
         let own = Arc::clone(&latest);
-        let run = move |screen: Screened, own: Arc<Latest>, shared: &Shared| show(screen, &own, shared);
-        let window = on_thread(cfg.title, cfg.size, cfg.display, own, |_| (), run)?;
+        let run =
+            move |screen: XWindow, own: Arc<LatestImage>, shared: &WindowState| run_image_loop(screen, &own, shared);
+        let window = spawn_window(cfg.title, cfg.size, cfg.display, own, |_| (), run)?;
         Ok(Self { window, latest })
     }
 
@@ -73,26 +74,26 @@ impl Drop for ImageWindow {
     }
 }
 
-impl Latest {
-    /// Waits up to [`LOOK`] for an image newer than number `last`. Returns the newest image and its number.
+impl LatestImage {
+    /// Waits up to [`POLL_INTERVAL`] for an image newer than number `last`. Returns the newest image and its number.
     fn newer_than(&self, last: u64) -> (u64, Arc<Canvas>) {
         let latest = self.image.lock().unwrap_or_else(PoisonError::into_inner);
-        let waited = self.changed.wait_timeout_while(latest, LOOK, |(number, _)| *number == last);
+        let waited = self.changed.wait_timeout_while(latest, POLL_INTERVAL, |(number, _)| *number == last);
         let latest = waited.unwrap_or_else(PoisonError::into_inner).0;
         (latest.0, Arc::clone(&latest.1))
     }
 }
 
 /// Shows images until the window closes.
-fn show(mut screen: Screened, latest: &Latest, shared: &Shared) -> Result<Closed, Failure> {
+fn run_image_loop(mut screen: XWindow, latest: &LatestImage, shared: &WindowState) -> Result<Closed, DisplayError> {
     let mut last = 0;
     let mut outdated = true;
     loop {
         for happened in screen.poll()? {
             match happened {
-                Happened::Close => return Ok(Closed::ByUser),
-                Happened::Exposed | Happened::Input(super::Input::Resize(_)) => outdated = true,
-                Happened::Input(_) => {}
+                WindowEvent::Close => return Ok(Closed::ByUser),
+                WindowEvent::Exposed | WindowEvent::Input(super::Input::Resize(_)) => outdated = true,
+                WindowEvent::Input(_) => {}
             }
         }
         if shared.close.load(Ordering::Acquire) {
@@ -100,8 +101,8 @@ fn show(mut screen: Screened, latest: &Latest, shared: &Shared) -> Result<Closed
         }
         let (number, image) = latest.newer_than(last);
         if number != last || outdated {
-            screen.present(&letterboxed(&image, screen.picture_size()))?;
-            shared.pictures.fetch_add(1, Ordering::AcqRel);
+            screen.present(&letterboxed(&image, screen.image_size()))?;
+            shared.frames.fetch_add(1, Ordering::AcqRel);
             (last, outdated) = (number, false);
         }
     }

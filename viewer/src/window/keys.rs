@@ -53,7 +53,7 @@ pub(crate) enum Action {
     Contacts,
     Frames,
     JointAxes,
-    Masses,
+    CentersOfMass,
     Names,
     Trails,
     Collisions,
@@ -61,7 +61,7 @@ pub(crate) enum Action {
     Panel,
     Sliders,
     Help,
-    Unselect,
+    ClearSelection,
 }
 
 impl Action {
@@ -85,7 +85,7 @@ const fn key(key: Key, action: Action, help: &'static str) -> Binding {
 }
 
 /// All key bindings.
-pub(crate) const TABLE: &[Binding] = &[
+pub(crate) const BINDINGS: &[Binding] = &[
     key(Key::F1, Action::Help, "this help"),
     key(Key::Char('h'), Action::Help, "this help"),
     key(Key::Char(' '), Action::Pause, "pause, go on"),
@@ -119,18 +119,18 @@ pub(crate) const TABLE: &[Binding] = &[
     key(Key::Char('c'), Action::Contacts, "contact forces"),
     key(Key::Char('f'), Action::Frames, "frames of links"),
     key(Key::Char('j'), Action::JointAxes, "axes of joints"),
-    key(Key::Char('m'), Action::Masses, "centres of mass"),
+    key(Key::Char('m'), Action::CentersOfMass, "centres of mass"),
     key(Key::Char('t'), Action::Names, "names"),
     key(Key::Char('l'), Action::Trails, "trails"),
     key(Key::Char('k'), Action::Collisions, "collision shapes"),
     key(Key::Char('u'), Action::Visuals, "visual shapes"),
     key(Key::Char('i'), Action::Panel, "what a camera sees, in four ways"),
     key(Key::Tab, Action::Sliders, "joint sliders"),
-    key(Key::Escape, Action::Unselect, "select nothing, close the help"),
+    key(Key::Escape, Action::ClearSelection, "select nothing, close the help"),
 ];
 
 /// Mouse actions of the help: gesture and effect.
-pub(crate) const MOUSE: &[[&str; 2]] = &[
+pub(crate) const MOUSE_HELP: &[[&str; 2]] = &[
     ["drag", "turn about the middle"],
     ["right drag", "move"],
     ["middle drag", "look around"],
@@ -141,7 +141,7 @@ pub(crate) const MOUSE: &[[&str; 2]] = &[
 
 /// Returns the action of a key.
 pub(crate) fn action(key: Key) -> Option<Action> {
-    TABLE.iter().find(|binding| binding.key == key).map(|binding| binding.action)
+    BINDINGS.iter().find(|binding| binding.key == key).map(|binding| binding.action)
 }
 
 /// Returns the label of a key.
@@ -158,13 +158,13 @@ pub(crate) fn label(key: Key) -> String {
 /// Returns the lines of the help. Keys with the same action share a line.
 pub(crate) fn help() -> Vec<[String; 2]> {
     let mut lines: Vec<(Action, [String; 2])> = Vec::new();
-    for binding in TABLE {
+    for binding in BINDINGS {
         match lines.iter_mut().find(|(action, _)| *action == binding.action) {
             Some((_, [keys, _])) => *keys += &format!(", {}", label(binding.key)),
             None => lines.push((binding.action, [label(binding.key), binding.help.into()])),
         }
     }
-    let mouse = MOUSE.iter().map(|line| line.map(String::from));
+    let mouse = MOUSE_HELP.iter().map(|line| line.map(String::from));
     lines.into_iter().map(|(_, line)| line).chain(mouse).collect()
 }
 
@@ -175,10 +175,10 @@ mod tests {
     /// Every key has one action, and the help names it.
     #[test]
     fn table() {
-        let keys: std::collections::HashSet<Key> = TABLE.iter().map(|binding| binding.key).collect();
-        assert_eq!(keys.len(), TABLE.len(), "a key is there twice");
+        let keys: std::collections::HashSet<Key> = BINDINGS.iter().map(|binding| binding.key).collect();
+        assert_eq!(keys.len(), BINDINGS.len(), "a key is there twice");
         let help = help();
-        for binding in TABLE {
+        for binding in BINDINGS {
             let named = |keys: &str| keys.split(", ").any(|key| key == label(binding.key));
             let said = |[keys, text]: &[String; 2]| text == binding.help && named(keys);
             assert!(help.iter().any(said), "{binding:?} is not in the help");

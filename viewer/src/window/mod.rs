@@ -17,13 +17,13 @@ pub use app::{App, Input, Modifiers};
 pub use images::{ImageWindow, ImageWindowCfg};
 pub use keys::Key;
 
-use crate::control::{Command, RecordButton, Speed, Viewer, Viewing, Wants};
+use crate::control::{Command, RecordButton, SnapshotRequest, Speed, Viewer, ViewerExt};
 use crate::stage::Canvas;
 use kinetoscope_sim::SimulationManager;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
-use x11::{Failure, Happened, Screened};
+use x11::{DisplayError, WindowEvent, XWindow};
 
 /// Settings of a simulation window.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,13 +40,13 @@ pub struct WindowCfg {
     /// physics needs all available time ([`App::new`]).
     pub threads: Option<usize>,
     /// Record button of the simulation. `None` keeps the button that another view has set, if any.
-    pub recording: Option<RecordButton>,
+    pub record_button: Option<RecordButton>,
 }
 
 impl Default for WindowCfg {
     fn default() -> Self {
-        let (title, speed) = ("Kinetoscope".into(), Some(Speed::REAL));
-        Self { title, size: [960, 540], display: None, speed, threads: None, recording: None }
+        let (title, speed) = ("Kinetoscope".into(), Some(Speed::REAL_TIME));
+        Self { title, size: [960, 540], display: None, speed, threads: None, record_button: None }
     }
 }
 
@@ -59,7 +59,7 @@ pub enum WindowError {
         "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which Wayland \
          desktops have too (XWayland), or run without a window: the examples with --headless, or with --serve for a \
          browser",
-        shown(.display), shown(.wayland)
+        quoted(.display), quoted(.wayland)
     )]
     NoDisplay {
         /// Attempted connection and its error.
@@ -74,7 +74,7 @@ pub enum WindowError {
     Thread(String),
 }
 
-fn shown(variable: &Option<String>) -> String {
+fn quoted(variable: &Option<String>) -> String {
     variable.as_ref().map_or_else(|| "not set".into(), |value| format!("{value:?}"))
 }
 
@@ -94,7 +94,7 @@ pub enum Closed {
 
 impl Closed {
     /// Returns the description of an unexpected end, or `None` for a regular end.
-    pub fn fault(&self) -> Option<&str> {
+    pub fn error(&self) -> Option<&str> {
         match self {
             Self::ByUser | Self::WithSimulation => None,
             Self::DisplayLost(reason) => Some(reason),
@@ -109,14 +109,14 @@ impl Closed {
 /// simulation is dropped, or [`close`](Self::close) is called.
 #[derive(Clone, Debug)]
 pub struct Window {
-    shared: Arc<Shared>,
+    shared: Arc<WindowState>,
 }
 
 #[derive(Debug, Default)]
-struct Shared {
+struct WindowState {
     close: AtomicBool,
-    number: AtomicU32,
-    pictures: AtomicU64,
+    window_id: AtomicU32,
+    frames: AtomicU64,
     closed: Mutex<Option<Closed>>,
     ended: Condvar,
 }
@@ -133,13 +133,13 @@ impl Window {
     }
 
     /// Returns the X11 window id, for tools that capture windows.
-    pub fn number(&self) -> u32 {
-        self.shared.number.load(Ordering::Acquire)
+    pub fn id(&self) -> u32 {
+        self.shared.window_id.load(Ordering::Acquire)
     }
 
     /// Returns the number of frames that were sent to the display.
-    pub fn pictures(&self) -> u64 {
-        self.shared.pictures.load(Ordering::Acquire)
+    pub fn frame_count(&self) -> u64 {
+        self.shared.frames.load(Ordering::Acquire)
     }
 
     /// Requests the window to close, without waiting.
@@ -157,18 +157,18 @@ impl Window {
 }
 
 /// Reports the end of a window's thread to waiting callers. When dropped without a report, it reports a crash.
-struct Ending(Arc<Shared>);
+struct EndGuard(Arc<WindowState>);
 
-impl Ending {
-    fn tell(&self, how: Closed) {
+impl EndGuard {
+    fn report(&self, how: Closed) {
         self.0.closed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(how);
         self.0.ended.notify_all();
     }
 }
 
-impl Drop for Ending {
+impl Drop for EndGuard {
     fn drop(&mut self) {
-        self.tell(Closed::Crashed);
+        self.report(Closed::Crashed);
     }
 }
 
@@ -196,17 +196,18 @@ pub trait OpenWindow {
 
 impl OpenWindow for SimulationManager {
     fn open_window_with(&mut self, mut cfg: WindowCfg) -> Result<Window, WindowError> {
-        let button = cfg.recording.take();
+        let button = cfg.record_button.take();
         let (title, size, display) = (cfg.title.clone(), cfg.size, cfg.display.clone());
-        let viewer = self.viewer(Wants::default());
+        let viewer = self.viewer(SnapshotRequest::default());
         let speed = cfg.speed;
         let begin = move |viewer: &Viewer| {
             if let Some(speed) = speed {
                 viewer.send(Command::SetSpeed(speed));
             }
         };
-        let run = move |screen: Screened, viewer: Viewer, shared: &Shared| show(screen, &viewer, &cfg, shared);
-        let window = on_thread(title, size, display, viewer, begin, run)?;
+        let run =
+            move |screen: XWindow, viewer: Viewer, shared: &WindowState| run_window_loop(screen, &viewer, &cfg, shared);
+        let window = spawn_window(title, size, display, viewer, begin, run)?;
         button.into_iter().for_each(|button| self.record_button(button));
         Ok(window)
     }
@@ -218,102 +219,107 @@ impl OpenWindow for SimulationManager {
 /// # Errors
 /// [`WindowError::NoDisplay`] if no display is available or it does not respond; [`WindowError::Thread`] if no thread
 /// can be started.
-fn on_thread<T: Send + 'static>(
+fn spawn_window<T: Send + 'static>(
     title: String,
     size: [usize; 2],
     display: Option<String>,
     state: T,
     begin: impl FnOnce(&T) + Send + 'static,
-    run: impl FnOnce(Screened, T, &Shared) -> Result<Closed, Failure> + Send + 'static,
+    run: impl FnOnce(XWindow, T, &WindowState) -> Result<Closed, DisplayError> + Send + 'static,
 ) -> Result<Window, WindowError> {
     let (opened, result) = mpsc::channel();
-    let shared = Arc::new(Shared::default());
+    let shared = Arc::new(WindowState::default());
     let window = Window { shared: Arc::clone(&shared) };
     let thread_main = move || {
-        let ending = Ending(Arc::clone(&shared));
+        let ending = EndGuard(Arc::clone(&shared));
         // Declared after `ending`, so `state` is dropped first if the thread panics.
         let state = state;
-        let screen = match Screened::open(&title, size, display.as_deref()) {
+        let screen = match XWindow::open(&title, size, display.as_deref()) {
             Ok(screen) => screen,
             Err(failure) => return drop(opened.send(Err(no_display(&failure)))),
         };
-        shared.number.store(screen.number(), Ordering::Release);
+        shared.window_id.store(screen.window_id(), Ordering::Release);
         begin(&state);
         // The send fails if the caller stopped waiting because the display took too long.
         if opened.send(Ok(())).is_err() {
             return;
         }
         let closed = run(screen, state, &shared).unwrap_or_else(|failure| Closed::DisplayLost(failure.to_string()));
-        ending.tell(closed);
+        ending.report(closed);
     };
     let thread = std::thread::Builder::new().name("kinetoscope-window".into());
     thread.spawn(thread_main).map_err(|error| WindowError::Thread(error.to_string()))?;
-    match result.recv_timeout(watch::PATIENCE) {
+    match result.recv_timeout(watch::TIMEOUT) {
         Ok(Ok(())) => Ok(window),
         Ok(Err(error)) => Err(error),
-        Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&Failure::Frozen)),
+        Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&DisplayError::Unresponsive)),
         Err(mpsc::RecvTimeoutError::Disconnected) => {
             Err(WindowError::Thread("it ended before the window was there".into()))
         }
     }
 }
 
-fn no_display(failure: &Failure) -> WindowError {
+fn no_display(failure: &DisplayError) -> WindowError {
     let variable = |name: &str| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned());
     let (display, wayland) = (variable("DISPLAY"), variable("WAYLAND_DISPLAY"));
     WindowError::NoDisplay { reason: failure.to_string(), display, wayland }
 }
 
 /// Longest time between two checks for user input.
-const LOOK: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Shows snapshots until the window closes.
-fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared) -> Result<Closed, Failure> {
+fn run_window_loop(
+    mut screen: XWindow,
+    viewer: &Viewer,
+    cfg: &WindowCfg,
+    shared: &WindowState,
+) -> Result<Closed, DisplayError> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let mut app = App::new(screen.picture_size(), cfg.threads.unwrap_or(cores));
-    app.keep_pace();
+    let mut app = App::new(screen.image_size(), cfg.threads.unwrap_or(cores));
+    app.enable_adaptive_quality();
     let mut canvas = Canvas::default();
-    let (mut last, mut wants) = (0, Wants::default());
+    let (mut last, mut wants) = (0, SnapshotRequest::default());
     let mut outdated = true;
     // The first snapshot is shown before the first key, because keys have no effect without a snapshot.
     if let Some(snapshot) = viewer.newest() {
         last = snapshot.number;
-        app.show(snapshot);
+        app.set_snapshot(snapshot);
     }
     loop {
         for happened in screen.poll()? {
             match happened {
-                Happened::Input(input) => app.handle(input),
-                Happened::Exposed => {}
-                Happened::Close => return Ok(Closed::ByUser),
+                WindowEvent::Input(input) => app.handle(input),
+                WindowEvent::Exposed => {}
+                WindowEvent::Close => return Ok(Closed::ByUser),
             }
             outdated = true;
         }
         if shared.close.load(Ordering::Acquire) {
             return Ok(Closed::ByUser);
         }
-        if viewer.is_over() {
+        if viewer.has_ended() {
             return Ok(Closed::WithSimulation);
         }
-        if app.wants() != wants {
-            wants = app.wants();
-            viewer.set_wants(wants);
+        if app.snapshot_request() != wants {
+            wants = app.snapshot_request();
+            viewer.set_request(wants);
         }
         for command in app.take_commands() {
-            app.was_heard(viewer.send(command));
+            app.set_send_result(viewer.send(command));
             outdated = true;
         }
-        if let Some(snapshot) = viewer.wait(last, LOOK) {
+        if let Some(snapshot) = viewer.wait(last, POLL_INTERVAL) {
             last = snapshot.number;
-            app.show(snapshot);
+            app.set_snapshot(snapshot);
             outdated = true;
         }
-        if outdated || app.moves(Instant::now()) {
+        if outdated || app.needs_redraw(Instant::now()) {
             app.draw(&mut canvas, Instant::now());
             let drawn = Instant::now();
             screen.present(&canvas)?;
-            app.handed_over(drawn.elapsed());
-            shared.pictures.fetch_add(1, Ordering::AcqRel);
+            app.set_send_duration(drawn.elapsed());
+            shared.frames.fetch_add(1, Ordering::AcqRel);
             outdated = false;
         }
     }

@@ -5,12 +5,12 @@
 mod display;
 mod on_x;
 
-use super::keys::{Action, TABLE};
+use super::keys::{Action, BINDINGS};
 use super::*;
 use crate::Screenshot;
-use crate::control::{Recording, RecordingState};
-use crate::sample::{HALF, Sample, sample, unlike};
-use crate::stage::{Eye, Look, Overlays, Painter, Panel, Shown, Snapshot};
+use crate::control::{RecordControl, RecordingState};
+use crate::sample::{CUBE_HALF_EDGE, Sample, differing_pixels, sample};
+use crate::stage::{CameraPanel, EnvSelection, OrbitCamera, Overlays, SceneRenderer, Snapshot, ViewOptions};
 use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
@@ -33,9 +33,9 @@ struct Shows {
 fn shows(num_envs: usize) -> Shows {
     let mut sample = sample(num_envs);
     sample.sim.update(50);
-    let viewer = sample.sim.viewer(Wants::default());
+    let viewer = sample.sim.viewer(SnapshotRequest::default());
     let mut app = App::new(SIZE, 1);
-    app.show(viewer.newest().unwrap());
+    app.set_snapshot(viewer.newest().unwrap());
     Shows { sample, viewer, app }
 }
 
@@ -69,7 +69,7 @@ impl Shows {
     fn over_the_cube(&mut self, env: usize) {
         let origin = self.sample.sim.cfg().env_origins();
         let at = |p: [f64; 3]| [0, 1, 2].map(|k| origin[(env, k)] + p[k]);
-        self.app.look_from(Eye::looking(at([0.02, 0.01, 1.5]), at([0.0, 0.0, 2.0 * HALF])).unwrap());
+        self.app.set_camera(OrbitCamera::look_at(at([0.02, 0.01, 1.5]), at([0.0, 0.0, 2.0 * CUBE_HALF_EDGE])).unwrap());
     }
 
     /// Moves the cube of each environment and shows the result.
@@ -79,8 +79,8 @@ impl Shows {
         let poses = ndarray::Array2::from_shape_fn((envs, 7), |(env, k)| row(env)[k]);
         let cube = sim.entities().rigid_object_id("cube").unwrap();
         sim.rigid_object_mut(cube).write_pose(&poses, None).unwrap();
-        self.viewer = sim.viewer(Wants::default());
-        self.app.show(self.viewer.newest().unwrap());
+        self.viewer = sim.viewer(SnapshotRequest::default());
+        self.app.set_snapshot(self.viewer.newest().unwrap());
         self.viewer.newest().unwrap()
     }
 
@@ -97,7 +97,7 @@ fn busy() -> Shows {
     let mut shows = shows(3);
     shows.over_the_cube(0);
     shows.click(MIDDLE);
-    assert!(shows.app.picked().is_some_and(|picked| picked.name == "cube"), "{:?}", shows.app.picked());
+    assert!(shows.app.selection().is_some_and(|picked| picked.name == "cube"), "{:?}", shows.app.selection());
     shows.press(Key::PageDown);
     shows.type_in("v");
     shows
@@ -106,7 +106,7 @@ fn busy() -> Shows {
 /// Every key has an effect. A held key repeats steps only: it pauses once, and starts one recording.
 #[test]
 fn keys_and_repeats() {
-    for binding in TABLE {
+    for binding in BINDINGS {
         let mut shows = busy();
         let before = format!("{:?}", shows.app);
         shows.app.handle(Input::Press(binding.key));
@@ -132,7 +132,7 @@ fn overlay_keys() {
         ("c", |all| &mut all.contacts),
         ("f", |all| &mut all.frames),
         ("j", |all| &mut all.joints),
-        ("m", |all| &mut all.masses),
+        ("m", |all| &mut all.centers_of_mass),
         ("t", |all| &mut all.names),
         ("l", |all| &mut all.trails),
         ("k", |all| &mut all.collisions),
@@ -150,7 +150,7 @@ fn overlay_keys() {
 #[test]
 fn command_keys() {
     let mut shows = shows(3);
-    assert_eq!(shows.type_in(" .1"), [Command::TogglePause, Command::Step(1), Command::SetSpeed(Speed::REAL)]);
+    assert_eq!(shows.type_in(" .1"), [Command::TogglePause, Command::Step(1), Command::SetSpeed(Speed::REAL_TIME)]);
     // The reset applies to the shown environment, or to all. The environment before the first is the last.
     for (keys, expected) in [
         (&[][..], None),
@@ -162,22 +162,22 @@ fn command_keys() {
         assert_eq!(shows.press(Key::Backspace), [Command::Reset(expected)], "{keys:?}");
     }
     shows.type_in("c");
-    assert_eq!(shows.app.wants().contacts, Some(Shown::All));
-    let times = Speed::Times;
+    assert_eq!(shows.app.snapshot_request().contacts, Some(EnvSelection::All));
+    let times = Speed::Factor;
     for (speed, measured, key, expected) in [
-        (Speed::REAL, Some(0.9), "-", 0.5),
-        (Speed::REAL, Some(0.9), "=", 2.0),
-        (Speed::REAL, Some(0.9), "+", 2.0),
+        (Speed::REAL_TIME, Some(0.9), "-", 0.5),
+        (Speed::REAL_TIME, Some(0.9), "=", 2.0),
+        (Speed::REAL_TIME, Some(0.9), "+", 2.0),
         (times(0.25), Some(0.9), "-", 0.125),
         // At the limits of the range.
         (times(1.5e-3), Some(0.9), "-", 1e-3),
         (times(700.0), Some(0.9), "+", 1e3),
         // At free speed: half and twice the measured speed.
-        (Speed::Free, Some(8.0), "-", 4.0),
-        (Speed::Free, None, "=", 2.0),
+        (Speed::Unlimited, Some(8.0), "-", 4.0),
+        (Speed::Unlimited, None, "=", 2.0),
     ] {
         let snapshot = shows.changed(|s| (s.run.speed, s.run.measured_speed) = (speed, measured));
-        shows.app.show(Arc::new(snapshot));
+        shows.app.set_snapshot(Arc::new(snapshot));
         assert_eq!(shows.type_in(key), [Command::SetSpeed(times(expected))], "{speed:?} {key}");
     }
 }
@@ -187,11 +187,11 @@ fn command_keys() {
 #[test]
 fn panel_of_environment() {
     let mut shows = shows(3);
-    let snapshot = shows.move_cube(|env| [0.0, 0.1 * env as f64, HALF]);
+    let snapshot = shows.move_cube(|env| [0.0, 0.1 * env as f64, CUBE_HALF_EDGE]);
     shows.press(Key::PageDown);
     shows.type_in("i");
     let [mut expected, mut other] = [Canvas::default(), Canvas::default()];
-    let mut panel = Panel::new(1);
+    let mut panel = CameraPanel::new(1);
     assert!(panel.draw(&snapshot, 0, 0, 160, &mut other) && panel.draw(&snapshot, 0, 1, 160, &mut expected));
     assert!(expected != other, "environments look alike");
     let canvas = shows.drawn();
@@ -214,7 +214,7 @@ fn full_inbox() {
     assert!(sent < 100_000, "it is taken for ever");
     // Below the status lines, where refusals are shown.
     let mut shining = |heard: Option<bool>| {
-        heard.into_iter().for_each(|heard| shows.app.was_heard(heard));
+        heard.into_iter().for_each(|heard| shows.app.set_send_result(heard));
         let canvas = shows.drawn();
         let pixels = (8..400).flat_map(|x| (50..70).map(move |y| (x, y)));
         pixels.filter(|&(x, y)| canvas.pixel(x, y) == YELLOW).count()
@@ -227,29 +227,33 @@ fn full_inbox() {
 /// Waiting callers see the end of a window, even if its thread panics.
 #[test]
 fn crash() {
-    let shared = Arc::new(Shared::default());
+    let shared = Arc::new(WindowState::default());
     let window = Window { shared: Arc::clone(&shared) };
     let crashing = std::thread::spawn(move || {
-        let _ending = Ending(shared);
+        let _ending = EndGuard(shared);
         panic!("as a mistake would");
     });
     assert_eq!(window.wait(Duration::from_secs(30)), Some(Closed::Crashed));
     assert!(!window.is_open() && crashing.join().is_err());
-    assert!(Closed::Crashed.fault().is_some() && Closed::ByUser.fault().is_none());
+    assert!(Closed::Crashed.error().is_some() && Closed::ByUser.error().is_none());
 }
 
 /// A camera motion by a mouse drag.
-type Way = fn(&mut Eye, [f64; 2], usize);
+type Way = fn(&mut OrbitCamera, [f64; 2], usize);
 
 /// Drags and the wheel move the camera. The effect on the image is tested with the camera.
 #[test]
 fn drags_and_wheel() {
     let Shows { sample: _sample, viewer: _viewer, mut app } = shows(1);
     let by = [40.0, -15.0];
-    let ways: [(u8, bool, Way); 4] =
-        [(1, false, Eye::orbit), (1, true, Eye::pan), (2, false, Eye::turn), (3, false, Eye::pan)];
+    let ways: [(u8, bool, Way); 4] = [
+        (1, false, OrbitCamera::orbit),
+        (1, true, OrbitCamera::pan),
+        (2, false, OrbitCamera::look_around),
+        (3, false, OrbitCamera::pan),
+    ];
     for (button, shift, way) in ways {
-        let (before, mut expected) = (app.eye(), app.eye());
+        let (before, mut expected) = (app.camera(), app.camera());
         // In two parts, as with a real mouse.
         way(&mut expected, [by[0], 0.0], SIZE[1]);
         way(&mut expected, [0.0, by[1]], SIZE[1]);
@@ -257,15 +261,15 @@ fn drags_and_wheel() {
         app.handle(Input::Move([100.0 + by[0], 100.0]));
         app.handle(Input::Move([100.0 + by[0], 100.0 + by[1]]));
         app.handle(Input::ButtonRelease(button, [100.0 + by[0], 100.0 + by[1]]));
-        assert!(app.eye() == expected && expected != before, "button {button}: {:?}", app.eye());
+        assert!(app.camera() == expected && expected != before, "button {button}: {:?}", app.camera());
         // After the release, the camera stays.
         app.handle(Input::Move([10.0, 10.0]));
-        assert_eq!(app.eye(), expected);
+        assert_eq!(app.camera(), expected);
     }
-    let mut expected = app.eye();
+    let mut expected = app.camera();
     expected.zoom(2.0);
     app.handle(Input::Wheel(2.0, MIDDLE));
-    assert_eq!(app.eye(), expected);
+    assert_eq!(app.camera(), expected);
     // Through a camera sensor, the view is fixed.
     for input in [
         Input::Press(Key::Char('v')),
@@ -276,7 +280,7 @@ fn drags_and_wheel() {
     ] {
         app.handle(input);
     }
-    assert_eq!(app.eye(), expected);
+    assert_eq!(app.camera(), expected);
 }
 
 /// A second button, pressed and released, has no effect on the drag of the first.
@@ -284,10 +288,10 @@ fn drags_and_wheel() {
 fn second_button() {
     let mut shows = shows(1);
     shows.over_the_cube(0);
-    let before = shows.app.eye();
+    let before = shows.app.camera();
     let mut commands = |inputs: &[Input]| {
         inputs.iter().for_each(|input| shows.app.handle(*input));
-        (shows.app.take_commands(), shows.app.eye())
+        (shows.app.take_commands(), shows.app.camera())
     };
     let [x, y] = MIDDLE;
     let (pulled, _) = commands(&[Input::ButtonPress(1, MIDDLE, CTRL), Input::Move([x + 20.0, y])]);
@@ -309,10 +313,10 @@ fn selection_and_spring() {
     let ([x, y], plain) = (MIDDLE, shows.drawn());
     shows.app.handle(Input::ButtonPress(1, MIDDLE, PLAIN));
     shows.app.handle(Input::ButtonRelease(1, [x + 1.0, y]));
-    let picked = shows.app.picked().unwrap().clone();
-    assert!(unlike(&shows.drawn(), &plain) > 2_000, "a note on it");
+    let picked = shows.app.selection().unwrap().clone();
+    assert!(differing_pixels(&shows.drawn(), &plain) > 2_000, "a note on it");
     assert!(picked.name == "cube" && picked.env == 3, "{picked:?}");
-    assert_eq!(shows.app.wants().contacts, Some(Shown::One(3)), "the forces on it");
+    assert_eq!(shows.app.snapshot_request().contacts, Some(EnvSelection::One(3)), "the forces on it");
     shows.app.handle(Input::ButtonPress(1, MIDDLE, CTRL));
     shows.app.handle(Input::Move([x + 90.0, y]));
     let [Command::Drag { env, body, target, .. }] = shows.app.take_commands()[..] else { panic!("one drag") };
@@ -325,13 +329,13 @@ fn selection_and_spring() {
     shows.app.handle(Input::ButtonRelease(1, MIDDLE));
     assert!(shows.app.take_commands().contains(&Command::Release));
     shows.press(Key::Escape);
-    assert!(shows.app.picked().is_none());
+    assert!(shows.app.selection().is_none());
     // While followed, the body stays at the image center.
     shows.click(MIDDLE);
     shows.type_in("x");
-    shows.move_cube(|_| [0.0, -0.8, HALF]);
+    shows.move_cube(|_| [0.0, -0.8, CUBE_HALF_EDGE]);
     shows.click(MIDDLE);
-    assert!(shows.app.picked().is_some_and(|picked| picked.name == "cube"), "{:?}", shows.app.picked());
+    assert!(shows.app.selection().is_some_and(|picked| picked.name == "cube"), "{:?}", shows.app.selection());
 }
 
 /// The slider panel is 210 pixels wide. Its first row is from 22 to 48. Its only slider goes from 8 pixels right of the
@@ -382,7 +386,7 @@ fn sensor_view() {
             continue;
         }
         shows.click([320.0 + 7.5 * (u as f64 + 0.5 - 32.0), 180.0 + 7.5 * (v as f64 + 0.5 - 24.0)]);
-        assert_eq!(shows.app.picked().map(|picked| picked.mask_id), Some(id), "pixel {u} {v}");
+        assert_eq!(shows.app.selection().map(|picked| picked.mask_id), Some(id), "pixel {u} {v}");
         tried += usize::from(id == cube);
     }
     assert!(tried > 3, "the cube was looked at {tried} times");
@@ -396,27 +400,30 @@ fn sensor_view_of_one_environment() {
     let [x, y, z] = shows.viewer.newest().unwrap().envs[0].origin;
     let snapshot = shows.changed(|s| s.envs[1].origin = [x + 0.15, y + 0.15, z + 0.2]);
     let through = snapshot.envs[0].views[0].as_ref().unwrap().view;
-    shows.app.show(Arc::new(snapshot.clone()));
+    shows.app.set_snapshot(Arc::new(snapshot.clone()));
     shows.type_in("c");
-    assert_eq!(shows.app.wants().contacts, Some(Shown::All));
+    assert_eq!(shows.app.snapshot_request().contacts, Some(EnvSelection::All));
     shows.type_in("v");
-    assert_eq!(shows.app.wants().contacts, Some(Shown::One(0)));
+    assert_eq!(shows.app.snapshot_request().contacts, Some(EnvSelection::One(0)));
     assert_eq!(shows.press(Key::Backspace), [Command::Reset(Some(EnvId(0)))]);
     let mut cubes = 0;
     for (row, column) in (0..12).flat_map(|row| (0..16).map(move |column| (f64::from(row), f64::from(column)))) {
         shows.click([85.0 + 31.0 * column, 8.0 + 30.0 * row]);
-        let picked = shows.app.picked().unwrap();
+        let picked = shows.app.selection().unwrap();
         assert_eq!(picked.env, 0, "{picked:?} at {row} {column}");
         cubes += usize::from(picked.name == "cube");
     }
     assert!(cubes > 3, "{cubes}");
     // Control: from the same pose without the camera, the other environment blocks the view.
-    let mut painter = Painter::new(1);
+    let mut painter = SceneRenderer::new(1);
     let mut pose = through.world_from_camera;
     (0..3).for_each(|k| pose.translation[k] += [x, y, z][k] as f32);
     let view = View { world_from_camera: pose, ..through };
     let mut others = (0..48).flat_map(|v| (0..64).map(move |u| [f64::from(u) + 0.5, f64::from(v) + 0.5]));
-    assert!(others.any(|at| painter.pick(&snapshot, &view, &Look::default(), at).is_some_and(|other| other.env == 1)));
+    assert!(
+        others
+            .any(|at| painter.pick(&snapshot, &view, &ViewOptions::default(), at).is_some_and(|other| other.env == 1))
+    );
 }
 
 #[test]
@@ -424,7 +431,7 @@ fn help_at_every_width() {
     let lines = keys::help().len();
     for (width, columns) in [(325, 1), (639, 1), (640, 2), (960, 2)] {
         let mut canvas = Canvas::new(width, 15 * lines + 34);
-        hud::help(&mut canvas);
+        hud::draw_help(&mut canvas);
         let rows = lines.div_ceil(columns);
         let [left, top] = [width - 315 * columns - 10, 15 * (lines - rows)].map(|free| free / 2);
         // Both parts of each line have letters.
@@ -450,7 +457,7 @@ fn every_size() {
     // The help is part of the image, of 640 pixels in a row.
     let with = shows.drawn();
     shows.press(Key::F1);
-    assert!(unlike(&with, &shows.drawn()) > 50_000, "{}", unlike(&with, &shows.drawn()));
+    assert!(differing_pixels(&with, &shows.drawn()) > 50_000, "{}", differing_pixels(&with, &shows.drawn()));
 }
 
 /// A held flight key moves along its own direction only: forward along the view, right of it, and up in the world. The
@@ -470,13 +477,13 @@ fn flight() {
         (Key::Right, [0.0, 1.0, 0.0]),
     ] {
         let mut shows = shows(1);
-        let before = shows.app.eye();
+        let before = shows.app.camera();
         shows.app.handle(Input::Press(key));
-        assert!(shows.app.moves(Instant::now()));
+        assert!(shows.app.needs_redraw(Instant::now()));
         std::thread::sleep(Duration::from_millis(30));
         shows.drawn();
-        let way = Vector3::from(shows.app.eye().target) - Vector3::from(before.target);
-        let forward = Vector3::from(before.forward());
+        let way = Vector3::from(shows.app.camera().target) - Vector3::from(before.target);
+        let forward = Vector3::from(before.direction());
         let to_right = forward.cross(&Vector3::z()).normalize();
         let wanted = forward * ahead + to_right * right + Vector3::z() * up;
         assert!((way.normalize() - wanted).norm() < 1e-9, "{key:?}: {way}, not along {wanted}");
@@ -484,7 +491,7 @@ fn flight() {
         let share = way.norm() / before.distance;
         assert!((0.029..0.101).contains(&share), "{key:?}: {share}");
         shows.app.handle(Input::FocusLost);
-        assert!(!shows.app.moves(Instant::now()));
+        assert!(!shows.app.needs_redraw(Instant::now()));
     }
 }
 
@@ -492,7 +499,7 @@ fn flight() {
 #[derive(Debug, Default)]
 struct Switch(bool);
 
-impl Recording for Switch {
+impl RecordControl for Switch {
     fn set(&mut self, _: &mut SimulationManager, on: bool) -> Result<(), String> {
         self.0 = on;
         Ok(())
@@ -515,7 +522,7 @@ fn record_button() {
     assert_eq!(shows.type_in("r"), [Command::Record(true)]);
     for on in [false, true] {
         shows.sample.sim.record_button(RecordButton::new(Switch(on)));
-        shows.app.show(shows.viewer.newest().unwrap());
+        shows.app.set_snapshot(shows.viewer.newest().unwrap());
         assert_eq!(shows.type_in("r"), [Command::Record(!on)]);
         assert_eq!(shows.click(on_button), [Command::Record(!on)]);
         assert!(shows.click([on_button[0], 40.0]).is_empty(), "below it");
@@ -537,10 +544,10 @@ fn record_button() {
 fn coarse(app: &mut App, held: &Snapshot, fine: &Canvas, images: &[(u64, u64)], handing: Duration) -> Vec<bool> {
     let (start, below) = (Instant::now(), 4 * 70 * fine.dimensions()[0]);
     let one = |&(number, milliseconds): &(u64, u64)| {
-        app.show(Arc::new(Snapshot { number, ..held.clone() }));
+        app.set_snapshot(Arc::new(Snapshot { number, ..held.clone() }));
         let mut canvas = Canvas::default();
         app.draw(&mut canvas, start + Duration::from_millis(milliseconds));
-        app.handed_over(handing);
+        app.set_send_duration(handing);
         canvas.bytes()[below..] != fine.bytes()[below..]
     };
     images.iter().map(one).collect()
@@ -555,10 +562,10 @@ fn coarse_while_moving() {
     held.run.paused = true;
     let app = |size: [usize; 2]| {
         let mut app = App::new(size, 1);
-        app.show(Arc::new(held.clone()));
+        app.set_snapshot(Arc::new(held.clone()));
         let mut fine = Canvas::default();
         app.draw(&mut fine, Instant::now());
-        app.keep_pace();
+        app.enable_adaptive_quality();
         (app, fine)
     };
     // Six million pixels on one thread take longer than a thirtieth of a second, which three images detect.
@@ -586,22 +593,22 @@ fn viewpoint() {
         let held = shows.viewer.newest().unwrap();
         let mut next = (*held).clone();
         next.viewpoint = shows.sample.sim.scene().viewpoint();
-        shows.app.show(Arc::new(next));
+        shows.app.set_snapshot(Arc::new(next));
     };
-    let expected = |eye: [f64; 3]| Eye::looking(eye, [0.0; 3]).unwrap();
-    assert_ne!(shows.app.eye(), expected([3.5; 3]), "the control");
+    let expected = |eye: [f64; 3]| OrbitCamera::look_at(eye, [0.0; 3]).unwrap();
+    assert_ne!(shows.app.camera(), expected([3.5; 3]), "the control");
     set(&mut shows, [3.5; 3]);
-    assert_eq!(shows.app.eye(), expected([3.5; 3]));
-    assert_eq!(shows.sample.sim.overview_eye([64, 48]), expected([3.5; 3]));
+    assert_eq!(shows.app.camera(), expected([3.5; 3]));
+    assert_eq!(shows.sample.sim.overview_camera([64, 48]), expected([3.5; 3]));
     // The user's own view stays until the program sets another.
     let own = expected([1.0, 2.0, 1.0]);
-    shows.app.look_from(own);
-    shows.app.show(shows.viewer.newest().unwrap());
-    assert_eq!(shows.app.eye(), own);
+    shows.app.set_camera(own);
+    shows.app.set_snapshot(shows.viewer.newest().unwrap());
+    assert_eq!(shows.app.camera(), own);
     set(&mut shows, [0.0, 2.0, 0.5]);
-    assert_eq!(shows.app.eye(), expected([0.0, 2.0, 0.5]));
+    assert_eq!(shows.app.camera(), expected([0.0, 2.0, 0.5]));
     for (eye, target) in [([1.0; 3], [1.0; 3]), ([f64::NAN, 0.0, 0.0], [0.0; 3]), ([0.0; 3], [f64::INFINITY; 3])] {
         assert!(shows.sample.sim.scene_mut().set_camera_view(eye, target).unwrap_err().to_string().contains("apart"));
     }
-    assert_eq!(shows.sample.sim.scene().viewpoint().unwrap().changes, 2);
+    assert_eq!(shows.sample.sim.scene().viewpoint().unwrap().revision, 2);
 }

@@ -9,14 +9,14 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Maximum duration of a request or of opening a window. An image takes seconds over a slow network.
-pub(super) const PATIENCE: Duration = Duration::from_secs(15);
+pub(super) const TIMEOUT: Duration = Duration::from_secs(15);
 /// Interval between two checks. Checks are counted instead of measuring time, so that a suspended program does not time
 /// out.
-const LOOK: Duration = Duration::from_secs(1);
+const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Watches the requests of one connection on its own thread, until it is dropped.
 #[derive(Debug)]
-pub(super) struct Watch {
+pub(super) struct Watchdog {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
@@ -25,12 +25,12 @@ pub(super) struct Watch {
 struct Shared {
     /// Number of started plus finished requests: odd while a request is in progress.
     requests: AtomicU64,
-    frozen: AtomicBool,
-    over: Mutex<bool>,
-    ends: Condvar,
+    timed_out: AtomicBool,
+    stop: Mutex<bool>,
+    stop_changed: Condvar,
 }
 
-impl Watch {
+impl Watchdog {
     /// Starts to watch a connection with this socket.
     ///
     /// # Errors
@@ -54,25 +54,25 @@ impl Watch {
     }
 
     /// True if the connection was closed because the display did not respond.
-    pub(super) fn is_frozen(&self) -> bool {
-        self.shared.frozen.load(Ordering::Acquire)
+    pub(super) fn has_timed_out(&self) -> bool {
+        self.shared.timed_out.load(Ordering::Acquire)
     }
 }
 
 impl Shared {
     fn watch(&self, socket: &UnixStream) {
-        let (mut last, mut looks) = (0, 0);
-        let mut over = self.over.lock().unwrap_or_else(PoisonError::into_inner);
+        let (mut last, mut checks) = (0, 0);
+        let mut over = self.stop.lock().unwrap_or_else(PoisonError::into_inner);
         while !*over {
-            over = self.ends.wait_timeout(over, LOOK).unwrap_or_else(PoisonError::into_inner).0;
+            over = self.stop_changed.wait_timeout(over, CHECK_INTERVAL).unwrap_or_else(PoisonError::into_inner).0;
             if *over {
                 return;
             }
             let requests = self.requests.load(Ordering::Acquire);
-            looks = if requests % 2 == 1 && requests == last { looks + 1 } else { 0 };
+            checks = if requests % 2 == 1 && requests == last { checks + 1 } else { 0 };
             last = requests;
-            if LOOK * looks >= PATIENCE {
-                self.frozen.store(true, Ordering::Release);
+            if CHECK_INTERVAL * checks >= TIMEOUT {
+                self.timed_out.store(true, Ordering::Release);
                 // The shutdown wakes the blocked thread. If it fails, the connection is already closed.
                 let _ = socket.shutdown(std::net::Shutdown::Both);
                 return;
@@ -81,10 +81,10 @@ impl Shared {
     }
 }
 
-impl Drop for Watch {
+impl Drop for Watchdog {
     fn drop(&mut self) {
-        *self.shared.over.lock().unwrap_or_else(PoisonError::into_inner) = true;
-        self.shared.ends.notify_all();
+        *self.shared.stop.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.shared.stop_changed.notify_all();
         if let Some(thread) = self.thread.take() {
             // A thread that panicked has ended as well.
             let _ = thread.join();
@@ -104,17 +104,17 @@ mod tests {
     #[test]
     fn unanswered_request() {
         let (own, other) = UnixStream::pair().unwrap();
-        let watch = Watch::start(own.try_clone().unwrap().into()).unwrap();
+        let watch = Watchdog::start(own.try_clone().unwrap().into()).unwrap();
         let start = Instant::now();
         assert_eq!(watch.request(|| (&own).read(&mut [0])).unwrap(), 0, "the connection is closed");
-        assert!(start.elapsed() >= PATIENCE && watch.is_frozen(), "{:?}", start.elapsed());
+        assert!(start.elapsed() >= TIMEOUT && watch.has_timed_out(), "{:?}", start.elapsed());
         drop(other);
         let (own, _other) = UnixStream::pair().unwrap();
-        let idle = Watch::start(own.into()).unwrap();
+        let idle = Watchdog::start(own.into()).unwrap();
         (0..3).for_each(|_| idle.request(|| ()));
-        assert!(!idle.is_frozen());
+        assert!(!idle.has_timed_out());
         let start = Instant::now();
         drop(idle);
-        assert!(start.elapsed() < LOOK, "it is not waited for");
+        assert!(start.elapsed() < CHECK_INTERVAL, "it is not waited for");
     }
 }

@@ -2,9 +2,9 @@
 //! else.
 
 use super::app::{Input, Modifiers};
-use super::enlarge::{self, Enlarged};
+use super::enlarge::{self, ScaledImage};
 use super::keys::Key;
-use super::watch::{PATIENCE, Watch};
+use super::watch::{TIMEOUT, Watchdog};
 use crate::stage::Canvas;
 use kinetoscope_render::View;
 use std::os::fd::AsFd as _;
@@ -30,8 +30,8 @@ x11rb::atom_manager! {
 
 /// An open window, with its keyboard mapping and its frame buffers.
 #[derive(Debug)]
-pub(super) struct Screened {
-    watch: Watch,
+pub(super) struct XWindow {
+    watch: Watchdog,
     connection: RustConnection,
     window: Window,
     gc: u32,
@@ -41,7 +41,7 @@ pub(super) struct Screened {
     shifts: [u32; 3],
     most_significant_first: bool,
     size: [usize; 2],
-    keys: Keys,
+    keys: KeyboardMap,
     /// Last key release, held back until the next event shows if the key repeats.
     released: Option<KeyReleaseEvent>,
     /// Pixels in the server's format.
@@ -49,12 +49,12 @@ pub(super) struct Screened {
     /// RENDER format of the window; `None` if the server cannot scale images.
     format: Option<Pictformat>,
     /// Server-side image that is shown enlarged, while the window is huge.
-    enlarged: Option<Enlarged>,
+    scaled_image: Option<ScaledImage>,
 }
 
 /// An event of the window.
 #[derive(Debug)]
-pub(super) enum Happened {
+pub(super) enum WindowEvent {
     Input(Input),
     /// A part of the window was uncovered and needs a redraw.
     Exposed,
@@ -64,7 +64,7 @@ pub(super) enum Happened {
 
 /// An error of the connection, or a refused request.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Failure {
+pub(super) enum DisplayError {
     #[error("{0}")]
     Connect(#[from] x11rb::errors::ConnectError),
     #[error("the connection to the display was lost: {0}")]
@@ -73,8 +73,8 @@ pub(super) enum Failure {
     Reply(#[from] ReplyError),
     #[error("the display refuses: {0}")]
     Id(#[from] ReplyOrIdError),
-    #[error("the display has not answered for {} s", PATIENCE.as_secs())]
-    Frozen,
+    #[error("the display has not answered for {} s", TIMEOUT.as_secs())]
+    Unresponsive,
     #[error("the connection to the display cannot be watched: {0}")]
     Watch(#[from] std::io::Error),
     #[error("the display shows no 8-bit red, green and blue in pixels of 32 bits")]
@@ -83,15 +83,15 @@ pub(super) enum Failure {
 
 /// Maximum number of rendered pixels. Larger windows are rendered at lower resolution and enlarged, because rendering
 /// more pixels takes longer than a thirtieth of a second.
-const MOST_PIXELS: usize = 1920 * 1200;
+const MAX_PIXELS: usize = 1920 * 1200;
 
-impl Screened {
+impl XWindow {
     /// Opens a window of about `size` pixels on a display; `None` uses the environment variable `DISPLAY`.
-    pub(super) fn open(title: &str, size: [usize; 2], display: Option<&str>) -> Result<Self, Failure> {
+    pub(super) fn open(title: &str, size: [usize; 2], display: Option<&str>) -> Result<Self, DisplayError> {
         let (connection, number) = x11rb::connect(display)?;
-        let watch = Watch::start(connection.stream().as_fd().try_clone_to_owned()?)?;
+        let watch = Watchdog::start(connection.stream().as_fd().try_clone_to_owned()?)?;
         let screen = &connection.setup().roots[number];
-        let (depth, shifts) = colors(&connection, screen)?;
+        let (depth, shifts) = color_layout(&connection, screen)?;
         let [width, height] = size.map(|n| u16::try_from(n.clamp(1, 16_000)).unwrap_or(u16::MAX));
         let window = connection.generate_id()?;
         let events = EventMask::EXPOSURE
@@ -128,11 +128,11 @@ impl Screened {
         let gc = connection.generate_id()?;
         connection.create_gc(gc, window, &CreateGCAux::new().graphics_exposures(0))?;
         connection.map_window(window)?;
-        let keys = Keys::of(&connection)?;
+        let keys = KeyboardMap::of(&connection)?;
         connection.flush()?;
         let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
         let size = [usize::from(width), usize::from(height)];
-        let format = enlarge::format(&connection, visual)?;
+        let format = enlarge::render_format(&connection, visual)?;
         let (pixels, enlarged, released) = (Vec::new(), None, None);
         Ok(Self {
             watch,
@@ -148,56 +148,57 @@ impl Screened {
             released,
             pixels,
             format,
-            enlarged,
+            scaled_image: enlarged,
         })
     }
 
     /// Returns the number of window pixels per image pixel, along each side.
-    fn coarseness(&self) -> usize {
+    fn pixel_scale(&self) -> usize {
         coarseness(self.size)
     }
 
     /// Returns the size of the image to render.
-    pub(super) fn picture_size(&self) -> [usize; 2] {
-        let k = self.coarseness();
+    pub(super) fn image_size(&self) -> [usize; 2] {
+        let k = self.pixel_scale();
         self.size.map(|n| n.div_ceil(k).max(1))
     }
 
     /// Returns the X11 window id.
-    pub(super) fn number(&self) -> u32 {
+    pub(super) fn window_id(&self) -> u32 {
         self.window
     }
 
     /// Returns the events since the last call.
-    pub(super) fn poll(&mut self) -> Result<Vec<Happened>, Failure> {
-        self.events().map_err(|failure| self.cause(failure))
+    pub(super) fn poll(&mut self) -> Result<Vec<WindowEvent>, DisplayError> {
+        self.events().map_err(|failure| self.resolve_error(failure))
     }
 
-    /// Replaces the error by [`Failure::Frozen`] if the connection was closed because the display did not respond.
-    fn cause(&self, failure: Failure) -> Failure {
-        if self.watch.is_frozen() { Failure::Frozen } else { failure }
+    /// Replaces the error by [`DisplayError::Unresponsive`] if the connection was closed because the display did not respond.
+    fn resolve_error(&self, failure: DisplayError) -> DisplayError {
+        if self.watch.has_timed_out() { DisplayError::Unresponsive } else { failure }
     }
 
-    fn events(&mut self) -> Result<Vec<Happened>, Failure> {
-        let mut happened: Vec<Happened> = Vec::new();
+    fn events(&mut self) -> Result<Vec<WindowEvent>, DisplayError> {
+        let mut happened: Vec<WindowEvent> = Vec::new();
         let mut released = self.released.take();
         // True if the next event may still arrive.
         let mut is_new = false;
         while let Some(event) = self.watch.request(|| self.connection.poll_for_event())? {
-            let repeats = matches!((&released, &event), (Some(key), Event::KeyPress(next)) if repeats(key, next));
+            let repeats =
+                matches!((&released, &event), (Some(key), Event::KeyPress(next)) if is_auto_repeat(key, next));
             if let Some(key) = released.take().filter(|_| !repeats) {
-                happened.extend(self.key(key.detail, key.state).map(|key| Happened::Input(Input::Release(key))));
+                happened.extend(self.key(key.detail, key.state).map(|key| WindowEvent::Input(Input::Release(key))));
             }
             if let Event::KeyRelease(key) = event {
                 (released, is_new) = (Some(key), true);
                 continue;
             }
-            let next = match self.meaning(&event) {
-                Some(Happened::Input(Input::Press(key))) if repeats => Some(Happened::Input(Input::Repeat(key))),
+            let next = match self.translate_event(&event) {
+                Some(WindowEvent::Input(Input::Press(key))) if repeats => Some(WindowEvent::Input(Input::Repeat(key))),
                 next => next,
             };
             // Of several consecutive mouse moves only the last counts.
-            if let (Some(Happened::Input(Input::Move(to))), Some(Happened::Input(Input::Move(last)))) =
+            if let (Some(WindowEvent::Input(Input::Move(to))), Some(WindowEvent::Input(Input::Move(last)))) =
                 (&next, happened.last_mut())
             {
                 *last = *to;
@@ -208,46 +209,46 @@ impl Screened {
         match released {
             Some(key) if is_new => self.released = Some(key),
             Some(key) => {
-                happened.extend(self.key(key.detail, key.state).map(|key| Happened::Input(Input::Release(key))));
+                happened.extend(self.key(key.detail, key.state).map(|key| WindowEvent::Input(Input::Release(key))));
             }
             None => {}
         }
         Ok(happened)
     }
 
-    fn meaning(&mut self, event: &Event) -> Option<Happened> {
-        let scale = self.coarseness() as f64;
+    fn translate_event(&mut self, event: &Event) -> Option<WindowEvent> {
+        let scale = self.pixel_scale() as f64;
         let at = |x: i16, y: i16| [f64::from(x) / scale, f64::from(y) / scale];
         let held = |state: KeyButMask| Modifiers {
             shift: state.contains(KeyButMask::SHIFT),
             ctrl: state.contains(KeyButMask::CONTROL),
         };
         Some(match event {
-            Event::Expose(_) => Happened::Exposed,
+            Event::Expose(_) => WindowEvent::Exposed,
             Event::ConfigureNotify(event) => {
                 let size = [event.width, event.height].map(|n| usize::from(n).max(1));
                 if size == self.size {
                     return None;
                 }
                 self.size = size;
-                Happened::Input(Input::Resize(self.picture_size()))
+                WindowEvent::Input(Input::Resize(self.image_size()))
             }
             Event::ClientMessage(event) => {
                 let asks = event.format == 32 && event.data.as_data32()[0] == self.atoms.WM_DELETE_WINDOW;
-                return asks.then_some(Happened::Close);
+                return asks.then_some(WindowEvent::Close);
             }
-            Event::DestroyNotify(event) if event.window == self.window => Happened::Close,
-            Event::KeyPress(event) => Happened::Input(Input::Press(self.key(event.detail, event.state)?)),
-            Event::ButtonPress(event) => Happened::Input(match event.detail {
+            Event::DestroyNotify(event) if event.window == self.window => WindowEvent::Close,
+            Event::KeyPress(event) => WindowEvent::Input(Input::Press(self.key(event.detail, event.state)?)),
+            Event::ButtonPress(event) => WindowEvent::Input(match event.detail {
                 4 => Input::Wheel(1.0, at(event.event_x, event.event_y)),
                 5 => Input::Wheel(-1.0, at(event.event_x, event.event_y)),
                 button => Input::ButtonPress(button, at(event.event_x, event.event_y), held(event.state)),
             }),
             Event::ButtonRelease(event) if !(4..=7).contains(&event.detail) => {
-                Happened::Input(Input::ButtonRelease(event.detail, at(event.event_x, event.event_y)))
+                WindowEvent::Input(Input::ButtonRelease(event.detail, at(event.event_x, event.event_y)))
             }
-            Event::MotionNotify(event) => Happened::Input(Input::Move(at(event.event_x, event.event_y))),
-            Event::FocusOut(_) => Happened::Input(Input::FocusLost),
+            Event::MotionNotify(event) => WindowEvent::Input(Input::Move(at(event.event_x, event.event_y))),
+            Event::FocusOut(_) => WindowEvent::Input(Input::FocusLost),
             _ => return None,
         })
     }
@@ -258,35 +259,42 @@ impl Screened {
     }
 
     /// Shows an image.
-    pub(super) fn present(&mut self, canvas: &Canvas) -> Result<(), Failure> {
-        self.send(canvas).map_err(|failure| self.cause(failure))
+    pub(super) fn present(&mut self, canvas: &Canvas) -> Result<(), DisplayError> {
+        self.send(canvas).map_err(|failure| self.resolve_error(failure))
     }
 
-    fn send(&mut self, canvas: &Canvas) -> Result<(), Failure> {
-        let (k, picture) = (self.coarseness(), canvas.dimensions());
-        let fits = |old: &Enlarged| k > 1 && (old.size, old.factor) == (picture, k);
-        if let Some(old) = self.enlarged.take_if(|old| !fits(old)) {
+    fn send(&mut self, canvas: &Canvas) -> Result<(), DisplayError> {
+        let (k, picture) = (self.pixel_scale(), canvas.dimensions());
+        let fits = |old: &ScaledImage| k > 1 && (old.size, old.factor) == (picture, k);
+        if let Some(old) = self.scaled_image.take_if(|old| !fits(old)) {
             self.watch.request(|| old.free(&self.connection))?;
         }
-        if let (true, None, Some(format)) = (k > 1, &self.enlarged, self.format) {
-            let enlarged =
-                self.watch.request(|| Enlarged::new(&self.connection, self.window, self.depth, format, picture, k))?;
-            self.enlarged = Some(enlarged);
+        if let (true, None, Some(format)) = (k > 1, &self.scaled_image, self.format) {
+            let enlarged = self
+                .watch
+                .request(|| ScaledImage::new(&self.connection, self.window, self.depth, format, picture, k))?;
+            self.scaled_image = Some(enlarged);
         }
-        match self.enlarged.take() {
+        match self.scaled_image.take() {
             Some(enlarged) => {
-                self.put(canvas, 1, enlarged.pixmap(), picture)?;
+                self.put_image(canvas, 1, enlarged.pixmap(), picture)?;
                 self.watch.request(|| enlarged.show(&self.connection, self.size))?;
-                self.enlarged = Some(enlarged);
+                self.scaled_image = Some(enlarged);
             }
-            None => self.put(canvas, k, self.window, self.size)?,
+            None => self.put_image(canvas, k, self.window, self.size)?,
         }
         self.watch.request(|| self.connection.flush())?;
         Ok(())
     }
 
     /// Sends an image to a drawable of `size` pixels, with each pixel repeated `k` times along each side.
-    fn put(&mut self, canvas: &Canvas, k: usize, to: Drawable, [width, height]: [usize; 2]) -> Result<(), Failure> {
+    fn put_image(
+        &mut self,
+        canvas: &Canvas,
+        k: usize,
+        to: Drawable,
+        [width, height]: [usize; 2],
+    ) -> Result<(), DisplayError> {
         let [columns, rows] = canvas.dimensions();
         let line = 4 * width;
         // Maximum payload of one request, without its header.
@@ -316,7 +324,7 @@ impl Screened {
     }
 }
 
-impl Drop for Screened {
+impl Drop for XWindow {
     fn drop(&mut self) {
         // Errors are ignored: if the connection is lost, the window is gone anyway.
         self.watch.request(|| {
@@ -326,64 +334,69 @@ impl Drop for Screened {
     }
 }
 
-/// Returns the number of window pixels per image pixel, along each side, for an image of at most about [`MOST_PIXELS`]
+/// Returns the number of window pixels per image pixel, along each side, for an image of at most about [`MAX_PIXELS`]
 /// pixels with sides that the renderer supports.
 fn coarseness(size: [usize; 2]) -> usize {
     let fits = |k: &usize| {
         let [width, height] = size.map(|n| n.div_ceil(*k));
-        (size[0] / k).max(1) * (size[1] / k).max(1) <= MOST_PIXELS && width.max(height) <= View::MAX_SIDE
+        (size[0] / k).max(1) * (size[1] / k).max(1) <= MAX_PIXELS && width.max(height) <= View::MAX_SIDE
     };
     (1..).find(fits).unwrap_or(1)
 }
 
 /// True if a release and a press come from a held key: the X server sends both with the same time stamp.
-fn repeats(released: &KeyReleaseEvent, next: &KeyPressEvent) -> bool {
+fn is_auto_repeat(released: &KeyReleaseEvent, next: &KeyPressEvent) -> bool {
     (released.detail, released.time) == (next.detail, next.time)
 }
 
 /// Returns the depth of the screen and the bit positions of red, green and blue.
-fn colors(connection: &RustConnection, screen: &Screen) -> Result<(u8, [u32; 3]), Failure> {
+fn color_layout(connection: &RustConnection, screen: &Screen) -> Result<(u8, [u32; 3]), DisplayError> {
     let depth = screen.root_depth;
     let formats = &connection.setup().pixmap_formats;
     let wide = formats.iter().any(|format| format.depth == depth && format.bits_per_pixel == 32);
     let visuals = screen.allowed_depths.iter().flat_map(|depth| &depth.visuals);
     let visual = visuals.filter(|_| wide).find(|visual| visual.visual_id == screen.root_visual);
-    let masks = visual.map(|visual| [visual.red_mask, visual.green_mask, visual.blue_mask]).ok_or(Failure::Colors)?;
+    let masks =
+        visual.map(|visual| [visual.red_mask, visual.green_mask, visual.blue_mask]).ok_or(DisplayError::Colors)?;
     let byte = |mask: u32| mask != 0 && mask >> mask.trailing_zeros() == 0xff;
-    if masks.into_iter().all(byte) { Ok((depth, masks.map(u32::trailing_zeros))) } else { Err(Failure::Colors) }
+    if masks.into_iter().all(byte) { Ok((depth, masks.map(u32::trailing_zeros))) } else { Err(DisplayError::Colors) }
 }
 
 /// Keyboard mapping: the keysyms of each key code.
 #[derive(Debug)]
-struct Keys {
-    first: u8,
-    each: usize,
-    signs: Vec<u32>,
+struct KeyboardMap {
+    first_keycode: u8,
+    keysyms_per_keycode: usize,
+    keysyms: Vec<u32>,
 }
 
-impl Keys {
-    fn of(connection: &RustConnection) -> Result<Self, Failure> {
+impl KeyboardMap {
+    fn of(connection: &RustConnection) -> Result<Self, DisplayError> {
         let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
         let count = last.saturating_sub(first).saturating_add(1);
         let mapping = connection.get_keyboard_mapping(first, count)?.reply()?;
-        Ok(Self { first, each: usize::from(mapping.keysyms_per_keycode), signs: mapping.keysyms })
+        Ok(Self {
+            first_keycode: first,
+            keysyms_per_keycode: usize::from(mapping.keysyms_per_keycode),
+            keysyms: mapping.keysyms,
+        })
     }
 
     /// Returns the key of a key code, with the upper keysym if Shift is held. With several keyboard layouts, the second
     /// one is used for keys without a binding in the first, such as Cyrillic letters. Each layout has two keysyms per
     /// key.
     fn get(&self, code: u8, shift: bool) -> Option<Key> {
-        let at = usize::from(code.checked_sub(self.first)?) * self.each;
-        let signs = self.signs.get(at..at + self.each)?;
+        let at = usize::from(code.checked_sub(self.first_keycode)?) * self.keysyms_per_keycode;
+        let signs = self.keysyms.get(at..at + self.keysyms_per_keycode)?;
         signs.chunks(2).take(2).find_map(|alphabet| {
             let upper = alphabet.get(1).copied().filter(|sign| shift && *sign != 0);
-            key_of(upper.or(alphabet.first().copied())?)
+            key_from_keysym(upper.or(alphabet.first().copied())?)
         })
     }
 }
 
 /// Returns the key of a keysym. Source: the X protocol's `keysymdef.h`, whose first 256 keysyms are Latin-1.
-fn key_of(sign: u32) -> Option<Key> {
+fn key_from_keysym(sign: u32) -> Option<Key> {
     Some(match sign {
         0x20..=0x7e => Key::Char(char::from_u32(sign)?.to_ascii_lowercase()),
         0xff08 => Key::Backspace,
@@ -420,13 +433,17 @@ mod tests {
             // The Shift key alone.
             (0xffe1, None),
         ] {
-            assert_eq!(key_of(sign), key, "{sign:x}");
+            assert_eq!(key_from_keysym(sign), key, "{sign:x}");
         }
-        let american = Keys { first: 8, each: 2, signs: vec![0x3d, 0x2b, 0x61, 0] };
+        let american = KeyboardMap { first_keycode: 8, keysyms_per_keycode: 2, keysyms: vec![0x3d, 0x2b, 0x61, 0] };
         // A Russian layout before an American one: the key between Tab and W is "short i" in the first, Q in the
         // second.
-        let two = Keys { first: 8, each: 4, signs: vec![0x6ca, 0x6ea, 0x71, 0x51, 0x20, 0x20, 0x6ca, 0x6ca] };
-        let russian = Keys { first: 8, each: 2, signs: vec![0x6ca, 0x6ea] };
+        let two = KeyboardMap {
+            first_keycode: 8,
+            keysyms_per_keycode: 4,
+            keysyms: vec![0x6ca, 0x6ea, 0x71, 0x51, 0x20, 0x20, 0x6ca, 0x6ca],
+        };
+        let russian = KeyboardMap { first_keycode: 8, keysyms_per_keycode: 2, keysyms: vec![0x6ca, 0x6ea] };
         for (keys, code, shift, expected) in [
             (&american, 8, false, Some('=')),
             (&american, 8, true, Some('+')),

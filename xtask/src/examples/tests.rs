@@ -30,7 +30,7 @@ fn files_and_folders() {
 
 #[test]
 fn rows_of_the_second_version() {
-    let rows = Rows::OfPhysics.chosen();
+    let rows = RowSelection::VersionDependent.chosen();
     assert!(TABLE.iter().all(|row| rows.iter().any(|chosen| chosen.example == row.example)));
     assert!(QUICK.iter().all(|quick| rows.iter().any(|row| row.example == *quick)));
     assert!(rows.iter().any(|row| row.args.contains("--friction 0.02")), "controls that must fail are among them");
@@ -71,7 +71,7 @@ fn disparities() {
         ("points elsewhere", report(100.0, 1.0, 0.2), false),
         ("empty", json!({}), false),
     ] {
-        assert_eq!(disparity_leads_to_the_points(&report).is_ok(), good, "{what}");
+        assert_eq!(check_disparity(&report).is_ok(), good, "{what}");
     }
 }
 
@@ -100,7 +100,7 @@ fn successes() {
         ("of few environments", changed(&[("needed", 1), ("num_envs", 4)]), false),
         ("no trial", json!({ "steps": 4 }), false),
     ] {
-        assert_eq!(enough_succeeded(&report).is_ok(), passes, "{what}");
+        assert_eq!(check_successes(&report).is_ok(), passes, "{what}");
     }
 }
 
@@ -120,16 +120,16 @@ fn balance_and_learning() {
         (0.0, 0.95, 0.9, 16, false),
     ] {
         let report = json!({ "reached_before": before, "reached_after": after, "needed": needed, "num_envs": envs });
-        assert_eq!(learned(&report).is_ok(), passes, "{report}");
+        assert_eq!(check_learned(&report).is_ok(), passes, "{report}");
     }
     for (after, signal, iterations, passes) in
         [(0.02, false, 32, true), (0.06, false, 32, false), (0.01, true, 32, false), (0.01, false, 0, false)]
     {
         let control = json!({ "reached_before": 0.01, "reached_after": after, "signal": signal,
                               "iterations": iterations, "num_envs": 256 });
-        assert_eq!(not_learned(&control).is_ok(), passes, "{control}");
+        assert_eq!(check_not_learned(&control).is_ok(), passes, "{control}");
     }
-    assert!(not_learned(&json!({})).is_err());
+    assert!(check_not_learned(&json!({})).is_err());
 }
 
 #[test]
@@ -140,24 +140,24 @@ fn controls() {
                 "planned_to_lift": planned, "open": open })
     };
     let good = row(false, true, 0.0);
-    for control in [none_lifted, none_opened] {
+    for control in [check_none_lifted, check_none_opened] {
         assert_eq!(control(&trial(0, &good, &good)), Ok(()));
         assert!(control(&trial(1, &good, &good)).is_err());
         assert!(control(&trial(0, &json!({ "planned": true }), &good)).is_err(), "says nothing");
         assert!(control(&json!({ "successes": 0, "num_envs": 16, "environments": [] })).is_err());
     }
-    assert!(none_lifted(&trial(0, &row(true, true, 0.0), &good)).is_err());
-    assert!(none_lifted(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
-    assert!(none_opened(&trial(0, &row(false, true, 0.16), &good)).is_err());
-    assert!(none_opened(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
+    assert!(check_none_lifted(&trial(0, &row(true, true, 0.0), &good)).is_err());
+    assert!(check_none_lifted(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
+    assert!(check_none_opened(&trial(0, &row(false, true, 0.16), &good)).is_err());
+    assert!(check_none_opened(&trial(0, &row(false, false, 0.0), &good)).is_err(), "the hand was not there");
     let row = |found: bool, beside: f64, fell: bool| {
         json!({ "success": false, "diverged": null, "found": found, "planned": true, "beside": beside,
                 "body_touched_floor": fell })
     };
     for (control, good, bad) in [
-        (all_fell as Requirement, row(true, 0.0, true), row(true, 0.0, false)),
-        (all_beside as Requirement, row(true, 0.027, true), row(true, 0.003, true)),
-        (none_found as Requirement, row(false, 0.2, true), row(true, 0.2, true)),
+        (check_all_fell as ReportCheck, row(true, 0.0, true), row(true, 0.0, false)),
+        (check_all_beside as ReportCheck, row(true, 0.027, true), row(true, 0.003, true)),
+        (check_none_found as ReportCheck, row(false, 0.2, true), row(true, 0.2, true)),
     ] {
         assert_eq!(control(&trial(0, &good, &good)), Ok(()));
         assert!(control(&trial(0, &bad, &good)).is_err());

@@ -11,20 +11,20 @@ use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
 /// Longest wait on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(90);
+const TIMEOUT: Duration = Duration::from_secs(90);
 
 /// A browser with an empty profile. Dropping the value ends the browser.
 pub(crate) struct Chromium {
     process: Child,
-    wire: Mutex<Wire>,
+    wire: Mutex<DevTools>,
     _profile: TempDir,
     _alone: MutexGuard<'static, ()>,
 }
 
 /// Serializes the browser tests: a machine with two cores already renders, steps and displays in each test.
-static ONE: Mutex<()> = Mutex::new(());
+static BROWSER_LOCK: Mutex<()> = Mutex::new(());
 
-struct Wire {
+struct DevTools {
     socket: WebSocket<TcpStream>,
     next: u64,
     /// Events received while waiting for responses.
@@ -33,7 +33,7 @@ struct Wire {
 
 impl Chromium {
     pub(crate) fn start(program: &Path) -> Self {
-        let alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let alone = BROWSER_LOCK.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
         // The sandbox does not work for root, nor in most containers. The only opened page is our own.
         let process = Command::new(program)
@@ -49,26 +49,27 @@ impl Chromium {
             .unwrap();
         // Chromium writes its port and the path of its WebSocket to this file.
         let file = profile.path().join("DevToolsActivePort");
-        let (port, path) = wait::some("Chromium", || {
+        let (port, path) = wait::until_some("Chromium", || {
             let text = std::fs::read_to_string(&file).unwrap_or_default();
             text.trim().split_once('\n').map(|(port, path)| (port.parse::<u16>().unwrap(), path.trim().to_string()))
         });
         let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_read_timeout(Some(TIMEOUT)).unwrap();
         let (socket, _) = tungstenite::client(format!("ws://127.0.0.1:{port}{path}"), stream).unwrap();
-        let wire = Mutex::new(Wire { socket, next: 0, events: Vec::new() });
+        let wire = Mutex::new(DevTools { socket, next: 0, events: Vec::new() });
         Self { process, wire, _profile: profile, _alone: alone }
     }
 
-    fn wire(&self) -> MutexGuard<'_, Wire> {
+    fn wire(&self) -> MutexGuard<'_, DevTools> {
         self.wire.lock().unwrap()
     }
 
     /// Opens a page and defines the functions of [`super::TOOLS`] in it.
     pub(crate) fn open(&self, url: &str) -> Tab<'_> {
-        let target = self.wire().ask(None, "Target.createTarget", json!({"url": "about:blank"}));
+        let target = self.wire().request(None, "Target.createTarget", json!({"url": "about:blank"}));
         let attach = json!({"targetId": target["targetId"], "flatten": true});
-        let session = self.wire().ask(None, "Target.attachToTarget", attach)["sessionId"].as_str().unwrap().to_string();
+        let session =
+            self.wire().request(None, "Target.attachToTarget", attach)["sessionId"].as_str().unwrap().to_string();
         let mut tab = Tab { browser: self, session };
         for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
             tab.ask(domain, json!({}));
@@ -98,9 +99,9 @@ impl Drop for Chromium {
     }
 }
 
-impl Wire {
+impl DevTools {
     /// Sends a request and waits for the response.
-    fn ask(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
+    fn request(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
         self.next += 1;
         let mut message = json!({"id": self.next, "method": method, "params": params});
         if let Some(session) = session {
@@ -127,7 +128,7 @@ pub(crate) struct Tab<'a> {
 
 impl Tab<'_> {
     fn ask(&mut self, method: &str, params: Value) -> Value {
-        self.browser.wire().ask(Some(&self.session), method, params)
+        self.browser.wire().request(Some(&self.session), method, params)
     }
 
     /// Evaluates an expression in the page.
@@ -150,7 +151,7 @@ impl Tab<'_> {
         // While the page loads, elements may not exist yet.
         let wanted = format!("(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()");
         while self.evaluate(&wanted) != true {
-            assert!(start.elapsed() < PATIENCE, "waited for {what}: {:?}", self.complaints());
+            assert!(start.elapsed() < TIMEOUT, "waited for {what}: {:?}", self.console_errors());
             std::thread::sleep(Duration::from_millis(30));
         }
     }
@@ -180,7 +181,7 @@ impl Tab<'_> {
     /// Drags with the left mouse button.
     pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
         self.hold(from, to, false);
-        self.let_go(to);
+        self.release(to);
     }
 
     /// Drags without releasing the button, with or without Ctrl.
@@ -193,7 +194,7 @@ impl Tab<'_> {
         }
     }
 
-    pub(crate) fn let_go(&mut self, at: [f64; 2]) {
+    pub(crate) fn release(&mut self, at: [f64; 2]) {
         self.mouse("mouseReleased", at, false, false);
     }
 
@@ -217,7 +218,7 @@ impl Tab<'_> {
     }
 
     /// Returns errors of the page's scripts, and actions that the browser blocked.
-    pub(crate) fn complaints(&mut self) -> Vec<String> {
+    pub(crate) fn console_errors(&mut self) -> Vec<String> {
         // Earlier events arrive before this response.
         self.ask("Runtime.evaluate", json!({"expression": "0"}));
         let wire = self.browser.wire();

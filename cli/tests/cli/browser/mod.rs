@@ -2,7 +2,7 @@
 
 mod chromium;
 
-use super::serve::running::{Running, play_fall};
+use super::serve::running::{ServedSimulation, play_fall};
 use chromium::{Chromium, Tab};
 use kinetoscope::FileRecording;
 use kinetoscope::record::RecorderCfg;
@@ -28,7 +28,7 @@ fn page<'a>(browser: &'a Chromium, url: &str) -> Tab<'a> {
 }
 
 /// Opens the page of a simulation and waits for its first image.
-fn page_of<'a>(browser: &'a Chromium, running: &Running) -> Tab<'a> {
+fn page_of<'a>(browser: &'a Chromium, running: &ServedSimulation) -> Tab<'a> {
     let mut tab = page(browser, &running.url);
     tab.wait_until("an image", "$('cover').hidden");
     tab
@@ -44,7 +44,7 @@ fn screenshot(tab: &mut Tab<'_>, name: &str) {
 #[track_caller]
 fn assert_content(tab: &mut Tab<'_>) {
     assert_eq!(tab.evaluate("$('note').hidden"), true, "nothing was refused");
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    assert_eq!(tab.console_errors(), Vec::<String>::new());
 }
 
 /// Test functions that are defined in every page. `$` finds an element. `pixels` returns the bytes of a canvas and its
@@ -90,7 +90,7 @@ window.blue = (id, limit) => {
 #[ignore = "needs Chromium: cargo xtask test"]
 fn simulation() {
     let browser = browser();
-    let running = Running::start(2);
+    let running = ServedSimulation::start(2);
     let mut tab = page_of(&browser, &running);
     tab.wait_until("its title", "document.title === 'arm – Kinetoscope'");
 
@@ -194,7 +194,7 @@ fn selection() {
         line.split_whitespace().filter_map(|number| number.parse().ok()).collect()
     }
     let browser = browser();
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let mut tab = page(&browser, &running.url);
     assert_eq!(tab.evaluate("$('selected-card').hidden"), true);
     tab.wait_until("a hint", "$('forces-title').textContent.includes('click on a body')");
@@ -222,7 +222,7 @@ fn selection() {
     tab.wait_until("nothing touches it", "/no contact/.test($('selected').textContent)");
     assert!(said(&mut tab, "position")[2] > rest);
     screenshot(&mut tab, "serve_pulled.png");
-    tab.let_go(up);
+    tab.release(up);
     tab.wait_until("it is back", "/contacts?: force on it/.test($('selected').textContent)");
     tab.click("$('unselect')");
     tab.wait_until("nothing is selected", "$('selected-card').hidden");
@@ -283,7 +283,7 @@ fn time_line() {
         assert_content(&mut tab);
     });
     // Control: a running simulation has no timeline, and without a record button the page shows none.
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let mut tab = page_of(&browser, &running);
     assert_eq!(tab.evaluate("[$('timeline-row').hidden, $('record').hidden]"), json!([true, true]));
     assert_eq!(tab.evaluate("$('timeline-row').getBoundingClientRect().height"), 0);
@@ -297,7 +297,8 @@ fn record_button() {
     let path = folder.path().join("run.npz");
     let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
     let recording = Some(RecordButton::shared(files));
-    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
+    let running =
+        ServedSimulation::start_at(1, "127.0.0.1:0", ServeCfg { record_button: recording, ..ServeCfg::default() });
     let mut tab = page(&browser, &running.url);
     tab.wait_until("a button", "!$('record').hidden && $('record').textContent === 'Record'");
     tab.click("$('record')");
@@ -307,7 +308,7 @@ fn record_button() {
     tab.wait_until("it has ended", "$('record').textContent === 'Record'");
     tab.wait_until("its size", "/^run.npz: .* MB$/.test($('record-text').textContent)");
     assert!(path.is_file());
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    assert_eq!(tab.console_errors(), Vec::<String>::new());
 }
 
 /// A lost connection is reported and restored.
@@ -315,14 +316,14 @@ fn record_button() {
 #[ignore = "needs Chromium: cargo xtask test"]
 fn reconnection() {
     let browser = browser();
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let address = running.address.to_string();
     let mut tab = page_of(&browser, &running);
     drop(running);
     tab.wait_until("lost", "$('link').dataset.state !== 'connected'");
     tab.wait_until("nothing can be pressed", "$('pause').disabled");
     // The port becomes free again once the system has closed the old connections.
-    let again = Running::start_at(1, &address, ServeCfg::default());
+    let again = ServedSimulation::start_at(1, &address, ServeCfg::default());
     tab.wait_until("found again", "$('link').dataset.state === 'connected'");
     tab.wait_until("it can be pressed", "!$('pause').disabled");
     wait::until("one viewer", || again.viewers() == 1);
@@ -333,7 +334,7 @@ fn reconnection() {
 #[ignore = "needs Chromium: cargo xtask test"]
 fn readability() {
     let browser = browser();
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let mut tab = page_of(&browser, &running);
     // Every control has an accessible name.
     let unnamed = tab.evaluate(
@@ -364,5 +365,5 @@ fn readability() {
         std::thread::sleep(Duration::from_millis(700));
         screenshot(&mut tab, name);
     }
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    assert_eq!(tab.console_errors(), Vec::<String>::new());
 }

@@ -1,7 +1,7 @@
 //! Access control: hosts, origins, tokens, and response statuses.
 
-use super::running::{Running, scene};
-use super::visitor::{connect, say, status, status_of};
+use super::running::{ServedSimulation, scene};
+use super::visitor::{connect, exchange, status, status_of};
 use kinetoscope::prelude::*;
 use kinetoscope::viewer::{ServeCfg, ServeError};
 use std::io::{Read, Write};
@@ -18,16 +18,16 @@ const UPGRADE: [&str; 4] = [
 /// The page is complete and loads nothing from elsewhere; other paths are refused.
 #[test]
 fn page() {
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     assert_eq!(running.url, format!("http://{}/", running.address));
-    let answer = say(running.address, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    let answer = exchange(running.address, b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
     assert_eq!(status_of(&answer), 200, "{answer}");
     let (head, page) = answer.split_once("\r\n\r\n").unwrap();
     assert!(head.contains("Content-Type: text/html") && head.contains("default-src 'none'"), "{head}");
     assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
     let length = head.lines().find_map(|line| line.strip_prefix("Content-Length: ")).unwrap();
     assert_eq!(length.parse::<usize>().unwrap(), page.len());
-    let answer = say(running.address, b"HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    let answer = exchange(running.address, b"HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n");
     assert!(status_of(&answer) == 200 && answer.ends_with("\r\n\r\n"), "{answer}");
     let host = "Host: localhost";
     for (path, headers, expected) in [
@@ -40,13 +40,13 @@ fn page() {
     ] {
         assert_eq!(status(running.address, path, headers), expected, "{path} {headers:?}");
     }
-    let post = say(running.address, b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nabcd");
+    let post = exchange(running.address, b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nabcd");
     assert_eq!(status_of(&post), 405, "{post}");
 }
 
 #[test]
 fn other_sites() {
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let port = running.address.port();
     for (host, expected) in [
         // A website whose name resolves to this machine (DNS rebinding).
@@ -81,7 +81,7 @@ fn other_sites() {
 /// An address of the network requires the token, and nothing else grants access.
 #[test]
 fn token() {
-    let running = Running::start_at(1, "0.0.0.0:0", ServeCfg::default());
+    let running = ServedSimulation::start_at(1, "0.0.0.0:0", ServeCfg::default());
     let token = running.url.split_once("/?token=").expect("a token in the address").1;
     assert!(token.len() >= 32, "{token}");
     let local = ([127, 0, 0, 1], running.address.port()).into();

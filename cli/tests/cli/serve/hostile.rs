@@ -1,7 +1,7 @@
 //! Hostile clients: they cause no panic and leak no memory, thread or file, and the next client is served.
 
-use super::running::Running;
-use super::visitor::{Visitor, say, status, status_of};
+use super::running::ServedSimulation;
+use super::visitor::{TestClient, exchange, status, status_of};
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::process;
 use kinetoscope_testkit::wait;
@@ -13,7 +13,7 @@ use tungstenite::Message;
 
 #[test]
 fn garbage() {
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     // Pseudo-random bytes of all values, a TLS handshake, and malformed requests.
     let noise: Vec<u8> = (0..4096_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     let tls = [&b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"[..], &noise].concat();
@@ -29,7 +29,7 @@ fn garbage() {
         b"GET /\x01 HTTP/1.1\r\nHost: localhost\r\n\r\n",
         b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
     ] {
-        let answer = say(running.address, bytes);
+        let answer = exchange(running.address, bytes);
         assert_eq!(status_of(&answer), 400, "{:?}: {answer}", String::from_utf8_lossy(&bytes[..bytes.len().min(40)]));
     }
     assert_eq!(status(running.address, "/", &["Host: localhost"]), 200);
@@ -51,8 +51,8 @@ fn frame(first: u8, payload: &[u8]) -> Vec<u8> {
 }
 
 /// Sends bytes on an open WebSocket. Returns the code of the close frame.
-fn closed_with(running: &Running, bytes: &[u8]) -> Option<u16> {
-    let mut visitor = Visitor::enter(running.address);
+fn closed_with(running: &ServedSimulation, bytes: &[u8]) -> Option<u16> {
+    let mut visitor = TestClient::connect(running.address);
     // After an early refusal, the rest cannot be written.
     let _ = visitor.socket.get_mut().write_all(bytes);
     loop {
@@ -66,7 +66,7 @@ fn closed_with(running: &Running, bytes: &[u8]) -> Option<u16> {
 
 #[test]
 fn malformed_frames() {
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     // A header that announces 2^62 bytes.
     let huge = [&[0x81, 0xff][..], &(1_u64 << 62).to_be_bytes(), &[0; 4], b"{"].concat();
     let fragments = [0x01, 0x00, 0x00].map(|first| frame(first, &[b' '; 8000])).concat();
@@ -83,7 +83,7 @@ fn malformed_frames() {
     ] {
         assert_eq!(closed_with(&running, &bytes), Some(code), "{what}");
     }
-    Visitor::enter(running.address).wait_state("served as before", |_| true);
+    TestClient::connect(running.address).wait_state("served as before", |_| true);
     wait::until("no viewer is left", || running.viewers() == 0);
 }
 
@@ -105,7 +105,7 @@ fn huge_heads_scenario() {
     if !process::is_child() {
         return;
     }
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let before = resident();
     let long = "x".repeat(64 << 20);
     let headers: String = (0..500).map(|k| format!("A{k}: b\r\n")).collect();
@@ -114,7 +114,7 @@ fn huge_heads_scenario() {
         ("a header", format!("GET / HTTP/1.1\r\nHost: localhost\r\nCookie: {long}\r\n\r\n")),
         ("many headers", format!("GET / HTTP/1.1\r\nHost: localhost\r\n{headers}\r\n")),
     ] {
-        assert_eq!(status_of(&say(running.address, head.as_bytes())), 431, "{what}");
+        assert_eq!(status_of(&exchange(running.address, head.as_bytes())), 431, "{what}");
     }
     drop(long);
     // The texts of 64 MB are freed; the server must not keep copies of them.
@@ -145,7 +145,7 @@ fn leaks_scenario() {
     let before = threads_and_files();
     assert!(more_than(bare), "a server has a thread and a socket: {bare:?} and {before:?}");
     for k in 0..20 {
-        let mut visitor = Visitor::enter(served.address());
+        let mut visitor = TestClient::connect(served.address());
         visitor.socket.send(Message::text(r#"{"do":"size","width":320,"height":180}"#)).unwrap();
         sim.update(5);
         // Some vanish at once, some while an image is sent.
@@ -161,7 +161,7 @@ fn leaks_scenario() {
     sim.update(10);
 
     // A viewer that is connected when the simulation ends is disconnected.
-    let mut visitor = Visitor::enter(served.address());
+    let mut visitor = TestClient::connect(served.address());
     wait::until("it is there", || served.viewers() == 1);
     drop(sim);
     while visitor.socket.read().is_ok() {}

@@ -1,10 +1,10 @@
 //! Images of the browser view.
 
-use super::running::Running;
-use super::visitor::{Came, Visitor};
+use super::running::ServedSimulation;
+use super::visitor::{ServerMessage, TestClient};
 use crate::support::{colors, red};
 use image::RgbImage;
-use kinetoscope_testkit::wait::PATIENCE;
+use kinetoscope_testkit::wait::TIMEOUT;
 use serde_json::json;
 use std::time::Duration;
 
@@ -20,16 +20,16 @@ fn shades(image: &RgbImage) -> usize {
 /// Images have the requested size and show the scene; those of a camera sensor show its four channels.
 #[test]
 fn sizes_and_channels() {
-    let running = Running::start(2);
-    let mut visitor = Visitor::enter(running.address);
-    visitor.ask(json!({"do": "environment", "env": 0}));
+    let running = ServedSimulation::start(2);
+    let mut visitor = TestClient::connect(running.address);
+    visitor.send(json!({"do": "environment", "env": 0}));
     for (width, height) in [(320, 180), (203, 121), (640, 360)] {
-        visitor.ask(json!({"do": "size", "width": width, "height": height}));
+        visitor.send(json!({"do": "size", "width": width, "height": height}));
         let image = visitor.wait_image("stage", |_, image| image.dimensions() == (width, height));
         assert!(shades(&image) > 100, "{} colors", shades(&image));
         assert!((0.001..0.9).contains(&share(&image)), "the cube is seen: {}", share(&image));
     }
-    visitor.ask(json!({"do": "camera", "name": "eye"}));
+    visitor.send(json!({"do": "camera", "name": "eye"}));
     let image = visitor.wait_image("camera", |about, _| about["camera"] == "eye");
     // Four images of 64 x 48 in a grid: color, depth, mask and normals.
     assert_eq!(image.dimensions(), (128, 96));
@@ -42,13 +42,13 @@ fn sizes_and_channels() {
 
 #[test]
 fn view_commands() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(running.address);
-    visitor.ask(json!({"do": "size", "width": 320, "height": 180}));
+    let running = ServedSimulation::start(1);
+    let mut visitor = TestClient::connect(running.address);
+    visitor.send(json!({"do": "size", "width": 320, "height": 180}));
     // Paused, so that only the view changes.
     visitor.pause();
     let mut after = |commands: &[serde_json::Value]| {
-        commands.iter().for_each(|command| visitor.ask(command.clone()));
+        commands.iter().for_each(|command| visitor.send(command.clone()));
         settled(&mut visitor)
     };
     let home = after(&[json!({"do": "home"})]);
@@ -64,28 +64,28 @@ fn view_commands() {
 }
 
 /// Waits for the last image of the most recently requested view.
-fn settled(visitor: &mut Visitor) -> RgbImage {
+fn settled(visitor: &mut TestClient) -> RgbImage {
     let mut last = visitor.wait_image("stage", |_, _| true);
     // Commands and images take turns on one connection: a refusal follows the commands before it.
-    visitor.ask(json!({"do": "environment", "env": 999}));
+    visitor.send(json!({"do": "environment", "env": 999}));
     visitor.wait("the answer", |came| match came {
-        Came::Image { about, image } if about["shows"] == "stage" => {
+        ServerMessage::Image { about, image } if about["shows"] == "stage" => {
             last = image;
             None
         }
-        Came::Refused(_) => Some(()),
+        ServerMessage::Refused(_) => Some(()),
         _ => None,
     });
     // An image rendered after that, if the view changed: at most one is still to come.
     let stream = visitor.socket.get_ref().try_clone().unwrap();
     stream.set_read_timeout(Some(Duration::from_millis(700))).unwrap();
-    while let Some(came) = visitor.next_or_silence() {
-        if let Came::Image { about, image } = came
+    while let Some(came) = visitor.next_message() {
+        if let ServerMessage::Image { about, image } = came
             && about["shows"] == "stage"
         {
             last = image;
         }
     }
-    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream.set_read_timeout(Some(TIMEOUT)).unwrap();
     last
 }

@@ -1,10 +1,10 @@
 //! A served simulation that steps on its own thread, and playback of a recording.
 
-use kinetoscope::RecordedFilm;
+use kinetoscope::RecordingPlayback;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use kinetoscope::record::{Film, RecorderCfg, Recording};
-use kinetoscope::viewer::{Command, ServeCfg, Served, Viewer, Viewing, Wants};
+use kinetoscope::record::{Playback, RecorderCfg, Recording};
+use kinetoscope::viewer::{Command, ServeCfg, ServerHandle, SnapshotRequest, Viewer, ViewerExt};
 use kinetoscope::viewer::{Play, Speed};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::worlds::{camera, cfg, cube, gains, sr5};
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 /// State of the simulation, as seen by the stepping program.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Now {
+pub(crate) struct SimState {
     pub(crate) steps: u64,
     pub(crate) positions: Array2<f64>,
     /// Longest duration of a step \[s\].
@@ -24,14 +24,14 @@ pub(crate) struct Now {
 }
 
 /// A served simulation. Dropping the value stops it.
-pub(crate) struct Running {
+pub(crate) struct ServedSimulation {
     pub(crate) url: String,
     pub(crate) address: SocketAddr,
-    served: Served,
-    now: Arc<Mutex<Now>>,
+    served: ServerHandle,
+    now: Arc<Mutex<SimState>>,
     stop: Arc<AtomicBool>,
     /// A viewer in addition to the browsers.
-    pub(crate) key: Viewer,
+    pub(crate) viewer: Viewer,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn scene(num_envs: usize) -> SimulationManager {
     sim
 }
 
-impl Running {
+impl ServedSimulation {
     /// Serves [`scene`] on a free port.
     pub(crate) fn start(num_envs: usize) -> Self {
         Self::start_at(num_envs, "127.0.0.1:0", ServeCfg::default())
@@ -58,8 +58,9 @@ impl Running {
     pub(crate) fn start_at(num_envs: usize, address: &str, cfg: ServeCfg) -> Self {
         let mut sim = scene(num_envs);
         let served = sim.serve_with(address, cfg).unwrap();
-        let key = sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false });
-        let (now, stop) = (Arc::<Mutex<Now>>::default(), Arc::new(AtomicBool::new(false)));
+        let key =
+            sim.viewer(SnapshotRequest { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false });
+        let (now, stop) = (Arc::<Mutex<SimState>>::default(), Arc::new(AtomicBool::new(false)));
         let robot = sim.entities().robot_id("arm").unwrap();
         let shared = (Arc::clone(&now), Arc::clone(&stop));
         let thread = std::thread::spawn(move || {
@@ -77,15 +78,23 @@ impl Running {
                 std::thread::sleep(Duration::from_millis(1));
             }
         });
-        Self { url: served.url().into(), address: served.address(), served, now, stop, key, thread: Some(thread) }
+        Self {
+            url: served.url().into(),
+            address: served.address(),
+            served,
+            now,
+            stop,
+            viewer: key,
+            thread: Some(thread),
+        }
     }
 
-    pub(crate) fn now(&self) -> Now {
+    pub(crate) fn now(&self) -> SimState {
         self.now.lock().unwrap().clone()
     }
 
     /// Restarts the measurement of the longest step.
-    pub(crate) fn forget_longest_step(&self) {
+    pub(crate) fn reset_longest_step(&self) {
         self.now.lock().unwrap().longest_step = 0.0;
     }
 
@@ -96,7 +105,7 @@ impl Running {
 
     /// Waits until a condition holds.
     #[track_caller]
-    pub(crate) fn wait_until(&self, what: &str, holds: impl Fn(&Now) -> bool) {
+    pub(crate) fn wait_until(&self, what: &str, holds: impl Fn(&SimState) -> bool) {
         wait::until(what, || holds(&self.now()));
     }
 
@@ -108,10 +117,10 @@ impl Running {
     }
 }
 
-impl Drop for Running {
+impl Drop for ServedSimulation {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::SeqCst);
-        self.key.send(Command::Resume);
+        self.viewer.send(Command::Resume);
         let ended = self.thread.take().unwrap().join();
         assert!(ended.is_ok() || std::thread::panicking(), "the simulation's thread panicked");
     }
@@ -133,15 +142,16 @@ pub(crate) fn play_fall(height: f64, watch: impl FnOnce(SocketAddr, &str) + Send
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
     sim.update(100);
     sim.finish_recording(recorder).unwrap();
-    let (film, mut sim) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
-    let served = sim.serve_with("127.0.0.1:0", ServeCfg { speed: Some(Speed::REAL), ..ServeCfg::default() }).unwrap();
+    let (film, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+    let served =
+        sim.serve_with("127.0.0.1:0", ServeCfg { speed: Some(Speed::REAL_TIME), ..ServeCfg::default() }).unwrap();
     let over = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let _ends = Ends(&over);
             watch(served.address(), served.url());
         });
-        sim.play(&mut RecordedFilm(film), &mut || !over.load(Ordering::Acquire)).unwrap();
+        sim.play(&mut RecordingPlayback(film), &mut || !over.load(Ordering::Acquire)).unwrap();
     });
     served.close(&mut sim).unwrap();
 }

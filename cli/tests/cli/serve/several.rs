@@ -1,7 +1,7 @@
 //! Several simultaneous viewers, including slow ones.
 
-use super::running::Running;
-use super::visitor::{Visitor, connect, say, status_of};
+use super::running::ServedSimulation;
+use super::visitor::{TestClient, connect, exchange, status_of};
 use kinetoscope::viewer::{Command, ServeCfg, Speed};
 use kinetoscope_testkit::wait;
 use serde_json::json;
@@ -15,11 +15,11 @@ const LONGEST_STEP: f64 = 2.0;
 
 #[test]
 fn own_views() {
-    let running = Running::start(2);
-    let mut visitors: Vec<Visitor> = (0..3).map(|_| Visitor::enter(running.address)).collect();
+    let running = ServedSimulation::start(2);
+    let mut visitors: Vec<TestClient> = (0..3).map(|_| TestClient::connect(running.address)).collect();
     for (k, visitor) in (0u32..).zip(&mut visitors) {
-        visitor.ask(json!({"do": "size", "width": 160 + 16 * k, "height": 90}));
-        visitor.ask(json!({"do": "environment", "env": k.checked_sub(1)}));
+        visitor.send(json!({"do": "size", "width": 160 + 16 * k, "height": 90}));
+        visitor.send(json!({"do": "environment", "env": k.checked_sub(1)}));
     }
     for (k, visitor) in (0u32..).zip(&mut visitors) {
         visitor.wait_image("stage", |_, image| image.dimensions() == (160 + 16 * k, 90));
@@ -33,8 +33,8 @@ fn own_views() {
 
 #[test]
 fn max_viewers() {
-    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { max_viewers: 2, ..Default::default() });
-    let (first, _second) = (Visitor::enter(running.address), Visitor::enter(running.address));
+    let running = ServedSimulation::start_at(1, "127.0.0.1:0", ServeCfg { max_viewers: 2, ..Default::default() });
+    let (first, _second) = (TestClient::connect(running.address), TestClient::connect(running.address));
     let third = tungstenite::client(format!("ws://{}/live", running.address), connect(running.address));
     let Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) = third else {
         panic!("a third viewer is accepted")
@@ -42,16 +42,16 @@ fn max_viewers() {
     assert_eq!(answer.status().as_u16(), 503);
     drop(first);
     wait::until("a place is free", || running.viewers() < 2);
-    Visitor::enter(running.address).wait_state("any", |_| true);
+    TestClient::connect(running.address).wait_state("any", |_| true);
 }
 
 /// A viewer that does not read slows neither the simulation nor another viewer.
 #[test]
 fn slow_viewers() {
-    let running = Running::start(1);
-    let [mut alive, dead, mut greedy] = [(); 3].map(|()| Visitor::enter(running.address));
+    let running = ServedSimulation::start(1);
+    let [mut alive, dead, mut greedy] = [(); 3].map(|()| TestClient::connect(running.address));
     alive.wait_state("three", |state| state["viewers"] == 3);
-    running.forget_longest_step();
+    running.reset_longest_step();
     let before = running.now().steps;
     // This viewer sends endlessly and reads no response, which fills the buffers of both sides.
     let talk = std::thread::spawn(move || {
@@ -80,13 +80,13 @@ fn slow_viewers() {
 /// The pause of a viewer that leaves ends after a while; a viewer that returns at once finds the simulation paused.
 #[test]
 fn pause_of_browser() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(running.address);
+    let running = ServedSimulation::start(1);
+    let mut visitor = TestClient::connect(running.address);
     visitor.pause();
     drop(visitor);
     wait::until("no viewer is left", || running.viewers() == 0);
     std::thread::sleep(Duration::from_secs(1));
-    let mut again = Visitor::enter(running.address);
+    let mut again = TestClient::connect(running.address);
     again.wait_state("still paused", |state| state["paused"] == true);
     drop(again);
     running.wait_for_steps(20);
@@ -95,40 +95,40 @@ fn pause_of_browser() {
 /// A pause by the program, such as by a window, stays when the browsers leave; their own settings do not.
 #[test]
 fn pause_of_program() {
-    let cfg = ServeCfg { speed: Some(Speed::Times(3.0)), ..ServeCfg::default() };
-    let running = Running::start_at(1, "127.0.0.1:0", cfg);
-    let run = || running.key.newest().unwrap().run.clone();
-    running.key.send(Command::Pause);
+    let cfg = ServeCfg { speed: Some(Speed::Factor(3.0)), ..ServeCfg::default() };
+    let running = ServedSimulation::start_at(1, "127.0.0.1:0", cfg);
+    let run = || running.viewer.newest().unwrap().run.clone();
+    running.viewer.send(Command::Pause);
     wait::until("it is held", || run().paused);
-    let mut visitor = Visitor::enter(running.address);
-    visitor.ask(json!({"do": "speed", "factor": 0.5}));
+    let mut visitor = TestClient::connect(running.address);
+    visitor.send(json!({"do": "speed", "factor": 0.5}));
     visitor.wait_state("slower", |state| state["speed"] == 0.5);
-    visitor.ask(json!({"do": "step"}));
+    visitor.send(json!({"do": "step"}));
     let steps = run().steps;
     visitor.wait_state("a step", |state| state["steps"].as_u64() > Some(steps) && state["paused"] == true);
     drop(visitor);
-    wait::until("the settings of the browser are undone", || run().speed == Speed::Times(3.0));
+    wait::until("the settings of the browser are undone", || run().speed == Speed::Factor(3.0));
     assert!(run().paused && run().steps == steps + 1, "{:?}", run());
-    running.key.send(Command::Resume);
+    running.viewer.send(Command::Resume);
     running.wait_for_steps(20);
 }
 
 /// More connections than the server accepts at a time leave room for viewers; silent connections are closed.
 #[test]
 fn silent_connections() {
-    let running = Running::start(1);
+    let running = ServedSimulation::start(1);
     let mut silent = connect(running.address);
     silent.write_all(b"GET / HTTP/1.1\r\nHost: loc").unwrap();
     let mut answer = String::new();
     silent.read_to_string(&mut answer).unwrap();
     assert_eq!(status_of(&answer), 408, "{answer}");
 
-    let mut viewer = Visitor::enter(running.address);
+    let mut viewer = TestClient::connect(running.address);
     let silent: Vec<_> = (0..120).map(|_| connect(running.address)).collect();
     viewer.wait_state("the viewer is served", |state| state["viewers"] == 1);
     drop(silent);
     let get = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
-    wait::until("there is room again", || status_of(&say(running.address, get)) == 200);
+    wait::until("there is room again", || status_of(&exchange(running.address, get)) == 200);
     // Clients that disconnect at once get no response.
     for _ in 0..20 {
         connect(running.address).shutdown(std::net::Shutdown::Both).unwrap();

@@ -1,7 +1,7 @@
 //! Commands of viewers: targets, pause, speed, selection, mouse spring, and recordings.
 
-use super::running::Running;
-use super::visitor::{Came, Visitor};
+use super::running::ServedSimulation;
+use super::visitor::{ServerMessage, TestClient};
 use crate::support::red;
 use serde_json::{Value, json};
 
@@ -14,9 +14,9 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 #[test]
 fn contents() {
-    let running = Running::start(2);
-    let contents = Visitor::enter(running.address).wait("contents", |came| match came {
-        Came::Contents(contents) => Some(contents),
+    let running = ServedSimulation::start(2);
+    let contents = TestClient::connect(running.address).wait("contents", |came| match came {
+        ServerMessage::Contents(contents) => Some(contents),
         _ => None,
     });
     assert_eq!((&contents["environments"], &contents["cameras"]), (&json!(2), &json!(["eye"])));
@@ -31,11 +31,11 @@ fn contents() {
 /// A slider moves its joint in the chosen environments and no other, and the state reports the target.
 #[test]
 fn targets() {
-    let running = Running::start(2);
-    let mut visitor = Visitor::enter(running.address);
-    visitor.ask(json!({"do": "environment", "env": 1}));
+    let running = ServedSimulation::start(2);
+    let mut visitor = TestClient::connect(running.address);
+    visitor.send(json!({"do": "environment", "env": 1}));
     visitor.wait_state("environment 1", |state| state["environment"] == 1);
-    visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": 0.8}));
+    visitor.send(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": 0.8}));
     // Gains of 1e4 / 1e3 hold a joint with a vertical axis to less than a milliradian at its target; 0.02 is a fraction
     // of the distance of 0.8.
     running.wait_until("its target", |now| now.steps > 0 && (now.positions[(1, 0)] - 0.8).abs() < 0.02);
@@ -52,13 +52,13 @@ fn targets() {
     assert!((row["targets"][0].as_f64().unwrap() - 0.8).abs() < 1e-12, "{row}");
     assert!(row["efforts"].as_array().unwrap().iter().all(Value::is_number), "{row}");
     // All environments at once.
-    visitor.ask(json!({"do": "environment", "env": null}));
-    visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": -0.5}));
+    visitor.send(json!({"do": "environment", "env": null}));
+    visitor.send(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": -0.5}));
     running.wait_until("both targets", |now| now.positions.column(0).iter().all(|q| (q + 0.5).abs() < 0.02));
 
     // Efforts hold the arm up: leaning forward, the second joint carries everything above it.
-    visitor.ask(json!({"do": "environment", "env": 0}));
-    visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT2", "value": 0.9}));
+    visitor.send(json!({"do": "environment", "env": 0}));
+    visitor.send(json!({"do": "target", "robot": "arm", "joint": "JOINT2", "value": 0.9}));
     visitor.wait_state("the arm leans", |state| near(state, 1, 0.9));
     // Drive law at rest: effort = kp (target - position), kp = 1e4 N m/rad.
     let state = visitor.wait_state("it is at rest", |state| {
@@ -72,8 +72,8 @@ fn targets() {
 
 #[test]
 fn refusals() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(running.address);
+    let running = ServedSimulation::start(1);
+    let mut visitor = TestClient::connect(running.address);
     visitor.wait_image("stage", |_, _| true);
     visitor.assert_refused([
         (json!({"do": "fly"}), "unknown variant `fly`"),
@@ -89,16 +89,16 @@ fn refusals() {
         (json!({"do": "select", "x": 0.5}), "missing field `y`"),
     ]);
     // A refusal by the simulation is part of its state.
-    visitor.ask(json!({"do": "record", "on": true}));
+    visitor.send(json!({"do": "record", "on": true}));
     visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
     running.wait_for_steps(10);
 }
 
 /// Connects a viewer to environment `env`, whose cube is at rest. Returns the cube's center in fractions of the image.
-fn at_rest(running: &Running, env: usize) -> (Visitor, [f64; 2]) {
-    let mut visitor = Visitor::enter(running.address);
-    visitor.ask(json!({"do": "size", "width": 640, "height": 360}));
-    visitor.ask(json!({"do": "environment", "env": env}));
+fn at_rest(running: &ServedSimulation, env: usize) -> (TestClient, [f64; 2]) {
+    let mut visitor = TestClient::connect(running.address);
+    visitor.send(json!({"do": "size", "width": 640, "height": 360}));
+    visitor.send(json!({"do": "environment", "env": env}));
     // The cube starts on the ground and sinks in by the compliance of the contact.
     let rests = |state: &Value| state["environment"] == env && state["time"].as_f64() > Some(1.5);
     visitor.wait_state("the cube is at rest", rests);
@@ -110,10 +110,10 @@ fn at_rest(running: &Running, env: usize) -> (Visitor, [f64; 2]) {
 /// A click on a resting body selects it: its pose, and the force that carries it.
 #[test]
 fn selection() {
-    let running = Running::start(2);
+    let running = ServedSimulation::start(2);
     let (mut visitor, [x, y]) = at_rest(&running, 1);
     let mut select = |y: f64, what: &str, holds: &dyn Fn(&Value) -> bool| {
-        visitor.ask(json!({"do": "select", "x": x, "y": y}));
+        visitor.send(json!({"do": "select", "x": x, "y": y}));
         visitor.wait_state(what, |state| holds(&state["selected"]))
     };
     let state = select(y, "forces of the selection", &|selected| selected["force"].is_array());
@@ -134,6 +134,6 @@ fn selection() {
     // Control: above it in the image is the arm, the ground or the sky.
     select(0.02, "something else", &|selected| selected["name"] != "cube");
     select(y, "the cube", &|selected| selected["name"] == "cube");
-    visitor.ask(json!({"do": "unselect"}));
+    visitor.send(json!({"do": "unselect"}));
     visitor.wait_state("nothing", |state| state["selected"].is_null());
 }

@@ -1,7 +1,7 @@
 //! A test client of the browser view, without a browser.
 
 use image::RgbImage;
-use kinetoscope_testkit::wait::PATIENCE;
+use kinetoscope_testkit::wait::TIMEOUT;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -10,7 +10,7 @@ use tungstenite::{Message, WebSocket};
 
 /// A message from the server.
 #[derive(Debug)]
-pub(crate) enum Came {
+pub(crate) enum ServerMessage {
     Contents(Value),
     State(Value),
     Refused(String),
@@ -18,43 +18,43 @@ pub(crate) enum Came {
 }
 
 /// A client that behaves like the page.
-pub(crate) struct Visitor {
+pub(crate) struct TestClient {
     pub(crate) socket: WebSocket<TcpStream>,
 }
 
-impl Visitor {
-    pub(crate) fn enter(address: SocketAddr) -> Self {
+impl TestClient {
+    pub(crate) fn connect(address: SocketAddr) -> Self {
         let (socket, answer) = tungstenite::client(format!("ws://{address}/live"), connect(address)).unwrap();
         assert_eq!(answer.status().as_u16(), 101);
         Self { socket }
     }
 
     /// Sends a command.
-    pub(crate) fn ask(&mut self, command: Value) {
+    pub(crate) fn send(&mut self, command: Value) {
         self.socket.send(Message::text(command.to_string())).unwrap();
     }
 
     /// Returns the next message and acknowledges it, like the page. Returns `None` if the read timeout expires.
-    pub(crate) fn next_or_silence(&mut self) -> Option<Came> {
+    pub(crate) fn next_message(&mut self) -> Option<ServerMessage> {
         loop {
             match self.socket.read() {
                 Ok(Message::Text(text)) => {
                     let message: Value = serde_json::from_str(&text).unwrap();
                     let came = match message["is"].as_str().unwrap() {
-                        "contents" => Came::Contents(message["contents"].clone()),
-                        "state" => Came::State(message["state"].clone()),
-                        "refused" => return Some(Came::Refused(message["reason"].as_str().unwrap().into())),
+                        "contents" => ServerMessage::Contents(message["contents"].clone()),
+                        "state" => ServerMessage::State(message["state"].clone()),
+                        "refused" => return Some(ServerMessage::Refused(message["reason"].as_str().unwrap().into())),
                         other => panic!("{other:?} is not of the protocol"),
                     };
-                    self.ask(json!({"do": "seen", "what": "state"}));
+                    self.send(json!({"do": "seen", "what": "state"}));
                     return Some(came);
                 }
                 Ok(Message::Binary(bytes)) => {
-                    self.ask(json!({"do": "seen", "what": "picture"}));
+                    self.send(json!({"do": "seen", "what": "picture"}));
                     let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
                     let about = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
                     let image = image::load_from_memory(&bytes[4 + length..]).unwrap().into_rgb8();
-                    return Some(Came::Image { about, image });
+                    return Some(ServerMessage::Image { about, image });
                 }
                 Ok(Message::Ping(_) | Message::Pong(_)) => {}
                 Ok(other) => panic!("{other:?} was not expected"),
@@ -66,11 +66,11 @@ impl Visitor {
 
     /// Waits for a message that satisfies `wanted`.
     #[track_caller]
-    pub(crate) fn wait<T>(&mut self, what: &str, mut wanted: impl FnMut(Came) -> Option<T>) -> T {
+    pub(crate) fn wait<T>(&mut self, what: &str, mut wanted: impl FnMut(ServerMessage) -> Option<T>) -> T {
         let start = Instant::now();
         loop {
-            assert!(start.elapsed() < PATIENCE, "waited for {what}");
-            if let Some(found) = wanted(self.next_or_silence().expect(what)) {
+            assert!(start.elapsed() < TIMEOUT, "waited for {what}");
+            if let Some(found) = wanted(self.next_message().expect(what)) {
                 return found;
             }
         }
@@ -80,7 +80,7 @@ impl Visitor {
     #[track_caller]
     pub(crate) fn wait_state(&mut self, what: &str, mut holds: impl FnMut(&Value) -> bool) -> Value {
         self.wait(what, |came| match came {
-            Came::State(state) if holds(&state) => Some(state),
+            ServerMessage::State(state) if holds(&state) => Some(state),
             _ => None,
         })
     }
@@ -89,7 +89,7 @@ impl Visitor {
     #[track_caller]
     pub(crate) fn wait_image(&mut self, shows: &str, mut good: impl FnMut(&Value, &RgbImage) -> bool) -> RgbImage {
         self.wait(shows, |came| match came {
-            Came::Image { about, image } if about["shows"] == shows && good(&about, &image) => Some(image),
+            ServerMessage::Image { about, image } if about["shows"] == shows && good(&about, &image) => Some(image),
             _ => None,
         })
     }
@@ -98,9 +98,9 @@ impl Visitor {
     #[track_caller]
     pub(crate) fn assert_refused<const N: usize>(&mut self, rows: [(Value, &str); N]) {
         for (command, words) in rows {
-            self.ask(command.clone());
+            self.send(command.clone());
             let reason = self.wait("a refusal", |came| match came {
-                Came::Refused(reason) => Some(reason),
+                ServerMessage::Refused(reason) => Some(reason),
                 _ => None,
             });
             assert!(reason.contains(words), "{command}: {reason}");
@@ -109,7 +109,7 @@ impl Visitor {
 
     /// Pauses the simulation and returns the paused state.
     pub(crate) fn pause(&mut self) -> Value {
-        self.ask(json!({"do": "pause"}));
+        self.send(json!({"do": "pause"}));
         self.wait_state("paused", |state| state["paused"] == true)
     }
 }
@@ -117,13 +117,13 @@ impl Visitor {
 /// Connects with the timeouts of the tests.
 pub(crate) fn connect(address: SocketAddr) -> TcpStream {
     let stream = TcpStream::connect(address).unwrap();
-    stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    stream.set_write_timeout(Some(PATIENCE)).unwrap();
+    stream.set_read_timeout(Some(TIMEOUT)).unwrap();
+    stream.set_write_timeout(Some(TIMEOUT)).unwrap();
     stream
 }
 
 /// Sends bytes and returns the response, up to the end of the connection.
-pub(crate) fn say(address: SocketAddr, bytes: &[u8]) -> String {
+pub(crate) fn exchange(address: SocketAddr, bytes: &[u8]) -> String {
     let mut stream = connect(address);
     // After an early refusal, the rest cannot be written.
     let _ = stream.write_all(bytes);
@@ -135,7 +135,7 @@ pub(crate) fn say(address: SocketAddr, bytes: &[u8]) -> String {
 /// Returns the status of a GET request with these headers.
 pub(crate) fn status(address: SocketAddr, path: &str, headers: &[&str]) -> u16 {
     let headers: String = headers.iter().map(|header| format!("{header}\r\n")).collect();
-    status_of(&say(address, format!("GET {path} HTTP/1.1\r\n{headers}\r\n").as_bytes()))
+    status_of(&exchange(address, format!("GET {path} HTTP/1.1\r\n{headers}\r\n").as_bytes()))
 }
 
 /// Returns the status of a response; 0 without a response.

@@ -1,6 +1,6 @@
 //! The command in a folder of its own, and helpers for its images.
 
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::wait;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -23,12 +23,12 @@ pub(crate) const ARM: &str = r#"<robot name="arm">
 "#;
 
 /// A folder in which command lines run. File names in them are relative to the folder.
-pub(crate) struct Shell(Files);
+pub(crate) struct CommandFolder(TempFiles);
 
-impl Shell {
+impl CommandFolder {
     /// Creates a folder with these files.
     pub(crate) fn with(files: &[(&str, &str)]) -> Self {
-        let shell = Self(Files::default());
+        let shell = Self(TempFiles::default());
         files.iter().for_each(|(name, content)| drop(shell.0.write(name, content)));
         shell
     }
@@ -71,7 +71,7 @@ impl Shell {
 
     /// Runs a command line that succeeds without warnings, and returns its output.
     #[track_caller]
-    pub(crate) fn ok(&self, line: &str) -> String {
+    pub(crate) fn run_ok(&self, line: &str) -> String {
         let (out, err, code) = self.run(line);
         assert_eq!((err.as_str(), code), ("", 0), "{line}: {out}");
         out
@@ -79,7 +79,7 @@ impl Shell {
 
     /// Runs a command line that is refused and prints only errors, and returns the errors.
     #[track_caller]
-    pub(crate) fn refused(&self, line: &str) -> String {
+    pub(crate) fn run_refused(&self, line: &str) -> String {
         let (out, err, code) = self.run(line);
         assert_eq!((out.as_str(), code), ("", 2), "{line}: {err}");
         err
@@ -91,7 +91,7 @@ impl Shell {
         let files = || std::fs::read_dir(self.0.folder()).unwrap().count();
         let before = files();
         for (line, words) in rows {
-            let err = self.refused(line);
+            let err = self.run_refused(line);
             assert!(err.contains(words), "{line}: {err}");
             assert_eq!(files(), before, "{line}: a file is written");
         }
@@ -99,9 +99,9 @@ impl Shell {
 }
 
 /// A running command. Dropping the value kills the process.
-pub(crate) struct Running(pub(crate) Child);
+pub(crate) struct RunningCommand(pub(crate) Child);
 
-impl Running {
+impl RunningCommand {
     pub(crate) fn start(command: &mut Command) -> Self {
         Self(command.stdout(Stdio::piped()).spawn().unwrap())
     }
@@ -126,11 +126,11 @@ impl Running {
     }
 
     pub(crate) fn ended(&mut self) -> ExitStatus {
-        wait::some("the end of the command", || self.0.try_wait().unwrap())
+        wait::until_some("the end of the command", || self.0.try_wait().unwrap())
     }
 }
 
-impl Drop for Running {
+impl Drop for RunningCommand {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();

@@ -96,7 +96,7 @@ fn rates() {
         sim.add_sensor("imu", ImuCfg { sampling: every, ..ImuCfg::on("ball/ball") }).unwrap();
         sim.add_sensor("second", ImuCfg::on("ball/ball")).unwrap();
         let rates = rates.iter().map(|(name, steps)| ((*name).to_string(), *steps)).collect();
-        let cfg = RecorderCfg { every: 3, rates, overwrite: true, ..RecorderCfg::new(path) };
+        let cfg = RecorderCfg { period_steps: 3, stream_periods: rates, overwrite: true, ..RecorderCfg::new(path) };
         let recorder = sim.record(cfg)?;
         sim.update(20);
         sim.finish_recording(recorder)
@@ -110,7 +110,7 @@ fn rates() {
     let captured: Vec<u64> = numbers_of(&path, "imu/time").iter().map(|time| (time / dt).round() as u64).collect();
     // Steps 4, 10, 14, 20; accelerations are those of the beginning of a step.
     assert_eq!(captured, [3, 9, 13, 19]);
-    // Control: without `rates`, `every` applies to states, and sensors are recorded at each measurement.
+    // Control: without `stream_periods`, `period_steps` applies to states, and sensors are recorded at each measurement.
     recorded(&[], &path).unwrap();
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0]);
     assert_eq!(numbers_of(&path, "imu/step").len(), 10);
@@ -121,7 +121,7 @@ fn rates() {
     assert_eq!(candidates, &["ball/state", "ball/body_poses", "imu", "second"]);
     let dataset = folder.path().join("run.lerobot");
     let error = recorded(&[("ball", 2)], &dataset).unwrap_err();
-    assert!(matches!(error, RecordError::NoPlace { .. }), "{error}");
+    assert!(matches!(error, RecordError::UnsupportedTopic { .. }), "{error}");
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn events_alone() {
     assert_eq!(logs.len(), 3, "{logs:?}");
     let pictures = folder.path().join("run.gif");
     let error = sim.record(RecorderCfg::new(pictures).with_topics([Topic::Events])).unwrap_err();
-    assert!(matches!(error, RecordError::NoPlace { .. }), "{error}");
+    assert!(matches!(error, RecordError::UnsupportedTopic { .. }), "{error}");
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn early_failure() {
     let (_folder, path) = scratch("run.mcap");
     let mut sim = falling(4);
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(&path) };
-    let recorder = Recorder::start(&mut sim, cfg, &Disk::full_after(20_000)).unwrap();
+    let recorder = Recorder::start(&mut sim, cfg, &StorageFactory::full_after(20_000)).unwrap();
     let recorder = sim.observers_mut().add(recorder);
     assert_eq!(sim.observers().get(recorder).unwrap().failure(), None);
     let begun = Instant::now();

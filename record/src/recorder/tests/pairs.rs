@@ -1,7 +1,7 @@
 //! Recorded calibration of stereo cameras.
 
 use super::*;
-use crate::{Recording, Wanted};
+use crate::{FieldSelector, Recording};
 use kinetoscope_sensors::camera::StereoCameraCfg;
 use kinetoscope_sensors::camera::{CameraPlacement, StereoCamera};
 
@@ -42,9 +42,10 @@ fn calibrations() {
             let (r, p) = (infos[k].rectification_matrix.transpose(), infos[k].projection_matrix.transpose());
             let topic = format!("/env_{env}/eyes/{eye}/camera_info");
             let read = |field: &str, count: usize| -> Vec<f64> {
-                let wanted: Vec<Wanted> = (0..count).map(|i| Wanted::new(&topic, format!("{field}[{i}]"))).collect();
-                let last = |samples: &crate::Samples| *samples.values.last().unwrap();
-                recording.samples(&wanted).unwrap().iter().map(last).collect()
+                let wanted: Vec<FieldSelector> =
+                    (0..count).map(|i| FieldSelector::new(&topic, format!("{field}[{i}]"))).collect();
+                let last = |samples: &crate::TimeSeries| *samples.values.last().unwrap();
+                recording.time_series(&wanted).unwrap().iter().map(last).collect()
             };
             assert_eq!((read("r", 9), read("p", 12)), (r.as_slice().to_vec(), p.as_slice().to_vec()), "{topic}");
         }
@@ -77,7 +78,8 @@ fn no_rectification() {
         assert!(left_out.iter().any(|what| what.starts_with(&said)), "{left_out:?}");
     }
     let recording = Recording::open(&path).unwrap();
-    let wanted = ["r[0]", "p[0]", "p[2]", "p[3]"].map(|field| Wanted::new("/env_0/eyes/right/camera_info", field));
-    let found: Vec<f64> = recording.samples(&wanted).unwrap().iter().map(|samples| samples.values[0]).collect();
+    let wanted =
+        ["r[0]", "p[0]", "p[2]", "p[3]"].map(|field| FieldSelector::new("/env_0/eyes/right/camera_info", field));
+    let found: Vec<f64> = recording.time_series(&wanted).unwrap().iter().map(|samples| samples.values[0]).collect();
     assert_eq!(found, [1.0, 20.0, 8.0, 0.0]);
 }

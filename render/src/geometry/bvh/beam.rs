@@ -11,17 +11,17 @@
 //! [`PAD`](super::PAD). It holds for heights at depth 0 up to 4 R: lines that begin farther out stay outside of the
 //! tree, by more than their error.
 
-use super::{Bvh, Entry, Node, Stack, WIDE, insert};
+use super::{BVH_WIDTH, Bvh, Node, StackEntry, TraversalStack, insert};
 use crate::geometry::packet::Packet;
-use crate::geometry::triangle::ShearPacket;
+use crate::geometry::triangle::ShearedPacket;
 use crate::simd::{D, Simd};
 use std::ops::Range;
 
 /// Rays from farther away than this multiple of the largest coordinate are cast one by one. Their positions at the tree
 /// are not accurate enough in double precision for lines that are right to single precision.
-pub(crate) const FAR: f64 = (1u32 << 20) as f64;
+pub(crate) const MAX_ORIGIN_RATIO: f64 = (1u32 << 20) as f64;
 /// Fraction of the largest coordinate: chords between depths closer than this have no slope.
-const THIN: f64 = 1e-4;
+const MIN_DEPTH_RATIO: f64 = 1e-4;
 
 /// A bundle of nearly parallel rays.
 #[derive(Clone, Copy)]
@@ -39,36 +39,36 @@ pub(crate) struct Beam<S: Simd> {
     depth: D<S>,
     speed: D<S>,
     /// Approximate fraction of the tree's cross-section between the lines.
-    share: f64,
+    covered_fraction: f64,
 }
 
 /// Result of a traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Walked {
+pub(crate) enum Traversal {
     /// All leaves that the rays may meet were visited.
-    All,
+    Complete,
     /// Stopped because the budget was exceeded.
-    Part,
+    OverBudget,
 }
 
 impl<S: Simd> Beam<S> {
     /// The beam around all lanes of a packet, within a tree; `None` if single precision cannot bound it.
     #[inline(always)]
-    pub(crate) fn around(s: S, packet: &Packet, shear: &ShearPacket<S>, tree: &Bvh) -> Option<Self> {
+    pub(crate) fn enclosing(s: S, packet: &Packet, shear: &ShearedPacket<S>, tree: &Bvh) -> Option<Self> {
         let axes @ [i, j, k] = shear.axes();
-        let [lo, hi] = tree.bounds;
+        let [lo, hi] = tree.padded_bounds;
         let reach = (0..3).fold(0.0f64, |m, k| m.max(lo[k].abs()).max(hi[k].abs()));
         let (origin, by, along) = (shear.origin(), shear.slopes(), packet.directions(s)[k]);
-        let farthest = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).most();
+        let farthest = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).reduce_max();
         let backward = along.lt(D::splat(s, 0.0)).to_bitmask();
-        if backward != 0 && backward != crate::geometry::packet::ALL || farthest > FAR * reach {
+        if backward != 0 && backward != crate::geometry::packet::ALL || farthest > MAX_ORIGIN_RATIO * reach {
             return None;
         }
         let sign = if backward == 0 { 1.0 } else { -1.0 };
         let (depth, speed) = (origin[2] * sign, along * sign);
         let (near, far) = if backward == 0 { (lo[k], hi[k]) } else { (-hi[k], -lo[k]) };
-        let start = depth.least().max(near);
-        let end = (depth + packet.limits(s) * speed).most().min(far);
+        let start = depth.reduce_min().max(near);
+        let end = (depth + packet.limits(s) * speed).reduce_max().min(far);
         let mut beam = Self {
             axes,
             sign: sign as f32,
@@ -77,7 +77,7 @@ impl<S: Simd> Beam<S> {
             lines: [[0.0; 3]; 4],
             depth,
             speed,
-            share: 1.0,
+            covered_fraction: 1.0,
         };
         let mut finite = start.is_finite() && end.is_finite();
         for axis in 0..2 {
@@ -85,11 +85,11 @@ impl<S: Simd> Beam<S> {
             let slope = by[axis] * sign;
             let first = origin[axis] + slope * (D::splat(s, start) - depth);
             let last = origin[axis] + slope * (D::splat(s, end) - depth);
-            let (low, high) = ([first.least(), last.least()], [first.most(), last.most()]);
+            let (low, high) = ([first.reduce_min(), last.reduce_min()], [first.reduce_max(), last.reduce_max()]);
             beam.lines[2 * axis] = line([start, end], low, reach, f64::min);
             beam.lines[2 * axis + 1] = line([start, end], high, reach, f64::max);
             let wide = 0.5 * ((high[0] - low[0]) + (high[1] - low[1]));
-            beam.share *= (wide / (hi[at] - lo[at])).min(1.0);
+            beam.covered_fraction *= (wide / (hi[at] - lo[at])).min(1.0);
             finite &= beam.lines[2 * axis..2 * axis + 2].iter().flatten().all(|x| x.is_finite());
         }
         finite.then_some(beam)
@@ -97,19 +97,19 @@ impl<S: Simd> Beam<S> {
 
     /// Approximate fraction of the tree's primitives that lie in the beam.
     #[inline(always)]
-    pub(crate) fn share(&self) -> f64 {
-        self.share
+    pub(crate) fn covered_fraction(&self) -> f64 {
+        self.covered_fraction
     }
 
     /// The largest depth within the limits, rounded up.
     #[inline(always)]
-    fn deepest(&self, limits: D<S>) -> f32 {
-        ((self.depth + limits * self.speed).most() as f32).next_up()
+    fn max_depth(&self, limits: D<S>) -> f32 {
+        ((self.depth + limits * self.speed).reduce_max() as f32).next_up()
     }
 
-    /// Depths at which the boxes begin, and a bit for each box that is met before the depth `deepest`.
+    /// Depths at which the boxes begin, and a bit for each box that is met before the depth `max_depth`.
     #[inline(always)]
-    fn meets(&self, node: &Node, deepest: f32) -> ([f32; WIDE], u32) {
+    fn intersect_children(&self, node: &Node, deepest: f32) -> ([f32; BVH_WIDTH], u32) {
         let [i, j, k] = self.axes;
         let sides = &node.sides;
         let (near, far) = if self.sign > 0.0 { (&sides[k], &sides[k + 3]) } else { (&sides[k + 3], &sides[k]) };
@@ -121,8 +121,8 @@ impl<S: Simd> Beam<S> {
             if z < end { z } else { end }
         };
         // One plain loop, which compilers vectorize.
-        let (mut from, mut met) = ([0.0f32; WIDE], [0u32; WIDE]);
-        for c in 0..WIDE {
+        let (mut from, mut met) = ([0.0f32; BVH_WIDTH], [0u32; BVH_WIDTH]);
+        for c in 0..BVH_WIDTH {
             let (z0, z1) = (near[c] * sign, far[c] * sign);
             from[c] = z0;
             let (a, b) = (within(z0), within(z1));
@@ -141,8 +141,8 @@ impl<S: Simd> Beam<S> {
 #[inline(always)]
 fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64) -> f64) -> [f32; 3] {
     let long = end - start;
-    let slope = if long > THIN * reach { (b - a) / long } else { 0.0 };
-    let height = if long > THIN * reach { a - slope * start } else { outer(a, b) };
+    let slope = if long > MIN_DEPTH_RATIO * reach { (b - a) / long } else { 0.0 };
+    let height = if long > MIN_DEPTH_RATIO * reach { a - slope * start } else { outer(a, b) };
     [height as f32, slope.max(0.0) as f32, slope.min(0.0) as f32]
 }
 
@@ -151,47 +151,47 @@ impl Bvh {
     /// `budget` primitives were visited. `leaf` receives the primitives of a leaf and returns new limits if they
     /// changed.
     #[inline(always)]
-    pub(crate) fn walk_beam<S: Simd>(
+    pub(crate) fn traverse_beam<S: Simd>(
         &self,
         beam: &Beam<S>,
         limits: D<S>,
         mut budget: usize,
-        Stack(stack): &mut Stack,
+        TraversalStack(stack): &mut TraversalStack,
         mut leaf: impl FnMut(Range<usize>) -> Option<D<S>>,
-    ) -> Walked {
+    ) -> Traversal {
         if self.nodes.is_empty() || beam.start > beam.end {
-            return Walked::All;
+            return Traversal::Complete;
         }
-        let mut deepest = beam.deepest(limits);
+        let mut deepest = beam.max_depth(limits);
         stack.clear();
         let mut index = self.root as usize;
         loop {
             let node = &self.nodes[index];
-            let (near, mut met) = beam.meets(node, deepest);
+            let (near, mut met) = beam.intersect_children(node, deepest);
             let bottom = stack.len();
             while met != 0 {
-                let k = met.trailing_zeros() as usize & (WIDE - 1);
+                let k = met.trailing_zeros() as usize & (BVH_WIDTH - 1);
                 met &= met - 1;
                 let (child, count) = (node.child[k], node.count[k]);
                 if count == 0 {
-                    insert(stack, bottom, Entry { near: near[k], child, count });
+                    insert(stack, bottom, StackEntry { entry_distance: near[k], child, count });
                     continue;
                 }
                 // Leaves are visited at once: their order among neighbors is worth less than keeping it.
                 let (first, count) = (child as usize, count as usize);
                 if count > budget {
-                    return Walked::Part;
+                    return Traversal::OverBudget;
                 }
                 budget -= count;
                 if let Some(limits) = leaf(first..first + count) {
-                    deepest = beam.deepest(limits);
+                    deepest = beam.max_depth(limits);
                 }
             }
             index = loop {
                 match stack.pop() {
-                    Some(next) if next.near <= deepest => break next.child as usize,
+                    Some(next) if next.entry_distance <= deepest => break next.child as usize,
                     Some(_) => {}
-                    None => return Walked::All,
+                    None => return Traversal::Complete,
                 }
             };
         }

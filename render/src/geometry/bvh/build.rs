@@ -7,9 +7,9 @@
 //! construction on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees,
 //! JCGT 4(3), 2015.
 
-use super::{Aabb, Bvh, Node, PAD, WIDE};
-use crate::simd::{F4, Level, Simd, at_level};
-use curve::Curve;
+use super::{Aabb, BVH_WIDTH, Bvh, Node, PAD};
+use crate::simd::{F4, Simd, SimdLevel, at_level};
+use curve::MortonOrder;
 use kinetoscope_scene::vector::to_f64;
 use leaves::Costs;
 
@@ -18,7 +18,7 @@ mod cut;
 mod leaves;
 
 /// Largest number of primitives in a group.
-const GROUP: usize = 24;
+const MAX_GROUP: usize = 24;
 /// Groups up to this size are leaves of the node above.
 const SINGLE_LEAF: usize = 3;
 /// Below this depth ranges are split in half by count: primitives spread over many orders of magnitude.
@@ -38,9 +38,9 @@ struct Bounds {
 }
 
 /// Box of a primitive or of a group. The fourth components hold its index (as bits) and its number of primitives.
-type Item = Bounds;
+type BuildItem = Bounds;
 
-const NOTHING: Bounds = Bounds { lo: [f32::INFINITY; 4], hi: [f32::NEG_INFINITY; 4] };
+const EMPTY: Bounds = Bounds { lo: [f32::INFINITY; 4], hi: [f32::NEG_INFINITY; 4] };
 
 #[inline(always)]
 fn quad(f: impl Fn(usize) -> f32) -> Quad {
@@ -52,25 +52,25 @@ impl Bounds {
         Self { lo: [lo[0], lo[1], lo[2], f32::from_bits(number)], hi: [hi[0], hi[1], hi[2], count as f32] }
     }
 
-    fn number(&self) -> u32 {
+    fn index(&self) -> u32 {
         self.lo[3].to_bits()
     }
 
     /// The box around both. Plain comparisons, because those of the library check for NaN.
     #[inline(always)]
-    fn with(&self, other: &Self) -> Self {
+    fn union(&self, other: &Self) -> Self {
         Self {
             lo: quad(|k| if self.lo[k] < other.lo[k] { self.lo[k] } else { other.lo[k] }),
             hi: quad(|k| if self.hi[k] > other.hi[k] { self.hi[k] } else { other.hi[k] }),
         }
     }
 
-    fn around(all: &[Self]) -> Self {
-        all.iter().fold(NOTHING, |sum, one| sum.with(one))
+    fn enclosing(all: &[Self]) -> Self {
+        all.iter().fold(EMPTY, |sum, one| sum.union(one))
     }
 
     #[inline(always)]
-    fn middle(&self) -> Quad {
+    fn center(&self) -> Quad {
         quad(|k| 0.5 * self.lo[k] + 0.5 * self.hi[k])
     }
 
@@ -84,9 +84,9 @@ impl Bounds {
 
 /// Bounding box of all items.
 #[inline(always)]
-fn bounds_of<S: Simd>(s: S, all: &[Item]) -> Bounds {
-    let mut lo = F4::load(s, &NOTHING.lo);
-    let mut hi = F4::load(s, &NOTHING.hi);
+fn bounds_of<S: Simd>(s: S, all: &[BuildItem]) -> Bounds {
+    let mut lo = F4::load(s, &EMPTY.lo);
+    let mut hi = F4::load(s, &EMPTY.hi);
     for item in all {
         lo = F4::load(s, &item.lo).min(lo);
         hi = F4::load(s, &item.hi).max(hi);
@@ -96,48 +96,48 @@ fn bounds_of<S: Simd>(s: S, all: &[Item]) -> Bounds {
 
 /// Maps a point to one of N cells along each axis of a box.
 #[derive(Clone, Copy, Debug)]
-struct Cells<const N: usize> {
+struct BinMapping<const N: usize> {
     base: Quad,
     /// Cells per unit length; 0 along axes without a usable length.
     scale: Quad,
 }
 
-impl<const N: usize> Cells<N> {
-    fn of(within: &Bounds) -> Self {
+impl<const N: usize> BinMapping<N> {
+    fn new(within: &Bounds) -> Self {
         // The factor below 1 keeps the last point of the box in the last cell.
         let scale = quad(|k| (N as f32 * (1.0 - 1e-6)) / (within.hi[k] - within.lo[k]));
         Self { base: within.lo, scale: scale.map(|x| if x.is_finite() { x } else { 0.0 }) }
     }
 
     #[inline(always)]
-    fn along(&self, axis: usize, x: f32) -> u32 {
+    fn bin(&self, axis: usize, x: f32) -> u32 {
         ((x - self.base[axis]) * self.scale[axis] - 0.5 + TO_BITS).to_bits() & (N as u32 - 1)
     }
 }
 
 /// A range of groups.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct GroupRange {
     bounds: Bounds,
     start: u32,
     end: u32,
     depth: u32,
 }
 
-impl Part {
+impl GroupRange {
     fn len(&self) -> usize {
         (self.end - self.start) as usize
     }
 
     /// Priority of splitting the range; below any area if it cannot be split.
     #[inline(always)]
-    fn worth(&self) -> f32 {
+    fn split_priority(&self) -> f32 {
         if self.len() > 1 { self.bounds.area() } else { -1.0 }
     }
 
     /// The first `count` groups and the rest.
     #[inline(always)]
-    fn cut(&self, count: usize, [near, far]: [Bounds; 2]) -> [Self; 2] {
+    fn split_at(&self, count: usize, [near, far]: [Bounds; 2]) -> [Self; 2] {
         let (at, depth) = (self.start + count as u32, self.depth + 1);
         [Self { bounds: near, end: at, depth, ..*self }, Self { bounds: far, start: at, depth, ..*self }]
     }
@@ -154,17 +154,17 @@ struct Child {
 
 /// Builds BVHs one after the other and keeps its memory between builds.
 #[derive(Debug)]
-pub(crate) struct Builder {
-    level: Level,
-    unsorted: Vec<Item>,
-    curve: Curve,
+pub(crate) struct BvhBuilder {
+    level: SimdLevel,
+    unsorted: Vec<BuildItem>,
+    curve: MortonOrder,
     /// Start of each group on the curve, and the end of the last one.
     starts: Vec<u32>,
-    groups: Vec<Item>,
+    groups: Vec<BuildItem>,
     /// Each group as a child of the node above it.
     children: Vec<Child>,
     /// Scratch memory for splits.
-    aside: Vec<Item>,
+    scratch: Vec<BuildItem>,
     nodes: Vec<Node>,
     costs: Costs,
     pad: f32,
@@ -172,8 +172,8 @@ pub(crate) struct Builder {
 
 impl Node {
     const EMPTY: Self = {
-        let (empty, full) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
-        Self { sides: [empty, empty, empty, full, full, full], child: [0; WIDE], count: [0; WIDE] }
+        let (empty, full) = ([f32::INFINITY; BVH_WIDTH], [f32::NEG_INFINITY; BVH_WIDTH]);
+        Self { sides: [empty, empty, empty, full, full, full], child: [0; BVH_WIDTH], count: [0; BVH_WIDTH] }
     };
 
     #[inline(always)]
@@ -190,21 +190,21 @@ impl Bvh {
     /// Builds a BVH over boxes of finite numbers; returns it and the order of the boxes in its leaves. The same boxes
     /// give the same BVH.
     pub(crate) fn build(boxes: impl IntoIterator<Item = Aabb>) -> (Self, Vec<u32>) {
-        Builder::new(Level::best()).build(boxes)
+        BvhBuilder::new(SimdLevel::best()).build(boxes)
     }
 }
 
-impl Builder {
+impl BvhBuilder {
     /// Creates a builder for a SIMD level. The BVHs are the same at every level.
-    pub(crate) fn new(level: Level) -> Self {
+    pub(crate) fn new(level: SimdLevel) -> Self {
         Self {
             level,
             unsorted: Vec::new(),
-            curve: Curve::default(),
+            curve: MortonOrder::default(),
             starts: Vec::new(),
             groups: Vec::new(),
             children: Vec::new(),
-            aside: Vec::new(),
+            scratch: Vec::new(),
             nodes: Vec::new(),
             costs: Costs::default(),
             pad: 0.0,
@@ -215,9 +215,12 @@ impl Builder {
     /// give the same BVH.
     pub(crate) fn build(&mut self, boxes: impl IntoIterator<Item = Aabb>) -> (Bvh, Vec<u32>) {
         self.unsorted.clear();
-        self.unsorted.extend((0..).zip(boxes).map(|(k, [lo, hi])| Item::item(lo, hi, k, 1)));
+        self.unsorted.extend((0..).zip(boxes).map(|(k, [lo, hi])| BuildItem::item(lo, hi, k, 1)));
         if self.unsorted.is_empty() {
-            return (Bvh { nodes: Vec::new(), root: 0, around: [[0.0; 3]; 2], bounds: [[0.0; 3]; 2] }, Vec::new());
+            return (
+                Bvh { nodes: Vec::new(), root: 0, bounds: [[0.0; 3]; 2], padded_bounds: [[0.0; 3]; 2] },
+                Vec::new(),
+            );
         }
         at_level!(self.level, s => s.vectorize(
             #[inline(always)]
@@ -244,17 +247,17 @@ impl Builder {
         let root = if count == 1 {
             0
         } else {
-            self.aside.clone_from(&self.groups);
-            self.add([Part { bounds, start: 0, end: count as u32, depth: 0 }; 2], 1)
+            self.scratch.clone_from(&self.groups);
+            self.build_wide_node([GroupRange { bounds, start: 0, end: count as u32, depth: 0 }; 2], 1)
         };
         let bounds = [lo.map(|x| x - pad), hi.map(|x| x + pad)];
-        (Bvh { nodes: std::mem::take(&mut self.nodes), root, around, bounds }, order)
+        (Bvh { nodes: std::mem::take(&mut self.nodes), root, bounds: around, padded_bounds: bounds }, order)
     }
 
     /// Adds all groups of primitives, which are in this order.
     #[inline(always)]
     fn add_groups<S: Simd>(&mut self, s: S, order: &[u32]) {
-        let mut things = [NOTHING; GROUP];
+        let mut things = [EMPTY; MAX_GROUP];
         for k in 1..self.starts.len() {
             let [start, end] = [self.starts[k - 1], self.starts[k]];
             let order = &order[start as usize..end as usize];
@@ -262,34 +265,34 @@ impl Builder {
                 *thing = self.unsorted[number as usize];
             }
             let alone = self.starts.len() == 2;
-            self.add_group(s, &things[..order.len().min(GROUP)], start, alone);
+            self.add_group(s, &things[..order.len().min(MAX_GROUP)], start, alone);
         }
     }
 }
 
-impl Builder {
+impl BvhBuilder {
     /// Adds a group whose first primitive is at `start`, and its node if it needs one.
     #[inline(always)]
-    fn add_group<S: Simd>(&mut self, s: S, things: &[Item], start: u32, alone: bool) {
+    fn add_group<S: Simd>(&mut self, s: S, things: &[BuildItem], start: u32, alone: bool) {
         let count = things.len() as u32;
         let (around, child) = if things.len() <= SINGLE_LEAF && !alone {
             (bounds_of(s, things), Child { index: start, count })
         } else {
-            let (ends, leaves) = leaves::ends(s, things, &mut self.costs);
+            let (ends, leaves) = leaves::leaf_ends(s, things, &mut self.costs);
             // Filled in place.
             let index = self.push(Node::EMPTY);
             let node = &mut self.nodes[index as usize];
-            let (mut around, mut first) = (NOTHING, 0);
+            let (mut around, mut first) = (EMPTY, 0);
             for (k, end) in ends.into_iter().map(usize::from).enumerate().take(leaves) {
                 let leaf = bounds_of(s, &things[first..end]);
                 let child = Child { index: start + first as u32, count: (end - first) as u32 };
                 node.set(k, &leaf, self.pad, child);
-                (around, first) = (around.with(&leaf), end);
+                (around, first) = (around.union(&leaf), end);
             }
             (around, Child { index, count: 0 })
         };
         let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
-        self.groups.push(Item::item([a, b, c], [d, e, f], self.children.len() as u32, count));
+        self.groups.push(BuildItem::item([a, b, c], [d, e, f], self.children.len() as u32, count));
         self.children.push(child);
     }
 
@@ -301,15 +304,15 @@ impl Builder {
 
     /// Adds the wide node of the first `count` of two ranges, and all nodes below it that are above groups; returns its
     /// index.
-    fn add(&mut self, seed: [Part; 2], mut count: usize) -> u32 {
-        let mut parts = [seed[0]; WIDE];
+    fn build_wide_node(&mut self, seed: [GroupRange; 2], mut count: usize) -> u32 {
+        let mut parts = [seed[0]; BVH_WIDTH];
         parts[1] = seed[1];
-        let mut worth = [-1.0f32; WIDE];
+        let mut worth = [-1.0f32; BVH_WIDTH];
         for (worth, part) in worth.iter_mut().zip(&parts).take(count) {
-            *worth = part.worth();
+            *worth = part.split_priority();
         }
         // Splits the largest range until there are eight.
-        while count < WIDE {
+        while count < BVH_WIDTH {
             let (mut largest, mut most) = (0, worth[0]);
             for (k, &other) in worth.iter().enumerate().skip(1) {
                 (largest, most) = if other > most { (k, other) } else { (largest, most) };
@@ -317,20 +320,20 @@ impl Builder {
             if most < 0.0 {
                 break;
             }
-            let [first, second] = self.open(&parts[largest]);
-            (worth[largest], worth[count]) = (first.worth(), second.worth());
+            let [first, second] = self.split(&parts[largest]);
+            (worth[largest], worth[count]) = (first.split_priority(), second.split_priority());
             (parts[largest], parts[count]) = (first, second);
             count += 1;
         }
         let mut node = Node::EMPTY;
         for (k, part) in parts.iter().enumerate().take(count) {
             let child = if part.len() == 1 {
-                self.children[self.groups[part.start as usize].number() as usize]
-            } else if part.len() <= WIDE {
-                Child { index: self.add_few(part), count: 0 }
+                self.children[self.groups[part.start as usize].index() as usize]
+            } else if part.len() <= BVH_WIDTH {
+                Child { index: self.build_small(part), count: 0 }
             } else {
-                let halves = self.open(part);
-                Child { index: self.add(halves, 2), count: 0 }
+                let halves = self.split(part);
+                Child { index: self.build_wide_node(halves, 2), count: 0 }
             };
             node.set(k, &part.bounds, self.pad, child);
         }
@@ -339,32 +342,32 @@ impl Builder {
 
     /// Adds the node of a range of at most eight groups: however the range is split, all groups are children of this
     /// node.
-    fn add_few(&mut self, part: &Part) -> u32 {
+    fn build_small(&mut self, part: &GroupRange) -> u32 {
         let mut node = Node::EMPTY;
-        for (k, group) in self.groups[part.start as usize..part.end as usize].iter().enumerate().take(WIDE) {
-            node.set(k, group, self.pad, self.children[group.number() as usize]);
+        for (k, group) in self.groups[part.start as usize..part.end as usize].iter().enumerate().take(BVH_WIDTH) {
+            node.set(k, group, self.pad, self.children[group.index() as usize]);
         }
         self.push(node)
     }
 
     /// Splits a range of several groups.
     #[inline(always)]
-    fn open(&mut self, part: &Part) -> [Part; 2] {
+    fn split(&mut self, part: &GroupRange) -> [GroupRange; 2] {
         let groups = &mut self.groups[part.start as usize..part.end as usize];
-        let best = if part.depth < MAX_DEPTH { cut::best(&part.bounds, groups, &mut self.aside) } else { None };
+        let best = if part.depth < MAX_DEPTH { cut::best_split(&part.bounds, groups, &mut self.scratch) } else { None };
         let (at, sides) = best.unwrap_or_else(|| {
             // No plane separates the groups, or the range is too deep.
             let at = groups.len() / 2;
-            (at, [Bounds::around(&groups[..at]), Bounds::around(&groups[at..])])
+            (at, [Bounds::enclosing(&groups[..at]), Bounds::enclosing(&groups[at..])])
         });
-        part.cut(at, sides)
+        part.split_at(at, sides)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::bvh::Stack;
+    use crate::geometry::bvh::TraversalStack;
     use kinetoscope_scene::Ray;
 
     /// Mean number of boxes that a ray down into the unit square tests.
@@ -373,12 +376,12 @@ mod tests {
         let mut seen = order.clone();
         seen.sort_unstable();
         assert!(seen.into_iter().eq(0..boxes.len() as u32), "each thing is in one leaf");
-        let (mut stack, mut count) = (Stack::default(), 0);
+        let (mut stack, mut count) = (TraversalStack::default(), 0);
         const RAYS: usize = 100;
         for k in 0..RAYS {
             let [x, y] = [0.05 + 0.009 * k as f64, (0.1 + 0.377 * k as f64).fract()];
             let ray = Ray { origin: [x, y, 1.0], direction: [0.0, 0.0, -1.0] };
-            tree.walk(&ray, 10.0, &mut stack, |leaf, limit| {
+            tree.traverse(&ray, 10.0, &mut stack, |leaf, limit| {
                 count += leaf.len();
                 limit
             });

@@ -6,15 +6,15 @@
 mod beam;
 mod build;
 
-pub(crate) use beam::{Beam, FAR, Walked};
-pub(crate) use build::Builder;
+pub(crate) use beam::{Beam, MAX_ORIGIN_RATIO, Traversal};
+pub(crate) use build::BvhBuilder;
 
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::vector::{V3, along};
+use kinetoscope_scene::vector::{V3, add_scaled};
 use std::ops::Range;
 
 /// Children of a node.
-const WIDE: usize = 8;
+const BVH_WIDTH: usize = 8;
 /// Padding of boxes, as a fraction of the largest coordinate R in the BVH. With u = 2^-24, the plane of a side is off
 /// by at most u R for the rounded origin, and by 4 u of its distance from there, which is 2 R at most, for the
 /// difference, the inverse of the rounded direction and the product: 9 u R, and terms of u².
@@ -30,8 +30,8 @@ pub(crate) struct Bvh {
     /// Index of the root node.
     root: u32,
     /// The box around all primitives, and the same box padded.
-    around: Aabb,
-    bounds: [V3; 2],
+    bounds: Aabb,
+    padded_bounds: [V3; 2],
 }
 
 /// Eight boxes, as arrays of their sides.
@@ -39,36 +39,36 @@ pub(crate) struct Bvh {
 #[repr(align(64))]
 struct Node {
     /// Smallest x, y, z, then largest x, y, z. A missing child has an empty box, from +inf to -inf.
-    sides: [[f32; WIDE]; 6],
+    sides: [[f32; BVH_WIDTH]; 6],
     /// Index of a node, or of the first primitive of a leaf.
-    child: [u32; WIDE],
+    child: [u32; BVH_WIDTH],
     /// Primitives of a leaf; 0 for a node.
-    count: [u32; WIDE],
+    count: [u32; BVH_WIDTH],
 }
 
 /// Stack of nodes to visit: scratch memory that is kept between traversals.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Stack(Vec<Entry>);
+pub(crate) struct TraversalStack(Vec<StackEntry>);
 
-impl Stack {
+impl TraversalStack {
     pub(crate) fn bytes(&self) -> usize {
-        self.0.capacity() * size_of::<Entry>()
+        self.0.capacity() * size_of::<StackEntry>()
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct StackEntry {
     /// Distance at which the ray enters the box.
-    near: f32,
+    entry_distance: f32,
     child: u32,
     count: u32,
 }
 
 /// A ray that starts where it enters the BVH, in single precision.
 #[derive(Clone, Copy, Debug)]
-struct ShortRay {
+struct EntryRay {
     /// Distance that the double precision ray runs before.
-    shift: f64,
+    entry_distance: f64,
     origin: [f32; 3],
     inverse: [f32; 3],
     /// Axes along which the larger sides come first.
@@ -78,42 +78,46 @@ struct ShortRay {
 impl Bvh {
     /// The box around all primitives; a point if there are no primitives.
     #[inline(always)]
-    pub(crate) fn around(&self) -> &Aabb {
-        &self.around
+    pub(crate) fn bounds(&self) -> &Aabb {
+        &self.bounds
     }
 
     /// Visits the leaves that `ray` may meet at distances from 0 to `limit`, near ones first. `leaf` receives the
     /// primitives of a leaf, as positions in the order of the build, and the limit; it returns a new limit.
     #[inline(always)]
-    pub(crate) fn walk(
+    pub(crate) fn traverse(
         &self,
         ray: &Ray,
         mut limit: f64,
-        Stack(stack): &mut Stack,
+        TraversalStack(stack): &mut TraversalStack,
         mut leaf: impl FnMut(Range<usize>, f64) -> f64,
     ) {
         let Some(short) = self.enter(ray, limit) else { return };
         let mut short_limit = short.limit(limit);
         stack.clear();
-        let mut entry = Entry { near: 0.0, child: self.root, count: 0 };
+        let mut entry = StackEntry { entry_distance: 0.0, child: self.root, count: 0 };
         loop {
-            if entry.near <= short_limit {
+            if entry.entry_distance <= short_limit {
                 let first = entry.child as usize;
                 if entry.count > 0 {
                     limit = leaf(first..first + entry.count as usize, limit);
                     short_limit = short.limit(limit);
                 } else {
                     let node = &self.nodes[first];
-                    let (near, mut met) = short.meets(node, short_limit);
+                    let (near, mut met) = short.intersect_children(node, short_limit);
                     if met != 0 {
-                        let child = |k: usize| Entry { near: near[k], child: node.child[k], count: node.count[k] };
-                        entry = child(met.trailing_zeros() as usize & (WIDE - 1));
+                        let child = |k: usize| StackEntry {
+                            entry_distance: near[k],
+                            child: node.child[k],
+                            count: node.count[k],
+                        };
+                        entry = child(met.trailing_zeros() as usize & (BVH_WIDTH - 1));
                         met &= met - 1;
                         let bottom = stack.len();
                         while met != 0 {
-                            let mut next = child(met.trailing_zeros() as usize & (WIDE - 1));
+                            let mut next = child(met.trailing_zeros() as usize & (BVH_WIDTH - 1));
                             met &= met - 1;
-                            if next.near < entry.near {
+                            if next.entry_distance < entry.entry_distance {
                                 std::mem::swap(&mut next, &mut entry);
                             }
                             insert(stack, bottom, next);
@@ -131,11 +135,11 @@ impl Bvh {
 
     /// The ray from where it enters the box around all primitives; `None` if it does not enter before `limit`.
     #[inline(always)]
-    fn enter(&self, ray: &Ray, limit: f64) -> Option<ShortRay> {
+    fn enter(&self, ray: &Ray, limit: f64) -> Option<EntryRay> {
         if self.nodes.is_empty() {
             return None;
         }
-        let [lo, hi] = self.bounds;
+        let [lo, hi] = self.padded_bounds;
         let (mut shift, mut leave) = (0.0f64, limit);
         for k in 0..3 {
             let (o, d) = (ray.origin[k], ray.direction[k]);
@@ -152,39 +156,39 @@ impl Bvh {
         if shift > leave {
             return None;
         }
-        let origin = along(ray.origin, shift, ray.direction).map(|x| x as f32);
+        let origin = add_scaled(ray.origin, shift, ray.direction).map(|x| x as f32);
         // A component close to 0 would have an infinite inverse; it keeps the sign of the ray.
         let inverse = ray.direction.map(|d| {
             let d = d as f32;
             1.0 / if d.abs() < 1e-18 { 1e-18f32.copysign(d) } else { d }
         });
         let backward = inverse.map(|x| x < 0.0);
-        Some(ShortRay { shift, origin, inverse, backward })
+        Some(EntryRay { entry_distance: shift, origin, inverse, backward })
     }
 }
 
 /// Inserts an entry into the sorted part of the stack above `bottom`: the nearest on top, of equally near entries the
 /// first.
 #[inline(always)]
-fn insert(stack: &mut Vec<Entry>, bottom: usize, entry: Entry) {
+fn insert(stack: &mut Vec<StackEntry>, bottom: usize, entry: StackEntry) {
     let mut at = stack.len();
     stack.push(entry);
-    while at > bottom && stack[at - 1].near <= stack[at].near {
+    while at > bottom && stack[at - 1].entry_distance <= stack[at].entry_distance {
         stack.swap(at - 1, at);
         at -= 1;
     }
 }
 
-impl ShortRay {
+impl EntryRay {
     /// A limit relative to the entry point, rounded up.
     #[inline(always)]
     fn limit(&self, limit: f64) -> f32 {
-        ((limit - self.shift) as f32).next_up()
+        ((limit - self.entry_distance) as f32).next_up()
     }
 
     /// Distances at which the ray enters each box, and a bit for each box that it meets before `limit`.
     #[inline(always)]
-    fn meets(&self, node: &Node, limit: f32) -> ([f32; WIDE], u32) {
+    fn intersect_children(&self, node: &Node, limit: f32) -> ([f32; BVH_WIDTH], u32) {
         let [x0, y0, z0, x1, y1, z1] = &node.sides;
         let sort = |k: usize, a, b| if self.backward[k] { (b, a) } else { (a, b) };
         let ((nx, fx), (ny, fy), (nz, fz)) = (sort(0, x0, x1), sort(1, y0, y1), sort(2, z0, z1));
@@ -192,9 +196,9 @@ impl ShortRay {
         let larger = |a: f32, b: f32| if a > b { a } else { b };
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         // One plain loop, which compilers vectorize.
-        let mut near = [0.0f32; WIDE];
-        let mut met = [0u32; WIDE];
-        for k in 0..WIDE {
+        let mut near = [0.0f32; BVH_WIDTH];
+        let mut met = [0u32; BVH_WIDTH];
+        for k in 0..BVH_WIDTH {
             near[k] = larger(larger((nx[k] - ox) * ix, (ny[k] - oy) * iy), larger((nz[k] - oz) * iz, 0.0));
             let far = smaller(smaller((fx[k] - ox) * ix, (fy[k] - oy) * iy), smaller((fz[k] - oz) * iz, limit));
             met[k] = u32::from(near[k] <= far) << k;

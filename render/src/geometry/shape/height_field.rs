@@ -10,14 +10,14 @@
 
 mod packet;
 
-use super::{RayShape, Touches};
-use crate::geometry::assets::Assets;
-use crate::geometry::bvh::Stack;
+use super::{Intersections, RayShape};
+use crate::geometry::assets::AssetCache;
+use crate::geometry::bvh::TraversalStack;
 use crate::geometry::packet::{ALL, Packet};
 use crate::simd::Simd;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;
-use kinetoscope_scene::vector::{V3, along, unit};
+use kinetoscope_scene::vector::{V3, add_scaled, normalize};
 use std::sync::Arc;
 
 /// Cells that a walk visits one by one before it tries blocks: rays from above mostly hit in the first or the second.
@@ -29,38 +29,38 @@ const SLACK: f64 = 1e-12;
 /// A height field, shared by all instances of the asset.
 #[derive(Clone, Debug)]
 pub(crate) struct HeightField {
-    field: Arc<Field>,
+    grid: Arc<HeightGrid>,
 }
 
 /// Heights over a grid.
 #[derive(Clone, Debug)]
-pub(crate) struct Field {
+pub(crate) struct HeightGrid {
     columns: usize,
     /// Cells along x and y.
     cells: [usize; 2],
     /// Half lengths along x and y \[m\].
     half: [f64; 2],
     /// Cells per meter.
-    per_metre: [f64; 2],
+    cells_per_meter: [f64; 2],
     /// Heights of all points, row by row \[m\].
     heights: Vec<f64>,
     /// Heights of the floor and of the highest point \[m\].
     floor: f64,
     top: f64,
     /// Level k has blocks of 2^(k+1) by 2^(k+1) cells.
-    pyramid: Vec<Level>,
+    pyramid: Vec<PyramidLevel>,
 }
 
 /// Lowest and highest height over blocks of cells.
 #[derive(Clone, Debug)]
-struct Level {
-    wide: usize,
+struct PyramidLevel {
+    width: usize,
     blocks: Vec<[f64; 2]>,
 }
 
 /// A ray in units of cells along x and y, from 0 at the lower corner.
 #[derive(Clone, Copy, Debug)]
-struct Walk {
+struct GridRay {
     origin: [f64; 2],
     direction: [f64; 2],
     inverse: [f64; 2],
@@ -70,7 +70,7 @@ struct Walk {
     side: f64,
 }
 
-impl Field {
+impl HeightGrid {
     pub(crate) fn new(shape: &kinetoscope_scene::shape::HeightField) -> Self {
         let [x, y, scale, bottom] = shape.size();
         let (rows, columns) = (shape.rows(), shape.columns());
@@ -80,7 +80,7 @@ impl Field {
             columns,
             cells,
             half: [x, y],
-            per_metre: [cells[0] as f64 / (2.0 * x), cells[1] as f64 / (2.0 * y)],
+            cells_per_meter: [cells[0] as f64 / (2.0 * x), cells[1] as f64 / (2.0 * y)],
             floor: -bottom,
             top: heights.iter().copied().fold(0.0, f64::max),
             heights,
@@ -99,7 +99,7 @@ impl Field {
                     .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], [a, b]| [lo.min(a), hi.max(b)])
             });
             let blocks = blocks.collect();
-            field.pyramid.push(Level { wide, blocks });
+            field.pyramid.push(PyramidLevel { width: wide, blocks });
         }
         field
     }
@@ -118,7 +118,7 @@ impl Field {
             return [a.min(b).min(d.min(e)), a.max(b).max(d.max(e))];
         }
         let level = &self.pyramid[level - 1];
-        level.blocks[j * level.wide + i]
+        level.blocks[j * level.width + i]
     }
 
     /// Heights of the corners of a cell: at (0, 0), (1, 0), (0, 1), (1, 1).
@@ -139,7 +139,7 @@ impl Field {
 
     /// The hit with the surface in a cell between distances `from` and `to`.
     #[inline(always)]
-    fn cross(&self, walk: &Walk, cell: [usize; 2], from: f64, to: f64) -> Option<Intersection> {
+    fn intersect_cell(&self, walk: &GridRay, cell: [usize; 2], from: f64, to: f64) -> Option<Intersection> {
         let corners = self.corners(cell);
         let [x, y] = [0, 1].map(|k| walk.origin[k] - cell[k] as f64);
         let [dx, dy] = walk.direction;
@@ -154,7 +154,7 @@ impl Field {
             let [h, hx, hy] = Self::plane(corners, right);
             // Height above the surface: gap + t closing.
             let (gap, closing) = (walk.z - (h + hx * x + hy * y), walk.dz - (hx * dx + hy * dy));
-            let normal = || unit([-hx * self.per_metre[0], -hy * self.per_metre[1], 1.0]);
+            let normal = || normalize([-hx * self.cells_per_meter[0], -hy * self.cells_per_meter[1], 1.0]);
             if (gap + closing * from) * walk.side <= 0.0 {
                 return Some(Intersection { t: from, normal: normal()? });
             }
@@ -167,7 +167,7 @@ impl Field {
 
     /// Walks from distance `from` to distance `to`.
     #[inline(always)]
-    fn walk(&self, walk: &Walk, mut from: f64, to: f64) -> Option<Intersection> {
+    fn walk_cells(&self, walk: &GridRay, mut from: f64, to: f64) -> Option<Intersection> {
         let position = |t: f64, k: usize| walk.origin[k] + t * walk.direction[k];
         let clamped = |p: f64, lo: usize, hi: usize| (p.max(0.0) as usize).clamp(lo, hi);
         let mut cell = [0, 1].map(|k| clamped(position(from, k), 0, self.cells[k] - 1));
@@ -197,7 +197,7 @@ impl Field {
                 level -= 1;
                 continue;
             }
-            if !clear && let Some(touch) = self.cross(walk, cell, from, leave) {
+            if !clear && let Some(touch) = self.intersect_cell(walk, cell, from, leave) {
                 return Some(touch);
             }
             let k = axis?;
@@ -226,20 +226,20 @@ impl Field {
     /// Hit of a ray straight down from above the surface, as height scanners cast them: it crosses one cell, so no walk
     /// is needed. `None` for other rays, for rays that begin below the surface, and outside of the footprint.
     #[inline(always)]
-    fn plumb(&self, ray: &Ray) -> Option<Intersection> {
+    fn intersect_vertical(&self, ray: &Ray) -> Option<Intersection> {
         let (o, d) = (ray.origin, ray.direction);
         if d[0] != 0.0 || d[1] != 0.0 || d[2] >= 0.0 || o[0].abs() > self.half[0] || o[1].abs() > self.half[1] {
             return None;
         }
-        let [h, hx, hy] = self.surface(o[0], o[1]);
+        let [h, hx, hy] = self.height_at(o[0], o[1]);
         let t = (o[2] - h) / -d[2];
-        let normal = unit([-hx * self.per_metre[0], -hy * self.per_metre[1], 1.0])?;
+        let normal = normalize([-hx * self.cells_per_meter[0], -hy * self.cells_per_meter[1], 1.0])?;
         (t >= 0.0).then_some(Intersection { t, normal })
     }
 
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
-        if let Some(touch) = self.plumb(ray) {
+    fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
+        if let Some(touch) = self.intersect_vertical(ray) {
             return (touch.t <= limit).then_some(touch);
         }
         let (o, d) = (ray.origin, ray.direction);
@@ -270,18 +270,18 @@ impl Field {
             let normal = [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 });
             (t <= limit).then_some(Intersection { t, normal })
         };
-        let origin = [0, 1].map(|k| (o[k] + self.half[k]) * self.per_metre[k]);
-        let direction = [0, 1].map(|k| d[k] * self.per_metre[k]);
+        let origin = [0, 1].map(|k| (o[k] + self.half[k]) * self.cells_per_meter[k]);
+        let direction = [0, 1].map(|k| d[k] * self.cells_per_meter[k]);
         let inverse = direction.map(|d| 1.0 / d);
-        let mut walk = Walk { origin, direction, inverse, z: o[2], dz: d[2], side: 1.0 };
+        let mut walk = GridRay { origin, direction, inverse, z: o[2], dz: d[2], side: 1.0 };
         match enter.1 {
             // Upward through the floor.
             Some(2) if d[2] > 0.0 => return wall(from, 2),
             // Downward through the top.
             Some(2) => {}
             came => {
-                let [x, y, z] = along(o, from, d);
-                let gap = z - self.surface(x, y)[0];
+                let [x, y, z] = add_scaled(o, from, d);
+                let gap = z - self.height_at(x, y)[0];
                 if gap < 0.0 {
                     match came {
                         Some(axis) => return wall(from, axis),
@@ -290,7 +290,7 @@ impl Field {
                 }
             }
         }
-        if let Some(touch) = self.walk(&walk, from, to.min(limit)) {
+        if let Some(touch) = self.walk_cells(&walk, from, to.min(limit)) {
             return (touch.t <= limit).then_some(touch);
         }
         // From inside through a wall or the floor, or from above through a floor without thickness.
@@ -305,8 +305,8 @@ impl Field {
 
     /// Height of the surface over a point of the footprint \[m\], and its slopes (per cell).
     #[inline(always)]
-    fn surface(&self, x: f64, y: f64) -> [f64; 3] {
-        let at = [(x + self.half[0]) * self.per_metre[0], (y + self.half[1]) * self.per_metre[1]];
+    fn height_at(&self, x: f64, y: f64) -> [f64; 3] {
+        let at = [(x + self.half[0]) * self.cells_per_meter[0], (y + self.half[1]) * self.cells_per_meter[1]];
         let cell = self.cell_at(at);
         let [x, y] = [0, 1].map(|k| at[k] - cell[k] as f64);
         let [h, hx, hy] = Self::plane(self.corners(cell), x >= y);
@@ -315,30 +315,36 @@ impl Field {
 }
 
 impl HeightField {
-    pub(super) fn of(shape: &kinetoscope_scene::shape::HeightField, assets: &mut Assets) -> Self {
-        Self { field: assets.height_field(shape) }
+    pub(super) fn from_shape(shape: &kinetoscope_scene::shape::HeightField, assets: &mut AssetCache) -> Self {
+        Self { grid: assets.height_field(shape) }
     }
 
     /// Bounding box: smallest and largest coordinates.
     pub(super) fn bounds(&self) -> [V3; 2] {
-        let Field { half, floor, top, .. } = &*self.field;
+        let HeightGrid { half, floor, top, .. } = &*self.grid;
         [[-half[0], -half[1], *floor], [half[0], half[1], *top]]
     }
 }
 
 impl RayShape for HeightField {
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Intersection> {
-        self.field.touch(ray, limit)
+    fn intersect(&self, ray: &Ray, limit: f64, _stack: &mut TraversalStack) -> Option<Intersection> {
+        self.grid.intersect(ray, limit)
     }
 
     #[inline(always)]
-    fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, _stack: &mut Stack, touches: &mut Touches) {
-        let field = &*self.field;
-        let plumb = field.plumb_packet(s, packet, touches);
-        let done = if plumb == ALL { plumb } else { plumb | field.steep_packet(s, packet, !plumb, touches) };
-        for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| done >> k & 1 == 0 && packet.has(*k)) {
-            *touch = field.touch(&packet.ray(k), packet.limit(k));
+    fn intersect_packet<S: Simd>(
+        &self,
+        s: S,
+        packet: &Packet,
+        _stack: &mut TraversalStack,
+        touches: &mut Intersections,
+    ) {
+        let field = &*self.grid;
+        let plumb = field.intersect_vertical_packet(s, packet, touches);
+        let done = if plumb == ALL { plumb } else { plumb | field.intersect_steep_packet(s, packet, !plumb, touches) };
+        for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| done >> k & 1 == 0 && packet.is_active(*k)) {
+            *touch = field.intersect(&packet.ray(k), packet.limit(k));
         }
     }
 }

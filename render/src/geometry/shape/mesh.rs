@@ -2,12 +2,12 @@
 
 pub(crate) mod columns;
 
-use super::{RayShape, Touches, touch_each};
-use crate::geometry::assets::Assets;
-use crate::geometry::bvh::{Beam, Builder, Bvh, Stack, Walked};
+use super::{Intersections, RayShape, intersect_each};
+use crate::geometry::assets::AssetCache;
+use crate::geometry::bvh::{Beam, Bvh, BvhBuilder, Traversal, TraversalStack};
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
-use crate::simd::{D, Level, Simd};
+use crate::geometry::triangle::{ShearedPacket, ShearedRay, Triangle, has_area, normal};
+use crate::simd::{D, Simd, SimdLevel};
 use columns::Columns;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;
@@ -17,21 +17,21 @@ use std::sync::{Arc, OnceLock};
 
 /// Triangles that a packet tests against all of its rays; beyond that, rays go on one by one. That costs about as much
 /// as these tests.
-const BUDGET: usize = 320;
+const MAX_PACKET_TRIANGLES: usize = 320;
 
 /// A mesh with its BVH, shared by all instances of the asset.
 #[derive(Clone, Debug)]
 pub(crate) struct Mesh {
-    tree: Arc<MeshTree>,
+    bvh: Arc<MeshBvh>,
 }
 
 /// The triangles of an asset, in the order of the BVH's leaves.
 #[derive(Clone, Debug)]
-pub(crate) struct MeshTree {
+pub(crate) struct MeshBvh {
     bvh: Bvh,
     triangles: Vec<Triangle>,
     /// Index of each triangle in the mesh.
-    numbers: Vec<u32>,
+    mesh_indices: Vec<u32>,
     /// Columns along each axis, built when the first steep rays come; `None` for unsuitable meshes.
     columns: [OnceLock<Option<Columns>>; 3],
 }
@@ -40,19 +40,19 @@ pub(crate) struct MeshTree {
 /// the time.
 #[derive(Debug)]
 pub(crate) struct MeshBuilder {
-    builder: Builder,
+    builder: BvhBuilder,
     triangles: Vec<Triangle>,
 }
 
 impl Default for MeshBuilder {
     fn default() -> Self {
-        Self { builder: Builder::new(Level::best()), triangles: Vec::new() }
+        Self { builder: BvhBuilder::new(SimdLevel::best()), triangles: Vec::new() }
     }
 }
 
 impl MeshBuilder {
     /// Builds a BVH over the triangles that have an area.
-    pub(crate) fn build(&mut self, mesh: &RenderMesh) -> MeshTree {
+    pub(crate) fn build(&mut self, mesh: &RenderMesh) -> MeshBvh {
         let (indices, positions) = (mesh.triangles(), mesh.positions());
         let corners = |indices: &[u32; 3]| indices.map(|i| positions[i as usize]);
         self.triangles.clear();
@@ -63,18 +63,18 @@ impl MeshBuilder {
                 self.triangles.push(triangle);
             }
         }
-        let mut tree = self.tree();
+        let mut tree = self.build_bvh();
         // Most meshes have no triangles without area.
         if tree.triangles.len() < indices.len() {
             let with_area: Vec<u32> =
                 (0..).zip(indices).filter(|(_, indices)| has_area(&corners(indices))).map(|(k, _)| k).collect();
-            tree.numbers.iter_mut().for_each(|number| *number = with_area[*number as usize]);
+            tree.mesh_indices.iter_mut().for_each(|number| *number = with_area[*number as usize]);
         }
         tree
     }
 
     /// Builds a BVH over the builder's triangles, all of which have an area.
-    fn tree(&mut self) -> MeshTree {
+    fn build_bvh(&mut self) -> MeshBvh {
         // Plain comparisons, because those of the library check for NaN.
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         let larger = |a: f32, b: f32| if a > b { a } else { b };
@@ -83,30 +83,30 @@ impl MeshBuilder {
         };
         let (bvh, numbers) = self.builder.build(self.triangles.iter().map(around));
         let triangles = numbers.iter().map(|&number| self.triangles[number as usize]).collect();
-        MeshTree { bvh, triangles, numbers, columns: Default::default() }
+        MeshBvh { bvh, triangles, mesh_indices: numbers, columns: Default::default() }
     }
 }
 
 impl Mesh {
-    pub(super) fn of(mesh: &Arc<RenderMesh>, assets: &mut Assets) -> Self {
-        Self { tree: assets.mesh(mesh) }
+    pub(super) fn from_mesh(mesh: &Arc<RenderMesh>, assets: &mut AssetCache) -> Self {
+        Self { bvh: assets.mesh(mesh) }
     }
 
     /// Bounding box: smallest and largest coordinates.
     pub(crate) fn bounds(&self) -> [V3; 2] {
-        self.tree.bounds()
+        self.bvh.bounds()
     }
 
     #[cfg(test)]
-    pub(crate) fn of_tree(tree: Arc<MeshTree>) -> Self {
-        Self { tree }
+    pub(crate) fn from_bvh(tree: Arc<MeshBvh>) -> Self {
+        Self { bvh: tree }
     }
 }
 
-impl MeshTree {
+impl MeshBvh {
     #[cfg(test)]
-    pub(crate) fn of_triangles(triangles: &[Triangle]) -> Self {
-        MeshBuilder { triangles: triangles.to_vec(), ..Default::default() }.tree()
+    pub(crate) fn from_triangles(triangles: &[Triangle]) -> Self {
+        MeshBuilder { triangles: triangles.to_vec(), ..Default::default() }.build_bvh()
     }
 
     #[cfg(test)]
@@ -126,8 +126,8 @@ impl MeshTree {
 
     /// Index in the mesh of a triangle given by its position in the BVH.
     #[inline(always)]
-    pub(crate) fn number(&self, index: usize) -> u32 {
-        self.numbers[index]
+    pub(crate) fn mesh_index(&self, index: usize) -> u32 {
+        self.mesh_indices[index]
     }
 
     /// Unit normal of a triangle given by its position in the BVH; its corners are counter-clockwise seen from the tip.
@@ -138,15 +138,15 @@ impl MeshTree {
 
     /// Bounding box: smallest and largest coordinates.
     pub(crate) fn bounds(&self) -> [V3; 2] {
-        self.bvh.around().map(to_f64)
+        self.bvh.bounds().map(to_f64)
     }
 
     /// True if the ray meets any triangle at a distance from 0 to `limit`.
     #[inline(always)]
-    pub(crate) fn blocks(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> bool {
-        let shear = Shear::new(ray);
+    pub(crate) fn any_hit(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> bool {
+        let shear = ShearedRay::new(ray);
         let mut blocked = false;
-        self.bvh.walk(
+        self.bvh.traverse(
             ray,
             limit,
             stack,
@@ -167,16 +167,16 @@ impl MeshTree {
 
     /// The nearest triangle up to `limit`, or the one `found` before: distance, and position in the BVH.
     #[inline(always)]
-    pub(crate) fn nearest(
+    pub(crate) fn closest_hit(
         &self,
         ray: &Ray,
         limit: f64,
         found: Option<(f64, usize)>,
-        stack: &mut Stack,
+        stack: &mut TraversalStack,
     ) -> Option<(f64, usize)> {
-        let shear = Shear::new(ray);
+        let shear = ShearedRay::new(ray);
         let mut best = found;
-        self.bvh.walk(
+        self.bvh.traverse(
             ray,
             limit,
             stack,
@@ -197,36 +197,37 @@ impl MeshTree {
         best
     }
 
-    /// Packet version of [`nearest`](Self::nearest): the same bits for every ray, up to its limit. `shear` is that of
+    /// Packet version of [`closest_hit`](Self::closest_hit): the same bits for every ray, up to its limit. `shear` is that of
     /// the rays, if they share one. Nearly parallel rays take one traversal together. Only lanes with a ray are
     /// written.
     #[inline(always)]
-    pub(crate) fn nearest_of_packet<S: Simd>(
+    pub(crate) fn closest_hits<S: Simd>(
         &self,
         s: S,
         packet: &Packet,
-        shear: Option<&ShearPacket<S>>,
-        stack: &mut Stack,
+        shear: Option<&ShearedPacket<S>>,
+        stack: &mut TraversalStack,
         found: &mut [Option<(f64, usize)>; WIDTH],
     ) {
         let beam = shear.and_then(
             #[inline(always)]
-            |shear| Some((shear, Beam::around(s, packet, shear, &self.bvh)?)),
+            |shear| Some((shear, Beam::enclosing(s, packet, shear, &self.bvh)?)),
         );
-        let narrow = beam.filter(|(_, beam)| beam.share() * self.triangles.len() as f64 <= BUDGET as f64);
+        let narrow = beam
+            .filter(|(_, beam)| beam.covered_fraction() * self.triangles.len() as f64 <= MAX_PACKET_TRIANGLES as f64);
         let Some((shear, beam)) = narrow else {
-            for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-                found[k] = self.nearest(&packet.ray(k), packet.limit(k), None, stack);
+            for k in (0..WIDTH).filter(|&k| packet.is_active(k)) {
+                found[k] = self.closest_hit(&packet.ray(k), packet.limit(k), None, stack);
             }
             return;
         };
         let (zero, mut limit) = (D::splat(s, 0.0), packet.limits(s));
         // Position of the best triangle, as a float that holds all positions exactly; +inf without a hit.
         let mut best = D::splat(s, f64::INFINITY);
-        let walked = self.bvh.walk_beam(
+        let walked = self.bvh.traverse_beam(
             &beam,
             limit,
-            BUDGET,
+            MAX_PACKET_TRIANGLES,
             stack,
             #[inline(always)]
             |leaf| {
@@ -242,43 +243,49 @@ impl MeshTree {
             },
         );
         let (limit, best) = (limit.array(), best.array());
-        for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+        for k in (0..WIDTH).filter(|&k| packet.is_active(k)) {
             found[k] = (best[k] < f64::INFINITY).then(|| (limit[k], best[k] as usize));
-            if walked == Walked::Part {
-                found[k] = self.nearest(&packet.ray(k), limit[k], found[k], stack);
+            if walked == Traversal::OverBudget {
+                found[k] = self.closest_hit(&packet.ray(k), limit[k], found[k], stack);
             }
         }
     }
 
     #[inline(always)]
-    fn touch(&self, (t, index): (f64, usize)) -> Option<Intersection> {
+    fn intersection_at(&self, (t, index): (f64, usize)) -> Option<Intersection> {
         Some(Intersection { t: t + 0.0, normal: normal(&self.triangles[index])? })
     }
 }
 
 impl RayShape for Mesh {
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection> {
-        self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
+    fn intersect(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<Intersection> {
+        self.bvh.intersection_at(self.bvh.closest_hit(ray, limit, None, stack)?)
     }
 
     /// Steep rays use columns; other nearly parallel rays take one traversal together. Every triangle that a ray may
     /// hit is tested by the arithmetic of the single ray. The nearest one counts, the first of equally near ones: the
     /// same bits.
     #[inline(always)]
-    fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
-        let tree = &*self.tree;
-        let Some(shear) = ShearPacket::new(s, packet) else { return touch_each(self, packet, stack, touches) };
+    fn intersect_packet<S: Simd>(
+        &self,
+        s: S,
+        packet: &Packet,
+        stack: &mut TraversalStack,
+        touches: &mut Intersections,
+    ) {
+        let tree = &*self.bvh;
+        let Some(shear) = ShearedPacket::new(s, packet) else { return intersect_each(self, packet, stack, touches) };
         if columns::are_steep(s, &shear)
             && let Some(columns) = tree.columns(shear.axes())
-            && columns.touch_packet(s, tree, packet, &shear, touches)
+            && columns.intersect_packet(s, tree, packet, &shear, touches)
         {
             return;
         }
         let mut found = [None; WIDTH];
-        tree.nearest_of_packet(s, packet, Some(&shear), stack, &mut found);
-        for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-            touches[k] = found[k].and_then(|found| tree.touch(found));
+        tree.closest_hits(s, packet, Some(&shear), stack, &mut found);
+        for k in (0..WIDTH).filter(|&k| packet.is_active(k)) {
+            touches[k] = found[k].and_then(|found| tree.intersection_at(found));
         }
     }
 }

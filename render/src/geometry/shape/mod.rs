@@ -8,33 +8,33 @@ pub(crate) mod height_field;
 pub(crate) mod mesh;
 mod ray_shape;
 
-use crate::geometry::assets::Assets;
+use crate::geometry::assets::AssetCache;
 #[cfg(test)]
-use crate::geometry::bvh::Stack;
+use crate::geometry::bvh::TraversalStack;
 use height_field::HeightField;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::shape::{ClosedForm, ForClosedForm};
+use kinetoscope_scene::shape::{ClosedForm, ClosedFormVisitor};
 use kinetoscope_scene::vector::V3;
 #[cfg(test)]
 use kinetoscope_scene::{Ray, shape::Intersection};
 use mesh::Mesh;
-use ray_shape::touch_each;
-pub(crate) use ray_shape::{ForShape, RayShape, Touches};
+use ray_shape::intersect_each;
+pub(crate) use ray_shape::{Intersections, RayShape, ShapeVisitor};
 
 /// A shape prepared for rays.
 #[derive(Clone, Debug)]
-pub(crate) enum Solid {
+pub(crate) enum RayGeometry {
     ClosedForm(Shape),
     Mesh(Mesh),
     HeightField(HeightField),
 }
 
-impl Solid {
+impl RayGeometry {
     /// Prepares a shape of a scene; BVHs and pyramids are shared through `assets`.
-    pub(crate) fn of(shape: &Shape, assets: &mut Assets) -> Self {
+    pub(crate) fn from_shape(shape: &Shape, assets: &mut AssetCache) -> Self {
         match (shape, shape.mesh()) {
-            (Shape::HeightField(field), _) => Self::HeightField(HeightField::of(field, assets)),
-            (_, Some(mesh)) => Self::Mesh(Mesh::of(mesh, assets)),
+            (Shape::HeightField(field), _) => Self::HeightField(HeightField::from_shape(field, assets)),
+            (_, Some(mesh)) => Self::Mesh(Mesh::from_mesh(mesh, assets)),
             (_, None) => Self::ClosedForm(shape.clone()),
         }
     }
@@ -50,20 +50,20 @@ impl Solid {
 
     /// The nearest surface at a distance from 0 to `limit`, both included, for a single ray.
     #[cfg(test)]
-    pub(crate) fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection> {
+    pub(crate) fn intersect(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<Intersection> {
         match self {
             Self::ClosedForm(shape) => shape.intersect(ray, limit),
-            Self::Mesh(shape) => shape.touch(ray, limit, stack),
-            Self::HeightField(shape) => shape.touch(ray, limit, stack),
+            Self::Mesh(shape) => shape.intersect(ray, limit, stack),
+            Self::HeightField(shape) => shape.intersect(ray, limit, stack),
         }
     }
 
     /// Runs `work` on the concrete shape.
     #[inline(always)]
-    pub(crate) fn with<W: ForShape>(&self, work: W) {
+    pub(crate) fn with<W: ShapeVisitor>(&self, work: W) {
         match self {
             Self::ClosedForm(shape) => {
-                shape.with_closed_form(OfClosedForm(work));
+                shape.with_closed_form(ClosedFormAdapter(work));
             }
             Self::Mesh(shape) => work.run(shape),
             Self::HeightField(shape) => work.run(shape),
@@ -72,13 +72,13 @@ impl Solid {
 }
 
 /// Adapter for work on a shape that has a closed form.
-struct OfClosedForm<W>(W);
+struct ClosedFormAdapter<W>(W);
 
-impl<W: ForShape> ForClosedForm for OfClosedForm<W> {
+impl<W: ShapeVisitor> ClosedFormVisitor for ClosedFormAdapter<W> {
     type Output = ();
 
     #[inline(always)]
-    fn run<T: ClosedForm>(self, shape: &T) {
+    fn visit<T: ClosedForm>(self, shape: &T) {
         self.0.run(shape);
     }
 }

@@ -1,46 +1,51 @@
 //! The trait of shapes that rays hit.
 
-use crate::geometry::bvh::Stack;
+use crate::geometry::bvh::TraversalStack;
 use crate::geometry::packet::{Packet, WIDTH};
 use crate::simd::Simd;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::{ClosedForm, Intersection};
 
 /// Intersections of the rays of a packet, one per lane.
-pub(crate) type Touches = [Option<Intersection>; WIDTH];
+pub(crate) type Intersections = [Option<Intersection>; WIDTH];
 
 /// Ray intersection of a shape.
 pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit`, both included.
-    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection>;
+    fn intersect(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<Intersection>;
 
-    /// Packet version of `touch`: the same bits for every ray, up to its limit. Overwrites `touches` in all lanes with
+    /// Packet version of `intersect`: the same bits for every ray, up to its limit. Overwrites `touches` in all lanes with
     /// a ray.
     #[inline(always)]
-    fn touch_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches)
+    fn intersect_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut TraversalStack, touches: &mut Intersections)
     where
         Self: Sized,
     {
-        touch_each(self, packet, stack, touches);
+        intersect_each(self, packet, stack, touches);
     }
 }
 
 impl<T: ClosedForm> RayShape for T {
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Intersection> {
+    fn intersect(&self, ray: &Ray, limit: f64, _stack: &mut TraversalStack) -> Option<Intersection> {
         self.intersect(ray, limit)
     }
 }
 
 /// Intersects one ray after the other.
 #[inline(always)]
-pub(super) fn touch_each(shape: &impl RayShape, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
-    for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| packet.has(*k)) {
-        *touch = shape.touch(&packet.ray(k), packet.limit(k), stack);
+pub(super) fn intersect_each(
+    shape: &impl RayShape,
+    packet: &Packet,
+    stack: &mut TraversalStack,
+    touches: &mut Intersections,
+) {
+    for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| packet.is_active(*k)) {
+        *touch = shape.intersect(&packet.ray(k), packet.limit(k), stack);
     }
 }
 
 /// Work compiled separately for each kind of shape.
-pub(crate) trait ForShape {
+pub(crate) trait ShapeVisitor {
     fn run<T: RayShape>(self, shape: &T);
 }

@@ -2,19 +2,19 @@
 
 use super::packets::{Compare, targets};
 use super::trees::soup;
-use super::{Dice, bits};
-use crate::geometry::bvh::Stack;
+use super::{TestRng, bits};
+use crate::geometry::bvh::TraversalStack;
 use crate::geometry::packet::{Packet, WIDTH};
 use crate::geometry::shape::mesh::columns::{Columns, are_steep};
-use crate::geometry::shape::mesh::{Mesh, MeshTree};
-use crate::geometry::shape::{ForShape, RayShape, Touches};
-use crate::geometry::triangle::{Shear, ShearPacket, Triangle};
+use crate::geometry::shape::mesh::{Mesh, MeshBvh};
+use crate::geometry::shape::{Intersections, RayShape, ShapeVisitor};
+use crate::geometry::triangle::{ShearedPacket, ShearedRay, Triangle};
 use crate::geometry::world::{RayHit, RayWorld};
-use crate::simd::{Scalar, at_level, levels};
+use crate::simd::{Scalar, all_levels, at_level};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
-use kinetoscope_scene::vector::{along, cross, dot, scale, sub, to_f64, unit};
+use kinetoscope_scene::vector::{add_scaled, cross, dot, normalize, scale, sub, to_f64};
 use kinetoscope_scene::{PoseF64, pose};
 use std::sync::Arc;
 
@@ -33,24 +33,24 @@ struct Count {
 }
 
 /// Casts packets through the mesh and through given columns, at every SIMD level, and each ray alone.
-fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_distance: f64) -> Count {
-    let mesh = Mesh::of_tree(Arc::clone(tree));
+fn compare(tree: &Arc<MeshBvh>, columns: Option<&Columns>, rays: &[Ray], max_distance: f64) -> Count {
+    let mesh = Mesh::from_bvh(Arc::clone(tree));
     let mut count = Count { packets: rays.len().div_ceil(WIDTH), ..Count::default() };
     Compare { rays, max_distance, what: "steep", hits: &mut count.hits }.run(&mesh);
     let Some(columns) = columns else { return count };
     for rays in rays.chunks(WIDTH) {
-        let packet = Packet::of(rays, max_distance);
-        for (index, level) in levels().into_iter().enumerate() {
-            let mut touches: Touches = [None; WIDTH];
-            let by_columns = at_level!(level, s => match ShearPacket::new(s, &packet) {
+        let packet = Packet::from_rays(rays, max_distance);
+        for (index, level) in all_levels().into_iter().enumerate() {
+            let mut touches: Intersections = [None; WIDTH];
+            let by_columns = at_level!(level, s => match ShearedPacket::new(s, &packet) {
                 Some(shear) if are_steep(s, &shear) && columns.axes() == shear.axes() => {
-                    columns.touch_packet(s, tree, &packet, &shear, &mut touches)
+                    columns.intersect_packet(s, tree, &packet, &shear, &mut touches)
                 }
                 _ => false,
             });
             if by_columns {
                 count.columns += usize::from(index == 0);
-                let alone = |ray: &Ray| mesh.touch(ray, max_distance, &mut Stack::default());
+                let alone = |ray: &Ray| mesh.intersect(ray, max_distance, &mut TraversalStack::default());
                 let alone = |k: usize| rays.get(k).filter(|ray| ray.is_finite()).and_then(alone);
                 count.wrong += (0..WIDTH).filter(|&k| bits(&alone(k)) != bits(&touches[k])).count();
             }
@@ -62,31 +62,31 @@ fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_di
 /// Packets of steep rays towards about `at`, from above and from below: along z on a grid of eighths, with exact hits
 /// of edges and corners; along z anywhere; parallel ones; fans to points of the grid; from within; and some that are
 /// not steep.
-fn steep(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
+fn steep(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for kind in 0..240 {
         let sign = if kind % 2 == 0 { -1.0 } else { 1.0 };
         let eighth = |x: f64| (8.0 * x).round() / 8.0;
         let first = dice.point(1.0);
-        let slope = [0; 2].map(|_| dice.number(-0.125, 0.125) * if kind % 12 == 2 { 2.0 } else { 0.9 });
-        let slanted = unit([slope[0], slope[1], sign]).unwrap();
-        let far = if kind % 5 == 0 { 0.2 } else { 10f64.powf(dice.number(0.3, 2.0)) };
+        let slope = [0; 2].map(|_| dice.uniform(-0.125, 0.125) * if kind % 12 == 2 { 2.0 } else { 0.9 });
+        let slanted = normalize([slope[0], slope[1], sign]).unwrap();
+        let far = if kind % 5 == 0 { 0.2 } else { 10f64.powf(dice.uniform(0.3, 2.0)) };
         for k in 0..WIDTH {
             let grid = [eighth(first[0]) + 0.125 * (k % 4) as f64, eighth(first[1]) + 0.125 * (k / 4) as f64];
-            let near = along(first, 0.3, dice.point(1.0));
+            let near = add_scaled(first, 0.3, dice.point(1.0));
             let (to, direction) = match kind % 6 {
                 0 => ([grid[0], grid[1], 0.0], [0.0, 0.0, sign]),
                 1 => (near, [0.0, -0.0, sign]),
                 2 => (near, slanted),
                 3 => ([grid[0], grid[1], eighth(first[2])], slanted),
-                4 => (near, unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), sign]).unwrap()),
+                4 => (near, normalize([dice.uniform(-0.1, 0.1), dice.uniform(-0.1, 0.1), sign]).unwrap()),
                 _ => {
                     let from = [first[0], first[1], -9.0 * sign];
-                    ([grid[0], grid[1], 0.0], unit(sub([grid[0], grid[1], 0.0], from)).unwrap())
+                    ([grid[0], grid[1], 0.0], normalize(sub([grid[0], grid[1], 0.0], from)).unwrap())
                 }
             };
-            let mut ray = Ray { origin: along(along(to, -far, direction), 1.0, at), direction };
-            if dice.number(0.0, 1.0) < 0.01 {
+            let mut ray = Ray { origin: add_scaled(add_scaled(to, -far, direction), 1.0, at), direction };
+            if dice.uniform(0.0, 1.0) < 0.01 {
                 ray.origin[k % 3] = f64::NAN;
             }
             rays.push(ray);
@@ -96,9 +96,9 @@ fn steep(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
 }
 
 /// A height field of triangles: cells of an eighth around the origin, two triangles each, heights in sixty-fourths.
-fn sheet(dice: &mut Dice, side: usize, height: f64) -> Vec<Triangle> {
+fn sheet(dice: &mut TestRng, side: usize, height: f64) -> Vec<Triangle> {
     let heights: Vec<f32> =
-        (0..side * side).map(|_| (height + f64::from(dice.number(0.0, 16.0) as u8) / 64.0) as f32).collect();
+        (0..side * side).map(|_| (height + f64::from(dice.uniform(0.0, 16.0) as u8) / 64.0) as f32).collect();
     let half = (side - 1) as f32 / 16.0;
     let point = |i: usize, j: usize| [i as f32 / 8.0 - half, j as f32 / 8.0 - half, heights[j * side + i]];
     let cell = |i: usize, j: usize| {
@@ -110,7 +110,7 @@ fn sheet(dice: &mut Dice, side: usize, height: f64) -> Vec<Triangle> {
 }
 
 /// Permutes the coordinates x, y, z to the given axes.
-fn turned<T: Copy>(p: [T; 3], axes: [usize; 3]) -> [T; 3] {
+fn permuted<T: Copy>(p: [T; 3], axes: [usize; 3]) -> [T; 3] {
     let mut to = p;
     axes.into_iter().zip(p).for_each(|(axis, x)| to[axis] = x);
     to
@@ -122,7 +122,7 @@ fn moved(triangles: &[Triangle], by: f32) -> Vec<Triangle> {
 
 #[test]
 fn steep_rays() {
-    let mut dice = Dice(51);
+    let mut dice = TestRng(51);
     let ground = sheet(&mut dice, 25, 0.0);
     // All triangles twice: of equally near ones the first counts.
     let twice: Vec<Triangle> = ground.iter().chain(&ground).copied().collect();
@@ -143,11 +143,11 @@ fn steep_rays() {
         for (last, max_distance) in [(2, f64::INFINITY), (2, 3.0), (2, 0.5), (0, f64::INFINITY), (1, 3.0)] {
             // The same mesh with other axes as the vertical one.
             let axes = [(last + 1) % 3, (last + 2) % 3, last];
-            let tree: Vec<_> = triangles.iter().map(|t| t.map(|p| turned(p, axes))).collect();
-            let tree = Arc::new(MeshTree::of_triangles(&tree));
+            let tree: Vec<_> = triangles.iter().map(|t| t.map(|p| permuted(p, axes))).collect();
+            let tree = Arc::new(MeshBvh::from_triangles(&tree));
             let rays: Vec<Ray> = steep(&mut dice, [at; 3])
                 .iter()
-                .map(|ray| Ray { origin: turned(ray.origin, axes), direction: turned(ray.direction, axes) })
+                .map(|ray| Ray { origin: permuted(ray.origin, axes), direction: permuted(ray.direction, axes) })
                 .collect();
             let count = compare(&tree, tree.columns(axes), &rays, max_distance);
             assert_eq!(count.wrong, 0, "{what}: {count:?}");
@@ -165,19 +165,19 @@ fn steep_rays() {
 /// and that to the sheet is not. The control: without slack, some hits are lost.
 #[test]
 fn slack() {
-    let mut dice = Dice(52);
+    let mut dice = TestRng(52);
     let flat = sheet(&mut dice, 33, 0.0);
     let flat: Vec<Triangle> = flat.iter().map(|t| t.map(|p| [p[0] + 2.5, p[1] + 2.5, 1e-30 * p[2]])).collect();
-    let tree = Arc::new(MeshTree::of_triangles(&flat));
+    let tree = Arc::new(MeshBvh::from_triangles(&flat));
     let columns = Columns::with_size(tree.triangles(), &[[0.5, 0.5, 0.0], [4.5, 4.5, 1e-30]], ABOVE, [32, 32]).unwrap();
     let rays: Vec<Ray> = (0..12_000)
         .map(|k| {
             let corner = to_f64(tree.triangles()[k % 2048][k % 3]);
-            let slope = dice.number(0.05, 0.12);
-            let direction = unit([slope, dice.number(-0.01, 0.01), -1.0]).unwrap();
-            let across = 8192.0 + corner[0] * dice.number(0.0, 1.0);
-            let mut origin = along(corner, -across / direction[0], direction);
-            origin[0] += dice.number(-1e-12, 1e-12);
+            let slope = dice.uniform(0.05, 0.12);
+            let direction = normalize([slope, dice.uniform(-0.01, 0.01), -1.0]).unwrap();
+            let across = 8192.0 + corner[0] * dice.uniform(0.0, 1.0);
+            let mut origin = add_scaled(corner, -across / direction[0], direction);
+            origin[0] += dice.uniform(-1e-12, 1e-12);
             Ray { origin, direction }
         })
         .collect();
@@ -192,13 +192,13 @@ fn slack() {
 /// that the BVH's boxes hide. The control: from closer, columns are used.
 #[test]
 fn far_rays() {
-    let mut dice = Dice(57);
-    let tree = Arc::new(MeshTree::of_triangles(&sheet(&mut dice, 25, 0.0)));
+    let mut dice = TestRng(57);
+    let tree = Arc::new(MeshBvh::from_triangles(&sheet(&mut dice, 25, 0.0)));
     let mut count = |sizes: f64| {
         // The sheet is 3 m wide.
         let ray = |_| {
-            let direction = unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), -1.0]).unwrap();
-            Ray { origin: along(dice.point(1.6), -3.0 * sizes, direction), direction }
+            let direction = normalize([dice.uniform(-0.1, 0.1), dice.uniform(-0.1, 0.1), -1.0]).unwrap();
+            Ray { origin: add_scaled(dice.point(1.6), -3.0 * sizes, direction), direction }
         };
         let rays: Vec<Ray> = (0..16_000).map(ray).collect();
         compare(&tree, tree.columns(ABOVE), &rays, f64::INFINITY)
@@ -215,7 +215,7 @@ fn far_rays() {
 /// Columns exist only for meshes that are spread out, with triangles of similar size.
 #[test]
 fn meshes_without_columns() {
-    let mut dice = Dice(53);
+    let mut dice = TestRng(53);
     let ground = sheet(&mut dice, 25, 0.0);
     let wall: Vec<Triangle> = ground.iter().map(|t| t.map(|p| [0.5, p[0], p[1]])).collect();
     let all = [[-1.5, -1.5, 0.0], [1.5, -1.5, 0.0], [1.5, 1.5, 0.0]];
@@ -228,17 +228,17 @@ fn meshes_without_columns() {
         ("a wall, without extent along x", &wall, false),
         ("of very different sizes", &mixed, false),
     ] {
-        assert_eq!(MeshTree::of_triangles(triangles).columns(ABOVE).is_some(), expected, "{what}");
+        assert_eq!(MeshBvh::from_triangles(triangles).columns(ABOVE).is_some(), expected, "{what}");
     }
 }
 
 /// A packet whose columns hold too many triangles uses the BVH.
 #[test]
 fn crowded_columns() {
-    let mut dice = Dice(54);
+    let mut dice = TestRng(54);
     let mut triangles = sheet(&mut dice, 33, 0.0);
     triangles.extend(soup(&mut dice, 900, [0.0; 3]).iter().map(|t| t.map(|p| p.map(|x| 0.05 * x))));
-    let tree = Arc::new(MeshTree::of_triangles(&triangles));
+    let tree = Arc::new(MeshBvh::from_triangles(&triangles));
     let rays = |x: f64| -> Vec<Ray> {
         let ray = |k: usize| [x + 0.01 * (k % 4) as f64, 0.01 * (k / 4) as f64, 2.0];
         (0..WIDTH).map(|k| Ray { origin: ray(k), direction: [0.0, 0.0, -1.0] }).collect()
@@ -253,25 +253,26 @@ fn crowded_columns() {
 /// are rounded. The control: by the signs of edges alone, as in the paper, some are.
 #[test]
 fn edge_on() {
-    let mut dice = Dice(55);
+    let mut dice = TestRng(55);
     let (mut rays, mut by_signs) = (0, 0);
     for _ in 0..200_000 {
         let triangle: Triangle = [0; 3].map(|_| dice.point(1.0).map(|x| x as f32));
         let [a, b, c] = triangle.map(to_f64);
         let (p, q) = (sub(b, a), sub(c, a));
-        let Some(direction) = unit(along(scale(p, dice.number(-1.0, 1.0)), dice.number(-1.0, 1.0), q)) else {
+        let Some(direction) = normalize(add_scaled(scale(p, dice.uniform(-1.0, 1.0)), dice.uniform(-1.0, 1.0), q))
+        else {
             continue;
         };
-        let Some(beside) = unit(cross(direction, cross(p, q))) else { continue };
+        let Some(beside) = normalize(cross(direction, cross(p, q))) else { continue };
         let [x, y, z] = [a, b, c].map(|p| dot(beside, p));
         let (low, high) = (x.min(y).min(z), x.max(y).max(z));
-        let away = high + (high - low) * dice.number(1.0, 3.0) - x;
-        let origin = along(along(a, away, beside), -dice.number(0.0, 5.0), direction);
+        let away = high + (high - low) * dice.uniform(1.0, 3.0) - x;
+        let origin = add_scaled(add_scaled(a, away, beside), -dice.uniform(0.0, 5.0), direction);
         let ray = Ray { origin, direction };
         rays += 1;
-        assert_eq!(Shear::new(&ray).distance(&triangle), None, "{ray:?} {triangle:?}");
-        let packet = Packet::of(&[ray], f64::INFINITY);
-        let together = ShearPacket::new(Scalar, &packet).unwrap().distances(&triangle);
+        assert_eq!(ShearedRay::new(&ray).distance(&triangle), None, "{ray:?} {triangle:?}");
+        let packet = Packet::from_rays(&[ray], f64::INFINITY);
+        let together = ShearedPacket::new(Scalar, &packet).unwrap().distances(&triangle);
         assert!(together.is_none_or(|(_, inside)| inside.to_bitmask() == 0), "{ray:?} {triangle:?}");
         by_signs += usize::from(inside_by_signs(&ray, &triangle));
     }
@@ -279,7 +280,7 @@ fn edge_on() {
 }
 
 fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
-    let shear = ShearPacket::new(Scalar, &Packet::of(&[*ray], f64::INFINITY)).unwrap();
+    let shear = ShearedPacket::new(Scalar, &Packet::from_rays(&[*ray], f64::INFINITY)).unwrap();
     let ([i, j, k], o) = (shear.axes(), ray.origin);
     let by = shear.slopes().map(|x| x.array()[0]);
     let [a, b, c] = triangle.map(to_f64).map(|p| {
@@ -294,12 +295,14 @@ fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
 /// Height scanners over and beside fixed and moving meshes: whole scans give the same hits as every ray alone.
 #[test]
 fn scans() {
-    let mut dice = Dice(56);
+    let mut dice = TestRng(56);
     let mesh = |triangles: &[Triangle]| {
         let positions = triangles.iter().flatten().copied().collect();
         let triangles = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let mesh = TriMesh { positions, triangles, ..TriMesh::default() };
-        Shape::from(kinetoscope_scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+        Shape::from(kinetoscope_scene::shape::Mesh {
+            mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)),
+        })
     };
     let (ground, heap) = (mesh(&sheet(&mut dice, 40, 0.0)), mesh(&soup(&mut dice, 400, [0.0; 3])));
     let targets = targets(&[ground.clone(), ground, heap.clone(), heap], 4, |k| k < 2);
@@ -315,11 +318,11 @@ fn scans() {
         let poses = [PoseF64::IDENTITY, PoseF64::IDENTITY, placed(1.0), placed(1.0)];
         let poses = if round % 3 == 0 { poses } else { [PoseF64::IDENTITY, placed(0.3), poses[2], poses[3]] };
         let roll = if round % 2 == 0 { 0.0 } else { 0.4 };
-        let yaw = dice.number(-3.0, 3.0);
-        let at = pose::from_xyz_rpy([dice.number(-2.0, 2.0), dice.number(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
-        let mut rays: Vec<Ray> = pattern.iter().map(|ray| ray.mapped_by(&PoseF64::from(&at))).collect();
+        let yaw = dice.uniform(-3.0, 3.0);
+        let at = pose::from_xyz_rpy([dice.uniform(-2.0, 2.0), dice.uniform(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
+        let mut rays: Vec<Ray> = pattern.iter().map(|ray| ray.transformed_by(&PoseF64::from(&at))).collect();
         rays[round * 7].origin[1] = f64::NAN;
-        for level in levels() {
+        for level in all_levels() {
             let mut world = RayWorld::with_level(&targets, level);
             world.place(&poses);
             let mut together = vec![RayHit::MISS; rays.len()];

@@ -1,20 +1,20 @@
 //! Packets find the same hits as single rays, to the bit, on every instruction set.
 
 use super::trees::soup;
-use super::{Dice, bits};
-use crate::geometry::assets::{Assets, RayAssets};
-use crate::geometry::bvh::{Beam, Stack, Walked};
+use super::{TestRng, bits};
+use crate::geometry::assets::{AssetCache, RayAssetCache};
+use crate::geometry::bvh::{Beam, Traversal, TraversalStack};
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::mesh::{Mesh, MeshTree};
-use crate::geometry::shape::{ForShape, RayShape, Solid};
-use crate::geometry::triangle::{ShearPacket, Triangle};
+use crate::geometry::shape::mesh::{Mesh, MeshBvh};
+use crate::geometry::shape::{RayGeometry, RayShape, ShapeVisitor};
+use crate::geometry::triangle::{ShearedPacket, Triangle};
 use crate::geometry::world::{RayHit, RayTargets, RayWorld};
-use crate::simd::{at_level, levels};
+use crate::simd::{all_levels, at_level};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere};
-use kinetoscope_scene::vector::{along, unit};
+use kinetoscope_scene::vector::{add_scaled, normalize};
 use kinetoscope_scene::{Instance, Material, PoseF64, RenderScene};
 use std::sync::Arc;
 
@@ -26,19 +26,19 @@ pub(super) struct Compare<'a> {
     pub(super) hits: &'a mut usize,
 }
 
-impl ForShape for Compare<'_> {
+impl ShapeVisitor for Compare<'_> {
     fn run<T: RayShape>(self, shape: &T) {
-        let mut stack = Stack::default();
+        let mut stack = TraversalStack::default();
         for (index, rays) in self.rays.chunks(WIDTH).enumerate() {
-            let packet = Packet::of(rays, self.max_distance);
+            let packet = Packet::from_rays(rays, self.max_distance);
             let alone: [Option<Intersection>; WIDTH] = std::array::from_fn(|k| {
                 let ray = rays.get(k).filter(|ray| ray.is_finite())?;
-                shape.touch(ray, self.max_distance, &mut stack)
+                shape.intersect(ray, self.max_distance, &mut stack)
             });
             *self.hits += alone.iter().flatten().count();
-            for level in levels() {
+            for level in all_levels() {
                 let mut touches = [None; WIDTH];
-                at_level!(level, s => shape.touch_packet(s, &packet, &mut stack, &mut touches));
+                at_level!(level, s => shape.intersect_packet(s, &packet, &mut stack, &mut touches));
                 for k in 0..WIDTH {
                     let (one, all) = (bits(&alone[k]), bits(&touches[k]));
                     assert_eq!(one, all, "{}, packet {index}, lane {k}, {level:?}: {:?}", self.what, rays.get(k));
@@ -49,10 +49,10 @@ impl ForShape for Compare<'_> {
 }
 
 /// Packets of every kind: parallel, from one point, crossing, and in all directions.
-fn packets(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
+fn packets(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for kind in 0..160 {
-        let spread = 10f64.powf(dice.number(-3.0, 0.0));
+        let spread = 10f64.powf(dice.uniform(-3.0, 0.0));
         let first = match kind % 5 {
             // Along an axis, on a grid of eighths: exact hits of edges and corners.
             0 | 1 => {
@@ -60,7 +60,7 @@ fn packets(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
                 let sign = if kind % 2 == 0 { 1.0 } else { -1.0 };
                 let direction = [0, 1, 2].map(|k| if k == axis { sign } else { 0.0 });
                 let origin = dice.point(1.0).map(|x| (8.0 * x).round() / 8.0);
-                Ray { origin: along(origin, -3.0, direction), direction }
+                Ray { origin: add_scaled(origin, -3.0, direction), direction }
             }
             _ => dice.ray(if kind % 2 == 0 { 20.0 } else { 1.5 }, 1.0),
         };
@@ -70,11 +70,11 @@ fn packets(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
             let mut ray = first;
             match kind % 5 {
                 0 => ray.origin = [0, 1, 2].map(|a| first.origin[a] + 0.125 * ((k >> (a % 2)) & 1) as f64),
-                1 | 2 => ray.origin = along(first.origin, spread, dice.point(1.0)),
-                3 => ray.direction = unit(along(first.direction, spread, dice.point(1.0))).unwrap(),
+                1 | 2 => ray.origin = add_scaled(first.origin, spread, dice.point(1.0)),
+                3 => ray.direction = normalize(add_scaled(first.direction, spread, dice.point(1.0))).unwrap(),
                 _ => ray = dice.ray(5.0, 1.0),
             }
-            if dice.number(0.0, 1.0) < 0.01 {
+            if dice.uniform(0.0, 1.0) < 0.01 {
                 ray.origin[k % 3] = f64::NAN;
             }
             ray.origin = [0, 1, 2].map(|a| ray.origin[a] + at[a]);
@@ -87,8 +87,8 @@ fn packets(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
     rays
 }
 
-fn terrain(side: usize, dice: &mut Dice) -> HeightField {
-    let elevation: Vec<f32> = (0..side * side).map(|_| (dice.number(0.0, 64.0) as u32) as f32 / 64.0).collect();
+fn terrain(side: usize, dice: &mut TestRng) -> HeightField {
+    let elevation: Vec<f32> = (0..side * side).map(|_| (dice.uniform(0.0, 64.0) as u32) as f32 / 64.0).collect();
     let half = (side - 1) as f64 / 16.0;
     HeightField::new([half, half, 0.5, 0.25], side, side, &elevation).unwrap()
 }
@@ -101,7 +101,7 @@ fn sheet(field: &HeightField) -> Vec<Triangle> {
 
 #[test]
 fn triangles() {
-    let mut dice = Dice(31);
+    let mut dice = TestRng(31);
     let sheet = sheet(&terrain(33, &mut dice));
     // All triangles twice: of equally near ones the first counts.
     let twice: Vec<Triangle> = sheet.iter().chain(&sheet).copied().collect();
@@ -115,7 +115,7 @@ fn triangles() {
         ("two sheets", twice, 0.0),
         ("nothing", vec![], 0.0),
     ] {
-        let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(&triangles)));
+        let mesh = Mesh::from_bvh(Arc::new(MeshBvh::from_triangles(&triangles)));
         for max_distance in [f64::INFINITY, 3.0, 0.5] {
             let rays = packets(&mut dice, [at; 3]);
             Compare { rays: &rays, max_distance, what, hits: &mut hits }.run(&mesh);
@@ -127,11 +127,11 @@ fn triangles() {
 /// A limit equal to the distance includes the hit, the next smaller number does not, in packets and alone.
 #[test]
 fn limits() {
-    let mut dice = Dice(32);
-    let mesh = Mesh::of_tree(Arc::new(MeshTree::of_triangles(&sheet(&terrain(17, &mut dice)))));
+    let mut dice = TestRng(32);
+    let mesh = Mesh::from_bvh(Arc::new(MeshBvh::from_triangles(&sheet(&terrain(17, &mut dice)))));
     let (mut hits, mut lost) = (0, 0);
     for rays in packets(&mut dice, [0.0; 3]).chunks(WIDTH) {
-        let Some(touch) = mesh.touch(&rays[0], f64::INFINITY, &mut Stack::default()) else { continue };
+        let Some(touch) = mesh.intersect(&rays[0], f64::INFINITY, &mut TraversalStack::default()) else { continue };
         for max_distance in [touch.t, touch.t.next_down()] {
             let before = hits;
             Compare { rays, max_distance, what: "a limit", hits: &mut hits }.run(&mesh);
@@ -143,11 +143,11 @@ fn limits() {
 
 #[test]
 fn height_fields() {
-    let mut dice = Dice(33);
+    let mut dice = TestRng(33);
     let mut hits = 0;
     for side in [2, 3, 17, 40] {
         let field = terrain(side, &mut dice);
-        let solid = Solid::of(&Shape::from(field), &mut Assets::default());
+        let solid = RayGeometry::from_shape(&Shape::from(field), &mut AssetCache::default());
         let mut rays = packets(&mut dice, [0.0; 3]);
         // Nearly straight down from above, some at points and along edges of the grid.
         for k in 0..200 * WIDTH {
@@ -155,10 +155,10 @@ fn height_fields() {
             if (k / WIDTH).is_multiple_of(3) {
                 ray.origin = ray.origin.map(|x| (8.0 * x).round() / 8.0);
             }
-            ray.origin[2] = if k.is_multiple_of(11) { dice.number(-0.5, 1.0) } else { 3.0 };
+            ray.origin[2] = if k.is_multiple_of(11) { dice.uniform(-0.5, 1.0) } else { 3.0 };
             if !(k / WIDTH).is_multiple_of(4) {
                 let [x, y, _] = dice.point(0.3);
-                ray.direction = unit([x, if k.is_multiple_of(13) { 0.0 } else { y }, -1.0]).unwrap();
+                ray.direction = normalize([x, if k.is_multiple_of(13) { 0.0 } else { y }, -1.0]).unwrap();
             }
             rays.push(ray);
         }
@@ -173,33 +173,33 @@ fn height_fields() {
 /// The control of the tests above: neighbors of a height scanner traverse the BVH together.
 #[test]
 fn beams() {
-    let mut dice = Dice(34);
-    let tree = MeshTree::of_triangles(&sheet(&terrain(65, &mut dice)));
+    let mut dice = TestRng(34);
+    let tree = MeshBvh::from_triangles(&sheet(&terrain(65, &mut dice)));
     let origin = |k: usize| [0.03 + 0.125 * (k % 4) as f64, 0.125 * (k / 4) as f64, 20.0];
     let rays: Vec<Ray> = (0..WIDTH).map(|k| Ray { origin: origin(k), direction: [0.0, 0.0, -1.0] }).collect();
-    let packet = Packet::of(&rays, f64::INFINITY);
-    for level in levels() {
+    let packet = Packet::from_rays(&rays, f64::INFINITY);
+    for level in all_levels() {
         at_level!(level, s => {
-            let shear = ShearPacket::new(s, &packet).unwrap();
-            let beam = Beam::around(s, &packet, &shear, tree.bvh()).unwrap();
+            let shear = ShearedPacket::new(s, &packet).unwrap();
+            let beam = Beam::enclosing(s, &packet, &shear, tree.bvh()).unwrap();
             let mut met = 0;
             let mut walk = |budget| {
                 let limits = packet.limits(s);
-                tree.bvh().walk_beam(&beam, limits, budget, &mut Stack::default(), |leaf| {
+                tree.bvh().traverse_beam(&beam, limits, budget, &mut TraversalStack::default(), |leaf| {
                     met += leaf.len();
                     None
                 })
             };
             // Five by three cells are below the rays, with thirty of 8192 triangles, but not in leaves of their own.
-            assert_eq!(walk(128), Walked::All);
-            assert_eq!(walk(8), Walked::Part, "the control");
+            assert_eq!(walk(128), Traversal::Complete);
+            assert_eq!(walk(8), Traversal::OverBudget, "the control");
             assert!(met >= 30, "{met}");
         });
     }
 }
 
 /// One shape of each kind.
-fn shapes(dice: &mut Dice) -> Vec<Shape> {
+fn shapes(dice: &mut TestRng) -> Vec<Shape> {
     let field = terrain(17, dice);
     vec![
         Plane { half: [0.4, 0.0] }.into(),
@@ -216,10 +216,10 @@ fn shapes(dice: &mut Dice) -> Vec<Shape> {
 pub(super) fn targets(shapes: &[Shape], count: usize, fixed: impl Fn(usize) -> bool) -> Arc<RayTargets> {
     let instance = |k: usize| {
         let instance = Instance::new(shapes[k % shapes.len()].clone(), Material::default(), k as i32 + 1);
-        if fixed(k) { instance.fixed() } else { instance }
+        if fixed(k) { instance.into_fixed() } else { instance }
     };
     let scene = RenderScene::new((0..count).map(instance).collect()).unwrap();
-    Arc::new(RayTargets::new(&scene, 0..count, &RayAssets::default()))
+    Arc::new(RayTargets::new(&scene, 0..count, &RayAssetCache::default()))
 }
 
 fn cast(world: &mut RayWorld, poses: &[PoseF64], rays: &[Ray]) -> Vec<RayHit> {
@@ -233,7 +233,7 @@ fn cast(world: &mut RayWorld, poses: &[PoseF64], rays: &[Ray]) -> Vec<RayHit> {
 /// instance.
 #[test]
 fn world() {
-    let mut dice = Dice(35);
+    let mut dice = TestRng(35);
     let shapes = shapes(&mut dice);
     let count = 5 * shapes.len();
     let poses: Vec<PoseF64> = (0..count)
@@ -244,14 +244,14 @@ fn world() {
         })
         .collect();
     let rays = packets(&mut dice, [0.0; 3]);
-    let mut assets = Assets::default();
-    let solids: Vec<Solid> = shapes.iter().map(|shape| Solid::of(shape, &mut assets)).collect();
+    let mut assets = AssetCache::default();
+    let solids: Vec<RayGeometry> = shapes.iter().map(|shape| RayGeometry::from_shape(shape, &mut assets)).collect();
     let expected: Vec<Option<(u64, u32)>> = rays
         .iter()
         .map(|ray| {
             let touch = |k: usize| {
-                let local = ray.seen_from(&poses[k]);
-                let touch = solids[k % solids.len()].touch(&local, 50.0, &mut Stack::default())?;
+                let local = ray.inverse_transformed_by(&poses[k]);
+                let touch = solids[k % solids.len()].intersect(&local, 50.0, &mut TraversalStack::default())?;
                 Some((touch.t, k))
             };
             let all = (0..count).filter(|_| ray.is_finite()).filter_map(touch);
@@ -264,7 +264,7 @@ fn world() {
     let mut first: Option<Vec<RayHit>> = None;
     for fixed in 0..3 {
         let targets = targets(&shapes, count, |k| fixed == 2 || fixed == 1 && k.is_multiple_of(2));
-        for level in levels() {
+        for level in all_levels() {
             let mut world = RayWorld::with_level(&targets, level);
             let hits = cast(&mut world, &poses, &rays);
             for (k, (hit, expected)) in hits.iter().zip(&expected).enumerate() {
@@ -291,7 +291,7 @@ fn world() {
 /// Fixed instances are placed again when they move; non-finite poses and rays hit nothing.
 #[test]
 fn placing() {
-    let mut dice = Dice(23);
+    let mut dice = TestRng(23);
     let shapes = shapes(&mut dice);
     let fixed = targets(&shapes, 16, |_| true);
     assert_eq!((fixed.len(), fixed.fixed_count()), (16, 16));

@@ -1,13 +1,13 @@
 //! Shapes compared with closed forms: hit points lie on the surface.
 
-use super::Dice;
+use super::TestRng;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
-use kinetoscope_scene::vector::{along, dot};
+use kinetoscope_scene::vector::{add_scaled, dot};
 
 fn touch(shape: impl Into<Shape>, origin: [f64; 3], direction: [f64; 3]) -> Option<(f64, [f64; 3])> {
-    let direction = kinetoscope_scene::vector::unit(direction).unwrap();
+    let direction = kinetoscope_scene::vector::normalize(direction).unwrap();
     shape.into().intersect(&Ray { origin, direction }, f64::INFINITY).map(|t| (t.t, t.normal))
 }
 
@@ -46,7 +46,7 @@ fn solids() -> Vec<Shape> {
 /// is the gradient of the distance.
 #[test]
 fn surfaces() {
-    let mut dice = Dice(1);
+    let mut dice = TestRng(1);
     for shape in solids() {
         let (name, mut hits, mut worst) = (shape.name(), 0, 0.0f64);
         for k in 0..20_000 {
@@ -67,7 +67,8 @@ fn surfaces() {
             let h = 1e-6;
             let slope = [0, 1, 2].map(|axis| {
                 let by = [0, 1, 2].map(|k| if k == axis { h } else { 0.0 });
-                (outside(&shape, along(ray.at(t), 1.0, by)) - outside(&shape, along(ray.at(t), -1.0, by))) / (2.0 * h)
+                (outside(&shape, add_scaled(ray.at(t), 1.0, by)) - outside(&shape, add_scaled(ray.at(t), -1.0, by)))
+                    / (2.0 * h)
             });
             // At an edge the slope is that of either face.
             let facing = dot(normal, slope).abs() / dot(slope, slope).sqrt();

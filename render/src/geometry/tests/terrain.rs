@@ -1,16 +1,16 @@
 //! The walk over a grid finds the same hits as brute force over the triangles of the same field.
 
-use super::Dice;
+use super::TestRng;
 use super::trees::nearest;
-use crate::geometry::assets::Assets;
-use crate::geometry::bvh::Stack;
-use crate::geometry::shape::Solid;
-use crate::geometry::shape::height_field::Field;
+use crate::geometry::assets::AssetCache;
+use crate::geometry::bvh::TraversalStack;
+use crate::geometry::shape::RayGeometry;
+use crate::geometry::shape::height_field::HeightGrid;
 use crate::geometry::triangle::Triangle;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::HeightField;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::vector::unit;
+use kinetoscope_scene::vector::normalize;
 
 /// The field's triangles. Grid points are a quarter of a meter apart; rounding to single precision is undone.
 fn triangles(field: &HeightField) -> Vec<Triangle> {
@@ -23,24 +23,24 @@ fn triangles(field: &HeightField) -> Vec<Triangle> {
     mesh.triangles().iter().map(|t| t.map(|i| snap(mesh.positions()[i as usize]))).collect()
 }
 
-fn solid(field: &HeightField) -> Solid {
-    Solid::of(&Shape::from(field.clone()), &mut Assets::default())
+fn solid(field: &HeightField) -> RayGeometry {
+    RayGeometry::from_shape(&Shape::from(field.clone()), &mut AssetCache::default())
 }
 
-fn distance(solid: &Solid, ray: &Ray) -> Option<(f64, [f64; 3])> {
-    solid.touch(ray, f64::INFINITY, &mut Stack::default()).map(|t| (t.t, t.normal))
+fn distance(solid: &RayGeometry, ray: &Ray) -> Option<(f64, [f64; 3])> {
+    solid.intersect(ray, f64::INFINITY, &mut TraversalStack::default()).map(|t| (t.t, t.normal))
 }
 
 /// Rough terrain with coordinates that single precision represents exactly, so that triangles match the grid.
-fn rough(dice: &mut Dice, rows: usize, columns: usize) -> HeightField {
-    let elevation: Vec<f32> = (0..rows * columns).map(|_| (dice.number(0.0, 256.0) as u32) as f32 / 256.0).collect();
+fn rough(dice: &mut TestRng, rows: usize, columns: usize) -> HeightField {
+    let elevation: Vec<f32> = (0..rows * columns).map(|_| (dice.uniform(0.0, 256.0) as u32) as f32 / 256.0).collect();
     let half = |n: usize| (n - 1) as f64 / 8.0;
     HeightField::new([half(columns), half(rows), 1.5, 0.5], rows, columns, &elevation).unwrap()
 }
 
 #[test]
 fn brute_force() {
-    let mut dice = Dice(11);
+    let mut dice = TestRng(11);
     for (rows, columns) in [(2, 2), (2, 9), (9, 9), (17, 33), (40, 23)] {
         let field = rough(&mut dice, rows, columns);
         let (walk, triangles) = (solid(&field), triangles(&field));
@@ -54,8 +54,8 @@ fn brute_force() {
                 // Grazing.
                 _ => {
                     let mut ray = dice.ray(6.0, 3.0);
-                    ray.origin[2] = dice.number(0.0, 2.0);
-                    ray.direction = unit([ray.direction[0], ray.direction[1], dice.number(-0.05, 0.05)]).unwrap();
+                    ray.origin[2] = dice.uniform(0.0, 2.0);
+                    ray.direction = normalize([ray.direction[0], ray.direction[1], dice.uniform(-0.05, 0.05)]).unwrap();
                     ray
                 }
             };
@@ -88,9 +88,9 @@ fn brute_force() {
 /// The control: the triangles of other terrain give other distances.
 #[test]
 fn other_terrain() {
-    let (a, b) = (rough(&mut Dice(1), 9, 9), rough(&mut Dice(2), 9, 9));
+    let (a, b) = (rough(&mut TestRng(1), 9, 9), rough(&mut TestRng(2), 9, 9));
     let (walk, triangles) = (solid(&a), triangles(&b));
-    let mut dice = Dice(3);
+    let mut dice = TestRng(3);
     let differ = |ray: &Ray| match (distance(&walk, ray), nearest(ray, &triangles, 0.0)) {
         (Some((t, _)), Some(u)) => (t - u).abs() > 1e-3,
         (t, u) => t.is_some() != u.is_some(),
@@ -103,7 +103,7 @@ fn other_terrain() {
 /// corners.
 #[test]
 fn scans_from_above() {
-    let field = rough(&mut Dice(5), 17, 17);
+    let field = rough(&mut TestRng(5), 17, 17);
     let (walk, e) = (solid(&field), field.elevation().clone());
     for (i, j) in (0..=64usize).flat_map(|j| (0..=64usize).map(move |i| (i, j))) {
         // Quarters of cells of 0.25 m.
@@ -150,8 +150,8 @@ fn long_rays() {
         assert!((t - expected).abs() < 1e-9, "{t} {expected}");
     }
     assert_eq!(hit([-900.0, 190.0, 1.0], [1.0, 0.0, 0.0]), None);
-    let slanted = Ray { origin: [-1212.0, -812.0, 1.5], direction: unit([1.0, 1.0, -1e-4]).unwrap() };
+    let slanted = Ray { origin: [-1212.0, -812.0, 1.5], direction: normalize([1.0, 1.0, -1e-4]).unwrap() };
     let z = slanted.at(hit(slanted.origin, slanted.direction).unwrap())[2];
     assert!((z - z.clamp(1.0, 1.5)).abs() < 1e-12, "on the peak, not on the ground behind it");
-    assert_eq!(Field::new(&field).levels(), 10);
+    assert_eq!(HeightGrid::new(&field).levels(), 10);
 }

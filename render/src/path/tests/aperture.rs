@@ -1,6 +1,6 @@
 //! Depth of field compared with the thin lens equation.
 
-use super::super::eye::Pupil;
+use super::super::eye::ThinLens;
 use super::*;
 use crate::aperture::Aperture;
 use crate::intrinsics::Intrinsics;
@@ -19,7 +19,7 @@ fn ahead() -> View {
 }
 
 /// A glowing square of half side `half` at a depth, facing the camera.
-fn lamp_at(depth: f32, half: f32) -> (RenderScene, [PoseF32; 1]) {
+fn emitter_at(depth: f32, half: f32) -> (RenderScene, [PoseF32; 1]) {
     let glow = Material { emission: 2.0, ..matt(0.5) };
     let scene = dark(vec![Instance::new(Plane { half: [half; 2] }, glow, 1)]);
     // The columns are its axes: its normal is -x.
@@ -29,10 +29,10 @@ fn lamp_at(depth: f32, half: f32) -> (RenderScene, [PoseF32; 1]) {
 
 /// The light of all pixels.
 fn image(scene: &RenderScene, poses: &[PoseF32], aperture: Option<&Aperture>, samples: u32) -> Vec<f64> {
-    let studio = Studio::new(scene, poses, &ahead());
+    let studio = TestScene::new(scene, poses, &ahead());
     let mut paths = studio.paths(samples, 0, 1);
-    paths.eye.pupil = aperture.and_then(Pupil::of);
-    let mut stack = Stack::default();
+    paths.camera_rays.thin_lens = aperture.and_then(ThinLens::from_aperture);
+    let mut stack = TraversalStack::default();
     (0..SIZE * SIZE).map(|k| paths.pixel(Scalar, [k % SIZE, k / SIZE], &mut stack).color[1]).collect()
 }
 
@@ -56,7 +56,7 @@ fn circle_of_confusion() {
         let aperture = Aperture { focal_length: 0.05, f_number, focus_distance: focus.into() };
         let c = f64::from(F) * (0.05 / f_number) * (1.0 / f64::from(focus) - 1.0 / f64::from(depth)).abs();
         assert!((aperture.circle_of_confusion(depth.into(), F.into()) - c).abs() < 1e-9 && (8.0..20.0).contains(&c));
-        let (scene, poses) = lamp_at(depth, half);
+        let (scene, poses) = emitter_at(depth, half);
         let blurred = image(&scene, &poses, Some(&aperture), 2048);
         let (sum, mean, var) = moments(&blurred);
         let side = 2.0 * f64::from(half) * f64::from(F) / f64::from(depth);
@@ -85,7 +85,7 @@ fn circle_of_confusion() {
 
 #[test]
 fn in_focus() {
-    let (scene, poses) = lamp_at(2.0, 0.0333);
+    let (scene, poses) = emitter_at(2.0, 0.0333);
     let sharp = image(&scene, &poses, None, 64);
     let aperture = |f_number| Aperture { focal_length: 0.05, f_number, focus_distance: 2.0 };
     let wide = image(&scene, &poses, Some(&aperture(0.25)), 64);
@@ -96,7 +96,7 @@ fn in_focus() {
     // An aperture without a size equals a pinhole, to the bit.
     assert_eq!(image(&scene, &poses, Some(&aperture(f64::INFINITY)), 64), sharp);
     // A control: at another distance it is blurred.
-    let (scene, poses) = lamp_at(1.8, 0.03);
+    let (scene, poses) = emitter_at(1.8, 0.03);
     assert_ne!(image(&scene, &poses, Some(&aperture(0.25)), 64), image(&scene, &poses, None, 64));
 }
 
@@ -106,20 +106,21 @@ fn fisheye() {
     let pixels = Intrinsics::Pixels { fx: 10.0, fy: 10.0, cx: 14.0, cy: 14.0 }.to_pixels(SIZE, SIZE).unwrap();
     let optics = Optics::new(Lens::from_name("equidistant").unwrap(), pixels).unwrap();
     let rays = LensRays::new(&optics, [SIZE; 2], 1).unwrap();
-    let (scene, poses) = lamp_at(1.0, 0.1);
-    let studio = Studio::new(&scene, &poses, &ahead());
-    let pupil = Pupil::of(&Aperture { focal_length: 0.1, f_number: 1.0, focus_distance: 2.0 });
-    let pose = wide(&PoseF32::IDENTITY);
+    let (scene, poses) = emitter_at(1.0, 0.1);
+    let studio = TestScene::new(&scene, &poses, &ahead());
+    let pupil = ThinLens::from_aperture(&Aperture { focal_length: 0.1, f_number: 1.0, focus_distance: 2.0 });
+    let pose = pose_to_f64(&PoseF32::IDENTITY);
     for at in [[14.3, 13.8], [26.0, 14.0], [5.0, 22.5]] {
-        let eye = Eye { lens: Some(&rays), pupil, ..studio.paths(1, 0, 0).eye };
+        let eye = CameraRayGenerator { lens: Some(&rays), thin_lens: pupil, ..studio.paths(1, 0, 0).camera_rays };
         let to = scale(optics.unproject(at).unwrap(), 2.0);
         for choice in [[0.0, 0.0], [0.9, 0.2], [1.0, 0.7]] {
-            let ray = eye.look(at, &pose, || choice).unwrap().ray;
+            let ray = eye.camera_ray(at, &pose, || choice).unwrap().ray;
             let along_ray = dot(sub(to, ray.origin), ray.direction);
             let off = sub(ray.at(along_ray), to);
             assert!(dot(off, off).sqrt() < 1e-9, "{at:?} {choice:?}");
             // From the aperture, which is perpendicular to the ray through its center.
-            let start = along(ray.origin, -eye.look(at, &pose, || choice).unwrap().travelled, ray.direction);
+            let start =
+                add_scaled(ray.origin, -eye.camera_ray(at, &pose, || choice).unwrap().near_distance, ray.direction);
             assert!((dot(start, start).sqrt() - 0.05 * choice[0].sqrt()).abs() < 1e-9);
             assert!(dot(start, to).abs() < 1e-9);
         }

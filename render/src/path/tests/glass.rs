@@ -19,7 +19,7 @@ fn clear_in_furnace() {
         let light = |material: Material| {
             let mut scene = dark(vec![Instance::new(shape.clone(), material, 1)]);
             scene.sky = Sky::uniform([1.0; 3]);
-            seen(&scene, &ONE, &looking([1.0, 0.7, 0.9], [0.02, 0.01, 0.03]), 64, 64).0
+            mean_light(&scene, &ONE, &one_ray_view([1.0, 0.7, 0.9], [0.02, 0.01, 0.03]), 64, 64).0
         };
         let limit = Tolerance::absolute(1e-12, "rounding of 64 bounces in double precision");
         assert_number(shape.name(), light(glass(1.5)), 1.0, limit);
@@ -46,13 +46,13 @@ fn plate() {
     ];
     let poses =
         [PoseF32::from_translation([0.0, 0.0, -0.5 * t as f32]), PoseF32::from_translation([x as f32, 0.0, -1.1])];
-    let view = looking([-1.0, 0.0, 1.0], [0.0; 3]);
+    let view = one_ray_view([-1.0, 0.0, 1.0], [0.0; 3]);
     let scene = dark(shapes);
-    let through = seen(&scene, &poses, &view, 1024, 4);
+    let through = mean_light(&scene, &poses, &view, 1024, 4);
     assert!(agrees(through, expected), "{through:?}, not {expected}");
     // Controls: it is darker than without losses, and with air instead of glass the ray misses.
     assert!(!agrees(through, 1.0), "{through:?}");
     let mut air = scene.instances().to_vec();
     air[0].material = glass(1.0);
-    assert_eq!(seen(&dark(air), &poses, &view, 64, 4).0, 0.0);
+    assert_eq!(mean_light(&dark(air), &poses, &view, 64, 4).0, 0.0);
 }

@@ -17,7 +17,7 @@ fn covered() -> (RenderScene, [PoseF32; 2]) {
 fn at(light: Light, x: f32) -> (f64, f64) {
     let (mut scene, poses) = covered();
     scene.lights = vec![light];
-    seen(&scene, &poses, &looking([2.5, 0.3, 0.6], [x, 0.0, 0.0]), 1024, 0)
+    mean_light(&scene, &poses, &one_ray_view([2.5, 0.3, 0.6], [x, 0.0, 0.0]), 1024, 0)
 }
 
 /// A light with a size beside the edge of a box: the lit part is the visible part of its disc.
@@ -29,7 +29,7 @@ fn near_lights() {
         let light = |radius: f64| Light {
             attenuation: [1., 0., 0.],
             radius: radius as f32,
-            ..lamp(kind, [0., 0., 2.], [0., 0., -1.])
+            ..light(kind, [0., 0., 2.], [0., 0., -1.])
         };
         let cosine = |x: f64| 2.0 / (4.0 + x * x).sqrt();
         let open = |x: f64| albedo(0.6) * f64::from(0.9f32) * cosine(x).powi(1 + exponent);
@@ -65,7 +65,7 @@ fn near_lights() {
 /// form.
 #[test]
 fn directional_lights() {
-    let light = Light { radius: RADIUS as f32, ..lamp(LightKind::Directional, [0.; 3], [0., 0., -1.]) };
+    let light = Light { radius: RADIUS as f32, ..light(LightKind::Directional, [0.; 3], [0., 0., -1.]) };
     // Integral over the directions (u, v, 1) with a given u, whose cosine is 1 / sqrt(1 + u² + v²).
     let column = |u: f64| 2.0 * ((RADIUS * RADIUS - u * u).max(0.0) / (1.0 + u * u)).sqrt().asinh();
     let expected = |x: f64| {
@@ -100,7 +100,7 @@ fn emissive_rectangle() {
     let scene = on_floor(matt(0.7), [Instance::new(Plane { half }, emitter, 2), board]);
     // Facing down, 0.8 m up.
     let rotation = [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
-    let view = looking([2.0, 0.5, 0.4], [0.0; 3]);
+    let view = one_ray_view([2.0, 0.5, 0.4], [0.0; 3]);
     let whole = |side: f64| form_factor(side / 0.8, f64::from(half[1]) / 0.8);
     for edge in [-0.2, -0.1, 0.05, 0.1, 0.2] {
         let board = PoseF32::from_translation([(edge - 1.0) as f32, 0.0, BOARD as f32]);
@@ -109,7 +109,7 @@ fn emissive_rectangle() {
         let cut = edge * 0.8 / (BOARD - THIN * f64::signum(edge));
         let factor = 0.5 * (whole(f64::from(half[0])) - f64::signum(cut) * whole(cut.abs()));
         let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
-        let light = seen(&scene, &poses, &view, 1024, 0);
+        let light = mean_light(&scene, &poses, &view, 1024, 0);
         assert!(agrees(light, expected), "{edge}: {light:?}, not {expected}");
         assert!(!agrees(light, 1.1 * expected), "it can tell a tenth: {light:?}");
     }
@@ -125,9 +125,9 @@ fn light_on_a_ceiling() {
     let ceiling = || Instance::new(Box { half: [3.0, 3.0, 0.5] }, matt(0.0), 2);
     let light = |instances: Vec<Instance>, height: f32, at: [f32; 3], eye: [f32; 3]| {
         let mut scene = dark(instances);
-        let point = lamp(LightKind::Point, [0., 0., height], [0., 0., -1.]);
+        let point = light(LightKind::Point, [0., 0., height], [0., 0., -1.]);
         scene.lights = vec![Light { attenuation: [1., 0., 0.], ..point }];
-        seen(&scene, &lifted(2.5)[..scene.instances().len()], &looking(eye, at), 1, 0).0
+        mean_light(&scene, &floor_and_object(2.5)[..scene.instances().len()], &one_ray_view(eye, at), 1, 0).0
     };
     let floor = || Instance::new(Plane::INFINITE, matt(0.6), 1);
     for k in 0..40 {
@@ -140,7 +140,7 @@ fn light_on_a_ceiling() {
     let ball = Shape::from(Sphere { radius: 0.4 }).tessellate(12);
     let mesh = std::sync::Arc::new(kinetoscope_scene::shape::RenderMesh::new(
         &ball,
-        kinetoscope_scene::shape::RenderMesh::CREASE,
+        kinetoscope_scene::shape::RenderMesh::DEFAULT_CREASE_ANGLE,
     ));
     let ball = || Instance::new(kinetoscope_scene::shape::Mesh { mesh: mesh.clone() }, matt(0.6), 1);
     let mut lit = 0;
@@ -163,7 +163,8 @@ fn close_above_a_smooth_surface() {
     let mut scene = dark(vec![Instance::new(bricks(&[0.5]), matt(0.6), 1), lid]);
     scene.lights = vec![sun()];
     for (height, lit) in [(0.55, false), (0.7, false), (0.45, true)] {
-        let (mean, _) = seen(&scene, &lifted(height), &looking([2.0, 0.1, 0.53], [0.0, 0.0, 0.5]), 1, 0);
+        let (mean, _) =
+            mean_light(&scene, &floor_and_object(height), &one_ray_view([2.0, 0.1, 0.53], [0.0, 0.0, 0.5]), 1, 0);
         assert!(if lit { mean > 0.1 } else { mean == 0.0 }, "{height}: {mean}");
     }
 }

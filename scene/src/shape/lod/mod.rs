@@ -7,7 +7,7 @@
 //! sum of these largest differences over the chain of collapses that led to it.
 //!
 //! The mesh and its coarser version are thus joined by a continuous one-to-one map that moves no point by more than
-//! [`Level::error`]. Every point of each surface has a point of the other within that distance, sheets stay sheets, and
+//! [`LodLevel::error`]. Every point of each surface has a point of the other within that distance, sheets stay sheets, and
 //! closed surfaces stay closed. Source of the idea: Cohen, Manocha and Olano, Simplifying polygonal models using
 //! successive mappings, Visualization 1997.
 //!
@@ -27,7 +27,7 @@ use simplify::Surface;
 
 /// A level of detail: a coarser version of a mesh.
 #[derive(Clone, Debug)]
-pub struct Level {
+pub struct LodLevel {
     /// Bound on the distance between both surfaces \[m\]: every point of each has a point of the other within it.
     pub error: f32,
     /// The coarser mesh, which has no levels itself.
@@ -37,16 +37,16 @@ pub struct Level {
 /// Smallest number of triangles of a mesh with levels.
 const MIN_TRIANGLES: usize = 1000;
 /// Bound of a simplification before the first level, so that the cheaper collapses come first \[m\].
-const BEFORE: f64 = 0.0625e-3;
+const INITIAL_BOUND: f64 = 0.0625e-3;
 /// Bounds of the levels \[m\]: 1/8 mm is half a pixel at a distance of 15 cm, for a focal length of 600 pixels.
 const BOUNDS: [f64; 4] = [0.125e-3, 0.25e-3, 0.5e-3, 1e-3];
 /// Smallest bound of a level \[m\].
-pub(super) const FINEST: f32 = 0.01e-3;
+pub(super) const MIN_BOUND: f32 = 0.01e-3;
 /// Largest ratio of a level's triangles to those of the previous level; other levels are not worth their memory.
-const WORTH: f64 = 0.8;
+const MAX_TRIANGLE_RATIO: f64 = 0.8;
 /// Rounding errors of all collapses of a vertex together, as a fraction of the mesh's extent. They are computed with 53
 /// bits, from unchanged positions.
-const ROUNDING: f64 = 1e-7;
+const ROUNDING_RATIO: f64 = 1e-7;
 
 /// False for a mesh without levels: it is small, collapses would distort its texture, or its vertices move.
 pub(super) fn may_have_levels(mesh: &RenderMesh) -> bool {
@@ -54,24 +54,24 @@ pub(super) fn may_have_levels(mesh: &RenderMesh) -> bool {
 }
 
 /// Levels of a mesh, the finest first.
-pub(super) fn chain(mesh: &RenderMesh) -> Vec<Level> {
+pub(super) fn build_levels(mesh: &RenderMesh) -> Vec<LodLevel> {
     let mut levels = Vec::new();
     if !may_have_levels(mesh) {
         return levels;
     }
     let [lo, hi] = mesh.bounds();
-    let rounding = ROUNDING * (0..3).map(|k| f64::from(hi[k]) - f64::from(lo[k])).fold(0.0, f64::max);
+    let rounding = ROUNDING_RATIO * (0..3).map(|k| f64::from(hi[k]) - f64::from(lo[k])).fold(0.0, f64::max);
     let mut surface = Surface::new(mesh);
     let mut last = mesh.triangles().len();
-    surface.simplify(BEFORE - rounding);
+    surface.simplify(INITIAL_BOUND - rounding);
     for bound in BOUNDS {
         // A margin of 0.1 % for the rounding to 24 bits.
         surface.simplify(0.999 * bound - rounding);
         let count = surface.triangles().len();
-        if count as f64 <= WORTH * last as f64 {
+        if count as f64 <= MAX_TRIANGLE_RATIO * last as f64 {
             last = count;
-            let error = ((f64::from(surface.error()) + rounding) as f32).max(FINEST);
-            levels.push(Level { error, mesh: prepare(mesh, surface.triangles()) });
+            let error = ((f64::from(surface.error()) + rounding) as f32).max(MIN_BOUND);
+            levels.push(LodLevel { error, mesh: prepare(mesh, surface.triangles()) });
         }
     }
     levels
@@ -95,5 +95,5 @@ fn prepare(mesh: &RenderMesh, triangles: &[[u32; 3]]) -> RenderMesh {
     let triangles = triangles.as_chunks::<3>().0.to_vec();
     let mut coarse = TriMesh::from_triangles(positions, triangles);
     coarse.normals = Some(normals);
-    RenderMesh::new(&coarse, RenderMesh::CREASE)
+    RenderMesh::new(&coarse, RenderMesh::DEFAULT_CREASE_ANGLE)
 }

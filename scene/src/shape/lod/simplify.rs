@@ -2,12 +2,12 @@
 
 use super::super::RenderMesh;
 use super::super::crease::weld;
-use super::star::{Best, Fan, Star};
+use super::star::{BestCollapse, Fan, Star};
 
 /// Largest number of rounds of collapses for one bound.
-const ROUNDS: usize = 40;
+const MAX_ROUNDS: usize = 40;
 /// A round that removes a smaller fraction of the vertices is the last one.
-const WORTH: f64 = 0.02;
+const MIN_REMOVED_RATIO: f64 = 0.02;
 
 /// Triangles of a mesh during its simplification.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ pub(super) struct Surface<'a> {
     start: Vec<u32>,
     around: Vec<(u32, u8)>,
     /// Smallest known bound of a triangle after a collapse of each vertex \[m\].
-    least: Vec<f32>,
+    min_error: Vec<f32>,
 }
 
 impl<'a> Surface<'a> {
@@ -37,7 +37,7 @@ impl<'a> Surface<'a> {
         let count = mesh.positions().len();
         let error = vec![0.0; triangles.len()];
         let (start, around, least) = (vec![0; count + 1], Vec::new(), vec![0.0; count]);
-        Self { mesh, vertex, triangles, error, start, around, least }
+        Self { mesh, vertex, triangles, error, start, around, min_error: least }
     }
 
     pub(super) fn triangles(&self) -> &[[u32; 3]] {
@@ -84,9 +84,9 @@ impl<'a> Surface<'a> {
 
     /// Collapses vertices while no triangle's bound exceeds `bound` \[m\].
     pub(super) fn simplify(&mut self, bound: f64) {
-        for _ in 0..ROUNDS {
-            let (vertices, removed) = self.round(bound);
-            if (removed as f64) < WORTH * vertices as f64 || removed == 0 {
+        for _ in 0..MAX_ROUNDS {
+            let (vertices, removed) = self.collapse_round(bound);
+            if (removed as f64) < MIN_REMOVED_RATIO * vertices as f64 || removed == 0 {
                 break;
             }
         }
@@ -96,34 +96,35 @@ impl<'a> Surface<'a> {
     ///
     /// Each vertex is tried once, unless another collapse changed its surroundings. Returns the number of vertices
     /// before the round, and the number of removed ones.
-    fn round(&mut self, bound: f64) -> (usize, usize) {
+    fn collapse_round(&mut self, bound: f64) -> (usize, usize) {
         self.connect();
         let (mut star, mut fan) = (Star::empty(), Fan::empty());
-        let mut changed = vec![false; self.least.len()];
+        let mut changed = vec![false; self.min_error.len()];
         let (mut vertices, mut removed) = (0, 0);
-        for v in 0..self.least.len() as u32 {
+        for v in 0..self.min_error.len() as u32 {
             if self.around(v).is_empty() {
                 continue;
             }
             vertices += 1;
-            if changed[v as usize] || f64::from(self.least[v as usize]) > bound {
+            if changed[v as usize] || f64::from(self.min_error[v as usize]) > bound {
                 continue;
             }
-            let best = if star.look(self, v) { star.best(self, &mut fan, &changed, bound) } else { Best::None };
+            let best =
+                if star.load(self, v) { star.best(self, &mut fan, &changed, bound) } else { BestCollapse::Impossible };
             match best {
-                Best::Enough(onto) => {
+                BestCollapse::WithinBound(onto) => {
                     for &w in star.ring[..star.count].iter().chain([&v]) {
-                        (changed[w as usize], self.least[w as usize]) = (true, 0.0);
+                        (changed[w as usize], self.min_error[w as usize]) = (true, 0.0);
                     }
                     self.apply(&star, onto, &fan);
                     removed += 1;
                 }
-                Best::Least(error) => self.least[v as usize] = error as f32,
-                Best::None => self.least[v as usize] = f32::INFINITY,
-                Best::Unknown => {}
+                BestCollapse::ExceedsBound(error) => self.min_error[v as usize] = error as f32,
+                BestCollapse::Impossible => self.min_error[v as usize] = f32::INFINITY,
+                BestCollapse::Unknown => {}
             }
         }
-        self.sweep();
+        self.remove_dead_triangles();
         (vertices, removed)
     }
 
@@ -141,7 +142,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Removes triangles that have vanished.
-    fn sweep(&mut self) {
+    fn remove_dead_triangles(&mut self) {
         let Self { triangles, error, .. } = self;
         let alive = |t: &[u32; 3]| t[0] != u32::MAX;
         let mut kept = triangles.iter().map(alive);

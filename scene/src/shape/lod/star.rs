@@ -3,11 +3,11 @@
 use super::simplify::Surface;
 
 /// Largest number of triangles around a vertex that may collapse.
-pub(super) const MOST: usize = 32;
+pub(super) const MAX_VALENCE: usize = 32;
 /// Cosine of the largest angle between a new triangle's own normal and the normals of its corners: 40°.
-const FACING: f32 = 0.766;
+const MIN_NORMAL_COSINE: f32 = 0.766;
 /// Sine of the angle below which lines count as parallel and triangles as degenerate: 53 bits do not resolve them.
-const PARALLEL: f64 = 1e-8;
+const PARALLEL_SINE: f64 = 1e-8;
 
 type V = [f64; 3];
 
@@ -33,14 +33,14 @@ fn area(a: [f64; 2], b: [f64; 2]) -> f64 {
 pub(super) struct Star {
     pub(super) count: usize,
     /// Triangles, with the vertex's corner in each.
-    pub(super) triangles: [(u32, u8); MOST],
-    pub(super) ring: [u32; MOST],
+    pub(super) triangles: [(u32, u8); MAX_VALENCE],
+    pub(super) ring: [u32; MAX_VALENCE],
     /// Vectors from the vertex to the ring.
-    to: [V; MOST],
+    to: [V; MAX_VALENCE],
     /// Projections of these vectors along the mean normal: right and up.
-    flat: [[f64; 2]; MOST],
+    flat: [[f64; 2]; MAX_VALENCE],
     /// Heights of the ring along the mean normal.
-    height: [f64; MOST],
+    height: [f64; MAX_VALENCE],
     normal: V,
     /// Sum over the triangles of area times n nᵀ, which gives the distances of points from their planes.
     quadric: [f64; 6],
@@ -48,13 +48,13 @@ pub(super) struct Star {
 
 /// Best collapse of a vertex.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Best {
+pub(super) enum BestCollapse {
     /// A collapse onto this place of the ring, within the bound.
-    Enough(usize),
+    WithinBound(usize),
     /// No collapse is within the bound; the smallest bound that was found.
-    Least(f64),
+    ExceedsBound(f64),
     /// No collapse is possible.
-    None,
+    Impossible,
     /// Unknown, because neighbors have changed.
     Unknown,
 }
@@ -64,30 +64,30 @@ pub(super) enum Best {
 #[derive(Clone, Debug)]
 pub(super) struct Fan {
     /// Bound of each triangle.
-    pub(super) error: [f64; MOST],
+    pub(super) error: [f64; MAX_VALENCE],
     /// Corner of the neighbor in each triangle, which selects one of its normals.
-    pub(super) corner: [u32; MOST],
+    pub(super) corner: [u32; MAX_VALENCE],
     /// The ring, counted from that neighbor: vectors from the vertex, their projections along the mean normal, heights.
-    to: [V; MOST],
-    flat: [[f64; 2]; MOST],
-    height: [f64; MOST],
+    to: [V; MAX_VALENCE],
+    flat: [[f64; 2]; MAX_VALENCE],
+    height: [f64; MAX_VALENCE],
     /// Normals of the new triangles, of any length.
-    planes: [V; MOST],
+    planes: [V; MAX_VALENCE],
     /// Largest difference in height over each new triangle.
-    apart: [f64; MOST],
+    max_gap: [f64; MAX_VALENCE],
     /// Old triangles above or below each new triangle, as bits.
-    over: [u32; MOST],
+    overlapped: [u32; MAX_VALENCE],
 }
 
 impl Star {
     pub(super) fn empty() -> Self {
         Self {
             count: 0,
-            triangles: [(0, 0); MOST],
-            ring: [0; MOST],
-            to: [[0.0; 3]; MOST],
-            flat: [[0.0; 2]; MOST],
-            height: [0.0; MOST],
+            triangles: [(0, 0); MAX_VALENCE],
+            ring: [0; MAX_VALENCE],
+            to: [[0.0; 3]; MAX_VALENCE],
+            flat: [[0.0; 2]; MAX_VALENCE],
+            height: [0.0; MAX_VALENCE],
             normal: [0.0; 3],
             quadric: [0.0; 6],
         }
@@ -95,18 +95,18 @@ impl Star {
 
     /// Loads a vertex. Returns `false` if the vertex must stay: on a border, where surfaces meet, or where the
     /// triangles around it overlap when seen along their mean normal.
-    pub(super) fn look(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
-        self.order(surface, vertex) && self.flatten(surface, vertex)
+    pub(super) fn load(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
+        self.sort_triangles(surface, vertex) && self.project(surface, vertex)
     }
 
     /// Sorts the triangles around the vertex.
-    fn order(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
+    fn sort_triangles(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         let around = surface.around(vertex);
         let count = around.len();
-        if !(3..=MOST).contains(&count) {
+        if !(3..=MAX_VALENCE).contains(&count) {
             return false;
         }
-        let mut ends = [0u32; MOST];
+        let mut ends = [0u32; MAX_VALENCE];
         for (k, &(triangle, corner)) in around.iter().enumerate() {
             self.triangles[k] = (triangle, corner);
             (self.ring[k], ends[k]) =
@@ -128,14 +128,14 @@ impl Star {
     }
 
     /// Projects the triangles along their mean normal.
-    fn flatten(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
+    fn project(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         let count = self.count;
         let middle = surface.position(vertex);
         for i in 0..count {
             self.to[i] = sub(surface.position(self.ring[i]), middle);
         }
         let next = |i: usize| if i + 1 < count { i + 1 } else { 0 };
-        let mut faces = [[0.0; 3]; MOST];
+        let mut faces = [[0.0; 3]; MAX_VALENCE];
         let mut sum = [0.0; 3];
         for (i, face) in faces[..count].iter_mut().enumerate() {
             *face = cross(self.to[i], self.to[next(i)]);
@@ -159,7 +159,7 @@ impl Star {
             self.flat[i] = [dot(d, right), dot(d, up)];
             self.height[i] = dot(d, n);
             let longest = dot(d, d).max(dot(self.to[next(i)], self.to[next(i)]));
-            if dot(c, n) <= PARALLEL * longest {
+            if dot(c, n) <= PARALLEL_SINE * longest {
                 return false;
             }
             let k = 1.0 / dot(c, c).sqrt();
@@ -184,9 +184,9 @@ impl Star {
 
     /// Tries the few most promising collapses onto neighbors that are not `changed`, until one keeps `bound`. Its
     /// triangles are then in `fan`.
-    pub(super) fn best(&self, surface: &Surface<'_>, fan: &mut Fan, changed: &[bool], bound: f64) -> Best {
+    pub(super) fn best(&self, surface: &Surface<'_>, fan: &mut Fan, changed: &[bool], bound: f64) -> BestCollapse {
         const TRIES: usize = 3;
-        let mut costs = [(0.0, 0); MOST];
+        let mut costs = [(0.0, 0); MAX_VALENCE];
         let mut count = 0;
         for k in (0..self.count).filter(|&k| !changed[self.ring[k] as usize]) {
             costs[count] = (self.cost(k), k);
@@ -197,7 +197,7 @@ impl Star {
         for &(_, onto) in &costs[..count] {
             let Some(error) = self.collapse(surface, onto, fan) else { continue };
             if error <= bound {
-                return Best::Enough(onto);
+                return BestCollapse::WithinBound(onto);
             }
             least = least.min(error);
             tries += 1;
@@ -206,15 +206,15 @@ impl Star {
             }
         }
         match (count == self.count, tries) {
-            (false, _) => Best::Unknown,
-            (true, 0) => Best::None,
-            (true, _) => Best::Least(least),
+            (false, _) => BestCollapse::Unknown,
+            (true, 0) => BestCollapse::Impossible,
+            (true, _) => BestCollapse::ExceedsBound(least),
         }
     }
 
     /// Computes the triangles after the collapse onto `ring[onto]`, and returns the largest of their bounds.
     ///
-    /// Returns `None` if triangles would overlap, deviate from the normals of their corners, or share an edge with more
+    /// Returns `Impossible` if triangles would overlap, deviate from the normals of their corners, or share an edge with more
     /// than one other triangle.
     pub(super) fn collapse(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<f64> {
         let m = self.count;
@@ -226,7 +226,7 @@ impl Star {
         for j in 1..m - 1 {
             let (a, b) = (from_start(fan.flat[j]), from_start(fan.flat[j + 1]));
             let longest = (a[0] * a[0] + a[1] * a[1]).max(b[0] * b[0] + b[1] * b[1]);
-            if area(a, b) <= PARALLEL * longest {
+            if area(a, b) <= PARALLEL_SINE * longest {
                 return None;
             }
         }
@@ -234,20 +234,20 @@ impl Star {
             fan.planes[j] = cross(sub(fan.to[j], fan.to[0]), sub(fan.to[j + 1], fan.to[0]));
         }
         self.corners(surface, onto, fan)?;
-        if self.pinches(surface, onto) {
+        if self.violates_link_condition(surface, onto) {
             return None;
         }
         self.overlay(fan);
         let mut largest = 0.0f64;
         for j in 1..m - 1 {
             let mut error = 0.0f64;
-            let mut left = fan.over[j];
+            let mut left = fan.overlapped[j];
             while left != 0 {
                 let i = onto + left.trailing_zeros() as usize;
                 left &= left - 1;
                 error = error.max(surface.error_of(self.triangles[if i < m { i } else { i - m }].0));
             }
-            fan.error[j] = error + fan.apart[j];
+            fan.error[j] = error + fan.max_gap[j];
             largest = largest.max(fan.error[j]);
         }
         Some(largest)
@@ -257,7 +257,7 @@ impl Star {
     /// above or below it.
     fn overlay(&self, fan: &mut Fan) {
         let m = self.count;
-        let Fan { to, flat, height, planes, apart, over, .. } = fan;
+        let Fan { to, flat, height, planes, max_gap: apart, overlapped: over, .. } = fan;
         let (start, rise) = (flat[0], height[0]);
         apart[1..m - 1].fill(0.0);
         over[1..m - 1].fill(0);
@@ -284,14 +284,14 @@ impl Star {
                 let turn = area(spoke, edge);
                 // They cross at the fractions s = before / turn of the spoke and t = after / turn of the edge.
                 let after = area(start, spoke);
-                let most = (1.0 + PARALLEL) * turn.abs();
+                let most = (1.0 + PARALLEL_SINE) * turn.abs();
                 let (s, t) = if turn < 0.0 { (-before, -after) } else { (before, after) };
                 let least = most - turn.abs();
                 if s < -least || s > most || t < -least || t > most || i == j {
                     continue;
                 }
                 // Parallel lines on top of each other separate at ends, which are evaluated anyway.
-                if turn * turn <= PARALLEL * PARALLEL * length * (spoke[0] * spoke[0] + spoke[1] * spoke[1]) {
+                if turn * turn <= PARALLEL_SINE * PARALLEL_SINE * length * (spoke[0] * spoke[0] + spoke[1] * spoke[1]) {
                     continue;
                 }
                 let inverse = 1.0 / turn.abs();
@@ -305,7 +305,7 @@ impl Star {
     }
 
     /// Selects a normal of the neighbor for each new triangle: of the two along the collapsed edge, the one nearer to
-    /// the corner's previous normal. Returns `None` if a triangle would deviate from the normals of its corners.
+    /// the corner's previous normal. Returns `Impossible` if a triangle would deviate from the normals of its corners.
     fn corners(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<()> {
         let m = self.count;
         let corner = |(triangle, corner): (u32, u8), step: u8| surface.corner(triangle, corner + step);
@@ -321,7 +321,7 @@ impl Star {
             let face = n.map(|x| (x / length) as f32);
             let kept =
                 [normals[usize::from(take_last)], surface.normal(corner(old, 1)), surface.normal(corner(old, 2))];
-            if !kept.iter().all(|&n| dot(n, face) >= FACING) {
+            if !kept.iter().all(|&n| dot(n, face) >= MIN_NORMAL_COSINE) {
                 return None;
             }
             fan.corner[j] = if take_last { last } else { first };
@@ -331,7 +331,7 @@ impl Star {
 
     /// True if the neighbor already has an edge to a vertex to which the collapse would make one: three sheets would
     /// meet there, or two would overlap.
-    fn pinches(&self, surface: &Surface<'_>, onto: usize) -> bool {
+    fn violates_link_condition(&self, surface: &Surface<'_>, onto: usize) -> bool {
         let m = self.count;
         let next = |i: usize, step: usize| if i + step < m { i + step } else { i + step - m };
         // Neighbors of the neighbor along the ring, to which it has edges. It must have no edge to other ring vertices.
@@ -349,14 +349,14 @@ impl Star {
 impl Fan {
     pub(super) fn empty() -> Self {
         Self {
-            error: [0.0; MOST],
-            corner: [0; MOST],
-            to: [[0.0; 3]; MOST],
-            flat: [[0.0; 2]; MOST],
-            height: [0.0; MOST],
-            planes: [[0.0; 3]; MOST],
-            apart: [0.0; MOST],
-            over: [0; MOST],
+            error: [0.0; MAX_VALENCE],
+            corner: [0; MAX_VALENCE],
+            to: [[0.0; 3]; MAX_VALENCE],
+            flat: [[0.0; 2]; MAX_VALENCE],
+            height: [0.0; MAX_VALENCE],
+            planes: [[0.0; 3]; MAX_VALENCE],
+            max_gap: [0.0; MAX_VALENCE],
+            overlapped: [0; MAX_VALENCE],
         }
     }
 }

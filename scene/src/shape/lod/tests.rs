@@ -1,8 +1,8 @@
 //! Tests of the bounds against distances found by brute force, and of the other guarantees of levels.
 use super::super::crease::weld;
 use super::super::{RenderMesh, Shape, Sphere};
-use super::{Level, MIN_TRIANGLES, chain};
-use crate::mesh::{MeshPart, TriMesh, load};
+use super::{LodLevel, MIN_TRIANGLES, build_levels};
+use crate::mesh::{Submesh, TriMesh, load};
 use std::collections::{BTreeMap, HashMap};
 
 type V = [f64; 3];
@@ -120,7 +120,7 @@ fn plate() -> TriMesh {
 }
 
 fn render(mesh: &TriMesh) -> RenderMesh {
-    RenderMesh::new(mesh, RenderMesh::CREASE)
+    RenderMesh::new(mesh, RenderMesh::DEFAULT_CREASE_ANGLE)
 }
 
 fn tessellated(segments: usize) -> TriMesh {
@@ -229,15 +229,15 @@ fn no_levels() {
 #[test]
 fn repeatable() {
     let mesh = sphere(120);
-    let numbers = |levels: &[Level]| -> Vec<u32> {
-        let of = |l: &Level| {
+    let numbers = |levels: &[LodLevel]| -> Vec<u32> {
+        let of = |l: &LodLevel| {
             let positions = l.mesh.positions().as_flattened().iter().map(|x| x.to_bits());
             let triangles = l.mesh.triangles().as_flattened().iter().copied();
             [l.error.to_bits()].into_iter().chain(positions).chain(triangles).collect::<Vec<_>>()
         };
         levels.iter().flat_map(of).collect()
     };
-    assert_eq!(numbers(&chain(&mesh)), numbers(mesh.levels()));
+    assert_eq!(numbers(&build_levels(&mesh)), numbers(mesh.levels()));
     assert_eq!(mesh.levels().len(), mesh.clone().levels().len());
 }
 
@@ -246,8 +246,8 @@ fn repeatable() {
 fn borders() {
     let mut half = tessellated(160);
     half.triangles.truncate(half.triangles.len() / 2);
-    let part = MeshPart { triangles: 0..half.triangles.len(), material: None };
-    let mesh = RenderMesh::of_part(&half, &part, 0.5);
+    let part = Submesh { triangles: 0..half.triangles.len(), material: None };
+    let mesh = RenderMesh::from_submesh(&half, &part, 0.5);
     let border = |mesh: &RenderMesh| -> Vec<[[u32; 3]; 2]> {
         let edges = edges(mesh);
         let open = edges.keys().filter(|(a, b)| !edges.contains_key(&(*b, *a)));

@@ -6,19 +6,19 @@
 use crate::camera::error::CameraError;
 use crate::camera::segmentation::Segment;
 use crate::camera::sensor::Camera;
-use kinetoscope_render::Shot;
+use kinetoscope_render::RenderRequest;
 use kinetoscope_render::frame::{Channels, Frame};
 use kinetoscope_scene::RenderScene;
 
 /// Renders segments in isolation, with the renderer and the lens of the camera.
-pub(super) struct Alone<'a> {
+pub(super) struct IsolatedRenderer<'a> {
     camera: &'a Camera,
     row: usize,
     env: usize,
     frame: Frame,
 }
 
-impl<'a> Alone<'a> {
+impl<'a> IsolatedRenderer<'a> {
     /// Creates the renderer for the image of `row`, which shows environment `env`.
     pub(super) fn new(camera: &'a Camera, row: usize, env: usize) -> Self {
         let (height, width) = camera.image_shape();
@@ -33,11 +33,11 @@ impl<'a> Alone<'a> {
     ) -> Result<impl Iterator<Item = ([usize; 2], i32)> + '_, CameraError> {
         let Self { camera, row, env, ref mut frame } = *self;
         camera
-            .shot_of(row, |rasterizer, shot, take| {
-                let scene = hide_others(shot.scene, segment);
-                rasterizer.render_takes(&mut [(Shot { scene: &scene, ..shot }, frame.as_mut())], &[take])
+            .with_render_request(row, |rasterizer, shot, take| {
+                let scene = with_only(shot.scene, segment);
+                rasterizer.render_samples(&mut [(RenderRequest { scene: &scene, ..shot }, frame.as_mut())], &[take])
             })
-            .map_err(|(_, error)| CameraError::Draw { env, error })?;
+            .map_err(|(_, error)| CameraError::Render { env, error })?;
         let width = camera.image_shape().1;
         let ids = frame.mask.iter().flatten().enumerate();
         Ok(ids.filter(|(_, id)| **id != 0).map(move |(k, &id)| ([k % width, k / width], id)))
@@ -45,7 +45,7 @@ impl<'a> Alone<'a> {
 }
 
 /// Returns the scene with all instances hidden except those of the segment; poses stay unchanged.
-fn hide_others(scene: &RenderScene, segment: &Segment) -> RenderScene {
+fn with_only(scene: &RenderScene, segment: &Segment) -> RenderScene {
     let mut instances = scene.instances().to_vec();
     for instance in &mut instances {
         instance.visible &= segment.mask_ids.contains(&instance.mask_id);

@@ -1,7 +1,7 @@
 //! 2D bounding boxes of segments in the image.
 
-use super::alone::Alone;
-use super::outline::outline;
+use super::alone::IsolatedRenderer;
+use super::outline::projected_extent;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
@@ -36,7 +36,7 @@ pub struct Box2d {
     ///
     /// If the lens bends lines or the [shutter](crate::camera::CameraCfg::shutter) has a nonzero span, the segment is
     /// rendered in isolation, each row at its own instant. The box then surrounds the pixels that
-    /// [`Occlusion::alone_pixels`](super::Occlusion::alone_pixels) counts.
+    /// [`Occlusion::unoccluded_pixels`](super::Occlusion::unoccluded_pixels) counts.
     pub loose: Option<PixelBox>,
     /// Number of pixels that see the segment.
     pub visible_pixels: usize,
@@ -52,31 +52,31 @@ impl Segmentation {
     /// # Errors
     ///
     /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) if the camera does not measure the mask, errors of
-    /// reading the mask, and an environment that the camera does not see. [`Draw`](crate::camera::CameraError::Draw) if
+    /// reading the mask, and an environment that the camera does not see. [`Render`](crate::camera::CameraError::Render) if
     /// an isolated segment cannot be rendered.
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;
-        let mut boxes = Boxes::new(self, level);
+        let mut boxes = BoxAccumulator::new(self, level);
         for ((v, u), &id) in mask.index_axis(Axis(0), row).indexed_iter() {
-            boxes.see(id, [u, v]);
+            boxes.add_visible_pixel(id, [u, v]);
         }
-        if camera.bends_lines() || camera.takes_time() {
-            let mut alone = Alone::new(camera, row, env);
+        if camera.is_distorted() || camera.has_shutter_span() {
+            let mut alone = IsolatedRenderer::new(camera, row, env);
             for segment in self.segments(level) {
                 for ([u, v], id) in alone.pixels(segment)? {
                     let [left, top] = [u, v].map(|x| x as f64);
-                    boxes.reach(id, [[left, left + 1.0], [top, top + 1.0]]);
+                    boxes.add_extent(id, [[left, left + 1.0], [top, top + 1.0]]);
                 }
             }
             return Ok(boxes.finish());
         }
-        camera.shot_of(row, |rasterizer, shot, _| {
+        camera.with_render_request(row, |rasterizer, shot, _| {
             for (instance, pose) in shot.scene.instances().iter().zip(shot.poses) {
-                if Layer::of(instance, rasterizer.groups()) != Layer::Hidden
-                    && let Some(extent) = outline(shot.view, instance, pose)
+                if Layer::for_instance(instance, rasterizer.groups()) != Layer::Hidden
+                    && let Some(extent) = projected_extent(shot.view, instance, pose)
                 {
-                    boxes.reach(instance.mask_id, extent);
+                    boxes.add_extent(instance.mask_id, extent);
                 }
             }
         });
@@ -85,54 +85,55 @@ impl Segmentation {
 }
 
 /// Accumulates the boxes of the segments of a level.
-struct Boxes<'a> {
+struct BoxAccumulator<'a> {
     segmentation: &'a Segmentation,
     level: SegmentLevel,
-    list: Vec<Growing>,
+    list: Vec<SegmentExtent>,
     /// Mask id of the last lookup, and the index of its segment in `list`.
-    last: (i32, Option<usize>),
+    last_lookup: (i32, Option<usize>),
 }
 
 /// Box of one segment, accumulated pixel by pixel and instance by instance.
 #[derive(Clone, Copy)]
-struct Growing {
+struct SegmentExtent {
     id: i32,
     pixels: usize,
-    seen: [[usize; 2]; 2],
+    visible_extent: [[usize; 2]; 2],
     /// Smallest and largest u, then v, of the loose box.
-    whole: Option<[[f64; 2]; 2]>,
+    full_extent: Option<[[f64; 2]; 2]>,
 }
 
-impl<'a> Boxes<'a> {
+impl<'a> BoxAccumulator<'a> {
     fn new(segmentation: &'a Segmentation, level: SegmentLevel) -> Self {
-        let growing = |id| Growing { id, pixels: 0, seen: [[usize::MAX; 2], [0; 2]], whole: None };
+        let growing =
+            |id| SegmentExtent { id, pixels: 0, visible_extent: [[usize::MAX; 2], [0; 2]], full_extent: None };
         let list = segmentation.segments(level).iter().map(|segment| growing(segment.id)).collect();
-        Self { segmentation, level, list, last: (0, None) }
+        Self { segmentation, level, list, last_lookup: (0, None) }
     }
 
-    fn of(&mut self, mask_id: i32) -> Option<&mut Growing> {
-        if self.last.0 != mask_id {
+    fn of(&mut self, mask_id: i32) -> Option<&mut SegmentExtent> {
+        if self.last_lookup.0 != mask_id {
             let segment = self.segmentation.segment_of(self.level, mask_id);
-            self.last = (mask_id, self.list.iter().position(|growing| growing.id == segment));
+            self.last_lookup = (mask_id, self.list.iter().position(|growing| growing.id == segment));
         }
-        self.last.1.map(|at| &mut self.list[at])
+        self.last_lookup.1.map(|at| &mut self.list[at])
     }
 
     /// Adds a pixel that sees a mask id.
-    fn see(&mut self, mask_id: i32, at: [usize; 2]) {
+    fn add_visible_pixel(&mut self, mask_id: i32, at: [usize; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
         growing.pixels += 1;
         for (axis, x) in at.into_iter().enumerate() {
-            growing.seen[0][axis] = growing.seen[0][axis].min(x);
-            growing.seen[1][axis] = growing.seen[1][axis].max(x + 1);
+            growing.visible_extent[0][axis] = growing.visible_extent[0][axis].min(x);
+            growing.visible_extent[1][axis] = growing.visible_extent[1][axis].max(x + 1);
         }
     }
 
     /// Extends the loose box of a mask id by `extent`: smallest and largest u, then v.
-    fn reach(&mut self, mask_id: i32, extent: [[f64; 2]; 2]) {
+    fn add_extent(&mut self, mask_id: i32, extent: [[f64; 2]; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
-        let before = growing.whole.unwrap_or(extent);
-        growing.whole = Some([0, 1].map(|k| [before[k][0].min(extent[k][0]), before[k][1].max(extent[k][1])]));
+        let before = growing.full_extent.unwrap_or(extent);
+        growing.full_extent = Some([0, 1].map(|k| [before[k][0].min(extent[k][0]), before[k][1].max(extent[k][1])]));
     }
 
     fn finish(self) -> Vec<Box2d> {
@@ -140,11 +141,12 @@ impl<'a> Boxes<'a> {
             let (min, max) = ([u[0], v[0]], [u[1], v[1]]);
             (min[0] < max[0] && min[1] < max[1]).then_some(PixelBox { min, max })
         };
-        let boxes = self.list.into_iter().map(|Growing { id, pixels, seen, whole }| {
-            let [min, max] = seen.map(|corner| corner.map(|x| x as f64));
-            let tight = (pixels > 0).then_some(PixelBox { min, max });
-            Box2d { id, tight, loose: whole.and_then(loose), visible_pixels: pixels }
-        });
+        let boxes =
+            self.list.into_iter().map(|SegmentExtent { id, pixels, visible_extent: seen, full_extent: whole }| {
+                let [min, max] = seen.map(|corner| corner.map(|x| x as f64));
+                let tight = (pixels > 0).then_some(PixelBox { min, max });
+                Box2d { id, tight, loose: whole.and_then(loose), visible_pixels: pixels }
+            });
         boxes.filter(|b| b.tight.is_some() || b.loose.is_some()).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! Occlusion of segments in the image.
 
-use super::alone::Alone;
+use super::alone::IsolatedRenderer;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
@@ -15,14 +15,14 @@ pub struct Occlusion {
     /// Number of pixels that see the segment.
     pub visible_pixels: usize,
     /// Number of pixels that would see the segment if it were alone; at least 1.
-    pub alone_pixels: usize,
+    pub unoccluded_pixels: usize,
 }
 
 impl Occlusion {
     /// Hidden fraction of the segment, as Isaac's occlusion ratio: 0 if everything inside the image is visible, 1 if
     /// nothing is. Parts outside the image do not count, nor does self-occlusion.
     pub fn ratio(&self) -> f64 {
-        1.0 - self.visible_pixels as f64 / self.alone_pixels as f64
+        1.0 - self.visible_pixels as f64 / self.unoccluded_pixels as f64
     }
 }
 
@@ -36,19 +36,19 @@ impl Segmentation {
     /// # Errors
     ///
     /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) if the camera does not measure the mask, errors of
-    /// reading the mask, and an environment that the camera does not see. [`Draw`](crate::camera::CameraError::Draw) if
+    /// reading the mask, and an environment that the camera does not see. [`Render`](crate::camera::CameraError::Render) if
     /// a segment cannot be rendered.
     pub fn occlusions(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Occlusion>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;
         let mask = mask.index_axis(Axis(0), row);
-        let mut alone = Alone::new(camera, row, env);
+        let mut alone = IsolatedRenderer::new(camera, row, env);
         let mut found = Vec::new();
         for segment in self.segments(level) {
             let alone_pixels = alone.pixels(segment)?.count();
             if alone_pixels > 0 {
                 let visible_pixels = mask.iter().filter(|id| segment.mask_ids.contains(id)).count();
-                found.push(Occlusion { id: segment.id, visible_pixels, alone_pixels });
+                found.push(Occlusion { id: segment.id, visible_pixels, unoccluded_pixels: alone_pixels });
             }
         }
         Ok(found)

@@ -7,21 +7,21 @@ use kinetoscope_scene::{Instance, PoseF32};
 
 /// Number of edges of circles that the frustum cuts. The polygon is inside the circle by at most 1 - cos(pi / 256) of
 /// its radius, which is 7.5e-5.
-const SEGMENTS: usize = 256;
+const CIRCLE_EDGES: usize = 256;
 
 /// Pose of an instance in the optical frame of the camera, double precision.
-struct Seen {
+struct CameraFromInstance {
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],
 }
 
-impl Seen {
+impl CameraFromInstance {
     fn point(&self, p: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|i| self.translation[i] + (0..3).map(|j| self.rotation[i][j] * p[j]).sum::<f64>())
     }
 
     /// Returns R diag(radii²) Rᵀ. n · M n is the squared extent of an ellipsoid along n.
-    fn spread(&self, radii: [f64; 3]) -> [[f64; 3]; 3] {
+    fn ellipsoid_matrix(&self, radii: [f64; 3]) -> [[f64; 3]; 3] {
         let r = &self.rotation;
         [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| r[i][k] * r[j][k] * radii[k] * radii[k]).sum()))
     }
@@ -49,8 +49,8 @@ impl Extent {
     /// A plane through the camera center with normal n touches the ellipsoid where (n · c)² = n · M n, with its center
     /// c. For n = (1, 0, -s), the plane x = s z, this is a quadratic equation in s. Its roots are the ends of the
     /// extent.
-    fn ellipsoid(&mut self, seen: &Seen, center: [f64; 3], radii: [f64; 3]) {
-        let (c, m) = (seen.point(center), seen.spread(radii));
+    fn ellipsoid(&mut self, seen: &CameraFromInstance, center: [f64; 3], radii: [f64; 3]) {
+        let (c, m) = (seen.point(center), seen.ellipsoid_matrix(radii));
         for axis in 0..2 {
             let a = c[2] * c[2] - m[2][2];
             let b = c[axis] * c[2] - m[axis][2];
@@ -63,12 +63,18 @@ impl Extent {
 
 /// Returns the extent of the part of an instance that is in the frustum \[pixels\]: smallest and largest u, then v. The
 /// frustum ends at the near plane, the far plane and the four edges of the image. `None` if no part is in the frustum.
-pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &PoseF32) -> Option<[[f64; 2]; 2]> {
+pub(super) fn projected_extent(
+    view: &View,
+    instance: &Instance,
+    world_from_instance: &PoseF32,
+) -> Option<[[f64; 2]; 2]> {
     let pose = view.world_from_camera.inverse_times(world_from_instance);
-    let seen =
-        Seen { rotation: pose.rotation.map(|row| row.map(f64::from)), translation: pose.translation.map(f64::from) };
+    let seen = CameraFromInstance {
+        rotation: pose.rotation.map(|row| row.map(f64::from)),
+        translation: pose.translation.map(f64::from),
+    };
     let shape = &instance.shape;
-    if shape.is_one_sided() && !is_before(&seen) {
+    if shape.is_one_sided() && !is_front_facing(&seen) {
         return None;
     }
     let (near, far) = (f64::from(view.near), f64::from(view.far));
@@ -79,8 +85,8 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
     let ([fx, fy], [cx, cy]) = ([view.fx, view.fy].map(f64::from), [view.cx, view.cy].map(f64::from));
     let size = [view.width as f64, view.height as f64];
     let pixels = |Extent([x, y]): Extent| [x.map(|x| fx * x + cx), y.map(|y| fy * y + cy)];
-    let endless = shape.bounds().is_none();
-    if low > near && high < far && !endless {
+    let is_unbounded = shape.bounds().is_none();
+    if low > near && high < far && !is_unbounded {
         let mut extent = Extent::NONE;
         // x / z takes its extremes over a convex hull at the hull's parts.
         shape.hull(&mut |part| match part {
@@ -97,7 +103,12 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
         }
     }
     // A clipped shape has other extremes than the whole shape.
-    let mut cutter = Cutter { sides: sides(view), polygon: Vec::new(), rest: Vec::new(), extent: Extent::NONE };
+    let mut cutter = FrustumClipper {
+        frustum_planes: frustum_planes(view),
+        polygon: Vec::new(),
+        clipped: Vec::new(),
+        extent: Extent::NONE,
+    };
     cutter.shape(shape, &seen, view);
     let [x, _] = cutter.extent.0;
     (x[0] <= x[1]).then(|| {
@@ -108,7 +119,7 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
 }
 
 /// Returns the six planes of the frustum as [a, b, c, d]: a x + b y + c z + d >= 0 inside, in the optical frame.
-fn sides(view: &View) -> [[f64; 4]; 6] {
+fn frustum_planes(view: &View) -> [[f64; 4]; 6] {
     let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
     let (near, far) = (f64::from(view.near), f64::from(view.far));
     [
@@ -122,40 +133,41 @@ fn sides(view: &View) -> [[f64; 4]; 6] {
 }
 
 /// Returns true if the camera is on the visible side of a one-sided plane.
-fn is_before(seen: &Seen) -> bool {
+fn is_front_facing(seen: &CameraFromInstance) -> bool {
     // Camera position in the frame of the plane: -Rᵀ t.
     (0..3).map(|i| seen.rotation[i][2] * seen.translation[i]).sum::<f64>() < 0.0
 }
 
 /// Clips the surfaces of shapes to the frustum and accumulates their extent.
-struct Cutter {
-    sides: [[f64; 4]; 6],
+struct FrustumClipper {
+    frustum_planes: [[f64; 4]; 6],
     /// The polygon being clipped, and the result of clipping it at one more plane.
     polygon: Vec<[f64; 3]>,
-    rest: Vec<[f64; 3]>,
+    clipped: Vec<[f64; 3]>,
     extent: Extent,
 }
 
-impl Cutter {
-    fn shape(&mut self, shape: &Shape, seen: &Seen, view: &View) {
+impl FrustumClipper {
+    fn shape(&mut self, shape: &Shape, seen: &CameraFromInstance, view: &View) {
         match shape {
             Shape::Plane(Plane { half }) => {
                 let far = f64::from(view.far);
-                let half = half.map(|half| if half == 0.0 { horizon(view, seen, far) } else { f64::from(half) });
+                let half =
+                    half.map(|half| if half == 0.0 { visible_half_extent(view, seen, far) } else { f64::from(half) });
                 let [x, y] = half;
                 self.polygon(&[[-x, -y], [x, -y], [x, y], [-x, y]].map(|[x, y]| seen.point([x, y, 0.0])));
             }
             _ => match shape.mesh() {
                 Some(mesh) => self.triangles(mesh.positions(), mesh.triangles(), seen),
                 None => {
-                    let mesh = shape.tessellate(SEGMENTS);
+                    let mesh = shape.tessellate(CIRCLE_EDGES);
                     self.triangles(&mesh.positions, &mesh.triangles, seen);
                 }
             },
         }
     }
 
-    fn triangles(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]], seen: &Seen) {
+    fn triangles(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]], seen: &CameraFromInstance) {
         for triangle in triangles {
             let corners = triangle.map(|k| positions.get(k as usize).copied().unwrap_or_default());
             self.polygon(&corners.map(|p| seen.point(p.map(f64::from))));
@@ -168,21 +180,21 @@ impl Cutter {
     fn polygon(&mut self, corners: &[[f64; 3]]) {
         self.polygon.clear();
         self.polygon.extend_from_slice(corners);
-        for [a, b, c, d] in self.sides {
+        for [a, b, c, d] in self.frustum_planes {
             let within = |p: &[f64; 3]| a * p[0] + b * p[1] + c * p[2] + d;
-            self.rest.clear();
+            self.clipped.clear();
             for (k, p) in self.polygon.iter().enumerate() {
                 let q = &self.polygon[(k + 1) % self.polygon.len()];
                 let (here, there) = (within(p), within(q));
                 if here >= 0.0 {
-                    self.rest.push(*p);
+                    self.clipped.push(*p);
                 }
                 if here * there < 0.0 {
                     let share = here / (here - there);
-                    self.rest.push([0, 1, 2].map(|i| p[i] + share * (q[i] - p[i])));
+                    self.clipped.push([0, 1, 2].map(|i| p[i] + share * (q[i] - p[i])));
                 }
             }
-            std::mem::swap(&mut self.polygon, &mut self.rest);
+            std::mem::swap(&mut self.polygon, &mut self.clipped);
             if self.polygon.is_empty() {
                 return;
             }
@@ -194,7 +206,7 @@ impl Cutter {
 }
 
 /// Returns half the side of a square that contains all of an infinite plane that the image shows \[m\].
-fn horizon(view: &View, seen: &Seen, far: f64) -> f64 {
+fn visible_half_extent(view: &View, seen: &CameraFromInstance, far: f64) -> f64 {
     let wide = |c: f32, f: f32, n: usize| f64::from(c.abs().max((n as f32 - c).abs()) / f);
     let (x, y) = (wide(view.cx, view.fx, view.width), wide(view.cy, view.fy, view.height));
     let to_origin = seen.translation.iter().map(|t| t * t).sum::<f64>().sqrt();
@@ -223,7 +235,7 @@ mod tests {
     }
 
     fn of(shape: impl Into<Shape>, pose: &PoseF32) -> Option<[[f64; 2]; 2]> {
-        outline(&view(), &Instance::new(shape, Material::default(), 1), pose)
+        projected_extent(&view(), &Instance::new(shape, Material::default(), 1), pose)
     }
 
     /// A pose from roll, pitch, yaw and a position.
@@ -323,7 +335,7 @@ mod tests {
 
     fn in_narrow(near: f32, shape: impl Into<Shape>, pose: &PoseF32) -> Option<[[f64; 2]; 2]> {
         let view = View { width: 640, height: 480, fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, near, ..view() };
-        outline(&view, &Instance::new(shape, Material::default(), 1), pose)
+        projected_extent(&view, &Instance::new(shape, Material::default(), 1), pose)
     }
 
     /// A slanted strip 1 m in front of the camera, between the lines u + v = s ± 500 w sqrt(2). The visible part is a

@@ -51,12 +51,12 @@ impl Segmentation {
     /// # Errors
     ///
     /// An environment that the camera does not see; [`NothingCaptured`](CameraError::NothingCaptured) before the first
-    /// reset or update; [`ThingPose`](CameraError::ThingPose) if the pose of an instance is not finite.
+    /// reset or update; [`EntityPose`](CameraError::EntityPose) if the pose of an instance is not finite.
     pub fn boxes_3d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box3d>, SensorError> {
         let row = camera.row(env)?;
-        camera.must_have_captured(row)?;
-        camera.shot_of(row, |rasterizer, shot, _| {
-            let drawn = |instance: &Instance| Layer::of(instance, rasterizer.groups()) != Layer::Hidden;
+        camera.require_captured(row)?;
+        camera.with_render_request(row, |rasterizer, shot, _| {
+            let drawn = |instance: &Instance| Layer::for_instance(instance, rasterizer.groups()) != Layer::Hidden;
             let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));
             let of = |id: i32| -> Option<Box3d> {
                 let parts = all.clone().filter(|(instance, _)| self.segment_of(level, instance.mask_id) == id);
@@ -77,7 +77,7 @@ impl Segmentation {
                 known && !place.rotation.iter().flatten().chain(&place.translation).all(|x| x.is_finite())
             };
             if let Some((instance, _)) = all.clone().find(lost) {
-                return Err(CameraError::ThingPose { env, id: instance.mask_id }.into());
+                return Err(CameraError::EntityPose { env, id: instance.mask_id }.into());
             }
             Ok(self.segments(level).iter().filter_map(|segment| of(segment.id)).collect())
         })

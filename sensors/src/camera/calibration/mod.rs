@@ -15,14 +15,14 @@ use kinetoscope_render::Renderer;
 use kinetoscope_render::lens::{Lens, LensModel};
 use kinetoscope_render::lens::{OpenCv, OpenCvFisheye};
 use kinetoscope_render::{Intrinsics, PixelIntrinsics};
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::pattern::closest_names;
 use kinetoscope_scene::yaml::{Node, Scalar, Value};
 use nalgebra::{Matrix3, Matrix3x4};
 use std::fmt;
 use std::path::Path;
 
 /// Tolerance of rotation matrices: files have six digits or more.
-const ROTATION: f64 = 1e-3;
+const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Distortion model of ROS. Files may also use the names of other tools, see [`Lens::from_name`]: `radtan`, `fisheye`,
 /// `kannala_brandt4` and more. `equidistant` has its ROS meaning, OpenCV's fisheye model.
@@ -61,7 +61,7 @@ impl DistortionModel {
     }
 
     /// Returns the model of OpenCV's lens with `count` coefficients.
-    fn of_open_cv(count: usize) -> Self {
+    fn for_coefficient_count(count: usize) -> Self {
         if count > 5 { Self::RationalPolynomial } else { Self::PlumbBob }
     }
 
@@ -69,7 +69,7 @@ impl DistortionModel {
     fn from_name(name: &str, count: usize) -> Option<Self> {
         let own = Self::ALL.into_iter().find(|model| model.name() == name);
         own.or_else(|| match Lens::from_name(name).ok()? {
-            Lens::OpenCv(_) => Some(Self::of_open_cv(count)),
+            Lens::OpenCv(_) => Some(Self::for_coefficient_count(count)),
             Lens::OpenCvFisheye(_) => Some(Self::Equidistant),
             _ => None,
         })
@@ -91,7 +91,7 @@ impl DistortionModel {
 ///
 /// In a file, the *center* of the first pixel is at (0, 0), as in OpenCV. In [`Intrinsics`] and [`Lens`], its corner
 /// is. So principal points are half a pixel less here: that of a centered camera of 640 pixels is 319.5.
-/// [`of`](Self::of), [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) convert between the two.
+/// [`from_intrinsics`](Self::from_intrinsics), [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) convert between the two.
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{CameraCfg, CameraInfo};
@@ -139,7 +139,7 @@ pub struct CameraInfo {
 
 impl CameraInfo {
     /// Center of the first pixel in [`Intrinsics`] \[pixels\], along both axes of the image; in a file it is at 0.
-    pub const FIRST_CENTRE: f64 = 0.5;
+    pub const FIRST_PIXEL_CENTER: f64 = 0.5;
 
     /// Reads a calibration file.
     ///
@@ -166,7 +166,7 @@ impl CameraInfo {
         let reader = Reader { file };
         let Value::Table(fields) = &root.value else {
             let problem = format!("is {}, not a table of fields", root.value.describe());
-            return Err(reader.wrong(root.line, "the file", problem));
+            return Err(reader.field_error(root.line, "the file", problem));
         };
         let find = |name: &str| fields.iter().find(|(key, _)| key == name).map(|(_, node)| node);
         let get = |name: &'static str| {
@@ -181,25 +181,25 @@ impl CameraInfo {
         let k = get("camera_matrix")?;
         let camera_matrix = Matrix3::from_row_slice(&reader.matrix("camera_matrix", k, [3, 3])?);
         Intrinsics::from_matrix(&camera_matrix)
-            .map_err(|error| reader.wrong(k.line, "camera_matrix", format!("is of no camera: {error}")))?;
+            .map_err(|error| reader.field_error(k.line, "camera_matrix", format!("is of no camera: {error}")))?;
         let (distortion_model, distortion_coefficients) =
             reader.distortion(find("distortion_model"), get("distortion_coefficients")?)?;
-        reader.not_binned(["binning_x", "binning_y"].map(|name| (name, find(name))))?;
-        find("roi").map_or(Ok(()), |roi| reader.not_a_part(roi, [width, height]))?;
+        reader.reject_binning(["binning_x", "binning_y"].map(|name| (name, find(name))))?;
+        find("roi").map_or(Ok(()), |roi| reader.reject_partial_roi(roi, [width, height]))?;
         let r = get("rectification_matrix")?;
         let rectification_matrix = Matrix3::from_row_slice(&reader.matrix("rectification_matrix", r, [3, 3])?);
         let off = (rectification_matrix * rectification_matrix.transpose() - Matrix3::identity()).amax();
-        if off > ROTATION || rectification_matrix.determinant() < 0.0 {
+        if off > ROTATION_TOLERANCE || rectification_matrix.determinant() < 0.0 {
             let determinant = rectification_matrix.determinant();
             let problem = format!("is no rotation: its determinant is {determinant:.4}, its rows are {off:.4} off");
-            return Err(reader.wrong(r.line, "rectification_matrix", problem));
+            return Err(reader.field_error(r.line, "rectification_matrix", problem));
         }
         let p = get("projection_matrix")?;
         let projection_matrix = Matrix3x4::from_row_slice(&reader.matrix("projection_matrix", p, [3, 4])?);
         let determinant = projection_matrix.fixed_columns::<3>(0).determinant();
         if determinant == 0.0 {
             let problem = "is singular: the determinant of its first three columns is 0".into();
-            return Err(reader.wrong(p.line, "projection_matrix", problem));
+            return Err(reader.field_error(p.line, "projection_matrix", problem));
         }
         Ok(Self {
             name,
@@ -223,15 +223,15 @@ impl CameraInfo {
     /// # Errors
     ///
     /// [`CalibrationError::Lens`] if `camera_info` has no model for the lens.
-    pub fn of(
+    pub fn from_intrinsics(
         name: &str,
         [width, height]: [usize; 2],
         pixels: &PixelIntrinsics,
         lens: &Lens,
     ) -> Result<Self, CalibrationError> {
-        let (distortion_model, distortion_coefficients) = of_lens(lens)?;
+        let (distortion_model, distortion_coefficients) = distortion_of(lens)?;
         let mut camera_matrix = Intrinsics::from(*pixels).matrix(width, height).map_err(CameraError::from)?;
-        (0..2).for_each(|axis| camera_matrix[(axis, 2)] -= Self::FIRST_CENTRE);
+        (0..2).for_each(|axis| camera_matrix[(axis, 2)] -= Self::FIRST_PIXEL_CENTER);
         let mut projection_matrix = Matrix3x4::zeros();
         projection_matrix.fixed_columns_mut::<3>(0).copy_from(&camera_matrix);
         Ok(Self {
@@ -249,7 +249,7 @@ impl CameraInfo {
     /// Focal lengths and principal point of raw images.
     pub fn intrinsics(&self) -> Intrinsics {
         let k = &self.camera_matrix;
-        let [cx, cy] = [0, 1].map(|axis| k[(axis, 2)] + Self::FIRST_CENTRE);
+        let [cx, cy] = [0, 1].map(|axis| k[(axis, 2)] + Self::FIRST_PIXEL_CENTER);
         Intrinsics::Pixels { fx: k[(0, 0)], fy: k[(1, 1)], cx, cy }
     }
 
@@ -286,12 +286,12 @@ impl Camera {
     /// An environment that the camera does not see, and [`CalibrationError::Lens`].
     pub fn camera_info(&self, name: &str, env: usize) -> Result<CameraInfo, SensorError> {
         let (optics, (height, width)) = (self.optics(env)?, self.image_shape());
-        Ok(CameraInfo::of(name, [width, height], &optics.pixels(), &optics.lens())?)
+        Ok(CameraInfo::from_intrinsics(name, [width, height], &optics.pixels(), &optics.lens())?)
     }
 }
 
 /// Returns the ROS distortion model of a lens and its coefficients.
-fn of_lens(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
+fn distortion_of(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
     match *lens {
         Lens::Pinhole(_) => Ok((DistortionModel::PlumbBob, vec![0.0; 5])),
         Lens::OpenCv(lens) => {
@@ -318,21 +318,21 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn wrong(&self, line: usize, field: &str, problem: String) -> CalibrationError {
+    fn field_error(&self, line: usize, field: &str, problem: String) -> CalibrationError {
         CalibrationError::Field { file: self.file.into(), line, field: field.into(), problem }
     }
 
     fn text<'n>(&self, field: &str, node: &'n Node) -> Result<&'n str, CalibrationError> {
         match &node.value {
             Value::Scalar(Scalar { text, .. }) => Ok(text),
-            other => Err(self.wrong(node.line, field, format!("is {}, not a word", other.describe()))),
+            other => Err(self.field_error(node.line, field, format!("is {}, not a word", other.describe()))),
         }
     }
 
     fn size(&self, field: &str, node: &Node) -> Result<usize, CalibrationError> {
         let text = self.text(field, node)?;
         text.parse::<usize>().ok().filter(|&n| n > 0).ok_or_else(|| {
-            self.wrong(node.line, field, format!("is {text:?}; it must be a whole number of pixels, at least 1"))
+            self.field_error(node.line, field, format!("is {text:?}; it must be a whole number of pixels, at least 1"))
         })
     }
 
@@ -341,38 +341,46 @@ impl Reader<'_> {
         text.parse::<f64>()
             .ok()
             .filter(|x| x.is_finite())
-            .ok_or_else(|| self.wrong(node.line, field, format!("has {text:?}; it must be a finite number")))
+            .ok_or_else(|| self.field_error(node.line, field, format!("has {text:?}; it must be a finite number")))
     }
 
     /// Reads `rows`, `cols` and `data` of a matrix.
     fn numbers(&self, field: &str, node: &Node) -> Result<([usize; 2], Vec<f64>), CalibrationError> {
         let Value::Table(parts) = &node.value else {
             let problem = format!("is {}, not a table of rows, cols and data", node.value.describe());
-            return Err(self.wrong(node.line, field, problem));
+            return Err(self.field_error(node.line, field, problem));
         };
         let part = |name: &str| {
             parts.iter().find(|(key, _)| key == name).map(|(_, node)| node).ok_or_else(|| {
                 let problem = format!("has no {name}; a matrix has rows, cols and data");
-                self.wrong(node.line, field, problem)
+                self.field_error(node.line, field, problem)
             })
         };
         let size = |name: &str| {
             let node = part(name)?;
             let text = self.text(&format!("{field}.{name}"), node)?;
             text.parse::<usize>().map_err(|_| {
-                self.wrong(node.line, &format!("{field}.{name}"), format!("is {text:?}; it must be a whole number"))
+                self.field_error(
+                    node.line,
+                    &format!("{field}.{name}"),
+                    format!("is {text:?}; it must be a whole number"),
+                )
             })
         };
         let (shape, data) = ([size("rows")?, size("cols")?], part("data")?);
         let name = format!("{field}.data");
         let Value::List(list) = &data.value else {
-            return Err(self.wrong(data.line, &name, format!("is {}, not a list of numbers", data.value.describe())));
+            return Err(self.field_error(
+                data.line,
+                &name,
+                format!("is {}, not a list of numbers", data.value.describe()),
+            ));
         };
         let numbers = list.iter().map(|node| self.number(&name, node)).collect::<Result<Vec<f64>, _>>()?;
         if shape[0].checked_mul(shape[1]) != Some(numbers.len()) {
             let problem =
                 format!("has {} numbers, not the {} x {} of rows and cols", numbers.len(), shape[0], shape[1]);
-            return Err(self.wrong(data.line, &name, problem));
+            return Err(self.field_error(data.line, &name, problem));
         }
         Ok((shape, numbers))
     }
@@ -382,7 +390,7 @@ impl Reader<'_> {
         let (shape, numbers) = self.numbers(field, node)?;
         if shape != expected {
             let [[rows, cols], [r, c]] = [shape, expected];
-            return Err(self.wrong(node.line, field, format!("is {rows} x {cols}; it must be {r} x {c}")));
+            return Err(self.field_error(node.line, field, format!("is {rows} x {cols}; it must be {r} x {c}")));
         }
         Ok(numbers)
     }
@@ -392,18 +400,16 @@ impl Reader<'_> {
         let (_, numbers) = self.numbers(field, d)?;
         let found = numbers.len();
         let named = match model {
-            Some(node) => {
-                Some((node, self.text("distortion_model", node)?)).filter(|(_, name)| !yaml::is_nothing(name))
-            }
+            Some(node) => Some((node, self.text("distortion_model", node)?)).filter(|(_, name)| !yaml::is_null(name)),
             None => None,
         };
         let known = match named {
-            None => DistortionModel::of_open_cv(found),
+            None => DistortionModel::for_coefficient_count(found),
             Some((node, name)) => DistortionModel::from_name(name, found).ok_or_else(|| CalibrationError::Model {
                 file: self.file.into(),
                 line: node.line,
                 model: name.into(),
-                candidates: closest(name, DistortionModel::names()),
+                candidates: closest_names(name, DistortionModel::names()),
             })?,
         };
         let counts = known.counts();
@@ -412,7 +418,7 @@ impl Reader<'_> {
             let others: Vec<String> = others.iter().map(usize::to_string).collect();
             let or = if others.is_empty() { "" } else { " or " };
             let problem = format!("has {found} numbers; {name} has {}{or}{last}", others.join(", "));
-            return Err(self.wrong(d.line, field, problem));
+            return Err(self.field_error(d.line, field, problem));
         }
         if let [tau_x, tau_y] = numbers[found.min(12)..]
             && [tau_x, tau_y] != [0.0; 2]
@@ -421,19 +427,20 @@ impl Reader<'_> {
                 "tilts the sensor (tau_x = {tau_x}, tau_y = {tau_y}): tilted sensors are not supported; the last two of 14 numbers \
                  have to be 0"
             );
-            return Err(self.wrong(d.line, field, problem));
+            return Err(self.field_error(d.line, field, problem));
         }
         Ok((known, numbers))
     }
 
     fn count(&self, field: &str, node: &Node) -> Result<usize, CalibrationError> {
         let text = self.text(field, node)?;
-        text.parse()
-            .map_err(|_| self.wrong(node.line, field, format!("is {text:?}; it must be a whole number of pixels")))
+        text.parse().map_err(|_| {
+            self.field_error(node.line, field, format!("is {text:?}; it must be a whole number of pixels"))
+        })
     }
 
     /// Rejects pixels that combine several pixels of the calibration.
-    fn not_binned(&self, fields: [(&str, Option<&Node>); 2]) -> Result<(), CalibrationError> {
+    fn reject_binning(&self, fields: [(&str, Option<&Node>); 2]) -> Result<(), CalibrationError> {
         for (field, node) in fields {
             let Some(node) = node else { continue };
             let count = self.count(field, node)?;
@@ -442,18 +449,18 @@ impl Reader<'_> {
                     "is {count}: several pixels in one are not supported; give image_width, image_height and camera_matrix of the \
                      pictures as they come, and no {field}"
                 );
-                return Err(self.wrong(node.line, field, problem));
+                return Err(self.field_error(node.line, field, problem));
             }
         }
         Ok(())
     }
 
     /// Rejects a region that is only a part of the calibrated image.
-    fn not_a_part(&self, roi: &Node, [width, height]: [usize; 2]) -> Result<(), CalibrationError> {
+    fn reject_partial_roi(&self, roi: &Node, [width, height]: [usize; 2]) -> Result<(), CalibrationError> {
         let Value::Table(parts) = &roi.value else {
             let problem =
                 format!("is {}, not a table of x_offset, y_offset, height, width and do_rectify", roi.value.describe());
-            return Err(self.wrong(roi.line, "roi", problem));
+            return Err(self.field_error(roi.line, "roi", problem));
         };
         let part = |name: &str| match parts.iter().find(|(key, _)| key == name) {
             Some((_, node)) => self.count(&format!("roi.{name}"), node),
@@ -468,7 +475,7 @@ impl Reader<'_> {
                 "is {w} x {h} at ({x}, {y}), a part of {width} x {height}, which is not supported; give the numbers of the part and \
                  no roi: image_width: {w}, image_height: {h}, cx less by {x}, cy less by {y}"
             );
-            return Err(self.wrong(roi.line, "roi", problem));
+            return Err(self.field_error(roi.line, "roi", problem));
         }
         Ok(())
     }

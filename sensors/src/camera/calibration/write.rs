@@ -11,16 +11,17 @@ impl CameraInfo {
         let mut out = String::new();
         let Self { width, height, distortion_model, .. } = self;
         // Writing to a string does not fail.
-        let _ = writeln!(out, "image_width: {width}\nimage_height: {height}\ncamera_name: {}", word(&self.name));
+        let _ =
+            writeln!(out, "image_width: {width}\nimage_height: {height}\ncamera_name: {}", quoted_scalar(&self.name));
         let k = self.camera_matrix.transpose();
-        matrix(&mut out, "camera_matrix", [3, 3], k.as_slice());
+        write_matrix(&mut out, "camera_matrix", [3, 3], k.as_slice());
         let _ = writeln!(out, "distortion_model: {distortion_model}");
         let d = &self.distortion_coefficients;
-        matrix(&mut out, "distortion_coefficients", [1, d.len()], d);
+        write_matrix(&mut out, "distortion_coefficients", [1, d.len()], d);
         let r = self.rectification_matrix.transpose();
-        matrix(&mut out, "rectification_matrix", [3, 3], r.as_slice());
+        write_matrix(&mut out, "rectification_matrix", [3, 3], r.as_slice());
         let p = self.projection_matrix.transpose();
-        matrix(&mut out, "projection_matrix", [3, 4], p.as_slice());
+        write_matrix(&mut out, "projection_matrix", [3, 4], p.as_slice());
         out
     }
 
@@ -36,13 +37,13 @@ impl CameraInfo {
 }
 
 /// Writes a matrix, row by row.
-fn matrix(out: &mut String, name: &str, [rows, cols]: [usize; 2], data: &[f64]) {
-    let data: Vec<String> = data.iter().map(|&x| number(x)).collect();
+fn write_matrix(out: &mut String, name: &str, [rows, cols]: [usize; 2], data: &[f64]) {
+    let data: Vec<String> = data.iter().map(|&x| format_number(x)).collect();
     let _ = writeln!(out, "{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]", data.join(", "));
 }
 
 /// Formats a number for YAML 1.1 readers too: with a decimal point, and a sign in the exponent.
-fn number(x: f64) -> String {
+fn format_number(x: f64) -> String {
     let text = format!("{x:?}");
     let Some((digits, exponent)) = text.split_once('e') else { return text };
     let point = if digits.contains('.') { "" } else { ".0" };
@@ -51,7 +52,7 @@ fn number(x: f64) -> String {
 }
 
 /// Formats a string, quoted unless it is a plain word.
-fn word(text: &str) -> String {
+fn quoted_scalar(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
     if text.chars().all(plain) && text.starts_with(|c: char| c.is_ascii_alphabetic()) {
         return text.into();

@@ -1,18 +1,18 @@
 //! YAML parser of calibration files.
 
 use super::CalibrationError;
-use kinetoscope_scene::yaml::{self, Dialect, Node};
+use kinetoscope_scene::yaml::{self, Node, YamlFeatures};
 
-const DIALECT: Dialect = Dialect { files: "calibration files", aliases: false, tags: true };
+const DIALECT: YamlFeatures = YamlFeatures { files: "calibration files", aliases: false, tags: true };
 
 /// Returns true if a scalar means null.
-pub(super) fn is_nothing(text: &str) -> bool {
+pub(super) fn is_null(text: &str) -> bool {
     ["", "~", "null"].contains(&text)
 }
 
 /// Removes the byte order mark, and replaces tabs between a key and its value by spaces. YAML allows both, but the
 /// parser rejects them. Lines and columns stay the same.
-fn readable(text: &str) -> String {
+fn normalize_whitespace(text: &str) -> String {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let spaced = |line: &str| {
         let rest = line.trim_start_matches(' ').trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_');
@@ -27,6 +27,6 @@ fn readable(text: &str) -> String {
 /// Parses a text with a single document.
 pub(super) fn parse(text: &str, file: &str) -> Result<Node, CalibrationError> {
     let wrong = |line, column, message: String| CalibrationError::Yaml { file: file.into(), line, column, message };
-    let root = yaml::parse(&readable(text), &DIALECT).map_err(|e| wrong(e.line, e.column, e.message))?;
+    let root = yaml::parse(&normalize_whitespace(text), &DIALECT).map_err(|e| wrong(e.line, e.column, e.message))?;
     root.ok_or_else(|| wrong(1, 1, "the file is empty".into()))
 }

@@ -1,7 +1,7 @@
 //! Depth noise that grows with the square of the depth.
 
-use super::{OfDepth, Picture, within};
-use kinetoscope_render::Stream;
+use super::{DepthEffect, ImageContext, within};
+use kinetoscope_render::RngStream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +40,7 @@ impl Default for DepthNoise {
     }
 }
 
-impl OfDepth for DepthNoise {
+impl DepthEffect for DepthNoise {
     fn check(&self) -> Result<(), SensorError> {
         const UP_TO: &str = "it must be 0 to 1000";
         within("constant of the depth noise", self.constant, [0.0, 1000.0], UP_TO)?;
@@ -48,13 +48,13 @@ impl OfDepth for DepthNoise {
         within("offset of the depth noise", self.offset, [-1000.0, 1000.0], "it must be -1000 to 1000")
     }
 
-    fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>) {
+    fn apply(&self, depths: &mut [f32], picture: &ImageContext<'_>) {
         let (near, far) = (picture.view.near, picture.view.far);
         for (block, depths) in (0..).zip(depths.chunks_mut(4)) {
             if depths.iter().all(|depth| depth.is_infinite()) {
                 continue;
             }
-            let normals = picture.ticket.normals(Stream::DEPTH, block);
+            let normals = picture.rng_key.normals(RngStream::DEPTH, block);
             for (depth, normal) in depths.iter_mut().zip(normals).filter(|(depth, _)| depth.is_finite()) {
                 let z = f64::from(*depth);
                 let sigma = self.constant + self.quadratic * (z - self.offset).powi(2);

@@ -1,6 +1,6 @@
 //! Depth holes of structured-light cameras.
 
-use super::{OfDepth, Picture, within};
+use super::{DepthEffect, ImageContext, within};
 use crate::error::SensorError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -35,32 +35,32 @@ impl Default for Holes {
     }
 }
 
-impl OfDepth for Holes {
+impl DepthEffect for Holes {
     fn check(&self) -> Result<(), SensorError> {
         within("max_angle of the holes", self.max_angle, [0.0, FRAC_PI_2], "it must be 0 to pi/2")?;
         within("baseline of the holes", self.baseline, [-1000.0, 1000.0], "it must be -1000 to 1000")
     }
 
-    fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>) {
+    fn apply(&self, depths: &mut [f32], picture: &ImageContext<'_>) {
         // Holes are first marked by a negative sign, so that the depths around them stay available.
         if self.max_angle < FRAC_PI_2 {
             let least = self.max_angle.cos();
             for pixel in 0..depths.len() {
-                if facing(depths, pixel, picture).is_some_and(|cosine| cosine < least) {
+                if incidence_cosine(depths, pixel, picture).is_some_and(|cosine| cosine < least) {
                     depths[pixel] = -depths[pixel].abs();
                 }
             }
         }
         if self.baseline != 0.0 {
-            let reach = f64::from(picture.view.fx) * self.baseline;
-            depths.chunks_mut(picture.view.width.max(1)).for_each(|row| shade(row, reach));
+            let projector_disparity = f64::from(picture.view.fx) * self.baseline;
+            depths.chunks_mut(picture.view.width.max(1)).for_each(|row| mark_projector_shadow(row, projector_disparity));
         }
         depths.iter_mut().filter(|depth| **depth < 0.0).for_each(|depth| *depth = f32::INFINITY);
     }
 }
 
 /// Returns the inverse of the measured or marked depth \[1/m\]; `None` for a miss.
-fn inverse(depth: f32) -> Option<f64> {
+fn inverse_depth(depth: f32) -> Option<f64> {
     depth.is_finite().then(|| 1.0 / f64::from(depth.abs()))
 }
 
@@ -68,12 +68,12 @@ fn inverse(depth: f32) -> Option<f64> {
 ///
 /// On a plane, the inverse depth is a linear function of the ray, and its coefficients n are the normal. Three rays
 /// determine them, by Cramer's rule.
-fn facing(depths: &[f32], pixel: usize, picture: &Picture<'_>) -> Option<f64> {
+fn incidence_cosine(depths: &[f32], pixel: usize, picture: &ImageContext<'_>) -> Option<f64> {
     let width = picture.view.width;
-    let here = inverse(depths[pixel])?;
+    let here = inverse_depth(depths[pixel])?;
     // Uses the neighbor with the more similar inverse depth: the other neighbor may be across an edge.
     let nearer = |before: Option<usize>, after: Option<usize>| {
-        let at = |pixel: Option<usize>| Some((pixel?, inverse(*depths.get(pixel?)?)?));
+        let at = |pixel: Option<usize>| Some((pixel?, inverse_depth(*depths.get(pixel?)?)?));
         match (at(before), at(after)) {
             (Some(a), Some(b)) => Some(if (here - a.1).abs() < (b.1 - here).abs() { a } else { b }),
             (one, other) => one.or(other),
@@ -94,13 +94,13 @@ fn facing(depths: &[f32], pixel: usize, picture: &Picture<'_>) -> Option<f64> {
 /// Marks the pixels of a row that the projector does not reach. The projector sees a point at depth z `reach / z`
 /// pixels to the left of its position in the camera image. So the order along the row, starting at the side of the
 /// projector, gives the occlusion: a point that does not extend the farthest position so far is in a shadow.
-fn shade(row: &mut [f32], reach: f64) {
+fn mark_projector_shadow(row: &mut [f32], reach: f64) {
     let count = row.len();
     // A projector to the left is the mirror image of a projector to the right.
     let mut first = f64::INFINITY;
     for k in 0..count {
         let pixel = if reach > 0.0 { count - 1 - k } else { k };
-        let Some(inverse) = inverse(row[pixel]) else { continue };
+        let Some(inverse) = inverse_depth(row[pixel]) else { continue };
         let seen = (count - k) as f64 - reach.abs() * inverse;
         if seen < first {
             first = seen;

@@ -17,13 +17,13 @@ mod tone;
 
 use super::error::CameraError;
 use crate::error::SensorError;
-pub(super) use kinds::Picture;
-use kinds::{OfDepth, OfLight, Place, within};
+pub(super) use kinds::ImageContext;
+use kinds::{DepthEffect, PixelContext, RadianceEffect, within};
 use kinetoscope_render::ToneCurve;
 use kinetoscope_render::frame::{Channel, Channels, FrameMut};
 use kinetoscope_render::frame::{Color, Depth};
 use serde::{Deserialize, Serialize};
-use tone::Tone;
+use tone::ToneLut;
 
 /// Declares the imperfections, in the order of their application: one module and one type each.
 macro_rules! imperfections {
@@ -66,20 +66,20 @@ macro_rules! imperfections {
 
             /// Checks all parameters.
             fn check_numbers(&self) -> Result<(), SensorError> {
-                $(self.$light.as_ref().map_or(Ok(()), OfLight::check)?;)*
-                $(self.$depth.as_ref().map_or(Ok(()), OfDepth::check)?;)*
+                $(self.$light.as_ref().map_or(Ok(()), RadianceEffect::check)?;)*
+                $(self.$depth.as_ref().map_or(Ok(()), DepthEffect::check)?;)*
                 Ok(())
             }
 
-            fn spoil_light(&self, light: &mut [f64; 3], place: &Place<'_>) {
+            fn spoil_light(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
                 $(if let Some(imperfection) = &self.$light {
-                    imperfection.spoil(light, place);
+                    imperfection.apply(light, place);
                 })*
             }
 
-            fn spoil_depth(&self, depths: &mut [f32], picture: &Picture<'_>) {
+            fn spoil_depth(&self, depths: &mut [f32], picture: &ImageContext<'_>) {
                 $(if let Some(imperfection) = &self.$depth {
-                    imperfection.spoil(depths, picture);
+                    imperfection.apply(depths, picture);
                 })*
             }
         }
@@ -124,20 +124,20 @@ impl Imperfections {
     }
 
     /// Applies all imperfections to a frame in which misses are infinite.
-    pub(super) fn spoil(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, picture: Picture<'_>) {
-        let tone = Tone::of(curve);
+    pub(super) fn apply(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, picture: ImageContext<'_>) {
+        let tone = ToneLut::for_curve(curve);
         if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
             for (pixel, bytes) in color.chunks_exact_mut(4).enumerate() {
-                let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| tone.light(byte));
-                self.spoil_light(&mut light, &Place { picture, pixel });
-                bytes[..3].copy_from_slice(&light.map(|light| tone.byte(light)));
+                let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| tone.decode(byte));
+                self.spoil_light(&mut light, &PixelContext { picture, pixel });
+                bytes[..3].copy_from_slice(&light.map(|light| tone.encode(light)));
             }
         }
         if !self.of_depth() {
             return;
         }
         let [depth, distance] = [frame.depth.as_deref_mut(), frame.distance.as_deref_mut()];
-        let (reach, other) = if picture.reaches_aside() { (distance, depth) } else { (depth, distance) };
+        let (reach, other) = if picture.clips_by_distance() { (distance, depth) } else { (depth, distance) };
         let times = |number: f32, factor: f64| match number.is_finite() {
             true => (f64::from(number) * factor) as f32,
             false => f32::INFINITY,
@@ -146,13 +146,13 @@ impl Imperfections {
             (Some(reach), other) => {
                 self.spoil_depth(reach, &picture);
                 for (pixel, (other, reach)) in other.into_iter().flatten().zip(reach).enumerate() {
-                    *other = times(*reach, picture.other_than_reach(pixel));
+                    *other = times(*reach, picture.clip_depth_conversion(pixel));
                 }
             }
             (None, Some(other)) => {
                 for (pixel, number) in other.iter_mut().enumerate() {
                     // At a right angle depth is 0 for any reach, so the reach is unknown and has no effect.
-                    let factor = picture.other_than_reach(pixel).recip();
+                    let factor = picture.clip_depth_conversion(pixel).recip();
                     *number = match factor.is_finite() || number.is_infinite() {
                         true => times(*number, factor),
                         false => picture.view.near,
@@ -160,7 +160,7 @@ impl Imperfections {
                 }
                 self.spoil_depth(other, &picture);
                 for (pixel, number) in other.iter_mut().enumerate() {
-                    *number = times(*number, picture.other_than_reach(pixel));
+                    *number = times(*number, picture.clip_depth_conversion(pixel));
                 }
             }
             (None, None) => {}

@@ -1,7 +1,7 @@
 //! Read noise of the electronics.
 
-use super::{OfLight, Place, within};
-use kinetoscope_render::Stream;
+use super::{RadianceEffect, PixelContext, within};
+use kinetoscope_render::RngStream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
@@ -22,13 +22,13 @@ impl Default for ReadNoise {
     }
 }
 
-impl OfLight for ReadNoise {
+impl RadianceEffect for ReadNoise {
     fn check(&self) -> Result<(), SensorError> {
         within("std of the read noise", self.std, [0.0, 100.0], "it must be 0 to 100")
     }
 
-    fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>) {
-        let normals = place.picture.ticket.normals(Stream::READ, place.pixel as u32);
+    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
+        let normals = place.picture.rng_key.normals(RngStream::READ, place.pixel as u32);
         for (light, normal) in light.iter_mut().zip(normals) {
             *light += self.std * normal;
         }

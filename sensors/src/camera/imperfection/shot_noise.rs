@@ -1,7 +1,7 @@
 //! Photon noise.
 
-use super::{OfLight, Place, within};
-use kinetoscope_render::Stream;
+use super::{RadianceEffect, PixelContext, within};
+use kinetoscope_render::RngStream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
@@ -26,22 +26,22 @@ impl Default for ShotNoise {
 }
 
 /// Mean from which the normal distribution is used: none of its values is below 0 then, with 32-bit normal numbers.
-const MANY: f64 = 50.0;
+const NORMAL_APPROXIMATION_MIN: f64 = 50.0;
 
-impl OfLight for ShotNoise {
+impl RadianceEffect for ShotNoise {
     fn check(&self) -> Result<(), SensorError> {
         within("electrons of the shot noise", self.electrons, [1.0, 1e9], "it must be 1 to 1e9")
     }
 
-    fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>) {
-        let (ticket, block) = (place.picture.ticket, place.pixel as u32);
+    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
+        let (ticket, block) = (place.picture.rng_key, place.pixel as u32);
         let mean = light.map(|light| light * self.electrons);
         // Random numbers are only computed if a channel needs them.
-        let normals = mean.iter().any(|mean| *mean >= MANY).then(|| ticket.normals(Stream::SHOT, block));
-        let uniforms = mean.iter().any(|mean| *mean < MANY).then(|| ticket.uniforms(Stream::SHOT_IN_THE_DARK, block));
+        let normals = mean.iter().any(|mean| *mean >= NORMAL_APPROXIMATION_MIN).then(|| ticket.normals(RngStream::SHOT, block));
+        let uniforms = mean.iter().any(|mean| *mean < NORMAL_APPROXIMATION_MIN).then(|| ticket.uniforms(RngStream::SHOT_LOW_LIGHT, block));
         for (k, light) in light.iter_mut().enumerate() {
             let counted = match (normals, uniforms) {
-                (Some(normals), _) if mean[k] >= MANY => mean[k] + mean[k].sqrt() * normals[k],
+                (Some(normals), _) if mean[k] >= NORMAL_APPROXIMATION_MIN => mean[k] + mean[k].sqrt() * normals[k],
                 (_, Some(uniforms)) => poisson(mean[k], uniforms[k]),
                 _ => mean[k],
             };
@@ -55,7 +55,7 @@ fn poisson(mean: f64, uniform: f64) -> f64 {
     let (mut count, mut probability) = (0.0, (-mean).exp());
     let mut below = probability;
     // The rest of the distribution at twenty times its mean is smaller than 32-bit numbers resolve.
-    while uniform > below && count < 20.0 * MANY {
+    while uniform > below && count < 20.0 * NORMAL_APPROXIMATION_MIN {
         count += 1.0;
         probability *= mean / count;
         below += probability;

@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope_render::PixelIntrinsics;
-use kinetoscope_render::Ticket;
+use kinetoscope_render::RngKey;
 use kinetoscope_render::View;
 use kinetoscope_render::frame::Frame;
 use kinetoscope_render::lens::LensRays;
@@ -19,18 +19,18 @@ fn view(size: [usize; 2], f: f32) -> View {
     View { width: size[0], height: size[1], fx: f, fy: f, cx, cy, near: 0.01, far: 100.0, world_from_camera }
 }
 
-fn pinhole<'a>(view: &'a View, ticket: &'a Ticket) -> Picture<'a> {
-    Picture { view, rays: None, ticket }
+fn pinhole<'a>(view: &'a View, ticket: &'a RngKey) -> ImageContext<'a> {
+    ImageContext { view, rays: None, rng_key: ticket }
 }
 
-fn tone() -> &'static Tone {
-    Tone::of(ToneCurve::Soft)
+fn tone() -> &'static ToneLut {
+    ToneLut::for_curve(ToneCurve::Soft)
 }
 
 /// Random key of frame `number`.
-fn ticket(number: u64) -> Ticket {
-    let mut ticket = Ticket::first(11, 3, "eye");
-    (0..number).for_each(|_| ticket.due());
+fn rng_key(number: u64) -> RngKey {
+    let mut ticket = RngKey::new(11, 3, "eye");
+    (0..number).for_each(|_| ticket.advance_scheduled());
     ticket
 }
 
@@ -42,16 +42,20 @@ fn only(set: impl FnOnce(&mut Imperfections)) -> Imperfections {
 }
 
 /// A gray image with imperfections.
-fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<[u8; 4]> {
+fn with_effects(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<[u8; 4]> {
     let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
     frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
-    imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, pinhole(&view([SIDE; 2], 150.0), &ticket(picture)));
+    imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, pinhole(&view([SIDE; 2], 150.0), &rng_key(picture)));
     frame.color.unwrap().as_chunks().0.to_vec()
 }
 
 /// Radiance of all pixels and colors of a gray image with imperfections.
-fn lights(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<f64> {
-    spoilt(imperfections, byte, picture).iter().flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().light(b)).collect()
+fn radiances(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<f64> {
+    with_effects(imperfections, byte, picture)
+        .iter()
+        .flat_map(|p| [p[0], p[1], p[2]])
+        .map(|b| tone().decode(b))
+        .collect()
 }
 
 /// Mean and variance.
@@ -64,9 +68,9 @@ fn moments(numbers: &[f64]) -> [f64; 2] {
 /// Mean, variance and count of the radiance of all pixels and colors. The quantization of the bytes adds a twelfth of
 /// the squared step to the variance (Sheppard's correction); this is subtracted.
 fn photon_transfer(imperfections: &Imperfections, byte: u8) -> [f64; 3] {
-    let lights = lights(imperfections, byte, u64::from(byte));
+    let lights = radiances(imperfections, byte, u64::from(byte));
     let [mean, variance] = moments(&lights);
-    let step = 0.5 * (tone().light(byte + 1) - tone().light(byte - 1));
+    let step = 0.5 * (tone().decode(byte + 1) - tone().decode(byte - 1));
     [mean, variance - step * step / 12.0, lights.len() as f64]
 }
 
@@ -99,7 +103,7 @@ fn photon_transfer_curve() {
         let imperfections = Imperfections { shot_noise, read_noise, ..Imperfections::default() };
         let points = levels.map(|byte| photon_transfer(&imperfections, byte));
         for (byte, [mean, variance, n]) in levels.into_iter().zip(points) {
-            let (light, bound) = (tone().light(byte), 6.0 * (variance / n).sqrt());
+            let (light, bound) = (tone().decode(byte), 6.0 * (variance / n).sqrt());
             // The middle of a byte and the mean of its radiance differ by an eighth of the change of the step: below
             // 1e-5 here.
             assert!((mean - light).abs() < bound + 1e-5, "{byte}: {mean} is not {light}");
@@ -120,8 +124,8 @@ fn correlations() {
     let read = only(|all| all.read_noise = Some(ReadNoise { std: 0.02 }));
     for imperfections in [shot, read] {
         let errors = |picture| {
-            let lights = lights(&imperfections, 150, picture);
-            lights.into_iter().map(|light| light - tone().light(150)).collect::<Vec<f64>>()
+            let lights = radiances(&imperfections, 150, picture);
+            lights.into_iter().map(|light| light - tone().decode(150)).collect::<Vec<f64>>()
         };
         let (a, b) = (errors(1), errors(2));
         assert_eq!(a, errors(1), "the same frame");
@@ -140,13 +144,13 @@ fn correlations() {
 #[test]
 fn few_electrons() {
     for electrons in [0.5, 3.0, 20.0] {
-        let light = tone().light(128);
+        let light = tone().decode(128);
         let shot = ShotNoise { electrons: electrons / light };
-        let (view, ticket) = (view([SIDE; 2], 150.0), ticket(1));
+        let (view, ticket) = (view([SIDE; 2], 150.0), rng_key(1));
         let mut counts = Vec::new();
         for pixel in 0..40_000 {
             let mut light = [light; 3];
-            shot.spoil(&mut light, &Place { picture: pinhole(&view, &ticket), pixel });
+            shot.apply(&mut light, &PixelContext { picture: pinhole(&view, &ticket), pixel });
             counts.extend(light.map(|light| light * shot.electrons));
         }
         assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
@@ -160,13 +164,13 @@ fn few_electrons() {
 /// Radiance falls with the fourth power of the cosine.
 #[test]
 fn vignetting() {
-    let of = |strength| spoilt(&only(|all| all.vignetting = Some(Vignetting { strength })), 200, 1);
+    let of = |strength| with_effects(&only(|all| all.vignetting = Some(Vignetting { strength })), 200, 1);
     for strength in [0.0, 0.5, 1.0] {
         let mut off = 0;
         for (pixel, found) in of(strength).into_iter().enumerate() {
             let (u, v) = ((pixel % SIDE) as f64 + 0.5, (pixel / SIDE) as f64 + 0.5);
             let angle = ((u - 100.0).hypot(v - 100.0) / 150.0).atan();
-            let expected = tone().byte(tone().light(200) * (1.0 - strength * (1.0 - angle.cos().powi(4))));
+            let expected = tone().encode(tone().decode(200) * (1.0 - strength * (1.0 - angle.cos().powi(4))));
             let close = found[..3].iter().all(|byte| byte.abs_diff(expected) <= 1);
             assert!(close && found[3] == 255, "{pixel}: {found:?}, {expected}");
             off += usize::from(found[0] != expected);
@@ -175,7 +179,7 @@ fn vignetting() {
         assert!(off < SIDE, "{off}");
     }
     // Control: at a corner, 43 degrees off the axis, 0.28 of the radiance is left.
-    let left = tone().light(of(Vignetting::default().strength)[0][0]) / tone().light(200);
+    let left = tone().decode(of(Vignetting::default().strength)[0][0]) / tone().decode(200);
     assert!((left - 0.28).abs() < 0.01, "{left}");
 }
 
@@ -188,12 +192,12 @@ fn zero_imperfections() {
         ..Imperfections::default()
     };
     for byte in 0..=255 {
-        assert!(spoilt(&light, byte, 1).iter().all(|pixel| *pixel == [byte, byte, byte, 255]), "{byte}");
+        assert!(with_effects(&light, byte, 1).iter().all(|pixel| *pixel == [byte, byte, byte, 255]), "{byte}");
     }
 }
 
 /// Depths and distances of reaches: the reaches are distances if rays of the lens do not all go forward, else depths.
-fn both(reaches: &[f32], picture: Picture<'_>) -> [Vec<f32>; 2] {
+fn depths_and_distances(reaches: &[f32], picture: ImageContext<'_>) -> [Vec<f32>; 2] {
     let of_pixel = |(pixel, reach): (usize, &f32)| {
         let [x, y, z] = picture.ray(pixel);
         let cosine = z / (x * x + y * y + z * z).sqrt();
@@ -210,21 +214,21 @@ fn both(reaches: &[f32], picture: Picture<'_>) -> [Vec<f32>; 2] {
 }
 
 /// Reaches with imperfections, computed from both channels and from each channel alone: all results must be equal.
-fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Picture<'_>) -> Vec<f32> {
+fn lens_reach_with_effects(imperfections: &Imperfections, reaches: &[f32], picture: ImageContext<'_>) -> Vec<f32> {
     let seen = |(pixel, reach): (usize, &f32)| if picture.ray(pixel) == [0.0; 3] { f32::INFINITY } else { *reach };
     let reaches: Vec<f32> = reaches.iter().enumerate().map(seen).collect();
-    let [depths, distances] = both(&reaches, picture);
+    let [depths, distances] = depths_and_distances(&reaches, picture);
     let view = picture.view;
     let spoilt = |depth: bool, distance: bool| {
         let mut frame = Frame::new(view.width, view.height, Channels { depth, distance, ..Channels::default() });
         (frame.depth, frame.distance) = (depth.then(|| depths.clone()), distance.then(|| distances.clone()));
-        imperfections.spoil(&mut frame.as_mut(), ToneCurve::Soft, picture);
+        imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, picture);
         [frame.depth.take(), frame.distance.take()]
     };
     let [found_depths, found_distances] = spoilt(true, true).map(Option::unwrap);
     let alone = [spoilt(true, false)[0].clone().unwrap(), spoilt(false, true)[1].clone().unwrap()];
-    let found = if picture.reaches_aside() { &found_distances } else { &found_depths };
-    let expected = both(found, picture);
+    let found = if picture.clips_by_distance() { &found_distances } else { &found_depths };
+    let expected = depths_and_distances(found, picture);
     for (k, all) in [found_depths.clone(), found_distances.clone()].into_iter().enumerate() {
         for pixel in 0..all.len() {
             let (one, expected) = (alone[k][pixel], expected[k][pixel]);
@@ -239,8 +243,8 @@ fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Pictur
 }
 
 /// Depths of a pinhole, with imperfections.
-fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
-    spoilt_behind(imperfections, depths, pinhole(view, &ticket(1)))
+fn depths_with_effects(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
+    lens_reach_with_effects(imperfections, depths, pinhole(view, &rng_key(1)))
 }
 
 /// Holes and noise are consistent between depth and distance, and the same if only one channel is measured.
@@ -252,8 +256,9 @@ fn distances() {
         let baseline = if rays.is_none() { 0.075 } else { 0.0 };
         let holes = Some(Holes { baseline, ..Holes::default() });
         let all = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), holes, ..Imperfections::default() };
-        let ticket = ticket(1);
-        let found = spoilt_behind(&all, &reaches, Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) });
+        let ticket = rng_key(1);
+        let found =
+            lens_reach_with_effects(&all, &reaches, ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) });
         assert!(rays.is_some() || found.iter().any(|reach| reach.is_infinite()), "there are holes");
         let same = found.iter().zip(&reaches).filter(|(found, reach)| found == reach).count();
         assert!(same < 10, "there is noise, but for {same}");
@@ -275,7 +280,7 @@ fn depth_noise() {
         for z in [0.5, 1.0, 2.0, 5.0] {
             let mut depths = vec![z as f32; SIDE * SIDE];
             depths[7] = f32::INFINITY;
-            let found = spoilt_depths(&only(|all| all.depth_noise = Some(depth_noise)), &depths, &view);
+            let found = depths_with_effects(&only(|all| all.depth_noise = Some(depth_noise)), &depths, &view);
             assert_eq!(found[7], f32::INFINITY, "a miss stays a miss");
             let errors: Vec<f64> = found.iter().filter(|z| z.is_finite()).map(|found| f64::from(*found) - z).collect();
             let [mean, variance] = moments(&errors);
@@ -287,7 +292,7 @@ fn depth_noise() {
     // Control: the deviations at 1 m and 2 m differ by a factor of four, not two.
     assert_eq!((laws[0].1)(2.0) / (laws[0].1)(1.0), 4.0);
     let huge = only(|all| all.depth_noise = Some(DepthNoise { constant: 1000.0, quadratic: 0.0, offset: 0.0 }));
-    let found = spoilt_depths(&huge, &[50.0; SIDE * SIDE], &view);
+    let found = depths_with_effects(&huge, &[50.0; SIDE * SIDE], &view);
     assert!(found.iter().all(|z| (0.01..=100.0).contains(z)), "saturated");
 }
 
@@ -299,7 +304,7 @@ fn projector_shadow() {
     let row: Vec<f32> = (0..100).map(|u| if (20..40).contains(&u) { 1.0 } else { 2.0 }).collect();
     let holes_with = |baseline: f64| {
         let holes = Some(Holes { max_angle: FRAC_PI_2, baseline });
-        spoilt_depths(&only(|all| all.holes = holes), &row.repeat(8), &view)
+        depths_with_effects(&only(|all| all.holes = holes), &row.repeat(8), &view)
     };
     for baseline in [0.075, 0.15, -0.075, -0.15, 0.0] {
         let found = holes_with(baseline);
@@ -329,8 +334,8 @@ fn grazing_holes() {
     for rays in lenses(&view) {
         let (mut inside, mut outside) = (0, 0);
         for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
-            let ticket = ticket(1);
-            let picture = Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+            let ticket = rng_key(1);
+            let picture = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
             let ray = |pixel| nalgebra::Vector3::from(picture.ray(pixel));
             let normal = nalgebra::Vector3::from(normal).normalize();
             // A plane 2 m from the camera; rays that do not reach the plane are misses.
@@ -338,7 +343,7 @@ fn grazing_holes() {
             let reached = |depth: f64| depth > 0.0 && depth < 1e3;
             let depths: Vec<f32> =
                 (0..80 * 60).map(|k| if reached(depth(k)) { depth(k) as f32 } else { f32::INFINITY }).collect();
-            let found = spoilt_behind(&all, &depths, picture);
+            let found = lens_reach_with_effects(&all, &depths, picture);
             let hits = found.iter().zip(&depths).enumerate().filter(|(_, (_, depth))| depth.is_finite());
             for (pixel, (found, depth)) in hits {
                 let angle = (-normal.dot(&ray(pixel)) / ray(pixel).norm()).acos();
@@ -371,10 +376,10 @@ fn lens_depth_noise() {
     let (view, law) = (view([120, 90], 60.0), DepthNoise { constant: 1e-3, quadratic: 2e-3, offset: 0.0 });
     let all = only(|all| all.depth_noise = Some(law));
     for rays in lenses(&view) {
-        let ticket = ticket(1);
-        let picture = Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+        let ticket = rng_key(1);
+        let picture = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
         for z in [0.5f64, 3.0] {
-            let errors: Vec<f64> = spoilt_behind(&all, &[z as f32; 120 * 90], picture)
+            let errors: Vec<f64> = lens_reach_with_effects(&all, &[z as f32; 120 * 90], picture)
                 .into_iter()
                 .filter(|found| found.is_finite())
                 .map(|found| f64::from(found) - z)
@@ -388,12 +393,12 @@ fn lens_depth_noise() {
 }
 
 /// Radiance of a white image with vignetting, by pixel.
-fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
-    let (view, ticket) = (view(size, 1.0), ticket(1));
-    let picture = Picture { rays: Some(rays), ..pinhole(&view, &ticket) };
+fn remaining_radiance(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
+    let (view, ticket) = (view(size, 1.0), rng_key(1));
+    let picture = ImageContext { rays: Some(rays), ..pinhole(&view, &ticket) };
     let shade = |pixel| {
         let mut light = [1.0; 3];
-        Vignetting::default().spoil(&mut light, &Place { picture, pixel });
+        Vignetting::default().apply(&mut light, &PixelContext { picture, pixel });
         assert!(light[0] == light[1] && light[1] == light[2]);
         light[0]
     };
@@ -421,7 +426,7 @@ fn lens_vignetting() {
         }
         let optics = Optics::new(lens, pixels).unwrap();
         let rays = LensRays::new(&optics, size, 1).unwrap();
-        for (k, found) in left(&rays, size).into_iter().enumerate() {
+        for (k, found) in remaining_radiance(&rays, size).into_iter().enumerate() {
             let at = [(k % 64) as f64 + 0.5, (k / 64) as f64 + 0.5];
             let Some(ray) = optics.unproject(at).map(nalgebra::Vector3::from) else {
                 assert_eq!(found, 0.0, "{}", lens.name());
@@ -466,7 +471,7 @@ fn image_circle_edge() {
         let f = 32.0 / max_angle;
         let pixels = PixelIntrinsics { fx: f, fy: f, cx: 32.5, cy: 32.5 };
         let rays = LensRays::new(&Optics::new(Equidistant { max_angle }.into(), pixels).unwrap(), size, 1).unwrap();
-        let found = left(&rays, size);
+        let found = remaining_radiance(&rays, size);
         for pixel in [32 * 65, 32 * 65 + 64, 32, 64 * 65 + 32] {
             let expected = max_angle.cos() * max_angle.sin() / max_angle;
             assert!((found[pixel] - expected).abs() < 1e-6, "{max_angle} {pixel}: {} is not {expected}", found[pixel]);
@@ -483,7 +488,7 @@ fn focal_length_unit() {
         let pixels = PixelIntrinsics { fx: 20.0 / scale, fy: 20.0 / scale, cx: 32.0, cy: 24.0 };
         let lens = FTheta::default();
         let lens = Lens::from(FTheta { focal_length: lens.focal_length / scale, ..lens });
-        left(&LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap(), size)
+        remaining_radiance(&LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap(), size)
     };
     let expected = of(1.0);
     for scale in [1e-4, 1e3] {
@@ -511,7 +516,7 @@ fn light_of_sky() {
     ];
     for (lens, most) in all {
         let rays = LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap();
-        let found = left(&rays, size).iter().sum::<f64>() / (f * f);
+        let found = remaining_radiance(&rays, size).iter().sum::<f64>() / (f * f);
         let expected = PI * most.sin().powi(2);
         // At a sharp edge at radius r, only the 2 pi r edge pixels can be counted wrong, randomly and by half a pixel
         // each. The bound is six times the square root.

@@ -4,47 +4,47 @@ use kinetoscope_render::ToneCurve;
 use std::sync::LazyLock;
 
 /// Lookup tables of all curves, computed on first use.
-static TONES: [LazyLock<Tone>; ToneCurve::ALL.len()] = [
-    LazyLock::new(|| Tone::new(ToneCurve::ALL[0])),
-    LazyLock::new(|| Tone::new(ToneCurve::ALL[1])),
-    LazyLock::new(|| Tone::new(ToneCurve::ALL[2])),
+static TONE_LUTS: [LazyLock<ToneLut>; ToneCurve::ALL.len()] = [
+    LazyLock::new(|| ToneLut::new(ToneCurve::ALL[0])),
+    LazyLock::new(|| ToneLut::new(ToneCurve::ALL[1])),
+    LazyLock::new(|| ToneLut::new(ToneCurve::ALL[2])),
 ];
 
 /// A tone curve in both directions. A byte that is decoded encodes to the same byte again.
 #[derive(Debug)]
-pub(super) struct Tone {
+pub(super) struct ToneLut {
     /// Radiance of each byte: the middle of its interval, and for 255 the smallest.
-    lights: [f64; 256],
+    radiance: [f64; 256],
     /// Smallest radiance of each byte from 1 on.
-    least: [f32; 255],
+    min_radiance: [f32; 255],
 }
 
-impl Tone {
+impl ToneLut {
     /// Returns the lookup table of a curve.
-    pub(super) fn of(curve: ToneCurve) -> &'static Self {
+    pub(super) fn for_curve(curve: ToneCurve) -> &'static Self {
         let place = ToneCurve::ALL.iter().position(|one| *one == curve);
-        &TONES[place.unwrap_or_default()]
+        &TONE_LUTS[place.unwrap_or_default()]
     }
 
     fn new(curve: ToneCurve) -> Self {
-        let least = std::array::from_fn(|k| reach(curve, k as f32 + 1.0));
+        let least = std::array::from_fn(|k| min_radiance_of(curve, k as f32 + 1.0));
         // The curve adds half a byte for rounding.
-        let light = |byte: usize| if byte == 255 { least[254] } else { reach(curve, byte as f32 + 0.5) };
-        Self { lights: std::array::from_fn(|byte| f64::from(light(byte))), least }
+        let light = |byte: usize| if byte == 255 { least[254] } else { min_radiance_of(curve, byte as f32 + 0.5) };
+        Self { radiance: std::array::from_fn(|byte| f64::from(light(byte))), min_radiance: least }
     }
 
-    pub(super) fn light(&self, byte: u8) -> f64 {
-        self.lights[usize::from(byte)]
+    pub(super) fn decode(&self, byte: u8) -> f64 {
+        self.radiance[usize::from(byte)]
     }
 
-    pub(super) fn byte(&self, light: f64) -> u8 {
+    pub(super) fn encode(&self, light: f64) -> u8 {
         let light = light as f32;
-        self.least.partition_point(|least| *least <= light) as u8
+        self.min_radiance.partition_point(|least| *least <= light) as u8
     }
 }
 
 /// Returns the smallest radiance whose byte, before truncation, is at least `value`.
-fn reach(curve: ToneCurve, value: f32) -> f32 {
+fn min_radiance_of(curve: ToneCurve, value: f32) -> f32 {
     // Positive floats are ordered as their bits; the curve is monotonic.
     let (mut below, mut above) = (0, 1000f32.to_bits());
     if curve.encode(0.0) >= value {
@@ -65,13 +65,13 @@ mod tests {
     #[test]
     fn round_trip() {
         for curve in ToneCurve::ALL {
-            let tone = Tone::of(curve);
+            let tone = ToneLut::for_curve(curve);
             for byte in 0..=255 {
-                assert_eq!(tone.byte(tone.light(byte)), byte, "{curve:?}");
+                assert_eq!(tone.encode(tone.decode(byte)), byte, "{curve:?}");
             }
-            assert_eq!([-1.0, 0.0, 1e9, f64::INFINITY].map(|light| tone.byte(light)), [0, 0, 255, 255], "{curve:?}");
+            assert_eq!([-1.0, 0.0, 1e9, f64::INFINITY].map(|light| tone.encode(light)), [0, 0, 255, 255], "{curve:?}");
         }
-        let lights = ToneCurve::ALL.map(|curve| Tone::of(curve).light(230));
+        let lights = ToneCurve::ALL.map(|curve| ToneLut::for_curve(curve).decode(230));
         assert!(lights[0] != lights[1] && lights[1] != lights[2], "each has its own: {lights:?}");
     }
 
@@ -80,17 +80,17 @@ mod tests {
     /// middle of a byte is far more precise.
     #[test]
     fn curve() {
-        let tone = Tone::of(ToneCurve::Soft);
+        let tone = ToneLut::for_curve(ToneCurve::Soft);
         let screen = |light: f64| {
             let k = light - 0.7;
             let bent = if k > 0.0 { 0.7 + 0.3 * k / (k + 0.3) } else { light };
             255.0 * if bent <= 0.0031308 { 12.92 * bent } else { 1.055 * bent.powf(1.0 / 2.4) - 0.055 }
         };
         for byte in 0..255 {
-            let found = screen(tone.light(byte));
+            let found = screen(tone.decode(byte));
             assert!((found - f64::from(byte)).abs() < 0.25, "{byte}: {found}");
         }
-        assert!((screen(tone.light(255)) - 254.5).abs() < 0.25);
-        assert!((screen(tone.light(100) * 1.02) - 100.0).abs() > 0.5, "the control: two percent would be seen");
+        assert!((screen(tone.decode(255)) - 254.5).abs() < 0.25);
+        assert!((screen(tone.decode(100) * 1.02) - 100.0).abs() > 0.5, "the control: two percent would be seen");
     }
 }

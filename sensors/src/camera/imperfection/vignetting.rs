@@ -1,6 +1,6 @@
 //! Light falloff away from the optical axis.
 
-use super::{OfLight, Place, within};
+use super::{RadianceEffect, PixelContext, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
@@ -33,12 +33,12 @@ impl Default for Vignetting {
     }
 }
 
-impl OfLight for Vignetting {
+impl RadianceEffect for Vignetting {
     fn check(&self) -> Result<(), SensorError> {
         within("strength of the vignetting", self.strength, [0.0, 1.0], "it must be 0 to 1")
     }
 
-    fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>) {
+    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
         let factor = 1.0 + self.strength * (place.picture.falloff(place.pixel) - 1.0);
         *light = light.map(|light| factor * light);
     }

@@ -3,13 +3,13 @@
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
 use crate::select::matching;
-use kinetoscope_scene::pattern::{PatternError, closest};
+use kinetoscope_scene::pattern::{PatternError, closest_names};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// An entity with its own mask id: a link of a robot, a rigid object, a geom of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Thing {
+pub struct SegmentedEntity {
     /// Mask id, from 1 on.
     pub id: i32,
     /// Name of the robot, of the object or of the geom of the world.
@@ -20,7 +20,7 @@ pub struct Thing {
     pub class: String,
 }
 
-impl Thing {
+impl SegmentedEntity {
     /// Full name: `object/link`, or the object if it has no links.
     pub fn name(&self) -> String {
         self.link.as_ref().map_or_else(|| self.object.clone(), |link| format!("{}/{link}", self.object))
@@ -86,25 +86,25 @@ pub struct Segment {
 /// Mapping from mask ids to segments, with names and classes. Converts images of the mask channel to segmented images.
 #[derive(Clone, Debug)]
 pub struct Segmentation {
-    levels: [Level; 3],
+    levels: [SegmentTable; 3],
 }
 
 /// Segments of one level.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Level {
+pub(super) struct SegmentTable {
     segments: Vec<Segment>,
     /// Pairs of mask id and segment id, sorted by mask id.
-    of_mask: Vec<(i32, i32)>,
+    segment_of_mask: Vec<(i32, i32)>,
 }
 
-impl Level {
+impl SegmentTable {
     /// Returns the segment id of a mask id.
-    pub(super) fn of(&self, mask_id: i32) -> i32 {
+    pub(super) fn segment_of(&self, mask_id: i32) -> i32 {
         if mask_id == 0 {
             return 0;
         }
-        let at = self.of_mask.binary_search_by_key(&mask_id, |(mask, _)| *mask);
-        at.map_or(Segmentation::UNKNOWN, |at| self.of_mask[at].1)
+        let at = self.segment_of_mask.binary_search_by_key(&mask_id, |(mask, _)| *mask);
+        at.map_or(Segmentation::UNKNOWN, |at| self.segment_of_mask[at].1)
     }
 }
 
@@ -119,8 +119,8 @@ impl Segmentation {
     /// [`CameraError::MaskId`] for a mask id that is 0, negative or given twice, or whose class has no name;
     /// [`SensorError::Pattern`] for a pattern that is not a regular expression or matches nothing (with the nearest
     /// names), and an entity that two patterns match.
-    pub fn new(things: impl IntoIterator<Item = Thing>, cfg: &SegmentationCfg) -> Result<Self, SensorError> {
-        let mut things: Vec<Thing> = things.into_iter().collect();
+    pub fn new(things: impl IntoIterator<Item = SegmentedEntity>, cfg: &SegmentationCfg) -> Result<Self, SensorError> {
+        let mut things: Vec<SegmentedEntity> = things.into_iter().collect();
         things.sort_by_key(|thing| thing.id);
         let wrong = |id, problem| Err(CameraError::MaskId { id, problem }.into());
         if let Some(nothing) = things.iter().find(|thing| thing.id == 0) {
@@ -132,16 +132,16 @@ impl Segmentation {
         if let Some(pair) = things.windows(2).find(|pair| pair[0].id == pair[1].id) {
             return wrong(pair[0].id, "is given twice");
         }
-        label(&mut things, &cfg.labels)?;
+        assign_classes(&mut things, &cfg.labels)?;
         if let Some(nameless) = things.iter().find(|thing| thing.class.is_empty()) {
             return wrong(nameless.id, "has a class without a name");
         }
         // Links of one object are one instance. Entities without links stay separate whatever their names: a geom of
         // the world may have the name of a robot.
-        let alone = |thing: &Thing| thing.link.is_none().then_some(thing.id);
-        let instances = level(&things, |thing| (thing.object.clone(), alone(thing)), false);
-        let links = level(&things, |thing| (thing.name(), Some(thing.id)), false);
-        let classes = level(&things, |thing| (thing.class.clone(), None), true);
+        let alone = |thing: &SegmentedEntity| thing.link.is_none().then_some(thing.id);
+        let instances = group_segments(&things, |thing| (thing.object.clone(), alone(thing)), false);
+        let links = group_segments(&things, |thing| (thing.name(), Some(thing.id)), false);
+        let classes = group_segments(&things, |thing| (thing.class.clone(), None), true);
         Ok(Self { levels: [instances, links, classes] })
     }
 
@@ -152,10 +152,10 @@ impl Segmentation {
 
     /// Returns the segment id of a mask id: 0 for 0 (nothing was hit), [`UNKNOWN`](Self::UNKNOWN) for unknown mask ids.
     pub fn segment_of(&self, level: SegmentLevel, mask_id: i32) -> i32 {
-        self.level(level).of(mask_id)
+        self.level(level).segment_of(mask_id)
     }
 
-    pub(super) fn level(&self, level: SegmentLevel) -> &Level {
+    pub(super) fn level(&self, level: SegmentLevel) -> &SegmentTable {
         match level {
             SegmentLevel::Instance => &self.levels[0],
             SegmentLevel::Link => &self.levels[1],
@@ -165,8 +165,8 @@ impl Segmentation {
 }
 
 /// Assigns classes to the entities that labels match.
-fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), SensorError> {
-    let names: Vec<String> = things.iter().map(Thing::name).collect();
+fn assign_classes(things: &mut [SegmentedEntity], labels: &[(String, String)]) -> Result<(), SensorError> {
+    let names: Vec<String> = things.iter().map(SegmentedEntity::name).collect();
     let objects: Vec<String> = things.iter().map(|thing| thing.object.clone()).collect();
     let mut taken_by: Vec<Option<&str>> = vec![None; things.len()];
     for (pattern, class) in labels {
@@ -180,7 +180,7 @@ fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), Sensor
                 known.extend(things.iter().filter_map(|thing| thing.link.as_deref()));
                 known.sort_unstable();
                 known.dedup();
-                let candidates = closest(&name, known).into_iter().map(str::to_owned).collect();
+                let candidates = closest_names(&name, known).into_iter().map(str::to_owned).collect();
                 return Err(SensorError::UnknownName { what, name, candidates });
             }
             (Err(_), Err(wrong)) => return Err(wrong),
@@ -201,8 +201,12 @@ fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), Sensor
 
 /// Groups entities with the same key into segments. The key begins with the name. The segment id is the first mask id,
 /// or, if `numbered`, an index from 1 on.
-fn level(things: &[Thing], key: impl Fn(&Thing) -> (String, Option<i32>), numbered: bool) -> Level {
-    let mut level = Level::default();
+fn group_segments(
+    things: &[SegmentedEntity],
+    key: impl Fn(&SegmentedEntity) -> (String, Option<i32>),
+    numbered: bool,
+) -> SegmentTable {
+    let mut level = SegmentTable::default();
     let mut known: HashMap<(String, Option<i32>), usize> = HashMap::new();
     for thing in things {
         let key = key(thing);
@@ -214,7 +218,7 @@ fn level(things: &[Thing], key: impl Fn(&Thing) -> (String, Option<i32>), number
             segments.push(Segment { id, name, class: thing.class.clone(), mask_ids: Vec::new() });
         }
         segments[index].mask_ids.push(thing.id);
-        level.of_mask.push((thing.id, segments[index].id));
+        level.segment_of_mask.push((thing.id, segments[index].id));
     }
     level
 }
@@ -223,11 +227,11 @@ fn level(things: &[Thing], key: impl Fn(&Thing) -> (String, Option<i32>), number
 mod tests {
     use super::*;
 
-    fn thing(id: i32, object: &str, link: Option<&str>, class: &str) -> Thing {
-        Thing { id, object: object.into(), link: link.map(Into::into), class: class.into() }
+    fn thing(id: i32, object: &str, link: Option<&str>, class: &str) -> SegmentedEntity {
+        SegmentedEntity { id, object: object.into(), link: link.map(Into::into), class: class.into() }
     }
 
-    fn things() -> Vec<Thing> {
+    fn things() -> Vec<SegmentedEntity> {
         vec![
             thing(1, "ground", None, "ground"),
             thing(6, "shelf", None, "object"),

@@ -4,5 +4,5 @@ mod labels;
 mod palette;
 mod picture;
 
-pub use labels::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing};
+pub use labels::{Segment, SegmentLevel, Segmentation, SegmentationCfg, SegmentedEntity};
 pub use palette::segment_color;

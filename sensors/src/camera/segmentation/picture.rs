@@ -29,7 +29,7 @@ impl Segmentation {
         let (mut last, mut segment) = (0, 0);
         Zip::from(out).and(mask).for_each(|out, &id| {
             if id != last {
-                (last, segment) = (id, level.of(id));
+                (last, segment) = (id, level.segment_of(id));
             }
             *out = segment;
         });
@@ -52,20 +52,20 @@ impl Segmentation {
             *out = Array4::zeros((n, height, width, 4));
         }
         let level = self.level(level);
-        paint(mask, out, |id| segment_color(level.of(id)));
+        write_colors(mask, out, |id| segment_color(level.segment_of(id)));
     }
 
     /// Converts segment ids, as returned by [`segment`](Self::segment), to RGBA colors, shape (N, H, W, 4).
-    pub fn colors_of(segments: ArrayView3<'_, i32>) -> Array4<u8> {
+    pub fn colorize_segments(segments: ArrayView3<'_, i32>) -> Array4<u8> {
         let (n, height, width) = segments.dim();
         let mut out = Array4::zeros((n, height, width, 4));
-        paint(segments, &mut out, segment_color);
+        write_colors(segments, &mut out, segment_color);
         out
     }
 }
 
 /// Writes the colors of ids; neighboring pixels mostly have the same id.
-fn paint(ids: ArrayView3<'_, i32>, out: &mut Array4<u8>, color_of: impl Fn(i32) -> [u8; 4]) {
+fn write_colors(ids: ArrayView3<'_, i32>, out: &mut Array4<u8>, color_of: impl Fn(i32) -> [u8; 4]) {
     let (mut last, mut color) = (0, color_of(0));
     for (&id, out) in ids.iter().zip(out.rows_mut()) {
         if id != last {
@@ -79,12 +79,12 @@ fn paint(ids: ArrayView3<'_, i32>, out: &mut Array4<u8>, color_of: impl Fn(i32) 
 
 #[cfg(test)]
 mod tests {
-    use super::super::{SegmentationCfg, Thing};
+    use super::super::{SegmentationCfg, SegmentedEntity};
     use super::*;
     use ndarray::{Array3, Axis, array};
 
     fn segmentation() -> Segmentation {
-        let thing = |id, object: &str, link: Option<&str>, class: &str| Thing {
+        let thing = |id, object: &str, link: Option<&str>, class: &str| SegmentedEntity {
             id,
             object: object.into(),
             link: link.map(Into::into),
@@ -115,7 +115,7 @@ mod tests {
             assert_eq!(raw, expected);
             assert_eq!(segmentation.segment(level, mask.index_axis(Axis(0), 1)), expected.index_axis(Axis(0), 1));
             let painted = segmentation.colorize(level, mask.view());
-            assert_eq!(painted, Segmentation::colors_of(expected.view()));
+            assert_eq!(painted, Segmentation::colorize_segments(expected.view()));
             segmentation.colorize_into(level, mask.view(), &mut colors);
             assert_eq!(colors, painted);
             for ((place, id), color) in expected.indexed_iter().zip(painted.rows()) {

@@ -3,15 +3,15 @@
 use super::Camera;
 use crate::camera::cfg::{CameraCfg, DepthMiss};
 use crate::camera::error::CameraError;
-use crate::camera::faults::Faults;
+use crate::camera::faults::SensorNoiseModel;
 use crate::camera::frame_buffer::FrameSource;
-use kinetoscope_render::Job;
-use kinetoscope_render::ParallelRasterizer;
-use kinetoscope_render::frame::{FrameMut, Pictures};
-use kinetoscope_render::{Before, Shot};
-use kinetoscope_render::{Opened, Take};
+use kinetoscope_render::ParallelRenderer;
+use kinetoscope_render::RenderJob;
+use kinetoscope_render::frame::{FrameMut, Images};
+use kinetoscope_render::{FrameSample, ShutterOpenState};
+use kinetoscope_render::{PreviousState, RenderRequest};
 use kinetoscope_render::{RenderError, View};
-use kinetoscope_render::{Stream, Ticket};
+use kinetoscope_render::{RngKey, RngStream};
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use std::ops::Range;
 use std::sync::PoisonError;
@@ -19,23 +19,23 @@ use std::sync::atomic::Ordering;
 
 /// Images with a flag for outdated ones.
 #[derive(Debug)]
-pub(in crate::camera) struct DrawnImages {
-    pictures: Pictures,
+pub(in crate::camera) struct RenderedImages {
+    images: Images,
     /// One flag per image.
     stale: Vec<bool>,
-    failure: Option<CameraError>,
+    error: Option<CameraError>,
 }
 
-impl DrawnImages {
+impl RenderedImages {
     /// Allocates `count` images, all of them outdated.
     pub(in crate::camera) fn new(cfg: &CameraCfg, count: usize) -> Self {
-        let pictures = Pictures::new(cfg.channels, count, cfg.width, cfg.height);
-        Self { pictures, stale: vec![true; count], failure: None }
+        let pictures = Images::new(cfg.channels, count, cfg.width, cfg.height);
+        Self { images: pictures, stale: vec![true; count], error: None }
     }
 
     /// Returns the images, or the error of rendering them.
-    pub(in crate::camera) fn pictures(&self) -> Result<&Pictures, CameraError> {
-        self.failure.clone().map_or(Ok(&self.pictures), Err)
+    pub(in crate::camera) fn images(&self) -> Result<&Images, CameraError> {
+        self.error.clone().map_or(Ok(&self.images), Err)
     }
 
     pub(in crate::camera) fn is_stale(&self, image: usize) -> bool {
@@ -47,22 +47,22 @@ impl DrawnImages {
     }
 
     /// Copies image `from` of the `count` images of `others`.
-    pub(in crate::camera) fn copy(&mut self, image: usize, others: &Pictures, count: usize, from: usize) {
-        self.pictures.copy_view(self.stale.len(), image, others, count, from);
+    pub(in crate::camera) fn copy(&mut self, image: usize, others: &Images, count: usize, from: usize) {
+        self.images.copy_view(self.stale.len(), image, others, count, from);
         self.stale[image] = false;
     }
 
     /// Shifts a range of images by `by` places. The last ones are dropped, the first ones become outdated.
     pub(in crate::camera) fn move_up(&mut self, images: Range<usize>, by: usize) {
-        self.pictures.move_up(self.stale.len(), images.clone(), by);
+        self.images.shift_views(self.stale.len(), images.clone(), by);
         let stale = &mut self.stale[images];
         stale.rotate_right(by);
         stale[..by].fill(true);
     }
 
     /// Clears a range of images to zero; they are not outdated then.
-    pub(in crate::camera) fn forget(&mut self, images: Range<usize>) {
-        self.pictures.forget(self.stale.len(), images.clone());
+    pub(in crate::camera) fn clear(&mut self, images: Range<usize>) {
+        self.images.clear_views(self.stale.len(), images.clone());
         self.stale[images].fill(false);
     }
 }
@@ -70,19 +70,19 @@ impl DrawnImages {
 /// The rasterizer of a camera, its noise, and buffers that are reused between renders.
 #[derive(Debug)]
 pub(in crate::camera) struct FrameRenderer {
-    rasterizer: ParallelRasterizer,
+    rasterizer: ParallelRenderer,
     views: Vec<View>,
-    jobs: Vec<Job<'static>>,
-    takes: Vec<Take<'static>>,
-    tickets: Vec<Ticket>,
+    jobs: Vec<RenderJob<'static>>,
+    frame_samples: Vec<FrameSample<'static>>,
+    rng_keys: Vec<RngKey>,
     /// Noise and imperfections of rendered images.
-    faults: Option<Faults>,
+    noise_model: Option<SensorNoiseModel>,
 }
 
 impl FrameRenderer {
-    pub(in crate::camera) fn new(rasterizer: ParallelRasterizer, faults: Option<Faults>) -> Self {
+    pub(in crate::camera) fn new(rasterizer: ParallelRenderer, faults: Option<SensorNoiseModel>) -> Self {
         let (views, jobs, takes, tickets) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { rasterizer, views, jobs, takes, tickets, faults }
+        Self { rasterizer, views, jobs, frame_samples: takes, rng_keys: tickets, noise_model: faults }
     }
 }
 
@@ -91,21 +91,21 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Draw`] if rendering was cancelled.
-    pub(in crate::camera) fn redraw<'a>(
+    /// [`CameraError::Render`] if rendering was cancelled.
+    pub(in crate::camera) fn render_stale<'a>(
         &'a self,
-        images: &mut DrawnImages,
+        images: &mut RenderedImages,
         source: impl Fn(usize) -> Option<FrameSource<'a>>,
     ) -> Result<(), CameraError> {
-        let DrawnImages { pictures, stale, failure } = images;
+        let RenderedImages { images: pictures, stale, error: failure } = images;
         let count = stale.len();
         let outdated = |image: usize| source(image).filter(|_| stale[image]);
         let sources = (0..count).filter_map(outdated);
         let frames = pictures.frames_mut(count).enumerate().filter(|(image, _)| outdated(*image).is_some());
-        let result = self.develop(sources.clone(), frames.map(|(_, frame)| frame));
+        let result = self.render_frames(sources.clone(), frames.map(|(_, frame)| frame));
         *failure = result.err().and_then(|(job, error)| {
             let row = sources.clone().nth(job)?.row;
-            Some(CameraError::Draw { env: self.env_ids()[row], error })
+            Some(CameraError::Render { env: self.env_ids()[row], error })
         });
         match failure {
             None => stale.fill(false),
@@ -117,34 +117,41 @@ impl Camera {
     }
 
     /// Renders frames into images, with the noise and the imperfections of the camera.
-    fn develop<'a>(
+    fn render_frames<'a>(
         &'a self,
         sources: impl Iterator<Item = FrameSource<'a>> + Clone,
         frames: impl Iterator<Item = FrameMut<'a>>,
     ) -> Result<(), (usize, RenderError)> {
         let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
-        let FrameRenderer { rasterizer, views, jobs: kept, takes: kept_takes, tickets, faults } = &mut *renderer;
+        let FrameRenderer {
+            rasterizer,
+            views,
+            jobs: kept,
+            frame_samples: kept_takes,
+            rng_keys: tickets,
+            noise_model: faults,
+        } = &mut *renderer;
         views.clear();
         views.extend(sources.clone().map(|source| self.view_from(&source)));
         tickets.clear();
-        let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
-        let mut takes: Vec<Take<'_>> = emptied(std::mem::take(kept_takes));
+        let mut jobs: Vec<RenderJob<'_>> = recycle(std::mem::take(kept));
+        let mut takes: Vec<FrameSample<'_>> = recycle(std::mem::take(kept_takes));
         let mut marked: Vec<&[Marker]> = Vec::new();
         for ((source, frame), view) in sources.zip(frames).zip(&*views) {
-            jobs.push((self.shot(&source, view, self.motion.before(source.row)), frame));
-            tickets.push(source.frame.ticket);
+            jobs.push((self.render_request(&source, view, self.motion.previous_frame(source.row)), frame));
+            tickets.push(source.frame.rng_key);
             if self.cfg.draw_markers {
                 marked.push(&source.frame.markers);
             }
-            takes.push(self.take_of(&source));
+            takes.push(self.frame_sample(&source));
         }
         let result = match self.cfg.draw_markers && self.cfg.channels.color {
-            true => render_marked(rasterizer, &mut jobs, &takes, &marked),
-            false => rasterizer.render_takes(&mut jobs, &takes),
+            true => render_with_markers(rasterizer, &mut jobs, &takes, &marked),
+            false => rasterizer.render_samples(&mut jobs, &takes),
         };
-        *kept_takes = emptied(takes);
+        *kept_takes = recycle(takes);
         if let Some(faults) = faults {
-            faults.spoil(&mut jobs, tickets);
+            faults.apply(&mut jobs, tickets);
         }
         let miss = match self.cfg.depth_miss {
             DepthMiss::Inf => None,
@@ -153,55 +160,67 @@ impl Camera {
         };
         for (shot, frame) in &mut jobs {
             if self.cfg.depth_miss == DepthMiss::Far {
-                keep_before(self.lens.far, shot.lens.is_some_and(|rays| !rays.is_forward()), frame);
+                clamp_hits_below_far(self.lens.far, shot.lens.is_some_and(|rays| !rays.is_forward()), frame);
             }
             miss.into_iter().for_each(|value| frame.replace_misses(value));
         }
-        self.draws.fetch_add(jobs.len() as u64, Ordering::Relaxed);
-        *kept = emptied(jobs);
+        self.render_count.fetch_add(jobs.len() as u64, Ordering::Relaxed);
+        *kept = recycle(jobs);
         result
     }
 
-    fn shot<'a>(&'a self, source: &FrameSource<'a>, view: &'a View, before: Option<Before<'a>>) -> Shot<'a> {
+    fn render_request<'a>(
+        &'a self,
+        source: &FrameSource<'a>,
+        view: &'a View,
+        before: Option<PreviousState<'a>>,
+    ) -> RenderRequest<'a> {
         let FrameSource { frame, rays, .. } = *source;
         let scene = frame.scene.0.as_deref().unwrap_or(&self.scene);
-        Shot { scene, poses: &frame.poses, view, lights: Some(&frame.lights), lens: rays.map(|rays| &**rays), before }
+        RenderRequest {
+            scene,
+            poses: &frame.poses,
+            view,
+            lights: Some(&frame.lights),
+            lens: rays.map(|rays| &**rays),
+            previous: before,
+        }
     }
 
     /// Returns the shutter poses and the path tracing seed of a frame.
-    fn take_of<'a>(&self, source: &FrameSource<'a>) -> Take<'a> {
-        let opened = source.frame.opened().and_then(|(poses, parent)| {
+    fn frame_sample<'a>(&self, source: &FrameSource<'a>) -> FrameSample<'a> {
+        let opened = source.frame.shutter_open_poses().and_then(|(poses, parent)| {
             let camera = self.viewpoints.world_from(source.viewpoint, Some(parent))?;
             let before = self.motion.shutter_seconds()?;
-            Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
+            Some(ShutterOpenState { poses, world_from_camera: PoseF32::from(&camera), age: before })
         });
-        Take { noise: source.frame.ticket.bits(Stream::PATHS), opened }
+        FrameSample { noise: source.frame.rng_key.bits(RngStream::PATHS), shutter_open: opened }
     }
 
     /// Returns true if the shutter has a nonzero span: image rows may show several instants.
-    pub(in crate::camera) fn takes_time(&self) -> bool {
+    pub(in crate::camera) fn has_shutter_span(&self) -> bool {
         self.motion.shutter_seconds().is_some()
     }
 
     /// Calls `act` with the render request of the shown frame of a row, for results other than the camera's images.
-    pub(in crate::camera) fn shot_of<T>(
+    pub(in crate::camera) fn with_render_request<T>(
         &self,
         row: usize,
-        act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>, Take<'_>) -> T,
+        act: impl FnOnce(&mut ParallelRenderer, RenderRequest<'_>, FrameSample<'_>) -> T,
     ) -> T {
         let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
         let source = self.shown_source(row);
         let view = self.view_from(&source);
-        act(&mut renderer.rasterizer, self.shot(&source, &view, None), self.take_of(&source))
+        act(&mut renderer.rasterizer, self.render_request(&source, &view, None), self.frame_sample(&source))
     }
 }
 
 /// Renders jobs, with the markers of each job in its color only. The color images with markers are separate jobs. All
 /// jobs are rendered together, so a failing job does not affect others, and each image is counted once.
-fn render_marked(
-    rasterizer: &mut ParallelRasterizer,
-    jobs: &mut [Job<'_>],
-    takes: &[Take<'_>],
+fn render_with_markers(
+    rasterizer: &mut ParallelRenderer,
+    jobs: &mut [RenderJob<'_>],
+    takes: &[FrameSample<'_>],
     markers: &[&[Marker]],
 ) -> Result<(), (usize, RenderError)> {
     let (mut stages, mut failed) = (Vec::new(), None);
@@ -209,7 +228,7 @@ fn render_marked(
         if markers.is_empty() || frame.color.is_none() {
             continue;
         }
-        match Stage::of(shot, &takes[index], markers) {
+        match MarkedScene::of(shot, &takes[index], markers) {
             Ok(stage) => stages.push((index, Some(stage))),
             Err(error) => {
                 failed = failed.or(Some((index, error)));
@@ -218,46 +237,51 @@ fn render_marked(
             }
         }
     }
-    let shots: Vec<Shot<'_>> = jobs.iter().map(|(shot, _)| *shot).collect();
-    let mut all: Vec<Job<'_>> = jobs.iter_mut().map(|(shot, frame)| (*shot, frame.reborrow())).collect();
+    let shots: Vec<RenderRequest<'_>> = jobs.iter().map(|(shot, _)| *shot).collect();
+    let mut all: Vec<RenderJob<'_>> = jobs.iter_mut().map(|(shot, frame)| (*shot, frame.reborrow())).collect();
     let (mut all_takes, mut of) = (takes.to_vec(), (0..shots.len()).collect::<Vec<_>>());
     for (index, stage) in &stages {
         let frame = FrameMut { color: all[*index].1.color.take(), ..FrameMut::default() };
-        let Some(Stage { scene, poses, opened }) = stage else { continue };
+        let Some(MarkedScene { scene, poses, shutter_open_poses: opened }) = stage else { continue };
         let take = takes[*index];
-        all.push((Shot { scene, poses, before: None, ..shots[*index] }, frame));
-        let opened = take.opened.zip(opened.as_deref()).map(|(opened, poses)| Opened { poses, ..opened });
-        all_takes.push(Take { opened, ..take });
+        all.push((RenderRequest { scene, poses, previous: None, ..shots[*index] }, frame));
+        let opened =
+            take.shutter_open.zip(opened.as_deref()).map(|(opened, poses)| ShutterOpenState { poses, ..opened });
+        all_takes.push(FrameSample { shutter_open: opened, ..take });
         of.push(*index);
     }
-    let drawn = rasterizer.render_takes(&mut all, &all_takes).map_err(|(place, error)| (of[place], error));
+    let drawn = rasterizer.render_samples(&mut all, &all_takes).map_err(|(place, error)| (of[place], error));
     let first = drawn.err().into_iter().chain(failed).min_by_key(|(index, _)| *index);
     first.map_or(Ok(()), Err)
 }
 
 /// A scene with markers added.
-struct Stage {
+struct MarkedScene {
     scene: RenderScene,
     poses: Vec<PoseF32>,
     /// Poses at shutter opening; markers do not move.
-    opened: Option<Vec<PoseF32>>,
+    shutter_open_poses: Option<Vec<PoseF32>>,
 }
 
-impl Stage {
-    fn of(shot: &Shot<'_>, take: &Take<'_>, markers: &[Marker]) -> Result<Self, RenderError> {
+impl MarkedScene {
+    fn of(shot: &RenderRequest<'_>, take: &FrameSample<'_>, markers: &[Marker]) -> Result<Self, RenderError> {
         let (added, places): (Vec<Instance>, Vec<PoseF32>) = markers.iter().flat_map(Marker::instances).unzip();
         let added = added.into_iter().map(|instance| Instance { group: Marker::GROUP, ..instance });
         let instances = shot.scene.instances().iter().cloned().chain(added).collect();
         // Each marker can be rendered, but the total number of triangles may be too large.
         let scene = shot.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
         let with = |poses: &[PoseF32]| poses.iter().chain(&places).copied().collect();
-        Ok(Self { scene, poses: with(shot.poses), opened: take.opened.as_ref().map(|opened| with(opened.poses)) })
+        Ok(Self {
+            scene,
+            poses: with(shot.poses),
+            shutter_open_poses: take.shutter_open.as_ref().map(|opened| with(opened.poses)),
+        })
     }
 }
 
 /// Clamps hits below the far plane, whose value means a miss; noise is clamped at the far plane. The clamped quantity
 /// is depth, and also distance if rays do not all go forward.
-fn keep_before(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
+fn clamp_hits_below_far(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
     let last = far.next_down();
     let reach = frame.distance.as_deref_mut().filter(|_| aside);
     for numbers in frame.depth.as_deref_mut().into_iter().chain(reach) {
@@ -266,7 +290,7 @@ fn keep_before(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
 }
 
 /// Reuses the memory of a vector for a vector of the same type with another lifetime.
-fn emptied<T, U>(mut list: Vec<T>) -> Vec<U> {
+fn recycle<T, U>(mut list: Vec<T>) -> Vec<U> {
     list.clear();
     // The in-place `collect` keeps the allocation.
     list.into_iter().filter_map(|_| None).collect()

@@ -5,7 +5,7 @@ use crate::camera::cfg::CameraCfg;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::{CameraConvention, Extrinsics, Placement, Poses};
 use crate::camera::imperfection::Imperfections;
-use crate::camera::picture_noise::of_channels;
+use crate::camera::picture_noise::for_channels;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{SensorCfg, SensorContext};
@@ -14,7 +14,7 @@ use kinetoscope_render::Renderer;
 use kinetoscope_render::frame::Channels;
 use kinetoscope_render::lens::Lens;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -124,7 +124,7 @@ impl StereoCameraCfg {
     /// # Errors
     ///
     /// [`CameraError::Pose`] or [`CameraError::LookAt`] for an invalid pose.
-    pub fn eyes(&self) -> Result<[CameraCfg; 2], CameraError> {
+    pub fn camera_cfgs(&self) -> Result<[CameraCfg; 2], CameraError> {
         let Rig { left_from_right, origin_from_left } = self.rig()?;
         let left = self.camera.extrinsics.parent_from_camera()? * origin_from_left;
         let at = |pose: Pose| {
@@ -139,7 +139,7 @@ impl StereoCameraCfg {
             lens: self.lens_right.unwrap_or(self.camera.lens),
             channels,
             imperfections: imperfections.cloned().unwrap_or_else(|| self.camera.imperfections.of_channels(channels)),
-            noise: noise.cloned().unwrap_or_else(|| of_channels(&self.camera.noise, channels)),
+            noise: noise.cloned().unwrap_or_else(|| for_channels(&self.camera.noise, channels)),
             extrinsics: at(left * left_from_right),
             renderer: match self.camera.renderer {
                 Renderer::RayTraced { samples, max_bounces, denoise, seed } => {
@@ -156,7 +156,7 @@ impl StereoCameraCfg {
 impl SensorCfg for StereoCameraCfg {
     type Sensor = StereoCamera;
 
-    fn requires(&self) -> Requires {
+    fn requires(&self) -> StateFields {
         self.camera.requires()
     }
 
@@ -166,16 +166,16 @@ impl SensorCfg for StereoCameraCfg {
 
     /// # Errors
     ///
-    /// An invalid pose of the right camera, and [`SensorError::Eye`] with the error of either camera as a
+    /// An invalid pose of the right camera, and [`SensorError::StereoCamera`] with the error of either camera as a
     /// [`CameraCfg`].
     fn build(&self, context: &SensorContext) -> Result<StereoCamera, SensorError> {
-        let [left, right] = self.eyes()?;
+        let [left, right] = self.camera_cfgs()?;
         // Noise and dropout are keyed by the name of the sensor, so the cameras need different names. Path tracing
-        // noise is keyed by the seed of the renderer, which `eyes` changes.
+        // noise is keyed by the seed of the renderer, which `camera_cfgs` changes.
         let name = format!("{}/right", context.name).into();
         let other = SensorContext { name, ..context.clone() };
         let [left, right] = [("left", left.build(context)), ("right", right.build(&other))]
-            .map(|(eye, camera)| camera.map_err(SensorError::of_eye(eye)));
+            .map(|(eye, camera)| camera.map_err(SensorError::of_stereo_camera(eye)));
         Ok(StereoCamera::new(left?, right?, self.rig()?))
     }
 }

@@ -14,7 +14,7 @@ pub(super) const ROUNDING: f64 = 1e-9;
 pub(super) struct DisparityMap {
     /// \[pixels\], shape (N, H, W).
     pixels: Array3<f32>,
-    draws: u64,
+    render_count: u64,
     stamps: Array1<f64>,
 }
 
@@ -42,22 +42,22 @@ impl StereoCamera {
         let baseline = self.baseline()?;
         let depth = self.left().depth()?;
         let update = |map: &mut DisparityMap| {
-            self.update_disparities(map, baseline, depth);
+            self.update_disparity_map(map, baseline, depth);
             Ok::<(), SensorError>(())
         };
         Ok(self.disparities.get_or_update(|| Ok(DisparityMap::default()), update)?.pixels.view())
     }
 
     /// [`disparity`](Self::disparity) of the latest delivered images, from the depth of
-    /// [`Camera::arrived`](crate::camera::Camera::arrived); computed at every call.
+    /// [`Camera::latest_delivered`](crate::camera::Camera::latest_delivered); computed at every call.
     ///
     /// # Errors
     ///
     /// Same as [`disparity`](Self::disparity).
-    pub fn arrived_disparity(&self) -> Result<Array3<f32>, SensorError> {
+    pub fn latest_delivered_disparity(&self) -> Result<Array3<f32>, SensorError> {
         let baseline = self.baseline()?;
-        let matrices = self.left().arrived_intrinsic_matrices();
-        let mut pixels = self.left().arrived::<Depth>()?.to_owned();
+        let matrices = self.left().latest_delivered_intrinsic_matrices();
+        let mut pixels = self.left().latest_delivered::<Depth>()?.to_owned();
         for (row, mut picture) in pixels.axis_iter_mut(Axis(0)).enumerate() {
             let scale = f64::from(matrices[(row, 0, 0)] as f32) * baseline;
             picture.mapv_inplace(|z| if self.left().is_hit(z) { (scale / f64::from(z)) as f32 } else { 0.0 });
@@ -73,8 +73,8 @@ impl StereoCamera {
 
     /// Returns the x position of the right camera \[m\] if the images are rectified.
     fn baseline(&self) -> Result<f64, CameraError> {
-        self.left().must_be_pinhole("disparity")?;
-        self.right().must_be_pinhole("disparity")?;
+        self.left().require_pinhole("disparity")?;
+        self.right().require_pinhole("disparity")?;
         let t = self.rig.left_from_right.translation.vector;
         let angle = self.rig.left_from_right.rotation.angle();
         let wrong = |what, value, expected: String| Err(CameraError::NotRectified { what, value, expected });
@@ -103,17 +103,17 @@ impl StereoCamera {
         Ok(t.x)
     }
 
-    fn update_disparities(&self, map: &mut DisparityMap, baseline: f64, depth: ArrayView3<'_, f32>) {
-        let (draws, stamps) = (self.left().draws(), self.left().stamps());
+    fn update_disparity_map(&self, map: &mut DisparityMap, baseline: f64, depth: ArrayView3<'_, f32>) {
+        let (draws, stamps) = (self.left().render_count(), self.left().stamps());
         // No image was rendered, and no other frame is shown since.
-        if map.draws == draws && map.stamps == stamps && map.pixels.dim() == depth.dim() {
+        if map.render_count == draws && map.stamps == stamps && map.pixels.dim() == depth.dim() {
             return;
         }
         if map.pixels.dim() != depth.dim() {
             map.pixels = Array3::zeros(depth.dim());
             map.stamps = Array1::zeros(stamps.len());
         }
-        map.draws = draws;
+        map.render_count = draws;
         map.stamps.assign(&stamps);
         for (row, (mut to, from)) in map.pixels.axis_iter_mut(Axis(0)).zip(depth.axis_iter(Axis(0))).enumerate() {
             let scale = f64::from(self.left().view_of(row).fx) * baseline;

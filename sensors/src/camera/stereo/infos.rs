@@ -11,9 +11,9 @@ use kinetoscope_render::Renderer;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
 
 /// Tolerance of R from a rotation: files have six digits or more.
-const ROTATION: f64 = 1e-3;
+const ROTATION_TOLERANCE: f64 = 1e-3;
 /// Tolerance of numbers that are equal in both P of a rectified stereo pair \[pixels\]: files round both the same way.
-const ALIKE: f64 = 1e-3;
+const PIXEL_TOLERANCE: f64 = 1e-3;
 
 impl StereoCameraCfg {
     /// Creates the configuration of a stereo camera from two calibrations: raw images of both cameras, as their drivers
@@ -53,22 +53,26 @@ impl StereoCameraCfg {
     ///
     /// # Errors
     ///
-    /// [`CameraError::NotAPair`] for
+    /// [`CameraError::NotAStereoPair`] for
     ///
     /// - sizes that differ,
     /// - R that is not a rotation,
     /// - P of the right camera whose fourth column does not place it to the right of the left camera,
     /// - P of the left camera whose fourth column is not 0 (maybe the files are swapped),
     /// - focal lengths or vertical principal points of both P that differ.
-    pub fn of_infos(left: &CameraInfo, right: &CameraInfo) -> Result<Self, CameraError> {
+    pub fn from_camera_infos(left: &CameraInfo, right: &CameraInfo) -> Result<Self, CameraError> {
         if (left.width, left.height) != (right.width, right.height) {
             let size = |info: &CameraInfo| format!("{} x {}", info.width, info.height);
             let expected = format!("the left one's, {}", size(left));
-            return Err(CameraError::NotAPair { what: "the size of the right picture", value: size(right), expected });
+            return Err(CameraError::NotAStereoPair {
+                what: "the size of the right picture",
+                value: size(right),
+                expected,
+            });
         }
         let baseline = baseline(&left.projection_matrix, &right.projection_matrix)?;
-        let from_left = rotation("R of the left eye", &left.rectification_matrix)?;
-        let from_right = rotation("R of the right eye", &right.rectification_matrix)?;
+        let from_left = nearest_rotation("R of the left eye", &left.rectification_matrix)?;
+        let from_right = nearest_rotation("R of the right eye", &right.rectification_matrix)?;
         let mut camera = CameraCfg::default();
         left.apply_to(&mut camera);
         let lens_right = right.lens();
@@ -90,8 +94,9 @@ impl StereoCameraCfg {
 
 /// Returns the baseline \[m\], from P of both cameras.
 fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, CameraError> {
-    let wrong =
-        |what, value: f64, expected: String| Err(CameraError::NotAPair { what, value: value.to_string(), expected });
+    let wrong = |what, value: f64, expected: String| {
+        Err(CameraError::NotAStereoPair { what, value: value.to_string(), expected })
+    };
     let focal = right[(0, 0)];
     if !(focal > 0.0 && focal.is_finite()) {
         return wrong("P[0][0] of the right eye", focal, "a focal length, positive and finite".into());
@@ -117,7 +122,7 @@ fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, Camera
         ("P[1][2] of the right eye", (1, 2)),
     ];
     for (what, at) in alike {
-        let same = (left[at] - right[at]).abs() <= ALIKE;
+        let same = (left[at] - right[at]).abs() <= PIXEL_TOLERANCE;
         if !same {
             return wrong(what, right[at], format!("the left eye's, {}", left[at]));
         }
@@ -126,18 +131,18 @@ fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, Camera
 }
 
 /// Returns the rotation nearest to a matrix.
-fn rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, CameraError> {
+fn nearest_rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, CameraError> {
     let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
     let nearest = matrix.svd(true, true);
     match (nearest.u, nearest.v_t) {
         // The product of the outer factors is orthogonal.
-        (Some(u), Some(v_t)) if off <= ROTATION && matrix.determinant() > 0.0 => {
+        (Some(u), Some(v_t)) if off <= ROTATION_TOLERANCE && matrix.determinant() > 0.0 => {
             Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * v_t)))
         }
         _ => {
             let value =
                 format!("no rotation: its determinant is {:.4}, its rows are {off:.4} off", matrix.determinant());
-            Err(CameraError::NotAPair { what, value, expected: "one".into() })
+            Err(CameraError::NotAStereoPair { what, value, expected: "one".into() })
         }
     }
 }
@@ -145,7 +150,7 @@ fn rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<
 impl StereoCamera {
     /// Returns the calibrations of both cameras in environment `env`, named `name` with `/left` or `/right` added: K
     /// and D of raw images, and R and P of the [rectification](Rectification). ROS nodes read them as a calibrated
-    /// stereo pair. [`StereoCameraCfg::of_infos`] is the inverse. Rectified images keep the principal points and focal
+    /// stereo pair. [`StereoCameraCfg::from_camera_infos`] is the inverse. Rectified images keep the principal points and focal
     /// lengths of raw images if the cameras are parallel and side by side, with the same fx, fy and cy.
     ///
     /// P projects points of the rectified *left* frame to rectified images. For the right camera it is
@@ -162,7 +167,7 @@ impl StereoCamera {
         let mut infos = [left, right];
         for ((info, rotation), projection) in infos.iter_mut().zip(rotations).zip(projections) {
             (info.rectification_matrix, info.projection_matrix) = (rotation, projection);
-            (0..2).for_each(|axis| info.projection_matrix[(axis, 2)] -= CameraInfo::FIRST_CENTRE);
+            (0..2).for_each(|axis| info.projection_matrix[(axis, 2)] -= CameraInfo::FIRST_PIXEL_CENTER);
         }
         Ok(infos)
     }

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Matrix3x4, Unit, UnitQuaternion, Vector3};
 
 /// Largest rotation of an optical axis by the rectification \[rad\], 80 degrees. Beyond it, the image center is at
 /// least 5.7 focal lengths aside, outside any usual image.
-const MOST: f64 = 80.0 * std::f64::consts::PI / 180.0;
+const MAX_AXIS_ROTATION: f64 = 80.0 * std::f64::consts::PI / 180.0;
 
 /// Stereo rectification: rotations and projections with which both images show a point in the same row. ROS calls them
 /// R and P.
@@ -47,7 +47,7 @@ impl Rectification {
     ///
     /// [`CameraError::NotRectifiable`] if the right camera is not to the right of the left one, or an optical axis
     /// would rotate by more than 80 degrees; [`CameraError::Pose`] and [`CameraError::Optics`] for invalid numbers.
-    pub fn of(left_from_right: &Pose, [left, right]: [PixelIntrinsics; 2]) -> Result<Self, CameraError> {
+    pub fn new(left_from_right: &Pose, [left, right]: [PixelIntrinsics; 2]) -> Result<Self, CameraError> {
         left_from_right.to_poses()?;
         [left, right].into_iter().try_for_each(|pixels| Intrinsics::from(pixels).to_pixels(1, 1).map(|_| ()))?;
         let (between, angle) = (left_from_right.translation.vector, left_from_right.rotation.angle());
@@ -58,13 +58,13 @@ impl Rectification {
             let projections = [projection(&left, 0.0), projection(&right, between.x)];
             return Ok(Self { rotations: [Matrix3::identity(); 2], projections });
         }
-        let refuse = |what, value, expected| Err(CameraError::NotRectifiable { what, value, expected });
+        let reject = |what, value, expected| Err(CameraError::NotRectifiable { what, value, expected });
         let half = left_from_right.rotation.powf(0.5);
         let level = half.inverse() * between;
         if level.x <= 0.0 {
-            return refuse("how far the right eye is to the right of the left one [m]", level.x, "positive");
+            return reject("how far the right eye is to the right of the left one [m]", level.x, "positive");
         }
-        let turn = to_x(&level);
+        let turn = rotation_to_x_axis(&level);
         let rotations = [turn * half.inverse(), turn * half];
         // Directions of the raw optical axes after the rotation.
         let axes = rotations.map(|rotation| rotation * Vector3::z());
@@ -73,8 +73,8 @@ impl Rectification {
             "the angle by which the right eye turns to be rectified [rad]",
         ]) {
             let angle = axis.xy().norm().atan2(axis.z);
-            if angle > MOST {
-                return refuse(what, angle, "at most 1.396 (80 degrees)");
+            if angle > MAX_AXIS_ROTATION {
+                return reject(what, angle, "at most 1.396 (80 degrees)");
             }
         }
         let f = left.fy.min(right.fy);
@@ -100,7 +100,7 @@ fn projection(pixels: &PixelIntrinsics, beside: f64) -> Matrix3x4<f64> {
 }
 
 /// Returns the smallest rotation that maps a direction to x. The sine keeps its digits for small angles.
-fn to_x(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+fn rotation_to_x_axis(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
     let axis = direction.cross(&Vector3::x());
     let angle = axis.norm().atan2(direction.x);
     let axis = Unit::try_new(axis, 0.0);
@@ -116,6 +116,6 @@ impl StereoCamera {
     pub fn rectification(&self, env: usize) -> Result<Rectification, SensorError> {
         let row = self.left().row(env)?;
         let pixels = [self.left(), self.right()].map(|eye| eye.viewpoints.row(row).pixels);
-        Ok(Rectification::of(&self.rig.left_from_right, pixels)?)
+        Ok(Rectification::new(&self.rig.left_from_right, pixels)?)
     }
 }

@@ -51,11 +51,11 @@ impl StereoCamera {
     /// Poses of the rig's [origin](super::StereoOrigin) in the environment at the captured instant, as
     /// [`Camera::pose_w`]. The poses of the cameras are `left().pose_w(..)` and `right().pose_w(..)`.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        self.origins(&self.left.pose_w(CameraConvention::Ros), convention)
+        self.rig_origins(&self.left.pose_w(CameraConvention::Ros), convention)
     }
 
     /// Returns the poses of the origins from poses of the left cameras.
-    fn origins(&self, left: &Array2<f64>, convention: CameraConvention) -> Array2<f64> {
+    fn rig_origins(&self, left: &Array2<f64>, convention: CameraConvention) -> Array2<f64> {
         let left_from_origin = self.rig.origin_from_left.inverse();
         let rows = left.rows().into_iter().map(|row| {
             let pose: [f64; 7] = std::array::from_fn(|k| row[k]);
@@ -63,7 +63,7 @@ impl StereoCamera {
             if pose.iter().any(|x| x.is_nan()) {
                 return [f64::NAN; 7];
             }
-            to_row(&convention.of_optical(&(from_row(&pose) * left_from_origin)))
+            to_row(&convention.pose_from_optical(&(from_row(&pose) * left_from_origin)))
         });
         Array2::from(rows.collect::<Vec<[f64; 7]>>())
     }
@@ -73,21 +73,21 @@ impl StereoCamera {
     ///
     /// # Errors
     ///
-    /// [`SensorError::Eye`] with the errors of [`CameraPlacement::set_intrinsics`]. Nothing is changed then.
-    pub fn set_eye_intrinsics(
+    /// [`SensorError::StereoCamera`] with the errors of [`CameraPlacement::set_intrinsics`]. Nothing is changed then.
+    pub fn set_left_right_intrinsics(
         &mut self,
         left: &[Intrinsics],
         right: &[Intrinsics],
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
-        self.both(|left_eye, right_eye| {
-            left_eye.set_intrinsics(left, env_ids).map_err(SensorError::of_eye("left"))?;
-            right_eye.set_intrinsics(right, env_ids).map_err(SensorError::of_eye("right"))
+        self.change_both(|left_eye, right_eye| {
+            left_eye.set_intrinsics(left, env_ids).map_err(SensorError::of_stereo_camera("left"))?;
+            right_eye.set_intrinsics(right, env_ids).map_err(SensorError::of_stereo_camera("right"))
         })
     }
 
     /// Changes both cameras; an error restores both.
-    fn both(
+    fn change_both(
         &mut self,
         change: impl FnOnce(&mut Camera, &mut Camera) -> Result<(), SensorError>,
     ) -> Result<(), SensorError> {
@@ -102,12 +102,12 @@ impl StereoCamera {
             self.left.viewpoints.free_unused_rays();
             self.right.viewpoints.free_unused_rays();
         }
-        self.outdate();
+        self.invalidate();
         result
     }
 
     /// Marks the disparities as outdated, because other images may be shown.
-    fn outdate(&mut self) {
+    fn invalidate(&mut self) {
         self.disparities.invalidate();
     }
 }
@@ -123,7 +123,7 @@ impl PlaceRows for StereoCamera {
         let lefts: Vec<Pose> = poses.iter().map(|origin| origin * origin_from_left).collect();
         let rights: Vec<Pose> = lefts.iter().map(|left| left * left_from_right).collect();
         let (lefts, rights) = (lefts.to_poses()?, rights.to_poses()?);
-        self.both(|left, right| {
+        self.change_both(|left, right| {
             left.place_rows(rows, &lefts, frame)?;
             right.place_rows(rows, &rights, frame)
         })
@@ -132,35 +132,35 @@ impl PlaceRows for StereoCamera {
     fn restore_rows(&mut self, rows: &[usize]) {
         self.left.restore_rows(rows);
         self.right.restore_rows(rows);
-        self.outdate();
+        self.invalidate();
     }
 }
 
 impl CameraPlacement for StereoCamera {
     fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.origins(&self.left.local_pose(CameraConvention::Ros), convention)
+        self.rig_origins(&self.left.local_pose(CameraConvention::Ros), convention)
     }
 
     fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        self.set_eye_intrinsics(intrinsics, intrinsics, env_ids)
+        self.set_left_right_intrinsics(intrinsics, intrinsics, env_ids)
     }
 }
 
 impl Sensor for StereoCamera {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        self.outdate();
+        self.invalidate();
         self.left.update(state)?;
         self.right.update(state)
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.outdate();
+        self.invalidate();
         self.left.reset(env_ids, state)?;
         self.right.reset(env_ids, state)
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.outdate();
+        self.invalidate();
         self.left.refresh(env_ids, state)?;
         self.right.refresh(env_ids, state)
     }

@@ -2,7 +2,7 @@
 
 use super::super::{
     Box2d, Camera, CameraCfg, CameraError, Extrinsics, Occlusion, PixelBox, Placement, SegmentLevel, Segmentation,
-    SegmentationCfg, Thing,
+    SegmentationCfg, SegmentedEntity,
 };
 use super::stage::point;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -13,7 +13,7 @@ use kinetoscope_scene::pose::from_xyz_rpy;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
-use kinetoscope_testkit::scenes::{Random, at, every_shape, random, things};
+use kinetoscope_testkit::scenes::{TestRng, every_shape, instances, random_scene, translation};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use ndarray::Array2;
 use std::collections::BTreeMap;
@@ -63,7 +63,7 @@ fn ahead() -> CameraCfg {
 }
 
 /// The same camera with an equidistant lens, where an angle of 1 rad is a focal length; needs a ray tracer.
-fn behind_a_lens(cfg: CameraCfg) -> CameraCfg {
+fn with_equidistant_lens(cfg: CameraCfg) -> CameraCfg {
     CameraCfg { lens: Lens::from_name("equidistant").unwrap(), renderer: Renderer::FastRayTraced, ..cfg }
 }
 
@@ -79,10 +79,10 @@ fn only((scene, poses): &(RenderScene, Vec<PoseF32>), is: impl Fn(i32) -> bool) 
 }
 
 /// A segmentation in which every instance is an object; objects with even mask ids share a class.
-fn table(scene: &RenderScene) -> Segmentation {
+fn segmentation_of(scene: &RenderScene) -> Segmentation {
     let ids: std::collections::BTreeSet<i32> = scene.instances().iter().map(|instance| instance.mask_id).collect();
     let class = |id| if id % 2 == 0 { "even" } else { "odd" }.into();
-    let thing = |id: i32| Thing { id, object: format!("thing {id}"), link: None, class: class(id) };
+    let thing = |id: i32| SegmentedEntity { id, object: format!("thing {id}"), link: None, class: class(id) };
     Segmentation::new(ids.into_iter().map(thing), &SegmentationCfg::default()).unwrap()
 }
 
@@ -113,11 +113,11 @@ fn brute_force() {
     for (seed, lens) in (1..=6).map(|seed| (seed, false)).chain((1..=3).map(|seed| (seed, true))) {
         let mut cfg = cfg([2.4, 0.5 * seed as f64 - 1.5, 0.7], [0.0; 3]);
         if lens {
-            cfg = behind_a_lens(cfg);
+            cfg = with_equidistant_lens(cfg);
         }
-        let scene = random(&mut Random(seed), 1.0);
+        let scene = random_scene(&mut TestRng(seed), 1.0);
         let camera = seen(&cfg, &scene);
-        let (segmentation, kind) = (table(&scene.0), usize::from(lens));
+        let (segmentation, kind) = (segmentation_of(&scene.0), usize::from(lens));
         // From images of single segments, also eight times as fine. Segments of instances equal those of links here.
         let mut images = BTreeMap::new();
         for level in LEVELS {
@@ -147,7 +147,7 @@ fn brute_force() {
                 assert_eq!(found.and_then(|b| b.tight), expected.map(|(edges, _)| edges), "{segment:?}");
                 assert_eq!(found.map_or(0, |found| found.visible_pixels), visible);
                 let occlusion = occlusions.iter().find(|found| found.id == segment.id);
-                let both = occlusion.map(|o| (o.visible_pixels, o.alone_pixels));
+                let both = occlusion.map(|o| (o.visible_pixels, o.unoccluded_pixels));
                 assert_eq!(both, by_itself.map(|(_, alone)| (visible, alone)), "{segment:?}");
                 tights[kind] += usize::from(expected.is_some());
                 hidden[kind] += usize::from(occlusion.is_some_and(|o| o.ratio() > 0.1));
@@ -176,7 +176,7 @@ fn brute_force() {
 }
 
 fn block(half: [f32; 3], [x, y, z]: [f32; 3]) -> (Shape, Material, PoseF32) {
-    (Box { half }.into(), Material::default(), at(x, y, z))
+    (Box { half }.into(), Material::default(), translation(x, y, z))
 }
 
 fn ball(radius: f32, pose: PoseF32) -> (Shape, Material, PoseF32) {
@@ -187,10 +187,10 @@ fn ball(radius: f32, pose: PoseF32) -> (Shape, Material, PoseF32) {
 /// between two pixels, so exactly half of the wall's pixels are hidden.
 #[test]
 fn half_hidden_wall() {
-    let scene = things([block([0.1, 1.0, 1.0], [4.0, 0.0, 0.0]), block([0.1, 2.0, 2.0], [2.0, -2.0, 0.0])]);
-    let (camera, segmentation) = (seen(&ahead(), &scene), table(&scene.0));
+    let scene = instances([block([0.1, 1.0, 1.0], [4.0, 0.0, 0.0]), block([0.1, 2.0, 2.0], [2.0, -2.0, 0.0])]);
+    let (camera, segmentation) = (seen(&ahead(), &scene), segmentation_of(&scene.0));
     let [wall, screen] = segmentation.occlusions(SegmentLevel::Instance, &camera, 0).unwrap()[..] else { panic!() };
-    assert_eq!((wall.ratio(), wall.visible_pixels * 2), (0.5, wall.alone_pixels));
+    assert_eq!((wall.ratio(), wall.visible_pixels * 2), (0.5, wall.unoccluded_pixels));
     assert_eq!((screen.id, screen.ratio()), (2, 0.0), "parts that the image cuts off are not hidden");
     let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &camera, 0).unwrap();
     let Box2d { tight: Some(tight), loose: Some(loose), .. } = boxes[0] else { panic!("{:?}", boxes[0]) };
@@ -220,8 +220,8 @@ fn lens_cones() {
     let ball = |angle| ball(0.3, turned(angle, [2.0, 0.0, 0.0]));
     let screen =
         |angle| (Box { half: [0.01, 0.08, 1.0] }.into(), Material::default(), turned(angle, [1.0, -0.08, 0.0]));
-    let scene = things([ball(0.0), ball(aside), screen(0.0), screen(aside)]);
-    let (camera, segmentation) = (seen(&behind_a_lens(ahead()), &scene), table(&scene.0));
+    let scene = instances([ball(0.0), ball(aside), screen(0.0), screen(aside)]);
+    let (camera, segmentation) = (seen(&with_equidistant_lens(ahead()), &scene), segmentation_of(&scene.0));
     let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &camera, 0).unwrap();
     let cone = (0.3f64 / 2.0).asin();
     for (found, middle) in boxes.iter().zip([0.0, aside]) {
@@ -235,7 +235,7 @@ fn lens_cones() {
         if middle == 0.0 {
             assert!((loose.min[1] - (36.0 - 84.0 * cone)).abs() < 0.52, "{loose:?}");
             let occlusion = segmentation.occlusions(SegmentLevel::Instance, &camera, 0).unwrap()[0];
-            assert_eq!((occlusion.visible_pixels, occlusion.alone_pixels), (visible_pixels, 2 * visible_pixels));
+            assert_eq!((occlusion.visible_pixels, occlusion.unoccluded_pixels), (visible_pixels, 2 * visible_pixels));
         }
     }
 }
@@ -244,10 +244,10 @@ fn lens_cones() {
 /// cube does.
 #[test]
 fn class_beside_image() {
-    let (scene, poses) = things([[2.0, -0.2, -0.4], [2.0, 9.0, 0.5]].map(|place| block([0.1; 3], place)));
+    let (scene, poses) = instances([[2.0, -0.2, -0.4], [2.0, 9.0, 0.5]].map(|place| block([0.1; 3], place)));
     let even = scene.instances().iter().map(|cube| Instance { mask_id: 2 * cube.mask_id, ..cube.clone() }).collect();
     let scene = (RenderScene::new(even).unwrap(), poses);
-    let (camera, all) = (seen(&ahead(), &scene), table(&scene.0));
+    let (camera, all) = (seen(&ahead(), &scene), segmentation_of(&scene.0));
     let of = |level| all.boxes_2d(level, &camera, 0).unwrap().iter().map(|b| b.loose.unwrap()).collect::<Vec<_>>();
     let (class, cubes) = (of(SegmentLevel::Semantic), of(SegmentLevel::Instance));
     assert_eq!(class, cubes);
@@ -260,11 +260,11 @@ fn class_beside_image() {
 fn without_box() {
     let glass = Material::from_rgba([1.0, 1.0, 1.0, 0.0]);
     let places = [[2.0, 0.0], [-2.0, 0.0], [2.0, 9.0], [1.0, 0.0], [2.0, 0.3]];
-    let (scene, poses) = things(places.map(|[x, y]| ball(0.2, at(x, y, 0.0))));
+    let (scene, poses) = instances(places.map(|[x, y]| ball(0.2, translation(x, y, 0.0))));
     let mut instances = scene.instances().to_vec();
     (instances[3].material, instances[4].visible) = (glass, false);
     let scene = (RenderScene::new(instances).unwrap(), poses);
-    let (camera, segmentation) = (seen(&ahead(), &scene), table(&scene.0));
+    let (camera, segmentation) = (seen(&ahead(), &scene), segmentation_of(&scene.0));
     let found = segmentation.boxes_2d(SegmentLevel::Link, &camera, 0).unwrap();
     assert_eq!(found.iter().map(|found| found.id).collect::<Vec<_>>(), [1]);
     let solid = segmentation.boxes_3d(SegmentLevel::Link, &camera, 0).unwrap();
@@ -275,11 +275,11 @@ fn without_box() {
     assert_eq!(error, "the camera does not measure mask; it measures color");
     assert!(segmentation.boxes_3d(SegmentLevel::Link, &blind, 3).is_err());
     // Errors before a capture, and for a pose that is not finite.
-    let scene = things([ball(0.2, at(0.0, f32::NAN, 0.0))]);
-    let boxes = |camera: &Camera| table(&scene.0).boxes_3d(SegmentLevel::Link, camera, 0).unwrap_err();
+    let scene = kinetoscope_testkit::scenes::instances([ball(0.2, translation(0.0, f32::NAN, 0.0))]);
+    let boxes = |camera: &Camera| segmentation_of(&scene.0).boxes_3d(SegmentLevel::Link, camera, 0).unwrap_err();
     let early = super::stage::cfg().build(&context(&scene.0)).unwrap();
     assert_eq!(boxes(&early), CameraError::NothingCaptured { env: 0 }.into());
-    assert_eq!(boxes(&seen(&ahead(), &scene)), CameraError::ThingPose { env: 0, id: 1 }.into());
+    assert_eq!(boxes(&seen(&ahead(), &scene)), CameraError::EntityPose { env: 0, id: 1 }.into());
 }
 
 /// A link with a rotated ellipsoid and a rotated capsule. Their half lengths along the axes of the link are sqrt(sum of
@@ -306,9 +306,9 @@ fn solid_boxes() {
     };
     for world_from_link in [Pose::identity(), from_xyz_rpy([0.5, 0.3, 0.2], [1.0, -0.4, 2.0])] {
         let place = |k: usize| PoseF32::from(&(world_from_link * link_from[k]));
-        let poses = vec![place(0), place(1), at(0.0, 0.0, -1.0)];
+        let poses = vec![place(0), place(1), translation(0.0, 0.0, -1.0)];
         let camera = seen(&cfg([2.0, 0.1, 0.4], [0.3, 0.2, 0.2]), &(scene.clone(), poses));
-        let boxes = table(&scene).boxes_3d(SegmentLevel::Link, &camera, 0).unwrap();
+        let boxes = segmentation_of(&scene).boxes_3d(SegmentLevel::Link, &camera, 0).unwrap();
         let [found] = boxes[..] else { panic!("a plane without end has no box: {boxes:?}") };
         for axis in 0..3 {
             let side = |sign: f64| [0, 1].map(|k| link_from[k].translation.vector[axis] + sign * reach(k, axis));
@@ -350,7 +350,7 @@ fn tight_solids() {
         let instance = Instance { frame_from_instance, ..Instance::new(shape.clone(), Material::default(), 1) };
         let scene = (RenderScene::new(vec![instance]).unwrap(), vec![PoseF32::from(&frame_from_instance)]);
         let camera = seen(&cfg([2.0, 0.0, 0.5], [0.0; 3]), &scene);
-        let found = table(&scene.0).boxes_3d(SegmentLevel::Semantic, &camera, 0).unwrap()[0];
+        let found = segmentation_of(&scene.0).boxes_3d(SegmentLevel::Semantic, &camera, 0).unwrap()[0];
         let positions = shape.tessellate(256).positions;
         let points: Vec<_> = positions.iter().map(|p| frame_from_instance * Point3::from(*p).cast::<f64>()).collect();
         for axis in 0..3 {
@@ -371,7 +371,7 @@ fn tight_solids() {
 fn rolling_shutter() {
     const STEPS: u64 = 10;
     let bar = || block([0.05, 0.1, 5.0], [0.0; 3]);
-    let (scene, _) = things([bar(), ball(0.3, PoseF32::IDENTITY), block([0.01, 0.4, 0.3], [0.0; 3]), bar()]);
+    let (scene, _) = instances([bar(), ball(0.3, PoseF32::IDENTITY), block([0.01, 0.4, 0.3], [0.0; 3]), bar()]);
     let place = |step: u64, id: i32| {
         let t = step as f32 * DT as f32;
         let places =
@@ -395,7 +395,7 @@ fn rolling_shutter() {
     };
     let pixels = |camera: &Camera, id| around_in(camera, |found| found == id);
     let rolling = Shutter { row_time: 0.08 / 47.0, exposure_time: 0.0 };
-    let (all, segmentation) = (image(&|_| true, rolling), table(&scene));
+    let (all, segmentation) = (image(&|_| true, rolling), segmentation_of(&scene));
     let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &all, 0).unwrap();
     let occlusions = segmentation.occlusions(SegmentLevel::Instance, &all, 0).unwrap();
     assert_eq!((boxes.len(), occlusions.len()), (4, 4), "{boxes:?} {occlusions:?}");
@@ -404,7 +404,7 @@ fn rolling_shutter() {
         let alone = pixels(&image(&|other| other == id, rolling), id).unwrap();
         assert_eq!((tight, visible_pixels), (visible.map(|v| v.0), visible.map_or(0, |v| v.1)), "{id}");
         assert_eq!(loose, Some(alone.0), "{id}");
-        assert_eq!(*occlusion, Occlusion { id, visible_pixels, alone_pixels: alone.1 });
+        assert_eq!(*occlusion, Occlusion { id, visible_pixels, unoccluded_pixels: alone.1 });
         assert!((0.0..=1.0).contains(&occlusion.ratio()), "{occlusion:?}");
     }
     let ratios: Vec<f64> = occlusions.iter().map(Occlusion::ratio).collect();

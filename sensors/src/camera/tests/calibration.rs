@@ -8,7 +8,7 @@ use kinetoscope_render::lens::{
 use kinetoscope_render::lens::{Lens, LensRays, Optics};
 use kinetoscope_render::{Intrinsics, PixelIntrinsics, Renderer};
 use kinetoscope_testkit::opencv::opencv;
-use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::urdf::TempFiles;
 
 /// As `cameracalibrator` writes it, with additions of some drivers.
 const FILE: &str = "\
@@ -43,7 +43,7 @@ binning_x: 0
 ";
 
 /// The simulated camera of a calibration.
-fn twin(info: &CameraInfo, renderer: Renderer) -> CameraCfg {
+fn simulated_camera(info: &CameraInfo, renderer: Renderer) -> CameraCfg {
     let mut twin = CameraCfg { renderer, ..cfg() };
     info.apply_to(&mut twin);
     twin
@@ -61,7 +61,7 @@ fn real_file() {
     let lens = OpenCv { k1: -0.312471, k2: 0.118365, p1: 4.13e-4, p2: -0.000218, ..OpenCv::default() };
     assert_eq!(info.lens(), Lens::from(lens));
     assert_eq!((info.projection_matrix[(0, 2)], info.projection_matrix[(1, 1)]), (32.30114, 59.23112));
-    let camera = built(&twin(&info, Renderer::FastRayTraced), &context(1));
+    let camera = built(&simulated_camera(&info, Renderer::FastRayTraced), &context(1));
     let (pose, k, d) = (pose_of(&camera, 0), &info.camera_matrix, &info.distortion_coefficients);
     let mut seen = 0;
     for ((_, row, column), _) in camera.depth().unwrap().indexed_iter().filter(|(_, depth)| depth.is_finite()) {
@@ -84,7 +84,7 @@ fn real_file() {
     assert!((own.camera_matrix - info.camera_matrix).amax() < 1e-14);
     // A centered camera of 640 x 480 pixels.
     let pixels = PixelIntrinsics { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 };
-    let centred = CameraInfo::of("", [640, 480], &pixels, &Lens::default()).unwrap();
+    let centred = CameraInfo::from_intrinsics("", [640, 480], &pixels, &Lens::default()).unwrap();
     assert_eq!([centred.camera_matrix[(0, 2)], centred.camera_matrix[(1, 2)]], [319.5, 239.5]);
     assert_eq!([centred.projection_matrix[(0, 2)], centred.projection_matrix[(1, 2)]], [319.5, 239.5]);
 }
@@ -152,7 +152,7 @@ fn round_trip() {
         (OpenCv::from_coefficients(&twelve).into(), DistortionModel::RationalPolynomial, 12),
         (OpenCvFisheye { k1: 0.1, k4: -0.01, ..Default::default() }.into(), DistortionModel::Equidistant, 4),
     ] {
-        let info = CameraInfo::of("front", [640, 480], &pixels, &lens).unwrap();
+        let info = CameraInfo::from_intrinsics("front", [640, 480], &pixels, &lens).unwrap();
         assert_eq!((info.distortion_model, info.distortion_coefficients.len()), (model, count));
         let again = CameraInfo::parse(&info.to_yaml(), "front.yaml").unwrap();
         assert_eq!(again, info);
@@ -160,7 +160,7 @@ fn round_trip() {
         assert_eq!(again.intrinsics(), Intrinsics::from(pixels));
         assert!(again.lens() == lens || lens.is_pinhole() && again.lens().is_pinhole());
     }
-    let files = Files::default();
+    let files = TempFiles::default();
     let path = files.folder().join("front.yaml");
     info.write(&path).unwrap();
     assert_eq!(CameraInfo::read(&path).unwrap(), info);
@@ -174,7 +174,7 @@ fn round_trip() {
 #[test]
 fn short_lenses() {
     let pixels = PixelIntrinsics { fx: 300.0, fy: 301.0, cx: 320.0, cy: 240.0 };
-    let of = |lens: Lens| CameraInfo::of("front", [640, 480], &pixels, &lens);
+    let of = |lens: Lens| CameraInfo::from_intrinsics("front", [640, 480], &pixels, &lens);
     let fisheye = OpenCvFisheye { k1: 0.1, k4: -0.01, ..Default::default() };
     let barrel = OpenCv { k1: -0.2, ..OpenCv::default() };
     for (short, long) in [
@@ -215,17 +215,17 @@ fn short_lenses() {
 /// Root cause: the default renderer rejects lenses other than a pinhole, and `apply_to` kept it. The simulated camera
 /// of every distorted calibration started with an error.
 #[test]
-fn renderer_of_twins() {
+fn renderer_of_calibrated_cameras() {
     let info = CameraInfo::parse(FILE, "left.yaml").unwrap();
-    let plain = twin(&info, Renderer::default());
+    let plain = simulated_camera(&info, Renderer::default());
     assert_eq!((Renderer::default(), plain.renderer), (Renderer::Raster, Renderer::FastRayTraced));
     assert!(built(&plain, &context(1)).depth().unwrap().iter().any(|depth| depth.is_finite()));
     // Other renderers trace rays already, and lenses without distortion work with all renderers.
     for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED] {
-        assert_eq!(twin(&info, renderer).renderer, renderer);
+        assert_eq!(simulated_camera(&info, renderer).renderer, renderer);
     }
     let straight = CameraInfo { distortion_coefficients: vec![0.0; 5], ..info };
-    assert_eq!(twin(&straight, Renderer::Raster).renderer, Renderer::Raster);
+    assert_eq!(simulated_camera(&straight, Renderer::Raster).renderer, Renderer::Raster);
 }
 
 /// A file without its end, which contains the distortion and, in some files, additions.

@@ -27,7 +27,7 @@ fn flow_of(camera: &Camera, row: usize) -> Vec<[f32; 2]> {
 
 /// Compares every pixel of an environment that shows `id` with the pixel that showed its point in the previous frame,
 /// if `before` returns it. Returns the compared flows.
-fn judge(camera: &Camera, row: usize, id: i32, before: impl Fn(Point3<f64>) -> Option<[f64; 2]>) -> Vec<[f32; 2]> {
+fn check_flow(camera: &Camera, row: usize, id: i32, before: impl Fn(Point3<f64>) -> Option<[f64; 2]>) -> Vec<[f32; 2]> {
     let pixels = (0..SIZE[1]).flat_map(|v| (0..SIZE[0]).map(move |u| (v, u)));
     let shown = pixels.zip(flow_of(camera, row)).filter(|((v, u), _)| camera.mask().unwrap()[(row, *v, *u)] == id);
     let judged = |((v, u), found): ((usize, usize), [f32; 2])| {
@@ -63,7 +63,7 @@ fn moving_ball() {
             assert!(*id == BALL || [0, GROUND].contains(id) && *found == expected, "{id}: {found:?}");
         }
         let (y, old) = (ball(row, 8)[1] - ball(row, 4)[1], super::stage::pose_of(&lazy, row).inverse());
-        let flows = judge(&lazy, row, BALL, |p| Some(pinhole(&lazy, row, old * (p - Vector3::y() * y))));
+        let flows = check_flow(&lazy, row, BALL, |p| Some(pinhole(&lazy, row, old * (p - Vector3::y() * y))));
         // +y is to the left of a camera that looks along +x: 0.04 m at about 1.4 m and 40 pixels.
         assert!(flows.iter().all(|flow| flow[0] < -0.8 && flow[0] > -1.6), "{flows:?}");
         balls += flows.len();
@@ -103,7 +103,7 @@ fn imperfect_fisheye() {
         let camera_from_world = camera.world_from_camera(row).unwrap().inverse();
         let moved = ball(row, 6)[1] - ball(row, 1)[1];
         let there = |p: Point3<f64>| then.project((camera_from_world * (p - Vector3::y() * moved)).coords.into());
-        balls += judge(&camera, row, BALL, |p| Some(there(p).unwrap())).len();
+        balls += check_flow(&camera, row, BALL, |p| Some(there(p).unwrap())).len();
         for (v, u) in (0..SIZE[1]).flat_map(|v| (0..SIZE[0]).map(move |u| (v, u))) {
             let Some(ray) = now.unproject([u as f64 + 0.5, v as f64 + 0.5]) else { continue };
             let light = [&camera, &imperfect].map(|camera| camera.color().unwrap()[(row, v, u, 0)]);
@@ -173,7 +173,7 @@ fn camera_on_link() {
             let then = old * p;
             (then.z >= 0.1 && p.coords.norm() <= 10.0).then(|| pinhole(&camera, row, then))
         };
-        judge(&camera, row, GROUND, before).len()
+        check_flow(&camera, row, GROUND, before).len()
     });
     assert!(judged[0] + judged[1] > 500, "{judged:?}");
 }
@@ -190,7 +190,7 @@ fn moved_camera() {
     };
     let assert_from = |camera: &Camera, old: usize| {
         let old = place(old).inverse();
-        let flows = judge(camera, 0, GROUND, |p| Some(pinhole(camera, 0, old * p)));
+        let flows = check_flow(camera, 0, GROUND, |p| Some(pinhole(camera, 0, old * p)));
         assert!(flows.iter().filter(|flow| flow[0].abs() > 0.1).count() > 100);
     };
     put(&mut camera, 0);

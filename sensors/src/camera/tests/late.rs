@@ -9,12 +9,12 @@ use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg};
 use kinetoscope_render::Intrinsics;
 use kinetoscope_render::frame::Channels;
-use kinetoscope_render::frame::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
+use kinetoscope_render::frame::{Color, Depth, Distance, ListedChannel, Mask, Normal, Position, ShadingNormal};
 use ndarray::{Axis, array};
 
 /// A past image as bits, in the order of [`bits`].
 fn past_bits(camera: &Camera, row: usize, age: usize) -> Vec<u32> {
-    fn of<C: Listed>(camera: &Camera, row: usize, age: usize, bits: impl Fn(C::Number) -> u32) -> Vec<u32> {
+    fn of<C: ListedChannel>(camera: &Camera, row: usize, age: usize, bits: impl Fn(C::Element) -> u32) -> Vec<u32> {
         let history = camera.history::<C>().unwrap();
         let [rows, length] = [camera.env_ids().len(), camera.history_length()];
         assert_eq!(history.shape()[..2], [rows, length]);
@@ -35,7 +35,7 @@ fn past_bits(camera: &Camera, row: usize, age: usize) -> Vec<u32> {
 }
 
 /// A camera with noise, dropout, latency, history and every imperfection.
-fn troubled() -> CameraCfg {
+fn imperfect_cfg() -> CameraCfg {
     let noise = NoiseCfg { std: 0.02, bias_std: 0.01, bias_walk: 0.05, resolution: 0.001 };
     let color = NoiseCfg { std: 3.0, bias_std: 2.0, bias_walk: 1.0, resolution: 0.0 };
     CameraCfg {
@@ -93,7 +93,7 @@ fn latency() {
         }
         assert!(seen.windows(2).all(|two| two[0] != two[1]), "the control: images differ");
         // An image that is shown and in the history is rendered once.
-        assert_eq!(late.draws(), 2 * (1 + late.frame_counts()[0]), "period {period}, latency {latency}");
+        assert_eq!(late.render_count(), 2 * (1 + late.frame_counts()[0]), "period {period}, latency {latency}");
     }
 }
 
@@ -121,18 +121,18 @@ fn history_shapes() {
 fn lazy_history() {
     let mut camera = built(&CameraCfg { history_length: 3, ..cfg() }, &context(1));
     (1..=10).for_each(|step| camera.update(&state(&[step])).unwrap());
-    assert_eq!(camera.draws(), 0);
+    assert_eq!(camera.render_count(), 0);
     camera.history::<Depth>().unwrap();
     camera.history::<Color>().unwrap();
     camera.depth().unwrap();
-    assert_eq!(camera.draws(), 3, "10, 9 and 8");
+    assert_eq!(camera.render_count(), 3, "10, 9 and 8");
     camera.update(&state(&[11])).unwrap();
     camera.history::<Depth>().unwrap();
-    assert_eq!(camera.draws(), 4, "11");
+    assert_eq!(camera.render_count(), 4, "11");
     camera.update(&state(&[12])).unwrap();
     camera.depth().unwrap();
     camera.history::<Depth>().unwrap();
-    assert_eq!(camera.draws(), 5, "12, once");
+    assert_eq!(camera.render_count(), 5, "12, once");
 }
 
 /// An owner that updates only at due steps gets the same images.
@@ -269,8 +269,8 @@ fn setters() {
 #[test]
 fn lazy_and_eager() {
     let context = context(2);
-    let mut lazy = built(&troubled(), &context);
-    let mut eager = built(&CameraCfg { lazy: false, ..troubled() }, &context);
+    let mut lazy = built(&imperfect_cfg(), &context);
+    let mut eager = built(&CameraCfg { lazy: false, ..imperfect_cfg() }, &context);
     for now in 1..=40u64 {
         for camera in [&mut lazy, &mut eager] {
             let there = state(&[now, if now > 20 { now - 20 } else { now }]);
@@ -297,14 +297,14 @@ fn lazy_and_eager() {
             assert_eq!((lazy.stamps(), lazy.frame_counts()), (eager.stamps(), eager.frame_counts()));
         }
     }
-    assert!(lazy.draws() < eager.draws(), "{} {}", lazy.draws(), eager.draws());
+    assert!(lazy.render_count() < eager.render_count(), "{} {}", lazy.render_count(), eager.render_count());
 }
 
 /// The number of threads changes no bit, and a subset of the environments has the same images.
 #[test]
 fn threads_and_environments() {
     let images = |context: &SensorContext| {
-        let mut camera = built(&troubled(), context);
+        let mut camera = built(&imperfect_cfg(), context);
         (1..=12).for_each(|step| camera.update(&state(&[step; 5])).unwrap());
         [bits(&camera, 0..5), past_bits(&camera, 4, 1)].concat()
     };
@@ -312,8 +312,10 @@ fn threads_and_environments() {
     assert!(by_threads.iter().all(|other| *other == by_threads[0]));
     let seed = context(5).seed + 1;
     assert!(images(&SensorContext { seed, ..context(5) }) != by_threads[0], "the control: another seed");
-    let (mut all, mut some) =
-        (built(&troubled(), &context(4)), built(&CameraCfg { env_ids: Some(vec![3, 1]), ..troubled() }, &context(4)));
+    let (mut all, mut some) = (
+        built(&imperfect_cfg(), &context(4)),
+        built(&CameraCfg { env_ids: Some(vec![3, 1]), ..imperfect_cfg() }, &context(4)),
+    );
     for now in 1..=14 {
         for camera in [&mut all, &mut some] {
             camera.update(&state(&[now, now + 1, now, now])).unwrap();
@@ -331,9 +333,9 @@ fn threads_and_environments() {
 fn bad_options() {
     let refused = |cfg: CameraCfg| cfg.build(&context(2)).unwrap_err();
     let history = refused(CameraCfg { history_length: 1 << 40, ..cfg() });
-    assert!(matches!(history, SensorError::Camera(CameraError::Past { captures: 1, .. })), "{history}");
+    assert!(matches!(history, SensorError::Camera(CameraError::HistoryMemory { pending_frames: 1, .. })), "{history}");
     let endless = refused(CameraCfg { history_length: usize::MAX, ..cfg() });
-    assert!(matches!(endless, SensorError::Camera(CameraError::Past { .. })), "{endless}");
+    assert!(matches!(endless, SensorError::Camera(CameraError::HistoryMemory { .. })), "{endless}");
     // 2000 images of 48 x 32 pixels fit.
     assert!(CameraCfg { history_length: 200, latency_steps: 1000, ..cfg() }.build(&context(2)).is_ok());
     for dropout in [-0.1, 1.1, f64::NAN] {
@@ -368,5 +370,5 @@ fn bad_options() {
         assert!(error.starts_with(text) && (!exact || error == text), "{error}");
     }
     let extrinsics = Extrinsics { parent: Some("tip".into()), ..Extrinsics::default() };
-    assert!(CameraCfg { extrinsics, ..troubled() }.build(&context(1)).is_ok(), "the control");
+    assert!(CameraCfg { extrinsics, ..imperfect_cfg() }.build(&context(1)).is_ok(), "the control");
 }

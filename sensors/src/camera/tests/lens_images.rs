@@ -166,7 +166,7 @@ fn own_intrinsics() {
     // An invalid value changes nothing.
     let bad = Intrinsics::Pixels { fx: 25.0, fy: 22.0, cx: 3000.0, cy: 20.0 };
     let error = camera.set_intrinsics(&[bad], Some(&[0])).unwrap_err();
-    assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::LensBlind { .. }))), "{error}");
+    assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::NoVisiblePixel { .. }))), "{error}");
     assert!(camera.set_intrinsics(&[other; 2], None).is_err());
     assert!(rows(&camera) == now);
     camera.restore(None).unwrap();

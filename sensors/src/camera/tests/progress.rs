@@ -21,19 +21,19 @@ fn cameras() {
     shared(&progress);
     progress.cancel();
     let total = 2 * (cfg().width * cfg().height) as u64;
-    let expected = CameraError::Draw { env: 0, error: RenderError::Cancelled { samples: 0, total } };
+    let expected = CameraError::Render { env: 0, error: RenderError::Canceled { samples: 0, total } };
     assert_eq!(camera.color().unwrap_err(), expected.into());
     progress.resume();
     // A cancelled image is rendered by the next reader.
     let fresh = built(&CameraCfg { renderer: paths(2), ..cfg() }, &context(1));
     assert_eq!((camera.color().unwrap(), progress.samples()), (fresh.color().unwrap(), total));
     // Control: an image that cannot be rendered is tried once.
-    let draws = camera.draws();
+    let draws = camera.render_count();
     let mut state = state(&[1]);
     state.visible.as_mut().unwrap().instance_poses[(0, 1)].translation[0] = f32::NAN;
     camera.update(&state).unwrap();
     assert!(camera.color().is_err() && camera.color().is_err());
-    assert_eq!(camera.draws(), draws + 1);
+    assert_eq!(camera.render_count(), draws + 1);
 }
 
 /// Cancelled images in flight and images of the history are rendered at the next read.
@@ -45,18 +45,23 @@ fn late_and_past() {
         (1..=3).for_each(|step| camera.update(&state(&[step])).unwrap());
         // After a write, the shown image is not the latest delivered one.
         camera.refresh(&[0], &state(&[3])).unwrap();
-        assert!(camera.color().is_ok() && camera.arrived_stamps() != camera.stamps());
+        assert!(camera.color().is_ok() && camera.latest_delivered_stamps() != camera.stamps());
         if cancelled {
             camera.progress().cancel();
             for _ in 0..2 {
-                assert!(camera.arrived::<Color>().unwrap_err().to_string().contains("broken off"));
+                assert!(camera.latest_delivered::<Color>().unwrap_err().to_string().contains("broken off"));
                 assert!(camera.history::<Color>().unwrap_err().to_string().contains("broken off"));
             }
             camera.progress().resume();
         }
-        let (arrived, past) = (camera.arrived::<Color>().unwrap().to_owned(), camera.history::<Color>().unwrap());
-        let drawn = camera.draws();
-        assert_eq!((camera.arrived::<Color>().unwrap(), camera.draws()), (arrived.view(), drawn), "drawn once");
+        let (arrived, past) =
+            (camera.latest_delivered::<Color>().unwrap().to_owned(), camera.history::<Color>().unwrap());
+        let drawn = camera.render_count();
+        assert_eq!(
+            (camera.latest_delivered::<Color>().unwrap(), camera.render_count()),
+            (arrived.view(), drawn),
+            "drawn once"
+        );
         (arrived, past.to_owned())
     };
     assert_eq!(run(true), run(false));

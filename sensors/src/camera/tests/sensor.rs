@@ -10,7 +10,7 @@ use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Depth;
 use kinetoscope_render::lens::Lens;
 use kinetoscope_render::{Intrinsics, Renderer};
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::pose::{from_row, from_wxyz, from_xyz_rpy, to_row};
 use kinetoscope_scene::{Pose, PoseF32, SceneState};
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -28,29 +28,29 @@ fn on(parent: &str) -> CameraCfg {
 #[test]
 fn lazy_draws() {
     let mut camera = built(&cfg(), &context(3));
-    assert_eq!(camera.draws(), 0, "not read yet");
+    assert_eq!(camera.render_count(), 0, "not read yet");
     camera.depth().unwrap();
     camera.color().unwrap();
     camera.point_cloud(1, Default::default()).unwrap();
-    assert_eq!(camera.draws(), 3);
+    assert_eq!(camera.render_count(), 3);
     (1..=5).for_each(|step| camera.update(&state(&[step; 3])).unwrap());
-    assert_eq!((camera.draws(), camera.frame_counts()), (3, array![5, 5, 5].view()));
+    assert_eq!((camera.render_count(), camera.frame_counts()), (3, array![5, 5, 5].view()));
     camera.color().unwrap();
-    assert_eq!(camera.draws(), 6);
+    assert_eq!(camera.render_count(), 6);
     // A quarantined environment is not rendered again.
     for _ in 0..2 {
         camera.update(&state(&[6, 5, 6])).unwrap();
         camera.color().unwrap();
-        assert_eq!((camera.draws(), camera.frame_counts()), (8, array![6, 5, 6].view()));
+        assert_eq!((camera.render_count(), camera.frame_counts()), (8, array![6, 5, 6].view()));
     }
     // After a setter, the changed environments are rendered again, at the same instant.
     camera.set_local_pose(&Pose::identity(), Some(&[2]), CameraConvention::World).unwrap();
     camera.set_intrinsics(&[Intrinsics::ISAAC], Some(&[2])).unwrap();
     camera.color().unwrap();
-    assert_eq!((camera.draws(), camera.stamps()), (9, array![6.0 * DT, 5.0 * DT, 6.0 * DT].view()));
+    assert_eq!((camera.render_count(), camera.stamps()), (9, array![6.0 * DT, 5.0 * DT, 6.0 * DT].view()));
     camera.set_intrinsics(&[], Some(&[])).unwrap();
     camera.color().unwrap();
-    assert_eq!(camera.draws(), 9);
+    assert_eq!(camera.render_count(), 9);
 }
 
 /// Images show the instant of capture, however late they are read.
@@ -59,7 +59,7 @@ fn instant_of_capture() {
     let context = context(2);
     let period = CameraCfg { update_period: 0.02, ..cfg() };
     let (mut lazy, mut eager) = (built(&period, &context), built(&CameraCfg { lazy: false, ..period }, &context));
-    assert_eq!(eager.draws(), 2);
+    assert_eq!(eager.render_count(), 2);
     let mut due = Vec::new();
     for step in 1..=11 {
         due.push(lazy.due_in(&[step - 1, step - 1]));
@@ -67,10 +67,10 @@ fn instant_of_capture() {
         eager.update(&state(&[step, step])).unwrap();
     }
     assert_eq!(due, [4, 3, 2, 1, 4, 3, 2, 1, 4, 3, 2]);
-    assert_eq!((lazy.draws(), eager.draws()), (0, 6));
+    assert_eq!((lazy.render_count(), eager.render_count()), (0, 6));
     let memory = lazy.color().unwrap().as_ptr();
     assert_eq!(bits(&lazy, 0..2), bits(&eager, 0..2));
-    assert_eq!((lazy.draws(), eager.draws()), (2, 6));
+    assert_eq!((lazy.render_count(), eager.render_count()), (2, 6));
     assert_eq!((lazy.stamps(), lazy.schedule().period_steps()), (array![8.0 * DT, 8.0 * DT].view(), 4));
     let mut fresh = built(&cfg(), &context);
     fresh.refresh(&[0, 1], &state(&[8, 8])).unwrap();
@@ -120,7 +120,7 @@ fn some_environments() {
     }
     assert_eq!(bits(&some, 0..2), bits(&all, [3, 1]));
     assert_eq!((some.stamps(), some.frame_counts()), (array![4.0 * DT, 2.0 * DT].view(), array![1, 0].view()));
-    assert_eq!((some.draws(), some.env_ids()), (2, [3, 1].as_slice()));
+    assert_eq!((some.render_count(), some.env_ids()), (2, [3, 1].as_slice()));
     for camera in [&mut all, &mut some] {
         camera.set_intrinsics(&[Intrinsics::Fovy { radians: 0.5 }], Some(&[1])).unwrap();
     }
@@ -138,12 +138,15 @@ fn concurrent_readers() {
         let sums = readers.map(|reader| reader.join().unwrap());
         assert!(sums.iter().all(|sum| *sum == sums[0]));
     });
-    assert_eq!(camera.draws(), 2);
+    assert_eq!(camera.render_count(), 2);
 }
 
 #[test]
 fn requirements() {
-    assert_eq!([cfg().requires(), on("tip").requires()], [Requires::VISIBLE, Requires::VISIBLE | Requires::POSES]);
+    assert_eq!(
+        [cfg().requires(), on("tip").requires()],
+        [StateFields::VISIBLE, StateFields::VISIBLE | StateFields::POSES]
+    );
     let bare = SceneState { body_poses: None, ..state(&[0]) };
     let mut free = cfg().build(&crate::SensorContext { bodies: Vec::new().into(), ..context(1) }).unwrap();
     free.reset(&[0], &bare).unwrap();
@@ -313,7 +316,7 @@ fn attached() {
     for (convention, name) in CONVENTIONS.into_iter().flat_map(|c| ["tip", "arm/tip"].map(|name| (c, name))) {
         // Looks along +x of the link.
         let rotation = CameraConvention::World.to_optical(&Pose::identity()).rotation;
-        let local = convention.of_optical(&Pose::from_parts([0.05, 0.02, 0.1].into(), rotation));
+        let local = convention.pose_from_optical(&Pose::from_parts([0.05, 0.02, 0.1].into(), rotation));
         let placement = Placement::Pose { pos: local.translation.into(), rotation: local.rotation };
         let extrinsics = Extrinsics { parent: Some(name.into()), placement, convention };
         let mut attached = built(&CameraCfg { extrinsics, ..cfg() }, &context);
@@ -340,7 +343,7 @@ fn world_pose_of_attached() {
     let there = look_at_pose([-1.2, 0.4, 0.9], [0.1, 0.0, 0.5], [0., 0., 1.]).unwrap();
     let close = |found: ndarray::ArrayView1<'_, f64>, row: [f64; 7]| (0..7).all(|k| (found[k] - row[k]).abs() < 1e-12);
     for convention in CONVENTIONS {
-        let row = to_row(&convention.of_optical(&there));
+        let row = to_row(&convention.pose_from_optical(&there));
         camera.set_world_poses(&Array2::from(vec![row]), None, convention).unwrap();
         let found = camera.pose_w(convention);
         assert!((0..2).all(|env| close(found.row(env), row)), "{found} is not {row:?}");
@@ -471,9 +474,9 @@ fn bad_configurations() {
     let some = |env_ids: &[usize]| CameraCfg { env_ids: Some(env_ids.to_vec()), ..cfg() };
     for (cfg, expected) in [
         (CameraCfg { channels: Channels::default(), ..cfg() }, CameraError::NoChannels.into()),
-        (CameraCfg { latency_steps: 1, ..flow.clone() }, CameraError::FlowOfThePast.into()),
-        (CameraCfg { history_length: 1, ..flow.clone() }, CameraError::FlowOfThePast.into()),
-        (CameraCfg { dropout: 0.1, ..flow }, CameraError::FlowOfThePast.into()),
+        (CameraCfg { latency_steps: 1, ..flow.clone() }, CameraError::FlowWithLatency.into()),
+        (CameraCfg { history_length: 1, ..flow.clone() }, CameraError::FlowWithLatency.into()),
+        (CameraCfg { dropout: 0.1, ..flow }, CameraError::FlowWithLatency.into()),
         (rays("panorama", vignetting), CameraError::NoAxis { what: "vignetting", lens: "panorama" }.into()),
         (rays("equidistant", holes), CameraError::PinholeOnly { what, lens: "equidistant" }.into()),
         (some(&[]), CameraError::NoEnvironments.into()),
@@ -508,7 +511,7 @@ fn bad_readings() {
     camera.reset(&[1], &state(&[0, 0])).unwrap();
     camera.depth().unwrap();
     assert_eq!(camera.color().unwrap_err().to_string(), "the camera does not measure color; it measures depth, mask");
-    assert_eq!(camera.draws(), 2, "nothing was drawn for the mistake");
+    assert_eq!(camera.render_count(), 2, "nothing was drawn for the mistake");
     assert!(matches!(camera.point_cloud(2, Default::default()), Err(SensorError::IndexOutOfRange { index: 2, .. })));
 }
 
@@ -542,7 +545,7 @@ fn bad_states() {
     bad.visible.as_mut().unwrap().instance_poses[(1, 1)] = PoseF32::from_translation([f32::NAN; 3]);
     camera.update(&bad).unwrap();
     for error in [camera.depth().unwrap_err(), camera.color().unwrap_err()] {
-        assert!(matches!(error, SensorError::Camera(CameraError::Draw { env: 1, .. })), "{error}");
+        assert!(matches!(error, SensorError::Camera(CameraError::Render { env: 1, .. })), "{error}");
     }
     let mut good = built(&cfg(), &context);
     for camera in [&mut camera, &mut good] {
@@ -582,7 +585,7 @@ fn bad_setters() {
     assert_eq!(kinds[5], SensorError::IndexOutOfRange { what: "environment", index: 3, count: 3 });
     assert_eq!(kinds[6], CameraError::DuplicateEnvironment { env: 0 }.into());
     assert_eq!(kinds[4].to_string(), "the camera does not see environment 1; it sees 2, 0");
-    assert_eq!((bits(&camera, 0..2), camera.draws()), (before, 2), "not even drawn again");
+    assert_eq!((bits(&camera, 0..2), camera.render_count()), (before, 2), "not even drawn again");
 
     let mut unborn = on("ball").build(&context).unwrap();
     assert_eq!(unborn.set_world_poses(&good, None, ROS), Err(CameraError::NothingCaptured { env: 0 }.into()));

@@ -7,7 +7,7 @@ use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_render::RenderError;
 use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Mask;
-use kinetoscope_render::{Aperture, Opened, RasterCfg, Renderer, Shutter};
+use kinetoscope_render::{Aperture, RasterCfg, Renderer, Shutter, ShutterOpenState};
 use kinetoscope_scene::PoseF32;
 use ndarray::Axis;
 
@@ -25,7 +25,7 @@ fn refusals() {
     for (aperture, shutter) in [(Some(good), Shutter::default()), (None, slow)] {
         for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
             let error = view_error(CameraCfg { renderer, aperture, shutter, ..cfg() });
-            assert!(matches!(error, RenderError::NeedsPaths { .. }), "{error}");
+            assert!(matches!(error, RenderError::NeedsPathTracing { .. }), "{error}");
         }
     }
     let of = |aperture| CameraCfg { renderer: PATHS, aperture: Some(aperture), ..cfg() };
@@ -53,7 +53,7 @@ fn refusals() {
     assert_eq!(error.unwrap_err(), CameraError::ShutterTooSlow { span: 4.5 * DT, period: 4.0 * DT }.into());
     let channels = Channels { flow: true, ..Channels::NONE };
     let error = CameraCfg { channels, shutter: slow, renderer: PATHS, ..cfg() }.build(&context(1));
-    assert_eq!(error.unwrap_err(), CameraError::FlowOfRows.into());
+    assert_eq!(error.unwrap_err(), CameraError::FlowWithShutterSpan.into());
 }
 
 const PERIOD: u64 = 5;
@@ -82,7 +82,8 @@ fn expected(camera: &Camera, env: usize, step: u64, opened: Option<u64>) -> Vec<
     let view = camera.view(env).unwrap();
     let opened = opened.map(|opened| (poses(opened), view.world_from_camera, (step - opened) as f64 * DT));
     let opened = opened.as_ref();
-    let opened = opened.map(|(poses, camera, before)| Opened { poses, world_from_camera: *camera, before: *before });
+    let opened =
+        opened.map(|(poses, camera, before)| ShutterOpenState { poses, world_from_camera: *camera, age: *before });
     let channels = Channels { mask: true, position: true, ..Channels::NONE };
     let by = (PATHS, rolling().shutter);
     let (scene, poses) = (context(1).scene.unwrap(), poses(step));

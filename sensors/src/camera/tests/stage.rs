@@ -4,7 +4,9 @@ use super::super::{Camera, CameraCfg, CameraConvention, Extrinsics, Placement};
 use crate::sensor::{SensorCfg, SensorContext};
 use kinetoscope_render::View;
 use kinetoscope_render::frame::{Channels, Frame};
-use kinetoscope_render::{Intrinsics, Opened, RasterCfg, Rasterizer, Renderer, Shot, Shutter, Take};
+use kinetoscope_render::{
+    FrameSample, ImageRenderer, Intrinsics, RasterCfg, RenderRequest, Renderer, Shutter, ShutterOpenState,
+};
 use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
@@ -135,12 +137,12 @@ pub(super) fn frame_of(
     (renderer, shutter): (Renderer, Shutter),
     channels: Channels,
     (scene, poses, view): (&RenderScene, &[PoseF32], &View),
-    opened: Option<Opened<'_>>,
+    opened: Option<ShutterOpenState<'_>>,
 ) -> Frame {
-    let mut rasterizer = Rasterizer::new(cfg);
+    let mut rasterizer = ImageRenderer::new(cfg);
     (rasterizer.renderer, rasterizer.shutter) = (renderer, shutter);
     let mut frame = Frame::new(view.width, view.height, channels);
-    let shot = Shot { scene, poses, view, lights: None, lens: None, before: None };
-    rasterizer.render_take(&shot, &Take { noise: 0, opened }, &mut frame.as_mut()).unwrap();
+    let shot = RenderRequest { scene, poses, view, lights: None, lens: None, previous: None };
+    rasterizer.render_sample(&shot, &FrameSample { noise: 0, shutter_open: opened }, &mut frame.as_mut()).unwrap();
     frame
 }

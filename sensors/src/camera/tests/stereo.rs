@@ -29,12 +29,12 @@ const BASELINE: f64 = 0.2;
 const SHIFTED: Intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
 
 /// A stereo camera of two small cameras, 20 cm apart.
-fn pair() -> StereoCameraCfg {
+fn stereo_cfg() -> StereoCameraCfg {
     StereoCameraCfg { camera: cfg(), left_to_right_pos: [BASELINE, 0.0, 0.0], ..StereoCameraCfg::default() }
 }
 
 fn pair_of(camera: CameraCfg) -> StereoCameraCfg {
-    StereoCameraCfg { camera, ..pair() }
+    StereoCameraCfg { camera, ..stereo_cfg() }
 }
 
 fn of(cfg: &StereoCameraCfg, context: &SensorContext) -> StereoCamera {
@@ -56,7 +56,7 @@ fn apart(a: &Pose, b: &Pose) -> [f64; 2] {
 
 /// Asserts the poses of the two cameras in an environment.
 #[track_caller]
-fn assert_eyes(stereo: &StereoCamera, env: usize, expected: [Pose; 2]) {
+fn assert_camera_poses(stereo: &StereoCamera, env: usize, expected: [Pose; 2]) {
     for (eye, expected) in [stereo.left(), stereo.right()].into_iter().zip(expected) {
         let [moved, turned] = apart(&pose_of(eye, env), &expected);
         assert!(moved < 1e-12 && turned < 1e-7, "{moved} {turned}");
@@ -75,10 +75,10 @@ fn single_cameras() {
     {
         let intrinsics_right = Some(right_lens);
         let (left_to_right_pos, left_to_right_rot) = ([0.2, 0.03, -0.04], turned);
-        let cfg = StereoCameraCfg { intrinsics_right, left_to_right_pos, left_to_right_rot, origin, ..pair() };
+        let cfg = StereoCameraCfg { intrinsics_right, left_to_right_pos, left_to_right_rot, origin, ..stereo_cfg() };
         let mut stereo = of(&cfg, &context);
         stereo.update(&state(&[3, 4])).unwrap();
-        assert_eyes(&stereo, 1, [left, left * offset]);
+        assert_camera_poses(&stereo, 1, [left, left * offset]);
         let origins = stereo.pose_w(CameraConvention::Ros);
         let [moved, turned] = apart(&from_row(&std::array::from_fn(|k| origins[(1, k)])), &there);
         assert!(moved < 1e-12 && turned < 1e-7, "{moved} {turned}");
@@ -215,9 +215,9 @@ fn disparity_formula() {
 #[test]
 fn lazy_disparity() {
     let mut stereo = of(&pair_of(CameraCfg { update_period: 0.02, ..cfg() }), &context(2));
-    assert_eq!(stereo.left().draws() + stereo.right().draws(), 0, "nothing is drawn before it is read");
+    assert_eq!(stereo.left().render_count() + stereo.right().render_count(), 0, "nothing is drawn before it is read");
     let address = stereo.disparity().unwrap().as_ptr();
-    assert_eq!((stereo.left().draws(), stereo.right().draws()), (2, 0), "disparity is of the left eye");
+    assert_eq!((stereo.left().render_count(), stereo.right().render_count()), (2, 0), "disparity is of the left eye");
     let before = stereo.disparity().unwrap().to_owned();
     let mut due = Vec::new();
     for step in 1..=4 {
@@ -225,10 +225,10 @@ fn lazy_disparity() {
         stereo.update(&state(&[step; 2])).unwrap();
         assert!(step == 4 || stereo.disparity().unwrap() == before, "not due yet");
     }
-    assert_eq!((due, stereo.left().draws()), (vec![4, 3, 2, 1], 2));
+    assert_eq!((due, stereo.left().render_count()), (vec![4, 3, 2, 1], 2));
     assert_ne!(stereo.disparity().unwrap(), before);
     assert_eq!(stereo.disparity().unwrap().as_ptr(), address, "memory stays where it is");
-    assert_eq!((stereo.left().draws(), stereo.left().frame_counts()), (4, array![1, 1].view()));
+    assert_eq!((stereo.left().render_count(), stereo.left().frame_counts()), (4, array![1, 1].view()));
     // Other intrinsics change the disparity at the same instant.
     let other = [Intrinsics::Pixels { fx: 20.0, fy: 26.0, cx: 22.25, cy: 17.5 }];
     let before = stereo.disparity().unwrap().to_owned();
@@ -260,7 +260,7 @@ fn independent_noise() {
 /// Root cause: the right camera copied the noise and imperfections of the left one for all channels. No stereo camera
 /// could be built whose right camera measures fewer channels.
 #[test]
-fn own_imperfections() {
+fn separate_imperfections() {
     let context = context(1);
     let [colors, both] = [false, true].map(|depth| Channels { color: true, depth, ..Channels::default() });
     let of_light = Imperfections { read_noise: Some(ReadNoise { std: 0.05 }), ..Imperfections::default() };
@@ -271,7 +271,7 @@ fn own_imperfections() {
     let cfg = StereoCameraCfg { channels_right: Some(colors), ..pair_of(camera.clone()) };
     let stereo = of(&cfg, &context);
     // Reference: a single camera at the pose of the right camera, with its name and all imperfections of color.
-    let extrinsics = cfg.eyes().unwrap()[1].extrinsics.clone();
+    let extrinsics = cfg.camera_cfgs().unwrap()[1].extrinsics.clone();
     let alone = CameraCfg { channels: colors, imperfections: of_light, noise: noise(&["color"]), extrinsics, ..camera };
     let named = SensorContext { name: "/right".into(), ..context.clone() };
     let color = |cfg: &CameraCfg| built(cfg, &named).color().unwrap().to_owned();
@@ -289,7 +289,7 @@ fn own_imperfections() {
 
 /// Root cause: errors of a stereo camera did not state which of the two cameras they belong to.
 #[test]
-fn errors_of_eyes() {
+fn errors_name_the_camera() {
     let context = context(1);
     let [colors, depths] = [true, false].map(|color| Channels { color, depth: !color, ..Channels::default() });
     let of_depth = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), ..Imperfections::default() };
@@ -337,45 +337,50 @@ fn placement() {
     attached.refresh(&[0, 1], &state(&[3, 2])).unwrap();
     let half = Pose::translation(-0.5 * BASELINE, 0.0, 0.0);
     let eyes = |middle: Pose| [middle * half, middle * half.inverse()];
-    assert_eyes(&attached, 1, eyes(from_row(&to_row(&tip(1, 2)))));
+    assert_camera_poses(&attached, 1, eyes(from_row(&to_row(&tip(1, 2)))));
     let there = look_at_pose([-1.2, 0.4, 0.9], [0.1, 0.0, 0.5], [0.0, 0.0, 1.0]).unwrap();
     for convention in [CameraConvention::Ros, CameraConvention::OpenGl, CameraConvention::World] {
-        attached.set_world_poses(&convention.of_optical(&there), Some(&[1]), convention).unwrap();
-        assert_eyes(&attached, 1, eyes(there));
-        let (now, expected) = (attached.pose_w(convention), to_row(&convention.of_optical(&there)));
+        attached.set_world_poses(&convention.pose_from_optical(&there), Some(&[1]), convention).unwrap();
+        assert_camera_poses(&attached, 1, eyes(there));
+        let (now, expected) = (attached.pose_w(convention), to_row(&convention.pose_from_optical(&there)));
         assert!(now.row(1).iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{now}");
     }
     // The cameras move with the link.
     attached.refresh(&[1], &state(&[3, 9])).unwrap();
-    assert_eyes(&attached, 1, eyes(tip(1, 9) * tip(1, 2).inverse() * there));
+    assert_camera_poses(&attached, 1, eyes(tip(1, 9) * tip(1, 2).inverse() * there));
 
-    let mut free = of(&pair(), &context);
+    let mut free = of(&stereo_cfg(), &context);
     free.look_at(&[[-1.2, 0.4, 0.9]], &[[0.1, 0.0, 0.5]], &[[0.0, 0.0, 1.0]], Some(&[0])).unwrap();
-    assert_eyes(&free, 0, eyes(there));
+    assert_camera_poses(&free, 0, eyes(there));
     let untouched = free.left().local_pose(CameraConvention::Ros);
     let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
-    assert!(free.set_eye_intrinsics(&[lens(44.0)], &[lens(-1.0)], None).is_err());
-    assert!(free.set_eye_intrinsics(&[lens(44.0)], &[lens(44.0); 3], None).is_err());
+    assert!(free.set_left_right_intrinsics(&[lens(44.0)], &[lens(-1.0)], None).is_err());
+    assert!(free.set_left_right_intrinsics(&[lens(44.0)], &[lens(44.0); 3], None).is_err());
     assert_eq!(free.left().intrinsic_matrices()[(0, 0, 0)], 40.0, "the left eye was not changed either");
     assert!(free.set_local_pose(&there, Some(&[2]), CameraConvention::Ros).is_err());
     assert!(free.look_at(&[[0.0; 3]], &[[0.0; 3]], &[[0.0; 3]], None).is_err());
     assert_eq!(free.left().local_pose(CameraConvention::Ros), untouched);
     free.restore(None).unwrap();
-    assert!(both_bits(&free, 2) == both_bits(&of(&pair(), &context), 2));
+    assert!(both_bits(&free, 2) == both_bits(&of(&stereo_cfg(), &context), 2));
 }
 
 #[test]
 fn without_disparity() {
     let context = context(1);
-    let lens =
-        |fx, fy, cy| StereoCameraCfg { intrinsics_right: Some(Intrinsics::Pixels { fx, fy, cx: 22.25, cy }), ..pair() };
-    let moved = |left_to_right_pos| StereoCameraCfg { left_to_right_pos, ..pair() };
+    let lens = |fx, fy, cy| StereoCameraCfg {
+        intrinsics_right: Some(Intrinsics::Pixels { fx, fy, cx: 22.25, cy }),
+        ..stereo_cfg()
+    };
+    let moved = |left_to_right_pos| StereoCameraCfg { left_to_right_pos, ..stereo_cfg() };
     let left_to_right_rot = UnitQuaternion::from_euler_angles(0.0, 0.25, 0.0);
     for (cfg, expected) in [
         (lens(41.0, 52.0, 17.5), "fx of the right eye is 41, it must be the left eye's, 40"),
         (lens(40.0, 51.0, 17.5), "fy of the right eye is 51"),
         (lens(40.0, 52.0, 17.0), "cy of the right eye is 17"),
-        (StereoCameraCfg { left_to_right_rot, ..pair() }, "the angle between the eyes [rad] is 0.25, it must be 0"),
+        (
+            StereoCameraCfg { left_to_right_rot, ..stereo_cfg() },
+            "the angle between the eyes [rad] is 0.25, it must be 0",
+        ),
         (moved([0.1, 0.01, 0.0]), "left_to_right_pos.y [m] is 0.01"),
         (moved([0.1, 0.0, -0.01]), "left_to_right_pos.z [m] is -0.01"),
         (moved([-0.1, 0.0, 0.0]), "left_to_right_pos.x [m] is -0.1"),
@@ -396,7 +401,7 @@ fn without_disparity() {
     assert!(matches!(nowhere, Err(SensorError::Camera(CameraError::Pose { .. }))));
     let error = lens(0.0, 1.0, 1.0).build(&context).unwrap_err();
     assert_eq!(error.to_string(), "the right eye: fx of the lens is 0; it must be positive and finite");
-    let SensorError::Eye { eye: "right", error } = error else { panic!("{error}") };
+    let SensorError::StereoCamera { side: "right", error } = error else { panic!("{error}") };
     assert!(matches!(*error, SensorError::Camera(CameraError::Optics(OpticsError::Lens { .. }))), "{error}");
 }
 
@@ -413,7 +418,7 @@ fn own_lenses() {
     let cfg = StereoCameraCfg { lens_right: Some(fisheye()), ..plain.clone() };
     let (stereo, without) = (of(&cfg, &context), of(&plain, &context));
     assert_eq!((stereo.left().lens(), stereo.right().lens()), (Lens::default(), fisheye()));
-    let alone = built(&CameraCfg { lens: fisheye(), ..cfg.eyes().unwrap()[1].clone() }, &context);
+    let alone = built(&CameraCfg { lens: fisheye(), ..cfg.camera_cfgs().unwrap()[1].clone() }, &context);
     assert!(both_bits(&stereo, 1) == [bits(without.left(), 0..1), bits(&alone, 0..1)]);
     // Control: the image differs from that without the lens.
     assert!(bits(stereo.right(), 0..1) != bits(without.right(), 0..1));
@@ -436,7 +441,7 @@ fn failed_changes() {
     // Intrinsics set before are kept, not replaced by the configured ones.
     stereo.set_intrinsics(&[lens(44.0)], Some(&[1])).unwrap();
     let (before, bytes) = (both_bits(&stereo, 2), stereo.left().lens_bytes());
-    assert!(stereo.set_eye_intrinsics(&[lens(30.0)], &[lens(-1.0)], None).is_err());
+    assert!(stereo.set_left_right_intrinsics(&[lens(30.0)], &[lens(-1.0)], None).is_err());
     stereo.set_local_pose(&stereo.local_pose(CameraConvention::Ros), None, CameraConvention::Ros).unwrap();
     assert!(both_bits(&stereo, 2) == before && stereo.left().lens_bytes() == bytes);
     // Control: a successful change is visible, and unused tables are freed.
@@ -448,7 +453,7 @@ fn failed_changes() {
 /// the projection by the right camera at its pose.
 #[test]
 fn projection_matrices() {
-    let stereo = of(&StereoCameraCfg { intrinsics_right: Some(SHIFTED), ..pair() }, &context(2));
+    let stereo = of(&StereoCameraCfg { intrinsics_right: Some(SHIFTED), ..stereo_cfg() }, &context(2));
     let [left, right] = stereo.camera_info("head", 1).unwrap();
     assert_eq!((left.name.as_str(), right.name.as_str()), ("head/left", "head/right"));
     assert_eq!(left.projection_matrix.column(3).amax(), 0.0);
@@ -471,7 +476,7 @@ fn projection_matrices() {
 
 /// A stereo camera of OpenCV: rotation and translation that map points from the left to the right frame, and the
 /// results of `stereoRectify`.
-struct Known {
+struct OpenCvStereo {
     r: [f64; 9],
     t: [f64; 3],
     r1: [f64; 9],
@@ -486,7 +491,7 @@ const K: [[f64; 4]; 2] = [[610.2, 611.0, 324.1, 238.7], [598.4, 600.3, 317.6, 24
 const D: [[f64; 5]; 2] = [[-0.31, 0.11, 0.0004, -0.0002, 0.01], [-0.28, 0.09, -0.0003, 0.0005, -0.005]];
 const POINTS: [[f64; 3]; 3] = [[0.3, -0.2, 1.5], [-0.4, 0.25, 2.0], [0.1, 0.05, 0.8]];
 
-impl Known {
+impl OpenCvStereo {
     fn all() -> impl Iterator<Item = Self> {
         opencv::<46>("stereo_rectify").map(|n| {
             let nine = |from: usize| std::array::from_fn(|k| n[from + k]);
@@ -536,11 +541,11 @@ fn pixels(intrinsics: Intrinsics) -> PixelIntrinsics {
 
 /// From K, D, R and P to the cameras: poses equal the input of OpenCV, and points project to the pixels of OpenCV.
 #[test]
-fn opencv_pairs() {
-    assert_eq!(Known::all().count(), 2);
-    for known in Known::all() {
+fn opencv_stereo_cameras() {
+    assert_eq!(OpenCvStereo::all().count(), 2);
+    for known in OpenCvStereo::all() {
         let [left, right] = known.infos();
-        let cfg = StereoCameraCfg::of_infos(&left, &right).unwrap();
+        let cfg = StereoCameraCfg::from_camera_infos(&left, &right).unwrap();
         let expected = known.left_from_right();
         // Numbers of 16 digits, and the rounding of OpenCV: some ulps in products of R, and the baseline is the norm of
         // T.
@@ -555,7 +560,7 @@ fn opencv_pairs() {
             let beside = rig_of(&cfg).inverse() * Point3::from(point);
             for (optics, at, seen) in [(&left, point, known.seen[0]), (&right, beside.into(), known.seen[1])] {
                 let found = optics.project(at).unwrap();
-                let off = [0, 1].map(|axis| found[axis] - CameraInfo::FIRST_CENTRE - seen[2 * k + axis]);
+                let off = [0, 1].map(|axis| found[axis] - CameraInfo::FIRST_PIXEL_CENTER - seen[2 * k + axis]);
                 assert!(off.iter().all(|off| off.abs() < 1e-10), "{point:?}: {off:?} pixels");
             }
         }
@@ -565,7 +570,7 @@ fn opencv_pairs() {
         assert!(apart(&rig_of(&cfg), &moved).iter().all(|off| *off > 5e-4));
         // R and the baseline equal those of OpenCV; f and the principal points are chosen differently, as documented.
         let [left, right] = K.map(|[fx, fy, cx, cy]| PixelIntrinsics { fx, fy, cx, cy });
-        let found = Rectification::of(&known.left_from_right(), [left, right]).unwrap();
+        let found = Rectification::new(&known.left_from_right(), [left, right]).unwrap();
         for (rotation, expected) in found.rotations.iter().zip([&known.r1, &known.r2]) {
             let off = (rotation - Matrix3::from_row_slice(expected)).amax();
             // OpenCV computes the last angle by an arc cosine, which has some ulps over that angle: 0.03 rad or more
@@ -590,7 +595,7 @@ fn of_two(cfg: &StereoCameraCfg) -> StereoCamera {
 }
 
 /// Stereo cameras that are not parallel, are rotated, or have other lenses.
-fn pairs() -> Vec<StereoCameraCfg> {
+fn stereo_cfgs() -> Vec<StereoCameraCfg> {
     let other = |fx, fy, cx, cy| Some(Intrinsics::Pixels { fx, fy, cx, cy });
     let turned = UnitQuaternion::from_euler_angles;
     let barrel = OpenCv { k1: -0.1, k2: 0.01, p1: 1e-3, p2: -2e-3, ..OpenCv::default() };
@@ -625,11 +630,11 @@ fn pairs() -> Vec<StereoCameraCfg> {
 /// farther left in the right one. Undistorting raw pixels gives the same result.
 #[test]
 fn rectified_rows() {
-    for cfg in pairs() {
+    for cfg in stereo_cfgs() {
         let stereo = of_two(&cfg);
         let eyes = [stereo.left(), stereo.right()];
         let infos = stereo.camera_info("head", 1).unwrap();
-        let ros = CameraInfo::FIRST_CENTRE;
+        let ros = CameraInfo::FIRST_PIXEL_CENTER;
         let f = infos[0].projection_matrix[(0, 0)];
         let baseline = Vector3::from(cfg.left_to_right_pos).norm();
         let (mut by_raw, mut skew, mut middle) = (0, 0.0f64, [0.0; 2]);
@@ -681,11 +686,11 @@ fn rectified_rows() {
 /// The calibrations of a stereo camera give the same stereo camera, through the text of files too.
 #[test]
 fn calibration_round_trip() {
-    for cfg in pairs() {
+    for cfg in stereo_cfgs() {
         let infos = of_two(&cfg).camera_info("head", 0).unwrap();
         let read = infos.each_ref().map(|info| CameraInfo::parse(&info.to_yaml(), &info.name).unwrap());
         assert_eq!(read, infos);
-        let again = StereoCameraCfg::of_infos(&read[0], &read[1]).unwrap();
+        let again = StereoCameraCfg::from_camera_infos(&read[0], &read[1]).unwrap();
         let [moved, turned] = apart(&rig_of(&again), &rig_of(&cfg));
         // Some ulps of numbers below 1.
         assert!(moved < 1e-14 && turned < 1e-14, "{moved} {turned}");
@@ -737,7 +742,7 @@ fn not_rectifiable() {
     }
     // Lenses without a ROS model are rejected as for a single camera, whatever the poses.
     let camera = CameraCfg { lens: Equisolid::default().into(), renderer: Renderer::FastRayTraced, ..cfg() };
-    let stereo = of_two(&StereoCameraCfg { camera, ..pairs()[2].clone() });
+    let stereo = of_two(&StereoCameraCfg { camera, ..stereo_cfgs()[2].clone() });
     let error = stereo.camera_info("head", 0).unwrap_err();
     assert!(matches!(error, SensorError::Calibration(CalibrationError::Lens { lens: "equisolid", .. })), "{error}");
     // Their rectification is still available.
@@ -764,10 +769,10 @@ fn refused_pairs() {
         (|l, _| l.rectification_matrix *= 1.1, "R of the left eye is no rotation: its determinant is 1.3310"),
     ];
     for (change, expected) in changes {
-        let [mut left, mut right] = Known::all().next().unwrap().infos();
+        let [mut left, mut right] = OpenCvStereo::all().next().unwrap().infos();
         change(&mut left, &mut right);
-        let error = StereoCameraCfg::of_infos(&left, &right).unwrap_err();
-        assert!(matches!(error, CameraError::NotAPair { .. }), "{error}");
+        let error = StereoCameraCfg::from_camera_infos(&left, &right).unwrap_err();
+        assert!(matches!(error, CameraError::NotAStereoPair { .. }), "{error}");
         let said = error.to_string();
         assert!(
             said.starts_with("these are no calibrations of a left and a right eye: ") && said.contains(expected),
@@ -775,9 +780,9 @@ fn refused_pairs() {
         );
     }
     // Files with few digits are accepted: R becomes the nearest rotation.
-    let [left, mut right] = Known::all().next().unwrap().infos();
+    let [left, mut right] = OpenCvStereo::all().next().unwrap().infos();
     right.rectification_matrix.iter_mut().for_each(|x| *x = (*x * 1e4).round() / 1e4);
-    let cfg = StereoCameraCfg::of_infos(&left, &right).unwrap();
-    let [moved, turned] = apart(&rig_of(&cfg), &Known::all().next().unwrap().left_from_right());
+    let cfg = StereoCameraCfg::from_camera_infos(&left, &right).unwrap();
+    let [moved, turned] = apart(&rig_of(&cfg), &OpenCvStereo::all().next().unwrap().left_from_right());
     assert!(moved < 1e-14 && turned > 1e-6 && turned < 1e-4, "{moved} {turned}");
 }

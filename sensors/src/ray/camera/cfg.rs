@@ -8,13 +8,13 @@ use crate::camera::{CameraError, DepthMiss, Extrinsics};
 use crate::error::SensorError;
 use crate::ray::sampler::{RaySampler, RaySamplerCfg, check_memory};
 use crate::ray::{HitTargets, RayError, RayPattern};
-use crate::sampling::{Channel, SamplingCfg};
+use crate::sampling::{SampleChannel, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
 use kinetoscope_render::Intrinsics;
 use kinetoscope_render::lens::Lens;
-use kinetoscope_render::lens::RaysOfRows;
-use kinetoscope_scene::Requires;
+use kinetoscope_render::lens::LensRayTables;
+use kinetoscope_scene::StateFields;
 use serde::{Deserialize, Serialize};
 
 /// Memory per ray \[bytes\]: a hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.
@@ -78,8 +78,12 @@ impl SensorCfg for RayCasterCameraCfg {
     type Sensor = RayCasterCamera;
 
     /// Poses of instances; body poses only if the camera is attached to a body.
-    fn requires(&self) -> Requires {
-        if self.extrinsics.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    fn requires(&self) -> StateFields {
+        if self.extrinsics.parent.is_some() {
+            StateFields::INSTANCES | StateFields::POSES
+        } else {
+            StateFields::INSTANCES
+        }
     }
 
     fn debug_vis(&self) -> bool {
@@ -98,9 +102,13 @@ impl SensorCfg for RayCasterCameraCfg {
         let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
         if !(self.max_distance > 0.0 && self.max_distance < f64::from(f32::MAX)) {
             let (what, of, value) = ("max_distance", "ray caster camera", self.max_distance);
-            return Err(
-                RayError::Number { what, of, value, allowed: "positive, and a number in single precision" }.into()
-            );
+            return Err(RayError::Number {
+                what,
+                owner: of,
+                value,
+                allowed: "positive, and a number in single precision",
+            }
+            .into());
         }
         let pixels = self.width.checked_mul(self.height).filter(|n| (1..=RayPattern::MAX_RAYS).contains(n));
         let Some(pixels) = pixels else {
@@ -121,12 +129,12 @@ impl SensorCfg for RayCasterCameraCfg {
             parent,
             rays: Pixels { width: self.width, height: self.height },
             max_distance: self.max_distance,
-            frame_channels: &[Channel::exact("poses", 7), Channel::exact("lenses", 4)],
+            frame_channels: &[SampleChannel::noiseless("poses", 7), SampleChannel::noiseless("lenses", 4)],
         };
         let rays = RaySampler::new(cfg, context)?;
-        let (size, envs) = ([self.width, self.height], EnvRows::all(context.num_envs));
+        let (size, envs) = ([self.width, self.height], EnvRows::for_all(context.num_envs));
         let lens =
-            RaysOfRows::new(Lens::default(), &viewpoint.pixels, size, 1, envs.len()).map_err(CameraError::from)?;
+            LensRayTables::new(Lens::default(), &viewpoint.pixels, size, 1, envs.len()).map_err(CameraError::from)?;
         Ok(RayCasterCamera::new(self, context, rays, Viewpoints::new(viewpoint, size, lens, envs, parent)))
     }
 }

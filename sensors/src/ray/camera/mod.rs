@@ -7,7 +7,7 @@ mod points;
 mod sensor;
 
 pub use cfg::RayCasterCameraCfg;
-pub use pictures::RayPictures;
+pub use pictures::RayImages;
 pub use sensor::RayCasterCamera;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Images of a ray-caster camera, computed from its hits.
 
 use super::pixels::Pixels;
-use super::sensor::Taken;
+use super::sensor::ImageViewpoint;
 use crate::camera::CameraConvention;
 use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_scene::pose::{from_row, to_row};
@@ -9,15 +9,15 @@ use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, ArrayView4};
 
 /// Images of one measurement in all environments.
 #[derive(Clone, Debug)]
-pub struct RayPictures {
-    pub(super) taken: Vec<Taken>,
+pub struct RayImages {
+    pub(super) viewpoints: Vec<ImageViewpoint>,
     pub(super) depth: Array3<f32>,
     pub(super) distance: Array3<f32>,
     pub(super) normal: Array4<f32>,
     pub(super) mask: Array3<i32>,
 }
 
-impl RayPictures {
+impl RayImages {
     /// Distance along the optical axis, shape (N, H, W) \[m\].
     pub fn depth(&self) -> ArrayView3<'_, f32> {
         self.depth.view()
@@ -40,17 +40,19 @@ impl RayPictures {
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        Array3::from_shape_fn((self.taken.len(), 3, 3), |(env, i, j)| self.taken[env].lens.matrix()[(i, j)])
+        Array3::from_shape_fn((self.viewpoints.len(), 3, 3), |(env, i, j)| {
+            self.viewpoints[env].intrinsics.matrix()[(i, j)]
+        })
     }
 
     /// Camera poses in the environment at the measurement, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        let row = |taken: &Taken| to_row(&convention.of_optical(&taken.world_from_camera));
-        Array2::from(self.taken.iter().map(row).collect::<Vec<[f64; 7]>>())
+        let row = |taken: &ImageViewpoint| to_row(&convention.pose_from_optical(&taken.world_from_camera));
+        Array2::from(self.viewpoints.iter().map(row).collect::<Vec<[f64; 7]>>())
     }
 
     /// Computes the images of an environment from sampled values; `miss` is the depth and distance of a miss.
-    pub(super) fn develop(
+    pub(super) fn compute(
         &mut self,
         env: usize,
         [distances, normals, ids, poses, lenses]: [ArrayView2<'_, f64>; 5],
@@ -60,7 +62,7 @@ impl RayPictures {
         let lens =
             PixelIntrinsics { fx: lenses[(env, 0)], fy: lenses[(env, 1)], cx: lenses[(env, 2)], cy: lenses[(env, 3)] };
         let world_from_camera = from_row(&std::array::from_fn(|k| poses[(env, k)]));
-        self.taken[env] = Taken { world_from_camera, lens };
+        self.viewpoints[env] = ImageViewpoint { world_from_camera, intrinsics: lens };
         for k in 0..pixels.width * pixels.height {
             let at = (env, k / pixels.width, k % pixels.width);
             let id = ids[(env, k)] as i32;

@@ -31,8 +31,13 @@ impl Rays for Pixels {
         self.width * self.height
     }
 
-    fn add(&self, (world_from_camera, lens): &Self::View, which: impl Iterator<Item = usize>, out: &mut Vec<Ray>) {
+    fn append_rays(
+        &self,
+        (world_from_camera, lens): &Self::View,
+        which: impl Iterator<Item = usize>,
+        out: &mut Vec<Ray>,
+    ) {
         let ray = |k| Ray { origin: [0.0; 3], direction: self.direction(lens, k) };
-        out.extend(which.map(|k| ray(k).mapped_by(world_from_camera)));
+        out.extend(which.map(|k| ray(k).transformed_by(world_from_camera)));
     }
 }

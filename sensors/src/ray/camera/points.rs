@@ -2,7 +2,7 @@
 
 use super::sensor::RayCasterCamera;
 use crate::camera::PointFrame;
-use crate::camera::point_cloud::{seen, unproject};
+use crate::camera::point_cloud::{hits_of, unproject};
 use crate::error::SensorError;
 use crate::sampling::Sampled;
 use kinetoscope_scene::Pose;
@@ -46,12 +46,12 @@ impl RayCasterCamera {
     ///
     /// Same as [`point_map`](Self::point_map).
     pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
-        Ok(seen(self.point_map(env, frame)?.view()))
+        Ok(hits_of(self.point_map(env, frame)?.view()))
     }
 
     fn unproject(&self, env: usize, frame: PointFrame, points: &mut [f32]) {
-        let taken = self.taken(env);
+        let taken = self.viewpoint(env);
         let pose = if frame == PointFrame::World { taken.world_from_camera } else { Pose::identity() };
-        unproject(&taken.lens, &pose, self.image_shape().1, self.depths(env), points);
+        unproject(&taken.intrinsics, &pose, self.image_shape().1, self.depths(env), points);
     }
 }

@@ -1,7 +1,7 @@
 //! Ray-caster camera sensor.
 
 use super::cfg::RayCasterCameraCfg;
-use super::pictures::RayPictures;
+use super::pictures::RayImages;
 use super::pixels::Pixels;
 use crate::camera::env_rows::EnvRows;
 use crate::camera::frustum::frustum;
@@ -36,31 +36,31 @@ use std::fmt;
 pub struct RayCasterCamera {
     path: String,
     rays: RaySampler<Pixels>,
-    images: Images,
+    model: ImageModel,
 }
 
 /// Viewpoints of the rays, and the current images.
 #[derive(Clone, Debug)]
-struct Images {
+struct ImageModel {
     viewpoints: Viewpoints,
     /// Poses of the parents at the last ray cast; `None` before.
     world_from_parent: Vec<Option<Pose>>,
     /// Depth and distance of a miss.
     miss: f32,
-    pictures: RayPictures,
+    images: RayImages,
 }
 
 /// Camera pose and intrinsics of an image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Taken {
+pub(super) struct ImageViewpoint {
     pub(super) world_from_camera: Pose,
-    pub(super) lens: PixelIntrinsics,
+    pub(super) intrinsics: PixelIntrinsics,
 }
 
 /// Sampler channels from which images are computed.
 const CHANNELS: [&str; 5] = ["distances", "normals", "ids", "poses", "lenses"];
 
-impl RayModel for Images {
+impl RayModel for ImageModel {
     type Rays = Pixels;
 
     fn frame(&mut self, env: usize, parent: Option<[f64; 7]>, values: &mut [f64]) -> (PoseF64, PixelIntrinsics) {
@@ -74,8 +74,8 @@ impl RayModel for Images {
         (PoseF64::from(&world_from_camera), pixels)
     }
 
-    fn show(&mut self, env: usize, sampler: &Sampler, rays: &Pixels) {
-        self.pictures.develop(env, CHANNELS.map(|channel| sampler.values(channel)), rays, self.miss);
+    fn update_outputs(&mut self, env: usize, sampler: &Sampler, rays: &Pixels) {
+        self.images.compute(env, CHANNELS.map(|channel| sampler.values(channel)), rays, self.miss);
     }
 }
 
@@ -115,42 +115,42 @@ impl RayCasterCamera {
         };
         let taken = |env| {
             let viewpoint = viewpoints.row(env);
-            Taken { world_from_camera: viewpoint.parent_from_camera, lens: viewpoint.pixels }
+            ImageViewpoint { world_from_camera: viewpoint.parent_from_camera, intrinsics: viewpoint.pixels }
         };
-        let pictures = RayPictures {
-            taken: (0..n).map(taken).collect(),
+        let pictures = RayImages {
+            viewpoints: (0..n).map(taken).collect(),
             depth: Array3::from_elem(shape, miss),
             distance: Array3::from_elem(shape, miss),
             normal: Array4::zeros((n, cfg.height, cfg.width, 3)),
             mask: Array3::zeros(shape),
         };
         let path = summary::path(context, viewpoints.parent);
-        Self { path, rays, images: Images { viewpoints, world_from_parent: vec![None; n], miss, pictures } }
+        Self { path, rays, model: ImageModel { viewpoints, world_from_parent: vec![None; n], miss, images: pictures } }
     }
 
     /// Images of the latest delivered measurement, in all environments. They equal the shown images, except with a
     /// latency after a write to the state: images in flight are then delivered but not shown. With a latency, they are
     /// computed at every call.
-    pub fn arrived(&self) -> Cow<'_, RayPictures> {
-        if !self.sampler().is_late() {
-            return Cow::Borrowed(&self.images.pictures);
+    pub fn latest_delivered(&self) -> Cow<'_, RayImages> {
+        if !self.sampler().has_latency() {
+            return Cow::Borrowed(&self.model.images);
         }
-        let mut pictures = self.images.pictures.clone();
-        for env in 0..pictures.taken.len() {
-            let values = CHANNELS.map(|channel| self.sampler().arrived(channel));
-            pictures.develop(env, values, self.rays.rays(), self.images.miss);
+        let mut pictures = self.model.images.clone();
+        for env in 0..pictures.viewpoints.len() {
+            let values = CHANNELS.map(|channel| self.sampler().latest_delivered(channel));
+            pictures.compute(env, values, self.rays.rays(), self.model.miss);
         }
         Cow::Owned(pictures)
     }
 
     /// Shown images.
-    pub fn pictures(&self) -> &RayPictures {
-        &self.images.pictures
+    pub fn images(&self) -> &RayImages {
+        &self.model.images
     }
 
     /// True if the camera is attached to a body.
     pub fn is_attached(&self) -> bool {
-        self.images.viewpoints.parent.is_some()
+        self.model.viewpoints.parent.is_some()
     }
 
     /// Image shape (height, width) \[pixels\].
@@ -160,12 +160,12 @@ impl RayCasterCamera {
 
     /// Distance along the optical axis, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn depth(&self) -> ArrayView3<'_, f32> {
-        self.images.pictures.depth.view()
+        self.model.images.depth.view()
     }
 
     /// Distance along the ray of the pixel, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn distance(&self) -> ArrayView3<'_, f32> {
-        self.images.pictures.distance.view()
+        self.model.images.distance.view()
     }
 
     /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where
@@ -176,12 +176,12 @@ impl RayCasterCamera {
 
     /// Unit normals of faces, turned to the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
     pub fn normal(&self) -> ArrayView4<'_, f32> {
-        self.images.pictures.normal.view()
+        self.model.images.normal.view()
     }
 
     /// Mask ids, shape (N, H, W); 0 for a miss.
     pub fn mask(&self) -> ArrayView3<'_, i32> {
-        self.images.pictures.mask.view()
+        self.model.images.mask.view()
     }
 
     /// Number of images delivered since the last reset, shape (N); the refresh of a reset does not count.
@@ -191,22 +191,22 @@ impl RayCasterCamera {
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the images \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        self.images.pictures.intrinsic_matrices()
+        self.model.images.intrinsic_matrices()
     }
 
     /// Poses in the environment at the instant of the images, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
-        self.images.pictures.pose_w(convention)
+        self.model.images.pose_w(convention)
     }
 
     /// Returns the camera pose and intrinsics of the image of an environment.
-    pub(super) fn taken(&self, env: usize) -> &Taken {
-        &self.images.pictures.taken[env]
+    pub(super) fn viewpoint(&self, env: usize) -> &ImageViewpoint {
+        &self.model.images.viewpoints[env]
     }
 
     /// Returns the depths of the pixels of an environment, row by row; `None` for a miss.
     pub(super) fn depths(&self, env: usize) -> impl Iterator<Item = Option<f32>> {
-        let RayPictures { depth, mask, .. } = &self.images.pictures;
+        let RayImages { depth, mask, .. } = &self.model.images;
         let (depth, mask) = (depth.index_axis(Axis(0), env), mask.index_axis(Axis(0), env));
         depth.into_iter().zip(mask).map(|(depth, id)| (*id != 0).then_some(*depth))
     }
@@ -215,41 +215,41 @@ impl RayCasterCamera {
 /// Changes take effect with the next image.
 impl PlaceRows for RayCasterCamera {
     fn env_rows(&self) -> &EnvRows {
-        &self.images.viewpoints.envs
+        &self.model.viewpoints.envs
     }
 
     fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError> {
-        let Images { viewpoints, world_from_parent: parents, .. } = &mut self.images;
+        let ImageModel { viewpoints, world_from_parent: parents, .. } = &mut self.model;
         Ok(viewpoints.place(rows, poses, frame, |row| parents[row])?)
     }
 
     fn restore_rows(&mut self, rows: &[usize]) {
-        self.images.viewpoints.restore(rows);
+        self.model.viewpoints.restore(rows);
     }
 }
 
 impl CameraPlacement for RayCasterCamera {
     fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.images.viewpoints.local_pose(convention)
+        self.model.viewpoints.local_pose(convention)
     }
 
     fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.images.viewpoints.envs.chosen(env_ids)?;
-        Ok(self.images.viewpoints.set_intrinsics(&rows, intrinsics, |_| Ok(()))?)
+        let rows = self.model.viewpoints.envs.selected_rows(env_ids)?;
+        Ok(self.model.viewpoints.set_intrinsics(&rows, intrinsics, |_| Ok(()))?)
     }
 }
 
 impl Sensor for RayCasterCamera {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        self.rays.update(state, &mut self.images)
+        self.rays.update(state, &mut self.model)
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.rays.reset(env_ids, state, &mut self.images)
+        self.rays.reset(env_ids, state, &mut self.model)
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.rays.refresh(env_ids, state, &mut self.images)
+        self.rays.refresh(env_ids, state, &mut self.model)
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
@@ -262,8 +262,8 @@ impl Sensor for RayCasterCamera {
 
     /// Axes of the optical frame and an arrow along each edge of the view frustum, at the instant of the image.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
-        let taken = self.images.pictures.taken.get(env);
-        let placed = taken.and_then(|taken| Some((taken, Optics::new(Lens::default(), taken.lens).ok()?)));
+        let taken = self.model.images.viewpoints.get(env);
+        let placed = taken.and_then(|taken| Some((taken, Optics::new(Lens::default(), taken.intrinsics).ok()?)));
         let (height, width) = self.image_shape();
         placed.map_or_else(Vec::new, |(taken, optics)| frustum(&taken.world_from_camera, &optics, height, width))
     }

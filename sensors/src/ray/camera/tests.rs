@@ -21,8 +21,8 @@ const BALL: i32 = 9;
 
 fn context(num_envs: usize) -> SensorContext {
     let instances = vec![
-        Instance::new(Plane { half: [3.0, 3.0] }, Material::default(), FLOOR).named("floor").fixed(),
-        Instance::new(Sphere { radius: 0.5 }, Material::default(), BALL).named("ball").of_body(0),
+        Instance::new(Plane { half: [3.0, 3.0] }, Material::default(), FLOOR).with_name("floor").into_fixed(),
+        Instance::new(Sphere { radius: 0.5 }, Material::default(), BALL).with_name("ball").with_body(0),
     ];
     let scene = Some(Arc::new(RenderScene::new(instances).unwrap()));
     let bodies = ["ball".to_string()].into();

@@ -6,11 +6,11 @@ use crate::error::SensorError;
 use crate::ray::pattern::Grid;
 use crate::ray::sampler::{RaySampler, RaySamplerCfg, check_memory};
 use crate::ray::{HitTargets, RayError, RayPattern};
-use crate::sampling::{Channel, SamplingCfg};
+use crate::sampling::{SampleChannel, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::Requires;
+use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 
@@ -95,8 +95,8 @@ impl SensorCfg for RayCasterCfg {
     type Sensor = RayCaster;
 
     /// Poses of instances; body poses only if the sensor is attached to a body.
-    fn requires(&self) -> Requires {
-        if self.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
+    fn requires(&self) -> StateFields {
+        if self.parent.is_some() { StateFields::INSTANCES | StateFields::POSES } else { StateFields::INSTANCES }
     }
 
     fn debug_vis(&self) -> bool {
@@ -113,7 +113,7 @@ impl SensorCfg for RayCasterCfg {
     /// of steps; rays that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCaster, SensorError> {
         let parent = self.parent.as_deref().map(|name| context.body(name)).transpose()?;
-        let number = |what, value, allowed| RayError::Number { what, of: "ray caster", value, allowed };
+        let number = |what, value, allowed| RayError::Number { what, owner: "ray caster", value, allowed };
         if self.max_distance.is_nan() || self.max_distance <= 0.0 {
             return Err(number("max_distance", self.max_distance, "positive").into());
         }
@@ -132,7 +132,7 @@ impl SensorCfg for RayCasterCfg {
         if self.pattern.count() <= RayPattern::MAX_RAYS {
             check_memory(context.num_envs, self.pattern.count(), BYTES_PER_RAY)?;
         }
-        let rays: Vec<Ray> = self.pattern.rays()?.into_iter().map(|ray| ray.mapped_by(&offset)).collect();
+        let rays: Vec<Ray> = self.pattern.rays()?.into_iter().map(|ray| ray.transformed_by(&offset)).collect();
         let cfg = RaySamplerCfg {
             kind: "ray caster",
             requires: self.requires(),
@@ -142,7 +142,10 @@ impl SensorCfg for RayCasterCfg {
             parent,
             rays,
             max_distance: self.max_distance,
-            frame_channels: &[Channel::exact("pos_w", 3).in_unit("m"), Channel::exact("quat_w", 4)],
+            frame_channels: &[
+                SampleChannel::noiseless("pos_w", 3).with_unit("m"),
+                SampleChannel::noiseless("quat_w", 4),
+            ],
         };
         Ok(RayCaster::new(self, context, RaySampler::new(cfg, context)?, parent))
     }

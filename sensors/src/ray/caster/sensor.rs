@@ -9,7 +9,7 @@ use crate::sensor::{Sensor, SensorContext};
 use crate::summary;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::pose::{from_row, to_row};
-use kinetoscope_scene::{Marker, Pose, PoseF64, Random, SceneState};
+use kinetoscope_scene::{KeyedRng, Marker, Pose, PoseF64, SceneState};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 use std::fmt;
 
@@ -24,12 +24,12 @@ pub struct RayCaster {
     pattern: &'static str,
     /// Rays of the pattern with its offset, in the frame of [`RayAlignment::align`].
     rays: RaySampler<Vec<Ray>>,
-    hits: Hits,
+    hits: HitModel,
 }
 
 /// Frames of the rays, and the current hits.
 #[derive(Clone, Debug)]
-struct Hits {
+struct HitModel {
     alignment: RayAlignment,
     drift: Drift,
     points: Array3<f64>,
@@ -41,46 +41,46 @@ struct Hits {
 #[derive(Clone, Debug)]
 struct Drift {
     range: [f64; 2],
-    randoms: Vec<Random>,
-    now: Vec<[f64; 3]>,
+    rngs: Vec<KeyedRng>,
+    offsets: Vec<[f64; 3]>,
 }
 
-impl RayModel for Hits {
+impl RayModel for HitModel {
     type Rays = Vec<Ray>;
 
     fn frame(&mut self, env: usize, parent: Option<[f64; 7]>, values: &mut [f64]) -> PoseF64 {
         let mut row = parent.unwrap_or_else(|| to_row(&Pose::identity()));
-        row.iter_mut().zip(self.drift.now[env]).for_each(|(x, drift)| *x += drift);
+        row.iter_mut().zip(self.drift.offsets[env]).for_each(|(x, drift)| *x += drift);
         values.copy_from_slice(&row);
         self.alignment.align(&from_row(&row))
     }
 
-    fn show(&mut self, env: usize, sampler: &Sampler, rays: &Vec<Ray>) {
+    fn update_outputs(&mut self, env: usize, sampler: &Sampler, rays: &Vec<Ray>) {
         let frame = frame(self.alignment, env, &sampler.values("pos_w"), &sampler.values("quat_w"));
         let (distances, ids) = (sampler.row("distances", env), sampler.row("ids", env));
-        let points = part_of(self.points.as_slice_mut(), env, 3 * rays.len());
+        let points = env_slice(self.points.as_slice_mut(), env, 3 * rays.len());
         for (((ray, &distance), &id), point) in rays.iter().zip(distances).zip(ids).zip(points.chunks_exact_mut(3)) {
             point.copy_from_slice(&hit(ray, &frame, distance, id));
         }
-        let shown_ids = part_of(self.ids.as_slice_mut(), env, rays.len());
-        let mask = part_of(self.mask.as_slice_mut(), env, rays.len());
+        let shown_ids = env_slice(self.ids.as_slice_mut(), env, rays.len());
+        let mask = env_slice(self.mask.as_slice_mut(), env, rays.len());
         for ((&id, shown_id), mask) in ids.iter().zip(shown_ids).zip(mask) {
             (*shown_id, *mask) = (id as i32, id != 0.0);
         }
     }
 
     fn reset(&mut self, env: usize) {
-        self.drift.draw(env);
+        self.drift.sample(env);
     }
 }
 
 impl Drift {
-    fn draw(&mut self, env: usize) {
+    fn sample(&mut self, env: usize) {
         let [low, high] = self.range;
         if low < high {
-            self.now[env] = [0; 3].map(|_| low + (high - low) * self.randoms[env].uniform());
+            self.offsets[env] = [0; 3].map(|_| low + (high - low) * self.rngs[env].uniform());
         } else {
-            self.now[env] = [low; 3];
+            self.offsets[env] = [low; 3];
         }
     }
 }
@@ -93,11 +93,11 @@ fn frame(alignment: RayAlignment, env: usize, pos: &ArrayView2<'_, f64>, quat: &
 
 /// Returns the end of a ray in the frame that `frame` maps to; infinite for a miss.
 fn hit(ray: &Ray, frame: &PoseF64, distance: f64, id: f64) -> [f64; 3] {
-    if id != 0.0 { ray.mapped_by(frame).at(distance) } else { [f64::INFINITY; 3] }
+    if id != 0.0 { ray.transformed_by(frame).at(distance) } else { [f64::INFINITY; 3] }
 }
 
 /// Returns the values of an environment in an array in C order.
-fn part_of<T>(all: Option<&mut [T]>, env: usize, width: usize) -> &mut [T] {
+fn env_slice<T>(all: Option<&mut [T]>, env: usize, width: usize) -> &mut [T] {
     all.map_or(&mut [], |all| &mut all[env * width..(env + 1) * width])
 }
 
@@ -146,14 +146,14 @@ impl RayCaster {
     ) -> Self {
         let (n, b) = (context.num_envs, rays.rays().len());
         let random =
-            |env| Random::keyed(context.seed, (context.first_env + env) as u64, &format!("{}/drift", context.name));
+            |env| KeyedRng::keyed(context.seed, (context.first_env + env) as u64, &format!("{}/drift", context.name));
         Self {
             path: summary::path(context, parent),
             pattern: cfg.pattern.name(),
             rays,
-            hits: Hits {
+            hits: HitModel {
                 alignment: cfg.alignment,
-                drift: Drift { range: cfg.drift, randoms: (0..n).map(random).collect(), now: vec![[0.0; 3]; n] },
+                drift: Drift { range: cfg.drift, rngs: (0..n).map(random).collect(), offsets: vec![[0.0; 3]; n] },
                 points: Array3::from_elem((n, b, 3), f64::INFINITY),
                 ids: Array2::zeros((n, b)),
                 mask: Array2::from_elem((n, b), false),
@@ -171,11 +171,11 @@ impl RayCaster {
         self.hits.points.view()
     }
 
-    /// [`hits`](Self::hits) of the latest delivered measurement, from the distances of [`Sampler::arrived`]; computed
+    /// [`hits`](Self::hits) of the latest delivered measurement, from the distances of [`Sampler::latest_delivered`]; computed
     /// at every call.
-    pub fn arrived_hits(&self) -> Array3<f64> {
+    pub fn latest_delivered_hits(&self) -> Array3<f64> {
         let [distances, ids, pos, quat] =
-            ["distances", "ids", "pos_w", "quat_w"].map(|channel| self.sampler().arrived(channel));
+            ["distances", "ids", "pos_w", "quat_w"].map(|channel| self.sampler().latest_delivered(channel));
         let (n, b) = distances.dim();
         let mut points = Array3::zeros((n, b, 3));
         for env in 0..n {
@@ -210,21 +210,21 @@ impl RayCaster {
 
     /// Origins of the rays, shape (N, B, 3) \[m\]; computed at every call.
     pub fn ray_starts(&self) -> Array3<f64> {
-        self.of_rays(|ray| ray.origin)
+        self.map_rays(|ray| ray.origin)
     }
 
     /// Unit directions of the rays, shape (N, B, 3); computed at every call.
     pub fn ray_directions(&self) -> Array3<f64> {
-        self.of_rays(|ray| ray.direction)
+        self.map_rays(|ray| ray.direction)
     }
 
-    fn of_rays(&self, what: impl Fn(&Ray) -> [f64; 3]) -> Array3<f64> {
+    fn map_rays(&self, what: impl Fn(&Ray) -> [f64; 3]) -> Array3<f64> {
         let (n, b) = self.hits.ids.dim();
         let mut out = Array3::zeros((n, b, 3));
         for env in 0..n {
             let frame = frame(self.hits.alignment, env, &self.pos_w(), &self.quat_w());
             for (k, ray) in self.rays.rays().iter().enumerate() {
-                let values = what(&ray.mapped_by(&frame));
+                let values = what(&ray.transformed_by(&frame));
                 values.into_iter().enumerate().for_each(|(axis, x)| out[(env, k, axis)] = x);
             }
         }

@@ -8,7 +8,7 @@ use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::{NoiseCfg, SensorError};
 use kinetoscope_scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
-use kinetoscope_scene::{Instance, Material, OwnScene, Pose, PoseF64, RenderScene, SceneState};
+use kinetoscope_scene::{EnvScene, Instance, Material, Pose, PoseF64, RenderScene, SceneState};
 use ndarray::{Array2, Array3, Axis};
 use std::sync::Arc;
 
@@ -22,21 +22,21 @@ const BALL: i32 = 5;
 /// Ground at z = 0, a block 0.25 m high for x > 1, a robot base (a box) with a foot fused to it, and a ball.
 fn context(num_envs: usize, threads: usize) -> SensorContext {
     let instance = |shape: kinetoscope_scene::shape::Shape, id, name: &str| {
-        Instance::new(shape, Material::default(), id).named(name)
+        Instance::new(shape, Material::default(), id).with_name(name)
     };
     let instances = vec![
-        instance(Plane::INFINITE.into(), GROUND, "ground").fixed(),
-        instance(Box { half: [5.0, 5.0, 0.125] }.into(), STEP, "step").fixed(),
-        instance(Box { half: [0.3, 0.2, 0.1] }.into(), BASE, "dog/base").of_body(0),
-        instance(Sphere { radius: 0.125 }.into(), FOOT, "dog/foot").of_body(1),
-        instance(Sphere { radius: 0.25 }.into(), BALL, "ball").of_body(2),
+        instance(Plane::INFINITE.into(), GROUND, "ground").into_fixed(),
+        instance(Box { half: [5.0, 5.0, 0.125] }.into(), STEP, "step").into_fixed(),
+        instance(Box { half: [0.3, 0.2, 0.1] }.into(), BASE, "dog/base").with_body(0),
+        instance(Sphere { radius: 0.125 }.into(), FOOT, "dog/foot").with_body(1),
+        instance(Sphere { radius: 0.25 }.into(), BALL, "ball").with_body(2),
     ];
     SensorContext {
         num_envs,
         dt: DT,
         name: "scanner".into(),
         bodies: ["dog/base", "dog/foot", "ball"].map(String::from).into(),
-        carriers: [0, 0, 2].into(),
+        moving_bodies: [0, 0, 2].into(),
         scene: Some(Arc::new(RenderScene::new(instances).unwrap())),
         threads,
         ..SensorContext::default()
@@ -347,7 +347,7 @@ fn mistakes() {
     let text = named("ball").build(&hidden()).unwrap_err().to_string();
     assert!(text.contains("\"ball\"") && text.contains("step"), "{text}");
     assert!(named("ball|step").build(&hidden()).is_ok());
-    let own_scenes = vec![OwnScene(None), OwnScene(Some(look([true; 5])))];
+    let own_scenes = vec![EnvScene(None), EnvScene(Some(look([true; 5])))];
     assert!(named("ball").build(&SensorContext { own_scenes, ..hidden() }).is_ok());
     let many = Grid { resolution: 1e-3, size: [1.0, 1.0], ..Grid::default() };
     let error = RayCasterCfg { pattern: many.into(), ..scanner() }.build(&context(1_000_000, 1)).unwrap_err();

@@ -1,6 +1,6 @@
 //! The hemispherical lidar RS-Bpearl.
 
-use super::{Line, PatternImpl, finite, positive};
+use super::{UnnormalizedRay, PatternImpl, check_finite, check_positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
@@ -45,11 +45,11 @@ impl PatternImpl for Bpearl {
         if valid { self.azimuths() * self.vertical_deg.len() as f64 } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<Line>, RayError> {
-        positive("bpearl", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
-        positive("bpearl", "horizontal_fov_deg", self.horizontal_fov_deg)?;
+    fn rays(&self) -> Result<Vec<UnnormalizedRay>, RayError> {
+        check_positive("bpearl", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
+        check_positive("bpearl", "horizontal_fov_deg", self.horizontal_fov_deg)?;
         for &angle in &self.vertical_deg {
-            finite("bpearl", "vertical_deg", angle)?;
+            check_finite("bpearl", "vertical_deg", angle)?;
         }
         let ray = |azimuth: usize, vertical: f64| {
             let yaw = (-0.5 * self.horizontal_fov_deg + azimuth as f64 * self.horizontal_resolution_deg).to_radians();

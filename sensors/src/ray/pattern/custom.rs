@@ -1,6 +1,6 @@
 //! User-defined rays.
 
-use super::{Line, PatternImpl};
+use super::{UnnormalizedRay, PatternImpl};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ impl PatternImpl for Custom {
         if self.starts.len() == self.directions.len() { self.starts.len() as f64 } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<Line>, RayError> {
+    fn rays(&self) -> Result<Vec<UnnormalizedRay>, RayError> {
         let (starts, directions) = (self.starts.len(), self.directions.len());
         if starts != directions {
             return Err(RayError::Lengths { starts, directions });

@@ -1,6 +1,6 @@
 //! Parallel rays over a rectangle.
 
-use super::{Line, PatternImpl, finite, positive};
+use super::{UnnormalizedRay, PatternImpl, check_finite, check_positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
@@ -65,12 +65,12 @@ impl PatternImpl for Grid {
         if valid { self.counts()[0] * self.counts()[1] } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<Line>, RayError> {
-        positive("grid", "resolution", self.resolution)?;
+    fn rays(&self) -> Result<Vec<UnnormalizedRay>, RayError> {
+        check_positive("grid", "resolution", self.resolution)?;
         for (what, length) in ["size along x", "size along y"].into_iter().zip(self.size) {
-            finite("grid", what, length)?;
+            check_finite("grid", what, length)?;
             if length < 0.0 {
-                return Err(RayError::Number { what, of: "grid", value: length, allowed: "0 or positive" });
+                return Err(RayError::Number { what, owner: "grid", value: length, allowed: "0 or positive" });
             }
         }
         let counts = self.shape();

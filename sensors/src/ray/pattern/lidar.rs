@@ -1,6 +1,6 @@
 //! Spinning lidar.
 
-use super::{Line, PatternImpl, finite, positive};
+use super::{UnnormalizedRay, PatternImpl, check_finite, check_positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
@@ -55,20 +55,20 @@ impl PatternImpl for Lidar {
         if valid { self.channels as f64 * self.azimuths() } else { f64::NAN }
     }
 
-    fn rays(&self) -> Result<Vec<Line>, RayError> {
-        positive("lidar", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
+    fn rays(&self) -> Result<Vec<UnnormalizedRay>, RayError> {
+        check_positive("lidar", "horizontal_resolution_deg", self.horizontal_resolution_deg)?;
         let [first, last] = self.horizontal_fov_deg;
-        finite("lidar", "horizontal_fov_deg", first)?;
-        finite("lidar", "horizontal_fov_deg", last)?;
+        check_finite("lidar", "horizontal_fov_deg", first)?;
+        check_finite("lidar", "horizontal_fov_deg", last)?;
         if !(first <= last && last - first < 360.0 + 1e-6) {
             let (what, allowed) = ("the span of horizontal_fov_deg", "between 0 and 360 degrees");
-            return Err(RayError::Number { what, of: "lidar", value: last - first, allowed });
+            return Err(RayError::Number { what, owner: "lidar", value: last - first, allowed });
         }
         let [low, high] = self.vertical_fov_deg;
         for value in [low, high] {
             if !(-90.0..=90.0).contains(&value) {
                 let (what, allowed) = ("vertical_fov_deg", "between -90 and 90 degrees");
-                return Err(RayError::Number { what, of: "lidar", value, allowed });
+                return Err(RayError::Number { what, owner: "lidar", value, allowed });
             }
         }
         let azimuths = self.azimuths() as usize;

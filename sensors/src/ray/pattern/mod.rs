@@ -5,11 +5,11 @@
 mod pattern_impl;
 
 pub use grid::GridOrder;
-use pattern_impl::{Line, PatternImpl};
+use pattern_impl::{PatternImpl, UnnormalizedRay};
 
 use super::RayError;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::vector::unit;
+use kinetoscope_scene::vector::normalize;
 use serde::{Deserialize, Serialize};
 
 /// Declares the patterns: one module and one type each.
@@ -84,29 +84,28 @@ impl RayPattern {
         if !possible(rays.len() as f64) {
             return Err(RayError::Count { pattern, count: rays.len() as f64, limit: Self::MAX_RAYS });
         }
-        let ray =
-            |(index, (start, direction)): (usize, Line)| {
-                let finite = start.iter().chain(&direction).all(|x| x.is_finite());
-                unit(direction)
-                    .filter(|_| finite)
-                    .map(|direction| Ray { origin: start, direction })
-                    .ok_or(RayError::Ray { pattern, ray: index, start, direction })
-            };
+        let ray = |(index, (start, direction)): (usize, UnnormalizedRay)| {
+            let finite = start.iter().chain(&direction).all(|x| x.is_finite());
+            normalize(direction)
+                .filter(|_| finite)
+                .map(|direction| Ray { origin: start, direction })
+                .ok_or(RayError::Ray { pattern, ray: index, start, direction })
+        };
         rays.into_iter().enumerate().map(ray).collect()
     }
 }
 
 /// Checks that a number is positive and finite.
-fn positive(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
+fn check_positive(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
     }
-    Err(RayError::Number { what, of, value, allowed: "positive and finite" })
+    Err(RayError::Number { what, owner: of, value, allowed: "positive and finite" })
 }
 
 /// Checks that a number is finite.
-fn finite(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
-    if value.is_finite() { Ok(value) } else { Err(RayError::Number { what, of, value, allowed: "finite" }) }
+fn check_finite(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
+    if value.is_finite() { Ok(value) } else { Err(RayError::Number { what, owner: of, value, allowed: "finite" }) }
 }
 
 #[cfg(test)]

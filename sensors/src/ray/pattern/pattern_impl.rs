@@ -3,7 +3,7 @@
 use crate::ray::RayError;
 
 /// Origin and direction of a ray; the direction has any length.
-pub(super) type Line = ([f64; 3], [f64; 3]);
+pub(super) type UnnormalizedRay = ([f64; 3], [f64; 3]);
 
 /// Operations of a ray pattern.
 pub(super) trait PatternImpl {
@@ -11,5 +11,5 @@ pub(super) trait PatternImpl {
     fn count(&self) -> f64;
 
     /// Generates the rays, or returns an error for invalid parameters.
-    fn rays(&self) -> Result<Vec<Line>, RayError>;
+    fn rays(&self) -> Result<Vec<UnnormalizedRay>, RayError>;
 }

@@ -1,6 +1,6 @@
 //! One ray through every pixel of a pinhole camera.
 
-use super::{Line, PatternImpl};
+use super::{UnnormalizedRay, PatternImpl};
 use kinetoscope_render::Intrinsics;
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ impl PatternImpl for Pinhole {
         self.width as f64 * self.height as f64
     }
 
-    fn rays(&self) -> Result<Vec<Line>, RayError> {
+    fn rays(&self) -> Result<Vec<UnnormalizedRay>, RayError> {
         let lens = self.intrinsics.to_pixels(self.width, self.height)?;
         let ray = |u: usize, v: usize| {
             // Offsets from the optical axis, to the right and down, at a depth of 1.

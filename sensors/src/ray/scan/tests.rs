@@ -6,11 +6,11 @@ use kinetoscope_scene::{Instance, Material, RenderScene};
 
 const ENVS: usize = 6;
 /// Not a whole number of jobs.
-const RAYS: usize = 3 * PART + 100;
+const RAYS: usize = 3 * RAYS_PER_JOB + 100;
 
 /// A plane and twenty balls.
 fn balls(radius: f32) -> RenderScene {
-    let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).fixed()];
+    let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).into_fixed()];
     instances.extend((0..20).map(|k| Instance::new(Sphere { radius }, Material::default(), 2 + k)));
     RenderScene::new(instances).expect("a good scene")
 }
@@ -62,7 +62,7 @@ fn threads() {
         let mut scan = scan(threads);
         [0, 1, 2].map(|step| {
             let poses = poses(step);
-            all.iter().for_each(|&env| scan.settle(env, &poses, &OwnScene::default()));
+            all.iter().for_each(|&env| scan.update_fixed(env, &poses, &EnvScene::default()));
             scan.cast(&all, &poses, view);
             bits(&scan)
         })
@@ -79,7 +79,7 @@ fn threads() {
 fn some_environments() {
     let mut scan = scan(2);
     let poses = poses(0);
-    (0..ENVS).for_each(|env| scan.settle(env, &poses, &OwnScene::default()));
+    (0..ENVS).for_each(|env| scan.update_fixed(env, &poses, &EnvScene::default()));
     scan.cast(&[4, 1, 4], &poses, view);
     let count = |scan: &Scan<Vec<Ray>>, env| {
         let mut count = 0;
@@ -97,16 +97,16 @@ fn some_environments() {
 fn own_scenes() {
     let all: Vec<usize> = (0..ENVS).collect();
     let poses = poses(0);
-    let cast = |scan: &mut Scan<Vec<Ray>>, own: &[OwnScene]| {
-        all.iter().for_each(|&env| scan.settle(env, &poses, &own[env]));
+    let cast = |scan: &mut Scan<Vec<Ray>>, own: &[EnvScene]| {
+        all.iter().for_each(|&env| scan.update_fixed(env, &poses, &own[env]));
         scan.cast(&all, &poses, view);
         bits(scan).chunks(6 * RAYS).map(<[u64]>::to_vec).collect::<Vec<_>>()
     };
-    let nothing = vec![OwnScene::default(); ENVS];
+    let nothing = vec![EnvScene::default(); ENVS];
     let (small, large) = (cast(&mut scan(2), &nothing), cast(&mut scan_of(&balls(0.45), 2), &nothing));
     let mut own = nothing.clone();
     for env in [0, 3] {
-        own[env] = OwnScene(Some(Arc::new(balls(0.45))));
+        own[env] = EnvScene(Some(Arc::new(balls(0.45))));
     }
     let mut scan = scan(2);
     let found = cast(&mut scan, &own);

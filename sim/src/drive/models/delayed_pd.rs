@@ -26,7 +26,7 @@ pub struct DelayedPd {
 }
 
 /// Largest supported delay \[steps\]: each step takes 24 bytes in each environment.
-const LONGEST: u32 = 10_000;
+const MAX_DELAY_STEPS: u32 = 10_000;
 
 /// Layout of the memory of a drive: its delay, the ring position of the next target, the ring buffer of targets.
 const DELAY: usize = 0;
@@ -35,7 +35,7 @@ const RING: usize = 2;
 
 impl DelayedPd {
     /// Capacity of the ring buffer: the largest delay \[steps\].
-    pub fn longest(&self) -> u32 {
+    pub fn delay_capacity(&self) -> u32 {
         self.delay.max(self.max_delay)
     }
 
@@ -56,19 +56,22 @@ impl ActuatorLaw for DelayedPd {
     }
 
     fn check(&self, _gains: &Gains) -> Result<(), String> {
-        if self.longest() > LONGEST {
-            return Err(format!("delay and max_delay are up to {} steps; {LONGEST} are the most", self.longest()));
+        if self.delay_capacity() > MAX_DELAY_STEPS {
+            return Err(format!(
+                "delay and max_delay are up to {} steps; {MAX_DELAY_STEPS} are the most",
+                self.delay_capacity()
+            ));
         }
         Ok(())
     }
 
-    fn memory(&self) -> Vec<f64> {
-        let mut memory = vec![0.0; RING + 3 * self.longest() as usize];
+    fn initial_memory(&self) -> Vec<f64> {
+        let mut memory = vec![0.0; RING + 3 * self.delay_capacity() as usize];
         memory[DELAY] = f64::from(self.delay);
         memory
     }
 
-    fn start(&self, target: &Target, memory: &mut [f64]) {
+    fn reset_memory(&self, target: &Target, memory: &mut [f64]) {
         for slot in memory[RING..].as_chunks_mut::<3>().0 {
             *slot = [target.position, target.velocity, target.feedforward];
         }
@@ -76,7 +79,7 @@ impl ActuatorLaw for DelayedPd {
 
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64 {
         let ring = memory[RING..].as_chunks::<3>().0;
-        let heard = match (memory[DELAY] as usize).min(ring.len()) {
+        let delayed = match (memory[DELAY] as usize).min(ring.len()) {
             0 => *target,
             delay => {
                 // A hand-made file may hold any number.
@@ -87,10 +90,10 @@ impl ActuatorLaw for DelayedPd {
                 Target { position: position.max(low).min(high), velocity, feedforward }
             }
         };
-        proportional_derivative(now, &heard, gains).clamp(-gains.max_effort, gains.max_effort)
+        proportional_derivative(now, &delayed, gains).clamp(-gains.max_effort, gains.max_effort)
     }
 
-    fn remember(&self, target: &Target, memory: &mut [f64]) {
+    fn update_memory(&self, target: &Target, memory: &mut [f64]) {
         let next = memory[NEXT] as usize;
         let ring = memory[RING..].as_chunks_mut::<3>().0;
         let slots = ring.len();

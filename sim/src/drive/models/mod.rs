@@ -43,12 +43,12 @@ pub trait ActuatorLaw: std::fmt::Debug {
     fn check(&self, gains: &Gains) -> Result<(), String>;
 
     /// Initial memory of the model, which it keeps from step to step in each environment.
-    fn memory(&self) -> Vec<f64> {
+    fn initial_memory(&self) -> Vec<f64> {
         Vec::new()
     }
 
     /// Resets the memory; `target` is the target of the drive at the start.
-    fn start(&self, _target: &Target, _memory: &mut [f64]) {}
+    fn reset_memory(&self, _target: &Target, _memory: &mut [f64]) {}
 
     /// Largest decrease of the effort per speed \[N m s/rad or N s/m\]: the damping that decides on stability.
     fn damping(&self, gains: &Gains) -> f64 {
@@ -59,7 +59,7 @@ pub trait ActuatorLaw: std::fmt::Debug {
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64;
 
     /// Updates the memory after a step with the target `target`.
-    fn remember(&self, _target: &Target, _memory: &mut [f64]) {}
+    fn update_memory(&self, _target: &Target, _memory: &mut [f64]) {}
 }
 
 /// List of actuator models: `Variant(configuration and law) = example`.

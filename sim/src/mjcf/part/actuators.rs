@@ -1,10 +1,10 @@
 //! Writer of the actuators of a part, all as `<general>`: MuJoCo's shortcuts only choose parameters of it.
 
 use super::super::write::{Element, number};
-use super::{PartError, Writing, row, row_of, some};
+use super::{PartError, PartWriter, mj_index, row, row_of};
 use kinetoscope_mujoco::words;
 
-impl Writing<'_> {
+impl PartWriter<'_> {
     /// Writes actuators without an activation state, and actuators with one. A robot has drives in their place.
     pub(super) fn actuators(&self) -> Result<[Vec<String>; 2], PartError> {
         let mut lists = [Vec::new(), Vec::new()];
@@ -21,31 +21,34 @@ impl Writing<'_> {
     fn actuator(&self, a: usize) -> Result<String, PartError> {
         let m = self.model;
         let count = m.nactuator();
-        let beyond = |what: &str| self.beyond("actuator", a, what);
+        let beyond = |what: &str| self.unsupported("actuator", a, what);
         let transmission = words::transmission(m.actuator_trntype()[a]).ok_or_else(|| beyond("a transmission"))?;
         let dynamics = words::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("a dyntype"))?;
         let gain = words::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
         let bias = words::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
         let dynamics = match dynamics {
             // The same filter, which MuJoCo 2.2.2 integrates with Euler's rule.
-            "filterexact" if !self.newer("actuator", a, "dyntype filterexact, for which filter stands") => "filter",
+            "filterexact" if !self.supports_v4("actuator", a, "dyntype filterexact, for which filter stands") => {
+                "filter"
+            }
             known => known,
         };
         let ids = row(m.actuator_trnid(), 2, a);
-        let site = |id: usize| self.full(&self.names.sites[id]);
+        let site = |id: usize| self.scoped_name(&self.names.sites[id]);
         let names = &self.names;
-        let first = some(ids[0]).map(|id| match transmission {
-            "joint" | "jointinparent" => self.full(&names.joints[id]),
-            "tendon" => self.full(&names.tendons[id]),
+        let first = mj_index(ids[0]).map(|id| match transmission {
+            "joint" | "jointinparent" => self.scoped_name(&names.joints[id]),
+            "tendon" => self.scoped_name(&names.tendons[id]),
             "body" => self.body(id),
             _ => site(id),
         });
-        let mut element = Element::new("general").attr("name", self.full(&names.actuators[a])).opt(transmission, first);
+        let mut element =
+            Element::new("general").attr("name", self.scoped_name(&names.actuators[a])).opt(transmission, first);
         element = match transmission {
             "cranksite" => element
-                .opt("slidersite", some(ids[1]).map(site))
+                .opt("slidersite", mj_index(ids[1]).map(site))
                 .attr("cranklength", number(m.actuator_cranklength()[a])),
-            "site" => element.opt("refsite", some(ids[1]).map(site)),
+            "site" => element.opt("refsite", mj_index(ids[1]).map(site)),
             _ => element,
         };
         let control = m.actuator_control(a);

@@ -1,15 +1,15 @@
 //! Writer of the meshes, height fields, textures and materials of a part.
 
 use super::super::write::Element;
-use super::{PartError, Writing, row, singles};
+use super::{PartError, PartWriter, format_f32s, row};
 use image::{ExtendedColorType, ImageEncoder};
-use kinetoscope_mujoco::{Asset, MeshArrays, Target, TextureType, words};
+use kinetoscope_mujoco::{Asset, MeshArrays, SupportedVersion, TextureType, words};
 use std::collections::HashMap;
 
 /// Order in which MuJoCo stacks the faces of a cube texture.
-const CUBE: &str = "RLUDFB";
+const CUBE_FACE_ORDER: &str = "RLUDFB";
 
-impl Writing<'_> {
+impl PartWriter<'_> {
     pub(super) fn assets(&self) -> Vec<String> {
         let m = self.model;
         let textures = (0..m.ntex()).filter_map(|t| self.texture(t));
@@ -17,7 +17,7 @@ impl Writing<'_> {
         let meshes = (0..m.nmesh()).map(|mesh| self.mesh(mesh));
         let fields = (0..m.nhfield()).map(|field| {
             Element::new("hfield")
-                .attr("name", self.full(&self.names.height_fields[field]))
+                .attr("name", self.scoped_name(&self.names.height_fields[field]))
                 .attr("file", self.height_field_file(field))
                 .numbers("size", row(m.hfield_size(), 4, field))
                 .leaf()
@@ -42,13 +42,13 @@ impl Writing<'_> {
     fn texture(&self, texture: usize) -> Option<String> {
         let arrays = self.model.texture(texture).filter(|_| self.is_written(texture))?;
         let mut element = Element::new("texture")
-            .attr("name", self.full(&self.names.textures[texture]))
+            .attr("name", self.scoped_name(&self.names.textures[texture]))
             .attr("type", if arrays.kind == TextureType::Cube { "cube" } else { "2d" })
             .attr("file", self.texture_file(texture));
         if arrays.kind == TextureType::Cube && arrays.height == 6 * arrays.width {
-            element = element.attr("gridsize", "6 1").attr("gridlayout", CUBE);
+            element = element.attr("gridsize", "6 1").attr("gridlayout", CUBE_FACE_ORDER);
         }
-        if arrays.channels == 4 && self.target == Target::V4 {
+        if arrays.channels == 4 && self.target == SupportedVersion::V4 {
             element = element.attr("nchannel", 4);
         }
         Some(element.leaf())
@@ -56,15 +56,15 @@ impl Writing<'_> {
 
     fn material(&self, material: usize) -> String {
         let values = self.model.material(material);
-        let texture = values.texture.filter(|t| self.is_written(*t)).map(|t| self.full(&self.names.textures[t]));
+        let texture = values.texture.filter(|t| self.is_written(*t)).map(|t| self.scoped_name(&self.names.textures[t]));
         let newer = |values: Option<f32>, what: &str| {
-            values.filter(|value| self.newer("material", material, &format!("{what} {value}")))
+            values.filter(|value| self.supports_v4("material", material, &format!("{what} {value}")))
         };
         let (metallic, roughness) = (newer(values.metallic, "metallic"), newer(values.roughness, "roughness"));
         Element::new("material")
-            .attr("name", self.full(&self.names.materials[material]))
+            .attr("name", self.scoped_name(&self.names.materials[material]))
             .opt("texture", texture)
-            .attr("texrepeat", singles(&values.tex_repeat))
+            .attr("texrepeat", format_f32s(&values.tex_repeat))
             .attr("texuniform", values.tex_uniform)
             .attr("emission", values.emission)
             .attr("specular", values.specular)
@@ -72,22 +72,22 @@ impl Writing<'_> {
             .attr("reflectance", values.reflectance)
             .opt("metallic", metallic)
             .opt("roughness", roughness)
-            .attr("rgba", singles(&values.rgba))
+            .attr("rgba", format_f32s(&values.rgba))
             .leaf()
     }
 
     fn mesh(&self, mesh: usize) -> String {
-        let Corners { positions, texcoords, triangles } = corners(&self.model.mesh(mesh));
-        let mut element = Element::new("mesh").attr("name", self.full(&self.names.meshes[mesh]));
-        if self.target == Target::V4 && !self.collides(mesh) {
+        let IndexedMesh { positions, texcoords, triangles } = single_index_mesh(&self.model.mesh(mesh));
+        let mut element = Element::new("mesh").attr("name", self.scoped_name(&self.names.meshes[mesh]));
+        if self.target == SupportedVersion::V4 && !self.collides(mesh) {
             // As for visuals of robots: a mesh without collisions may be flat or open.
             element = element.attr("inertia", "shell");
         }
         if let Some(texcoords) = texcoords {
-            element = element.attr("texcoord", singles(texcoords.as_flattened()));
+            element = element.attr("texcoord", format_f32s(texcoords.as_flattened()));
         }
         let triangles: Vec<String> = triangles.as_flattened().iter().map(ToString::to_string).collect();
-        element.attr("vertex", singles(positions.as_flattened())).attr("face", triangles.join(" ")).leaf()
+        element.attr("vertex", format_f32s(positions.as_flattened())).attr("face", triangles.join(" ")).leaf()
     }
 
     fn collides(&self, mesh: usize) -> bool {
@@ -112,7 +112,7 @@ impl Writing<'_> {
             let (width, height) = (arrays.width as u32, arrays.height as u32);
             image::codecs::png::PngEncoder::new(&mut bytes)
                 .write_image(arrays.pixels, width, height, color)
-                .map_err(|error| self.beyond("texture", texture, error.to_string()))?;
+                .map_err(|error| self.unsupported("texture", texture, error.to_string()))?;
             files.push(Asset { name: self.texture_file(texture), bytes });
         }
         for field in 0..m.nhfield() {
@@ -137,15 +137,15 @@ fn color(channels: usize) -> Option<ExtendedColorType> {
 }
 
 /// Triangles with one index for position and texture coordinate, as in MJCF.
-struct Corners {
+struct IndexedMesh {
     positions: Vec<[f32; 3]>,
     texcoords: Option<Vec<[f32; 2]>>,
     triangles: Vec<[i32; 3]>,
 }
 
-fn corners(mesh: &MeshArrays<'_>) -> Corners {
+fn single_index_mesh(mesh: &MeshArrays<'_>) -> IndexedMesh {
     let Some(texcoords) = mesh.texcoords else {
-        return Corners { positions: mesh.positions.to_vec(), texcoords: None, triangles: mesh.faces.to_vec() };
+        return IndexedMesh { positions: mesh.positions.to_vec(), texcoords: None, triangles: mesh.faces.to_vec() };
     };
     let mut known: HashMap<[i32; 2], i32> = HashMap::new();
     let (mut positions, mut coordinates) = (Vec::new(), Vec::new());
@@ -160,5 +160,5 @@ fn corners(mesh: &MeshArrays<'_>) -> Corners {
     let pairs = mesh.faces.iter().zip(mesh.face_texcoords);
     let corners: Vec<i32> =
         pairs.flat_map(|(face, texture)| (0..3).map(|k| [face[k], texture[k]])).map(corner).collect();
-    Corners { positions, texcoords: Some(coordinates), triangles: corners.as_chunks::<3>().0.to_vec() }
+    IndexedMesh { positions, texcoords: Some(coordinates), triangles: corners.as_chunks::<3>().0.to_vec() }
 }

@@ -1,16 +1,16 @@
 //! Writer of the constraints of a part: contact pairs, equalities, tendons.
 
 use super::super::write::{Element, number};
-use super::{PartError, Writing, row, row_of, singles, some};
-use kinetoscope_mujoco::Target;
+use super::{PartError, PartWriter, format_f32s, mj_index, row, row_of};
+use kinetoscope_mujoco::SupportedVersion;
 use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::PathPoint;
+use kinetoscope_mujoco::words::WrapType;
 
-impl Writing<'_> {
+impl PartWriter<'_> {
     /// Writes pairs of geoms with their own contact parameters, and pairs of bodies that never collide.
     pub(super) fn contacts(&self) -> Vec<String> {
         let m = self.model;
-        let geom = |id: i32| some(id).map(|id| self.full(&self.names.geoms[id]));
+        let geom = |id: i32| mj_index(id).map(|id| self.scoped_name(&self.names.geoms[id]));
         let pair = |p: usize| {
             Element::new("pair")
                 .opt("geom1", geom(m.pair_geom1()[p]))
@@ -42,23 +42,23 @@ impl Writing<'_> {
     fn equality(&self, e: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
         let kind = words::equality(m.eq_type()[e])
-            .ok_or_else(|| self.beyond("equality", e, "a type that is not connect, weld, joint or tendon"))?;
-        let (first, second) = (some(m.eq_obj1id()[e]), some(m.eq_obj2id()[e]));
+            .ok_or_else(|| self.unsupported("equality", e, "a type that is not connect, weld, joint or tendon"))?;
+        let (first, second) = (mj_index(m.eq_obj1id()[e]), mj_index(m.eq_obj2id()[e]));
         let data = row_of(m.eq_data(), m.neq(), e);
-        let element = Element::new(kind).attr("name", self.full(&self.names.equalities[e]));
+        let element = Element::new(kind).attr("name", self.scoped_name(&self.names.equalities[e]));
         let between_sites = m.equality_is_between_sites(e);
-        if between_sites && !self.newer("equality", e, &format!("the whole {kind}, which is between sites")) {
+        if between_sites && !self.supports_v4("equality", e, &format!("the whole {kind}, which is between sites")) {
             return Ok(None);
         }
-        let site = |id: usize| self.full(&self.names.sites[id]);
+        let site = |id: usize| self.scoped_name(&self.names.sites[id]);
         let element = match kind {
             "joint" => element
-                .opt("joint1", first.map(|id| self.full(&self.names.joints[id])))
-                .opt("joint2", second.map(|id| self.full(&self.names.joints[id])))
+                .opt("joint1", first.map(|id| self.scoped_name(&self.names.joints[id])))
+                .opt("joint2", second.map(|id| self.scoped_name(&self.names.joints[id])))
                 .numbers("polycoef", &data[..5]),
             "tendon" => element
-                .opt("tendon1", first.map(|id| self.full(&self.names.tendons[id])))
-                .opt("tendon2", second.map(|id| self.full(&self.names.tendons[id])))
+                .opt("tendon1", first.map(|id| self.scoped_name(&self.names.tendons[id])))
+                .opt("tendon2", second.map(|id| self.scoped_name(&self.names.tendons[id])))
                 .numbers("polycoef", &data[..5]),
             _ if between_sites => element.opt("site1", first.map(site)).opt("site2", second.map(site)),
             _ => element
@@ -90,11 +90,11 @@ impl Writing<'_> {
         let m = self.model;
         let first = m.tendon_adr()[t] as usize;
         let path = first..first + m.tendon_num()[t] as usize;
-        let point = |p: usize| words::path_point(m.wrap_type()[p]);
-        let fixed = path.clone().all(|p| point(p) == Some(PathPoint::Joint));
+        let point = |p: usize| words::wrap_type(m.wrap_type()[p]);
+        let fixed = path.clone().all(|p| point(p) == Some(WrapType::Joint));
         let tag = if fixed { "fixed" } else { "spatial" };
         let mut element = Element::new(tag)
-            .attr("name", self.full(&self.names.tendons[t]))
+            .attr("name", self.scoped_name(&self.names.tendons[t]))
             .attr("group", m.tendon_group()[t])
             .attr("margin", number(m.tendon_margin()[t]))
             .attr("stiffness", number(m.tendon_stiffness()[t]))
@@ -106,44 +106,44 @@ impl Writing<'_> {
         };
         let rest = row_of(m.tendon_lengthspring(), m.ntendon(), t);
         // 2.2.2 has one rest length; 4.x has a range of lengths without force.
-        let rest = if self.target == Target::V2 { &rest[..1] } else { rest };
+        let rest = if self.target == SupportedVersion::V2 { &rest[..1] } else { rest };
         element = element
             .numbers("springlength", rest)
             .numbers("solreflimit", row_of(m.tendon_solref_lim(), m.ntendon(), t))
             .numbers("solimplimit", row_of(m.tendon_solimp_lim(), m.ntendon(), t))
             .numbers("solreffriction", row_of(m.tendon_solref_fri(), m.ntendon(), t))
             .numbers("solimpfriction", row_of(m.tendon_solimp_fri(), m.ntendon(), t));
-        let inertia = m.tendon_inertia(t);
-        if inertia != 0.0 && self.newer("tendon", t, &format!("armature {inertia}")) {
+        let inertia = m.tendon_armature(t);
+        if inertia != 0.0 && self.supports_v4("tendon", t, &format!("armature {inertia}")) {
             element = element.attr("armature", number(inertia));
         }
         if let Some(range) = m.tendon_actuator_force(t)
-            && self.newer("tendon", t, &format!("actuatorfrcrange {range:?}"))
+            && self.supports_v4("tendon", t, &format!("actuatorfrcrange {range:?}"))
         {
             element = element.attr("actuatorfrclimited", "true").numbers("actuatorfrcrange", &range);
         }
         if !fixed {
-            let material = some(m.tendon_matid()[t]).map(|id| self.full(&self.names.materials[id]));
+            let material = mj_index(m.tendon_matid()[t]).map(|id| self.scoped_name(&self.names.materials[id]));
             element = element
                 .attr("width", number(m.tendon_width()[t]))
                 .opt("material", material)
-                .attr("rgba", singles(row(m.tendon_rgba(), 4, t)));
+                .attr("rgba", format_f32s(row(m.tendon_rgba(), 4, t)));
         }
         lines.push(element.open());
         for p in path {
-            let (id, parameter) = (some(m.wrap_objid()[p]), m.wrap_prm()[p]);
-            let site = |id: usize| self.full(&self.names.sites[id]);
+            let (id, parameter) = (mj_index(m.wrap_objid()[p]), m.wrap_prm()[p]);
+            let site = |id: usize| self.scoped_name(&self.names.sites[id]);
             let element = match point(p) {
-                Some(PathPoint::Joint) => Element::new("joint")
-                    .opt("joint", id.map(|id| self.full(&self.names.joints[id])))
+                Some(WrapType::Joint) => Element::new("joint")
+                    .opt("joint", id.map(|id| self.scoped_name(&self.names.joints[id])))
                     .attr("coef", number(parameter)),
-                Some(PathPoint::Pulley) => Element::new("pulley").attr("divisor", number(parameter)),
-                Some(PathPoint::Site) => Element::new("site").opt("site", id.map(site)),
-                Some(PathPoint::Geom) => Element::new("geom")
-                    .opt("geom", id.map(|id| self.full(&self.names.geoms[id])))
+                Some(WrapType::Pulley) => Element::new("pulley").attr("divisor", number(parameter)),
+                Some(WrapType::Site) => Element::new("site").opt("site", id.map(site)),
+                Some(WrapType::Geom) => Element::new("geom")
+                    .opt("geom", id.map(|id| self.scoped_name(&self.names.geoms[id])))
                     // MuJoCo stores the index of the side site as a floating-point number.
-                    .opt("sidesite", some(parameter.round() as i32).map(site)),
-                None => return Err(self.beyond("tendon", t, "a path of unknown points")),
+                    .opt("sidesite", mj_index(parameter.round() as i32).map(site)),
+                None => return Err(self.unsupported("tendon", t, "a path of unknown points")),
             };
             lines.push(format!("  {}", element.leaf()));
         }

@@ -15,31 +15,31 @@ mod sensors;
 mod settings;
 
 pub(crate) use names::PartNames;
-pub(crate) use rig::{Base, Passive, Rig};
-pub(crate) use sensors::left_out as sensors_left_out;
-pub(crate) use settings::compare;
+pub(crate) use rig::{PassiveJointProperties, RobotOverrides, RootAttachment};
+pub(crate) use sensors::unsupported_sensors as sensors_left_out;
+pub(crate) use settings::setting_warnings;
 
-use kinetoscope_mujoco::{Asset, Model, Target};
+use kinetoscope_mujoco::{Asset, Model, SupportedVersion};
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::cell::RefCell;
 use std::fmt;
 
 /// XML lines of a part for both supported MuJoCo versions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MjcfPart {
+pub struct PartDocument {
     uid: String,
     v2: PartLines,
     v4: PartLines,
     /// Sensors of the file that are left out for both versions, with their indices.
-    sensors_left_out: Vec<(usize, LeftOut)>,
+    omitted_sensors: Vec<(usize, OmittedElement)>,
 }
 
 /// XML lines of a part, by section of the document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartLines {
     /// Location of the MJCF file.
-    pub source: Source,
+    pub source: SourceLocation,
     /// Meshes, height fields, textures, materials.
     pub assets: Vec<String>,
     /// Bodies of the world.
@@ -53,28 +53,28 @@ pub struct PartLines {
     /// Actuators without an activation.
     pub actuators: Vec<String>,
     /// Actuators with an activation.
-    pub actuators_with_state: Vec<String>,
+    pub stateful_actuators: Vec<String>,
     /// Sensors.
     pub sensors: Vec<String>,
     /// Elements and attributes of the file that this MuJoCo version does not support.
-    pub left_out: Vec<LeftOut>,
+    pub omitted: Vec<OmittedElement>,
 }
 
 /// Element or attribute of a file that is left out of a part.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct OmittedElement {
     /// Kind of the element, as in MJCF.
     pub element: &'static str,
     /// Name in the file, or a generated name.
     pub name: String,
     /// Omitted property and the reason.
-    pub what: String,
+    pub property: String,
 }
 
 /// Formatted as `body "arm": gravcomp`.
-impl fmt::Display for LeftOut {
+impl fmt::Display for OmittedElement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {:?}: {}", self.element, self.name, self.what)
+        write!(f, "{} {:?}: {}", self.element, self.name, self.property)
     }
 }
 
@@ -92,7 +92,7 @@ pub struct PartError {
 
 /// Compiled MJCF file with the settings that turn it into a part.
 #[derive(Clone, Copy, Debug)]
-pub struct PartOf<'a> {
+pub struct PartSource<'a> {
     /// Model that MuJoCo compiled from the file.
     pub model: &'a Model,
     /// Names of all elements of the file.
@@ -104,33 +104,37 @@ pub struct PartOf<'a> {
     /// Prefix of the names of its asset files.
     pub stem: &'a str,
     /// Differences from the file, for a part that is a robot.
-    pub rig: Option<&'a Rig>,
+    pub rig: Option<&'a RobotOverrides>,
 }
 
 /// Writer of a file as a part, for one MuJoCo version.
-struct Writing<'a> {
+struct PartWriter<'a> {
     model: &'a Model,
     names: &'a PartNames,
     uid: &'a str,
     pose: &'a Pose,
     stem: &'a str,
-    rig: Option<&'a Rig>,
+    rig: Option<&'a RobotOverrides>,
     /// MuJoCo version that reads the lines; another version may have compiled the file.
-    target: Target,
-    sensors_left_out: &'a [(usize, LeftOut)],
-    left_out: RefCell<Vec<LeftOut>>,
+    target: SupportedVersion,
+    sensors_left_out: &'a [(usize, OmittedElement)],
+    left_out: RefCell<Vec<OmittedElement>>,
 }
 
-impl MjcfPart {
-    /// Converts a file to a part, without the sensors `sensors_left_out`.
+impl PartDocument {
+    /// Converts a file to a part, without the sensors `omitted_sensors`.
     ///
     /// # Errors
     /// The model has an element that a part cannot represent.
-    pub fn new(of: &PartOf<'_>, sensors_left_out: Vec<(usize, LeftOut)>, source: &Source) -> Result<Self, PartError> {
+    pub fn new(
+        of: &PartSource<'_>,
+        sensors_left_out: Vec<(usize, OmittedElement)>,
+        source: &SourceLocation,
+    ) -> Result<Self, PartError> {
         of.check()?;
-        let lines = |target| of.writing(target, &sensors_left_out).lines(source);
-        let (v2, v4) = (lines(Target::V2)?, lines(Target::V4)?);
-        Ok(Self { uid: of.uid.into(), v2, v4, sensors_left_out })
+        let lines = |target| of.writer(target, &sensors_left_out).lines(source);
+        let (v2, v4) = (lines(SupportedVersion::V2)?, lines(SupportedVersion::V4)?);
+        Ok(Self { uid: of.uid.into(), v2, v4, omitted_sensors: sensors_left_out })
     }
 
     /// Name of the part.
@@ -139,30 +143,30 @@ impl MjcfPart {
     }
 
     /// Sensors of the file that the scene does not have, with their indices.
-    pub(crate) fn sensors_left_out(&self) -> &[(usize, LeftOut)] {
-        &self.sensors_left_out
+    pub(crate) fn sensors_left_out(&self) -> &[(usize, OmittedElement)] {
+        &self.omitted_sensors
     }
 
     /// Returns the XML lines for a MuJoCo version.
-    pub fn lines(&self, target: Target) -> &PartLines {
+    pub fn lines(&self, target: SupportedVersion) -> &PartLines {
         match target {
-            Target::V2 => &self.v2,
-            Target::V4 => &self.v4,
+            SupportedVersion::V2 => &self.v2,
+            SupportedVersion::V4 => &self.v4,
         }
     }
 }
 
-impl<'a> PartOf<'a> {
+impl<'a> PartSource<'a> {
     /// Checks that a part can represent every element of the model.
     ///
     /// # Errors
     /// The model has an element that a part cannot represent.
     pub fn check(&self) -> Result<(), PartError> {
-        match self.model.beyond() {
+        match self.model.unsupported_feature() {
             None => Ok(()),
             Some(beyond) => {
                 let name = self.names.of(beyond.element, beyond.index);
-                Err(PartError { element: beyond.element, name, what: beyond.what.into() })
+                Err(PartError { element: beyond.element, name, what: beyond.feature.into() })
             }
         }
     }
@@ -172,17 +176,17 @@ impl<'a> PartOf<'a> {
     /// # Errors
     /// A texture cannot be written.
     pub fn files(&self) -> Result<Vec<Asset>, PartError> {
-        self.writing(Target::V2, &[]).files()
+        self.writer(SupportedVersion::V2, &[]).files()
     }
 
-    fn writing(&self, target: Target, sensors_left_out: &'a [(usize, LeftOut)]) -> Writing<'a> {
+    fn writer(&self, target: SupportedVersion, sensors_left_out: &'a [(usize, OmittedElement)]) -> PartWriter<'a> {
         let Self { model, names, uid, pose, stem, rig } = *self;
-        Writing { model, names, uid, pose, stem, rig, target, sensors_left_out, left_out: RefCell::default() }
+        PartWriter { model, names, uid, pose, stem, rig, target, sensors_left_out, left_out: RefCell::default() }
     }
 }
 
-impl Writing<'_> {
-    fn lines(self, source: &Source) -> Result<PartLines, PartError> {
+impl PartWriter<'_> {
+    fn lines(self, source: &SourceLocation) -> Result<PartLines, PartError> {
         let [actuators, actuators_with_state] = self.actuators()?;
         let lines = PartLines {
             source: source.clone(),
@@ -192,35 +196,35 @@ impl Writing<'_> {
             equalities: self.equalities()?,
             tendons: self.tendons()?,
             actuators,
-            actuators_with_state,
+            stateful_actuators: actuators_with_state,
             sensors: self.sensors()?,
-            left_out: Vec::new(),
+            omitted: Vec::new(),
         };
-        Ok(PartLines { left_out: self.left_out.into_inner(), ..lines })
+        Ok(PartLines { omitted: self.left_out.into_inner(), ..lines })
     }
 
     /// True if the target is MuJoCo 4.x. Otherwise records that `what` of an element is left out, since only models of
     /// 4.x have it.
-    fn newer(&self, element: &'static str, index: usize, what: &str) -> bool {
-        if self.target == Target::V2 {
+    fn supports_v4(&self, element: &'static str, index: usize, what: &str) -> bool {
+        if self.target == SupportedVersion::V2 {
             let (name, what) = (self.names.of(element, index), what.into());
-            self.left_out.borrow_mut().push(LeftOut { element, name, what });
+            self.left_out.borrow_mut().push(OmittedElement { element, name, property: what });
         }
-        self.target == Target::V4
+        self.target == SupportedVersion::V4
     }
 
     /// Name in the scene of an element of the file.
-    fn full(&self, name: &str) -> String {
+    fn scoped_name(&self, name: &str) -> String {
         format!("{}/{name}", self.uid)
     }
 
     /// Name in the scene of a body of the file; the file's world is the static body of the part.
     fn body(&self, body: usize) -> String {
-        if body == 0 { self.uid.into() } else { self.full(&self.names.bodies[body]) }
+        if body == 0 { self.uid.into() } else { self.scoped_name(&self.names.bodies[body]) }
     }
 
     /// Creates an error about an element of the file.
-    fn beyond(&self, element: &'static str, index: usize, what: impl Into<String>) -> PartError {
+    fn unsupported(&self, element: &'static str, index: usize, what: impl Into<String>) -> PartError {
         PartError { element, name: self.names.of(element, index), what: what.into() }
     }
 }
@@ -236,11 +240,11 @@ fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
 }
 
 /// Converts an index of MuJoCo, which is -1 for no object.
-fn some(index: i32) -> Option<usize> {
+fn mj_index(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }
 
 /// Formats single-precision numbers with the shortest text that reads back to the same values.
-fn singles(values: &[f32]) -> String {
+fn format_f32s(values: &[f32]) -> String {
     values.iter().map(f32::to_string).collect::<Vec<_>>().join(" ")
 }

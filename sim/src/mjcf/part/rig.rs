@@ -8,11 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Elements that are not written at all: geoms and sites of the file's world, actuators, actuator force limits of
 /// joints, excluded pairs with the world, and the geom pairs in `pairs`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rig {
+pub struct RobotOverrides {
     /// Passive properties of each joint of the file.
-    pub joints: Vec<Passive>,
+    pub joints: Vec<PassiveJointProperties>,
     /// Attachment of the root body.
-    pub base: Base,
+    pub base: RootAttachment,
     /// MuJoCo's `contype` and `conaffinity` for every geom that collides in the file.
     pub contact: [i32; 2],
     /// Indices of the geom pairs that are left out.
@@ -25,7 +25,7 @@ pub struct Rig {
 
 /// Passive properties of each degree of freedom of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Passive {
+pub struct PassiveJointProperties {
     /// Viscous damping \[N m s/rad or N s/m\].
     pub damping: f64,
     /// Rotor inertia \[kg m² or kg\].
@@ -36,7 +36,7 @@ pub struct Passive {
 
 /// Attachment of a root body to the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Base {
+pub enum RootAttachment {
     /// Joints as in the file.
     AsFile,
     /// Fixed in the world: the free joint with this index is not written.

@@ -1,30 +1,30 @@
 //! Warnings about global settings and sensors of a file that the scene does not take over, with their locations in the
 //! text.
 
-use super::LeftOut;
+use super::OmittedElement;
 use kinetoscope_mujoco::Model;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Maximum number of included files; MuJoCo rejects a file that is included twice.
-const MOST_FILES: usize = 100;
+const MAX_INCLUDED_FILES: usize = 100;
 
 /// Prefix of the element name of a sensor.
 const SENSOR: &str = "sensor ";
 
 /// Element at the top of a file, or a sensor.
 #[derive(Clone, Debug)]
-struct Stated {
+struct TopLevelElement {
     element: String,
     /// Attributes of the element. Attributes of a nested `<flag>` have that word as prefix.
     attributes: Vec<String>,
-    source: Source,
+    source: SourceLocation,
 }
 
 /// Collects the elements at the top of a file and of its included files, in order.
-fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files: &mut usize) {
+fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<TopLevelElement>, files: &mut usize) {
     *files += 1;
     let Ok(document) = roxmltree::Document::parse(text) else { return };
     let shared = Arc::new(file.to_path_buf());
@@ -32,9 +32,9 @@ fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files
         if node.tag_name().name() == "include" {
             let Some(path) = node.attribute("file").map(|name| folder.join(name)) else { continue };
             if let Ok(text) = std::fs::read_to_string(&path)
-                && *files < MOST_FILES
+                && *files < MAX_INCLUDED_FILES
             {
-                stated(&text, &path, folder, found, files);
+                collect_top_level(&text, &path, folder, found, files);
             }
             continue;
         }
@@ -44,15 +44,15 @@ fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files
             attributes.chain(flags.flat_map(|flag| flag.attributes()).map(|a| format!("flag {}", a.name())));
         let source = |node: roxmltree::Node<'_, '_>| {
             let line = document.text_pos_at(node.range().start).row;
-            Source { file: Arc::clone(&shared), line }
+            SourceLocation { file: Arc::clone(&shared), line }
         };
-        found.push(Stated {
+        found.push(TopLevelElement {
             element: node.tag_name().name().to_string(),
             attributes: attributes.collect(),
             source: source(node),
         });
         let of_sensors = node.children().filter(|child| child.is_element() && node.has_tag_name("sensor"));
-        found.extend(of_sensors.map(|sensor| Stated {
+        found.extend(of_sensors.map(|sensor| TopLevelElement {
             element: format!("{SENSOR}{}", sensor.tag_name().name()),
             attributes: Vec::new(),
             source: source(sensor),
@@ -62,19 +62,19 @@ fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files
 
 /// Warns about settings of a file that the scene overrides for all of its parts, and about sensors that are left out.
 /// `owner` names the part in the messages, such as `part "arm"`.
-pub(crate) fn compare(
+pub(crate) fn setting_warnings(
     owner: &str,
     text: &str,
     file: &Path,
     model: &Model,
     scene: &Model,
-    sensors_left_out: &[(usize, LeftOut)],
+    sensors_left_out: &[(usize, OmittedElement)],
 ) -> Vec<Diagnostic> {
     let mut found = Vec::new();
-    stated(text, file, file.parent().unwrap_or(Path::new("")), &mut found, &mut 0);
+    collect_top_level(text, file, file.parent().unwrap_or(Path::new("")), &mut found, &mut 0);
     let mut diagnostics = Vec::new();
     // Sensors of the model have the order of the file.
-    let sensors: Vec<&Stated> = found.iter().filter(|s| s.element.starts_with(SENSOR)).collect();
+    let sensors: Vec<&TopLevelElement> = found.iter().filter(|s| s.element.starts_with(SENSOR)).collect();
     for (index, left_out) in sensors_left_out {
         let at = sensors.get(*index).filter(|_| sensors.len() == model.nsensor()).map(|s| s.source.clone());
         let message = format!("{owner}: {left_out}: it is left out, the rest of the file is not");
@@ -89,7 +89,7 @@ pub(crate) fn compare(
             at.map(|s| s.source.clone()),
             format!(
                 "{owner}: option {} is {}{default}; the scene's {} holds",
-                difference.name, difference.here, difference.there
+                difference.name, difference.first, difference.second
             ),
         ));
     }

@@ -15,7 +15,7 @@ fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
 
 /// Force law of an actuator along its length.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Law {
+pub(super) struct ActuatorLaw {
     /// Stiffness \[N/m or N m/rad\]; 0 without a position servo.
     pub(super) stiffness: f64,
     /// Damping \[N s/m or N m s/rad\]; 0 without a servo.
@@ -23,11 +23,11 @@ pub(super) struct Law {
     /// Largest force in both directions \[N or N m\]; `None` without a limit.
     pub(super) force: Option<f64>,
     /// Features of the actuator that a drive with these numbers does not reproduce, as texts for messages.
-    pub(super) unsaid: Vec<String>,
+    pub(super) unsupported: Vec<String>,
 }
 
 /// Determines the law of an actuator on the length `gear Σ cᵢ qᵢ` with the joints and coefficients `path`.
-pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64)]) -> Law {
+pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64)]) -> ActuatorLaw {
     let count = model.nactuator();
     let unknown = "unknown";
     let gain_type = words::gain(model.actuator_gaintype()[actuator]).unwrap_or(unknown);
@@ -76,7 +76,7 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
             unsaid.push(said);
         }
     }
-    Law { stiffness, damping, force, unsaid }
+    ActuatorLaw { stiffness, damping, force, unsupported: unsaid }
 }
 
 /// Range of lengths of an actuator within the limits of the joints.

@@ -3,12 +3,12 @@
 //! MuJoCo's equality is `y - y0 = c0 + c1 (x - x0) + c2 (x - x0)² + ...` with the initial positions y0 and x0 of the
 //! file.
 
-use super::drives::is_single;
-use super::places::Places;
+use super::drives::is_single_dof;
+use super::places::SourceLocations;
 use crate::mjcf::part::PartNames;
 use kinetoscope_mujoco::{Model, words};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 
 /// Coupling of a joint to another joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub(super) enum Coupling {
     /// Linear coupling, `ratio * position + offset`, to a joint of the file.
     Mimic {
         /// Location of the equality.
-        source: Source,
+        source: SourceLocation,
         /// Index of the followed joint.
         driver: usize,
         /// Ratio.
@@ -25,12 +25,12 @@ pub(super) enum Coupling {
         offset: f64,
     },
     /// Any other coupling. It has a polynomial if it is the only coupling of the joint and does not close a cycle.
-    Other(Option<Follows>),
+    Nonlinear(Option<PolynomialRelation>),
 }
 
 /// Polynomial coupling of a joint: `y - y0 = Σ coefficients[k] (x - x0)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Follows {
+pub(super) struct PolynomialRelation {
     /// Index of the followed joint; `None` for a joint that stays at c0.
     pub(super) driver: Option<usize>,
     /// Coefficients in ascending order, the constant first.
@@ -42,7 +42,7 @@ pub(super) fn of_joints(
     owner: &str,
     model: &Model,
     names: &PartNames,
-    places: &Places,
+    places: &SourceLocations,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Vec<Option<Coupling>> {
     let mut couplings: Vec<Option<Coupling>> = vec![None; model.njnt()];
@@ -59,7 +59,9 @@ pub(super) fn of_joints(
         let free = couplings[follower].is_none();
         let start = |joint: usize| model.qpos0()[model.jnt_qposadr()[joint] as usize];
         couplings[follower] = match driver {
-            Some(driver) if linear && free && is_single(model, driver) && !leads_to(&couplings, driver, follower) => {
+            Some(driver)
+                if linear && free && is_single_dof(model, driver) && !reaches(&couplings, driver, follower) =>
+            {
                 let (multiplier, offset) = (data[1], start(follower) + data[0] - data[1] * start(driver));
                 Some(Coupling::Mimic { source, driver, multiplier, offset })
             }
@@ -70,8 +72,8 @@ pub(super) fn of_joints(
                 );
                 diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, source, message));
                 let coefficients = [0, 1, 2, 3, 4].map(|k| if driver.is_some() || k == 0 { data[k] } else { 0.0 });
-                let leads_on = driver.is_none_or(|driver| !leads_to(&couplings, driver, follower));
-                Some(Coupling::Other((free && leads_on).then_some(Follows { driver, coefficients })))
+                let leads_on = driver.is_none_or(|driver| !reaches(&couplings, driver, follower));
+                Some(Coupling::Nonlinear((free && leads_on).then_some(PolynomialRelation { driver, coefficients })))
             }
         };
     }
@@ -80,12 +82,12 @@ pub(super) fn of_joints(
 
 /// Joint at the end of the mimic chain of `joint`, or `joint` itself, and the ratio of the chain. `None` if another
 /// kind of coupling holds a joint of the chain.
-pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Option<(usize, f64)> {
+pub(super) fn mimic_root(couplings: &[Option<Coupling>], mut joint: usize) -> Option<(usize, f64)> {
     let mut ratio = 1.0;
     loop {
         match &couplings[joint] {
             None => return Some((joint, ratio)),
-            Some(Coupling::Other(_)) => return None,
+            Some(Coupling::Nonlinear(_)) => return None,
             Some(Coupling::Mimic { driver, multiplier, .. }) => {
                 joint = *driver;
                 ratio *= multiplier;
@@ -95,14 +97,14 @@ pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Opti
 }
 
 /// True if the mimics and polynomial couplings from `joint` reach `end`.
-fn leads_to(couplings: &[Option<Coupling>], mut joint: usize, end: usize) -> bool {
+fn reaches(couplings: &[Option<Coupling>], mut joint: usize, end: usize) -> bool {
     loop {
         if joint == end {
             return true;
         }
         joint = match &couplings[joint] {
             Some(Coupling::Mimic { driver, .. }) => *driver,
-            Some(Coupling::Other(Some(Follows { driver: Some(driver), .. }))) => *driver,
+            Some(Coupling::Nonlinear(Some(PolynomialRelation { driver: Some(driver), .. }))) => *driver,
             _ => return false,
         };
     }

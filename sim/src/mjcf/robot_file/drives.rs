@@ -8,33 +8,33 @@
 //! while the other joints stand still.
 
 use super::actuator::law;
-use super::couplings::{Coupling, followed};
+use super::couplings::{Coupling, mimic_root};
 use super::error::RobotFileError;
-use super::places::Places;
+use super::places::SourceLocations;
 use crate::mjcf::part::PartNames;
 use kinetoscope_mujoco::Model;
 use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::PathPoint;
-use kinetoscope_robot::description::FileDrive;
+use kinetoscope_mujoco::words::WrapType;
+use kinetoscope_robot::description::FileActuation;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use std::collections::BTreeMap;
 
 /// Actuation of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Acting {
+pub(super) struct JointActuation {
     /// Drive that is equivalent to the actuators.
-    pub(super) drive: FileDrive,
+    pub(super) drive: FileActuation,
     /// Largest effort \[N m or N\]; `None` if an actuator has no limit.
     pub(super) effort: Option<f64>,
 }
 
 /// Effect of an actuator on a joint and on the joints that follow it.
 #[derive(Clone, Debug, Default)]
-struct Arm {
+struct MomentArm {
     /// Effort per force, J.
-    total: f64,
+    moment_arm: f64,
     /// Sum of the absolute values of the terms of J.
-    size: f64,
+    abs_sum: f64,
     /// Joints of the file, and the ratio by which each follows.
     joints: Vec<(usize, f64)>,
     /// Largest effort within the joints' own limits, with the force at its limit; infinite without limits.
@@ -42,7 +42,7 @@ struct Arm {
 }
 
 /// Joints that an actuator acts on.
-struct Target {
+struct ActuatorTarget {
     /// Joints and their coefficients.
     path: Vec<(usize, f64)>,
     /// Name of the tendon with this path; `None` for an actuator on a joint.
@@ -55,31 +55,29 @@ pub(super) fn of_joints(
     owner: &str,
     model: &Model,
     names: &PartNames,
-    places: &Places,
+    places: &SourceLocations,
     couplings: &[Option<Coupling>],
     diagnostics: &mut Vec<Diagnostic>,
-) -> Result<Vec<Acting>, RobotFileError> {
-    let unsaid = if model.nactuator() == 0 { FileDrive::Unsaid } else { FileDrive::Passive };
+) -> Result<Vec<JointActuation>, RobotFileError> {
+    let unsaid = if model.nactuator() == 0 { FileActuation::Unspecified } else { FileActuation::Passive };
     let own_limit = |joint: usize| model.joint_actuator_force(joint).map(|[low, high]| low.abs().max(high.abs()));
-    let mut acting: Vec<Acting> =
-        (0..model.njnt()).map(|joint| Acting { drive: unsaid, effort: own_limit(joint) }).collect();
+    let mut acting: Vec<JointActuation> =
+        (0..model.njnt()).map(|joint| JointActuation { drive: unsaid, effort: own_limit(joint) }).collect();
     // Actuated joints, by the joint that they follow.
     let mut acted: BTreeMap<usize, BTreeMap<usize, f64>> = BTreeMap::new();
     let mut replaced = Vec::new();
     for actuator in 0..model.nactuator() {
         let name = &names.actuators[actuator];
-        let Target { path, tendon } = target(model, names, actuator).map_err(|target| RobotFileError::Actuator {
-            at: places.get("actuator", name),
-            actuator: name.clone(),
-            target,
+        let ActuatorTarget { path, tendon } = target(model, names, actuator).map_err(|target| {
+            RobotFileError::Actuator { at: places.get("actuator", name), actuator: name.clone(), target }
         })?;
         let gear = model.actuator_gear()[6 * actuator];
         let law = law(model, actuator, gear, &path);
         let quoted = |joint: usize| format!("{:?}", names.joints[joint]);
-        let mut notes = law.unsaid;
-        let mut arms: BTreeMap<usize, Arm> = BTreeMap::new();
+        let mut notes = law.unsupported;
+        let mut arms: BTreeMap<usize, MomentArm> = BTreeMap::new();
         for &(joint, coefficient) in &path {
-            let Some((driver, ratio)) = followed(couplings, joint) else {
+            let Some((driver, ratio)) = mimic_root(couplings, joint) else {
                 notes.push(format!("it has no part in {}, which an equality holds that no mimic says", quoted(joint)));
                 continue;
             };
@@ -89,8 +87,8 @@ pub(super) fn of_joints(
             let arm = arms.entry(driver).or_default();
             let (own, force) = (own_limit(joint).unwrap_or(f64::INFINITY), law.force.unwrap_or(f64::INFINITY));
             let coefficient = gear * coefficient;
-            arm.total += coefficient * ratio;
-            arm.size += (coefficient * ratio).abs();
+            arm.moment_arm += coefficient * ratio;
+            arm.abs_sum += (coefficient * ratio).abs();
             if coefficient * ratio != 0.0 {
                 arm.effort += ratio.abs() * own.min(force * coefficient.abs());
                 arm.joints.push((joint, ratio));
@@ -98,7 +96,7 @@ pub(super) fn of_joints(
         }
         // A sum of terms that cancel leaves rounding only.
         arms.retain(|&driver, arm| {
-            let acts = arm.total.abs() > 1e-12 * arm.size && law.force != Some(0.0);
+            let acts = arm.moment_arm.abs() > 1e-12 * arm.abs_sum && law.force != Some(0.0);
             if !acts {
                 notes.push(format!("it never moves {}, so no drive of it is made", quoted(driver)));
             }
@@ -109,10 +107,10 @@ pub(super) fn of_joints(
             notes.push(format!("it moves {} together, and each has a drive of its own", joints.join(", ")));
         }
         for (driver, arm) in arms {
-            let force = law.force.map_or(f64::INFINITY, |force| force * arm.total.abs());
-            let (limit, scale) = (arm.effort.min(force), arm.total * arm.total);
+            let force = law.force.map_or(f64::INFINITY, |force| force * arm.moment_arm.abs());
+            let (limit, scale) = (arm.effort.min(force), arm.moment_arm * arm.moment_arm);
             let first = !acted.contains_key(&driver);
-            add(&mut acting[driver], first, law.stiffness * scale, law.damping * scale, limit);
+            add_actuator(&mut acting[driver], first, law.stiffness * scale, law.damping * scale, limit);
             acted.entry(driver).or_default().extend(arm.joints);
         }
         if let Some(tendon) = &tendon {
@@ -140,39 +138,41 @@ pub(super) fn of_joints(
 }
 
 /// Joints that an actuator acts on, or a description of a target that drives do not support.
-fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<Target, String> {
+fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<ActuatorTarget, String> {
     let id = usize::try_from(model.actuator_trnid()[2 * actuator]).unwrap_or(0);
     match words::transmission(model.actuator_trntype()[actuator]) {
-        Some("joint" | "jointinparent") if is_single(model, id) => Ok(Target { path: vec![(id, 1.0)], tendon: None }),
+        Some("joint" | "jointinparent") if is_single_dof(model, id) => {
+            Ok(ActuatorTarget { path: vec![(id, 1.0)], tendon: None })
+        }
         Some("joint" | "jointinparent") => Err(format!("the free joint {:?}", names.joints[id])),
         Some("tendon") => {
             let first = model.tendon_adr()[id] as usize;
             let points = first..first + model.tendon_num()[id] as usize;
             let tendon = &names.tendons[id];
-            if !points.clone().all(|p| words::path_point(model.wrap_type()[p]) == Some(PathPoint::Joint)) {
+            if !points.clone().all(|p| words::wrap_type(model.wrap_type()[p]) == Some(WrapType::Joint)) {
                 return Err(format!("the spatial tendon {tendon:?}"));
             }
             let path = points.map(|p| (model.wrap_objid()[p] as usize, model.wrap_prm()[p])).collect();
-            Ok(Target { path, tendon: Some(tendon.clone()) })
+            Ok(ActuatorTarget { path, tendon: Some(tendon.clone()) })
         }
         other => Err(format!("a {}", other.unwrap_or("kind of object that has no name"))),
     }
 }
 
 /// True for a hinge or a slide.
-pub(super) fn is_single(model: &Model, joint: usize) -> bool {
+pub(super) fn is_single_dof(model: &Model, joint: usize) -> bool {
     matches!(words::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
 }
 
 /// Adds an actuator to a joint; `limit` is infinite without a limit.
-fn add(acting: &mut Acting, first: bool, stiffness: f64, damping: f64, limit: f64) {
+fn add_actuator(acting: &mut JointActuation, first: bool, stiffness: f64, damping: f64, limit: f64) {
     let old = if first { 0.0 } else { acting.effort.unwrap_or(f64::INFINITY) };
     acting.effort = Some(old + limit).filter(|effort| effort.is_finite());
     let (old_stiffness, old_damping) = match acting.drive {
-        FileDrive::Servo { stiffness, damping } => (stiffness, damping),
+        FileActuation::Servo { stiffness, damping } => (stiffness, damping),
         _ => (0.0, 0.0),
     };
     let (stiffness, damping) = (old_stiffness + stiffness, old_damping + damping);
     let follows = stiffness > 0.0 || damping > 0.0;
-    acting.drive = if follows { FileDrive::Servo { stiffness, damping } } else { FileDrive::Effort };
+    acting.drive = if follows { FileActuation::Servo { stiffness, damping } } else { FileActuation::Effort };
 }

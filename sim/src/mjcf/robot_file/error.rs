@@ -2,7 +2,7 @@
 
 use crate::mjcf::part::PartError;
 use kinetoscope_mujoco::CompileError;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 
 /// Advice on another use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
 const AS_A_PART: &str = "such a file is a scene, or a part of one";
@@ -21,8 +21,8 @@ pub enum RobotFileError {
     #[error("the file has no body; a robot is one body in the file's world and what hangs on it")]
     NoBody,
     /// The file's world has several child bodies.
-    #[error("the file has {} bodies in its world ({}); a robot is one and what hangs on it: give each a file, or {AS_A_PART}", .roots.len(), few(.roots))]
-    SeveralRoots {
+    #[error("the file has {} bodies in its world ({}); a robot is one and what hangs on it: give each a file, or {AS_A_PART}", .roots.len(), format_first(.roots))]
+    MultipleRoots {
         /// Names of these bodies.
         roots: Vec<String>,
     },
@@ -35,7 +35,7 @@ pub enum RobotFileError {
     )]
     BallJoint {
         /// Location of the joint.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
     },
@@ -43,7 +43,7 @@ pub enum RobotFileError {
     #[error("{at}: body {body:?} is a mocap body, which no joint moves; {AS_A_PART}")]
     MocapBody {
         /// Location of the body.
-        at: Source,
+        at: SourceLocation,
         /// Name of the body.
         body: String,
     },
@@ -51,9 +51,9 @@ pub enum RobotFileError {
     #[error(
         "{at}: joint {joint:?} holds the root body {body:?} in the world, so the base cannot be free; set fix_base: true, or move the joint to a body below"
     )]
-    BaseIsJointed {
+    BaseNotFree {
         /// Location of the joint.
-        at: Source,
+        at: SourceLocation,
         /// Name of the joint.
         joint: String,
         /// Name of the body.
@@ -65,7 +65,7 @@ pub enum RobotFileError {
     )]
     Actuator {
         /// Location of the actuator.
-        at: Source,
+        at: SourceLocation,
         /// Name of the actuator.
         actuator: String,
         /// Description of the target.
@@ -77,7 +77,7 @@ pub enum RobotFileError {
     )]
     NeedsWorld {
         /// Location of the element.
-        at: Source,
+        at: SourceLocation,
         /// Kind of the element, as in MJCF.
         element: &'static str,
         /// Name of the element.
@@ -88,7 +88,7 @@ pub enum RobotFileError {
 }
 
 /// Lists the first names and the number of further ones.
-fn few(names: &[String]) -> String {
+fn format_first(names: &[String]) -> String {
     const SHOWN: usize = 5;
     let first = names[..names.len().min(SHOWN)].join(", ");
     match names.len().saturating_sub(SHOWN) {

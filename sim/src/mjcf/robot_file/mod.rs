@@ -17,29 +17,34 @@ mod world;
 pub use error::RobotFileError;
 
 use super::document::{Inertial, Integrator, Mjcf};
-use super::part::{Base, LeftOut, MjcfPart, PartError, PartNames, PartOf, Passive, Rig, compare};
-use super::robot::{DampedJoint, GeomOwner, LinkFrame, Purpose, RobotCfg, RobotLayout, add_drive, unused_joint};
+use super::part::{
+    OmittedElement, PartDocument, PartError, PartNames, PartSource, PassiveJointProperties, RobotOverrides,
+    RootAttachment, setting_warnings,
+};
+use super::robot::{
+    DampedJoint, GeomOwner, LinkFrame, MjcfDialect, RobotLayout, RobotMjcfCfg, add_drive, unused_joint_name,
+};
 use crate::error::Result;
 use crate::mjcf::document::GeomRole;
-use crate::named::Named;
-use crate::objects::mjcf_part_data::{engine_sensors, read};
+use crate::named::EntityLabel;
+use crate::objects::mjcf_part_data::{engine_sensors, read_and_compile};
 use crate::objects::robot_file::MjcfFile;
 use kinetoscope_mujoco::{Asset, Model, words};
 use kinetoscope_robot::body_inertia::{RigidBody, fuse};
 use kinetoscope_robot::description::{JointId, LinkId, RobotDescription};
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use kinetoscope_sensors::EngineSensor;
-use places::Places;
+use places::SourceLocations;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tree::{Described, Describing, Root};
+use tree::{DescriptionBuilder, FileDescription, Root};
 
 /// MJCF file of a robot, with the model that MuJoCo compiled from the file alone.
 #[derive(Clone, Debug)]
-pub struct RobotFile {
-    source: Source,
+pub struct MjcfRobotFile {
+    source: SourceLocation,
     model: Model,
     names: PartNames,
     root: Root,
@@ -51,16 +56,16 @@ pub struct RobotFile {
     stem: String,
     files: Vec<Asset>,
     sensors: Vec<EngineSensor>,
-    sensors_left_out: Vec<(usize, LeftOut)>,
+    sensors_left_out: Vec<(usize, OmittedElement)>,
 }
 
 /// Settings for loading a file.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Loading<'a> {
+pub(crate) struct LoadSettings<'a> {
     /// Name of the robot.
     pub(crate) uid: &'a str,
     /// Label of the robot in diagnostics.
-    pub(crate) named: &'a Named,
+    pub(crate) named: &'a EntityLabel,
     /// Index of the robot in the simulation.
     pub(crate) index: usize,
     /// True for a fixed base.
@@ -71,41 +76,49 @@ pub(crate) struct Loading<'a> {
     pub(crate) scene: Option<&'a Model>,
 }
 
-impl RobotFile {
+impl MjcfRobotFile {
     /// Reads and compiles a file, and describes its robot. `wrong` wraps the errors of the file.
     pub(crate) fn load(
         file: &MjcfFile,
-        of: &Loading<'_>,
+        of: &LoadSettings<'_>,
         wrong: impl Fn(RobotFileError) -> crate::error::Error,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<(Self, RobotDescription)> {
-        let (text, model) = read(&file.path, file.text.as_deref(), |error| wrong(RobotFileError::Compile(error)))?;
+        let (text, model) =
+            read_and_compile(&file.path, file.text.as_deref(), |error| wrong(RobotFileError::Compile(error)))?;
         let names = PartNames::of_model(&model);
-        let places = Places::of(&text, &file.path);
+        let places = SourceLocations::of(&text, &file.path);
         let owner = of.named.to_string();
         let root = tree::root(&model, &names, &places, of.fix_base).map_err(&wrong)?;
         world::check(&owner, &model, &names, &places, diagnostics).map_err(&wrong)?;
-        world::say_contacts(&owner, &model, &names, of.self_collision, &places.file(), diagnostics);
+        world::warn_contacts(&owner, &model, &names, of.self_collision, &places.file(), diagnostics);
         let couplings = couplings::of_joints(&owner, &model, &names, &places, diagnostics);
         let acting = drives::of_joints(&owner, &model, &names, &places, &couplings, diagnostics).map_err(&wrong)?;
-        friction::say(&owner, &model, &names, &couplings, &places.file(), diagnostics);
-        let describing = Describing {
+        friction::warn_solver_params(&owner, &model, &names, &couplings, &places.file(), diagnostics);
+        let describing = DescriptionBuilder {
             uid: of.uid,
             owner: &owner,
             model: &model,
             names: &names,
             places: &places,
             root,
-            acting: &acting,
+            actuation: &acting,
             couplings: &couplings,
         };
-        let Described { description, links, joints } = describing.describe(diagnostics);
+        let FileDescription { description, links, joints } = describing.build(diagnostics);
         let stem = format!("robot{}_", of.index);
         let pose = Pose::identity();
-        let part = PartOf { model: &model, names: &names, uid: of.uid, pose: &pose, stem: &stem, rig: None };
+        let part = PartSource { model: &model, names: &names, uid: of.uid, pose: &pose, stem: &stem, rig: None };
         let files = part.check().and_then(|()| part.files()).map_err(|error| wrong(error.into()))?;
         let sensors_left_out = world::sensors(&model, &names);
-        diagnostics.extend(compare(&owner, &text, &file.path, &model, of.scene.unwrap_or(&model), &sensors_left_out));
+        diagnostics.extend(setting_warnings(
+            &owner,
+            &text,
+            &file.path,
+            &model,
+            of.scene.unwrap_or(&model),
+            &sensors_left_out,
+        ));
         let is_kept = |s: &usize| sensors_left_out.iter().all(|(other, _)| other != s);
         let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
         let sensors = engine_sensors(of.uid, &model, &names, &kept);
@@ -142,35 +155,40 @@ impl RobotFile {
     pub(crate) fn add(
         &self,
         description: &RobotDescription,
-        cfg: &RobotCfg<'_>,
+        cfg: &RobotMjcfCfg<'_>,
         self_collision: bool,
         mjcf: &mut Mjcf,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<RobotLayout, PartError> {
-        let rows = matches!(cfg.purpose, Purpose::Run { friction_tendons: true });
+        let rows = matches!(cfg.dialect, MjcfDialect::Simulation { friction_tendons: true });
         let (joints, damped) = self.passive(cfg, rows, mjcf);
         let contact = match cfg.contact {
             GeomRole::Collision { contype, conaffinity, .. } => [contype, conaffinity],
             GeomRole::Visual => [0, 0],
         };
         let base = match (self.root.free_joint, cfg.fix_base) {
-            (Some(joint), true) => Base::Fixed(joint),
-            (None, false) => Base::Free { body: self.root.body, name: unused_joint(description, cfg.uid, "base") },
-            _ => Base::AsFile,
+            (Some(joint), true) => RootAttachment::Fixed(joint),
+            (None, false) => {
+                RootAttachment::Free { body: self.root.body, name: unused_joint_name(description, cfg.uid, "base") }
+            }
+            _ => RootAttachment::AsFile,
         };
         let free_joint = match &base {
-            Base::Free { name, .. } => Some(name.clone()),
-            Base::Fixed(_) => None,
-            Base::AsFile => self.root.free_joint.map(|joint| self.full(cfg, &self.names.joints[joint])),
+            RootAttachment::Free { name, .. } => Some(name.clone()),
+            RootAttachment::Fixed(_) => None,
+            RootAttachment::AsFile => {
+                self.root.free_joint.map(|joint| self.scoped_name(cfg, &self.names.joints[joint]))
+            }
         };
-        let inertials = self.loaded_bodies(description, cfg.fix_base, diagnostics);
-        let (pairs, colliding) = (world::pairs(&self.model, self_collision), world::colliding(&self.model));
-        let rig = Rig { joints, base, contact, pairs, colliding, inertials };
+        let inertials = self.overridden_inertials(description, cfg.fix_base, diagnostics);
+        let (pairs, colliding) =
+            (world::omitted_pairs(&self.model, self_collision), world::pair_only_geoms(&self.model));
+        let rig = RobotOverrides { joints, base, contact, pairs, colliding, inertials };
         let (model, names) = (&self.model, &self.names);
-        let part = PartOf { model, names, uid: cfg.uid, pose: &cfg.base_pose, stem: &self.stem, rig: Some(&rig) };
-        mjcf.parts.push(Arc::new(MjcfPart::new(&part, self.sensors_left_out.clone(), &self.source)?));
+        let part = PartSource { model, names, uid: cfg.uid, pose: &cfg.base_pose, stem: &self.stem, rig: Some(&rig) };
+        mjcf.parts.push(Arc::new(PartDocument::new(&part, self.sensors_left_out.clone(), &self.source)?));
         for plan in cfg.plans {
-            let tendon = rows && (plan.friction > 0.0 || cfg.room_for_friction);
+            let tendon = rows && (plan.friction > 0.0 || cfg.reserve_friction_tendons);
             add_drive(mjcf, cfg.uid, description.joint(plan.joint), plan, tendon);
         }
         let links =
@@ -178,12 +196,12 @@ impl RobotFile {
         let of_body = |body: usize| self.links.iter().position(|(other, _)| *other == body).map(LinkId);
         let geoms = (0..model.ngeom()).filter_map(|geom| {
             let body = usize::try_from(model.geom_bodyid()[geom]).ok().filter(|body| *body > 0)?;
-            Some(GeomOwner { geom: self.full(cfg, &names.geoms[geom]), link: of_body(body)?, visual: None })
+            Some(GeomOwner { geom: self.scoped_name(cfg, &names.geoms[geom]), link: of_body(body)?, visual: None })
         });
         Ok(RobotLayout {
             links: links.collect(),
             free_joint,
-            base_pairs: self.base_pairs(cfg),
+            base_contact_exclusions: self.base_pairs(cfg),
             geoms: geoms.collect(),
             damped,
         })
@@ -194,22 +212,27 @@ impl RobotFile {
         &self.names.tendons
     }
 
-    fn full(&self, cfg: &RobotCfg<'_>, name: &str) -> String {
+    fn scoped_name(&self, cfg: &RobotMjcfCfg<'_>, name: &str) -> String {
         format!("{}/{name}", cfg.uid)
     }
 
     /// Name in the document of a body of the file.
-    fn body(&self, cfg: &RobotCfg<'_>, body: usize) -> String {
-        if body == 0 { cfg.uid.into() } else { self.full(cfg, &self.names.bodies[body]) }
+    fn body(&self, cfg: &RobotMjcfCfg<'_>, body: usize) -> String {
+        if body == 0 { cfg.uid.into() } else { self.scoped_name(cfg, &self.names.bodies[body]) }
     }
 
     /// Passive properties of all joints, and the joints whose damping is integrated with the drives.
-    fn passive(&self, cfg: &RobotCfg<'_>, rows: bool, mjcf: &Mjcf) -> (Vec<Passive>, Vec<DampedJoint>) {
+    fn passive(
+        &self,
+        cfg: &RobotMjcfCfg<'_>,
+        rows: bool,
+        mjcf: &Mjcf,
+    ) -> (Vec<PassiveJointProperties>, Vec<DampedJoint>) {
         let m = &self.model;
         let mut damped = Vec::new();
         let of_joint = |joint: usize| {
             let dof = m.jnt_dofadr()[joint] as usize;
-            let mut passive = Passive {
+            let mut passive = PassiveJointProperties {
                 damping: m.dof_damping()[dof],
                 armature: m.dof_armature()[dof],
                 frictionloss: m.dof_frictionloss()[dof],
@@ -217,11 +240,11 @@ impl RobotFile {
             if let Some(plan) = self.joints[joint].and_then(|id| cfg.plans.iter().find(|plan| plan.joint == id)) {
                 let tendon = rows && plan.actuator.is_some();
                 let frictionloss = if tendon { 0.0 } else { plan.friction };
-                passive = Passive { damping: plan.damping, armature: plan.armature, frictionloss };
+                passive = PassiveJointProperties { damping: plan.damping, armature: plan.armature, frictionloss };
             }
             passive
         };
-        let mut joints: Vec<Passive> = (0..m.njnt()).map(of_joint).collect();
+        let mut joints: Vec<PassiveJointProperties> = (0..m.njnt()).map(of_joint).collect();
         // As for robots from URDF files; `mjcf::robot` gives the reason.
         if rows && mjcf.option.integrator != Integrator::Rk4 {
             for (joint, passive) in joints.iter_mut().enumerate() {
@@ -231,7 +254,7 @@ impl RobotFile {
                     let armature = passive.armature;
                     passive.armature += mjcf.option.timestep * damping;
                     let dofs = if words::joint(m.jnt_type()[joint]) == Some("free") { 6 } else { 1 };
-                    let joint = self.full(cfg, &self.names.joints[joint]);
+                    let joint = self.scoped_name(cfg, &self.names.joints[joint]);
                     damped.push(DampedJoint { joint, dofs, damping, armature });
                 }
             }
@@ -240,14 +263,14 @@ impl RobotFile {
     }
 
     /// Mass properties of the bodies whose links carry mass beyond that of the file.
-    fn loaded_bodies(
+    fn overridden_inertials(
         &self,
         description: &RobotDescription,
         fix_base: bool,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> BTreeMap<usize, Inertial> {
         let mut loaded = BTreeMap::new();
-        for (body, &still) in self.still_bodies(fix_base).iter().enumerate().skip(1) {
+        for (body, &still) in self.static_bodies(fix_base).iter().enumerate().skip(1) {
             let of_body = self.links.iter().enumerate().filter(|(_, (other, _))| *other == body);
             let links: Vec<(LinkId, Pose)> = of_body.map(|(link, (_, pose))| (LinkId(link), *pose)).collect();
             let mass = |(link, _): &(LinkId, Pose)| description.link(*link).inertial.as_ref().map_or(0.0, |i| i.mass);
@@ -268,7 +291,7 @@ impl RobotFile {
     }
 
     /// True for each body that never moves.
-    fn still_bodies(&self, fix_base: bool) -> Vec<bool> {
+    fn static_bodies(&self, fix_base: bool) -> Vec<bool> {
         let m = &self.model;
         let root = if self.root.free_joint.is_some() { self.root.body } else { 0 };
         (0..m.nbody()).map(|body| body == 0 || fix_base && m.body_weldid()[body] as usize == root).collect()
@@ -276,8 +299,8 @@ impl RobotFile {
 
     /// Pairs of a body that never moves and a moving child body: MuJoCo does not exclude their contacts. Pairs that the
     /// file excludes itself are omitted.
-    fn base_pairs(&self, cfg: &RobotCfg<'_>) -> Vec<(String, String)> {
-        let still = self.still_bodies(cfg.fix_base);
+    fn base_pairs(&self, cfg: &RobotMjcfCfg<'_>) -> Vec<(String, String)> {
+        let still = self.static_bodies(cfg.fix_base);
         let parent = |body: usize| self.model.body_parentid()[body] as usize;
         (1..still.len())
             .filter(|&body| parent(body) > 0 && still[parent(body)] && !still[body])

@@ -1,25 +1,25 @@
 //! Locations of the named elements of a file and of the files it includes.
 
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Maximum number of files that are read; MuJoCo rejects a file that is included twice.
-const MOST_FILES: usize = 100;
+const MAX_INCLUDED_FILES: usize = 100;
 
 /// Locations of the named elements of a file.
-pub(super) struct Places {
-    file: Source,
+pub(super) struct SourceLocations {
+    file: SourceLocation,
     /// Locations by kind and name.
-    named: HashMap<(String, String), Source>,
+    named: HashMap<(String, String), SourceLocation>,
 }
 
-impl Places {
+impl SourceLocations {
     /// Searches `text`, the content of `file`. Elements that this search misses are located at the first line of the
     /// file.
     pub(super) fn of(text: &str, file: &Path) -> Self {
-        let mut places = Self { file: Source::new(file, 1), named: HashMap::new() };
+        let mut places = Self { file: SourceLocation::new(file, 1), named: HashMap::new() };
         places.add(text, file, file.parent().unwrap_or(Path::new("")), &mut 0);
         places
     }
@@ -32,7 +32,7 @@ impl Places {
             let tag = node.tag_name().name();
             if tag == "include"
                 && let Some(path) = node.attribute("file").map(|name| folder.join(name))
-                && *files < MOST_FILES
+                && *files < MAX_INCLUDED_FILES
                 && let Ok(text) = std::fs::read_to_string(&path)
             {
                 self.add(&text, &path, folder, files);
@@ -47,17 +47,17 @@ impl Places {
             };
             let line = document.text_pos_at(node.range().start).row;
             let key = (kind.to_string(), name.to_string());
-            self.named.entry(key).or_insert_with(|| Source { file: Arc::clone(&shared), line });
+            self.named.entry(key).or_insert_with(|| SourceLocation { file: Arc::clone(&shared), line });
         }
     }
 
     /// Location of the `kind` called `name`; the first line of the file if the search missed it.
-    pub(super) fn get(&self, kind: &str, name: &str) -> Source {
+    pub(super) fn get(&self, kind: &str, name: &str) -> SourceLocation {
         self.named.get(&(kind.to_string(), name.to_string())).unwrap_or(&self.file).clone()
     }
 
     /// Location of the first line of the file.
-    pub(super) fn file(&self) -> Source {
+    pub(super) fn file(&self) -> SourceLocation {
         self.file.clone()
     }
 }
@@ -74,14 +74,14 @@ mod tests {
         let file = dir.path().join("whole.xml");
         let text = "<mujoco><worldbody>\n<body name='a'><freejoint name='f'/>\n<joint name='a'/></body>\n\
                     <include file='part.xml'/></worldbody>\n<actuator><motor name='a'/></actuator></mujoco>";
-        let places = Places::of(text, &file);
+        let places = SourceLocations::of(text, &file);
         for (kind, name, expected) in [
-            ("body", "a", Source::new(&file, 2)),
-            ("joint", "f", Source::new(&file, 2)),
-            ("joint", "a", Source::new(&file, 3)),
-            ("body", "b", Source::new(&part, 3)),
-            ("actuator", "a", Source::new(&file, 5)),
-            ("joint", "none", Source::new(&file, 1)),
+            ("body", "a", SourceLocation::new(&file, 2)),
+            ("joint", "f", SourceLocation::new(&file, 2)),
+            ("joint", "a", SourceLocation::new(&file, 3)),
+            ("body", "b", SourceLocation::new(&part, 3)),
+            ("actuator", "a", SourceLocation::new(&file, 5)),
+            ("joint", "none", SourceLocation::new(&file, 1)),
         ] {
             assert_eq!(places.get(kind, name), expected, "{kind} {name}");
         }

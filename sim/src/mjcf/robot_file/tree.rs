@@ -6,20 +6,20 @@
 //! by ref. Two joints of one body have an auxiliary frame without a body between them. Another auxiliary frame follows
 //! the last joint if its anchor is not the origin of the body.
 
-use super::couplings::{Coupling, Follows};
-use super::drives::{Acting, is_single};
+use super::couplings::{Coupling, PolynomialRelation};
+use super::drives::{JointActuation, is_single_dof};
 use super::error::RobotFileError;
-use super::places::Places;
+use super::places::SourceLocations;
 use crate::mjcf::part::PartNames;
 use kinetoscope_mujoco::{Model, words};
 use kinetoscope_robot::description::{
-    Curve, FileDrive, Inertial, Joint, JointDefaults, JointId, JointKind, JointLimit, Link, LinkId, Mimic,
-    RobotDescription,
+    CouplingPolynomial, FileActuation, Inertial, Joint, JointDefaults, JointId, JointKind, JointLimit, Link, LinkId,
+    Mimic, RobotDescription,
 };
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use nalgebra::{Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 
@@ -35,14 +35,19 @@ pub(super) struct Root {
 }
 
 /// Finds the root, and rejects features that robots do not support.
-pub(super) fn root(model: &Model, names: &PartNames, places: &Places, fix_base: bool) -> Result<Root, RobotFileError> {
+pub(super) fn root(
+    model: &Model,
+    names: &PartNames,
+    places: &SourceLocations,
+    fix_base: bool,
+) -> Result<Root, RobotFileError> {
     let roots: Vec<usize> = (1..model.nbody()).filter(|&body| model.body_parentid()[body] == 0).collect();
     let body = match roots[..] {
         [] => return Err(RobotFileError::NoBody),
         [root] => root,
         _ => {
             let roots = roots.iter().map(|&body| format!("{:?}", names.bodies[body])).collect();
-            return Err(RobotFileError::SeveralRoots { roots });
+            return Err(RobotFileError::MultipleRoots { roots });
         }
     };
     let kind = |joint: usize| words::joint(model.jnt_type()[joint]);
@@ -54,7 +59,7 @@ pub(super) fn root(model: &Model, names: &PartNames, places: &Places, fix_base: 
         let name = &names.bodies[body];
         return Err(RobotFileError::MocapBody { at: places.get("body", name), body: name.clone() });
     }
-    if !(0..model.njnt()).any(|joint| is_single(model, joint)) {
+    if !(0..model.njnt()).any(|joint| is_single_dof(model, joint)) {
         return Err(RobotFileError::NoJoint);
     }
     // MuJoCo allows a free joint only to a body in the world, as its only joint.
@@ -64,7 +69,7 @@ pub(super) fn root(model: &Model, names: &PartNames, places: &Places, fix_base: 
     if is_world && !fix_base {
         let joint = &names.joints[of_root[0]];
         let (at, body) = (places.get("joint", joint), names.bodies[body].clone());
-        return Err(RobotFileError::BaseIsJointed { at, joint: joint.clone(), body });
+        return Err(RobotFileError::BaseNotFree { at, joint: joint.clone(), body });
     }
     Ok(Root { body, free_joint, is_world })
 }
@@ -94,7 +99,7 @@ fn translation(by: Vector3<f64>) -> Pose {
 
 /// Description with its relation to the file.
 #[derive(Debug)]
-pub(super) struct Described {
+pub(super) struct FileDescription {
     pub(super) description: RobotDescription,
     /// Body of the file, and pose in that body, for each named link.
     pub(super) links: Vec<(usize, Pose)>,
@@ -103,22 +108,22 @@ pub(super) struct Described {
 }
 
 /// Converter of a compiled file to a description.
-pub(super) struct Describing<'a> {
+pub(super) struct DescriptionBuilder<'a> {
     pub(super) uid: &'a str,
     /// Label of the robot in diagnostics.
     pub(super) owner: &'a str,
     pub(super) model: &'a Model,
     pub(super) names: &'a PartNames,
-    pub(super) places: &'a Places,
+    pub(super) places: &'a SourceLocations,
     pub(super) root: Root,
-    pub(super) acting: &'a [Acting],
+    pub(super) actuation: &'a [JointActuation],
     pub(super) couplings: &'a [Option<Coupling>],
 }
 
 /// Set of names in use.
-struct Names(BTreeSet<String>);
+struct NameSet(BTreeSet<String>);
 
-impl Names {
+impl NameSet {
     /// Returns `name`, with `suffix` appended until the name is unused.
     fn unused(&mut self, name: &str, suffix: &str) -> String {
         let mut name = name.to_string();
@@ -129,10 +134,10 @@ impl Names {
     }
 }
 
-impl Describing<'_> {
-    pub(super) fn describe(&self, diagnostics: &mut Vec<Diagnostic>) -> Described {
+impl DescriptionBuilder<'_> {
+    pub(super) fn build(&self, diagnostics: &mut Vec<Diagnostic>) -> FileDescription {
         let m = self.model;
-        let mut names = Names(BTreeSet::new());
+        let mut names = NameSet(BTreeSet::new());
         let mut links = Vec::new();
         let mut placed = Vec::new();
         // Body b is link b - 1, or link b if the file's world is the root.
@@ -157,14 +162,14 @@ impl Describing<'_> {
             placed.push((m.site_bodyid()[site] as usize, pose_of(m.site_pos(), m.site_quat(), site)));
         }
         let named = links.len();
-        let mut joint_names = Names(self.names.joints.iter().cloned().collect());
+        let mut joint_names = NameSet(self.names.joints.iter().cloned().collect());
         let mut joints = Vec::new();
         let mut of_file = vec![None; m.njnt()];
         let link_of = |body: usize| LinkId(body - first);
         let all = (1..m.nbody()).filter(|&body| self.root.is_world || body != self.root.body);
         for body in all {
             let (mut parent, child) = (link_of(m.body_parentid()[body] as usize), link_of(body));
-            // Pose of the next frame in the parent: the pose of the body, moved by `at` in its axes.
+            // Pose of the next frame in the parent: the pose of the body, moved by `driver_start` in its axes.
             let (mut before, mut at) = (body_pose(m, body), Vector3::zeros());
             let of_body = joints_of(m, body);
             for (k, &joint) in of_body.iter().enumerate() {
@@ -186,7 +191,7 @@ impl Describing<'_> {
                 } else {
                     let name = names.unused(&format!("{}.frame", self.names.joints[joint]), "'");
                     let source = self.places.get("joint", &self.names.joints[joint]);
-                    links.push(Link { between_joints: true, ..self.link(name, source) });
+                    links.push(Link { is_auxiliary_frame: true, ..self.link(name, source) });
                     LinkId(links.len() - 1)
                 };
                 of_file[joint] = Some(JointId(joints.len()));
@@ -214,15 +219,15 @@ impl Describing<'_> {
                         joints[id.0].mimic = Some(Mimic { source, joint: driver, multiplier, offset });
                     }
                 }
-                Some(Coupling::Other(follows)) => {
-                    let curve = follows.map(|Follows { driver, coefficients }| Curve {
+                Some(Coupling::Nonlinear(follows)) => {
+                    let curve = follows.map(|PolynomialRelation { driver, coefficients }| CouplingPolynomial {
                         joint: driver.and_then(|driver| of_file[driver]),
-                        at: driver.map_or(0.0, |driver| self.start(driver)),
-                        start: self.start(joint),
+                        driver_start: driver.map_or(0.0, |driver| self.start(driver)),
+                        follower_start: self.start(joint),
                         coefficients,
                     });
                     if let Some(defaults) = &mut joints[id.0].defaults {
-                        defaults.drive = FileDrive::Coupled(curve);
+                        defaults.drive = FileActuation::Coupled(curve);
                     }
                 }
             }
@@ -233,14 +238,14 @@ impl Describing<'_> {
         }
         // The root is the first link: the world, or the first body.
         let description = RobotDescription { name: self.uid.into(), links, joints, root: LinkId(0) };
-        Described { description, links: placed, joints: of_file }
+        FileDescription { description, links: placed, joints: of_file }
     }
 
-    fn link(&self, name: String, source: Source) -> Link {
+    fn link(&self, name: String, source: SourceLocation) -> Link {
         Link::new(name, source, self.uid.into())
     }
 
-    fn inertial(&self, body: usize, source: &Source) -> Option<Inertial> {
+    fn inertial(&self, body: usize, source: &SourceLocation) -> Option<Inertial> {
         let m = self.model;
         let (mass, moments) = (m.body_mass()[body], vector(m.body_inertia(), body));
         (body > 0 && (mass > 0.0 || moments.max() > 0.0)).then(|| Inertial {
@@ -267,7 +272,7 @@ impl Describing<'_> {
         let m = self.model;
         let (name, dof) = (self.names.joints[joint].clone(), m.jnt_dofadr()[joint] as usize);
         let source = self.places.get("joint", &name);
-        let Acting { drive, effort } = self.acting[joint];
+        let JointActuation { drive, effort } = self.actuation[joint];
         let range = m.jnt_limited(joint).then(|| [m.jnt_range()[2 * joint], m.jnt_range()[2 * joint + 1]]);
         let limit = (range.is_some() || effort.is_some()).then(|| JointLimit {
             source: source.clone(),
@@ -298,7 +303,7 @@ impl Describing<'_> {
     }
 }
 
-fn fixed(name: String, source: Source, parent: LinkId, child: LinkId, parent_from_joint: Pose) -> Joint {
+fn fixed(name: String, source: SourceLocation, parent: LinkId, child: LinkId, parent_from_joint: Pose) -> Joint {
     Joint {
         name,
         source,

@@ -1,17 +1,17 @@
 //! Elements of the file's world, which a robot leaves out, and elements that depend on them.
 
 use super::error::RobotFileError;
-use super::places::Places;
-use crate::mjcf::part::{LeftOut, PartNames, sensors_left_out};
+use super::places::SourceLocations;
+use crate::mjcf::part::{OmittedElement, PartNames, sensors_left_out};
 use kinetoscope_mujoco::Model;
 use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::PathPoint;
+use kinetoscope_mujoco::words::WrapType;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::Source;
+use kinetoscope_scene::source::SourceLocation;
 use std::collections::BTreeSet;
 
 /// Converts an index of MuJoCo, which is -1 for no object.
-fn some(index: i32) -> Option<usize> {
+fn mj_index(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }
 
@@ -20,7 +20,7 @@ pub(super) fn check(
     owner: &str,
     model: &Model,
     names: &PartNames,
-    places: &Places,
+    places: &SourceLocations,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<(), RobotFileError> {
     let in_world = |bodies: &[i32], kind: &'static str, of: &[String]| {
@@ -44,13 +44,13 @@ pub(super) fn check(
     for tendon in 0..model.ntendon() {
         let first = model.tendon_adr()[tendon] as usize;
         for point in first..first + model.tendon_num()[tendon] as usize {
-            let Some(id) = some(model.wrap_objid()[point]) else { continue };
+            let Some(id) = mj_index(model.wrap_objid()[point]) else { continue };
             let site = |id: usize| (model.site_bodyid()[id] == 0).then(|| &names.sites[id]);
-            let used = match words::path_point(model.wrap_type()[point]) {
-                Some(PathPoint::Site) => site(id),
-                Some(PathPoint::Geom) => {
+            let used = match words::wrap_type(model.wrap_type()[point]) {
+                Some(WrapType::Site) => site(id),
+                Some(WrapType::Geom) => {
                     let geom = (model.geom_bodyid()[id] == 0).then(|| &names.geoms[id]);
-                    geom.or_else(|| some(model.wrap_prm()[point].round() as i32).and_then(site))
+                    geom.or_else(|| mj_index(model.wrap_prm()[point].round() as i32).and_then(site))
                 }
                 _ => None,
             };
@@ -61,7 +61,7 @@ pub(super) fn check(
     }
     for equality in (0..model.neq()).filter(|&equality| model.equality_is_between_sites(equality)) {
         let sites = [model.eq_obj1id()[equality], model.eq_obj2id()[equality]];
-        if let Some(site) = sites.into_iter().filter_map(some).find(|&site| model.site_bodyid()[site] == 0) {
+        if let Some(site) = sites.into_iter().filter_map(mj_index).find(|&site| model.site_bodyid()[site] == 0) {
             return Err(needs("equality", &names.equalities[equality], &names.sites[site]));
         }
     }
@@ -70,25 +70,28 @@ pub(super) fn check(
 
 /// Sensors that a robot cannot have: those that no part can have, and those of actuators and of elements of the file's
 /// world.
-pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)> {
+pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedElement)> {
     let mut left_out = sensors_left_out(model, names);
     for sensor in 0..model.nsensor() {
         if left_out.iter().any(|(other, _)| *other == sensor) {
             continue;
         }
         // Drives are friction rows or forces of this crate, which MuJoCo's sum over actuators does not include.
-        let word = words::sensor(model.sensor_type()[sensor]).map_or("", |word| word.word);
+        let word = words::sensor(model.sensor_type()[sensor]).map_or("", |word| word.keyword);
         if matches!(word, "jointactuatorfrc" | "tendonactuatorfrc") {
             let what = format!("the type {word}, the force of actuators, whose place drives take");
-            left_out.push((sensor, LeftOut { element: "sensor", name: names.sensors[sensor].clone(), what }));
+            left_out.push((
+                sensor,
+                OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property: what },
+            ));
             continue;
         }
         let observed = [
             (model.sensor_objtype()[sensor], model.sensor_objid()[sensor]),
             (model.sensor_reftype()[sensor], model.sensor_refid()[sensor]),
         ];
-        let gone = observed.into_iter().find_map(|(kind, id)| {
-            let (word, id) = (words::observed(kind)?, some(id)?);
+        let omitted = observed.into_iter().find_map(|(kind, id)| {
+            let (word, id) = (words::object_type(kind)?, mj_index(id)?);
             let (name, is_gone) = match word {
                 "actuator" => (&names.actuators[id], true),
                 "geom" => (&names.geoms[id], model.geom_bodyid()[id] == 0),
@@ -98,8 +101,11 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)>
             };
             is_gone.then(|| format!("{word} {name:?}, which a robot leaves out"))
         });
-        if let Some(what) = gone {
-            left_out.push((sensor, LeftOut { element: "sensor", name: names.sensors[sensor].clone(), what }));
+        if let Some(what) = omitted {
+            left_out.push((
+                sensor,
+                OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property: what },
+            ));
         }
     }
     left_out.sort_by_key(|(sensor, _)| *sensor);
@@ -108,25 +114,26 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)>
 
 /// Warns about contacts of the file that the robot does not have: geom pairs that are left out, and excluded pairs with
 /// the file's world.
-pub(super) fn say_contacts(
+pub(super) fn warn_contacts(
     owner: &str,
     model: &Model,
     names: &PartNames,
     self_collision: bool,
-    file: &Source,
+    file: &SourceLocation,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let mut say = |message: String| {
         diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, file.clone(), format!("{owner}: {message}")));
     };
-    let geom = |id: i32| some(id).map_or_else(String::new, |id| format!("{:?}", names.geoms[id]));
+    let geom = |id: i32| mj_index(id).map_or_else(String::new, |id| format!("{:?}", names.geoms[id]));
     let named = |pairs: &BTreeSet<usize>| {
         let named = |&p: &usize| format!("{} and {}", geom(model.pair_geom1()[p]), geom(model.pair_geom2()[p]));
         pairs.iter().map(named).collect::<Vec<_>>().join(", ")
     };
-    let with_world = pairs(model, true);
+    let with_world = omitted_pairs(model, true);
     if !with_world.is_empty() {
-        let colliding: Vec<String> = colliding(model).iter().map(|&id| format!("{:?}", names.geoms[id])).collect();
+        let colliding: Vec<String> =
+            pair_only_geoms(model).iter().map(|&id| format!("{:?}", names.geoms[id])).collect();
         let more = match colliding.as_slice() {
             [] => String::new(),
             geoms => format!(
@@ -139,7 +146,7 @@ pub(super) fn say_contacts(
             named(&with_world)
         ));
     }
-    let own = &pairs(model, self_collision) - &with_world;
+    let own = &omitted_pairs(model, self_collision) - &with_world;
     if !own.is_empty() {
         say(format!("pairs of its own geoms hold only with self_collision: true: {}", named(&own)));
     }
@@ -152,11 +159,11 @@ pub(super) fn say_contacts(
 }
 
 /// Geoms of the robot whose bits disable collisions, but which the file pairs with geoms of its world.
-pub(super) fn colliding(model: &Model) -> BTreeSet<usize> {
+pub(super) fn pair_only_geoms(model: &Model) -> BTreeSet<usize> {
     let mut geoms = BTreeSet::new();
-    for pair in pairs(model, true) {
+    for pair in omitted_pairs(model, true) {
         let both = [model.pair_geom1()[pair], model.pair_geom2()[pair]];
-        geoms.extend(both.into_iter().filter_map(some).filter(|&geom| {
+        geoms.extend(both.into_iter().filter_map(mj_index).filter(|&geom| {
             model.geom_bodyid()[geom] > 0 && model.geom_contype()[geom] == 0 && model.geom_conaffinity()[geom] == 0
         }));
     }
@@ -164,8 +171,8 @@ pub(super) fn colliding(model: &Model) -> BTreeSet<usize> {
 }
 
 /// Geom pairs that are left out: pairs with geoms of the file's world, and all pairs of a robot without self-collision.
-pub(super) fn pairs(model: &Model, self_collision: bool) -> BTreeSet<usize> {
-    let of_world = |geom: i32| some(geom).is_some_and(|geom| model.geom_bodyid()[geom] == 0);
+pub(super) fn omitted_pairs(model: &Model, self_collision: bool) -> BTreeSet<usize> {
+    let of_world = |geom: i32| mj_index(geom).is_some_and(|geom| model.geom_bodyid()[geom] == 0);
     let is_left_out =
         |pair: &usize| !self_collision || of_world(model.pair_geom1()[*pair]) || of_world(model.pair_geom2()[*pair]);
     (0..model.npair()).filter(is_left_out).collect()

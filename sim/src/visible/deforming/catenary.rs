@@ -9,9 +9,9 @@ use kinetoscope_mujoco::{Data, Model, words};
 /// Number of segments of a hanging tendon; MuJoCo has as many as its round shapes have slices, 28 by default.
 pub(super) const SEGMENTS: usize = 28;
 /// Relative excess over the straight length up to which a tendon is straight: it would sag by 1/50 000 of its length.
-const TAUT: f64 = 1e-9;
+const STRAIGHT_TOLERANCE: f64 = 1e-9;
 /// Ratio of length to horizontal distance above which a tendon hangs as two straight lines, as in MuJoCo.
-const STEEP: f64 = 100.0;
+const MAX_LENGTH_RATIO: f64 = 100.0;
 
 /// True if a tendon hangs when it is slack.
 pub(super) fn may_hang(model: &Model, tendon: usize) -> bool {
@@ -21,14 +21,14 @@ pub(super) fn may_hang(model: &Model, tendon: usize) -> bool {
     };
     model.tendon_num()[tendon] == 2
         && model.tendon_damping()[tendon] == 0.0
-        && !model.tendon_has_curves(tendon)
+        && !model.tendon_has_nonlinear_terms(tendon)
         && model.tendon_frictionloss()[tendon] == 0.0
-        && model.gravity_acts()
+        && model.has_gravity()
         && !(0..model.nactuator()).any(acts)
 }
 
 /// Length of a tendon that may hang \[m\]; `None` if it is straight.
-pub(super) fn slack(data: &Data, tendon: usize) -> Option<f64> {
+pub(super) fn hanging_length(data: &Data, tendon: usize) -> Option<f64> {
     let model = data.model();
     let [lower, upper] = [0, 1].map(|k| model.tendon_range()[2 * tendon + k]);
     if model.tendon_stiffness()[tendon] != 0.0 {
@@ -57,7 +57,7 @@ pub(super) fn segments([from, to]: [[f64; 3]; 2], gravity: [f64; 3], length: f64
     }
     let across = if run > 1e-15 { level.map(|x| x / run) } else { [0.0; 3] };
     let at = |x: f64, height: f64| [0, 1, 2].map(|k| from[k] + x * across[k] + height * up[k]);
-    if length > STEEP * run {
+    if length > MAX_LENGTH_RATIO * run {
         // A bead on a string hangs where both parts are equally steep.
         let down = -0.5 * ((length * length - run * run).max(0.0).sqrt() - rise);
         let fall = 2.0 * down - rise;
@@ -66,7 +66,7 @@ pub(super) fn segments([from, to]: [[f64; 3]; 2], gravity: [f64; 3], length: f64
         return each([lowest, to]);
     }
     let ratio = (length * length - rise * rise).sqrt() / run;
-    if ratio - 1.0 <= TAUT {
+    if ratio - 1.0 <= STRAIGHT_TOLERANCE {
         return each([from, to]);
     }
     let scale = 0.5 * run / half_angle(ratio);

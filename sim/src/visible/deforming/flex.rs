@@ -25,7 +25,7 @@ impl Cable {
         let at = |vertex: i32| usize::try_from(vertex).ok().and_then(|vertex| points.get(vertex)).copied();
         for &[a, b] in flex.edges {
             if let (Some(a), Some(b)) = (at(a), at(b)) {
-                each(Segment { ends: [a, b], width: flex.radius });
+                each(Segment { ends: [a, b], radius: flex.radius });
             }
         }
     }
@@ -43,14 +43,14 @@ pub(super) struct Cloth {
     /// Triangles of flex vertices, whose normals are averaged.
     faces: Vec<[u32; 3]>,
     count: usize,
-    corners: Vec<Corner>,
+    corners: Vec<FlexVertex>,
     /// Triangles of the rendered mesh, as indices of `corners`.
     triangles: Vec<[u32; 3]>,
 }
 
 /// Vertex of the rendered mesh.
 #[derive(Clone, Copy, Debug)]
-struct Corner {
+struct FlexVertex {
     /// Index of the flex vertex.
     vertex: u32,
     /// Distance along the smooth normal \[m\].
@@ -60,10 +60,10 @@ struct Corner {
 }
 
 /// Collector of the vertices of the rendered mesh: one for each position, side and texture coordinate.
-struct Builder<'a> {
+struct FlexMeshBuilder<'a> {
     flex: &'a FlexArrays<'a>,
     known: HashMap<(u32, i32, u32, u32), u32>,
-    corners: Vec<Corner>,
+    corners: Vec<FlexVertex>,
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
 }
@@ -71,7 +71,7 @@ struct Builder<'a> {
 /// Triangle number of vertices with smooth normals, which triangles share.
 const SHARED: u32 = u32::MAX;
 
-impl Builder<'_> {
+impl FlexMeshBuilder<'_> {
     /// Adds a triangle of flex vertices, each on a side of the flex, with their texture coordinates.
     fn add(&mut self, vertices: [(u32, i32); 3], texcoords: [u32; 3], smooth: bool) {
         let number = if smooth { SHARED } else { self.triangles.len() as u32 };
@@ -80,7 +80,7 @@ impl Builder<'_> {
             let texcoord = if self.flex.texcoords.is_empty() { 0 } else { texcoord };
             *self.known.entry((vertex, side, texcoord, number)).or_insert_with(|| {
                 let offset = side as f32 * self.flex.radius as f32;
-                self.corners.push(Corner { vertex, offset, side: if smooth { side as f32 } else { 0.0 } });
+                self.corners.push(FlexVertex { vertex, offset, side: if smooth { side as f32 } else { 0.0 } });
                 let [u, v] = self.flex.texcoords.get(texcoord as usize).copied().unwrap_or_default();
                 // MuJoCo's v axis points down the image.
                 self.uvs.push([u, 1.0 - v]);
@@ -97,10 +97,15 @@ impl Cloth {
         let count = flex.vertices;
         let index = |n: i32| u32::try_from(n).unwrap_or(u32::MAX);
         let exists = |vertices: &[u32]| vertices.iter().all(|&vertex| (vertex as usize) < count);
-        let mut builder =
-            Builder { flex, known: HashMap::new(), corners: Vec::new(), uvs: Vec::new(), triangles: Vec::new() };
+        let mut builder = FlexMeshBuilder {
+            flex,
+            known: HashMap::new(),
+            corners: Vec::new(),
+            uvs: Vec::new(),
+            triangles: Vec::new(),
+        };
         let mut faces = Vec::new();
-        let smooth = !flex.flat;
+        let smooth = !flex.flat_shading;
         if flex.dimensions == 2 {
             for (element, texcoords) in
                 flex.elements.as_chunks::<3>().0.iter().zip(flex.element_texcoords.as_chunks::<3>().0)
@@ -129,7 +134,7 @@ impl Cloth {
                 }
             }
         }
-        let Builder { corners, uvs, triangles, .. } = builder;
+        let FlexMeshBuilder { corners, uvs, triangles, .. } = builder;
         let mut mesh = TriMesh::from_triangles(vec![[0.0; 3]; corners.len()], triangles.clone());
         mesh.uvs = (!flex.texcoords.is_empty()).then_some(uvs);
         (Self { first_vertex: flex.first_vertex, faces, count, corners, triangles }, mesh)

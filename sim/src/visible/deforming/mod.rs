@@ -12,11 +12,11 @@ mod tendon;
 #[cfg(test)]
 mod tests;
 
-pub(super) use buffers::Buffers;
+pub(super) use buffers::SceneBufferPool;
 
-use super::identity::Drawable;
-use super::shown::is_shown;
-use super::surface::{Surfaces, color};
+use super::identity::DeformingElement;
+use super::shown::is_visible;
+use super::surface::{ModelMaterials, color};
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh};
@@ -25,36 +25,36 @@ use std::sync::Arc;
 
 /// Instances of a model whose shapes change.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Deforming {
-    paths: Vec<Path>,
-    meshes: Vec<MovingMesh>,
+pub(super) struct DeformingInstances {
+    paths: Vec<CapsulePath>,
+    meshes: Vec<DeformingMesh>,
 }
 
 /// Capsules along a path that changes.
 #[derive(Clone, Debug)]
-struct Path {
+struct CapsulePath {
     first: usize,
     capsules: usize,
-    line: Line,
+    line: PathSource,
 }
 
 /// Path that capsules follow.
 #[derive(Clone, Debug)]
-enum Line {
+enum PathSource {
     Tendon(tendon::Tendon),
     Cable(flex::Cable),
 }
 
 /// Mesh whose vertices move.
 #[derive(Clone, Debug)]
-struct MovingMesh {
+struct DeformingMesh {
     instance: usize,
-    surface: Surface,
+    surface: MeshSource,
 }
 
 /// Element that moves the vertices of a mesh.
 #[derive(Clone, Debug)]
-enum Surface {
+enum MeshSource {
     Skin(usize),
     Flex(Arc<flex::Cloth>),
 }
@@ -63,7 +63,7 @@ enum Surface {
 struct Segment {
     ends: [[f64; 3]; 2],
     /// Radius \[m\].
-    width: f64,
+    radius: f64,
 }
 
 /// Working memory for the vertices of one mesh.
@@ -76,7 +76,7 @@ struct Scratch {
     of_flex: [Vec<[f32; 3]>; 2],
 }
 
-impl Line {
+impl PathSource {
     fn segments(&self, data: &Data, each: &mut dyn FnMut(Segment)) {
         match self {
             Self::Tendon(tendon) => tendon.segments(data, each),
@@ -85,7 +85,7 @@ impl Line {
     }
 }
 
-impl Surface {
+impl MeshSource {
     fn vertices(&self, data: &Data, scratch: &mut Scratch) {
         match self {
             Self::Skin(skin) => skin::vertices(data, *skin, scratch),
@@ -95,28 +95,32 @@ impl Surface {
 }
 
 /// Finds the visible elements of a model whose shape changes.
-pub(super) fn shown(model: &Model) -> Vec<Drawable> {
+pub(super) fn visible_elements(model: &Model) -> Vec<DeformingElement> {
     let tendons = (0..model.ntendon()).filter(|&t| {
         let rgba = &model.tendon_rgba()[4 * t..4 * t + 4];
         tendon::is_spatial(model, t)
             && model.tendon_width()[t] > 0.0
-            && is_shown(model.tendon_group()[t], &color(model, rgba, model.tendon_matid()[t]))
+            && is_visible(model.tendon_group()[t], &color(model, rgba, model.tendon_matid()[t]))
     });
     let skins = (0..model.nskin()).filter(|&s| {
         let skin = model.skin(s);
-        !skin.faces.is_empty() && is_shown(skin.group, &color(model, skin.rgba, skin.material))
+        !skin.faces.is_empty() && is_visible(skin.group, &color(model, skin.rgba, skin.material))
     });
     let flexes = (0..model.nflex()).filter(|&f| {
         let flex = model.flex(f);
         flex.is_some_and(|flex| {
             let drawn = flex.dimensions != 1 || flex.radius > 0.0;
-            drawn && is_shown(flex.group, &color(model, flex.rgba, flex.material))
+            drawn && is_visible(flex.group, &color(model, flex.rgba, flex.material))
         })
     });
-    tendons.map(Drawable::Tendon).chain(skins.map(Drawable::Skin)).chain(flexes.map(Drawable::Flex)).collect()
+    tendons
+        .map(DeformingElement::Tendon)
+        .chain(skins.map(DeformingElement::Skin))
+        .chain(flexes.map(DeformingElement::Flex))
+        .collect()
 }
 
-impl Deforming {
+impl DeformingInstances {
     pub(super) fn is_empty(&self) -> bool {
         self.paths.is_empty() && self.meshes.is_empty()
     }
@@ -129,8 +133,8 @@ impl Deforming {
     pub(super) fn add(
         &mut self,
         model: &Model,
-        surfaces: &Surfaces<'_>,
-        drawable: Drawable,
+        surfaces: &ModelMaterials<'_>,
+        drawable: DeformingElement,
         like: &Instance,
         instances: &mut Vec<Instance>,
     ) -> Result<(), RenderSceneError> {
@@ -139,47 +143,48 @@ impl Deforming {
             material,
             // A negative group counts as the first one, as in MuJoCo's viewers.
             group: u8::try_from(group.clamp(0, 31)).unwrap_or(0),
-            deforms: true,
+            is_deformable: true,
             ..like.clone()
         };
-        let mut path = |line: Line, capsules: usize, width: f64, material: Material, group: i32| {
+        let mut path = |line: PathSource, capsules: usize, width: f64, material: Material, group: i32| {
             let first = instances.len();
             let unused = Capsule { radius: width as f32, half_length: width as f32 };
             let hidden = Instance { visible: false, ..instance(unused.into(), material, group) };
             hidden.validate()?;
             instances.extend(std::iter::repeat_n(hidden, capsules));
-            self.paths.push(Path { first, capsules, line });
+            self.paths.push(CapsulePath { first, capsules, line });
             Ok(())
         };
         match drawable {
-            Drawable::Tendon(t) => {
+            DeformingElement::Tendon(t) => {
                 let tendon = tendon::Tendon::of(model, t);
                 let material = surfaces.material(&model.tendon_rgba()[4 * t..4 * t + 4], model.tendon_matid()[t]);
-                let capsules = tendon.most_segments();
-                path(Line::Tendon(tendon), capsules, model.tendon_width()[t], material, model.tendon_group()[t])
+                let capsules = tendon.max_segments();
+                path(PathSource::Tendon(tendon), capsules, model.tendon_width()[t], material, model.tendon_group()[t])
             }
-            Drawable::Skin(s) => {
+            DeformingElement::Skin(s) => {
                 let skin = model.skin(s);
                 let mesh = Arc::new(RenderMesh::deformable(&skin::bind_pose(&skin)));
                 let material = surfaces.material(skin.rgba, skin.material);
                 let skinned = instance(Mesh { mesh }.into(), material, skin.group);
                 skinned.validate()?;
-                self.meshes.push(MovingMesh { instance: instances.len(), surface: Surface::Skin(s) });
+                self.meshes.push(DeformingMesh { instance: instances.len(), surface: MeshSource::Skin(s) });
                 instances.push(skinned);
                 Ok(())
             }
-            Drawable::Flex(f) => {
+            DeformingElement::Flex(f) => {
                 let Some(flex) = model.flex(f) else { return Ok(()) };
                 let material = surfaces.material(flex.rgba, flex.material);
                 if flex.dimensions == 1 {
                     let cable = flex::Cable::of(f);
-                    return path(Line::Cable(cable), flex.edges.len(), flex.radius, material, flex.group);
+                    return path(PathSource::Cable(cable), flex.edges.len(), flex.radius, material, flex.group);
                 }
                 let (cloth, mesh) = flex::Cloth::of(&flex);
                 let mesh = Arc::new(RenderMesh::deformable(&mesh));
                 let draped = instance(Mesh { mesh }.into(), material, flex.group);
                 draped.validate()?;
-                self.meshes.push(MovingMesh { instance: instances.len(), surface: Surface::Flex(Arc::new(cloth)) });
+                self.meshes
+                    .push(DeformingMesh { instance: instances.len(), surface: MeshSource::Flex(Arc::new(cloth)) });
                 instances.push(draped);
                 Ok(())
             }
@@ -187,7 +192,7 @@ impl Deforming {
     }
 
     /// Moves the capsules of paths to their poses in `data`. Meshes are in the world frame.
-    pub(super) fn place(&self, data: &Data, poses: &mut [PoseF32]) {
+    pub(super) fn update_poses(&self, data: &Data, poses: &mut [PoseF32]) {
         for path in &self.paths {
             let poses = &mut poses[path.first..path.first + path.capsules];
             let mut used = 0;
@@ -205,7 +210,7 @@ impl Deforming {
     }
 
     /// Sets the shapes of a scene to those of `data`.
-    fn shape(&self, data: &Data, scene: &mut RenderScene, scratch: &mut Scratch) {
+    fn update_shapes(&self, data: &Data, scene: &mut RenderScene, scratch: &mut Scratch) {
         for path in &self.paths {
             let mut used = 0;
             path.line.segments(data, &mut |segment| {
@@ -220,7 +225,7 @@ impl Deforming {
                 scene.set_shape(index, shape, false);
             }
         }
-        for MovingMesh { instance, surface } in &self.meshes {
+        for DeformingMesh { instance, surface } in &self.meshes {
             surface.vertices(data, scratch);
             let Scratch { positions, normals, .. } = scratch;
             // A diverged environment keeps its last shape; the poses of its bodies show that it cannot be rendered.
@@ -254,7 +259,7 @@ impl Segment {
     fn capsule(&self) -> Capsule {
         let [from, to] = self.ends;
         let length = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
-        let radius = self.width as f32;
+        let radius = self.radius as f32;
         let half = (0.5 * length) as f32;
         let shortest = 1e-6 * radius;
         // The pose reports a position that is not finite.

@@ -12,7 +12,7 @@ use kinetoscope_mujoco::{Data, Model};
 pub(super) struct Tendon {
     tendon: usize,
     /// Number of points of the longest path.
-    most_points: usize,
+    max_points: usize,
     /// True if it hangs like a string when it is slack.
     may_hang: bool,
 }
@@ -31,15 +31,15 @@ impl Tendon {
         // Every element of a path gives at most two points: the tangent points on a geom.
         Self {
             tendon,
-            most_points: 2 * model.tendon_num()[tendon] as usize,
+            max_points: 2 * model.tendon_num()[tendon] as usize,
             may_hang: catenary::may_hang(model, tendon),
         }
     }
 
     /// Number of segments of the longest path.
-    pub(super) fn most_segments(&self) -> usize {
+    pub(super) fn max_segments(&self) -> usize {
         let hanging = if self.may_hang { catenary::SEGMENTS } else { 0 };
-        self.most_points.saturating_sub(1).max(hanging)
+        self.max_points.saturating_sub(1).max(hanging)
     }
 
     /// Segments of the path in `data`, in order.
@@ -52,10 +52,12 @@ impl Tendon {
         let points = data.wrap_xpos().as_chunks::<3>().0.get(first..first + count).unwrap_or(&[]);
         let objects = data.wrap_obj().get(first..first + count).unwrap_or(&[]);
         if self.may_hang
-            && let Some(length) = catenary::slack(data, self.tendon)
+            && let Some(length) = catenary::hanging_length(data, self.tendon)
             && let [from, to] = *points
         {
-            return catenary::segments([from, to], model.gravity(), length, &mut |ends| each(Segment { ends, width }));
+            return catenary::segments([from, to], model.gravity(), length, &mut |ends| {
+                each(Segment { ends, radius: width })
+            });
         }
         for (ends, objects) in points.array_windows::<2>().zip(objects.array_windows::<2>()) {
             if objects.contains(&PULLEY) {
@@ -63,7 +65,7 @@ impl Tendon {
             }
             // Thinner inside the geom that the tendon wraps around.
             let inside = objects.iter().all(|object| *object >= 0);
-            each(Segment { ends: *ends, width: if inside { 0.5 * width } else { width } });
+            each(Segment { ends: *ends, radius: if inside { 0.5 * width } else { width } });
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Tests of tendons, skins and flexes against closed forms.
 
-use super::super::Visible;
+use super::super::VisualScene;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::Shape;
@@ -17,19 +17,19 @@ fn state(mjcf: &str, qpos: &[f64]) -> (Model, Data) {
 }
 
 /// Scene of a state, with its poses.
-fn seen(visible: &Visible, data: &Data) -> (Arc<RenderScene>, Vec<PoseF32>) {
+fn seen(visible: &VisualScene, data: &Data) -> (Arc<RenderScene>, Vec<PoseF32>) {
     let scene = visible.scene_at(data);
     let (mut poses, mut lights) = (vec![PoseF32::IDENTITY; scene.instances().len()], scene.lights.clone());
-    visible.read(data, &mut poses, &mut lights);
+    visible.read_poses(data, &mut poses, &mut lights);
     (scene, poses)
 }
 
 fn is_shown(instance: &Instance) -> bool {
-    instance.deforms && instance.visible
+    instance.is_deformable && instance.visible
 }
 
 /// Ends and radii of the visible capsules.
-fn capsules(visible: &Visible, data: &Data) -> Vec<([[f64; 3]; 2], f64)> {
+fn capsules(visible: &VisualScene, data: &Data) -> Vec<([[f64; 3]; 2], f64)> {
     let (scene, poses) = seen(visible, data);
     let shown = scene.instances().iter().zip(&poses).filter(|(instance, _)| is_shown(instance));
     shown
@@ -79,7 +79,7 @@ fn tendons() {
     // The string from x = 1 to x = 2 is 2 m long.
     let rise = 3.0_f64.sqrt();
     let (model, data) = state(PATHS, &[0.25, rise]);
-    let visible = Visible::of_model(&model);
+    let visible = VisualScene::of_model(&model);
     // The point at 60 degrees from the x axis.
     let tangent = |side: f64| [side * 0.25, 0.0, 0.25 * 3.0_f64.sqrt()];
     let (left, right, above, hook) = ([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -0.75]);
@@ -91,12 +91,12 @@ fn tendons() {
     let (scene, _) = seen(&visible, &data);
     let names = |scene: &RenderScene| {
         let mut names: Vec<String> =
-            scene.instances().iter().filter(|i| i.deforms).map(|i| i.name.to_string()).collect();
+            scene.instances().iter().filter(|i| i.is_deformable).map(|i| i.name.to_string()).collect();
         names.dedup();
         names
     };
     assert_eq!(names(&scene), ["over", "parts", "string"]);
-    let red = scene.instances().iter().find(|i| i.deforms).expect("a tendon").material.rgba;
+    let red = scene.instances().iter().find(|i| i.is_deformable).expect("a tendon").material.rgba;
     assert_eq!(red, [1.0, 0.0, 0.0, 1.0]);
     // The scene of all environments has no visible capsule.
     assert!(!visible.scene().instances().iter().any(is_shown), "capsules without a place are hidden");
@@ -109,7 +109,7 @@ fn tendons() {
 fn slack_strings() {
     let string = |qpos: f64| {
         let (model, data) = state(PATHS, &[0.0, qpos]);
-        let all = capsules(&Visible::of_model(&model), &data);
+        let all = capsules(&VisualScene::of_model(&model), &data);
         all.into_iter().filter(|(_, radius)| (radius - 0.005).abs() < 1e-6).map(|(ends, _)| ends).collect::<Vec<_>>()
     };
     let level = string(0.0);
@@ -161,9 +161,9 @@ const STRIP: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
 fn skin_of_two_bones() {
     // x and z of each vertex at y = -1.
     let line = |inflate: &str, angle: f64| {
-        let place = if mj::TARGET == mj::Target::V4 { "deformable" } else { "asset" };
+        let place = if mj::BUILD_VERSION == mj::SupportedVersion::V4 { "deformable" } else { "asset" };
         let (model, data) = state(&STRIP.replace("PLACE", place).replace("INFLATE", inflate), &[angle]);
-        let (scene, poses) = seen(&Visible::of_model(&model), &data);
+        let (scene, poses) = seen(&VisualScene::of_model(&model), &data);
         let index = scene.instances().iter().position(is_shown).expect("a skin");
         assert_eq!((poses[index], &*scene.instances()[index].name), (PoseF32::IDENTITY, "strip"));
         let mesh = scene.instances()[index].mesh().expect("a mesh");
@@ -188,17 +188,17 @@ fn skin_of_two_bones() {
 /// its own are made from that scene.
 #[test]
 fn memory_of_scenes() {
-    use kinetoscope_scene::OwnScene;
+    use kinetoscope_scene::EnvScene;
     let (model, mut data) = state(PATHS, &[0.0, 2.0]);
-    let visible = Visible::of_model(&model);
-    let none = OwnScene(None);
-    let mut shape = |z: f64, held: &mut OwnScene, own: &OwnScene| {
+    let visible = VisualScene::of_model(&model);
+    let none = EnvScene(None);
+    let mut shape = |z: f64, held: &mut EnvScene, own: &EnvScene| {
         data.qpos_mut()[0] = z;
         data.forward().expect("forward");
-        visible.shape(&data, 3, own, held);
+        visible.update_shapes(&data, 3, own, held);
         held.0.clone().expect("a scene")
     };
-    let mut now = OwnScene(None);
+    let mut now = EnvScene(None);
     let first = Arc::as_ptr(&shape(0.0, &mut now, &none));
     assert_eq!(Arc::as_ptr(&shape(0.1, &mut now, &none)), first, "used again");
     let held = shape(0.2, &mut now, &none);
@@ -211,7 +211,7 @@ fn memory_of_scenes() {
     };
     // From z = 1 to the hook.
     assert!((half_length(&held) - 1.8).abs() < 1e-6 && (half_length(&second) - 1.7).abs() < 1e-6);
-    let own = OwnScene(Some(Arc::new((**visible.scene()).clone())));
+    let own = EnvScene(Some(Arc::new((**visible.scene()).clone())));
     let own_copy = shape(0.4, &mut now, &own);
     assert!(!Arc::ptr_eq(&own_copy, &second) && (half_length(&own_copy) - 1.6).abs() < 1e-6);
 }

@@ -1,14 +1,14 @@
 //! Playback of recordings to viewers, with pause, single frames, speed and seek.
 
-use super::{Conductor, Kind, PATIENCE};
-use crate::control::hub::Mail;
+use super::{CommandKind, MAX_WAIT, ViewController};
+use crate::control::hub::CollectedCommands;
 use crate::control::{Command, Speed};
-use crate::stage::{Run, Timeline};
+use crate::stage::{RunState, Timeline};
 use kinetoscope_sim::SimulationManager;
 use std::time::{Duration, Instant};
 
 /// A sequence of simulation states with time stamps, such as a recording.
-pub trait Film {
+pub trait PlaybackSource {
     /// Time stamps of the frames \[s\], in ascending order.
     fn times(&self) -> &[f64];
 
@@ -25,10 +25,10 @@ pub trait Film {
 pub enum PlayError {
     /// The recording has no frames.
     #[error("there is nothing to show: not a single moment was recorded")]
-    Empty,
+    NoFrames,
     /// The time stamps are not finite or not in ascending order.
     #[error("there is nothing to show: the times of a film must be finite and in ascending order")]
-    Times,
+    InvalidTimes,
     /// A frame cannot be shown.
     #[error("{0}")]
     Frame(String),
@@ -45,16 +45,16 @@ pub trait Play {
     ///
     /// # Errors
     /// The recording is empty, its times are invalid, or a frame cannot be shown.
-    fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError>;
+    fn play(&mut self, film: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError>;
 }
 
 impl Play for SimulationManager {
-    fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
+    fn play(&mut self, film: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
         let mut head = Playhead::new(film.times())?;
-        let known = self.observers().ids::<Conductor>().first().copied();
+        let known = self.observers().ids::<ViewController>().first().copied();
         // The conductor is removed meanwhile, so that writes of the recording do not notify it.
         let taken = known.and_then(|id| self.observers_mut().remove(id).ok());
-        let mut conductor = taken.unwrap_or_else(Conductor::new);
+        let mut conductor = taken.unwrap_or_else(ViewController::new);
         let result = conductor.play(self, film, &mut head, go_on);
         self.observers_mut().add(conductor);
         result
@@ -66,88 +66,95 @@ impl Play for SimulationManager {
 struct Playhead {
     times: Vec<f64>,
     /// Current playback time \[s\].
-    now: f64,
+    time: f64,
     frame: usize,
-    plays: bool,
+    playing: bool,
     speed: Speed,
-    /// Wall-clock time of the last update of `now`.
-    at: Instant,
+    /// Wall-clock time of the last update of `time`.
+    updated_at: Instant,
 }
 
 impl Playhead {
     fn new(times: &[f64]) -> Result<Self, PlayError> {
-        let first = *times.first().ok_or(PlayError::Empty)?;
+        let first = *times.first().ok_or(PlayError::NoFrames)?;
         if !(times.is_sorted() && times.iter().all(|time| time.is_finite())) {
-            return Err(PlayError::Times);
+            return Err(PlayError::InvalidTimes);
         }
-        Ok(Self { times: times.to_vec(), now: first, frame: 0, plays: true, speed: Speed::REAL, at: Instant::now() })
+        Ok(Self {
+            times: times.to_vec(),
+            time: first,
+            frame: 0,
+            playing: true,
+            speed: Speed::REAL_TIME,
+            updated_at: Instant::now(),
+        })
     }
 
-    fn ends(&self) -> [f64; 2] {
+    fn time_range(&self) -> [f64; 2] {
         [self.times[0], self.times[self.times.len() - 1]]
     }
 
     /// Moves to a time; the frame becomes the last one at or before it.
     fn seek(&mut self, time: f64) {
-        let [start, end] = self.ends();
-        self.now = time.clamp(start, end);
-        self.frame = self.times.partition_point(|frame| *frame <= self.now).saturating_sub(1);
+        let [start, end] = self.time_range();
+        self.time = time.clamp(start, end);
+        self.frame = self.times.partition_point(|frame| *frame <= self.time).saturating_sub(1);
     }
 
-    fn go_to_frame(&mut self, frame: usize) {
+    fn seek_frame(&mut self, frame: usize) {
         self.frame = frame.min(self.times.len() - 1);
-        self.now = self.times[self.frame];
+        self.time = self.times[self.frame];
     }
 
     /// Advances the playback time by the elapsed wall-clock time.
     fn advance(&mut self, now: Instant) {
-        let passed = now.saturating_duration_since(self.at).as_secs_f64();
-        self.at = now;
-        if let (true, Speed::Times(factor)) = (self.plays, self.speed) {
-            self.seek(self.now + passed * factor);
+        let passed = now.saturating_duration_since(self.updated_at).as_secs_f64();
+        self.updated_at = now;
+        if let (true, Speed::Factor(factor)) = (self.playing, self.speed) {
+            self.seek(self.time + passed * factor);
         }
         self.stop_at_the_end();
     }
 
     fn stop_at_the_end(&mut self) {
-        self.plays &= self.frame + 1 < self.times.len();
+        self.playing &= self.frame + 1 < self.times.len();
     }
 
     /// Advances by one frame after a snapshot was published at free speed.
-    fn was_shown(&mut self) {
-        if self.plays && self.speed == Speed::Free {
-            self.go_to_frame(self.frame + 1);
+    fn on_frame_published(&mut self) {
+        if self.playing && self.speed == Speed::Unlimited {
+            self.seek_frame(self.frame + 1);
         }
     }
 
     /// Returns the time until the next frame.
-    fn rest(&self) -> Duration {
-        match (self.plays, self.speed) {
-            (false, _) => PATIENCE,
-            (true, Speed::Free) => Duration::ZERO,
-            (true, Speed::Times(factor)) => {
-                let next = self.times.get(self.frame + 1).copied().unwrap_or(self.now);
-                Duration::from_secs_f64(((next - self.now) / factor).clamp(0.0, PATIENCE.as_secs_f64()))
+    fn time_to_next_frame(&self) -> Duration {
+        match (self.playing, self.speed) {
+            (false, _) => MAX_WAIT,
+            (true, Speed::Unlimited) => Duration::ZERO,
+            (true, Speed::Factor(factor)) => {
+                let next = self.times.get(self.frame + 1).copied().unwrap_or(self.time);
+                Duration::from_secs_f64(((next - self.time) / factor).clamp(0.0, MAX_WAIT.as_secs_f64()))
             }
         }
     }
 
-    fn obey(&mut self, command: Command) -> Result<(), String> {
+    fn handle_command(&mut self, command: Command) -> Result<(), String> {
         match command {
-            Command::Pause => self.plays = false,
+            Command::Pause => self.playing = false,
             Command::Resume => self.resume(),
-            Command::TogglePause if self.plays => self.plays = false,
+            Command::TogglePause if self.playing => self.playing = false,
             Command::TogglePause => self.resume(),
             Command::Step(count) => {
-                self.plays = false;
-                self.go_to_frame(self.frame.saturating_add(count as usize));
+                self.playing = false;
+                self.seek_frame(self.frame.saturating_add(count as usize));
             }
             Command::SetSpeed(speed) if speed.is_valid() => self.speed = speed,
             Command::SetSpeed(speed) => {
-                let [slow, fast] = Speed::RANGE;
+                let [slow, fast] = Speed::FACTOR_RANGE;
                 return Err(format!("speed {speed:?}: the factor must be {slow} to {fast}"));
             }
-            Command::Reset(_) => self.go_to_frame(0),
+            Command::Reset(_) => self.seek_frame(0),
             Command::Seek(time) if time.is_finite() => self.seek(time),
             Command::Seek(time) => return Err(format!("{time} is no time to go to")),
             Command::Release => {}
@@ -162,64 +169,67 @@ impl Playhead {
     /// Resumes playback; at the last frame it restarts from the first.
     fn resume(&mut self) {
         if self.frame + 1 >= self.times.len() {
-            self.go_to_frame(0);
+            self.seek_frame(0);
         }
-        self.plays = true;
+        self.playing = true;
     }
 }
 
-impl Conductor {
+impl ViewController {
     fn play(
         &mut self,
         sim: &mut SimulationManager,
-        film: &mut dyn Film,
+        film: &mut dyn PlaybackSource,
         head: &mut Playhead,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<(), PlayError> {
         let mut shown = None;
         while go_on() {
-            let Mail { commands, wants, .. } = self.hub.collect();
-            self.dirty |= wants != self.wants || !commands.is_empty();
-            self.wants = wants;
+            let CollectedCommands { commands, wants, .. } = self.hub.collect();
+            self.dirty |= wants != self.request || !commands.is_empty();
+            self.request = wants;
             head.advance(Instant::now());
             for (_, command) in commands {
-                self.refusals.answer(Kind::of(&command), head.obey(command));
+                self.refusals.record_result(CommandKind::of(&command), head.handle_command(command));
             }
             head.stop_at_the_end();
-            self.dirty |= shown != Some((head.frame, head.plays));
-            let rest = self.rest();
+            self.dirty |= shown != Some((head.frame, head.playing));
+            let rest = self.time_to_next_snapshot();
             if self.dirty && rest.is_zero() {
                 film.show(sim, head.frame).map_err(PlayError::Frame)?;
-                shown = Some((head.frame, head.plays));
-                self.present(sim, head);
+                shown = Some((head.frame, head.playing));
+                self.publish_frame(sim, head);
                 if !self.dirty {
-                    head.was_shown();
+                    head.on_frame_published();
                 }
             }
             // If a viewer is just reading the newest snapshot, the next attempt comes soon.
-            let wait =
-                if self.dirty { self.rest().max(Duration::from_millis(2)) } else { head.rest().max(self.rest()) };
-            self.hub.wait_for_news(wait.clamp(Duration::from_millis(1), PATIENCE));
+            let wait = if self.dirty {
+                self.time_to_next_snapshot().max(Duration::from_millis(2))
+            } else {
+                head.time_to_next_frame().max(self.time_to_next_snapshot())
+            };
+            self.hub.wait_for_input(wait.clamp(Duration::from_millis(1), MAX_WAIT));
         }
         Ok(())
     }
 
     /// Publishes a snapshot of the current frame.
-    fn present(&mut self, sim: &mut SimulationManager, head: &Playhead) {
-        let [start, end] = head.ends();
-        let run = Run {
+    fn publish_frame(&mut self, sim: &mut SimulationManager, head: &Playhead) {
+        let [start, end] = head.time_range();
+        let run = RunState {
             steps: head.frame as u64,
-            paused: !head.plays,
+            paused: !head.playing,
             speed: head.speed,
             measured_speed: None,
-            refused: self.refusals.reason(),
-            refusals: self.refusals.count(),
+            last_refusal: self.refusals.last_reason(),
+            refusal_count: self.refusals.count(),
             recording: None,
-            timeline: Some(Timeline { now: head.times[head.frame], start, end }),
+            timeline: Some(Timeline { time: head.times[head.frame], start, end }),
         };
-        self.shown = Some(Instant::now());
-        let taken = self.pool.take(sim, self.hub.viewers() + 2, &self.wants, run);
-        self.dirty = !taken.is_some_and(|snapshot| self.hub.show(snapshot));
+        self.published_at = Some(Instant::now());
+        let taken = self.pool.capture(sim, self.hub.viewers() + 2, &self.request, run);
+        self.dirty = !taken.is_some_and(|snapshot| self.hub.publish(snapshot));
     }
 }
 
@@ -227,7 +237,7 @@ impl Conductor {
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
-    use crate::control::{Viewer, Viewing, Wants};
+    use crate::control::{SnapshotRequest, Viewer, ViewerExt};
     use crate::sample::sample;
     use crate::stage::Snapshot;
     use ndarray::array;
@@ -236,7 +246,7 @@ mod tests {
     /// A cube that rises by a meter each second, recorded ten times a second.
     struct Rising(Vec<f64>);
 
-    impl Film for Rising {
+    impl PlaybackSource for Rising {
         fn times(&self) -> &[f64] {
             &self.0
         }
@@ -250,7 +260,7 @@ mod tests {
 
     fn height(snapshot: &Snapshot) -> f64 {
         let cube = snapshot.names.bodies.iter().position(|name| name == "cube").unwrap();
-        snapshot.envs[0].look.bodies[cube].translation.z
+        snapshot.envs[0].snapshot.bodies[cube].translation.z
     }
 
     /// Returns the snapshot after commands, once playback rests. Returns a copy, because held snapshots block the pool.
@@ -274,7 +284,7 @@ mod tests {
         }
         let mut sim = sample(1).sim;
         let steps = sim.observers().steps();
-        let viewer = sim.viewer(Wants { rate: 200.0, ..Wants::default() });
+        let viewer = sim.viewer(SnapshotRequest { rate: 200.0, ..SnapshotRequest::default() });
         // The times do not begin at 0, like a recording that was started late.
         let mut film = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
         let over = AtomicBool::new(false);
@@ -299,8 +309,8 @@ mod tests {
             let timeline = seen.run.timeline.unwrap();
             assert_eq!([timeline.start, timeline.end], [3.0, 7.0]);
             // The last frame at or before the requested time.
-            assert!((timeline.now - 5.0).abs() < 1e-9 && (height(&seen) - 5.0).abs() < 1e-9, "{timeline:?}");
-            assert!(seen.run.paused && (seen.envs[0].look.time - 5.0).abs() < 1e-9);
+            assert!((timeline.time - 5.0).abs() < 1e-9 && (height(&seen) - 5.0).abs() < 1e-9, "{timeline:?}");
+            assert!(seen.run.paused && (seen.envs[0].snapshot.time - 5.0).abs() < 1e-9);
             let seen = watched(viewer, &[Command::Step(3)]);
             assert!((height(&seen) - 5.3).abs() < 1e-9 && seen.run.steps == 23);
             for (commands, expected) in [
@@ -308,9 +318,9 @@ mod tests {
                 (&[Command::Seek(1e9)], 7.0),
                 (&[Command::Seek(3.0)], 3.0),
                 // Ten times real time: reaches the end in less than half a second and pauses there.
-                (&[Command::SetSpeed(Speed::Times(10.0)), Command::Resume], 7.0),
+                (&[Command::SetSpeed(Speed::Factor(10.0)), Command::Resume], 7.0),
                 // From the end, playback restarts.
-                (&[Command::SetSpeed(Speed::Free), Command::TogglePause], 7.0),
+                (&[Command::SetSpeed(Speed::Unlimited), Command::TogglePause], 7.0),
                 (&[Command::Reset(None)], 3.0),
             ] {
                 let seen = watched(viewer, commands);
@@ -341,24 +351,24 @@ mod tests {
         playing(|viewer| {
             for (command, words) in [
                 (Command::Seek(f64::NAN), "no time"),
-                (Command::SetSpeed(Speed::Times(0.0)), "factor"),
+                (Command::SetSpeed(Speed::Factor(0.0)), "factor"),
                 (
-                    Command::Drag { env: kinetoscope_sim::EnvId(0), body: 0, hold: [0.0; 3], target: [0.0; 3] },
+                    Command::Drag { env: kinetoscope_sim::EnvId(0), body: 0, anchor: [0.0; 3], target: [0.0; 3] },
                     "recording",
                 ),
             ] {
-                let refused = watched(viewer, &[Command::Pause, command]).run.refused.unwrap();
+                let refused = watched(viewer, &[Command::Pause, command]).run.last_refusal.unwrap();
                 assert!(refused.contains(words), "{refused}");
             }
         });
-        assert!(matches!(Playhead::new(&[]), Err(PlayError::Empty)));
+        assert!(matches!(Playhead::new(&[]), Err(PlayError::NoFrames)));
         for times in [[0.0, f64::NAN], [f64::NEG_INFINITY, 0.0], [1.0, 0.0]] {
-            assert!(matches!(Playhead::new(&times), Err(PlayError::Times)), "{times:?}");
+            assert!(matches!(Playhead::new(&times), Err(PlayError::InvalidTimes)), "{times:?}");
         }
         let mut sim = sample(1).sim;
-        assert_eq!(sim.play(&mut Rising(Vec::new()), &mut || true), Err(PlayError::Empty));
+        assert_eq!(sim.play(&mut Rising(Vec::new()), &mut || true), Err(PlayError::NoFrames));
         // Control: a running simulation has no timeline.
-        let viewer = sim.viewer(Wants::default());
+        let viewer = sim.viewer(SnapshotRequest::default());
         viewer.send(Command::Seek(1.0));
         sim.update(1);
         assert!(viewer.newest().unwrap().run.timeline.is_none());

@@ -4,12 +4,12 @@ use crate::control::Command;
 
 /// Group of a command. A mouse spring sends many commands per second, and their success must not clear other refusals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum CommandKind {
     Spring,
     Other,
 }
 
-impl Kind {
+impl CommandKind {
     pub(super) fn of(command: &Command) -> Self {
         if matches!(command, Command::Drag { .. } | Command::Release) { Self::Spring } else { Self::Other }
     }
@@ -18,23 +18,23 @@ impl Kind {
 /// The last refusal, kept until a later success clears it, and the total count.
 #[derive(Debug, Default)]
 pub(super) struct Refusals {
-    last: Option<(Kind, String)>,
+    last: Option<(CommandKind, String)>,
     count: u64,
 }
 
 impl Refusals {
     /// Records the result of a command. A success clears the last refusal of the same kind; other commands clear any.
-    pub(super) fn answer(&mut self, kind: Kind, done: Result<(), String>) {
+    pub(super) fn record_result(&mut self, kind: CommandKind, done: Result<(), String>) {
         match done {
             Ok(()) => {
-                self.last.take_if(|(of, _)| kind == Kind::Other || *of == kind);
+                self.last.take_if(|(of, _)| kind == CommandKind::Other || *of == kind);
             }
-            Err(reason) => self.note(kind, Some(reason)),
+            Err(reason) => self.record_refusal(kind, Some(reason)),
         }
     }
 
     /// Records a refusal if there is a reason.
-    pub(super) fn note(&mut self, kind: Kind, reason: Option<String>) {
+    pub(super) fn record_refusal(&mut self, kind: CommandKind, reason: Option<String>) {
         if let Some(reason) = reason {
             self.count += 1;
             self.last = Some((kind, reason));
@@ -42,11 +42,11 @@ impl Refusals {
     }
 
     /// Clears the last refusal, after the last viewer was dropped.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.last = None;
     }
 
-    pub(super) fn reason(&self) -> Option<String> {
+    pub(super) fn last_reason(&self) -> Option<String> {
         self.last.as_ref().map(|(_, reason)| reason.clone())
     }
 

@@ -2,16 +2,16 @@
 //! closed repeatedly, and the loss of the display ends the window, not the program.
 
 use super::display::{SIZE, Target, cfg_on, is_red, simulation};
-use crate::sample::Running;
+use crate::sample::SteppingThread;
 use crate::window::App;
 use crate::{
-    Canvas, Closed, Command, Eye, ImageWindow, ImageWindowCfg, OpenWindow, Speed, Viewer, Viewing, Wants, Window,
-    WindowError,
+    Canvas, Closed, Command, ImageWindow, ImageWindowCfg, OpenWindow, OrbitCamera, SnapshotRequest, Speed, Viewer,
+    ViewerExt, Window, WindowError,
 };
 use kinetoscope_sim::SimulationManager;
 use kinetoscope_testkit::process;
 use kinetoscope_testkit::wait;
-use kinetoscope_testkit::wait::{PATIENCE, threads_and_files};
+use kinetoscope_testkit::wait::{TIMEOUT, threads_and_files};
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -36,7 +36,7 @@ fn drawn(app: &mut App) -> Vec<[u8; 3]> {
 }
 
 fn ended(window: &Window) -> Closed {
-    window.wait(PATIENCE).expect("it ends")
+    window.wait(TIMEOUT).expect("it ends")
 }
 
 #[track_caller]
@@ -53,12 +53,12 @@ fn image_and_mouse() {
     let mut sim = simulation();
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
     let connection = display.connect();
-    let target = Target::on(&connection, window.number());
+    let target = Target::on(&connection, window.id());
     let mut app = App::new(SIZE, 2);
-    app.show(sim.viewer(Wants::default()).newest().unwrap());
-    let (first, mut eye) = (drawn(&mut app), app.eye());
-    let mut expect = |what: &str, eye: Eye| {
-        app.look_from(eye);
+    app.set_snapshot(sim.viewer(SnapshotRequest::default()).newest().unwrap());
+    let (first, mut eye) = (drawn(&mut app), app.camera());
+    let mut expect = |what: &str, eye: OrbitCamera| {
+        app.set_camera(eye);
         let expected = drawn(&mut app);
         let shown = || screenshot(&connection, [0, 0], SIZE);
         wait::until(what, || shown()[BELOW_STATUS..] == expected[BELOW_STATUS..]);
@@ -69,7 +69,7 @@ fn image_and_mouse() {
     assert!(red > 200, "cubes are in the image: {red}");
     // Mouse drags by 60 and 20 pixels with the left and right button, and steps of the wheel.
     let at = [200i16, 150];
-    for (button, way) in [(1, Eye::orbit as fn(&mut Eye, [f64; 2], usize)), (3, Eye::pan)] {
+    for (button, way) in [(1, OrbitCamera::orbit as fn(&mut OrbitCamera, [f64; 2], usize)), (3, OrbitCamera::pan)] {
         target.send(BUTTON_PRESS_EVENT, button, 0, at);
         target.send(MOTION_NOTIFY_EVENT, 0, 0, [at[0] + 60, at[1] + 20]);
         target.send(BUTTON_RELEASE_EVENT, button, 0, [at[0] + 60, at[1] + 20]);
@@ -93,7 +93,7 @@ fn image_and_mouse() {
         wait::until("it is drawn at this size", || screenshot(&connection, last, [1, 1]) != [[0; 3]]);
         assert!(window.is_open(), "{size:?}: {:?}", window.closed());
     }
-    close(&connection, window.number());
+    close(&connection, window.id());
     assert_eq!(ended(&window), Closed::ByUser);
     // Dropping the simulation closes the window.
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
@@ -108,11 +108,11 @@ fn keys() {
     let mut sim = simulation();
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
     let connection = display.connect();
-    let target = Target::on(&connection, window.number());
-    let viewer = sim.viewer(Wants::default());
-    let run = Running::start(sim);
+    let target = Target::on(&connection, window.id());
+    let viewer = sim.viewer(SnapshotRequest::default());
+    let run = SteppingThread::start(sim);
     // The space bar pauses and resumes; 0 is free speed.
-    for (keys, paused, speed) in [(&b" "[..], true, None), (b" ", false, None), (b"0", false, Some(Speed::Free))] {
+    for (keys, paused, speed) in [(&b" "[..], true, None), (b" ", false, None), (b"0", false, Some(Speed::Unlimited))] {
         target.press(keys);
         wait_for(&viewer, paused, speed);
     }
@@ -120,7 +120,7 @@ fn keys() {
     // the repeats.
     target.hold(b' ', 5);
     target.press(b"1");
-    wait_for(&viewer, true, Some(Speed::REAL));
+    wait_for(&viewer, true, Some(Speed::REAL_TIME));
     target.press(b" ");
     wait_for(&viewer, false, None);
     // Steps repeat: one and four more.
@@ -131,7 +131,7 @@ fn keys() {
     target.hold(b'.', 4);
     wait::until("five steps", || steps() == before + 5);
     target.press(b"0 ");
-    wait_for(&viewer, false, Some(Speed::Free));
+    wait_for(&viewer, false, Some(Speed::Unlimited));
     drop(viewer);
     drop(run.end());
     assert_eq!(ended(&window), Closed::WithSimulation);
@@ -160,9 +160,9 @@ fn images() {
         wait::until("the image is on the screen", || shown() == pixels(&image));
     }
     // A larger window scales the image up.
-    Target::on(&connection, images.window().number()).resize([80, 60]);
+    Target::on(&connection, images.window().id()).resize([80, 60]);
     wait::until("the image is scaled", || screenshot(&connection, [6, 4], [2, 2]) == [[250, 251, 252]; 4]);
-    close(&connection, images.window().number());
+    close(&connection, images.window().id());
     assert_eq!(ended(images.window()), Closed::ByUser);
     // The program continues: an image for a closed window is dropped.
     images.show(filled([1, 2, 3]));
@@ -181,13 +181,13 @@ fn images() {
 }
 
 /// Opens a window on `display`, pauses the simulation with it, and steps on a thread.
-fn paused(display: &Display, mut sim: SimulationManager) -> (Window, Viewer, Running) {
+fn paused(display: &Display, mut sim: SimulationManager) -> (Window, Viewer, SteppingThread) {
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
-    let viewer = sim.viewer(Wants::default());
+    let viewer = sim.viewer(SnapshotRequest::default());
     // The connection stays open until the command has run: a server drops the events of clients that have disconnected.
     let connection = display.connect();
-    Target::on(&connection, window.number()).press(b" ");
-    let run = Running::start(sim);
+    Target::on(&connection, window.id()).press(b" ");
+    let run = SteppingThread::start(sim);
     wait_for(&viewer, true, None);
     (window, viewer, run)
 }
@@ -207,13 +207,13 @@ fn lost_display() {
     let other = std::thread::spawn(move || simulation().open_window_with(cfg).unwrap_err());
     // Snapshots of a paused simulation are published when a viewer changes its requests; then an image is due.
     while window.is_open() {
-        viewer.set_wants(Wants { markers: run.steps().is_multiple_of(2), ..Wants::default() });
-        viewer.send(Command::SetSpeed(Speed::REAL));
+        viewer.set_request(SnapshotRequest { markers: run.steps().is_multiple_of(2), ..SnapshotRequest::default() });
+        viewer.send(Command::SetSpeed(Speed::REAL_TIME));
         std::thread::sleep(Duration::from_millis(5));
     }
     let Closed::DisplayLost(reason) = ended(&window) else { panic!("{:?}", window.closed()) };
     assert!(reason.contains("not answered for 15 s"), "{reason}");
-    run.goes_on_beyond(held + 10);
+    run.wait_for_steps_beyond(held + 10);
     let error = other.join().unwrap().to_string();
     assert!(error.contains("not answered for 15 s"), "{error}");
     display.signal("CONT");
@@ -224,7 +224,7 @@ fn lost_display() {
     drop(viewer);
     display.server.kill().unwrap();
     assert!(matches!(ended(&window), Closed::DisplayLost(_)), "{:?}", window.closed());
-    run.goes_on_beyond(run.steps() + 10);
+    run.wait_for_steps_beyond(run.steps() + 10);
     let mut sim = run.end();
 
     // No display is available any more.
@@ -324,7 +324,7 @@ fn huge() {
     let mut sim = simulation();
     let window = sim.open_window_with(cfg_on(&name)).unwrap();
     let connection = display.connect();
-    let target = Target::on(&connection, window.number());
+    let target = Target::on(&connection, window.id());
     let is_drawn = |[x, y]: [usize; 2]| screenshot(&connection, [x - 1, y - 1], [1, 1]) != [[0; 3]];
     // The simulation does not step, so an image is sent only after a key press. It has four bytes per pixel, plus the
     // request header.
@@ -347,10 +347,10 @@ fn huge() {
     assert_sent(coarse, 8192);
     // The display shows that image with each pixel repeated 6 by 6 times, around the leftmost cube.
     let mut app = App::new(coarse, 2);
-    let snapshot = sim.viewer(Wants::default()).newest().unwrap();
+    let snapshot = sim.viewer(SnapshotRequest::default()).newest().unwrap();
     // The view is that of the window's first size.
-    app.look_from(Eye::overview(&snapshot, SIZE));
-    app.show(snapshot);
+    app.set_camera(OrbitCamera::overview(&snapshot, SIZE));
+    app.set_snapshot(snapshot);
     let expected = drawn(&mut app);
     let red = (0..expected.len()).filter(|&k| is_red(&expected[k])).map(|k| [k % coarse[0], k / coarse[0]]);
     let cube = red.min_by_key(|place| place[0]).unwrap();

@@ -1,6 +1,6 @@
 //! Sorting of boxes along a Morton curve, and grouping of adjacent boxes.
 
-use super::{Bounds, Cells, GROUP, Item, NOTHING, TO_BITS};
+use super::{BinMapping, Bounds, BuildItem, EMPTY, MAX_GROUP, TO_BITS};
 use crate::simd::{F4, Simd};
 
 /// Bits per coordinate on the curve.
@@ -8,15 +8,15 @@ const BITS: u32 = 10;
 /// Size of a radix sort digit: one digit per axis.
 const DIGITS: usize = 1 << BITS;
 /// Fewer keys than this are sorted by comparison: clearing and summing the counters of a radix sort takes longer.
-const FEW: usize = 512;
+const RADIX_SORT_MIN: usize = 512;
 /// Adjacent cells with at most this many boxes together become one group: one node less, and not more to test.
-const JOINED: usize = 12;
+const MAX_JOINED: usize = 12;
 /// Lowest bits of the Morton code of a cell. If more boxes than a group holds differ in these bits only, they are
 /// sorted along a finer curve.
-const CROWDED: u32 = 3;
+const CROWDED_BITS: u32 = 3;
 
 /// Bits of a coordinate spread out with two empty bits between them. A table takes a third of the time of shifting.
-static SPREAD: [u32; 1 << BITS] = {
+static MORTON_BITS: [u32; 1 << BITS] = {
     let mut table = [0; 1 << BITS];
     let mut x = 0;
     while x < table.len() {
@@ -33,29 +33,41 @@ static SPREAD: [u32; 1 << BITS] = {
 /// Items in the order of the curve: the Morton code in the upper half of each number, the index of the item in the
 /// lower.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Curve {
+pub(super) struct MortonOrder {
     keys: Vec<u64>,
     /// Scratch memory for sorting.
     sorted: Vec<u64>,
 }
 
-impl Curve {
+impl MortonOrder {
     /// Sorts items by the Morton codes of their centers within a box around them, and writes the starts of the groups
     /// and the end of the last group. A group is the largest cell of the curve (halves of halves of the box) that holds
     /// no more items than a group may, or a few adjacent small cells.
     #[inline(always)]
-    pub(super) fn sort<S: Simd>(&mut self, s: S, items: &[Item], bounds: &Bounds, starts: &mut Vec<u32>) -> &[u64] {
-        self.through(s, items, 0..items.len() as u32, bounds);
+    pub(super) fn sort<S: Simd>(
+        &mut self,
+        s: S,
+        items: &[BuildItem],
+        bounds: &Bounds,
+        starts: &mut Vec<u32>,
+    ) -> &[u64] {
+        self.compute_keys(s, items, 0..items.len() as u32, bounds);
         starts.clear();
-        group(s, items, &mut self.keys, 0, starts);
+        find_groups(s, items, &mut self.keys, 0, starts);
         starts.push(items.len() as u32);
         &self.keys
     }
 
     /// Computes sorted keys of some items.
     #[inline(always)]
-    fn through<S: Simd>(&mut self, s: S, items: &[Item], numbers: impl ExactSizeIterator<Item = u32>, bounds: &Bounds) {
-        let mut cells = Cells::<{ 1 << BITS }>::of(bounds);
+    fn compute_keys<S: Simd>(
+        &mut self,
+        s: S,
+        items: &[BuildItem],
+        numbers: impl ExactSizeIterator<Item = u32>,
+        bounds: &Bounds,
+    ) {
+        let mut cells = BinMapping::<{ 1 << BITS }>::new(bounds);
         // Cells are cubes: the small thickness of a flat object, perhaps rounding noise, is not split as if it were as
         // long as the other sides.
         let least =
@@ -70,10 +82,10 @@ impl Curve {
             let Bounds { lo: [a, b, c, _], hi: [d, e, f, _] } = items[number as usize];
             let middle = half * F4::load(s, &[a, b, c, 0.0]) + half * F4::load(s, &[d, e, f, 0.0]);
             let [x, y, z, _] = ((middle - base) * scale + down + to_bits).array();
-            let place = |x: f32| SPREAD[x.to_bits() as usize % DIGITS];
+            let place = |x: f32| MORTON_BITS[x.to_bits() as usize % DIGITS];
             self.keys.push(u64::from(place(x) | place(y) << 1 | place(z) << 2) << 32 | u64::from(number));
         }
-        if self.keys.len() < FEW {
+        if self.keys.len() < RADIX_SORT_MIN {
             self.keys.sort_unstable();
             return;
         }
@@ -102,26 +114,26 @@ impl Curve {
 }
 
 /// Finds the starts of the groups of sorted keys.
-fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
+fn find_groups<S: Simd>(s: S, items: &[BuildItem], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let place = |key: u64| (key >> 32) as u32;
     // The first cell cannot join a group before it.
-    let (mut at, mut last) = (0, GROUP);
+    let (mut at, mut last) = (0, MAX_GROUP);
     while at < keys.len() {
         let here = place(keys[at]);
         let differs = |key: Option<&u64>| key.map_or(u32::MAX, |&key| place(key) ^ here);
         // The cell must not contain the item before the group or the first one after a full group.
-        let (before, after) = (differs(keys[..at].last()), differs(keys.get(at + GROUP)));
-        if after >> CROWDED == 0 {
-            let count = keys[at..].partition_point(|&key| place(key) >> CROWDED == here >> CROWDED);
-            crowd(s, items, &mut keys[at..at + count], first + at as u32, starts);
-            (at, last) = (at + count, GROUP);
+        let (before, after) = (differs(keys[..at].last()), differs(keys.get(at + MAX_GROUP)));
+        if after >> CROWDED_BITS == 0 {
+            let count = keys[at..].partition_point(|&key| place(key) >> CROWDED_BITS == here >> CROWDED_BITS);
+            group_crowded(s, items, &mut keys[at..at + count], first + at as u32, starts);
+            (at, last) = (at + count, MAX_GROUP);
             continue;
         }
         let bits = before.checked_ilog2().unwrap_or(0).min(after.ilog2());
         // All candidates are counted: the end of the cell is unpredictable for a branch.
-        let few = &keys[at..keys.len().min(at + GROUP)];
+        let few = &keys[at..keys.len().min(at + MAX_GROUP)];
         let count = few.iter().filter(|&&key| place(key) >> bits == here >> bits).count();
-        if last + count <= JOINED {
+        if last + count <= MAX_JOINED {
             last += count;
         } else {
             starts.push(first + at as u32);
@@ -134,23 +146,23 @@ fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &m
 /// Groups keys that the remaining bits cannot distinguish: they are sorted along a curve of their own. Happens for
 /// dense details with an outlier far away.
 #[cold]
-fn crowd<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
+fn group_crowded<S: Simd>(s: S, items: &[BuildItem], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let numbers = || keys.iter().map(|&key| key as u32);
-    let within = numbers().fold(NOTHING, |sum, number| {
-        let middle = items[number as usize].middle();
-        sum.with(&Bounds { lo: middle, hi: middle })
+    let within = numbers().fold(EMPTY, |sum, number| {
+        let middle = items[number as usize].center();
+        sum.union(&Bounds { lo: middle, hi: middle })
     });
-    let mut finer = Curve::default();
+    let mut finer = MortonOrder::default();
     s.vectorize(
         #[inline(always)]
-        || finer.through(s, items, numbers(), &within),
+        || finer.compute_keys(s, items, numbers(), &within),
     );
     let finer = finer.keys;
     if finer[0] >> 32 != finer[finer.len() - 1] >> 32 {
         keys.copy_from_slice(&finer);
-        group(s, items, keys, first, starts);
+        find_groups(s, items, keys, first, starts);
     } else {
         // All centers coincide.
-        starts.extend((0..keys.len() as u32).step_by(GROUP).map(|k| first + k));
+        starts.extend((0..keys.len() as u32).step_by(MAX_GROUP).map(|k| first + k));
     }
 }

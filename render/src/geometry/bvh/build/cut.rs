@@ -1,39 +1,47 @@
 //! Binary splits of a range of groups by the surface area heuristic: by planes between bins, or by position on the
 //! curve.
 
-use super::{Bounds, Cells, Item, NOTHING, quad};
+use super::{BinMapping, Bounds, BuildItem, EMPTY, quad};
 
 /// Bins along the longest side.
 const BINS: usize = 16;
 /// Up to this many groups are split between neighbors on the curve: clearing and summing bins would take longer than
 /// filling them.
-const FEW: usize = 16;
+const MAX_CURVE_SPLIT: usize = 16;
 
 /// The best split of at least two groups within a box: the number of groups before it, once they are sorted by it, and
 /// the boxes of both sides; `None` if no plane separates the groups.
 #[inline(always)]
-pub(super) fn best(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
+pub(super) fn best_split(
+    within: &Bounds,
+    groups: &mut [BuildItem],
+    aside: &mut [BuildItem],
+) -> Option<(usize, [Bounds; 2])> {
     // Splits keep the order along the curve.
-    if groups.len() <= FEW { Some(between(groups)) } else { halve(within, groups, aside) }
+    if groups.len() <= MAX_CURVE_SPLIT {
+        Some(best_curve_split(groups))
+    } else {
+        best_plane_split(within, groups, aside)
+    }
 }
 
-/// The best position to split up to [`FEW`] groups along the curve: the number of groups before it, and the boxes of
+/// The best position to split up to [`MAX_CURVE_SPLIT`] groups along the curve: the number of groups before it, and the boxes of
 /// both sides.
-fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
-    let n = groups.len().min(FEW);
-    let mut rest = [NOTHING; FEW];
-    let mut costs = [0.0f32; FEW];
-    let (mut sum, mut after) = (NOTHING, 0.0);
+fn best_curve_split(groups: &[BuildItem]) -> (usize, [Bounds; 2]) {
+    let n = groups.len().min(MAX_CURVE_SPLIT);
+    let mut rest = [EMPTY; MAX_CURVE_SPLIT];
+    let mut costs = [0.0f32; MAX_CURVE_SPLIT];
+    let (mut sum, mut after) = (EMPTY, 0.0);
     for k in (1..n).rev() {
-        sum = sum.with(&groups[k]);
+        sum = sum.union(&groups[k]);
         rest[k] = sum;
         after += groups[k].hi[3];
         costs[k] = after * sum.area();
     }
-    let (mut sum, mut before) = (NOTHING, 0.0);
+    let (mut sum, mut before) = (EMPTY, 0.0);
     let (mut best, mut cost) = ((1, groups[0]), f32::INFINITY);
     for k in 1..n {
-        sum = sum.with(&groups[k - 1]);
+        sum = sum.union(&groups[k - 1]);
         before += groups[k - 1].hi[3];
         let whole = before * sum.area() + costs[k];
         if whole < cost {
@@ -41,37 +49,41 @@ fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
         }
     }
     let (at, near) = best;
-    (at, [near, rest[at % FEW]])
+    (at, [near, rest[at % MAX_CURVE_SPLIT]])
 }
 
 /// Partitions groups by the best plane between bins along the longest side of their box. Returns the number of groups
 /// before the plane and the boxes of both sides; `None` if all centers are in one bin.
-fn halve(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
-    let cells = Cells::<BINS>::of(within);
+fn best_plane_split(
+    within: &Bounds,
+    groups: &mut [BuildItem],
+    aside: &mut [BuildItem],
+) -> Option<(usize, [Bounds; 2])> {
+    let cells = BinMapping::<BINS>::new(within);
     let [x, y, z, _] = quad(|k| within.hi[k] - within.lo[k]);
     let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(z > y) };
-    let cell = |group: &Item| cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % BINS;
+    let cell = |group: &BuildItem| cells.bin(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % BINS;
     // The fourth component holds the number of primitives.
-    let mut bins = [Bounds { hi: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 0.0], ..NOTHING }; BINS];
+    let mut bins = [Bounds { hi: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 0.0], ..EMPTY }; BINS];
     for group in &*groups {
         let bin = &mut bins[cell(group)];
         let count = bin.hi[3] + group.hi[3];
-        *bin = bin.with(group);
+        *bin = bin.union(group);
         bin.hi[3] = count;
     }
     let mut costs = [0.0; BINS];
-    let mut rest = [NOTHING; BINS];
-    let (mut sum, mut after) = (NOTHING, 0.0);
+    let mut rest = [EMPTY; BINS];
+    let (mut sum, mut after) = (EMPTY, 0.0);
     for k in (1..BINS).rev() {
-        sum = sum.with(&bins[k]);
+        sum = sum.union(&bins[k]);
         rest[k] = sum;
         after += bins[k].hi[3];
         costs[k] = after;
     }
     let mut best: Option<(f32, usize, Bounds)> = None;
-    let (mut sum, mut before) = (NOTHING, 0.0);
+    let (mut sum, mut before) = (EMPTY, 0.0);
     for k in 0..BINS - 1 {
-        sum = sum.with(&bins[k]);
+        sum = sum.union(&bins[k]);
         before += bins[k].hi[3];
         if before == 0.0 || costs[k + 1] == 0.0 {
             continue;

@@ -1,49 +1,53 @@
 //! Splits a group into leaves at the least cost, by dynamic programming: the cheapest leaves of the first j primitives
 //! are the cheapest leaves of fewer primitives, plus one leaf.
 
-use super::{GROUP, Item, WIDE};
+use super::{BVH_WIDTH, BuildItem, MAX_GROUP};
 use crate::simd::{F4, F8, Simd};
 
 /// Largest number of primitives in a leaf.
-const LEAF: usize = 4;
+const MAX_LEAF: usize = 4;
 /// Cost of visiting a leaf, in tests of one primitive.
 const LEAF_COST: f32 = 1.0;
 /// Cost of a visited leaf with one primitive, two, and so on.
-const TESTS: [f32; LEAF] = [1.0 + LEAF_COST, 2.0 + LEAF_COST, 3.0 + LEAF_COST, 4.0 + LEAF_COST];
-const _: () = assert!(GROUP <= LEAF * WIDE, "every group can be cut into leaves");
+const LEAF_COSTS: [f32; MAX_LEAF] = [1.0 + LEAF_COST, 2.0 + LEAF_COST, 3.0 + LEAF_COST, 4.0 + LEAF_COST];
+const _: () = assert!(MAX_GROUP <= MAX_LEAF * BVH_WIDTH, "every group can be cut into leaves");
 
 /// Costs of the leaves of a group. The memory is kept between groups, so that only rows in use are written. Rows beyond
 /// the primitives of the group are those of an earlier group.
 #[derive(Clone, Debug)]
 pub(super) struct Costs {
     /// Cost of a leaf that ends with each primitive, one primitive long, two, and so on.
-    costs: [[f32; LEAF]; GROUP],
+    costs: [[f32; MAX_LEAF]; MAX_GROUP],
     /// Least cost of the first j primitives as k leaves, in row j + LEAF - 1. The rows in front stand for negative j.
-    least: [[f32; WIDE]; LEAF + GROUP],
+    min_costs: [[f32; BVH_WIDTH]; MAX_LEAF + MAX_GROUP],
 }
 
 impl Default for Costs {
     fn default() -> Self {
-        let mut least = [[f32::INFINITY; WIDE]; LEAF + GROUP];
-        least[LEAF - 1][0] = 0.0;
-        Self { costs: [[0.0; LEAF]; GROUP], least }
+        let mut least = [[f32::INFINITY; BVH_WIDTH]; MAX_LEAF + MAX_GROUP];
+        least[MAX_LEAF - 1][0] = 0.0;
+        Self { costs: [[0.0; MAX_LEAF]; MAX_GROUP], min_costs: least }
     }
 }
 
 /// Splits consecutive primitives into leaves: the end of each leaf, and the number of leaves.
 #[inline(always)]
-pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut Costs) -> ([u8; WIDE], usize) {
-    let things = &things[..things.len().min(GROUP)];
+pub(super) fn leaf_ends<S: Simd>(
+    s: S,
+    things: &[BuildItem],
+    Costs { costs, min_costs: least }: &mut Costs,
+) -> ([u8; BVH_WIDTH], usize) {
+    let things = &things[..things.len().min(MAX_GROUP)];
     // The last rows, the newest first: avoids reading memory that has just been written.
     let none = F8::splat(s, f32::INFINITY);
-    let mut recent = [none; LEAF];
-    recent[0] = F8::load(s, &least[LEAF - 1]);
+    let mut recent = [none; MAX_LEAF];
+    recent[0] = F8::load(s, &least[MAX_LEAF - 1]);
     // Least cost of all primitives as k + 1 leaves.
     let mut best = none;
     // The boxes around the last primitive, the last two, and so on.
     let mut lo = [F4::splat(s, f32::INFINITY); 3];
     let mut hi = [F4::splat(s, f32::NEG_INFINITY); 3];
-    let (longest, tests) = (F4::splat(s, f32::MAX), F4::load(s, &TESTS));
+    let (longest, tests) = (F4::splat(s, f32::MAX), F4::load(s, &LEAF_COSTS));
     for (j, thing) in things.iter().enumerate() {
         for axis in 0..3 {
             lo[axis] = lo[axis].shift_in(f32::INFINITY).min(F4::splat(s, thing.lo[axis]));
@@ -61,7 +65,7 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
             best = best.min(*row + F8::splat(s, cost));
         }
         recent = [best.shift_in(f32::INFINITY), recent[0], recent[1], recent[2]];
-        least[LEAF + j] = recent[0].array();
+        least[MAX_LEAF + j] = recent[0].array();
     }
     let (mut leaves, mut cost) = (0, f32::INFINITY);
     for (k, other) in best.array().into_iter().enumerate() {
@@ -69,19 +73,19 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
     }
     // Sizes beyond the range have an infinite cost: full leaves are used.
     if cost == f32::INFINITY {
-        let ends = std::array::from_fn(|k| (LEAF * (k + 1)).min(things.len()) as u8);
-        return (ends, things.len().div_ceil(LEAF));
+        let ends = std::array::from_fn(|k| (MAX_LEAF * (k + 1)).min(things.len()) as u8);
+        return (ends, things.len().div_ceil(MAX_LEAF));
     }
-    let mut ends = [0; WIDE];
+    let mut ends = [0; BVH_WIDTH];
     let mut j = things.len();
     for k in (0..=leaves).rev() {
         ends[k] = j as u8;
         // Leaf lengths that gave the least cost. All are tested: the first one is unpredictable for a branch.
-        let gave = (0..LEAF).fold(1 << LEAF, |bits: u32, before| {
-            bits | u32::from(least[LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
+        let gave = (0..MAX_LEAF).fold(1 << MAX_LEAF, |bits: u32, before| {
+            bits | u32::from(least[MAX_LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
         });
         j -= gave.trailing_zeros() as usize + 1;
-        cost = least[LEAF + j - 1][k];
+        cost = least[MAX_LEAF + j - 1][k];
     }
     (ends, leaves + 1)
 }
@@ -90,15 +94,15 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
 mod tests {
     use super::super::Bounds;
     use super::*;
-    use crate::simd::{Scalar, at_level, levels};
+    use crate::simd::{Scalar, all_levels, at_level};
 
     /// Cost of leaves, by their areas.
-    fn cost(things: &[Item], ends: impl IntoIterator<Item = usize>) -> f32 {
+    fn cost(things: &[BuildItem], ends: impl IntoIterator<Item = usize>) -> f32 {
         let mut first = 0;
         let mut sum = 0.0;
         for end in ends {
             let leaf = &things[first..end];
-            sum += (leaf.len() as f32 + LEAF_COST) * Bounds::around(leaf).area();
+            sum += (leaf.len() as f32 + LEAF_COST) * Bounds::enclosing(leaf).area();
             first = end;
         }
         assert_eq!(first, things.len(), "everything is in a leaf");
@@ -117,21 +121,23 @@ mod tests {
         let mut kept = Costs::default();
         for round in 0..200 {
             let count = 1 + round % 14;
-            let things: Vec<Item> = (0..count as u32)
+            let things: Vec<BuildItem> = (0..count as u32)
                 .map(|k| {
                     let lo = [dice() + 0.3 * k as f32, dice(), dice()];
                     let long = dice() * dice();
-                    Item::item(lo, lo.map(|x| x + long), k, 1)
+                    BuildItem::item(lo, lo.map(|x| x + long), k, 1)
                 })
                 .collect();
-            let (ends, leaves) = ends(Scalar, &things, &mut kept);
+            let (ends, leaves) = leaf_ends(Scalar, &things, &mut kept);
             let chosen = ends[..leaves].iter().map(|&end| usize::from(end));
-            assert!(chosen.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end))).all(|n| n <= LEAF));
+            assert!(
+                chosen.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end))).all(|n| n <= MAX_LEAF)
+            );
             let mut least = f32::INFINITY;
             for cuts in 0..1u32 << (count - 1) {
                 let all = (1..count).filter(|k| cuts >> (k - 1) & 1 == 1).chain([count]);
                 let lengths = all.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end)));
-                if all.clone().count() <= WIDE && lengths.max().is_some_and(|longest| longest <= LEAF) {
+                if all.clone().count() <= BVH_WIDTH && lengths.max().is_some_and(|longest| longest <= MAX_LEAF) {
                     least = least.min(cost(&things, all));
                 }
             }
@@ -144,9 +150,9 @@ mod tests {
     #[test]
     fn huge_boxes() {
         let huge = [[-3e38f32; 3], [3e38; 3]];
-        let things: Vec<Item> = (0..GROUP as u32).map(|k| Item::item(huge[0], huge[1], k, 1)).collect();
-        for level in levels() {
-            let (ends, leaves) = at_level!(level, s => ends(s, &things, &mut Costs::default()));
+        let things: Vec<BuildItem> = (0..MAX_GROUP as u32).map(|k| BuildItem::item(huge[0], huge[1], k, 1)).collect();
+        for level in all_levels() {
+            let (ends, leaves) = at_level!(level, s => leaf_ends(s, &things, &mut Costs::default()));
             assert_eq!(ends[..leaves], [4, 8, 12, 16, 20, 24]);
         }
     }

@@ -1,21 +1,21 @@
 //! Packets of rays from above: the first steps of the walk in all lanes at once, by the operations of the single ray.
 
-use super::{FIRST_CELLS, Field, SLACK};
+use super::{FIRST_CELLS, HeightGrid, SLACK};
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::Touches;
+use crate::geometry::shape::Intersections;
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
 use kinetoscope_scene::shape::Intersection;
 
 /// Corner heights of a cell in each lane, and the index of the cell.
 #[derive(Clone, Copy)]
-struct Cells<S: Simd> {
+struct CellLanes<S: Simd> {
     /// At (0, 0), (1, 0), (0, 1), (1, 1).
     corners: [D<S>; 4],
     at: [D<S>; 2],
 }
 
-impl<S: Simd> Cells<S> {
-    /// Packet version of [`Field::plane`]: height and slopes of the surface right or left of the diagonal.
+impl<S: Simd> CellLanes<S> {
+    /// Packet version of [`HeightGrid::plane`]: height and slopes of the surface right or left of the diagonal.
     #[inline(always)]
     fn plane(&self, right: N<S>) -> D3<S> {
         let [a, b, d, e] = self.corners;
@@ -23,10 +23,10 @@ impl<S: Simd> Cells<S> {
     }
 }
 
-impl Field {
+impl HeightGrid {
     /// The cells under points in units of cells; points outside of the footprint get a cell of the rim.
     #[inline(always)]
-    fn cells_at<S: Simd>(&self, s: S, at: [D<S>; 2]) -> Cells<S> {
+    fn cells_at<S: Simd>(&self, s: S, at: [D<S>; 2]) -> CellLanes<S> {
         let (x, y) = (at[0].array(), at[1].array());
         let (mut cells, mut corners) = ([[0.0; WIDTH]; 2], [[0.0; WIDTH]; 4]);
         for k in 0..WIDTH {
@@ -36,7 +36,7 @@ impl Field {
         }
         let [a, b, d, e] = &corners;
         let corners = [D::load(s, a), D::load(s, b), D::load(s, d), D::load(s, e)];
-        Cells { corners, at: [D::load(s, &cells[0]), D::load(s, &cells[1])] }
+        CellLanes { corners, at: [D::load(s, &cells[0]), D::load(s, &cells[1])] }
     }
 
     /// Packet version of [`unit`](kinetoscope_scene::vector::unit) for the surface's normal; false in lanes without a
@@ -44,7 +44,7 @@ impl Field {
     #[inline(always)]
     fn normals<S: Simd>(&self, s: S, hx: D<S>, hy: D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
         let one = D::splat(s, 1.0);
-        let up = [-hx * self.per_metre[0], -hy * self.per_metre[1], one];
+        let up = [-hx * self.cells_per_meter[0], -hy * self.cells_per_meter[1], one];
         let largest = up[0].abs().max(up[1].abs()).max(one);
         let up = [up[0] / largest, up[1] / largest, up[2] / largest];
         let by = one / dot_3(up, up).sqrt();
@@ -57,7 +57,7 @@ impl Field {
 
     /// Packet version of [`plumb`](Self::plumb); returns a bit for each lane it applies to.
     #[inline(always)]
-    pub(super) fn plumb_packet<S: Simd>(&self, s: S, packet: &Packet, touches: &mut Touches) -> u64 {
+    pub(super) fn intersect_vertical_packet<S: Simd>(&self, s: S, packet: &Packet, touches: &mut Intersections) -> u64 {
         let (o, d) = (packet.origins(s), packet.directions(s));
         let zero = D::splat(s, 0.0);
         let half = [D::splat(s, self.half[0]), D::splat(s, self.half[1])];
@@ -66,21 +66,27 @@ impl Field {
         if (down & over).to_bitmask() == 0 {
             return 0;
         }
-        let at = [(o[0] + half[0]) * self.per_metre[0], (o[1] + half[1]) * self.per_metre[1]];
+        let at = [(o[0] + half[0]) * self.cells_per_meter[0], (o[1] + half[1]) * self.cells_per_meter[1]];
         let cells = self.cells_at(s, at);
         let (x, y) = (at[0] - cells.at[0], at[1] - cells.at[1]);
         let [h, hx, hy] = cells.plane(y.le(x));
         let t = (o[2] - (h + hx * x + hy * y)) / -d[2];
         let (normal, known) = self.normals(s, hx, hy);
         let done = down & over & zero.le(t) & known;
-        write(touches, t, &normal, (done & t.le(packet.limits(s))).to_bitmask());
+        write_hits(touches, t, &normal, (done & t.le(packet.limits(s))).to_bitmask());
         done.to_bitmask()
     }
 
     /// The first steps of [`touch`](Self::touch) for the `wanted` rays of a packet that enter through the top of the
     /// bounding box. Returns a bit for each lane that hits the surface there.
     #[inline(always)]
-    pub(super) fn steep_packet<S: Simd>(&self, s: S, packet: &Packet, wanted: u64, touches: &mut Touches) -> u64 {
+    pub(super) fn intersect_steep_packet<S: Simd>(
+        &self,
+        s: S,
+        packet: &Packet,
+        wanted: u64,
+        touches: &mut Intersections,
+    ) -> u64 {
         let (o, d, limit) = (packet.origins(s), packet.directions(s), packet.limits(s));
         let zero = D::splat(s, 0.0);
         let none = d[0].eq(zero) | d[1].eq(zero) | zero.le(d[2]);
@@ -102,7 +108,7 @@ impl Field {
             return 0;
         }
         let to = leave.min(limit);
-        let pm = self.per_metre;
+        let pm = self.cells_per_meter;
         let origin = [(o[0] + D::splat(s, self.half[0])) * pm[0], (o[1] + D::splat(s, self.half[1])) * pm[1]];
         let along = [d[0] * pm[0], d[1] * pm[1]];
         let one = D::splat(s, 1.0);
@@ -136,10 +142,10 @@ impl Field {
             let clear = (highest + slack).lt(z0.min(z1));
             let close = active & !clear.to_bitmask();
             if close != 0 {
-                let (t, hx, hy, met) = cross(s, &cells, origin, along, [o[2], d[2]], from, leave);
+                let (t, hx, hy, met) = intersect_cells(s, &cells, origin, along, [o[2], d[2]], from, leave);
                 let (normal, known) = self.normals(s, hx, hy);
                 let met = (met & known & t.le(limit)).to_bitmask() & close;
-                write(touches, t, &normal, met);
+                write_hits(touches, t, &normal, met);
                 done |= met;
                 active &= !met;
             }
@@ -153,11 +159,11 @@ impl Field {
     }
 }
 
-/// Packet version of [`Field::cross`] for rays above the surface: distance, slopes at the hit, and the lanes that hit.
+/// Packet version of [`HeightGrid::intersect_cells`] for rays above the surface: distance, slopes at the hit, and the lanes that hit.
 #[inline(always)]
-fn cross<S: Simd>(
+fn intersect_cells<S: Simd>(
     s: S,
-    cells: &Cells<S>,
+    cells: &CellLanes<S>,
     origin: [D<S>; 2],
     [dx, dy]: [D<S>; 2],
     [z, dz]: [D<S>; 2],
@@ -192,7 +198,7 @@ fn cross<S: Simd>(
 
 /// Writes the hits of some lanes.
 #[inline(always)]
-fn write<S: Simd>(touches: &mut Touches, t: D<S>, normal: &[[f64; WIDTH]; 3], lanes: u64) {
+fn write_hits<S: Simd>(touches: &mut Intersections, t: D<S>, normal: &[[f64; WIDTH]; 3], lanes: u64) {
     let t = t.array();
     for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| lanes >> k & 1 == 1) {
         *touch = Some(Intersection { t: t[k], normal: [normal[0][k], normal[1][k], normal[2][k]] });

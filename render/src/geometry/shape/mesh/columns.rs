@@ -8,7 +8,7 @@
 //! Above is along any axis of the mesh's own frame (MuJoCo turns meshes to their principal axes). That axis is called z
 //! below.
 //!
-//! No triangle is missed that [`Shear`](crate::geometry::triangle::Shear) finds a ray inside of. Some point of that
+//! No triangle is missed that [`ShearedRay`](crate::geometry::triangle::Shear) finds a ray inside of. Some point of that
 //! triangle, at a height z between those of its corners, is along x where the ray is at that height, up to rounding:
 //! the corners as seen from the ray are on both sides of it. With coordinates up to M, slopes b up to 1 and e = 2^-53,
 //! a corner is off by at most e M times 2 (the difference to the ray's origin along x), 2 (along z), 2 (their product
@@ -17,31 +17,31 @@
 //! meets the triangle's own interval; along y likewise. Rounding keeps order when coordinates become columns. So
 //! intervals that meet have columns in common, and both have all columns of a rectangle.
 
-use super::MeshTree;
-use crate::geometry::bvh::FAR;
+use super::MeshBvh;
+use crate::geometry::bvh::MAX_ORIGIN_RATIO;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::Touches;
-use crate::geometry::triangle::{ShearPacket, Triangle, distances, normals};
+use crate::geometry::shape::Intersections;
+use crate::geometry::triangle::{ShearedPacket, Triangle, distances, normals};
 use crate::simd::{D, D3, Simd};
 use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::vector::V3;
 
 /// Meshes with fewer triangles have no columns: their BVHs are small.
-const FEWEST: usize = 256;
+const MIN_TRIANGLES: usize = 256;
 /// Width of columns, relative to the mean extent of the triangles. A ray passes many narrow columns, and wide columns
 /// hold many triangles to test.
-const NARROW: f64 = 0.7;
+const COLUMN_WIDTH: f64 = 0.7;
 /// Largest ratio of columns to triangles.
-const MOST: f64 = 2.0;
+const MAX_COLUMNS_PER_TRIANGLE: f64 = 2.0;
 /// Largest mean number of columns per triangle; meshes of triangles of very different sizes have no columns.
-const SPREAD: usize = 12;
+const MAX_MEAN_COLUMNS: usize = 12;
 /// Largest slope of a steep ray: meters along x or y per meter along z.
-const STEEP: f64 = 0.125;
+const MAX_SLOPE: f64 = 0.125;
 /// Columns that a ray may pass along x, and along y.
-const PASSED: usize = 4;
+const MAX_PASSED: usize = 4;
 /// Largest number of triangles in the columns that the rays of a packet pass. A BVH traversal costs about as much as
 /// these tests.
-const CROWD: usize = 320;
+const MAX_CANDIDATES: usize = 320;
 /// Marks the absence of a triangle.
 const NONE: u32 = u32::MAX;
 
@@ -51,7 +51,7 @@ pub(crate) struct Columns {
     axes: [usize; 3],
     /// Smallest coordinates of all triangles \[m\].
     low: [f64; 2],
-    per_metre: [f64; 2],
+    columns_per_meter: [f64; 2],
     /// Columns along x and y.
     size: [usize; 2],
     /// Start of each column's list, row by row along x, and the end of the last list.
@@ -62,7 +62,7 @@ pub(crate) struct Columns {
     /// Heights of the lowest and highest corner \[m\].
     heights: [f64; 2],
     /// Largest absolute coordinate \[m\].
-    reach: f64,
+    max_coordinate: f64,
     /// Widening of rays, as a fraction of the largest coordinate.
     slack: f64,
 }
@@ -70,19 +70,19 @@ pub(crate) struct Columns {
 impl Columns {
     /// Builds columns slightly narrower than the mean triangle; `None` if triangles are in too many columns.
     pub(crate) fn new(triangles: &[Triangle], bounds: &[V3; 2], axes: [usize; 3]) -> Option<Self> {
-        if triangles.len() < FEWEST {
+        if triangles.len() < MIN_TRIANGLES {
             return None;
         }
         let count = triangles.len() as f64;
         let size = [0, 1].map(|axis| {
             let mean =
                 triangles.iter().map(|t| extent(t, axes[axis])).map(|[low, high]| high - low).sum::<f64>() / count;
-            (bounds[1][axes[axis]] - bounds[0][axes[axis]]) / (NARROW * mean)
+            (bounds[1][axes[axis]] - bounds[0][axes[axis]]) / (COLUMN_WIDTH * mean)
         });
         // The number of columns is limited by their memory.
-        let fewer = (MOST * count / (size[0] * size[1])).sqrt().min(1.0);
+        let fewer = (MAX_COLUMNS_PER_TRIANGLE * count / (size[0] * size[1])).sqrt().min(1.0);
         let size = size.map(|n| (n * fewer).ceil());
-        let known = size.iter().all(|n| (1.0..=MOST * count).contains(n));
+        let known = size.iter().all(|n| (1.0..=MAX_COLUMNS_PER_TRIANGLE * count).contains(n));
         if known { Self::with_size(triangles, bounds, axes, size.map(|n| n as usize)) } else { None }
     }
 
@@ -97,17 +97,17 @@ impl Columns {
         let mut columns = Self {
             axes,
             low: [low[0], low[1]],
-            per_metre,
+            columns_per_meter: per_metre,
             size,
             starts: vec![0; size[0] * size[1] + 2],
             lists: Vec::new(),
             sides: Vec::new(),
             heights: [low[2], high[2]],
-            reach: bounds.iter().flatten().fold(0.0, |m, x| x.abs().max(m)),
+            max_coordinate: bounds.iter().flatten().fold(0.0, |m, x| x.abs().max(m)),
             // 32 e.
             slack: 16.0 * f64::EPSILON,
         };
-        let most = SPREAD * triangles.len();
+        let most = MAX_MEAN_COLUMNS * triangles.len();
         let rectangles = triangles.iter().map(|t| columns.rectangle(t));
         let in_all: usize = rectangles.map(|[from, to]| (to[0] - from[0] + 1) * (to[1] - from[1] + 1)).sum();
         if in_all > most || !per_metre.iter().all(|x| x.is_finite()) {
@@ -158,11 +158,11 @@ impl Columns {
 
     /// Column of a coordinate; the first or the last one for coordinates outside.
     fn column(&self, axis: usize, x: f64) -> usize {
-        let at = (x - self.low[axis]) * self.per_metre[axis];
+        let at = (x - self.low[axis]) * self.columns_per_meter[axis];
         at.max(0.0).min((self.size[axis] - 1) as f64) as usize
     }
 
-    /// Passes the columns of a triangle to `show`, row by row.
+    /// Passes the columns of a triangle to `write_hits`, row by row.
     fn each_row(&mut self, triangle: &Triangle, show: impl Fn(std::ops::Range<usize>, &mut [u32], &mut [u32])) {
         let [[left, bottom], [right, top]] = self.rectangle(triangle);
         for row in bottom..=top {
@@ -180,9 +180,9 @@ fn extent(triangle: &Triangle, axis: usize) -> [f64; 2] {
 
 /// True if all rays of a packet are steep enough.
 #[inline(always)]
-pub(crate) fn are_steep<S: Simd>(s: S, shear: &ShearPacket<S>) -> bool {
+pub(crate) fn are_steep<S: Simd>(s: S, shear: &ShearedPacket<S>) -> bool {
     let [x, y] = shear.slopes();
-    x.abs().max(y.abs()).le(D::splat(s, STEEP)).to_bitmask() == crate::geometry::packet::ALL
+    x.abs().max(y.abs()).le(D::splat(s, MAX_SLOPE)).to_bitmask() == crate::geometry::packet::ALL
 }
 
 /// A value per ray, for both ends, along both axes.
@@ -190,12 +190,12 @@ type Ends<T> = [[[T; WIDTH]; 2]; 2];
 
 /// True if two intervals overlap.
 #[inline(always)]
-fn meet([a, b]: &[f32; 2], [c, d]: [f64; 2]) -> bool {
+fn overlap([a, b]: &[f32; 2], [c, d]: [f64; 2]) -> bool {
     (f64::from(*a) <= d) & (c <= f64::from(*b))
 }
 
 /// The nearest triangle of each ray so far.
-struct Nearest {
+struct ClosestHits {
     limit: [f64; WIDTH],
     best: [u32; WIDTH],
 }
@@ -212,39 +212,41 @@ impl Columns {
     /// Intersects a packet of steep rays. Returns false if their columns hold too many triangles, or if the rays begin
     /// so far away that rounding could put them into triangles whose BVH boxes they miss.
     #[inline(always)]
-    pub(crate) fn touch_packet<S: Simd>(
+    pub(crate) fn intersect_packet<S: Simd>(
         &self,
         s: S,
-        tree: &MeshTree,
+        tree: &MeshBvh,
         packet: &Packet,
-        shear: &ShearPacket<S>,
-        touches: &mut Touches,
+        shear: &ShearedPacket<S>,
+        touches: &mut Intersections,
     ) -> bool {
-        let (origin, by) = (shear.origin(), shear.by());
-        if origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).most() > FAR * self.reach {
+        let (origin, by) = (shear.origin(), shear.shear());
+        if origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).reduce_max()
+            > MAX_ORIGIN_RATIO * self.max_coordinate
+        {
             return false;
         }
-        let (ends, [[left, bottom], [right, top]]) = self.passed(s, &origin, &by);
+        let (ends, [[left, bottom], [right, top]]) = self.column_ranges(s, &origin, &by);
         let mut crowd = 0;
         for k in 0..WIDTH {
-            if !packet.has(k) {
+            if !packet.is_active(k) {
                 continue;
             }
-            if right[k] - left[k] >= PASSED || top[k] - bottom[k] >= PASSED {
+            if right[k] - left[k] >= MAX_PASSED || top[k] - bottom[k] >= MAX_PASSED {
                 return false;
             }
             for row in bottom[k]..=top[k] {
                 crowd += self.list(row, left[k], right[k]).len();
             }
         }
-        if crowd > CROWD {
+        if crowd > MAX_CANDIDATES {
             return false;
         }
-        let mut nearest = Nearest { limit: packet.limits(s).array(), best: [NONE; WIDTH] };
+        let mut nearest = ClosestHits { limit: packet.limits(s).array(), best: [NONE; WIDTH] };
         let rays = [origin, by].map(|v| [v[0].array(), v[1].array(), v[2].array()]);
         let mut pairs = Pairs::default();
         for k in 0..WIDTH {
-            if !packet.has(k) {
+            if !packet.is_active(k) {
                 continue;
             }
             let [x, y] = [[ends[0][0][k], ends[1][0][k]], [ends[0][1][k], ends[1][1][k]]];
@@ -255,7 +257,7 @@ impl Columns {
                     // Written without a branch, which would be unpredictable: about half of the triangles are near the
                     // ray.
                     let sides = &self.sides[triangle as usize];
-                    pairs.count += usize::from(meet(&sides[0], x) & meet(&sides[1], y));
+                    pairs.count += usize::from(overlap(&sides[0], x) & overlap(&sides[1], y));
                     if pairs.count == WIDTH {
                         pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
                         pairs.count = 0;
@@ -267,14 +269,14 @@ impl Columns {
             // The remaining lanes hold earlier pairs or default ones: they change nothing.
             pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
         }
-        tree.show(s, &nearest.limit, &nearest.best, touches);
+        tree.write_hits(s, &nearest.limit, &nearest.best, touches);
         true
     }
 
     /// Intervals of the rays' coordinates along both axes, and the first and the last columns there.
     #[inline(always)]
-    fn passed<S: Simd>(&self, s: S, origin: &D3<S>, by: &D3<S>) -> (Ends<f64>, Ends<usize>) {
-        let reach = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).max(D::splat(s, self.reach));
+    fn column_ranges<S: Simd>(&self, s: S, origin: &D3<S>, by: &D3<S>) -> (Ends<f64>, Ends<usize>) {
+        let reach = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).max(D::splat(s, self.max_coordinate));
         let slack = reach * self.slack;
         let [below, above] = self.heights.map(|z| D::splat(s, z) - origin[2]);
         let zero = D::splat(s, 0.0);
@@ -284,7 +286,7 @@ impl Columns {
             let last = D::splat(s, (self.size[axis] - 1) as f64);
             for (end, x) in [a.min(b) - slack, a.max(b) + slack].into_iter().enumerate() {
                 ends[end][axis] = x.array();
-                let at = (x - D::splat(s, self.low[axis])) * self.per_metre[axis];
+                let at = (x - D::splat(s, self.low[axis])) * self.columns_per_meter[axis];
                 let at = at.max(zero).min(last).array();
                 for k in 0..WIDTH {
                     columns[end][axis][k] = at[k] as u32 as usize;
@@ -311,7 +313,7 @@ impl Pairs {
         triangles: &[Triangle],
         axes: [usize; 3],
         rays: &[[[f64; WIDTH]; 3]; 2],
-        nearest: &mut Nearest,
+        nearest: &mut ClosestHits,
     ) {
         let mut corners = [[[0.0; WIDTH]; 3]; 3];
         let mut lines = [[[0.0; WIDTH]; 3]; 2];
@@ -351,10 +353,10 @@ impl Pairs {
     }
 }
 
-impl MeshTree {
+impl MeshBvh {
     /// Writes the hits of a packet, lane by lane.
     #[inline(always)]
-    fn show<S: Simd>(&self, s: S, limit: &[f64; WIDTH], best: &[u32; WIDTH], touches: &mut Touches) {
+    fn write_hits<S: Simd>(&self, s: S, limit: &[f64; WIDTH], best: &[u32; WIDTH], touches: &mut Intersections) {
         let mut corners = [[[0.0; WIDTH]; 3]; 3];
         for lane in 0..WIDTH {
             let found = if best[lane] == NONE { 0 } else { best[lane] as usize };
