@@ -16,7 +16,7 @@ use kinetoscope::sensors::ContactSensor;
 use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::ray::{HitTargets, RayCaster};
 use launcher::spawn::SpawnFlags;
-use launcher::{Launcher, MainLoop, picture, stage};
+use launcher::{Launcher, MainLoop, image_file, stage};
 use serde_json::{Value, json};
 use std::any::Any;
 use std::path::{Path, PathBuf};
@@ -220,7 +220,7 @@ fn report(
     (steps, dt, rate): (u64, f64, f64),
 ) -> launcher::Result<Value> {
     let (sim, (camera, scanner, contacts)) = (scene.sim(), sensors(scene)?);
-    let depth = picture::finite_range(camera.depth()?.iter().copied());
+    let depth = image_file::finite_range(camera.depth()?.iter().copied());
     let hit = scanner.hit_mask();
     let forces = contacts.net_forces_w();
     let of_env = |env: usize| -> Value {
@@ -266,7 +266,7 @@ fn write_images(scene: &mut InteractiveScene, out: &Path) -> launcher::Result {
     for (row, env) in front.env_ids().iter().enumerate() {
         let pixels: Vec<u8> = color.index_axis(Axis(0), row).iter().copied().collect();
         let file = out.join(format!("front_camera_env{env}.png"));
-        picture::write_png(&file, &picture::color_image([width, height], &pixels))?;
+        image_file::write_png(&file, &image_file::color_image([width, height], &pixels))?;
     }
     let sim = scene.sim_mut();
     let markers = sim.scene().markers();

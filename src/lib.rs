@@ -13,10 +13,12 @@ struct PageOfCameras;
 
 pub mod assets;
 #[cfg(all(feature = "record", feature = "viewer"))]
-mod record_button;
+mod file_recording;
 #[cfg(all(feature = "record", feature = "viewer"))]
-mod recorded_film;
+mod recording_playback;
 
+#[cfg(all(feature = "record", feature = "viewer"))]
+pub use file_recording::FileRecording;
 pub use kinetoscope_exec as exec;
 pub use kinetoscope_mujoco as mujoco;
 #[cfg(feature = "record")]
@@ -32,9 +34,7 @@ pub use kinetoscope_viewer as viewer;
 pub use nalgebra;
 pub use ndarray;
 #[cfg(all(feature = "record", feature = "viewer"))]
-pub use record_button::FileRecording;
-#[cfg(all(feature = "record", feature = "viewer"))]
-pub use recorded_film::RecordingPlayback;
+pub use recording_playback::RecordingPlayback;
 
 /// Names that most programs need (at most 45), and the traits of their methods: `use kinetoscope::prelude::*;`.
 pub mod prelude {

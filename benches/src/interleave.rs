@@ -8,7 +8,7 @@
 //! times as fast as the other, because it gets the larger pages. Comparisons of many environments are therefore done
 //! [in both orders](in_both_orders).
 
-use crate::foreign;
+use crate::other_load;
 use crate::settings::BenchResult;
 use kinetoscope::mujoco::trim_heap;
 use std::time::{Duration, Instant};
@@ -161,7 +161,7 @@ pub(crate) fn measure(plan: MeasurementCfg, sides: &mut [&mut dyn Contender]) ->
         if start.elapsed().as_secs_f64() > PATIENCE * plan.seconds && quiet.len() >= FEWEST_ROUNDS {
             break;
         }
-        let (begin, foreign_before) = (Instant::now(), foreign::seconds(&processes));
+        let (begin, foreign_before) = (Instant::now(), other_load::seconds(&processes));
         let mut round = vec![Duration::ZERO; sides.len()];
         for (i, side) in sides.iter_mut().enumerate() {
             round[i] += warm_block(*side, steps)?;
@@ -173,7 +173,7 @@ pub(crate) fn measure(plan: MeasurementCfg, sides: &mut [&mut dyn Contender]) ->
             side.push(time.as_secs_f64() / f64::from(2 * steps));
         }
         let length = begin.elapsed().as_secs_f64();
-        let foreign = foreign::seconds(&processes).zip(foreign_before).map_or(0.0, |(after, before)| after - before);
+        let foreign = other_load::seconds(&processes).zip(foreign_before).map_or(0.0, |(after, before)| after - before);
         quiet.push(foreign <= MAX_OTHER_LOAD * length);
         measured += if foreign <= MAX_OTHER_LOAD * length { length } else { 0.0 };
         done += per_round;

@@ -3,19 +3,19 @@
 //! `cargo xtask bench` runs them on both supported MuJoCo versions. A table goes to standard error, the rows as JSON to
 //! a file.
 
+mod baseline;
 mod camera;
 mod contacts;
 mod drive;
-mod foreign;
 mod ik;
 mod interleave;
 mod memory;
 mod models;
 mod mujoco_batch;
+mod other_load;
 mod randomize;
 mod rays;
 mod record;
-mod rival;
 mod row;
 mod settings;
 mod startup;

@@ -1,9 +1,9 @@
 //! Batched stepping, compared with `mujoco.batch` from Python: the same model, states and threads, in turns. The two
 //! processes are started in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
+use crate::baseline::{self, Process};
 use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{Case, STEPS};
-use crate::rival::{self, Process};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
 use crate::step::Ours;
@@ -16,7 +16,7 @@ const ENVS: [usize; 2] = [64, 1024];
 const THREADS: [usize; 2] = [1, 2];
 
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
-    let python = rival::python("mujoco.batch");
+    let python = baseline::python("mujoco.batch");
     let mut rows = Vec::new();
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {

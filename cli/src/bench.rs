@@ -1,6 +1,6 @@
 //! `kinetoscope bench`: simulation and rendering throughput of a model.
 
-use crate::ending::{CommandStatus, Result};
+use crate::command_status::{CommandStatus, Result};
 use crate::model::{Model, ModelArgs, Setup, SpawnArgs};
 use crate::progress;
 use crate::render::{RenderArgs, images_per_second};

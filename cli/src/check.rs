@@ -1,6 +1,6 @@
 //! `kinetoscope check`: report on the contents of robot files, with warnings.
 
-use crate::ending::{CommandStatus, Result};
+use crate::command_status::{CommandStatus, Result};
 use crate::model::{Files, ModelArgs, Setup, may_be_scene};
 use crate::scene_report::{MjcfReport, SceneReport};
 use kinetoscope::prelude::*;

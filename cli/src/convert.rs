@@ -1,6 +1,6 @@
 //! `kinetoscope convert`: exports a robot as MJCF with its meshes, for both supported MuJoCo versions.
 
-use crate::ending::{CommandStatus, Result};
+use crate::command_status::{CommandStatus, Result};
 use crate::excerpt;
 use crate::model::{ModelArgs, Setup};
 use std::path::{Path, PathBuf};

@@ -2,15 +2,15 @@
 //! scenes.
 
 mod bench;
+mod channel_image;
 mod check;
+mod command_status;
 mod convert;
-mod ending;
 mod excerpt;
+mod field_names;
 mod file_kind;
 mod interrupt;
 mod model;
-mod names;
-mod picture;
 mod plot;
 mod progress;
 mod recover;
@@ -20,7 +20,7 @@ mod scene_report;
 mod view;
 
 use clap::{Parser, Subcommand};
-use ending::CommandStatus;
+use command_status::CommandStatus;
 use std::process::ExitCode;
 
 /// Tools for robots and scenes from URDF and MJCF: check, convert, render, view, benchmark, replay. No GPU, no OpenGL

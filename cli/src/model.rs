@@ -1,6 +1,6 @@
 //! Model arguments of commands: URDF files, an MJCF file, or a scene file.
 
-use crate::ending::Result;
+use crate::command_status::Result;
 use crate::excerpt;
 use crate::file_kind::FileKind;
 use kinetoscope::assets;

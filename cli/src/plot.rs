@@ -1,7 +1,7 @@
 //! `kinetoscope plot`: plots recorded values over time.
 
-use crate::ending::{CommandStatus, Result};
-use crate::names::{group_fields, matches_pattern};
+use crate::command_status::{CommandStatus, Result};
+use crate::field_names::{group_fields, matches_pattern};
 use kinetoscope::record::{FieldSelector, RecordedTopic, Recording};
 use kinetoscope::viewer::plot::{self, Plot, Series};
 use std::io::Write;

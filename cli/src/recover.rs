@@ -1,6 +1,6 @@
 //! `kinetoscope recover`: completes the file of an interrupted recording.
 
-use crate::ending::{CommandStatus, Result};
+use crate::command_status::{CommandStatus, Result};
 use kinetoscope::record::recover_to;
 use std::path::PathBuf;
 

@@ -1,8 +1,8 @@
 //! `kinetoscope render`: renders an image of a model in its initial state.
 
-use crate::ending::{CommandStatus, Result};
+use crate::channel_image::{self, Channel};
+use crate::command_status::{CommandStatus, Result};
 use crate::model::{Files, ModelArgs, Setup};
-use crate::picture::{self, Channel};
 use crate::progress;
 use clap::ValueEnum;
 use kinetoscope::exec::ThreadPool;
@@ -115,7 +115,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     progress::with_progress("paths", || progress.fraction(), || rasterizer.render(&mut job))
         .map_err(|(_, error)| error)?;
     let seconds = start.elapsed().as_secs_f64();
-    picture::write(&frame, args.channel, [view.width, view.height], &args.out)?;
+    channel_image::write(&frame, args.channel, [view.width, view.height], &args.out)?;
     println!("{}: {} x {} pixels in {:.1} ms", args.out.display(), view.width, view.height, 1e3 * seconds);
     Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })
 }

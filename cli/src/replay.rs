@@ -1,6 +1,6 @@
 //! `kinetoscope replay`: shows a recording, renders images of it, or verifies it by running its actions again.
 
-use crate::ending::{CommandStatus, Result};
+use crate::command_status::{CommandStatus, Result};
 use crate::{excerpt, interrupt};
 use kinetoscope::RecordingPlayback;
 use kinetoscope::prelude::*;

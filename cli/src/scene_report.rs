@@ -1,6 +1,6 @@
 //! Reports of `check` on scenes: MJCF files that are not robots, and scene files.
 
-use crate::ending::Result;
+use crate::command_status::Result;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::MjcfPart;

@@ -1,6 +1,6 @@
 //! `kinetoscope view`: simulates a model in a window or a browser.
 
-use crate::ending::{CommandStatus, Result};
+use crate::command_status::{CommandStatus, Result};
 use crate::interrupt;
 use crate::model::{ModelArgs, Setup, SpawnArgs};
 use kinetoscope::FileRecording;

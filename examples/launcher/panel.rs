@@ -1,6 +1,6 @@
 //! Four channels of a camera side by side, with titles and a scale for the depth.
 
-use super::picture;
+use super::image_file;
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::ascii::{FONT_8X13, FONT_10X20};
 use embedded_graphics::pixelcolor::Rgb888;
@@ -59,12 +59,12 @@ fn slice<T, D: RemoveAxis>(channel: ArrayView<'_, T, D>, row: usize) -> super::R
 /// A 2 x 2 grid of color, depth, mask and normals with titles.
 pub(crate) fn grid(views: &CameraChannels<'_>) -> RgbImage {
     let size = views.size;
-    let range = picture::finite_range(views.depth.iter().copied()).unwrap_or([0.0, 1.0]);
+    let range = image_file::finite_range(views.depth.iter().copied()).unwrap_or([0.0, 1.0]);
     let pictures = [
-        ("Color", picture::color_image(size, views.color)),
-        ("Depth", picture::depth_image(size, views.depth, range)),
-        ("Mask", picture::mask_image(size, views.mask)),
-        ("Normals", picture::normal_image(size, views.normal)),
+        ("Color", image_file::color_image(size, views.color)),
+        ("Depth", image_file::depth_image(size, views.depth, range)),
+        ("Mask", image_file::mask_image(size, views.mask)),
+        ("Normals", image_file::normal_image(size, views.normal)),
     ];
     let (width, height) = (size[0] as u32, size[1] as u32);
     let cell = [width + 2 * GAP, height + TITLE + SCALE];

@@ -1,6 +1,6 @@
 //! All environments in one image, with the debug markers of the sensors.
 
-use super::{Result, picture};
+use super::{Result, image_file};
 use kinetoscope::prelude::*;
 use kinetoscope::render::ParallelRenderer;
 use kinetoscope::render::View;
@@ -33,5 +33,5 @@ pub(crate) fn write(
     let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
     ParallelRenderer::new(cfg, sim.threads()).render(&mut job).map_err(|(_, error)| error)?;
     let color = frame.color.unwrap_or_default();
-    picture::write_png(path, &picture::color_image([width, height], &color))
+    image_file::write_png(path, &image_file::color_image([width, height], &color))
 }

@@ -1,6 +1,6 @@
 //! Examples that run a task in 16 environments and count the successes.
 
-use super::{Launcher, Result, picture, stage};
+use super::{Launcher, Result, image_file, stage};
 use clap::Parser;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
@@ -157,6 +157,6 @@ impl ImageSeries {
         let color = camera.color()?;
         let color = color.as_slice().ok_or("the picture is not in one piece")?;
         let file = out.join(format!("{}_{}.png", self.name, self.taken));
-        picture::write_png(&file, &picture::color_image([width, height], color))
+        image_file::write_png(&file, &image_file::color_image([width, height], color))
     }
 }

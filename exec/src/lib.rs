@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `thread_pool.rs` | [`ThreadPool`]: the interface |
 //! | `workers.rs` | the worker threads, and all unsafe code of this crate |
-//! | `patience.rs` | time for which an idle worker spins before it sleeps |
+//! | `spin_limit.rs` | time for which an idle worker spins before it sleeps |
 //!
 //! ```
 //! use kinetoscope_exec::ThreadPool;
@@ -17,7 +17,7 @@
 //! assert_eq!(squares[9], 81);
 //! ```
 
-mod patience;
+mod spin_limit;
 mod thread_pool;
 mod workers;
 

@@ -4,7 +4,7 @@
 //! 0.05 ms and a few allocations, several times per image.
 #![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
 
-use crate::patience::SpinLimit;
+use crate::spin_limit::SpinLimit;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

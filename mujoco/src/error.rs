@@ -1,8 +1,8 @@
 //! Errors of MuJoCo.
 
-use super::newer::UnknownKeyword;
+use super::unknown_keyword::UnknownKeyword;
 use super::version::{BUILD_VERSION, SupportedVersion, version_string};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 
 /// Error of an engine call (`mju_error`). The data of the call must be reset or dropped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

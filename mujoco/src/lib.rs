@@ -13,13 +13,13 @@
 //!
 //! | files | content |
 //! |---|---|
-//! | `vfs`, `plugins` | compilation of MJCF text and files with their assets |
-//! | `model`, `arrays`, `control`, `options`, `name`, `weld`, `raw` | [`Model`]: sizes, arrays, options, names |
-//! | `look`, `deforming` | meshes, textures, materials, lights, skins and flexes |
+//! | `compile`, `plugins` | compilation of MJCF text and files with their assets |
+//! | `model`, `arrays`, `version_counts`, `options`, `name`, `weld`, `raw` | [`Model`]: sizes, arrays, options, names |
+//! | `visual`, `skin_flex` | meshes, textures, materials, lights, skins and flexes |
 //! | `data`, `state`, `ray`, `jacobian`, `prefetch` | [`Data`]: state, steps, contacts, rays, Jacobians |
 //! | `editor` | [`ModelEditor`]: models that share most arrays with a compiled model |
-//! | `beyond`, `newer`, [`words`] | features by version, and MJCF keywords |
-//! | `version`, `guard`, `error`, `memory` | version check, error handler, error types, allocator |
+//! | `unsupported`, `unknown_keyword`, [`mjcf_keywords`] | features by version, and MJCF keywords |
+//! | `version`, `guard`, `error`, `heap` | version check, error handler, error types, allocator |
 //!
 //! ```
 //! use kinetoscope_mujoco::{Data, compile};
@@ -34,49 +34,49 @@
 #![allow(unsafe_code, reason = "the wall to MuJoCo")]
 
 mod arrays;
-mod beyond;
-mod control;
+mod compile;
 mod data;
-mod deforming;
 mod editor;
 mod error;
 mod guard;
+mod heap;
 mod jacobian;
-mod look;
-mod memory;
+pub mod mjcf_keywords;
 mod model;
 mod name;
-mod newer;
 mod options;
 mod plugins;
 mod prefetch;
 mod raw;
 mod ray;
+mod skin_flex;
 mod state;
 #[cfg(test)]
 mod tests;
+mod unknown_keyword;
+mod unsupported;
 mod version;
-mod vfs;
+mod version_counts;
+mod visual;
 mod weld;
-pub mod words;
 
-pub use beyond::UnsupportedFeature;
+pub use compile::{Asset, LoadError, compile, compile_file};
 pub use data::{Data, Overflow, Warning, WarningCounts};
-pub use deforming::{Bone, FlexArrays, SkinArrays};
 pub use editor::{DiagonalInertia, ModelEditor};
 pub use error::{CompileError, EngineError};
-pub use look::{
-    HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,
-};
-pub use memory::trim_heap;
+pub use heap::trim_heap;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use options::OptionDifference;
 pub use prefetch::prefetch;
 pub use ray::RayHit;
+pub use skin_flex::{Bone, FlexArrays, SkinArrays};
 pub use state::{IntegrationState, UnnormalizedQuats, UserInputs};
+pub use unsupported::UnsupportedFeature;
 pub use version::{BUILD_VERSION, SupportedVersion, VersionError, check_version, version_string};
-pub use vfs::{Asset, LoadError, compile, compile_file};
+pub use visual::{
+    HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,
+};
 pub use weld::Weld;
 
 pub use mujoco_sys as sys;

@@ -2,7 +2,7 @@
 
 use super::Plot;
 use super::axis::Axis;
-use super::thin::decimate_m4;
+use super::decimate::decimate_m4;
 
 /// The geometry of a plot, in pixels from the top left corner.
 #[derive(Clone, Debug, PartialEq)]

@@ -15,14 +15,14 @@
 //! |---|---|
 //! | `axis` | linear and logarithmic axes, ticks |
 //! | `layout` | positions of lines and texts: [`PlotLayout`] |
-//! | `thin` | reduction of long curves to what is visible |
+//! | `decimate` | reduction of long curves to what is visible |
 //! | `svg` | SVG output |
 #![forbid(unsafe_code)]
 
 mod axis;
+mod decimate;
 mod layout;
 mod svg;
-mod thin;
 
 pub use layout::{Anchor, Curve, Label, PlotLayout};
 use std::fmt;

@@ -1,7 +1,7 @@
 //! Configuration of recorders.
 
 use crate::format::Format;
-use crate::stage::OverviewCfg;
+use crate::overview::OverviewCfg;
 use crate::topic::Topic;
 use kinetoscope_sim::EnvId;
 use std::path::PathBuf;

@@ -11,14 +11,14 @@
 //!
 //! | modules | content |
 //! |---|---|
-//! | `recorder`, `cfg`, `topic`, `source`, `stream`, `stage`, `clock` | the observer: what is recorded, and when |
+//! | `recorder`, `cfg`, `topic`, `source`, `stream`, `overview`, `clock` | the observer: what is recorded, and when |
 //! | `packet`, `writer`, `file`, `folder` | packets, the writer thread, atomic files and folders |
-//! | `mcap_file`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
+//! | `mcap_writer`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
 //! | `npz`, [`npy`], `zip` | NumPy archives |
-//! | `picture_folder`, `picture`, `animation` | PNG files and animations |
+//! | `image_folder`, `png`, `animation` | PNG files and animations |
 //! | `episodes`, `lerobot`, `robomimic` | datasets of episodes for learning |
-//! | `read`, `archive`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
-//! | [`replay`], `film`, `scene_file` | simulation of recorded actions, and display of recorded motion ([`Playback`]) |
+//! | `read`, `recorded_arrays`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
+//! | [`replay`], `playback`, `scene_file` | simulation of recorded actions, and display of recorded motion ([`Playback`]) |
 //!
 //! ```no_run
 //! use kinetoscope_record::{Record, RecorderCfg, Topic};
@@ -33,23 +33,24 @@
 #![forbid(unsafe_code)]
 
 mod animation;
-mod archive;
 mod cfg;
 mod clock;
 mod episodes;
 mod error;
 mod file;
-mod film;
 mod folder;
 mod format;
+mod image_folder;
 mod lerobot;
-mod mcap_file;
+mod mcap_writer;
 pub mod npy;
 mod npz;
+mod overview;
 mod packet;
-mod picture;
-mod picture_folder;
+mod playback;
+mod png;
 mod read;
+mod recorded_arrays;
 mod recorder;
 mod recover;
 pub mod replay;
@@ -59,7 +60,6 @@ mod ros;
 mod scene_file;
 mod scene_update;
 mod source;
-mod stage;
 mod stream;
 #[cfg(test)]
 mod tests;
@@ -69,12 +69,12 @@ mod zip;
 
 pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};
-pub use film::Playback;
 pub use format::Format;
+pub use overview::OverviewCfg;
 pub use packet::{Event, EventKind};
+pub use playback::Playback;
 pub use read::{FieldSelector, RecordedTopic, Recording, TimeSeries};
 pub use recorder::{Record, Recorder, RecorderId, RecordingSummary};
 pub use recover::{Recovered, recover, recover_to};
-pub use stage::OverviewCfg;
 pub use stream::{Distortion, ElementType, StreamField, StreamKind, StreamSchema};
 pub use topic::Topic;

@@ -2,7 +2,7 @@
 
 use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, lock_partial_file, partial_path_of, remove_file_if_exists};
-use crate::mcap_file::{io_error, options};
+use crate::mcap_writer::{io_error, options};
 use mcap::records::{AttachmentHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError, Writer};

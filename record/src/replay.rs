@@ -12,9 +12,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::archive::RecordedArrays;
 use crate::error::{RecordError, Result};
 use crate::packet::{Packet, StreamRows};
+use crate::recorded_arrays::RecordedArrays;
 use crate::source::StreamSource;
 use kinetoscope_sim::{EnvId, SimulationManager};
 use serde_json::Value;

@@ -3,8 +3,8 @@
 mod camera;
 
 use crate::error::{RecordError, Result};
+use crate::overview::{OverviewCfg, OverviewRenderer};
 use crate::packet::{StreamRows, ValueBuffer};
-use crate::stage::{OverviewCfg, OverviewRenderer};
 use crate::stream::{ElementType, StreamField, StreamKind, StreamSchema};
 use camera::{DISPARITY, StereoSide, timing_camera};
 use kinetoscope_sensors::camera::StereoCamera;

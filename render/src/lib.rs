@@ -10,16 +10,16 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `rasterizer`, `parallel` | one frame, and many frames on several threads |
+//! | `image_renderer`, `parallel_renderer` | one frame, and many frames on several threads |
 //! | `request` | scene, view and options of a frame |
 //! | [`frame`] | image channels (color, depth, ...), one file each, and their buffers |
 //! | `renderer`, `aperture`, `shutter`, `progress` | choice of the renderer, depth of field, motion blur, progress |
 //! | [`lens`], `intrinsics` | mapping from pixels to rays |
 //! | `visibility` | views, and the surface at each pixel: `raster` finds it by triangles, `trace` by rays |
 //! | `shade` | shading: from visible surfaces to channels |
-//! | `path`, `exposure`, `rolling` | path tracing, its frames, and rolling shutter of all other channels |
+//! | `path`, `path_frame`, `rolling_shutter` | path tracing, its frames, and rolling shutter of all other channels |
 //! | [`geometry`] | rays, triangles, shapes, bounding volume hierarchies |
-//! | `ticket` | counter-based random numbers of sensor noise |
+//! | `rng_key` | counter-based random numbers of sensor noise |
 //! | `simd` | SIMD lanes, instruction set selected at run time |
 //! | `optics_error` | errors of lenses and intrinsics |
 //!
@@ -46,24 +46,24 @@
 #![forbid(unsafe_code)]
 
 mod aperture;
-mod exposure;
 pub mod frame;
 pub mod geometry;
+mod image_renderer;
 mod intrinsics;
 pub mod lens;
 mod optics_error;
-mod parallel;
+mod parallel_renderer;
 mod path;
+mod path_frame;
 mod progress;
 mod raster;
-mod rasterizer;
 mod renderer;
 mod request;
-mod rolling;
+mod rng_key;
+mod rolling_shutter;
 mod shade;
 mod shutter;
 mod simd;
-mod ticket;
 mod trace;
 mod visibility;
 
@@ -71,18 +71,18 @@ mod visibility;
 mod tests;
 
 pub use aperture::Aperture;
+pub use image_renderer::ImageRenderer;
 pub use intrinsics::{Intrinsics, PixelIntrinsics};
 pub use optics_error::OpticsError;
-pub use parallel::ParallelRenderer;
-pub use parallel::RenderJob;
-pub use path::film::Accumulator;
+pub use parallel_renderer::ParallelRenderer;
+pub use parallel_renderer::RenderJob;
+pub use path::accumulator::Accumulator;
 pub use progress::RenderProgress;
 pub use raster::Layer;
-pub use rasterizer::ImageRenderer;
 pub use renderer::Renderer;
 pub use request::{PreviousState, RasterCfg, RenderRequest};
-pub use shade::plan::{check_exposure_optics, check_occlusion};
+pub use rng_key::{RngKey, RngStream};
+pub use shade::prepared_frame::{check_exposure_optics, check_occlusion};
 pub use shade::tone::ToneCurve;
 pub use shutter::{FrameSample, Shutter, ShutterOpenState};
-pub use ticket::{RngKey, RngStream};
 pub use visibility::{RenderError, View};

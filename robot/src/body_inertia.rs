@@ -6,7 +6,7 @@ use crate::description::{JointKind, LinkId, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::inertia::RigidInertia;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::Matrix3;
 
 /// Mass of a moving body without mass \[kg\]. One milligram disturbs no robot and is far above MuJoCo's minimum.

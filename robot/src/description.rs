@@ -5,7 +5,7 @@
 //! element has its [`SourceLocation`].
 
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::{Matrix3, Unit, Vector3};
 use std::path::PathBuf;
 

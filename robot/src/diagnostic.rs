@@ -1,6 +1,6 @@
 //! Warnings about the user's input: repairs, ignored elements and unusual values. They are collected, never printed.
 
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -146,7 +146,7 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// Creates a warning at `source`.
+    /// Creates a warning at `source_location`.
     pub fn new(kind: DiagnosticKind, source: impl Into<Option<SourceLocation>>, message: impl Into<String>) -> Self {
         Self { kind, source: source.into(), message: message.into() }
     }

@@ -9,7 +9,7 @@ use crate::mesh_key::MeshKey;
 use crate::urdf::MissingInertia;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::{HullCache, HullCfg, TriMesh, VolumeIntegrals};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;

@@ -9,8 +9,8 @@
 //! | [`RenderScene`], [`Instance`], [`Material`], [`Texture`], [`Light`], [`Sky`], [`Marker`] | a scene to render |
 //! | [`SceneState`], [`VisibleState`], [`Contacts`], [`StateFields`] | state of all environments at one time |
 //! | [`KeyedRng`], [`Philox`], [`sampling`] | random numbers and sample warping |
-//! | [`Ray`], [`framing`] | rays, and camera placement around a scene |
-//! | [`file_format`], [`yaml`], [`pattern`], [`source`], [`AtomicFile`] | configuration files, name patterns, files |
+//! | [`Ray`], [`camera_fit`] | rays, and camera placement around a scene |
+//! | [`file_format`], [`yaml`], [`pattern`], [`source_location`], [`AtomicFile`] | configuration files, name patterns, files |
 //!
 //! ```
 //! use kinetoscope_scene::shape::Sphere;
@@ -25,8 +25,8 @@
 
 mod atomic_file;
 pub mod basis;
+pub mod camera_fit;
 pub mod file_format;
-pub mod framing;
 mod light;
 mod marker;
 mod material;
@@ -39,11 +39,11 @@ mod quantities;
 mod random;
 mod ray;
 mod render_scene;
-mod requires;
 pub mod sampling;
 pub mod shape;
-pub mod source;
+pub mod source_location;
 mod state;
+mod state_fields;
 pub mod terrain;
 pub mod vector;
 pub mod yaml;
@@ -58,5 +58,5 @@ pub use pose_f64::PoseF64;
 pub use random::{KeyedRng, Philox};
 pub use ray::Ray;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
-pub use requires::StateFields;
 pub use state::{Contact, Contacts, EnvScene, SceneState, StateDims, VisibleState};
+pub use state_fields::StateFields;

@@ -8,7 +8,7 @@
 //! velocities are those of t_(k+1). The state has both times.
 
 use crate::quantities::{PerEnvArray, quantities};
-use crate::requires::StateFields;
+use crate::state_fields::StateFields;
 use crate::{Light, Marker, PoseF32, PoseF64, RenderScene};
 use ndarray::{Array2, Array3};
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Frame transformer: poses of frames in the world and relative to a source frame.
 
+use crate::body_state::{check_offset, pose, write_front};
 use crate::error::SensorError;
-use crate::frames::{check_offset, pose, write_front};
 use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{Selection, at_least_one, matching};

@@ -1,7 +1,7 @@
 //! Inertial measurement units (IMU).
 
+use crate::body_state::{check_offset, pose, vector, write_front};
 use crate::error::SensorError;
-use crate::frames::{check_offset, pose, vector, write_front};
 use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};

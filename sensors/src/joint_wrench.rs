@@ -1,7 +1,7 @@
 //! Joint wrench sensor: six-axis force and torque in joints.
 
+use crate::body_state::{pose, vector, write_front};
 use crate::error::SensorError;
-use crate::frames::{pose, vector, write_front};
 use crate::sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Selection, at_least_one, select};
@@ -36,7 +36,7 @@ pub struct JointWrenchCfg {
 /// Shapes: N environments, B links.
 ///
 /// Both are in the axes of the link and about its origin: the joint frame on the child side, as URDF defines it. For
-/// [`JointWrenchCfg::frames`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
+/// [`JointWrenchCfg::body_state`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
 /// force and `T` the torque about the origin of the link; the frame is at `p` with the rotation `R` in the link. The
 /// force is then `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, wherever the frame is.
 ///
@@ -81,7 +81,7 @@ impl SensorCfg for JointWrenchCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing, an empty selection of `links` and `frames`, a link that is fused to another one
+    /// A pattern that matches nothing, an empty selection of `links` and `body_state`, a link that is fused to another one
     /// (the error names it), or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;

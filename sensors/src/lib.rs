@@ -41,14 +41,13 @@
 #![forbid(unsafe_code)]
 
 mod actuator_state;
+mod body_state;
 mod cached;
 pub mod camera;
 mod contact_sensor;
 mod delay;
 mod error;
-mod expected;
 mod frame_transformer;
-mod frames;
 mod history;
 mod imu;
 mod joint_state;
@@ -61,12 +60,12 @@ mod schedule;
 mod select;
 mod sensor;
 mod slot;
+mod state_requirements;
 mod summary;
 
 pub use actuator_state::{ActuatorState, ActuatorStateCfg};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use error::SensorError;
-pub use expected::StateRequirements;
 pub use frame_transformer::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};
 pub use history::History;
 pub use imu::{Imu, ImuCfg};
@@ -78,3 +77,4 @@ pub use sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 pub use slot::SensorSlot;
+pub use state_requirements::StateRequirements;

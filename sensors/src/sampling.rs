@@ -5,11 +5,11 @@
 
 use crate::delay::{self, DelayLine};
 use crate::error::SensorError;
-use crate::expected::StateRequirements;
 use crate::history::History;
 use crate::noise::{NoiseCfg, NoiseState};
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::SensorContext;
+use crate::state_requirements::StateRequirements;
 use kinetoscope_scene::SceneState;
 use kinetoscope_scene::StateFields;
 use ndarray::{Array1, Array2, ArrayView, ArrayView1, ArrayView2, ArrayView3, Axis, Dimension, IntoDimension};

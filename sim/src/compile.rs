@@ -3,13 +3,13 @@
 use crate::batch::Batch;
 use crate::body_pose::BodyFrame;
 use crate::capture::BodyAxis;
-use crate::contents::{EntitySet, GROUND_MASK_ID};
 use crate::drive::gains::Gains;
 use crate::drive::table::{Drive, DriveTable, Realization};
 use crate::drive::{DriveModel, implicit};
+use crate::entity_set::{EntitySet, GROUND_MASK_ID};
 use crate::env::{SimEnv, with_small_buffers};
 use crate::error::{Error, Result};
-use crate::index::{
+use crate::indexing::{
     BodyIndexing, GeomIndexing, JointIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths,
 };
 use crate::mjcf::document::{Mjcf, WeldEquality};

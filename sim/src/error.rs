@@ -2,10 +2,10 @@
 
 use crate::batch_error::BatchError;
 use crate::drive::plan::PlanError;
+use crate::entity_label::EntityLabel;
 use crate::mjcf::error::RobotMjcfError;
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot_file::RobotFileError;
-use crate::named::EntityLabel;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
 use crate::shard::ShardError;
@@ -14,7 +14,7 @@ use kinetoscope_mujoco::{CompileError, EngineError, LoadError, VersionError};
 use kinetoscope_robot::kinematics::KinematicsError;
 use kinetoscope_robot::shape_inertia::ShapeInertiaError;
 use kinetoscope_robot::urdf::UrdfError;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::path::PathBuf;
 
 /// Result of the public API.

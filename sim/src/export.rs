@@ -1,9 +1,9 @@
 //! Export of every stage of the pipeline: URDF, description, MJCF with meshes for both supported MuJoCo versions.
 
 use crate::compile::document;
-use crate::contents::EntitySet;
 use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::drive::plan::JointPlan;
+use crate::entity_set::EntitySet;
 use crate::error::{Error, Result};
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
 use crate::mjcf::part::PartDocument;
@@ -17,7 +17,7 @@ use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_robot::urdf::write_urdf;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufWriter;
 use std::path::Path;

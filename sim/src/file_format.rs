@@ -1,7 +1,7 @@
 //! Serde formats for configuration types whose derived form would be hard to read.
 
 use crate::drive::PerJoint;
-use crate::objects::robot_file::MjcfFile;
+use crate::objects::mjcf_file::MjcfFile;
 use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::file_format::pairs;
 use serde::de::value::MapAccessDeserializer;

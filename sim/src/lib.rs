@@ -62,13 +62,14 @@ mod batch_error;
 mod body_pose;
 mod capture;
 mod compile;
-mod contents;
 mod diverged;
 #[cfg(not(feature = "internals"))]
 mod drive;
 #[cfg(feature = "internals")]
 pub mod drive;
 mod entities;
+mod entity_label;
+mod entity_set;
 #[cfg(not(feature = "internals"))]
 mod env;
 #[cfg(feature = "internals")]
@@ -78,17 +79,15 @@ mod export;
 mod file_format;
 mod gather;
 mod ids;
-mod index;
+mod indexing;
 pub mod inspect;
 mod interactive_scene;
 mod light_cfg;
-mod look;
 mod manager;
 #[cfg(not(feature = "internals"))]
 mod mjcf;
 #[cfg(feature = "internals")]
 pub mod mjcf;
-mod named;
 mod objects;
 mod observer;
 mod randomization;
@@ -103,6 +102,7 @@ mod step_result;
 mod surface_cfg;
 mod viewpoint;
 mod visible;
+mod visual_state;
 mod warnings;
 mod wrenches;
 
@@ -111,6 +111,7 @@ pub use diverged::DivergedEnv;
 pub use drive::plan::PlanError;
 pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveCfgError, DriveModel, DriveType, IdealPd, PerJoint};
 pub use entities::Entities;
+pub use entity_label::EntityLabel;
 pub use error::{Error, Result};
 pub use ids::{EnvId, MjcfId, RigidObjectId, RobotId, TerrainId};
 pub use interactive_scene::{
@@ -118,16 +119,15 @@ pub use interactive_scene::{
 };
 pub(crate) use kinetoscope_scene::pattern;
 pub use light_cfg::{LightCfg, LightKindCfg};
-pub use look::{BodyMotion, EnvVisualState, JointAxis};
 pub use manager::SimulationManager;
 pub use mjcf::document::{FrictionCone, Integrator};
 pub use mjcf::error::RobotMjcfError;
 pub use mjcf::part::PartError;
 pub use mjcf::robot_file::RobotFileError;
-pub use named::EntityLabel;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};
 pub use objects::kinematics::IkResult;
 pub use objects::mesh_collision::MeshCollision;
+pub use objects::mjcf_file::MjcfFile;
 pub use objects::mjcf_part::{MjcfPart, MjcfPartMut};
 pub use objects::mjcf_part_data::{ActuatorIndex, MjcfPartCfg};
 pub use objects::object_group::{RigidObjectGroup, RigidObjectGroupMut};
@@ -136,7 +136,6 @@ pub use objects::rigid_object::{RigidObject, RigidObjectMut};
 pub use objects::rigid_object_data::{BodyType, RigidObjectCfg};
 pub use objects::robot::{Robot, RobotCfg, RobotMut};
 pub use objects::robot_data::JointIndex;
-pub use objects::robot_file::MjcfFile;
 pub use objects::robot_part::RobotPartMut;
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
@@ -157,5 +156,6 @@ pub use step_result::StepResult;
 pub use surface_cfg::SurfaceCfg;
 pub use viewpoint::Viewpoint;
 pub use visible::{FreeCamera, MaskId, ModelCamera, OffscreenScene, VisualScene};
+pub use visual_state::{BodyMotion, EnvVisualState, JointAxis};
 pub use warnings::Warnings;
 pub use wrenches::WrenchFrame;

@@ -2,8 +2,8 @@
 
 use crate::batch::Batch;
 use crate::compile::compile;
-use crate::contents::EntitySet;
 use crate::diverged::DivergedEnv;
+use crate::entity_set::EntitySet;
 use crate::env::{EnvStatus, SimEnv};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, MjcfId, RigidObjectId, RobotId, TerrainId, env_mask};

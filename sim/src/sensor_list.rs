@@ -1,7 +1,7 @@
 //! The sensors of a simulation: built from configurations, updated after steps, read through typed handles.
 
 use crate::capture::CaptureRequest;
-use crate::contents::check_uid_syntax;
+use crate::entity_set::check_uid_syntax;
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;

@@ -2,9 +2,9 @@
 
 use crate::batch::Batch;
 use crate::capture::BodyAxis;
-use crate::contents::EntitySet;
+use crate::entity_set::EntitySet;
 use crate::env::SimEnv;
-use crate::index::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
+use crate::indexing::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
 use crate::randomization::{ModelPatcher, PropertyOverrides, PropertyTables};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::StateLayout;

@@ -1,7 +1,7 @@
 //! Surface properties besides color: gloss, metal, glass, emission.
 
+use crate::entity_label::EntityLabel;
 use crate::error::{Error, Result};
-use crate::named::EntityLabel;
 use crate::pattern;
 use kinetoscope_scene::Material;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Command terms: goals of an episode.
 
-use crate::dice::EpisodeRng;
+use crate::episode_rng::EpisodeRng;
 use crate::error::{EnvError, Result};
 use crate::space::Space;
 use std::fmt;

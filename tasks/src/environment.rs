@@ -2,13 +2,13 @@
 
 use crate::builder::Terms;
 use crate::cfg::EnvCfg;
-use crate::dice::{EpisodeKey, EpisodeRng};
+use crate::context::{TaskState, TermContext};
+use crate::episode_rng::{EpisodeKey, EpisodeRng};
 use crate::error::{EnvError, Result, TermKind};
 use crate::event::EventMode;
-use crate::now::{TaskState, TermContext};
+use crate::reset_monitor::ResetMonitor;
 use crate::space::Space;
 use crate::step::{EndReason, EndedEpisode, Step, StepInfo};
-use crate::watch::ResetMonitor;
 use kinetoscope_scene::KeyedRng;
 use kinetoscope_sim::{EnvId, ObserverId, SimulationManager, StepResult};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};

@@ -1,6 +1,6 @@
 //! Event terms: random initial states, property changes, pushes.
 
-use crate::dice::EpisodeRng;
+use crate::episode_rng::EpisodeRng;
 use crate::error::{EnvError, Result, TermResult};
 use kinetoscope_sim::SimulationManager;
 use std::fmt;

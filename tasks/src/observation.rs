@@ -1,7 +1,7 @@
 //! Observation terms.
 
+use crate::context::TermContext;
 use crate::error::{EnvError, Result, TermKind, TermResult};
-use crate::now::TermContext;
 use crate::space::Space;
 use kinetoscope_scene::KeyedRng;
 use ndarray::Array2;

@@ -1,7 +1,7 @@
 //! Reward terms.
 
+use crate::context::TermContext;
 use crate::error::{EnvError, Result, TermKind, TermResult};
-use crate::now::TermContext;
 use ndarray::Array1;
 use std::fmt;
 

@@ -1,7 +1,7 @@
 //! Termination terms: reasons for episodes to end.
 
+use crate::context::TermContext;
 use crate::error::{Result, TermKind, TermResult};
-use crate::now::TermContext;
 use ndarray::Array1;
 use std::fmt;
 

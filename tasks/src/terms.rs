@@ -23,8 +23,8 @@ terms! {
 }
 
 use crate::action::ActionTerm;
+use crate::context::TermContext;
 use crate::error::{Result, TermResult};
-use crate::now::TermContext;
 use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;

@@ -5,8 +5,8 @@
 //! | [`bits`] | bit-for-bit comparison of numbers |
 //! | [`tolerance`] | comparison within a tolerance that carries its derivation |
 //! | [`image_check`] | comparison of images; a failure writes an image of the difference |
-//! | [`refusal`] | tables of invalid inputs and their expected errors |
-//! | [`needs`] | robots, models and programs that only some machines have |
+//! | [`error_tables`] | tables of invalid inputs and their expected errors |
+//! | [`test_resources`] | robots, models and programs that only some machines have |
 //! | [`opencv`] | reference values of OpenCV |
 //! | [`process`] | tests in their own process |
 //! | [`srgb`] | the transfer function of sRGB |
@@ -23,15 +23,15 @@
 #![forbid(unsafe_code)]
 
 pub mod bits;
+pub mod error_tables;
 pub mod image_check;
-pub mod needs;
 pub mod opencv;
 pub mod process;
-pub mod refusal;
 #[cfg(feature = "scenes")]
 pub mod scenes;
 pub mod srgb;
 pub mod svg;
+pub mod test_resources;
 pub mod tolerance;
 pub mod urdf;
 pub mod wait;

@@ -5,7 +5,6 @@
 mod articulations;
 mod batch;
 mod drives;
-mod env;
 mod environments;
 mod kinematics;
 mod mjcf;
@@ -15,4 +14,5 @@ mod recording;
 mod robot;
 mod scene;
 mod sensors;
+mod tasks;
 mod terrain;

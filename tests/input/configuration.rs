@@ -3,7 +3,7 @@
 use super::support::{ball, cfg, hinge, robot};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{DriveModel, GroundCfg, Integrator, LightCfg};
-use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::error_tables::assert_errors;
 
 type Change = fn(&mut SimulationManagerCfg);
 

@@ -264,7 +264,7 @@ fn dynamics() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn dynamics_of_anymal() {
-    let anymal = kinetoscope_testkit::needs::robot(ANYMAL);
+    let anymal = kinetoscope_testkit::test_resources::robot(ANYMAL);
     let anymal = anymal.to_str().unwrap();
     compare_with_mujoco(&[anymal], components(&[anymal]), true);
 }

@@ -3,7 +3,7 @@
 use super::support::{INERTIAL, TETRAHEDRON, hinge_with, robot, sim};
 use kinetoscope::mujoco::{BUILD_VERSION, LoadError, compile};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::source::SourceLocation;
+use kinetoscope::scene::source_location::SourceLocation;
 use kinetoscope::sim::Integrator;
 use kinetoscope::sim::mjcf::document::{
     Body, FrictionCone, Geom, GeomRole, Inertial, Joint, JointType, Mjcf, PhysicsOption, Shape,

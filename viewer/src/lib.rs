@@ -13,7 +13,7 @@
 //! | Module | Contents |
 //! |---|---|
 //! | `control` | [`ViewController`], [`Viewer`] handles, commands, recording playback |
-//! | `stage` | snapshots, camera model, rendering, overlays, picking |
+//! | `scene_view` | snapshots, camera model, rendering, overlays, picking |
 //! | [`window`] | native X11 windows |
 //! | `serve` | HTTP and WebSocket server of the browser view |
 //! | `screenshot` | [`Screenshot`]: one image in one call |
@@ -37,19 +37,19 @@ mod file_extension;
 pub mod plot;
 #[cfg(test)]
 mod sample;
+mod scene_view;
 mod screenshot;
 mod serve;
-mod stage;
 pub mod window;
 
 pub use control::{
     Command, Play, PlayError, PlaybackSource, RecordButton, RecordControl, RecordingState, SnapshotRequest, Speed,
     ViewController, Viewer, ViewerExt,
 };
-pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
-pub use serve::{Serve, ServeCfg, ServeError, ServerHandle};
-pub use stage::{
+pub use scene_view::{
     CameraView, Canvas, EnvSelection, JointEntry, Names, OrbitCamera, Overlays, RunState, SceneRenderer, Snapshot,
     SnapshotEnv, Timeline, ViewOptions,
 };
+pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
+pub use serve::{Serve, ServeCfg, ServeError, ServerHandle};
 pub use window::{Closed, ImageWindow, ImageWindowCfg, OpenWindow, Window, WindowCfg, WindowError};

@@ -2,7 +2,7 @@
 //! thread.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
-use crate::stage::Canvas;
+use crate::scene_view::Canvas;
 use kinetoscope_render::Intrinsics;
 use kinetoscope_render::frame::Channels;
 use kinetoscope_robot::urdf::UrdfCfg;

@@ -2,7 +2,7 @@
 
 use crate::control::SnapshotRequest;
 use crate::file_extension;
-use crate::stage::{
+use crate::scene_view::{
     Canvas, EnvSelection, OrbitCamera, Overlays, RunState, SceneRenderer, Snapshot, SnapshotPool, ViewOptions,
 };
 use kinetoscope_render::{RenderError, View};

@@ -7,7 +7,7 @@ use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci, no_findings};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
-use crate::{arrows, circles, docs_check, examples, mutate, own_time, source_check, wheel};
+use crate::{dependencies, docs_check, examples, import_cycles, mutate, own_time, source_check, wheel};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -62,8 +62,8 @@ impl Context<'_> {
 const STAGES: &[Stage] = &[
     Stage { name: "setup", what: "what the machine lacks", when: When::Always, run: install },
     Stage { name: "fmt", what: "formatting", when: When::Always, run: fmt },
-    Stage { name: "arrows", what: "rooms and their arrows", when: When::Always, run: |c| arrows::run(c.repo) },
-    Stage { name: "circles", what: "circles of files", when: When::Always, run: |c| circles::run(c.repo) },
+    Stage { name: "arrows", what: "rooms and their arrows", when: When::Always, run: |c| dependencies::run(c.repo) },
+    Stage { name: "circles", what: "circles of files", when: When::Always, run: |c| import_cycles::run(c.repo) },
     Stage { name: "rules", what: "rules of the tree", when: When::Always, run: rules },
     Stage {
         name: "docs",

@@ -1,8 +1,8 @@
 //! The table of example runs in CI, and the check that every example is in the table.
 
-use crate::alike;
 use crate::progress::Progress;
 use crate::run::{Failure, Repo, XtaskResult, in_ci, no_findings};
+use crate::same_images;
 use crate::setup::Prepared;
 use crate::test;
 use serde_json::Value;
@@ -409,7 +409,7 @@ pub(crate) fn run(repo: &Repo, ready: &Prepared, packages: &[&str], rows: RowSel
         return Ok(());
     }
     for (example, [ours, other], lit) in SAME_SCENES {
-        alike::check(&out.join(ours), &out.join(other), lit)
+        same_images::check(&out.join(ours), &out.join(other), lit)
             .map_err(|reason| Failure::new(format!("{example}: {reason}")))?;
     }
     Ok(())

@@ -8,21 +8,20 @@
 //! | `demo`, `test`, `ci`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
-//! | `arrows`, `circles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
-//! | `examples`, `alike` | the table of example runs, and the comparison of their images |
+//! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
+//! | `examples`, `same_images` | the table of example runs, and the comparison of their images |
 //! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
 //! | `mutations` | the lists of code mutations |
 #![forbid(unsafe_code)]
 
-mod alike;
-mod arrows;
 mod bench;
 mod bless;
 mod ci;
-mod circles;
 mod demo;
+mod dependencies;
 mod docs_check;
 mod examples;
+mod import_cycles;
 mod mutate;
 mod mutations;
 mod own_time;
@@ -32,6 +31,7 @@ mod progress;
 mod python;
 mod robots;
 mod run;
+mod same_images;
 mod setup;
 mod source_check;
 mod svg;

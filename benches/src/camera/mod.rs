@@ -15,20 +15,20 @@
 //! default size of each side, 4096 texels in MuJoCo and at most 1024 in ours. Another row reduces MuJoCo's shadow maps
 //! to the size of ours.
 
-mod by_rays;
-mod limit;
+mod hardware_limits;
+mod ray_casting;
 mod scene;
 mod sides;
 
-pub(crate) use by_rays::ray_casting;
+pub(crate) use ray_casting::ray_casting;
 pub(crate) use scene::Scene;
 
+use crate::baseline::{can_run, python};
 use crate::interleave::{Contender, MeasurementCfg, Times, measure};
-use crate::rival::{can_run, python};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
+use hardware_limits::{ComputeLoop, CopyLoop};
 use kinetoscope::render::Renderer;
-use limit::{ComputeLoop, CopyLoop};
 use scene::Scenes;
 use sides::{Baseline, BaselineRenderer, OurRenderer, Quality, Work};
 use std::ffi::OsString;

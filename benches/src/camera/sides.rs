@@ -1,8 +1,8 @@
 //! The compared renderers: our rasterizer in this process, baselines in other processes.
 
 use super::scene::{GROUPS, Scene};
+use crate::baseline::Process;
 use crate::interleave::Contender;
-use crate::rival::Process;
 use crate::settings::BenchResult;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::render::View;

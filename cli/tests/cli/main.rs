@@ -19,8 +19,8 @@ mod excerpt;
 #[path = "../../src/file_kind.rs"]
 mod file_kind;
 #[allow(dead_code, reason = "only its tests are run")]
-#[path = "../../src/names.rs"]
-mod names;
+#[path = "../../src/field_names.rs"]
+mod field_names;
 #[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/progress.rs"]
 mod progress;

@@ -74,7 +74,7 @@ fn commands() {
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn programs() {
-    let python = kinetoscope_testkit::needs::python_readers();
+    let python = kinetoscope_testkit::test_resources::python_readers();
     let folder = folder();
     // LeRobot needs some gigabytes: read_lerobot.py reads the data set where LeRobot is installed.
     let absent =

@@ -1,6 +1,6 @@
 //! `kinetoscope view`: a window on Xvfb, a page for browsers, and how the command ends.
 
-use super::serve::visitor::exchange;
+use super::serve::test_client::exchange;
 use super::support::{CommandFolder, RunningCommand, colors, window_of};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};

@@ -1,7 +1,7 @@
 //! Animated PNG: frames are chunks of PNG files, as in the third edition of the PNG specification, section 4.9.
 
 use super::{Encoder, Output, check_sides, duration};
-use crate::picture::PngWriter;
+use crate::png::PngWriter;
 use crate::writer::{WriteError, WriteResult};
 use std::io::{Seek, SeekFrom, Write};
 

@@ -9,7 +9,7 @@ use crate::error::{RecordError, Result};
 use crate::file::{Storage, StorageFactory};
 use crate::folder::PartialFolder;
 use crate::format::Format;
-use crate::picture::PngWriter;
+use crate::png::PngWriter;
 use crate::stream::StreamSchema;
 use crate::writer::{FormatWriter, WriteError, WriteResult};
 use parquet::{ColumnType, ParquetWriter, put_bytes};

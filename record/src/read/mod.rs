@@ -11,14 +11,14 @@
 //! ```
 
 mod mcap;
+mod mcap_arrays;
 mod npz;
-mod rows;
 
-pub(crate) use rows::{McapArrays, read_arrays};
+pub(crate) use mcap_arrays::{McapArrays, read_arrays};
 
-use crate::archive::RecordedArrays;
 use crate::error::{RecordError, Result};
 use crate::format::Format;
+use crate::recorded_arrays::RecordedArrays;
 use kinetoscope_scene::pattern::closest_names;
 use std::path::{Path, PathBuf};
 

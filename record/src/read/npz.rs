@@ -1,8 +1,8 @@
 //! Topics and numbers of NumPy archives, by environment.
 
 use super::{FieldSelector, RecordedTopic, TimeSeries};
-use crate::archive::RecordedArrays;
 use crate::error::Result;
+use crate::recorded_arrays::RecordedArrays;
 use serde_json::Value;
 
 /// Names of the numbers of a pose.

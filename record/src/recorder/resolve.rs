@@ -5,10 +5,10 @@ use crate::cfg::RecorderCfg;
 use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, StorageFactory, parent_dir};
 use crate::format::Format;
+use crate::image_folder::ImageFolderWriter;
 use crate::lerobot;
-use crate::mcap_file::{self, McapWriter};
+use crate::mcap_writer::{self, McapWriter};
 use crate::npz::{self, NpzWriter};
-use crate::picture_folder::ImageFolderWriter;
 use crate::scene_file::{self, SCENE_ARCHIVE};
 use crate::source::StreamSource;
 use crate::stream::{StreamKind, StreamSchema};
@@ -89,7 +89,7 @@ pub(super) fn resolve(
     }
     if format == Format::Mcap
         && let Some(name) =
-            mcap_file::topic_conflict(&sources.iter().map(|source| &source.stream).collect::<Vec<_>>(), cfg.scene)
+            mcap_writer::topic_conflict(&sources.iter().map(|source| &source.stream).collect::<Vec<_>>(), cfg.scene)
     {
         return Err(RecordError::DuplicateName { path: cfg.path.clone(), name });
     }

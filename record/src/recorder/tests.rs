@@ -1,5 +1,5 @@
 mod events;
-mod pairs;
+mod stereo;
 
 use super::*;
 use crate::packet::ValueBuffer;

@@ -21,7 +21,7 @@
 //! Until the end, rows and compressed images are in two unnamed files in the same folder, because the number and the
 //! lengths of episodes are not known before. A killed process leaves nothing.
 
-mod heap;
+mod block_file;
 
 use crate::cfg::RecorderCfg;
 use crate::episodes::{self, DatasetWriter, EpisodeFrame, EpisodeSplitter, Features, Role};
@@ -30,9 +30,9 @@ use crate::file::{PartialFile, parent_dir};
 use crate::format::Format;
 use crate::stream::StreamSchema;
 use crate::writer::{FormatWriter, WriteError, WriteResult};
+use block_file::{BlockFile, BlockPosition};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use heap::{BlockFile, BlockPosition};
 use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5FileOptions, H5Group, Hdf5Error};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;

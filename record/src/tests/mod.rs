@@ -4,15 +4,15 @@
 mod archives;
 mod contents;
 mod episodes;
+mod errors;
 mod hdf5;
 mod images;
 mod kill;
 mod lerobot;
-mod outcomes;
 mod own_sensor;
 mod readers;
-mod refusals;
 mod scenes;
+mod task_results;
 
 pub(crate) use crate::{
     FieldSelector, Format, OverviewCfg, Record, RecordError, RecorderCfg, Recording, RecordingSummary, Topic, recover,

@@ -14,7 +14,7 @@
 
 pub(crate) mod assets;
 pub(crate) mod bvh;
-pub(crate) mod corner;
+pub(crate) mod interpolation;
 pub mod packet;
 pub(crate) mod shape;
 pub(crate) mod triangle;

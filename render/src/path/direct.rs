@@ -1,6 +1,6 @@
 //! Direct light: light that reaches a point straight from lights and emissive surfaces.
 
-use super::point::SurfaceInteraction;
+use super::interaction::SurfaceInteraction;
 use super::{MIN_FOOTPRINT_GROWTH, Path, PathTracer, offset_origin, times};
 use crate::shade::shadow_rays::SHADOW_RAY_FRACTION;
 use crate::simd::Simd;

@@ -8,14 +8,14 @@
 //! Source: Kajiya, The rendering equation, 1986. The units of light are those of
 //! [`Renderer`](crate::renderer::Renderer).
 
+pub(crate) mod accumulator;
+pub(super) mod bsdf;
+pub(crate) mod camera_rays;
+pub(crate) mod denoise;
 mod direct;
 mod emitter;
-pub(crate) mod eye;
-pub(crate) mod film;
-mod lamp;
-pub(super) mod lobe;
-pub(super) mod point;
-pub(crate) mod smooth;
+pub(super) mod interaction;
+mod light_source;
 pub(super) mod sobol;
 mod texel;
 
@@ -29,14 +29,14 @@ use crate::simd::Simd;
 use crate::trace::motion::{END_TIME, Motion, pose_to_f64};
 use crate::trace::{Hit, RayTracer};
 use crate::visibility::Projection;
+use camera_rays::CameraRayGenerator;
 use emitter::{Emitters, power_heuristic};
-use eye::CameraRayGenerator;
+use interaction::SurfaceInteraction;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::basis::OrthonormalBasis;
 use kinetoscope_scene::vector::{V3, add_scaled, dot, scale, to_f64};
 use kinetoscope_scene::{Light, LightingSpace, PoseF64, RenderScene, Texture};
-use lamp::LightSource;
-use point::SurfaceInteraction;
+use light_source::LightSource;
 use sobol::{SobolSample, SobolSequence};
 use std::sync::Arc;
 
@@ -267,7 +267,7 @@ impl PathTracer<'_> {
     fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, FirstHit) {
         let (sample, time) = (path.sample, path.time);
         let mut first = FirstHit { albedo: [1.0; 3], gloss: 0.0, normal: [0.0; 3], distance: 0.0 };
-        let Some(eye::CameraRay {
+        let Some(camera_rays::CameraRay {
             mut ray,
             near_distance: near,
             mut limit,

@@ -1,6 +1,6 @@
 //! Draw list of a frame: visible items, their order, and their bounds in the image.
 
-use super::detail;
+use super::lod;
 use super::tile::BLOCK;
 use crate::lens::rays::LensRays;
 use crate::visibility::Projection;
@@ -173,7 +173,7 @@ impl DrawList {
                 continue;
             };
             let level = if parts == Granularity::LodClusters {
-                detail::select_level(projection, instance, &placed.camera_from_instance)
+                lod::select_level(projection, instance, &placed.camera_from_instance)
             } else {
                 0
             };

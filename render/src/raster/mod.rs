@@ -5,8 +5,8 @@
 //! that stay in the cache. Items are drawn front to back, and blocks that are full of nearer surfaces are skipped.
 
 mod cluster;
-mod detail;
 mod draw_list;
+mod lod;
 pub(crate) mod tile;
 mod triangle;
 
@@ -14,11 +14,11 @@ use crate::simd::{COLUMN, F, LANES, M, ROW, Simd, U};
 use crate::simd::{load, load_u, select, select_u, splat, splat_u, store, store_u};
 use crate::visibility::{Projection, primitive};
 use cluster::{ClusterPass, Vertices};
-pub(crate) use detail::select_level;
 pub use draw_list::Layer;
 pub(crate) use draw_list::{DrawItem, DrawList, Granularity, PlacedInstance};
 use kinetoscope_scene::RenderScene;
 use kinetoscope_scene::shape::Shape;
+pub(crate) use lod::select_level;
 use tile::{BLOCK, NO_ID, SAMPLES, Tile};
 
 /// Rasterizes items into a visibility buffer.

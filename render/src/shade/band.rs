@@ -2,7 +2,7 @@
 
 use super::group::{Colors, SamplePositions, resolve};
 use super::multisample::{EdgeSamples, blend};
-use super::plan::PreparedFrame;
+use super::prepared_frame::PreparedFrame;
 use super::shadow::ShadowBand;
 use super::tone::encode;
 use crate::frame::{FrameMut, PixelGroup, Stage};

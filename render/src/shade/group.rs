@@ -2,7 +2,7 @@
 
 use super::light::{ShadeContext, ViewRays, albedo, shade, sky};
 use super::mirror::{MirrorSamples, Mirrors};
-use super::moves::MotionVectors;
+use super::motion_vectors::MotionVectors;
 use super::surface::{CameraRays, InstanceSurface, LensRayLanes, surface};
 use super::tone::to_srgb;
 use crate::frame::PixelGroup;

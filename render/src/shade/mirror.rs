@@ -7,7 +7,7 @@ use super::shadow_rays::{SurfacePoints, arrays, lanes_of};
 use super::surface::{InstanceSurface, Surface, SurfacePointLanes};
 use super::tone::{decode_bytes, to_bytes};
 use crate::geometry::bvh::TraversalStack;
-use crate::geometry::corner::interpolate_triangle;
+use crate::geometry::interpolation::interpolate_triangle;
 use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
 use crate::trace::motion::END_TIME;
 use crate::trace::{Hit, RayTracer};

@@ -2,7 +2,7 @@
 
 use super::harness::{TestFrame, look_at_view};
 use crate::frame::FrameMut;
-use crate::rasterizer::ImageRenderer;
+use crate::image_renderer::ImageRenderer;
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::visibility::{RenderError, View};

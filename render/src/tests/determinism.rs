@@ -2,11 +2,11 @@
 
 use super::harness::{EXACT, Image, TestFrame, assert_same_bits, look_at_view};
 use super::shutter::{bar, bar_at};
-use super::{detail, lenses};
+use super::{lenses, lod};
 use crate::aperture::Aperture;
 use crate::frame::{Channels, Frame};
-use crate::parallel::ParallelRenderer;
-use crate::rasterizer::ImageRenderer;
+use crate::image_renderer::ImageRenderer;
+use crate::parallel_renderer::ParallelRenderer;
 use crate::renderer::Renderer;
 use crate::request::{RasterCfg, RenderRequest};
 use crate::shutter::Shutter;
@@ -107,9 +107,9 @@ fn rolling_shutter() {
 
 #[test]
 fn detail_levels() {
-    let still = |_| detail::new_transparent().with(|still| still.cfg = detail::ON);
+    let still = |_| lod::new_transparent().with(|still| still.cfg = lod::ON);
     let images = assert_same_bits("levels of detail", (1, &still), &[2, 3], &[1, 9]);
-    assert!(images[0].bits() != detail::transparent().draw().bits(), "levels are in use");
+    assert!(images[0].bits() != lod::transparent().draw().bits(), "levels are in use");
 }
 
 /// Bands, samples and unselected channels change no bit of the other channels.

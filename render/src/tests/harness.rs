@@ -2,9 +2,9 @@
 
 use crate::aperture::Aperture;
 use crate::frame::{Channels, Frame};
+use crate::image_renderer::ImageRenderer;
 use crate::lens::LensRays;
-use crate::parallel::ParallelRenderer;
-use crate::rasterizer::ImageRenderer;
+use crate::parallel_renderer::ParallelRenderer;
 use crate::renderer::Renderer;
 use crate::request::{PreviousState, RasterCfg, RenderRequest};
 use crate::shade::tone::ToneCurve;

@@ -1,7 +1,6 @@
 //! Images, compared with analytic answers and other renderers.
 
 mod degenerate;
-mod detail;
 mod determinism;
 mod flow;
 mod golden;
@@ -9,7 +8,8 @@ mod harness;
 mod lens_images;
 mod lens_poles;
 mod lenses;
-mod light;
+mod lighting;
+mod lod;
 mod mirrors;
 mod progress;
 mod reference;

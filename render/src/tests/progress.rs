@@ -1,9 +1,9 @@
 //! Long renderings report their progress and can be canceled.
 
 use crate::frame::{Channels, Frame};
-use crate::parallel::ParallelRenderer;
+use crate::image_renderer::ImageRenderer;
+use crate::parallel_renderer::ParallelRenderer;
 use crate::progress::RenderProgress;
-use crate::rasterizer::ImageRenderer;
 use crate::renderer::Renderer;
 use crate::request::{RasterCfg, RenderRequest};
 use crate::visibility::{RenderError, View};

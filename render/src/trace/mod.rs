@@ -9,8 +9,8 @@
 //! There its rays are cast in packets of eight, the nearest instances first. The rays fill the rasterizer's own
 //! visibility buffer, so every channel comes from the same code.
 
+mod instance_bvh;
 pub(crate) mod motion;
-mod tree;
 
 use super::raster::tile::{BLOCK, BLOCK_AREA, NO_ID, SAMPLES, Tile};
 use super::raster::{DrawItem, Layer, PlacedInstance};
@@ -23,13 +23,13 @@ use crate::lens::ViewCone;
 use crate::lens::rays::LensRays;
 use crate::simd::Simd;
 use crate::visibility::Projection;
+use instance_bvh::InstanceBvh;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::vector::{V3, add_scaled, dot, scale};
 use kinetoscope_scene::{Instance, Marker, PoseF32, PoseF64, RenderScene};
 use motion::{Motion, orthonormalized, pose_to_f64};
 use std::sync::Arc;
-use tree::InstanceBvh;
 
 /// Largest number of surfaces of a transparent instance that a shadow ray passes.
 const MAX_FRONT_HITS: usize = 64;

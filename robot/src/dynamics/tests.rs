@@ -4,7 +4,7 @@
 use super::*;
 use crate::description::{Inertial, Joint, Link, Mimic};
 use kinetoscope_scene::pose::from_xyz_rpy;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_vector};
 use nalgebra::{Matrix3, Unit};
 use std::f64::consts::FRAC_PI_2;

@@ -1,7 +1,7 @@
 //! Errors of URDF files, of their meshes and of their assembly.
 
 use kinetoscope_scene::pattern::format_candidates;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::path::PathBuf;
 use thiserror::Error;
 

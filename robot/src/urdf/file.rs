@@ -3,7 +3,7 @@
 use super::tree::Tree;
 use crate::description::PartialInertial;
 use crate::diagnostic::Diagnostic;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 
 use super::error::UrdfError;
 use super::link::{read_origin, read_pose};
-use super::number::{Reader, format_number, write_attribute};
+use super::reader::{Reader, format_number, write_attribute};
 use crate::description::PartialInertial;
 use crate::diagnostic::DiagnosticKind;
 use kinetoscope_scene::pose::from_xyz_rpy;

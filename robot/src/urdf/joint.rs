@@ -3,7 +3,7 @@
 use super::error::UrdfError;
 use super::file::{JointMetadata, LimitMetadata};
 use super::link::read_origin;
-use super::number::{Reader, format_number, format_numbers, write_attribute};
+use super::reader::{Reader, format_number, format_numbers, write_attribute};
 use super::tree::{JointEdge, NamedElement, owned};
 use crate::description::JointKind;
 use crate::diagnostic::DiagnosticKind;

@@ -3,12 +3,12 @@
 use super::error::UrdfError;
 use super::file::{LinkMetadata, VisualMetadata};
 use super::inertial::read_inertial;
-use super::number::{Reader, format_element, format_number, format_numbers, write_attribute};
+use super::reader::{Reader, format_element, format_number, format_numbers, write_attribute};
 use super::rotation::rpy_of;
 use super::tree::owned;
 use crate::diagnostic::DiagnosticKind;
 use kinetoscope_scene::pattern::closest_names;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::Node;
 use std::collections::{BTreeMap, HashMap, HashSet};
 

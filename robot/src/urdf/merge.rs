@@ -19,7 +19,7 @@ use crate::diagnostic::Diagnostic;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest_names};
 use kinetoscope_scene::pose::from_xyz_rpy;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::{Matrix3, Unit, Vector3};
 
 /// Merged robot with the warnings about its files.

@@ -2,7 +2,7 @@
 
 use super::config::NameCase;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::HashMap;
 
 /// Registry that gives out each name once. Links and joints have separate registries.

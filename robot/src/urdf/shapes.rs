@@ -7,7 +7,7 @@ use super::merge::pose_of;
 use super::resolve::{Resolved, Resolver};
 use crate::description::{Collision, Geometry, Material, Visual};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::path::PathBuf;

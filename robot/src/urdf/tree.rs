@@ -5,7 +5,7 @@
 
 use super::error::UrdfError;
 use kinetoscope_scene::pattern::closest_names;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::HashMap;
 
 /// Tree of the links and joints of one file, as indices.

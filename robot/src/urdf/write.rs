@@ -3,7 +3,7 @@
 //! The text is the same for the same description, and reads back to the same robot up to rounding (1e-12). Materials
 //! are written inside the visuals, since two components may use one name for two materials.
 
-use super::number::{format_number, format_numbers, write_attribute};
+use super::reader::{format_number, format_numbers, write_attribute};
 use super::rotation::rpy_of;
 use crate::description::{Geometry, Inertial, Joint, JointKind, Material, PartialInertial, RobotDescription};
 use kinetoscope_scene::Pose;

@@ -1,7 +1,7 @@
 //! Repair of XML text that a namespace-aware parser rejects and other readers of URDF accept.
 
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::{Document, Error};
 use std::path::Path;
 

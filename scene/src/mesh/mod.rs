@@ -5,6 +5,8 @@
 mod affine;
 mod builder;
 mod cell;
+mod convex_decomposition;
+mod convex_decomposition_cache;
 mod dae;
 mod dae_material;
 mod error;
@@ -18,32 +20,30 @@ mod load;
 mod mtl;
 mod obj;
 mod options;
-mod pieces;
-mod pieces_cache;
 mod polygon;
 mod prisms;
-mod solid;
 mod stl;
 #[cfg(test)]
 mod tests_corrupt;
 #[cfg(test)]
 mod tests_robots;
 mod trimesh;
+mod volume_integrals;
 mod write;
 
 use std::ops::Range;
 use std::path::PathBuf;
 
+pub use convex_decomposition::{ConvexDecomposition, ConvexDecompositionCfg, convex_decomposition};
 pub use error::MeshError;
 pub use hull::{HullCfg, convex_hull};
 pub use hull_cache::HullCache;
 pub use hull_error::HullError;
 pub use load::{load, load_bytes, load_with};
 pub use options::{DaeUpAxis, MeshOptions};
-pub use pieces::{ConvexDecomposition, ConvexDecompositionCfg, convex_decomposition};
 pub use prisms::prisms;
-pub use solid::VolumeIntegrals;
 pub use trimesh::InvalidMesh;
+pub use volume_integrals::VolumeIntegrals;
 pub use write::{write_binary_stl, write_obj};
 
 /// Triangles with optional normals and texture coordinates, in one vertex array.

@@ -1,6 +1,6 @@
 //! Thin prisms from the triangles of a mesh.
 
-use super::pieces::{Triangle, triangles_of, unit_normal};
+use super::convex_decomposition::{Triangle, triangles_of, unit_normal};
 use super::{HullError, TriMesh};
 
 /// Builds a prism for each triangle with an area: its front is the triangle, its back is `thickness` \[m\] behind it.
@@ -28,7 +28,7 @@ pub fn prisms(mesh: &TriMesh, thickness: f64) -> Result<Vec<TriMesh>, HullError>
         let faces = [[0, 1, 2], [3, 5, 4]].into_iter().chain(sides).collect();
         let prism = TriMesh::from_triangles(positions, faces);
         // The volume in single precision: the back of a sliver may be degenerate or flipped.
-        let expected = super::pieces::area(&triangle) * thickness;
+        let expected = super::convex_decomposition::area(&triangle) * thickness;
         let volume = prism.signed_volume();
         (volume >= MIN_VOLUME && volume >= 0.5 * expected).then_some(prism)
     };

@@ -2,7 +2,7 @@
 
 use super::area_sampling::AreaSampling;
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
-use super::grid::{arc, revolve};
+use super::revolution::{arc, revolve};
 use super::interval::{Interval, sphere_interval, slab_interval, cylinder_interval};
 use crate::Ray;
 use crate::mesh::TriMesh;

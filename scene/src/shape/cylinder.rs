@@ -2,7 +2,7 @@
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection};
-use super::grid::revolve;
+use super::revolution::revolve;
 use super::interval::{slab_interval, cylinder_interval};
 use crate::Ray;
 use crate::mesh::TriMesh;

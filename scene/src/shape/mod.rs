@@ -7,10 +7,10 @@ mod area_sampling;
 mod closed_form;
 mod crease;
 mod deformation;
-mod grid;
 mod interval;
 mod lod;
 pub mod render_mesh;
+mod revolution;
 mod triangulated;
 
 use crate::Ray;
@@ -19,9 +19,9 @@ use crate::vector::{V3, to_f64};
 pub use area_sampling::{AreaSampling, SurfacePoint};
 pub use closed_form::{ClosedForm, ClosedFormVisitor, HullPart, Intersection};
 pub use deformation::smooth_normals;
-pub(crate) use grid::revolve;
 pub use lod::LodLevel;
 pub use render_mesh::{Cluster, RenderMesh};
+pub(crate) use revolution::revolve;
 use std::sync::Arc;
 pub use triangulated::{TriangleSampling, Triangulated};
 

@@ -2,7 +2,7 @@
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
-use super::grid::{arc, revolve};
+use super::revolution::{arc, revolve};
 use super::interval::sphere_interval;
 use crate::Ray;
 use crate::basis::OrthonormalBasis;

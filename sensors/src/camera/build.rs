@@ -1,14 +1,14 @@
 //! Construction of cameras from their configurations, with validation.
 
-use super::arrivals::HistoryImages;
 use super::cfg::CameraCfg;
+use super::delivered::HistoryImages;
 use super::env_rows::EnvRows;
 use super::error::CameraError;
-use super::faults::SensorNoiseModel;
 use super::frame_buffer::FrameBuffer;
 use super::imperfection::Imperfections;
 use super::motion::Motion;
-use super::sensor::drawing::{FrameRenderer, RenderedImages};
+use super::noise_model::SensorNoiseModel;
+use super::sensor::rendering::{FrameRenderer, RenderedImages};
 use super::sensor::{Camera, ViewTemplate};
 use super::viewpoints::{Viewpoint, Viewpoints};
 use crate::cached::Cached;

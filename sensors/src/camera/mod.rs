@@ -1,21 +1,21 @@
 //! Cameras: sensor, configuration, frame buffer, imperfections, calibration, segmentation, bounding boxes and stereo.
 
 mod accessors;
-mod arrivals;
 mod boxes;
 mod build;
 mod calibration;
 mod cfg;
 pub mod colormap;
+mod delivered;
 pub(crate) mod env_rows;
 mod error;
 mod extrinsics;
-mod faults;
 mod frame_buffer;
 pub(crate) mod frustum;
+mod image_noise;
 pub mod imperfection;
 mod motion;
-mod picture_noise;
+mod noise_model;
 pub(crate) mod placement;
 pub(crate) mod point_cloud;
 mod segmentation;
@@ -27,10 +27,10 @@ pub(crate) mod viewpoints;
 #[cfg(test)]
 mod tests;
 
-pub use arrivals::HistoryView;
 pub use boxes::{Box2d, Box3d, Occlusion, PixelBox};
 pub use calibration::{CalibrationError, CameraInfo, DistortionModel};
 pub use cfg::{CameraCfg, DepthMiss};
+pub use delivered::HistoryView;
 pub use error::CameraError;
 pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pose};
 pub use imperfection::Imperfections;

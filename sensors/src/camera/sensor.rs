@@ -1,9 +1,9 @@
 //! Camera sensor: captures the state when a frame is due, renders it when it is read.
 
-pub(super) mod drawing;
+pub(super) mod rendering;
 
-use super::arrivals::HistoryImages;
 use super::cfg::{CameraCfg, DepthMiss};
+use super::delivered::HistoryImages;
 use super::env_rows::EnvRows;
 use super::error::CameraError;
 use super::extrinsics::CameraConvention;
@@ -16,7 +16,6 @@ use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::Sensor;
-use drawing::{FrameRenderer, RenderedImages};
 use kinetoscope_render::RenderProgress;
 use kinetoscope_render::RngKey;
 use kinetoscope_render::frame::{Channels, Images};
@@ -29,6 +28,7 @@ use kinetoscope_scene::StateFields;
 use kinetoscope_scene::pose::to_row;
 use kinetoscope_scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use ndarray::{Array2, Array3, ArrayView1};
+use rendering::{FrameRenderer, RenderedImages};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 

@@ -1,9 +1,9 @@
 //! Ray casters and ray-caster cameras. The ray geometry is in [`kinetoscope_render::geometry`].
 
 mod camera;
+mod cast_order;
 mod caster;
 mod error;
-mod order;
 pub mod pattern;
 mod sampler;
 mod scan;

@@ -1,6 +1,6 @@
 //! Parallel ray casting in many environments.
 
-use super::order::coherent_order;
+use super::cast_order::coherent_order;
 use crate::sensor::SensorContext;
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_render::geometry::FixedTargets;

@@ -8,7 +8,7 @@ mod contacts;
 mod motion;
 
 use crate::body_pose::BodyFrame;
-use crate::index::{BodyIndexing, MjcfIndexing, RobotIndexing};
+use crate::indexing::{BodyIndexing, MjcfIndexing, RobotIndexing};
 use kinetoscope_mujoco::{Data, EngineError, Model};
 use kinetoscope_scene::Contact;
 use kinetoscope_scene::StateFields;

@@ -14,8 +14,8 @@
 
 mod acceleration;
 mod cfg;
-mod drawn;
 mod force;
+mod gain_overrides;
 mod mode;
 mod none;
 

@@ -1,6 +1,6 @@
 //! Drives of a compiled model (joint, row or actuator), and their gains and targets in one environment.
 
-use super::drawn::GainOverrides;
+use super::gain_overrides::GainOverrides;
 use super::gains::{DriveSetting, Gains, Target};
 use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
 use super::{DriveType, actuator, implicit};

@@ -2,7 +2,7 @@
 
 use super::rows::fill_joints;
 use crate::env::SimEnv;
-use crate::index::JointIndexing;
+use crate::indexing::JointIndexing;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 

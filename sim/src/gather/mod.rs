@@ -11,7 +11,7 @@ mod poses;
 mod rows;
 mod sensordata;
 mod velocities;
-mod visible;
+mod visual_scene;
 
 use crate::env::{EnvStatus, SimEnv};
 use crate::simulation::Simulation;
@@ -33,7 +33,7 @@ const QUANTITIES: [(StateFields, Fill); 11] = [
     (StateFields::CONTACTS, contacts::fill),
     (StateFields::ACCELERATIONS, accelerations::fill),
     (StateFields::JOINT_WRENCHES, joint_wrenches::fill),
-    (StateFields::VISIBLE, visible::fill),
+    (StateFields::VISIBLE, visual_scene::fill),
     (StateFields::INSTANCES, instances::fill),
 ];
 
@@ -65,7 +65,7 @@ pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneS
         if visual_scene.is_none() { StateFields::VISIBLE | StateFields::INSTANCES } else { StateFields::NONE };
     let mut state = SceneState::with_room(requires.without(unavailable | StateFields::MARKERS), &lengths);
     if let (Some(room), Some(visible)) = (&mut state.visible, visual_scene) {
-        *room = visible::allocate(visible, lengths.num_envs);
+        *room = visual_scene::allocate(visible, lengths.num_envs);
     }
     state
 }

@@ -1,6 +1,6 @@
 //! Rows of one environment: one number per joint, or quantities captured inside the step.
 
-use crate::index::JointIndexing;
+use crate::indexing::JointIndexing;
 use crate::simulation::Simulation;
 use ndarray::{Array2, Array3, Axis};
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::manager::SimulationManager;
 use crate::pattern::strip_env_prefix;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 
 /// Pair of bodies or robots that never collide.
 #[derive(Clone, Debug, PartialEq, Eq)]

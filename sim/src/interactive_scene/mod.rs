@@ -6,7 +6,7 @@
 mod entity;
 mod exclusion;
 mod file;
-mod look_up;
+mod lookup;
 mod types;
 mod value;
 mod yaml;
@@ -21,7 +21,7 @@ use crate::manager::SimulationManager;
 use crate::pattern::strip_env_prefix;
 use crate::simulation_cfg::SimulationManagerCfg;
 use entity::{BuildPhase, EntityHandle};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use std::path::Path;

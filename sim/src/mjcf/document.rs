@@ -6,7 +6,7 @@
 use super::part::PartDocument;
 use crate::light_cfg::LightKindCfg;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! Errors of robots that MJCF cannot represent.
 
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 
 /// Maximum number of moving bodies one below the other. MuJoCo's XML reader rejects documents that are nested deeper
 /// than 100 elements on 2.2.2 and 500 on 4.x.

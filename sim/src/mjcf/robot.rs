@@ -12,7 +12,7 @@ use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::TriMesh;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -10,7 +10,7 @@ use super::part::PartLines;
 use crate::light_cfg::LightKindCfg;
 use kinetoscope_mujoco::{CompileError, SupportedVersion};
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::fmt::Write as _;
 
 /// MJCF text with the source of each of its lines.

@@ -4,7 +4,7 @@ use crate::body_pose::body_pose;
 use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::BodyIndexing;
+use crate::indexing::BodyIndexing;
 use crate::objects::rows::{ArgumentSpec, EnvRows, unique_envs};
 use crate::randomization::Property;
 use crate::sensor_list::SensorList;

@@ -5,12 +5,12 @@ use crate::body_pose::BodyFrame;
 use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::MjcfIndexing;
+use crate::indexing::MjcfIndexing;
 use crate::objects::rows::{ArgumentSpec, EnvRows, check_unique_columns, unique_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
-use kinetoscope_mujoco::{Model, words};
+use kinetoscope_mujoco::{Model, mjcf_keywords};
 use kinetoscope_scene::pose::{from_row, to_row};
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::ops::Range;
@@ -104,7 +104,7 @@ impl<'a> MjcfPart<'a> {
         let [free, ball, one] = widths;
         let columns = |joint: usize| {
             let first = first[joint] as usize;
-            let width = match words::joint(self.model().jnt_type()[joint]) {
+            let width = match mjcf_keywords::joint(self.model().jnt_type()[joint]) {
                 Some("free") => free,
                 Some("ball") => ball,
                 _ => one,
@@ -369,7 +369,7 @@ impl<'a> MjcfPartMut<'a> {
         let model = &self.data.model;
         let first = |joint: usize| {
             let first = model.jnt_qposadr()[joint] as usize;
-            match words::joint(model.jnt_type()[joint]) {
+            match mjcf_keywords::joint(model.jnt_type()[joint]) {
                 Some("free") => Some(first + 3),
                 Some("ball") => Some(first),
                 _ => None,

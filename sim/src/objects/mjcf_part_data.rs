@@ -1,16 +1,16 @@
 //! Data of MJCF parts: configuration, compiled model, frames.
 
+use crate::entity_label::EntityLabel;
 use crate::error::{Error, Result};
 use crate::mjcf::part::{PartDocument, PartNames, PartSource, sensors_left_out, setting_warnings};
-use crate::named::EntityLabel;
 use crate::objects::robot_data::check_pose;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco::{CompileError, LoadError, Model, words};
+use kinetoscope_mujoco::{CompileError, LoadError, Model, mjcf_keywords};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use kinetoscope_sensors::EngineSensor;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -209,7 +209,9 @@ impl MjcfData {
     /// Names of the joints with one degree of freedom, in MuJoCo's order.
     pub(crate) fn single_dof_joints(&self) -> impl Iterator<Item = &str> {
         let names = self.names.joints.iter().zip(self.model.jnt_type());
-        names.filter(|(_, kind)| matches!(words::joint(**kind), Some("hinge" | "slide"))).map(|(name, _)| name.as_str())
+        names
+            .filter(|(_, kind)| matches!(mjcf_keywords::joint(**kind), Some("hinge" | "slide")))
+            .map(|(name, _)| name.as_str())
     }
 
     /// Name in the scene of an element of the file.
@@ -293,11 +295,11 @@ pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: 
     let mut next = 0;
     kept.iter()
         .filter_map(|&s| {
-            let word = words::sensor(model.sensor_type()[s])?;
+            let word = mjcf_keywords::sensor(model.sensor_type()[s])?;
             // Angles and lengths have different units: the observed joint decides.
             let hinge = || {
                 let joint = usize::try_from(model.sensor_objid()[s]).ok()?;
-                words::joint(model.jnt_type()[joint]).map(|kind| kind == "hinge")
+                mjcf_keywords::joint(model.jnt_type()[joint]).map(|kind| kind == "hinge")
             };
             let unit = match word.keyword {
                 "jointpos" | "jointlimitpos" => hinge().map(|hinge| if hinge { "rad" } else { "m" }),
@@ -314,7 +316,7 @@ pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: 
                 unit: unit.map(Into::into),
                 first,
                 width,
-                force_stage: words::needs_acceleration_stage(model.sensor_needstage()[s]),
+                force_stage: mjcf_keywords::needs_acceleration_stage(model.sensor_needstage()[s]),
                 is_quaternion: word.quaternion,
             })
         })

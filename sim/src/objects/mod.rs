@@ -1,12 +1,13 @@
 //! Entities of a simulation, such as robots, objects and terrains: handle, configuration, data, and read and write
 //! access.
 
-mod apart;
 pub(crate) mod articulation;
+mod collision_exclusion;
 pub(crate) mod free_body;
 pub(crate) mod kinematics;
 pub(crate) mod mass_properties;
 pub(crate) mod mesh_collision;
+pub(crate) mod mjcf_file;
 pub(crate) mod mjcf_part;
 pub(crate) mod mjcf_part_data;
 pub(crate) mod object_group;
@@ -18,15 +19,14 @@ pub(crate) mod rigid_object_data;
 mod rigid_object_properties;
 pub(crate) mod robot;
 pub(crate) mod robot_cfg;
+mod robot_clearance;
 pub(crate) mod robot_data;
 mod robot_drives;
-pub(crate) mod robot_file;
-mod robot_joints;
+mod robot_full_state;
 mod robot_limits;
-mod robot_lowest;
 pub(crate) mod robot_part;
+mod robot_passive_joints;
 mod robot_state;
-mod robot_states;
 mod robot_wrenches;
 mod rows;
 pub(crate) mod shape;

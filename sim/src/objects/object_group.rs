@@ -3,7 +3,7 @@
 use super::free_body::{FreeBody, FreeBodyMut};
 use super::object_group_data::{RigidObjectGroupCfg, RigidObjectGroupData, RigidObjectGroupId};
 use super::rows::unique_envs;
-use crate::contents::EntitySet;
+use crate::entity_set::EntitySet;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::manager::SimulationManager;

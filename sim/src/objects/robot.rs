@@ -7,7 +7,7 @@ use crate::drive::plan::JointPlan;
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::{JointIndexing, RobotIndexing};
+use crate::indexing::{JointIndexing, RobotIndexing};
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, check_unique_indices, unique_envs};
 use crate::sensor_list::SensorList;

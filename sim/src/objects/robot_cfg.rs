@@ -1,6 +1,6 @@
 //! Configuration of a robot.
 
-use super::robot_file::MjcfFile;
+use super::mjcf_file::MjcfFile;
 use crate::drive::DriveCfg;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_robot::urdf::UrdfCfg;

@@ -3,10 +3,10 @@
 use crate::drive::gains::Gains;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::{DriveModel, PdGains};
+use crate::entity_label::EntityLabel;
 use crate::error::{Error, Result};
 use crate::mjcf::document::Integrator;
 use crate::mjcf::robot_file::{LoadSettings, MjcfRobotFile, RobotFileError};
-use crate::named::EntityLabel;
 use crate::objects::robot_cfg::RobotCfg;
 use crate::pattern;
 use crate::simulation_cfg::SimulationManagerCfg;

@@ -5,7 +5,7 @@ use crate::capture::body_velocity;
 use crate::env::SimEnv;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::RobotIndexing;
+use crate::indexing::RobotIndexing;
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::NumberKind;

@@ -4,7 +4,7 @@ use super::weld_data::{WeldCfg, WeldData, WeldId};
 use crate::body_pose::body_pose;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
-use crate::index::WeldIndexing;
+use crate::indexing::WeldIndexing;
 use crate::manager::SimulationManager;
 use crate::objects::rows::unique_envs;
 use crate::sensor_list::SensorList;

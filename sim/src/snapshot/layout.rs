@@ -1,7 +1,7 @@
 //! Layout of states: sizes, names and step settings of a compiled scene, which distinguish one scene from another.
 
 use crate::drive::table::DriveTable;
-use kinetoscope_mujoco::{Model, ObjectKind, words};
+use kinetoscope_mujoco::{Model, ObjectKind, mjcf_keywords};
 
 /// Step settings, then sizes and names of everything that has numbers in a state, one line each.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl StateLayout {
         lines.extend(sizes.map(|(what, count)| format!("{count} {what}")));
         let name = |kind, index| model.name(kind, index).unwrap_or_default();
         for joint in 0..model.njnt() {
-            let word = words::joint(model.jnt_type()[joint]).unwrap_or("joint");
+            let word = mjcf_keywords::joint(model.jnt_type()[joint]).unwrap_or("joint");
             lines.push(format!("{word} joint {:?}", name(ObjectKind::Joint, joint)));
         }
         for body in 0..model.nbody() {

@@ -4,11 +4,11 @@ mod bytes;
 mod error;
 mod file;
 mod layout;
-mod own;
+mod properties;
 
 pub use error::SnapshotError;
 pub(crate) use layout::StateLayout;
-pub(crate) use own::SavedProperties;
+pub(crate) use properties::SavedProperties;
 
 use crate::env::EnvState;
 use crate::error::Result;

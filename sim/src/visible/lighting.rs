@@ -1,7 +1,7 @@
 //! Lights, headlight and sky of MuJoCo models.
 
 use super::surface;
-use crate::contents::EntitySet;
+use crate::entity_set::EntitySet;
 use crate::light_cfg::{LightCfg, LightKindCfg};
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;

@@ -6,24 +6,24 @@
 //! [`VisualScene::read_poses`] copies the poses of one environment.
 
 mod deforming;
+mod env_scene;
 mod geom;
 mod identity;
 mod lighting;
 mod overview;
-mod own;
-pub(crate) mod painted;
-mod shown;
-mod still;
+mod posed_scene;
 mod surface;
+pub(crate) mod surface_overrides;
 mod urdf_visual;
+mod visibility;
 
-use self::painted::SurfaceOverrides;
+use self::surface_overrides::SurfaceOverrides;
 use deforming::{DeformingInstances, SceneBufferPool};
 use identity::ElementIdentity;
 pub use identity::MaskId;
 pub(crate) use identity::{ElementOwner, MaskIdMap, of_simulation, tendon_owners};
 pub(crate) use lighting::Lighting;
-pub use still::{FreeCamera, ModelCamera, OffscreenScene};
+pub use posed_scene::{FreeCamera, ModelCamera, OffscreenScene};
 pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
@@ -133,7 +133,7 @@ impl VisualScene {
     }
 
     /// Extracts the render scene of `model`. The geoms in `replacements` are rendered as these parts. `frames` are the
-    /// frames on the body axis of sensors, `painted` has additional surface properties, and `look` is the lighting.
+    /// frames on the body axis of sensors, `surface_overrides` has additional surface properties, and `look` is the lighting.
     pub(crate) fn extract(
         model: &Model,
         identities: &MaskIdMap,
@@ -270,7 +270,7 @@ impl VisualScene {
         !self.deforming.is_empty()
     }
 
-    /// Puts the scene of environment `env`, whose own scene is `own`, into `out` with the shapes of `data`; `own`
+    /// Puts the scene of environment `env`, whose own scene is `env_scene`, into `out` with the shapes of `data`; `env_scene`
     /// itself if no shape changes. The memory of scenes without other holders is reused.
     pub(crate) fn update_shapes(&self, data: &Data, env: usize, own: &EnvScene, out: &mut EnvScene) {
         if self.deforms() {

@@ -1,7 +1,7 @@
 //! Several environments in one scene, side by side.
 
 use super::VisualScene;
-use crate::contents::GROUND_MASK_ID;
+use crate::entity_set::GROUND_MASK_ID;
 use crate::error::{Error, Result};
 use kinetoscope_scene::{Marker, PoseF32, RenderScene};
 

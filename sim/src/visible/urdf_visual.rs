@@ -9,7 +9,7 @@ use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;

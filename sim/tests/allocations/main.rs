@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod kinematics;
-mod measuring;
 mod rendering;
-mod update;
+mod sensors;
+mod stepping;
 
 use kinetoscope_exec::ThreadPool;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,6 +1,6 @@
 //! Random initial root states.
 
-use crate::dice::EpisodeRng;
+use crate::episode_rng::EpisodeRng;
 use crate::event::EventTerm;
 use ndarray::Array2;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};

@@ -5,7 +5,7 @@ use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::JointStateCfg;
 use kinetoscope::sim::{EntityTypes, Error};
-use kinetoscope_testkit::refusal::{assert_error, assert_errors_unchanged};
+use kinetoscope_testkit::error_tables::{assert_error, assert_errors_unchanged};
 use kinetoscope_testkit::worlds::{add_ball, object, pose_error, pose_of_row};
 
 #[test]

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::sim::EntityTypes;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 /// [`door`] as MJCF, with limits in radians and an actuator that defines a drive.
 const LEAF: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="frame">

@@ -3,7 +3,7 @@
 use kinetoscope::mujoco::compile_file;
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{EnvStatus, SimEnv};
-use kinetoscope_testkit::needs::{files_below, sample_model};
+use kinetoscope_testkit::test_resources::{files_below, sample_model};
 use std::sync::Arc;
 
 #[test]

@@ -16,7 +16,7 @@ use kinetoscope::sim::env::SimEnv;
 use kinetoscope::sim::{
     ActuatorModel, DcMotor, DelayedPd, DriveModel, DriveType, Error, IdealPd, Integrator, RandomizationError,
 };
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::worlds::add_ball;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -10,7 +10,7 @@ use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{DriveModel, IdealPd};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::assert_close;
 
 const EXACT: Tolerance = Tolerance::mixed(1e-12, "a handful of operations");

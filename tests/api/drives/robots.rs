@@ -25,7 +25,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::description::LinkId;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::{DriveModel, WrenchFrame};
-use kinetoscope_testkit::needs;
+use kinetoscope_testkit::test_resources;
 use kinetoscope_testkit::worlds::{cfg, urdf_robot};
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
@@ -96,13 +96,13 @@ fn cycle_of_the_bundled_robots() {
 #[ignore = "needs real robots: cargo xtask test"]
 fn cycle_of_the_vendors_robots() {
     let files = ["rokae_description/urdf/SR5.urdf", "inspire_hand/DFQ_left_hand.urdf"];
-    cycle(files.map(needs::robot), "joint[1-6]", "L_.*");
+    cycle(files.map(test_resources::robot), "joint[1-6]", "L_.*");
 }
 
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn anymal_on_the_ground() {
-    let file = needs::robot("anymal_c_simple_description/urdf/anymal.urdf");
+    let file = test_resources::robot("anymal_c_simple_description/urdf/anymal.urdf");
     for (name, drive) in [("defaults", DriveCfg::default()), ("soft", gains(80.0, 2.0)), ("limp", no_drive())] {
         let init_qpos = [(".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
         let init_qpos = init_qpos.map(|(joints, angle)| (joints.to_string(), angle)).to_vec();

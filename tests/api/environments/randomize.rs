@@ -6,7 +6,7 @@ use kinetoscope::mujoco::{BUILD_VERSION, ObjectKind, SupportedVersion};
 use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{DriveType, Error, FrictionCone, RandomizationError};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{gains, passive, text_robot};

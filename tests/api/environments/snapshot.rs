@@ -6,7 +6,7 @@ use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::JointStateCfg;
 use kinetoscope::sim::{DelayedPd, DriveType, Error, FrictionCone, Integrator, Snapshot, SnapshotError, WrenchFrame};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::text_robot;

@@ -58,7 +58,7 @@ fn reachable_poses() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendors_robot() {
-    let urdf = kinetoscope_testkit::needs::robot("rokae_description/urdf/SR5.urdf");
+    let urdf = kinetoscope_testkit::test_resources::robot("rokae_description/urdf/SR5.urdf");
     check("the vendor's SR5", arm(urdf), "xMateSR5_link6", false);
 }
 

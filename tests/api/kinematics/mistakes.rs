@@ -4,7 +4,7 @@ use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::robot::kinematics::{IkCfg, NullSpacePosture, TipFrame};
 use kinetoscope::sim::Result;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 #[track_caller]
 fn assert_says(result: Result<impl std::fmt::Debug>, parts: &[&str]) {

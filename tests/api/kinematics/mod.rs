@@ -1,9 +1,9 @@
 //! Kinematics of robots: poses, Jacobians and inverse kinematics, compared with MuJoCo and with closed forms.
 
 mod inverse;
-mod judges;
 mod mistakes;
 mod planar;
+mod references;
 mod singular;
 
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis};

@@ -6,7 +6,7 @@ use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sensors::{MujocoSensor, MujocoSensorCfg};
 use kinetoscope::sim::EntityTypes;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::count_diagnostics;
 

@@ -5,7 +5,7 @@ use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::sensors::{FrameTransformerCfg, TargetFrameCfg};
 use kinetoscope::sim::{ActuatorIndex, Error};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 #[test]
 fn reads_and_writes() {

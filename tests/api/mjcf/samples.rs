@@ -2,10 +2,10 @@
 
 use super::*;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, words};
+use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, mjcf_keywords};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::sim::Error;
-use kinetoscope_testkit::needs::{files_below, sample_model};
+use kinetoscope_testkit::test_resources::{files_below, sample_model};
 use std::path::Path;
 
 /// The file compiled by MuJoCo alone, with the options of [`empty`] after its own.
@@ -113,7 +113,7 @@ fn every_sample() {
         let travelled = relative_difference(plain.qpos0(), data.qpos());
         assert!(far <= 1e-9, "{name} is {far} from the file alone after {steps} steps");
         assert!(travelled > 1e-6 || plain.nv() == 0, "{name} does not move: {travelled}");
-        assert!((0..plain.nsensor()).all(|s| words::sensor(plain.sensor_type()[s]).is_some()), "{name}");
+        assert!((0..plain.nsensor()).all(|s| mjcf_keywords::sensor(plain.sensor_type()[s]).is_some()), "{name}");
         parts.push(name);
     }
     let (good, bad): (Vec<_>, Vec<_>) =

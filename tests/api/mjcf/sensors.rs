@@ -10,7 +10,7 @@ use kinetoscope::sensors::{
 };
 use kinetoscope::sim::MjcfId;
 use kinetoscope_testkit::bits::bits;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use kinetoscope_testkit::worlds::{count_diagnostics, pose_of_row, sr5};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};

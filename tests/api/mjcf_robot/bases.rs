@@ -4,7 +4,7 @@ use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sim::Error;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use std::f64::consts::FRAC_PI_2;
 
 /// A cart with a wheel; `%` is replaced by the joint of the cart.

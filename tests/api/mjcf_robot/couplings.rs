@@ -5,7 +5,7 @@ use kinetoscope::ndarray::array;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::kinematics::{IkCfg, KinematicsError, TipFrame};
 use kinetoscope::sim::Error;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
 
 /// A driven crank, a finger on either side, and a fourth joint; `%` is replaced by the equalities.

@@ -5,7 +5,7 @@ use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sim::Error;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{gains, pose_error, pose_of_row, urdf_robot};
 
@@ -90,7 +90,7 @@ fn dumps() {
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn humanoid() {
     let of_file = |name: &str| RobotCfg {
-        mjcf: Some(MjcfFile::new(kinetoscope_testkit::needs::sample_model(name))),
+        mjcf: Some(MjcfFile::new(kinetoscope_testkit::test_resources::sample_model(name))),
         ..Default::default()
     };
     assert_error(empty(1).add_robot(of_file("humanoid/22_humanoids.xml")), "", &["bodies in its world"]);
@@ -127,7 +127,7 @@ fn humanoid() {
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn other_samples() {
     let (mut robots, mut refused) = (0, 0);
-    for folder in std::fs::read_dir(kinetoscope_testkit::needs::sample_model("")).unwrap().flatten() {
+    for folder in std::fs::read_dir(kinetoscope_testkit::test_resources::sample_model("")).unwrap().flatten() {
         for file in std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path()) {
             for fix_base in [true, false] {
                 if file.extension().is_none_or(|extension| extension != "xml") {

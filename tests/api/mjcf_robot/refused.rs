@@ -4,7 +4,7 @@
 use super::*;
 use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope::sim::{DriveModel, Error, RobotFileError};
-use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::error_tables::assert_errors;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::count_diagnostics;
 use std::path::PathBuf;

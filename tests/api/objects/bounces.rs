@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::sim::{FrictionCone, RigidObjectId};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 fn bouncing_ball(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {
     RigidObjectCfg { restitution, ..ball(uid, 0.1, mass, [0.0; 3]) }

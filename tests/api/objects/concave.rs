@@ -4,7 +4,7 @@ use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::mesh::ConvexDecompositionCfg;
 use kinetoscope::sim::MeshCollision;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
 use std::f32::consts::{FRAC_PI_2, TAU};
 

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::{Array3, Axis};
 use kinetoscope::sim::{Error, RigidObjectGroupCfg, RigidObjectGroupId, RigidObjectId};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 fn blocks() -> RigidObjectGroupCfg {
     let at = |uid, x| object(uid, ObjectShape::cube(0.1), [x, 0.0, 0.0]);

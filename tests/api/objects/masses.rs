@@ -5,7 +5,7 @@ use super::*;
 use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::sim::{RigidObjectId, WrenchFrame};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 /// F t / m in each environment; moments scale with the mass, T t / I, for a cube m a²/6.
 #[test]

@@ -6,7 +6,7 @@ use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::mesh::HullCfg;
 use kinetoscope::sim::{Error, Result, WrenchFrame};
-use kinetoscope_testkit::refusal::{assert_error, assert_errors, assert_errors_unchanged};
+use kinetoscope_testkit::error_tables::{assert_error, assert_errors, assert_errors_unchanged};
 
 #[test]
 fn configurations() {

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
 use kinetoscope::sim::{Error, RigidObjectId, Snapshot, WeldCfg, WeldId};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::worlds::{pose_error, pose_of_row, sr5};
 
 fn weld(first: &str, second: &str) -> WeldCfg {

@@ -2,7 +2,7 @@
 
 use super::ENVS;
 use kinetoscope::prelude::*;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use kinetoscope_testkit::worlds::{cfg, count_diagnostics, empty_cfg, mjcf_robot, pose_of_row, sim};
 use nalgebra::{UnitQuaternion, Vector3};

@@ -2,8 +2,8 @@
 
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use kinetoscope_testkit::needs;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
+use kinetoscope_testkit::test_resources;
 use kinetoscope_testkit::worlds::{gains, pose_of_row, sim, urdf_robot};
 
 const LEGS: [&str; 4] = ["LF", "RF", "LH", "RH"];
@@ -25,7 +25,7 @@ fn bundled() -> RobotCfg {
 
 /// ANYbotics' own robot.
 fn vendor() -> RobotCfg {
-    quadruped("vendor", needs::robot("anymal_c_simple_description/urdf/anymal.urdf"))
+    quadruped("vendor", test_resources::robot("anymal_c_simple_description/urdf/anymal.urdf"))
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::ENVS;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::prelude::*;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
 use kinetoscope_testkit::worlds::{empty_cfg, gains, no_drive, pose_error, pose_of_row, text_robot};

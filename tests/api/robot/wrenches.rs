@@ -8,7 +8,7 @@ use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::robot::description::LinkId;
 use kinetoscope::sim::WrenchFrame;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
 use kinetoscope_testkit::worlds::{add_ball, empty_cfg, no_drive, pose_of_row, text_robot};

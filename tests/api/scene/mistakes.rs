@@ -1,6 +1,6 @@
 //! Mistakes in scene files: each error names the file, the line, and the valid alternatives.
 
-use super::parts;
+use super::groups_and_welds;
 use super::round_trip::QUADRUPED;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{EntityTypes, Error, Result};
@@ -169,7 +169,7 @@ fn in_yaml() {
 /// Errors of scene construction have the line of the entity.
 #[test]
 fn in_building() {
-    let text = |from: &str, to: &str| parts::TEXT.replace(from, to);
+    let text = |from: &str, to: &str| groups_and_welds::TEXT.replace(from, to);
     let rows: [(&str, String, &str); 12] = [
         ("2: entity ", "# a ball\n[entities.ball]\ntype = \"rigid_object\"\nmass = 0.0".into(), "\"ball\"|mass"),
         (

@@ -3,10 +3,10 @@
 mod contact;
 pub(crate) mod custom;
 mod debug_vis;
+mod determinism;
 mod frames;
 mod imu;
 mod refused;
-mod same_bits;
 mod schedule;
 mod worlds;
 mod wrench;

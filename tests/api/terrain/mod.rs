@@ -8,7 +8,7 @@ use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
 use kinetoscope::sim::RigidObjectId;
-use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::error_tables::assert_errors;
 use kinetoscope_testkit::worlds::{ball, cfg, sim};
 use nalgebra::Point3;
 

@@ -7,7 +7,7 @@ use kinetoscope::render::ImageRenderer;
 use kinetoscope::render::frame::Frame;
 use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::{OffscreenScene, Result};
-use kinetoscope_testkit::needs::{files_below, sample_model};
+use kinetoscope_testkit::test_resources::{files_below, sample_model};
 use kinetoscope_testkit::urdf::TempFiles;
 
 /// Renders a scene from the free camera of MuJoCo's viewers; returns the share of pixels with an object.
@@ -57,8 +57,11 @@ fn vendor_robots() {
         ("inspire_hand/DFQ_left_hand.urdf", 0),
     ] {
         let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
-        sim.add_robot(kinetoscope_testkit::worlds::urdf_robot("robot", kinetoscope_testkit::needs::robot(file)))
-            .unwrap();
+        sim.add_robot(kinetoscope_testkit::worlds::urdf_robot(
+            "robot",
+            kinetoscope_testkit::test_resources::robot(file),
+        ))
+        .unwrap();
         let still = OffscreenScene::of_env(&mut sim, EnvId(0)).unwrap();
         let scene = still.visible().scene();
         let textures_of = scene.instances().iter().filter_map(|i| i.material.texture.as_ref());

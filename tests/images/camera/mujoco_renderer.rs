@@ -14,7 +14,7 @@ use kinetoscope::render::{ImageRenderer, RenderRequest};
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::VisualScene;
-use kinetoscope_testkit::needs::{python_renderer, robot, sample_model};
+use kinetoscope_testkit::test_resources::{python_renderer, robot, sample_model};
 use kinetoscope_testkit::urdf::TempFiles;
 use nalgebra::Vector3;
 use std::path::Path;

@@ -5,7 +5,9 @@
 //! pixels for which a ray half a pixel away from the center hits another geom or leaves the tangent plane.
 
 use super::view;
-use crate::rays::judge::{GROUPS, MESH_WITH_INNER_EDGES, TestRng, at_rest, data_of, data_with, height_field, mask_of};
+use crate::rays::mujoco_rays::{
+    GROUPS, MESH_WITH_INNER_EDGES, TestRng, at_rest, data_of, data_with, height_field, mask_of,
+};
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
 use kinetoscope::prelude::*;
@@ -152,7 +154,7 @@ fn random_scenes() {
 fn sample_models() {
     for name in ["humanoid/humanoid.xml", "slider_crank/slider_crank.xml", "tendon_arm/arm26.xml", "mug/mug.xml"] {
         // The samples are of 2.2.2; later versions have dropped some elements.
-        let Ok(compiled) = mj::compile_file(&kinetoscope_testkit::needs::sample_model(name)) else {
+        let Ok(compiled) = mj::compile_file(&kinetoscope_testkit::test_resources::sample_model(name)) else {
             assert!(mj::BUILD_VERSION == mj::SupportedVersion::V4, "{name}");
             continue;
         };

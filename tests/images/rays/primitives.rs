@@ -1,6 +1,6 @@
 //! Random scenes of every kind of geom: distances and geoms agree with `mj_ray`.
 
-use crate::rays::judge::{
+use crate::rays::mujoco_rays::{
     MESH_WITH_INNER_EDGES, TestRng, check, compare, data_of, data_with, height_field, ray_through,
 };
 use kinetoscope::scene::Ray;

@@ -1,6 +1,6 @@
 //! Ray casters on moving bodies.
 
-use crate::rays::judge::{DISTANCE_TOLERANCE, GROUPS};
+use crate::rays::mujoco_rays::{DISTANCE_TOLERANCE, GROUPS};
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};

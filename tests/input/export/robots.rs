@@ -2,7 +2,7 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope_testkit::needs::robot;
+use kinetoscope_testkit::test_resources::robot;
 use kinetoscope_testkit::worlds::urdf_robot;
 use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;

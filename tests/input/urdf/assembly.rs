@@ -4,7 +4,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::description::RobotDescription;
 use kinetoscope::robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope::robot::urdf::{NameCase, NameCaseCfg, UrdfError, assemble, parse_str, write_urdf, write_urdf_with};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf::{TempFiles, joint, limit};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::{
     Strictness, UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str, parse_str_with,
 };
-use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::error_tables::assert_errors;
 use kinetoscope_testkit::urdf::TempFiles;
 use std::path::Path;
 

@@ -11,7 +11,7 @@ use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::MissingInertia;
 use kinetoscope::robot::urdf::write_urdf;
 use kinetoscope::sim::OffscreenScene;
-use kinetoscope_testkit::refusal::assert_errors;
+use kinetoscope_testkit::error_tables::assert_errors;
 use kinetoscope_testkit::urdf::{TempFiles, collision, joint, limit, robot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 

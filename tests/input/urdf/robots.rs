@@ -7,7 +7,7 @@ use kinetoscope::robot::description::RobotDescription;
 use kinetoscope::robot::description::{Geometry, JointKind, Material};
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::{MergedRobot, assemble, parse_file, write_urdf};
-use kinetoscope_testkit::needs::{files_below, robot, robots_dir};
+use kinetoscope_testkit::test_resources::{files_below, robot, robots_dir};
 use kinetoscope_testkit::worlds::{cfg, sim, urdf_robot};
 
 const SR5: &str = "rokae_description/urdf/SR5.urdf";
@@ -63,8 +63,8 @@ fn vendors() {
     mesh_scales(fingers);
 
     let components = vec![
-        ComponentCfg::new("arm", kinetoscope_testkit::needs::robot(SR5)),
-        ComponentCfg::new("hand", kinetoscope_testkit::needs::robot(HAND)),
+        ComponentCfg::new("arm", kinetoscope_testkit::test_resources::robot(SR5)),
+        ComponentCfg::new("hand", kinetoscope_testkit::test_resources::robot(HAND)),
     ];
     let both = assemble(&UrdfCfg { components, ..Default::default() }).unwrap().description;
     let connector = both.joint(both.joint_id("arm_TO_hand_CONNECTOR").unwrap());

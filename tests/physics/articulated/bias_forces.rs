@@ -3,7 +3,7 @@
 //!
 //! Tolerance: as for the mass matrix, rounding of v/h and the condition of M; 1e-9.
 
-use super::subjects::{KINDS, Kind, TestRobot, max_difference};
+use super::test_robots::{KINDS, Kind, TestRobot, max_difference};
 use crate::law::{law, max_or_nan};
 use nalgebra::Vector3;
 

@@ -6,7 +6,7 @@
 //! rounding of half a digit of each state variable in each step. Control: Euler.
 
 use super::newton_euler::{Motion, Tree, joints};
-use super::subjects::EARTH;
+use super::test_robots::EARTH;
 use crate::lab::*;
 use crate::numerical::double_pendulum::{Method, RodState};
 use std::f64::consts::FRAC_PI_2;

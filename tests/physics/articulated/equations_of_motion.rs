@@ -6,7 +6,7 @@
 //! (3 n + 1) ε |M| |q̈| (Higham, Accuracy and Stability of Numerical Algorithms, § 10.1), both multiplied by the
 //! reference's mass matrix.
 
-use super::subjects::{EARTH, KINDS, TestRobot, max_difference};
+use super::test_robots::{EARTH, KINDS, TestRobot, max_difference};
 use crate::law::{law, max_or_nan};
 use nalgebra::Vector3;
 

@@ -21,7 +21,7 @@
 //! square. RK4 has no other error here. The formula for many steps neglects 3/(2 N) + 1/(2 N²) of itself.
 
 use super::newton_euler::{Motion, Tree, joints};
-use super::subjects::EARTH;
+use super::test_robots::EARTH;
 use crate::lab::*;
 use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
 use nalgebra::{Point3, Vector3};
@@ -158,7 +158,7 @@ fn holds() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn holds_for_anymal() {
-    let path = kinetoscope_testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf");
+    let path = kinetoscope_testkit::test_resources::robot("anymal_c_simple_description/urdf/anymal.urdf");
     let fall = |cfg| simulate_fall(path.clone(), cfg, 2.0, 0.0, [0.0; 3]);
     let (euler, exact) = (fall(earth()), fall(rk4(earth())));
     assert!((euler.mass - 52.13485).abs() < 1e-5, "{}", euler.mass);

@@ -4,7 +4,7 @@
 //!
 //! Tolerance: 1e-12 m/s² of rounding in a step, times e^1 and the time: 1e-10.
 
-use super::subjects::{EARTH, KINDS, Kind, TestRobot, max_difference};
+use super::test_robots::{EARTH, KINDS, Kind, TestRobot, max_difference};
 use crate::law::{law, max_or_nan};
 
 /// The largest velocity after one step and after a tenth of a second, held by the share `part` of the efforts.

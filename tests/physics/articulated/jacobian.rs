@@ -3,7 +3,7 @@
 //!
 //! Tolerance: ε²/6 of third derivatives of order 1 m, and 1e-16/ε of rounding: 1e-9 with ε = 1e-5; the law allows 1e-8.
 
-use super::subjects::{EARTH, KINDS, Kind, TestRobot};
+use super::test_robots::{EARTH, KINDS, Kind, TestRobot};
 use crate::lab::row;
 use crate::law::{law, max_or_nan};
 use kinetoscope::robot::kinematics::TipFrame;

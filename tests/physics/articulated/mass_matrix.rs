@@ -4,7 +4,7 @@
 //! Tolerance: rounding of the factorization, 1e-16 times the condition of M, up to 1e5 with fingers of 50 g on an arm
 //! of 4 kg: 1e-9.
 
-use super::subjects::{KINDS, Kind, TestRobot, max_difference};
+use super::test_robots::{KINDS, Kind, TestRobot, max_difference};
 use crate::law::{law, max_or_nan};
 use nalgebra::Vector3;
 

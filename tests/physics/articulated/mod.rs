@@ -1,7 +1,7 @@
 //! Mechanisms: bodies connected by joints.
 
 mod newton_euler;
-mod subjects;
+mod test_robots;
 
 mod atwood_machine;
 mod bead_on_a_rod;

@@ -4,7 +4,7 @@
 //!
 //! Tolerance: as for the mass matrix; 1e-9 of accelerations.
 
-use super::subjects::{KINDS, Kind, TestRobot, max_difference};
+use super::test_robots::{KINDS, Kind, TestRobot, max_difference};
 use crate::lab::row;
 use crate::law::{law, max_or_nan};
 use kinetoscope::robot::kinematics::TipFrame;

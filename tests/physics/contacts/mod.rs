@@ -1,6 +1,6 @@
 //! Contacts and sensors.
 
-mod ball_in_picture;
+mod ball_image;
 
 mod coulomb_directions;
 mod four_legs;

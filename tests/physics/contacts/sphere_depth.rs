@@ -1,10 +1,10 @@
-//! A ball in a depth image: number of its pixels, their centroid ([`ball_in_picture`](super::ball_in_picture)), and the
+//! A ball in a depth image: number of its pixels, their centroid ([`ball_image`](super::ball_image)), and the
 //! depth of the nearest point. That depth is D - R on the optical axis, where D is the distance of the center.
 //! Elsewhere the ray (x, y, 1) of a pixel meets the ball at the depth (b - √(b² - a (c² - R²)))/a, with a = x² + y² +
 //! 1, b = (x, y, 1)·c.
 //!
 //! Tolerance of area and centroid: a pixel belongs to the ball if the ray of its center meets the ball, that is, if the
-//! root is real. The set of these pixels differs from the ellipse of `ball_in_picture` by the amounts that [`center_moments`]
+//! root is real. The set of these pixels differs from the ellipse of `ball_image` by the amounts that [`center_moments`]
 //! counts with this formula. The image may differ only by that, and by one pixel for each root so close to 0 that
 //! single precision decides.
 //!
@@ -12,7 +12,7 @@
 //! smallest compared root, over a. The nearest pixel is half a pixel off the axis in both directions, where the formula
 //! gives slightly more than D - R.
 
-use super::ball_in_picture::{FOCAL, ImageMoments, PRINCIPAL_POINT, SIZE, expected_moments, measured_moments};
+use super::ball_image::{FOCAL, ImageMoments, PRINCIPAL_POINT, SIZE, expected_moments, measured_moments};
 use crate::lab::*;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::sensors::camera::CameraConvention;

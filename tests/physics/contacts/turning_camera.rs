@@ -1,12 +1,12 @@
 //! A camera at the rim of a turntable, at radius r, looks inward at a static ball at (X, 0, Z). After a rotation by θ =
 //! ω t the ball is at x = X sin(-θ), z = r - X cos θ of the camera's frame, y = z_c - Z; its image follows from
-//! [`ball_in_picture`](super::ball_in_picture). A static camera at the rim and a ball on the turntable give the
+//! [`ball_image`](super::ball_image). A static camera at the rim and a ball on the turntable give the
 //! mirrored motion: x = X sin θ.
 //!
 //! Tolerance: ω is constant to rounding. The centroid of 1000 pixels is accurate to 0.1 pixels, the area to 4 √(2 π r)
 //! pixels (law `sphere_depth`).
 
-use super::ball_in_picture::{FOCAL, ImageMoments, PRINCIPAL_POINT, SIZE, expected_moments, measured_moments};
+use super::ball_image::{FOCAL, ImageMoments, PRINCIPAL_POINT, SIZE, expected_moments, measured_moments};
 use crate::lab::*;
 use kinetoscope::sim::MaskId;
 use kinetoscope_testkit::worlds::{fixed, object};

@@ -6,7 +6,7 @@ pub(crate) mod soft_contact;
 mod asymmetric_top;
 mod billiards;
 mod bowling_ball;
-mod centre_of_percussion;
+mod center_of_percussion;
 mod conveyor;
 mod conveyor_on_the_ground;
 mod drag;

@@ -1,7 +1,7 @@
 //! State shared by the simulation's thread and its viewers.
 
 use super::{Command, SnapshotRequest};
-use crate::stage::Snapshot;
+use crate::scene_view::Snapshot;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -1,19 +1,19 @@
 //! Connection between a running simulation and its viewers: commands, snapshot delivery and recording playback.
 
-mod conductor;
 mod hub;
-mod pace;
+mod real_time_clock;
 mod recording;
 mod spring;
 #[cfg(test)]
 mod tests;
+mod view_controller;
 
-pub use conductor::{Play, PlayError, PlaybackSource, ViewController};
 pub(crate) use hub::NOT_STEPPING;
 pub use hub::Viewer;
 pub use recording::{RecordButton, RecordControl, RecordingState};
+pub use view_controller::{Play, PlayError, PlaybackSource, ViewController};
 
-use crate::stage::EnvSelection;
+use crate::scene_view::EnvSelection;
 use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
 
 /// A request of a viewer to the simulation. Commands run between two steps, on the simulation's thread.
@@ -52,7 +52,7 @@ pub enum Command {
     Drag {
         /// The environment.
         env: EnvId,
-        /// Index of the body in [`Names::bodies`](crate::stage::Names::bodies).
+        /// Index of the body in [`Names::bodies`](crate::scene_view::Names::bodies).
         body: usize,
         /// Attachment point of the spring, in the body frame \[m\].
         anchor: [f64; 3],

@@ -3,7 +3,7 @@
 use super::spring::Spring;
 use super::*;
 use crate::sample::{MASS, Sample, SteppingThread, sample};
-use crate::stage::{RunState, Snapshot};
+use crate::scene_view::{RunState, Snapshot};
 use kinetoscope_scene::Pose;
 use kinetoscope_sim::{BodyMotion, ObjectShape, RigidObjectCfg, RigidObjectId, SimulationManagerCfg};
 use kinetoscope_testkit::wait::TIMEOUT;

@@ -1,6 +1,6 @@
 //! Rasterization of plots.
 
-use crate::stage::Canvas;
+use crate::scene_view::Canvas;
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::iso_8859_1::FONT_7X13;
 use embedded_graphics::pixelcolor::Rgb888;

@@ -16,7 +16,7 @@
 mod bitmap;
 
 use crate::file_extension;
-use crate::stage::Canvas;
+use crate::scene_view::Canvas;
 pub use kinetoscope_plot::{Plot, Series, SizeError};
 use kinetoscope_scene::AtomicFile;
 use std::path::{Path, PathBuf};

@@ -21,30 +21,30 @@
 //! Each viewer has its own thread, which renders images of the newest [`Snapshot`](crate::Snapshot). Only one viewer of
 //! a server renders at a time, so all viewers together use at most one core. The simulation waits for none of them.
 
+mod access_policy;
 mod address;
-mod answer;
 mod command;
-mod door;
 mod error;
-mod eyes;
-mod head;
 mod page;
+mod request_head;
+mod response;
 mod server;
-mod show;
 mod state;
 mod token;
-mod viewer;
+mod view_backend;
+mod viewer_session;
+mod websocket_session;
 
 pub use error::ServeError;
 
 use crate::control::{RecordButton, SnapshotRequest, Speed, ViewerExt};
-use door::AccessPolicy;
-use eyes::ViewerHub;
+use access_policy::AccessPolicy;
 use kinetoscope_sim::{Observer, ObserverId, SimEvent, SimulationManager};
 use server::{Server, ServerContext};
 use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
 use token::Token;
+use viewer_session::ViewerHub;
 
 /// Settings of the browser view.
 #[derive(Clone, Debug, PartialEq)]

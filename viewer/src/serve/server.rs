@@ -1,11 +1,11 @@
 //! HTTP server with one thread per connection, and limits on the number of connections.
 
-use super::answer::{self, Status};
-use super::door::AccessPolicy;
+use super::access_policy::AccessPolicy;
 use super::error::ServeError;
-use super::head::RequestHead;
-use super::show::ViewBackend;
-use super::{page, viewer};
+use super::request_head::RequestHead;
+use super::response::{self, Status};
+use super::view_backend::ViewBackend;
+use super::{page, websocket_session};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -208,19 +208,19 @@ fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
     let head = match RequestHead::read(stream) {
         Ok(Some(head)) => head,
         Ok(None) => return,
-        Err(status) => return answer::send_error(stream, status),
+        Err(status) => return response::send_error(stream, status),
     };
     if let Err(status) = house.policy.check(&head) {
-        return answer::send_error(stream, status);
+        return response::send_error(stream, status);
     }
     match (head.method.as_str(), head.path.as_str()) {
         ("GET" | "HEAD", "/" | "/index.html") => match super::token::random_hex() {
-            Ok(nonce) => answer::send_page(stream, &page::html(&nonce), &nonce, head.method == "GET"),
-            Err(_) => answer::send_error(stream, Status::InternalError),
+            Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, head.method == "GET"),
+            Err(_) => response::send_error(stream, Status::InternalError),
         },
         ("GET", WEBSOCKET_PATH) => upgrade(stream, house, head),
-        ("GET" | "HEAD", _) => answer::send_error(stream, Status::NotFound),
-        _ => answer::send_error(stream, Status::MethodNotAllowed),
+        ("GET" | "HEAD", _) => response::send_error(stream, Status::NotFound),
+        _ => response::send_error(stream, Status::MethodNotAllowed),
     }
 }
 
@@ -231,16 +231,20 @@ fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
     // Sixteen bytes in base64.
     let key = head.header("sec-websocket-key").ok().flatten().filter(|key| key.len() == 24);
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
-        return answer::send_error(stream, Status::UpgradeRequired);
+        return response::send_error(stream, Status::UpgradeRequired);
     };
-    let Some(seat) = ViewerSlot::acquire(house) else { return answer::send_error(stream, Status::ServiceUnavailable) };
+    let Some(seat) = ViewerSlot::acquire(house) else {
+        return response::send_error(stream, Status::ServiceUnavailable);
+    };
     let switch = format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {}\r\n\r\n",
         derive_accept_key(key.as_bytes())
     );
-    let sent = stream.set_write_timeout(Some(viewer::WRITE_TIMEOUT)).and_then(|()| stream.write_all(switch.as_bytes()));
+    let sent = stream
+        .set_write_timeout(Some(websocket_session::WRITE_TIMEOUT))
+        .and_then(|()| stream.write_all(switch.as_bytes()));
     if sent.is_ok() {
-        viewer::run_session(stream, head.rest, house, house.backend.open_session());
+        websocket_session::run_session(stream, head.rest, house, house.backend.open_session());
     }
     drop(seat);
 }

@@ -1,7 +1,7 @@
 //! JSON messages to the page: scene contents and state.
 
 use crate::control::Speed;
-use crate::stage::{EnvSelection, JointEntry, Names, Overlays, Selection, Snapshot, selection_text, slider_range};
+use crate::scene_view::{EnvSelection, JointEntry, Names, Overlays, Selection, Snapshot, selection_text, slider_range};
 use serde_json::{Value, json};
 
 /// Name, label, and accessor of an overlay.

@@ -1,11 +1,11 @@
 //! State of a simulation window: handles mouse and keyboard input and renders the image, independent of X11.
 
-use super::desks::ThreadBudget;
-use super::fineness::AdaptiveQuality;
-use super::keys::{Action, Key, action};
+use super::adaptive_quality::AdaptiveQuality;
+use super::key_bindings::{Action, Key, action};
+use super::thread_budget::ThreadBudget;
 use super::{hud, timeline};
 use crate::control::{Command, NOT_STEPPING, SnapshotRequest, Speed};
-use crate::stage::{
+use crate::scene_view::{
     CameraPanel, Canvas, EnvSelection, MouseSpring, OrbitCamera, Overlays, SceneRenderer, Selection, Snapshot, Trails,
     ViewOptions, required_contacts, selection_text,
 };

@@ -1,8 +1,8 @@
 //! Text and controls on top of the window image: status, help, joint sliders. Pure drawing functions on a canvas.
 
-use super::keys;
+use super::key_bindings;
 use crate::control::{RecordingState, Speed};
-use crate::stage::{Canvas, EnvSelection, Snapshot, slider_range};
+use crate::scene_view::{Canvas, EnvSelection, Snapshot, slider_range};
 use embedded_graphics::mono_font::MonoFont;
 use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_7X13};
 
@@ -113,7 +113,7 @@ const HELP_COLUMN_WIDTH: i32 = 315;
 
 /// Draws the help in the center, in two columns if the canvas is wide enough, otherwise in one.
 pub(super) fn draw_help(canvas: &mut Canvas) {
-    let lines = keys::help();
+    let lines = key_bindings::help();
     let [width, height] = canvas.dimensions().map(to_i32);
     let columns = if width < 2 * HELP_COLUMN_WIDTH + 10 { 1 } else { 2 };
     let rows = to_i32(lines.len().div_ceil(columns));

@@ -2,7 +2,7 @@
 
 use super::x11::{DisplayError, WindowEvent, XWindow};
 use super::{Closed, POLL_INTERVAL, Window, WindowError, WindowState, spawn_window};
-use crate::stage::Canvas;
+use crate::scene_view::Canvas;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 

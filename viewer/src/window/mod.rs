@@ -1,24 +1,24 @@
 //! Native X11 windows: a live view of a simulation, and a window for images.
 
+mod adaptive_quality;
 mod app;
-mod desks;
-mod enlarge;
-mod fineness;
 mod hud;
 mod images;
-mod keys;
+mod key_bindings;
+mod server_scaling;
 #[cfg(test)]
 mod tests;
+mod thread_budget;
 mod timeline;
-mod watch;
+mod watchdog;
 mod x11;
 
 pub use app::{App, Input, Modifiers};
 pub use images::{ImageWindow, ImageWindowCfg};
-pub use keys::Key;
+pub use key_bindings::Key;
 
 use crate::control::{Command, RecordButton, SnapshotRequest, Speed, Viewer, ViewerExt};
-use crate::stage::Canvas;
+use crate::scene_view::Canvas;
 use kinetoscope_sim::SimulationManager;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
@@ -249,7 +249,7 @@ fn spawn_window<T: Send + 'static>(
     };
     let thread = std::thread::Builder::new().name("kinetoscope-window".into());
     thread.spawn(thread_main).map_err(|error| WindowError::Thread(error.to_string()))?;
-    match result.recv_timeout(watch::TIMEOUT) {
+    match result.recv_timeout(watchdog::TIMEOUT) {
         Ok(Ok(())) => Ok(window),
         Ok(Err(error)) => Err(error),
         Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&DisplayError::Unresponsive)),

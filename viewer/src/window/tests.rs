@@ -5,12 +5,12 @@
 mod display;
 mod on_x;
 
-use super::keys::{Action, BINDINGS};
+use super::key_bindings::{Action, BINDINGS};
 use super::*;
 use crate::Screenshot;
 use crate::control::{RecordControl, RecordingState};
 use crate::sample::{CUBE_HALF_EDGE, Sample, differing_pixels, sample};
-use crate::stage::{CameraPanel, EnvSelection, OrbitCamera, Overlays, SceneRenderer, Snapshot, ViewOptions};
+use crate::scene_view::{CameraPanel, EnvSelection, OrbitCamera, Overlays, SceneRenderer, Snapshot, ViewOptions};
 use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
@@ -428,7 +428,7 @@ fn sensor_view_of_one_environment() {
 
 #[test]
 fn help_at_every_width() {
-    let lines = keys::help().len();
+    let lines = key_bindings::help().len();
     for (width, columns) in [(325, 1), (639, 1), (640, 2), (960, 2)] {
         let mut canvas = Canvas::new(width, 15 * lines + 34);
         hud::draw_help(&mut canvas);

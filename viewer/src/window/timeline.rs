@@ -1,6 +1,6 @@
 //! Timeline of a recording, along the lower edge of a window.
 
-use crate::stage::{Canvas, Snapshot, Timeline};
+use crate::scene_view::{Canvas, Snapshot, Timeline};
 use embedded_graphics::mono_font::ascii::FONT_6X10;
 
 const DARK: [u8; 3] = [20, 22, 26];
@@ -53,7 +53,7 @@ pub(super) fn time_at_x(snapshot: &Snapshot, width: usize, x: f64) -> Option<f64
 mod tests {
     use super::*;
     use crate::control::Command;
-    use crate::stage::RunState;
+    use crate::scene_view::RunState;
     use crate::window::{App, Input, Modifiers};
     use std::sync::Arc;
 

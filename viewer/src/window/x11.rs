@@ -2,10 +2,10 @@
 //! else.
 
 use super::app::{Input, Modifiers};
-use super::enlarge::{self, ScaledImage};
-use super::keys::Key;
-use super::watch::{TIMEOUT, Watchdog};
-use crate::stage::Canvas;
+use super::key_bindings::Key;
+use super::server_scaling::{self, ScaledImage};
+use super::watchdog::{TIMEOUT, Watchdog};
+use crate::scene_view::Canvas;
 use kinetoscope_render::View;
 use std::os::fd::AsFd as _;
 use x11rb::connection::{Connection, RequestConnection as _};
@@ -132,7 +132,7 @@ impl XWindow {
         connection.flush()?;
         let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
         let size = [usize::from(width), usize::from(height)];
-        let format = enlarge::render_format(&connection, visual)?;
+        let format = server_scaling::render_format(&connection, visual)?;
         let (pixels, enlarged, released) = (Vec::new(), None, None);
         Ok(Self {
             watch,

@@ -16,7 +16,7 @@ pub(super) const RENDERER: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-render",
         "optical flow to the left, not to the right",
-        "render/src/shade/moves.rs",
+        "render/src/shade/motion_vectors.rs",
         ["let right = u - (there.x * nearness * fx + cx);", "let right = (there.x * nearness * fx + cx) - u;"],
         &["tests::flow::homography", "tests::flow::random_scenes"],
     ),

@@ -6,7 +6,7 @@ pub(super) const VIEWS: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-viewer",
         "slow motion is fast",
-        "viewer/src/control/pace.rs",
+        "viewer/src/control/real_time_clock.rs",
         ["* self.dt / factor);", "* self.dt * factor);"],
         &["control::pace::tests::waits"],
     ),
@@ -20,14 +20,14 @@ pub(super) const VIEWS: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-viewer",
         "view moves with the mouse, not against it",
-        "viewer/src/stage/eye.rs",
+        "viewer/src/scene_view/orbit_camera.rs",
         ["self.shift((up * dy - right * dx) * scale);", "self.shift((up * dy + right * dx) * scale);"],
         &["stage::eye::tests::drags"],
     ),
     Mutation::of(
         "kinetoscope-viewer",
         "contact force on the selected body with the wrong sign",
-        "viewer/src/stage/pick.rs",
+        "viewer/src/scene_view/pick.rs",
         ["contact.bodies.iter().zip([-1.0, 1.0])", "contact.bodies.iter().zip([1.0, -1.0])"],
         &["stage::tests::selected_cube"],
     ),
@@ -41,7 +41,7 @@ pub(super) const VIEWS: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-viewer",
         "film shows the frame after the time",
-        "viewer/src/control/conductor/playback.rs",
+        "viewer/src/control/view_controller/playback.rs",
         [
             "partition_point(|frame| *frame <= self.now).saturating_sub(1)",
             "partition_point(|frame| *frame <= self.now).min(self.times.len() - 1)",
@@ -58,7 +58,7 @@ pub(super) const VIEWS: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-viewer",
         "body pulled to its place in the grid of environments",
-        "viewer/src/stage/pull.rs",
+        "viewer/src/scene_view/mouse_spring.rs",
         ["f64::from(place[k]) - origin[k]", "f64::from(place[k])"],
         &["window::tests::selection_and_spring"],
     ),

@@ -17,7 +17,7 @@ use std::time::Duration;
 const SCREENSHOTS: &str = "KINETOSCOPE_SCREENSHOTS";
 
 fn browser() -> Chromium {
-    Chromium::start(&kinetoscope_testkit::needs::chromium())
+    Chromium::start(&kinetoscope_testkit::test_resources::chromium())
 }
 
 /// Opens the page at an address and waits for the connection.

@@ -1,7 +1,7 @@
 //! Access control: hosts, origins, tokens, and response statuses.
 
 use super::running::{ServedSimulation, scene};
-use super::visitor::{connect, exchange, status, status_of};
+use super::test_client::{connect, exchange, status, status_of};
 use kinetoscope::prelude::*;
 use kinetoscope::viewer::{ServeCfg, ServeError};
 use std::io::{Read, Write};

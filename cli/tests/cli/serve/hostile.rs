@@ -1,7 +1,7 @@
 //! Hostile clients: they cause no panic and leak no memory, thread or file, and the next client is served.
 
 use super::running::ServedSimulation;
-use super::visitor::{TestClient, exchange, status, status_of};
+use super::test_client::{TestClient, exchange, status, status_of};
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::process;
 use kinetoscope_testkit::wait;

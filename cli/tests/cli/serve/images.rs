@@ -1,7 +1,7 @@
 //! Images of the browser view.
 
 use super::running::ServedSimulation;
-use super::visitor::{ServerMessage, TestClient};
+use super::test_client::{ServerMessage, TestClient};
 use crate::support::{colors, red};
 use image::RgbImage;
 use kinetoscope_testkit::wait::TIMEOUT;

@@ -6,4 +6,4 @@ mod images;
 pub(crate) mod running;
 mod several;
 mod steering;
-pub(crate) mod visitor;
+pub(crate) mod test_client;

@@ -1,7 +1,7 @@
 //! Several simultaneous viewers, including slow ones.
 
 use super::running::ServedSimulation;
-use super::visitor::{TestClient, connect, exchange, status_of};
+use super::test_client::{TestClient, connect, exchange, status_of};
 use kinetoscope::viewer::{Command, ServeCfg, Speed};
 use kinetoscope_testkit::wait;
 use serde_json::json;

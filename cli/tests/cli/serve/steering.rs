@@ -1,7 +1,7 @@
 //! Commands of viewers: targets, pause, speed, selection, mouse spring, and recordings.
 
 use super::running::ServedSimulation;
-use super::visitor::{ServerMessage, TestClient};
+use super::test_client::{ServerMessage, TestClient};
 use crate::support::red;
 use serde_json::{Value, json};
 

@@ -9,13 +9,13 @@
 
 use super::{Aabb, BVH_WIDTH, Bvh, Node, PAD};
 use crate::simd::{F4, Simd, SimdLevel, at_level};
-use curve::MortonOrder;
 use kinetoscope_scene::vector::to_f64;
 use leaves::Costs;
+use morton::MortonOrder;
 
-mod curve;
-mod cut;
 mod leaves;
+mod morton;
+mod split;
 
 /// Largest number of primitives in a group.
 const MAX_GROUP: usize = 24;
@@ -354,7 +354,8 @@ impl BvhBuilder {
     #[inline(always)]
     fn split(&mut self, part: &GroupRange) -> [GroupRange; 2] {
         let groups = &mut self.groups[part.start as usize..part.end as usize];
-        let best = if part.depth < MAX_DEPTH { cut::best_split(&part.bounds, groups, &mut self.scratch) } else { None };
+        let best =
+            if part.depth < MAX_DEPTH { split::best_split(&part.bounds, groups, &mut self.scratch) } else { None };
         let (at, sides) = best.unwrap_or_else(|| {
             // No plane separates the groups, or the range is too deep.
             let at = groups.len() / 2;

@@ -1,7 +1,7 @@
 //! Columns: packets of steep rays find the same hits as single rays through the BVH, to the bit.
 
+use super::bvhs::soup;
 use super::packets::{Compare, targets};
-use super::trees::soup;
 use super::{TestRng, bits};
 use crate::geometry::bvh::TraversalStack;
 use crate::geometry::packet::{Packet, WIDTH};

@@ -1,10 +1,10 @@
 //! Rays compared with closed forms and with brute force.
 
+mod bvhs;
 mod columns;
 mod packets;
 mod shapes;
 mod terrain;
-mod trees;
 
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;

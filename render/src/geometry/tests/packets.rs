@@ -1,6 +1,6 @@
 //! Packets find the same hits as single rays, to the bit, on every instruction set.
 
-use super::trees::soup;
+use super::bvhs::soup;
 use super::{TestRng, bits};
 use crate::geometry::assets::{AssetCache, RayAssetCache};
 use crate::geometry::bvh::{Beam, Traversal, TraversalStack};

@@ -1,7 +1,7 @@
 //! The walk over a grid finds the same hits as brute force over the triangles of the same field.
 
 use super::TestRng;
-use super::trees::nearest;
+use super::bvhs::nearest;
 use crate::geometry::assets::AssetCache;
 use crate::geometry::bvh::TraversalStack;
 use crate::geometry::shape::RayGeometry;

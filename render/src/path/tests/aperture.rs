@@ -1,6 +1,6 @@
 //! Depth of field compared with the thin lens equation.
 
-use super::super::eye::ThinLens;
+use super::super::camera_rays::ThinLens;
 use super::*;
 use crate::aperture::Aperture;
 use crate::intrinsics::Intrinsics;

@@ -1,6 +1,6 @@
 //! Occlusion of segments in the image.
 
-use super::alone::IsolatedRenderer;
+use super::isolated::IsolatedRenderer;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;

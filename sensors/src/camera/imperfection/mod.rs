@@ -12,13 +12,13 @@
 //! Motion blur is not an imperfection, because it needs several instants that a finished image does not contain. See
 //! [`CameraCfg::shutter`](super::CameraCfg::shutter).
 
-mod kinds;
+mod effect;
 mod tone;
 
 use super::error::CameraError;
 use crate::error::SensorError;
-pub(super) use kinds::ImageContext;
-use kinds::{DepthEffect, PixelContext, RadianceEffect, within};
+pub(super) use effect::ImageContext;
+use effect::{DepthEffect, PixelContext, RadianceEffect, within};
 use kinetoscope_render::ToneCurve;
 use kinetoscope_render::frame::{Channel, Channels, FrameMut};
 use kinetoscope_render::frame::{Color, Depth};

@@ -1,8 +1,8 @@
 //! Stereo cameras: two cameras on one rig, with disparity, rectification and ROS calibrations.
 
+mod camera_info;
 mod cfg;
 mod disparity;
-mod infos;
 mod rectify;
 mod sensor;
 

@@ -4,7 +4,7 @@ use super::super::{
     Box2d, Camera, CameraCfg, CameraError, Extrinsics, Occlusion, PixelBox, Placement, SegmentLevel, Segmentation,
     SegmentationCfg, SegmentedEntity,
 };
-use super::stage::point;
+use super::test_scene::point;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_render::frame::Channels;
 use kinetoscope_render::lens::Lens;
@@ -134,7 +134,7 @@ fn brute_force() {
                     let channels = Channels { mask: true, ..Channels::default() };
                     let (scene, poses) = only(&scene, is);
                     let by = (Renderer::Raster, Shutter::default());
-                    let frame = super::stage::frame_of(cfg.raster, by, channels, (&scene, &poses, &view), None);
+                    let frame = super::test_scene::frame_of(cfg.raster, by, channels, (&scene, &poses, &view), None);
                     around(frame.mask.as_ref().unwrap(), k * SIZE[0], is)
                 };
                 let [by_itself, fine] = *images.entry(segment.mask_ids.clone()).or_insert_with(|| match lens {
@@ -269,15 +269,15 @@ fn without_box() {
     assert_eq!(found.iter().map(|found| found.id).collect::<Vec<_>>(), [1]);
     let solid = segmentation.boxes_3d(SegmentLevel::Link, &camera, 0).unwrap();
     assert_eq!(solid.iter().map(|found| found.id).collect::<Vec<_>>(), [1, 2, 3], "those are in the environment");
-    let blind = CameraCfg { channels: Channels { color: true, ..Channels::default() }, ..super::stage::cfg() };
-    let blind = super::stage::built(&blind, &super::stage::context(1));
+    let blind = CameraCfg { channels: Channels { color: true, ..Channels::default() }, ..super::test_scene::cfg() };
+    let blind = super::test_scene::built(&blind, &super::test_scene::context(1));
     let error = segmentation.boxes_2d(SegmentLevel::Link, &blind, 0).unwrap_err().to_string();
     assert_eq!(error, "the camera does not measure mask; it measures color");
     assert!(segmentation.boxes_3d(SegmentLevel::Link, &blind, 3).is_err());
     // Errors before a capture, and for a pose that is not finite.
     let scene = kinetoscope_testkit::scenes::instances([ball(0.2, translation(0.0, f32::NAN, 0.0))]);
     let boxes = |camera: &Camera| segmentation_of(&scene.0).boxes_3d(SegmentLevel::Link, camera, 0).unwrap_err();
-    let early = super::stage::cfg().build(&context(&scene.0)).unwrap();
+    let early = super::test_scene::cfg().build(&context(&scene.0)).unwrap();
     assert_eq!(boxes(&early), CameraError::NothingCaptured { env: 0 }.into());
     assert_eq!(boxes(&seen(&ahead(), &scene)), CameraError::EntityPose { env: 0, id: 1 }.into());
 }

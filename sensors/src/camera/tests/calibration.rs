@@ -1,7 +1,7 @@
 //! Calibration files: real files of each model, all supported notations, and errors of broken files.
 
 use super::super::{CalibrationError, CameraCfg, CameraInfo, DistortionModel};
-use super::stage::{built, cfg, context, point, pose_of};
+use super::test_scene::{built, cfg, context, point, pose_of};
 use kinetoscope_render::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };

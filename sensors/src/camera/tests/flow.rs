@@ -2,7 +2,7 @@
 
 use super::super::imperfection::{DepthNoise, Vignetting};
 use super::super::{Camera, CameraCfg, CameraConvention, CameraPlacement, Extrinsics, Placement};
-use super::stage::{BALL, GROUND, SIZE, ball, built, cfg, context, pinhole, point, state, tip};
+use super::test_scene::{BALL, GROUND, SIZE, ball, built, cfg, context, pinhole, point, state, tip};
 use crate::sensor::Sensor;
 use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Flow;
@@ -62,7 +62,7 @@ fn moving_ball() {
             let expected = if *id == 0 { [f32::INFINITY; 2] } else { [0.0; 2] };
             assert!(*id == BALL || [0, GROUND].contains(id) && *found == expected, "{id}: {found:?}");
         }
-        let (y, old) = (ball(row, 8)[1] - ball(row, 4)[1], super::stage::pose_of(&lazy, row).inverse());
+        let (y, old) = (ball(row, 8)[1] - ball(row, 4)[1], super::test_scene::pose_of(&lazy, row).inverse());
         let flows = check_flow(&lazy, row, BALL, |p| Some(pinhole(&lazy, row, old * (p - Vector3::y() * y))));
         // +y is to the left of a camera that looks along +x: 0.04 m at about 1.4 m and 40 pixels.
         assert!(flows.iter().all(|flow| flow[0] < -0.8 && flow[0] > -1.6), "{flows:?}");

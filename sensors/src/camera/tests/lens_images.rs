@@ -2,8 +2,8 @@
 
 use super::super::{Camera, CameraCfg, CameraError, CameraPlacement, DepthMiss, PointFrame};
 use super::lenses::{WARPED, all};
-use super::stage;
-use super::stage::{BALL, GROUND, RADIUS, built, context, point};
+use super::test_scene;
+use super::test_scene::{BALL, GROUND, RADIUS, built, context, point};
 use crate::SensorError;
 use crate::sensor::{Sensor, SensorCfg};
 use kinetoscope_render::OpticsError;
@@ -31,7 +31,7 @@ fn cfg_of(lens: impl Into<Lens>, pixels: PixelIntrinsics) -> CameraCfg {
         renderer: Renderer::FastRayTraced,
         near: 0.3,
         far: 4.0,
-        ..stage::cfg()
+        ..test_scene::cfg()
     }
 }
 
@@ -39,7 +39,7 @@ fn cfg_of(lens: impl Into<Lens>, pixels: PixelIntrinsics) -> CameraCfg {
 /// normal.
 fn meets(eye: Point3<f64>, ray: Vector3<f64>, range: [f64; 2]) -> Option<(f64, i32, Vector3<f64>)> {
     let inside = |t: &f64| *t >= range[0] && *t <= range[1];
-    let middle = Point3::from(stage::ball(0, 0));
+    let middle = Point3::from(test_scene::ball(0, 0));
     let (a, b, c) = (ray.norm_squared(), (eye - middle).dot(&ray), (eye - middle).norm_squared() - RADIUS * RADIUS);
     let root = (b * b - a * c).max(0.0).sqrt();
     let ball = [(-b - root) / a, (-b + root) / a].into_iter().filter(|_| b * b > a * c).find(inside);
@@ -119,7 +119,9 @@ fn channels() {
 
 #[test]
 fn lens_without_distortion() {
-    let bits = |lens, renderer| stage::bits(&built(&CameraCfg { lens, renderer, ..stage::cfg() }, &context(1)), 0..1);
+    let bits = |lens, renderer| {
+        test_scene::bits(&built(&CameraCfg { lens, renderer, ..test_scene::cfg() }, &context(1)), 0..1)
+    };
     for renderer in [Renderer::FastRayTraced, FEW_PATHS, Renderer::Raster, Renderer::Hybrid] {
         assert!(bits(Lens::default(), renderer) == bits(OpenCv::default().into(), renderer), "{renderer:?}");
     }
@@ -147,7 +149,7 @@ fn own_intrinsics() {
     let pixels = PixelIntrinsics { fx: 18.0, fy: 20.0, cx: 32.0, cy: 24.0 };
     let cfg = cfg_of(Equidistant::default(), pixels);
     let mut camera = built(&cfg, &context(3));
-    let rows = |camera: &Camera| [0, 1, 2].map(|row| stage::bits(camera, [row]));
+    let rows = |camera: &Camera| [0, 1, 2].map(|row| test_scene::bits(camera, [row]));
     let (before, bytes) = (rows(&camera), camera.lens_bytes());
     assert_eq!(
         bytes,

@@ -3,12 +3,12 @@
 mod boxes;
 mod calibration;
 mod flow;
-mod late;
+mod latency;
 mod lens_images;
 pub(super) mod lenses;
-mod noisy;
+mod noise;
 mod progress;
 mod sensor;
 mod shutter;
-mod stage;
 mod stereo;
+mod test_scene;

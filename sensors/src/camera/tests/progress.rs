@@ -1,6 +1,6 @@
 //! Progress and cancellation of long renders.
 
-use super::stage::{built, cfg, context, state};
+use super::test_scene::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
 use crate::sensor::{Sensor, SensorCfg};
 use kinetoscope_render::RenderError;

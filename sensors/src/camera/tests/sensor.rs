@@ -1,7 +1,7 @@
 //! The camera as a sensor: capture and rendering times, measured values against closed forms, and rejected mistakes.
 
 use super::super::*;
-use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
+use super::test_scene::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg};
 use kinetoscope_render::OpticsError;

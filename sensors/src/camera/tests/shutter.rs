@@ -1,7 +1,7 @@
 //! Rolling shutters and motion blur, against closed forms.
 
 use super::super::{Camera, CameraCfg, CameraError};
-use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
+use super::test_scene::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_render::RenderError;
@@ -87,7 +87,7 @@ fn expected(camera: &Camera, env: usize, step: u64, opened: Option<u64>) -> Vec<
     let channels = Channels { mask: true, position: true, ..Channels::NONE };
     let by = (PATHS, rolling().shutter);
     let (scene, poses) = (context(1).scene.unwrap(), poses(step));
-    let frame = super::stage::frame_of(RasterCfg::default(), by, channels, (&scene, &poses, &view), opened);
+    let frame = super::test_scene::frame_of(RasterCfg::default(), by, channels, (&scene, &poses, &view), opened);
     let mask = frame.mask.unwrap().into_iter().map(|x| x as u32);
     mask.chain(frame.position.unwrap().into_iter().map(f32::to_bits)).collect()
 }

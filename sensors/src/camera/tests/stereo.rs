@@ -5,7 +5,7 @@ use super::super::{
     DistortionModel, Extrinsics, Imperfections, Placement, Rectification, StereoCamera, StereoCameraCfg, StereoOrigin,
     look_at_pose,
 };
-use super::stage::{
+use super::test_scene::{
     BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pinhole, point, pose_of, state, tip,
 };
 use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
@@ -86,7 +86,7 @@ fn single_cameras() {
         for (eye, pose, intrinsics) in [(stereo.left(), left, LENS), (stereo.right(), left * offset, right_lens)] {
             let placement = Placement::Pose { pos: pose.translation.into(), rotation: pose.rotation };
             let extrinsics = Extrinsics { placement, ..Extrinsics::default() };
-            let mut alone = built(&CameraCfg { extrinsics, intrinsics, ..super::stage::cfg() }, &context);
+            let mut alone = built(&CameraCfg { extrinsics, intrinsics, ..super::test_scene::cfg() }, &context);
             alone.update(&state(&[3, 4])).unwrap();
             assert_eq!(bits(eye, 0..2), bits(&alone, 0..2), "{origin:?}");
             assert_eq!((eye.stamps(), eye.frame_counts()), (alone.stamps(), alone.frame_counts()));

@@ -1,13 +1,13 @@
 //! Ray-caster cameras: depth, distances, normals and masks of chosen targets, computed in double precision.
 
 mod cfg;
-mod pictures;
+mod images;
 mod pixels;
 mod points;
 mod sensor;
 
 pub use cfg::RayCasterCameraCfg;
-pub use pictures::RayImages;
+pub use images::RayImages;
 pub use sensor::RayCasterCamera;
 
 #[cfg(test)]

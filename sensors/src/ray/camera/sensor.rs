@@ -1,7 +1,7 @@
 //! Ray-caster camera sensor.
 
 use super::cfg::RayCasterCameraCfg;
-use super::pictures::RayImages;
+use super::images::RayImages;
 use super::pixels::Pixels;
 use crate::camera::env_rows::EnvRows;
 use crate::camera::frustum::frustum;

@@ -2,7 +2,7 @@
 
 use super::super::write::{Element, number};
 use super::{PartError, PartWriter, mj_index, row, row_of};
-use kinetoscope_mujoco::words;
+use kinetoscope_mujoco::mjcf_keywords;
 
 impl PartWriter<'_> {
     /// Writes actuators without an activation state, and actuators with one. A robot has drives in their place.
@@ -22,10 +22,11 @@ impl PartWriter<'_> {
         let m = self.model;
         let count = m.nactuator();
         let beyond = |what: &str| self.unsupported("actuator", a, what);
-        let transmission = words::transmission(m.actuator_trntype()[a]).ok_or_else(|| beyond("a transmission"))?;
-        let dynamics = words::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("a dyntype"))?;
-        let gain = words::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
-        let bias = words::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
+        let transmission =
+            mjcf_keywords::transmission(m.actuator_trntype()[a]).ok_or_else(|| beyond("a transmission"))?;
+        let dynamics = mjcf_keywords::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("a dyntype"))?;
+        let gain = mjcf_keywords::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
+        let bias = mjcf_keywords::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
         let dynamics = match dynamics {
             // The same filter, which MuJoCo 2.2.2 integrates with Euler's rule.
             "filterexact" if !self.supports_v4("actuator", a, "dyntype filterexact, for which filter stands") => {

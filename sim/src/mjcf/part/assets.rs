@@ -3,7 +3,7 @@
 use super::super::write::Element;
 use super::{PartError, PartWriter, format_f32s, row};
 use image::{ExtendedColorType, ImageEncoder};
-use kinetoscope_mujoco::{Asset, MeshArrays, SupportedVersion, TextureType, words};
+use kinetoscope_mujoco::{Asset, MeshArrays, SupportedVersion, TextureType, mjcf_keywords};
 use std::collections::HashMap;
 
 /// Order in which MuJoCo stacks the faces of a cube texture.
@@ -96,7 +96,7 @@ impl PartWriter<'_> {
         let paired = |geom: usize| m.pair_geom1().iter().chain(m.pair_geom2()).any(|g| *g as usize == geom);
         (0..m.ngeom()).any(|geom| {
             m.geom_dataid()[geom] == mesh as i32
-                && words::geom(m.geom_type()[geom]).is_some_and(|(word, _)| word == "mesh")
+                && mjcf_keywords::geom(m.geom_type()[geom]).is_some_and(|(word, _)| word == "mesh")
                 && (touches(geom) || paired(geom))
         })
     }

@@ -2,7 +2,7 @@
 
 use super::super::write::{Element, number};
 use super::{PartError, PartWriter, PassiveJointProperties, RootAttachment, format_f32s, mj_index, row, row_of};
-use kinetoscope_mujoco::{LightType, SupportedVersion, words};
+use kinetoscope_mujoco::{LightType, SupportedVersion, mjcf_keywords};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 
@@ -168,8 +168,8 @@ impl PartWriter<'_> {
 
     fn joint(&self, joint: usize) -> Result<Element, PartError> {
         let m = self.model;
-        let kind =
-            words::joint(m.jnt_type()[joint]).ok_or_else(|| self.unsupported("joint", joint, "an unknown type"))?;
+        let kind = mjcf_keywords::joint(m.jnt_type()[joint])
+            .ok_or_else(|| self.unsupported("joint", joint, "an unknown type"))?;
         let (qpos, dof) = (m.jnt_qposadr()[joint] as usize, m.jnt_dofadr()[joint] as usize);
         let mut element =
             Element::new("joint").attr("name", self.scoped_name(&self.names.joints[joint])).attr("type", kind);
@@ -215,7 +215,7 @@ impl PartWriter<'_> {
 
     fn geom(&self, geom: usize) -> Result<Element, PartError> {
         let m = self.model;
-        let (kind, sizes) = words::geom(m.geom_type()[geom])
+        let (kind, sizes) = mjcf_keywords::geom(m.geom_type()[geom])
             .ok_or_else(|| self.unsupported("geom", geom, "a type that is no plane, hfield, primitive or mesh"))?;
         let place = pose_row(row(m.geom_pos(), 3, geom), row(m.geom_quat(), 4, geom));
         let place = self.to_scene_body(m.geom_bodyid()[geom], place);
@@ -264,7 +264,7 @@ impl PartWriter<'_> {
 
     fn site(&self, site: usize) -> Result<Element, PartError> {
         let m = self.model;
-        let (kind, sizes) = words::geom(m.site_type()[site])
+        let (kind, sizes) = mjcf_keywords::geom(m.site_type()[site])
             .filter(|(_, sizes)| *sizes > 0)
             .ok_or_else(|| self.unsupported("site", site, "a type that is no primitive"))?;
         let place = pose_row(row(m.site_pos(), 3, site), row(m.site_quat(), 4, site));
@@ -279,8 +279,8 @@ impl PartWriter<'_> {
 
     fn camera(&self, camera: usize) -> Result<Element, PartError> {
         let m = self.model;
-        let mode =
-            words::tracking_mode(m.cam_mode()[camera]).ok_or_else(|| self.unsupported("camera", camera, "a mode"))?;
+        let mode = mjcf_keywords::tracking_mode(m.cam_mode()[camera])
+            .ok_or_else(|| self.unsupported("camera", camera, "a mode"))?;
         let place = pose_row(row(m.cam_pos(), 3, camera), row(m.cam_quat(), 4, camera));
         let element = Element::new("camera")
             .attr("name", self.scoped_name(&self.names.cameras[camera]))
@@ -294,8 +294,8 @@ impl PartWriter<'_> {
     /// Writes a light; `None` for an image-based light, which lights whole scenes.
     fn light(&self, light: usize) -> Result<Option<Element>, PartError> {
         let m = self.model;
-        let mode =
-            words::tracking_mode(m.light_mode()[light]).ok_or_else(|| self.unsupported("light", light, "a mode"))?;
+        let mode = mjcf_keywords::tracking_mode(m.light_mode()[light])
+            .ok_or_else(|| self.unsupported("light", light, "a mode"))?;
         let values = m.light(light);
         let element = Element::new("light")
             .attr("name", self.scoped_name(&self.names.lights[light]))

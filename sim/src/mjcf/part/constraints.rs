@@ -3,8 +3,8 @@
 use super::super::write::{Element, number};
 use super::{PartError, PartWriter, format_f32s, mj_index, row, row_of};
 use kinetoscope_mujoco::SupportedVersion;
-use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::WrapType;
+use kinetoscope_mujoco::mjcf_keywords;
+use kinetoscope_mujoco::mjcf_keywords::WrapType;
 
 impl PartWriter<'_> {
     /// Writes pairs of geoms with their own contact parameters, and pairs of bodies that never collide.
@@ -41,7 +41,7 @@ impl PartWriter<'_> {
     /// Writes an equality; `None` if it couples sites and the target MuJoCo version supports bodies only.
     fn equality(&self, e: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
-        let kind = words::equality(m.eq_type()[e])
+        let kind = mjcf_keywords::equality(m.eq_type()[e])
             .ok_or_else(|| self.unsupported("equality", e, "a type that is not connect, weld, joint or tendon"))?;
         let (first, second) = (mj_index(m.eq_obj1id()[e]), mj_index(m.eq_obj2id()[e]));
         let data = row_of(m.eq_data(), m.neq(), e);
@@ -90,7 +90,7 @@ impl PartWriter<'_> {
         let m = self.model;
         let first = m.tendon_adr()[t] as usize;
         let path = first..first + m.tendon_num()[t] as usize;
-        let point = |p: usize| words::wrap_type(m.wrap_type()[p]);
+        let point = |p: usize| mjcf_keywords::wrap_type(m.wrap_type()[p]);
         let fixed = path.clone().all(|p| point(p) == Some(WrapType::Joint));
         let tag = if fixed { "fixed" } else { "spatial" };
         let mut element = Element::new(tag)

@@ -10,18 +10,18 @@ mod assets;
 mod bodies;
 mod constraints;
 mod names;
-mod rig;
+mod robot_overrides;
 mod sensors;
 mod settings;
 
 pub(crate) use names::PartNames;
-pub(crate) use rig::{PassiveJointProperties, RobotOverrides, RootAttachment};
+pub(crate) use robot_overrides::{PassiveJointProperties, RobotOverrides, RootAttachment};
 pub(crate) use sensors::unsupported_sensors as sensors_left_out;
 pub(crate) use settings::setting_warnings;
 
 use kinetoscope_mujoco::{Asset, Model, SupportedVersion};
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::cell::RefCell;
 use std::fmt;
 

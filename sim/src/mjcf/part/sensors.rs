@@ -5,8 +5,8 @@
 use super::super::write::{Element, number};
 use super::{OmittedElement, PartError, PartNames, PartWriter, mj_index};
 use kinetoscope_mujoco::Model;
-use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::SensorObjectSyntax;
+use kinetoscope_mujoco::mjcf_keywords;
+use kinetoscope_mujoco::mjcf_keywords::SensorObjectSyntax;
 
 /// Sensors that only MuJoCo 4.x supports.
 const V4_SENSORS: [&str; 4] = ["jointactuatorfrc", "tendonactuatorfrc", "e_potential", "e_kinetic"];
@@ -23,10 +23,10 @@ pub(crate) fn unsupported_sensors(model: &Model, names: &PartNames) -> Vec<(usiz
 /// Reason why a sensor cannot be written, if any.
 fn unsupported_reason(m: &Model, s: usize) -> Option<String> {
     let code = m.sensor_type()[s];
-    let Some(word) = words::sensor(code) else {
+    let Some(word) = mjcf_keywords::sensor(code) else {
         return Some(format!(
             "the type {}",
-            words::unsupported_sensor(code).map_or_else(|| code.to_string(), String::from)
+            mjcf_keywords::unsupported_sensor(code).map_or_else(|| code.to_string(), String::from)
         ));
     };
     let id = mj_index(m.sensor_objid()[s]).unwrap_or(0);
@@ -39,7 +39,7 @@ fn unsupported_reason(m: &Model, s: usize) -> Option<String> {
         return Some(format!("{} of the world, which holds the whole scene", word.keyword));
     }
     let observed = [(m.sensor_objtype()[s], m.sensor_objid()[s]), (m.sensor_reftype()[s], m.sensor_refid()[s])];
-    if observed.into_iter().any(|(kind, id)| id >= 0 && kind != 0 && words::object_type(kind).is_none()) {
+    if observed.into_iter().any(|(kind, id)| id >= 0 && kind != 0 && mjcf_keywords::object_type(kind).is_none()) {
         return Some("an object of a kind that has no frame".into());
     }
     m.unsupported_sensor_feature(s).map(Into::into)
@@ -54,7 +54,8 @@ impl PartWriter<'_> {
     /// Writes a sensor; `None` if the target MuJoCo version does not support its type.
     fn sensor(&self, s: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
-        let word = words::sensor(m.sensor_type()[s]).ok_or_else(|| self.unsupported("sensor", s, "an unknown type"))?;
+        let word = mjcf_keywords::sensor(m.sensor_type()[s])
+            .ok_or_else(|| self.unsupported("sensor", s, "an unknown type"))?;
         if V4_SENSORS.contains(&word.keyword) && !self.supports_v4("sensor", s, &format!("the type {}", word.keyword)) {
             return Ok(None);
         }
@@ -89,7 +90,7 @@ impl PartWriter<'_> {
             return Ok(None);
         }
         let unknown = || self.unsupported("sensor", sensor, "an object of a kind that has no frame");
-        let kind = words::object_type(kind).ok_or_else(unknown)?;
+        let kind = mjcf_keywords::object_type(kind).ok_or_else(unknown)?;
         let names = &self.names;
         let name = match kind {
             "body" | "xbody" => self.body(id),

@@ -4,7 +4,7 @@
 use super::OmittedElement;
 use kinetoscope_mujoco::Model;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::path::Path;
 use std::sync::Arc;
 

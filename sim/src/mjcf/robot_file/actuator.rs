@@ -5,7 +5,7 @@
 //! gain only scales its control. A velocity servo has no `b1` and `gain = -b2`.
 
 use kinetoscope_mujoco::Model;
-use kinetoscope_mujoco::words;
+use kinetoscope_mujoco::mjcf_keywords;
 
 /// Row `index` of an array with `count` rows.
 fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
@@ -30,9 +30,9 @@ pub(super) struct ActuatorLaw {
 pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64)]) -> ActuatorLaw {
     let count = model.nactuator();
     let unknown = "unknown";
-    let gain_type = words::gain(model.actuator_gaintype()[actuator]).unwrap_or(unknown);
-    let bias_type = words::bias(model.actuator_biastype()[actuator]).unwrap_or(unknown);
-    let dynamics = words::dynamics(model.actuator_dyntype()[actuator]).unwrap_or(unknown);
+    let gain_type = mjcf_keywords::gain(model.actuator_gaintype()[actuator]).unwrap_or(unknown);
+    let bias_type = mjcf_keywords::bias(model.actuator_biastype()[actuator]).unwrap_or(unknown);
+    let dynamics = mjcf_keywords::dynamics(model.actuator_dyntype()[actuator]).unwrap_or(unknown);
     let gain = row_of(model.actuator_gainprm(), count, actuator)[0];
     let bias = row_of(model.actuator_biasprm(), count, actuator);
     let (stiffness, damping) = (-bias[1], -bias[2]);

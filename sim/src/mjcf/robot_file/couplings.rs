@@ -4,11 +4,11 @@
 //! file.
 
 use super::drives::is_single_dof;
-use super::places::SourceLocations;
+use super::locations::SourceLocations;
 use crate::mjcf::part::PartNames;
-use kinetoscope_mujoco::{Model, words};
+use kinetoscope_mujoco::{Model, mjcf_keywords};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 
 /// Coupling of a joint to another joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,7 @@ pub(super) fn of_joints(
 ) -> Vec<Option<Coupling>> {
     let mut couplings: Vec<Option<Coupling>> = vec![None; model.njnt()];
     for equality in 0..model.neq() {
-        if words::equality(model.eq_type()[equality]) != Some("joint") || !model.equality_is_active(equality) {
+        if mjcf_keywords::equality(model.eq_type()[equality]) != Some("joint") || !model.equality_is_active(equality) {
             continue;
         }
         let Ok(follower) = usize::try_from(model.eq_obj1id()[equality]) else { continue };

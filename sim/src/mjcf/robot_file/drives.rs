@@ -10,11 +10,11 @@
 use super::actuator::law;
 use super::couplings::{Coupling, mimic_root};
 use super::error::RobotFileError;
-use super::places::SourceLocations;
+use super::locations::SourceLocations;
 use crate::mjcf::part::PartNames;
 use kinetoscope_mujoco::Model;
-use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::WrapType;
+use kinetoscope_mujoco::mjcf_keywords;
+use kinetoscope_mujoco::mjcf_keywords::WrapType;
 use kinetoscope_robot::description::FileActuation;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use std::collections::BTreeMap;
@@ -140,7 +140,7 @@ pub(super) fn of_joints(
 /// Joints that an actuator acts on, or a description of a target that drives do not support.
 fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<ActuatorTarget, String> {
     let id = usize::try_from(model.actuator_trnid()[2 * actuator]).unwrap_or(0);
-    match words::transmission(model.actuator_trntype()[actuator]) {
+    match mjcf_keywords::transmission(model.actuator_trntype()[actuator]) {
         Some("joint" | "jointinparent") if is_single_dof(model, id) => {
             Ok(ActuatorTarget { path: vec![(id, 1.0)], tendon: None })
         }
@@ -149,7 +149,7 @@ fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<ActuatorT
             let first = model.tendon_adr()[id] as usize;
             let points = first..first + model.tendon_num()[id] as usize;
             let tendon = &names.tendons[id];
-            if !points.clone().all(|p| words::wrap_type(model.wrap_type()[p]) == Some(WrapType::Joint)) {
+            if !points.clone().all(|p| mjcf_keywords::wrap_type(model.wrap_type()[p]) == Some(WrapType::Joint)) {
                 return Err(format!("the spatial tendon {tendon:?}"));
             }
             let path = points.map(|p| (model.wrap_objid()[p] as usize, model.wrap_prm()[p])).collect();
@@ -161,7 +161,7 @@ fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<ActuatorT
 
 /// True for a hinge or a slide.
 pub(super) fn is_single_dof(model: &Model, joint: usize) -> bool {
-    matches!(words::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
+    matches!(mjcf_keywords::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
 }
 
 /// Adds an actuator to a joint; `limit` is infinite without a limit.

@@ -2,7 +2,7 @@
 
 use crate::mjcf::part::PartError;
 use kinetoscope_mujoco::CompileError;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 
 /// Advice on another use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
 const AS_A_PART: &str = "such a file is a scene, or a part of one";

@@ -5,7 +5,7 @@ use super::drives::is_single_dof;
 use crate::mjcf::part::PartNames;
 use kinetoscope_mujoco::Model;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 
 /// MuJoCo's default `solref` and `solimp`.
 const DEFAULTS: ([f64; 2], [f64; 5]) = ([0.02, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0]);

@@ -10,7 +10,7 @@ mod couplings;
 mod drives;
 mod error;
 mod friction;
-mod places;
+mod locations;
 mod tree;
 mod world;
 
@@ -24,19 +24,19 @@ use super::part::{
 use super::robot::{
     DampedJoint, GeomOwner, LinkFrame, MjcfDialect, RobotLayout, RobotMjcfCfg, add_drive, unused_joint_name,
 };
+use crate::entity_label::EntityLabel;
 use crate::error::Result;
 use crate::mjcf::document::GeomRole;
-use crate::named::EntityLabel;
+use crate::objects::mjcf_file::MjcfFile;
 use crate::objects::mjcf_part_data::{engine_sensors, read_and_compile};
-use crate::objects::robot_file::MjcfFile;
-use kinetoscope_mujoco::{Asset, Model, words};
+use kinetoscope_mujoco::{Asset, Model, mjcf_keywords};
 use kinetoscope_robot::body_inertia::{RigidBody, fuse};
 use kinetoscope_robot::description::{JointId, LinkId, RobotDescription};
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use kinetoscope_sensors::EngineSensor;
-use places::SourceLocations;
+use locations::SourceLocations;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tree::{DescriptionBuilder, FileDescription, Root};
@@ -253,7 +253,7 @@ impl MjcfRobotFile {
                 if damping > 0.0 && is_written {
                     let armature = passive.armature;
                     passive.armature += mjcf.option.timestep * damping;
-                    let dofs = if words::joint(m.jnt_type()[joint]) == Some("free") { 6 } else { 1 };
+                    let dofs = if mjcf_keywords::joint(m.jnt_type()[joint]) == Some("free") { 6 } else { 1 };
                     let joint = self.scoped_name(cfg, &self.names.joints[joint]);
                     damped.push(DampedJoint { joint, dofs, damping, armature });
                 }

@@ -9,9 +9,9 @@
 use super::couplings::{Coupling, PolynomialRelation};
 use super::drives::{JointActuation, is_single_dof};
 use super::error::RobotFileError;
-use super::places::SourceLocations;
+use super::locations::SourceLocations;
 use crate::mjcf::part::PartNames;
-use kinetoscope_mujoco::{Model, words};
+use kinetoscope_mujoco::{Model, mjcf_keywords};
 use kinetoscope_robot::description::{
     CouplingPolynomial, FileActuation, Inertial, Joint, JointDefaults, JointId, JointKind, JointLimit, Link, LinkId,
     Mimic, RobotDescription,
@@ -19,7 +19,7 @@ use kinetoscope_robot::description::{
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::{Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 
@@ -50,7 +50,7 @@ pub(super) fn root(
             return Err(RobotFileError::MultipleRoots { roots });
         }
     };
-    let kind = |joint: usize| words::joint(model.jnt_type()[joint]);
+    let kind = |joint: usize| mjcf_keywords::joint(model.jnt_type()[joint]);
     if let Some(joint) = (0..model.njnt()).find(|&joint| kind(joint) == Some("ball")) {
         let name = &names.joints[joint];
         return Err(RobotFileError::BallJoint { at: places.get("joint", name), joint: name.clone() });
@@ -173,7 +173,7 @@ impl DescriptionBuilder<'_> {
             let (mut before, mut at) = (body_pose(m, body), Vector3::zeros());
             let of_body = joints_of(m, body);
             for (k, &joint) in of_body.iter().enumerate() {
-                let slides = words::joint(m.jnt_type()[joint]) == Some("slide");
+                let slides = mjcf_keywords::joint(m.jnt_type()[joint]) == Some("slide");
                 let (axis, reference) = (Unit::new_normalize(vector(m.jnt_axis(), joint)), self.start(joint));
                 let parent_from_joint = if slides {
                     before * translation(axis.into_inner() * -reference)
@@ -281,7 +281,7 @@ impl DescriptionBuilder<'_> {
             effort,
             velocity: None,
         });
-        let kind = match words::joint(m.jnt_type()[joint]) {
+        let kind = match mjcf_keywords::joint(m.jnt_type()[joint]) {
             Some("slide") => JointKind::Prismatic,
             _ if range.is_some() => JointKind::Revolute,
             _ => JointKind::Continuous,

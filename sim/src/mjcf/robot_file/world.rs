@@ -1,13 +1,13 @@
 //! Elements of the file's world, which a robot leaves out, and elements that depend on them.
 
 use super::error::RobotFileError;
-use super::places::SourceLocations;
+use super::locations::SourceLocations;
 use crate::mjcf::part::{OmittedElement, PartNames, sensors_left_out};
 use kinetoscope_mujoco::Model;
-use kinetoscope_mujoco::words;
-use kinetoscope_mujoco::words::WrapType;
+use kinetoscope_mujoco::mjcf_keywords;
+use kinetoscope_mujoco::mjcf_keywords::WrapType;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source::SourceLocation;
+use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::BTreeSet;
 
 /// Converts an index of MuJoCo, which is -1 for no object.
@@ -46,7 +46,7 @@ pub(super) fn check(
         for point in first..first + model.tendon_num()[tendon] as usize {
             let Some(id) = mj_index(model.wrap_objid()[point]) else { continue };
             let site = |id: usize| (model.site_bodyid()[id] == 0).then(|| &names.sites[id]);
-            let used = match words::wrap_type(model.wrap_type()[point]) {
+            let used = match mjcf_keywords::wrap_type(model.wrap_type()[point]) {
                 Some(WrapType::Site) => site(id),
                 Some(WrapType::Geom) => {
                     let geom = (model.geom_bodyid()[id] == 0).then(|| &names.geoms[id]);
@@ -77,7 +77,7 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedEl
             continue;
         }
         // Drives are friction rows or forces of this crate, which MuJoCo's sum over actuators does not include.
-        let word = words::sensor(model.sensor_type()[sensor]).map_or("", |word| word.keyword);
+        let word = mjcf_keywords::sensor(model.sensor_type()[sensor]).map_or("", |word| word.keyword);
         if matches!(word, "jointactuatorfrc" | "tendonactuatorfrc") {
             let what = format!("the type {word}, the force of actuators, whose place drives take");
             left_out.push((
@@ -91,7 +91,7 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedEl
             (model.sensor_reftype()[sensor], model.sensor_refid()[sensor]),
         ];
         let omitted = observed.into_iter().find_map(|(kind, id)| {
-            let (word, id) = (words::object_type(kind)?, mj_index(id)?);
+            let (word, id) = (mjcf_keywords::object_type(kind)?, mj_index(id)?);
             let (name, is_gone) = match word {
                 "actuator" => (&names.actuators[id], true),
                 "geom" => (&names.geoms[id], model.geom_bodyid()[id] == 0),

@@ -4,7 +4,7 @@
 //! is limited to lengths from 0, or has a spring that acts beyond a length only. A tendon with damping, friction or an
 //! actuator does not hang.
 
-use kinetoscope_mujoco::{Data, Model, words};
+use kinetoscope_mujoco::{Data, Model, mjcf_keywords};
 
 /// Number of segments of a hanging tendon; MuJoCo has as many as its round shapes have slices, 28 by default.
 pub(super) const SEGMENTS: usize = 28;
@@ -16,7 +16,7 @@ const MAX_LENGTH_RATIO: f64 = 100.0;
 /// True if a tendon hangs when it is slack.
 pub(super) fn may_hang(model: &Model, tendon: usize) -> bool {
     let acts = |actuator: usize| {
-        words::transmission(model.actuator_trntype()[actuator]) == Some("tendon")
+        mjcf_keywords::transmission(model.actuator_trntype()[actuator]) == Some("tendon")
             && usize::try_from(model.actuator_trnid()[2 * actuator]) == Ok(tendon)
     };
     model.tendon_num()[tendon] == 2

@@ -15,8 +15,8 @@ mod tests;
 pub(super) use buffers::SceneBufferPool;
 
 use super::identity::DeformingElement;
-use super::shown::is_visible;
 use super::surface::{ModelMaterials, color};
+use super::visibility::is_visible;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh};

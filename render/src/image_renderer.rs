@@ -1,0 +1,227 @@
+//! Renders single frames.
+
+use super::aperture::Aperture;
+use super::path_frame::path_trace;
+use super::progress::RenderProgress;
+use super::renderer::Renderer;
+use super::rolling_shutter::RollingShutter;
+use super::shutter::{FrameSample, Shutter, ShutterInterval};
+use crate::frame::{Frame, FrameMut};
+use crate::geometry::assets::RayAssetCache;
+use crate::path::accumulator::Accumulator;
+use crate::raster::tile::BLOCK;
+use crate::request::{RasterCfg, RenderRequest};
+use crate::shade::band::RasterScratch;
+use crate::shade::prepared_frame::{PreparedFrame, RenderSettings};
+use crate::simd::SimdLevel;
+use crate::visibility::{RenderError, View};
+use kinetoscope_exec::ThreadPool;
+use kinetoscope_scene::{PoseF32, RenderScene};
+
+/// Renders frames, one at a time; keeps its scratch memory. Use one per thread.
+///
+/// The same request gives the same bits on every thread and with every instruction set.
+///
+/// Transparency: instances with 0 < alpha < 1 are blended into the color, back to front by the depth of their origins.
+/// Only the nearest surface of each is blended. All other channels contain the nearest surface whatever its alpha,
+/// unless that is 0, as in MuJoCo. The opacity of textures is ignored.
+#[derive(Debug)]
+pub struct ImageRenderer {
+    /// Options of the rasterizer.
+    pub cfg: RasterCfg,
+    /// The renderer that is used.
+    pub renderer: Renderer,
+    /// Aperture of the lens, for depth of field; `None` is a pinhole.
+    pub aperture: Option<Aperture>,
+    /// Exposure time and readout of the rows.
+    pub shutter: Shutter,
+    /// Exposure compensation in stops, -20 to 20: light is multiplied by 2 to this power before the tone curve. Bright
+    /// areas that saturate in one image keep their detail in an image with fewer stops.
+    pub exposure_compensation: f64,
+    /// Progress of path tracing.
+    pub progress: RenderProgress,
+    pub(super) assets: RayAssetCache,
+    pub(super) prepared: PreparedFrame,
+    pub(super) scratch: RasterScratch,
+    /// Accumulator of path-traced images.
+    pub(super) accumulator: Accumulator,
+    /// Scratch memory of images whose rows show different instants.
+    pub(super) rolling_shutter: RollingShutter,
+}
+
+/// Clones the settings. The clone has its own progress counter.
+impl Clone for ImageRenderer {
+    fn clone(&self) -> Self {
+        let Self {
+            cfg,
+            renderer,
+            aperture,
+            shutter,
+            exposure_compensation: stops,
+            progress: _,
+            assets,
+            prepared: plan,
+            scratch: brush,
+            accumulator: film,
+            rolling_shutter: roll,
+        } = self;
+        Self {
+            cfg: *cfg,
+            renderer: *renderer,
+            aperture: *aperture,
+            shutter: *shutter,
+            exposure_compensation: *stops,
+            progress: RenderProgress::default(),
+            assets: assets.clone(),
+            prepared: plan.clone(),
+            scratch: brush.clone(),
+            accumulator: film.clone(),
+            rolling_shutter: roll.clone(),
+        }
+    }
+}
+
+impl Default for ImageRenderer {
+    fn default() -> Self {
+        Self::new(RasterCfg::default())
+    }
+}
+
+impl ImageRenderer {
+    /// Creates a rasterizer with the best SIMD level of this machine.
+    pub fn new(cfg: RasterCfg) -> Self {
+        Self::with_level(cfg, SimdLevel::best())
+    }
+
+    /// Creates a rasterizer with a given SIMD level.
+    pub(crate) fn with_level(cfg: RasterCfg, level: SimdLevel) -> Self {
+        Self {
+            cfg,
+            renderer: Renderer::default(),
+            aperture: None,
+            shutter: Shutter::default(),
+            exposure_compensation: 0.0,
+            progress: RenderProgress::default(),
+            assets: RayAssetCache::default(),
+            prepared: PreparedFrame::default(),
+            scratch: RasterScratch::new(level),
+            accumulator: Accumulator::default(),
+            rolling_shutter: RollingShutter::default(),
+        }
+    }
+
+    /// Current settings of all frames.
+    pub(super) fn settings(&self) -> RenderSettings<'_> {
+        let Self { cfg, renderer, aperture, shutter, exposure_compensation: stops, assets, .. } = self;
+        RenderSettings {
+            cfg: *cfg,
+            renderer: *renderer,
+            aperture: aperture.as_ref(),
+            shutter: *shutter,
+            exposure_compensation: *stops,
+            assets,
+        }
+    }
+
+    /// Scratch memory held \[bytes\].
+    pub fn scratch_bytes(&self) -> usize {
+        self.prepared.bytes() + self.scratch.bytes() + self.accumulator.bytes() + self.rolling_shutter.bytes()
+    }
+
+    /// Renders the channels of `frame`.
+    ///
+    /// # Errors
+    ///
+    /// For an invalid view, pose or buffer; the frame is unchanged then.
+    pub fn render(
+        &mut self,
+        scene: &RenderScene,
+        poses: &[PoseF32],
+        view: &View,
+        frame: &mut Frame,
+    ) -> Result<(), RenderError> {
+        self.render_request(
+            &RenderRequest { scene, poses, view, lights: None, lens: None, previous: None },
+            &mut frame.as_mut(),
+        )
+    }
+
+    /// Renders the channels of `frame` into borrowed buffers.
+    ///
+    /// # Errors
+    ///
+    /// For an invalid view, pose or buffer; the frame is unchanged then.
+    pub fn render_request(&mut self, shot: &RenderRequest<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
+        self.render_sample(shot, &FrameSample::default(), frame)
+    }
+
+    /// As [`render_request`](Self::render_request), with noise and motion for path tracing: `take` holds the noise number and
+    /// the poses at shutter opening.
+    ///
+    /// # Errors
+    ///
+    /// As [`render_request`](Self::render_request), and for invalid or too recent poses at shutter opening.
+    pub fn render_sample(
+        &mut self,
+        shot: &RenderRequest<'_>,
+        take: &FrameSample<'_>,
+        frame: &mut FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        let paths = self.renderer.path_count(shot, frame);
+        self.progress.begin(paths);
+        if self.renderer.is_path_tracing() {
+            let result = path_trace(&ThreadPool::serial(), std::slice::from_mut(self), shot, take, frame);
+            if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Canceled { .. })) {
+                self.progress.subtract(paths.saturating_sub(self.progress.samples()));
+            }
+            return result;
+        }
+        let Self {
+            cfg,
+            renderer,
+            aperture,
+            shutter,
+            exposure_compensation: stops,
+            assets,
+            prepared: plan,
+            scratch: brush,
+            ..
+        } = self;
+        let (aperture, shutter) = (aperture.as_ref(), *shutter);
+        plan.prepare(
+            RenderSettings { cfg: *cfg, renderer: *renderer, aperture, shutter, exposure_compensation: *stops, assets },
+            shot,
+            frame,
+        )?;
+        for band in plan.shadow_bands() {
+            brush.render_shadow_band(shot.scene, band);
+        }
+        brush.render_band(plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
+        Ok(())
+    }
+
+    /// Renders one row of an image, at its own instant, into a frame of that row.
+    pub(super) fn render_row(
+        &mut self,
+        shot: &RenderRequest<'_>,
+        interval: &ShutterInterval<'_>,
+        y: usize,
+        row: &mut FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        let Self {
+            cfg,
+            renderer,
+            aperture,
+            shutter,
+            exposure_compensation: stops,
+            assets,
+            scratch: brush,
+            rolling_shutter: roll,
+            ..
+        } = self;
+        let (aperture, shutter) = (aperture.as_ref(), *shutter);
+        let style =
+            RenderSettings { cfg: *cfg, renderer: *renderer, aperture, shutter, exposure_compensation: *stops, assets };
+        roll.render_row(brush, style, shot, interval, y, row)
+    }
+}

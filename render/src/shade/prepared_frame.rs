@@ -1,0 +1,371 @@
+//! State that all bands of a frame share: draw list, lights and shadows.
+
+use super::MAX_BAND_SAMPLES;
+use super::group::ShadingContext;
+use super::horizon::Horizon;
+use super::light::{Lighting, MAX_LIGHTS, ShadeContext};
+use super::mirror::{self, Mirrors, ReflectionBounds};
+use super::motion_vectors::MotionVectors;
+use super::shadow::{ShadowBand, ShadowMap};
+use super::shadow_fit::{self, LightView};
+use super::shadow_rays::ShadowRays;
+use super::tone::ToneCurve;
+use crate::aperture::Aperture;
+use crate::frame::{FrameMut, Stage};
+use crate::geometry::assets::RayAssetCache;
+use crate::geometry::bvh::TraversalStack;
+use crate::lens::rays::LensRays;
+use crate::raster::tile::{BLOCK, SAMPLES};
+use crate::raster::{DrawList, Granularity, Layer, select_level};
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::request::RenderRequest;
+use crate::shutter::Shutter;
+use crate::trace::RayTracer;
+use crate::visibility::{Projection, RenderError, View};
+use kinetoscope_scene::{Instance, LightingSpace, PoseF32};
+use std::cell::RefCell;
+
+/// Largest number of lights with a shadow map.
+const MAX_SHADOWS: usize = 4;
+
+/// A frame that is prepared for rendering, band by band; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PreparedFrame {
+    pub(crate) list: DrawList,
+    lighting: Lighting,
+    motion_vectors: MotionVectors,
+    shadows: Vec<ShadowMap>,
+    /// Number of maps in use.
+    map_count: usize,
+    /// Sample planes: 1, or 5 with multisampling.
+    pub(crate) planes: usize,
+    /// Projection of the image; `None` if preparation failed.
+    pub(crate) projection: Option<Projection>,
+    /// Ray tracer, used if any rays are cast.
+    pub(crate) tracer: RayTracer,
+    pub(crate) renderer: Renderer,
+    /// True if visibility is ray traced.
+    pub(crate) traces_visibility: bool,
+    /// True if shadows are ray traced.
+    shadow_rays: bool,
+    /// Rays per sample for ambient occlusion.
+    occlusion_rays: u16,
+    /// The first instance that mirrors, for rasterized color.
+    first_mirror: Option<usize>,
+    pub(crate) tone: ToneCurve,
+    /// Factor of light before the tone curve.
+    pub(crate) exposure: f32,
+    /// The only row of each block that is rendered; `None` for all rows.
+    pub(crate) only_row: Option<usize>,
+}
+
+/// Settings of a renderer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RenderSettings<'a> {
+    pub(crate) cfg: RasterCfg,
+    pub(crate) renderer: Renderer,
+    pub(crate) aperture: Option<&'a Aperture>,
+    pub(crate) shutter: Shutter,
+    pub(crate) exposure_compensation: f64,
+    /// Cache of BVHs over meshes.
+    pub(crate) assets: &'a RayAssetCache,
+}
+
+/// Largest exposure compensation, in stops.
+const MAX_STOPS: f64 = 20.0;
+
+impl PreparedFrame {
+    pub(crate) fn bytes(&self) -> usize {
+        self.list.bytes()
+            + self.tracer.bytes()
+            + self.motion_vectors.bytes()
+            + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
+    }
+
+    /// Validates a request and builds its draw list. Shadow maps are rendered later, see [`PreparedFrame::shadow_bands`].
+    pub(crate) fn prepare(
+        &mut self,
+        style: RenderSettings<'_>,
+        shot: &RenderRequest<'_>,
+        frame: &FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        self.projection = None;
+        let View { width, height, .. } = *shot.view;
+        shot.view.validate()?;
+        frame.validate(width * height)?;
+        self.prepare_part(style, shot, frame)
+    }
+
+    /// As [`prepare`](Self::prepare), for one row of the image; the frame covers the row of blocks that contains it.
+    pub(crate) fn prepare_row(
+        &mut self,
+        style: RenderSettings<'_>,
+        shot: &RenderRequest<'_>,
+        frame: &FrameMut<'_>,
+        row: usize,
+    ) -> Result<(), RenderError> {
+        self.projection = None;
+        self.prepare_part(style, shot, frame)?;
+        self.only_row = Some(row % BLOCK);
+        Ok(())
+    }
+
+    fn prepare_part(
+        &mut self,
+        style: RenderSettings<'_>,
+        shot: &RenderRequest<'_>,
+        frame: &FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        let RenderSettings { cfg, renderer, aperture, shutter, exposure_compensation: stops, assets } = style;
+        (self.map_count, self.only_row) = (0, None);
+        let RenderRequest { scene, poses, view, .. } = *shot;
+        view.validate()?;
+        if !matches!(cfg.samples, 1 | 4) {
+            return Err(RenderError::Samples { samples: cfg.samples });
+        }
+        if !(-MAX_STOPS..=MAX_STOPS).contains(&stops) {
+            return Err(RenderError::ExposureCompensation { stops: stops as f32 });
+        }
+        renderer.validate()?;
+        check_occlusion(cfg, renderer)?;
+        if poses.len() != scene.instances().len() {
+            return Err(RenderError::PoseCount { expected: scene.instances().len(), found: poses.len() });
+        }
+        if let Some((instance, pose)) = poses.iter().enumerate().find(|(_, p)| !p.is_rigid()) {
+            return Err(RenderError::InstancePose { instance, pose: *pose });
+        }
+        aperture.map_or(Ok(()), Aperture::check)?;
+        shutter.check()?;
+        check_exposure_optics(renderer, aperture, shutter)?;
+        if frame.wants(Stage::Flow) {
+            self.motion_vectors.prepare(shot)?;
+        }
+        let projection = Projection::from(view);
+        let wants_color = frame.wants(Stage::Color);
+        let multisampled = wants_color && cfg.samples == 4 && !renderer.is_path_tracing();
+        if let Some(lens) = shot.lens {
+            check_lens(lens, renderer, view, if multisampled { 4 } else { 1 })?;
+        }
+        let shaded = wants_color && !renderer.is_path_tracing();
+        let hybrid = wants_color && renderer == Renderer::Hybrid;
+        self.shadow_rays = hybrid && cfg.shadows;
+        self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
+        (self.tone, self.exposure) = (cfg.tone, stops.exp2() as f32);
+        if shaded && scene.lighting_space == LightingSpace::Display && cfg.tone == ToneCurve::Soft {
+            self.tone = ToneCurve::Clip;
+        }
+        let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden && mirror::reflectance(i) > 0.0;
+        self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded && cfg.reflections);
+        let casts_rays = self.shadow_rays || self.occlusion_rays > 0 || self.first_mirror.is_some();
+        if shaded {
+            self.prepare_lights(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
+        }
+        self.planes = if multisampled { SAMPLES.len() } else { 1 };
+        self.traces_visibility = renderer.traces_visibility(shot.lens.is_some());
+        let parts = match renderer {
+            _ if self.traces_visibility => Granularity::Instances,
+            Renderer::Raster if cfg.lod => Granularity::LodClusters,
+            _ => Granularity::FullClusters,
+        };
+        let keep = |instance: &Instance| Layer::for_instance(instance, cfg.groups);
+        self.list.build(&projection, shot.lens, scene, poses, parts, keep);
+        if self.traces_visibility || casts_rays {
+            self.tracer.prepare_geometry(scene, assets, keep);
+        }
+        if casts_rays || wants_color && renderer.is_path_tracing() {
+            self.tracer.place(scene, poses, None);
+        }
+        self.renderer = renderer;
+        self.projection = Some(projection);
+        Ok(())
+    }
+
+    /// Prepares lights and their shadow maps.
+    fn prepare_lights(&mut self, cfg: RasterCfg, shot: &RenderRequest<'_>) {
+        let RenderRequest { scene, poses, view, lights, lens, .. } = *shot;
+        let lights = lights.unwrap_or(&scene.lights);
+        let mut maps = [None; 256];
+        if cfg.shadows {
+            let side = shadow_side(cfg, view);
+            let lamps = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
+            let mut views = [None; MAX_LIGHTS];
+            let mut casting = [0; MAX_LIGHTS];
+            let lamps = lamps.filter(|(k, l)| l.cast_shadow && *k < maps.len());
+            let lamps = lamps.filter_map(|(k, light)| Some((k, LightView::from_light(light)?)));
+            for ((k, lamp), (view, of)) in lamps.zip(views.iter_mut().zip(&mut casting)) {
+                (*view, *of) = (Some(lamp), k);
+            }
+            let receivers = match lens {
+                None => {
+                    let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden;
+                    shadow_fit::visible_extents(&Projection::from(view), scene, poses, shown, &views)
+                }
+                Some(_) => shadow_fit::unbounded_extents(),
+            };
+            for ((lamp, receivers), k) in views.iter().flatten().zip(&receivers).zip(casting) {
+                if self.map_count == MAX_SHADOWS {
+                    break;
+                }
+                if self.shadows.len() == self.map_count {
+                    self.shadows.push(ShadowMap::empty());
+                }
+                if self.shadows[self.map_count].prepare(lamp, receivers, scene, poses, cfg, side) {
+                    maps[k] = Some(self.map_count);
+                    self.map_count += 1;
+                }
+            }
+        }
+        let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
+        self.lighting.prepare(scene, lights, forward, |k| maps.get(k).copied().flatten());
+        let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden;
+        self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
+    }
+
+    /// True if there are shadow maps to render.
+    pub(crate) fn has_shadows(&self) -> bool {
+        self.map_count > 0
+    }
+
+    /// Bands of the shadow maps; all must be rendered before the image.
+    pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
+        self.shadows.iter_mut().take(self.map_count).flat_map(ShadowMap::bands)
+    }
+
+    /// Samples of a tile that can hold any band of the shadow maps, including maps that are not in use now.
+    pub(crate) fn max_shadow_band_samples(&self) -> usize {
+        self.shadows.iter().map(ShadowMap::max_band_texels).max().unwrap_or(0)
+    }
+
+    /// Rows of blocks that are rendered together.
+    pub(crate) fn band_rows(&self) -> usize {
+        let Some(projection) = &self.projection else { return 1 };
+        let blocks = [projection.width.div_ceil(BLOCK), projection.height.div_ceil(BLOCK)];
+        // Small images with many samples are split in two, so that the scratch memory is not much larger than the
+        // image.
+        let most = if self.planes > 1 { blocks[1].div_ceil(2) } else { blocks[1] };
+        (MAX_BAND_SAMPLES / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
+    }
+
+    /// Context for shading pixels; the flags select the stages `surface`, `albedo` and `flow`.
+    pub(crate) fn context<'a>(
+        &'a self,
+        shot: &RenderRequest<'a>,
+        projection: &'a Projection,
+        stack: &'a RefCell<&'a mut TraversalStack>,
+        [detail, albedo, flow]: [bool; 3],
+    ) -> ShadingContext<'a> {
+        let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
+        let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
+        let only_first = shot.scene.lighting_space == LightingSpace::Display;
+        let mirrors = self.first_mirror.map(|first| {
+            let tracer = &self.tracer;
+            let others = shot.scene.instances()[first + 1..].iter().any(|instance| mirror::reflectance(instance) > 0.0);
+            let reach = (only_first || !others)
+                .then(|| tracer.bounds_without(first as u32))
+                .flatten()
+                .map(ReflectionBounds::new);
+            Mirrors { tracer, stack, first, only_first, bounds: reach }
+        });
+        ShadingContext {
+            projection,
+            lens: shot.lens,
+            poses: shot.poses,
+            placed: &self.list.placed,
+            shade: ShadeContext {
+                scene: shot.scene,
+                lighting: &self.lighting,
+                shadows: &self.shadows[..self.map_count],
+                shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
+                pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel_spacing() as f32),
+            },
+            mirrors,
+            surface: detail,
+            albedo,
+            motion_vectors: flow.then_some(&self.motion_vectors),
+        }
+    }
+}
+
+/// Checks that a renderer supports the configured ambient occlusion.
+///
+/// # Errors
+///
+/// [`RenderError::Occlusion`] for occlusion rays of a renderer that casts none.
+pub fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderError> {
+    match renderer {
+        Renderer::Raster | Renderer::FastRayTraced if cfg.occlusion_rays > 0 => {
+            Err(RenderError::Occlusion { rays: cfg.occlusion_rays, renderer: renderer.name() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Checks that a renderer supports the configured depth of field and exposure time.
+///
+/// # Errors
+///
+/// [`RenderError::NeedsPathTracing`] for a renderer without path tracing.
+pub fn check_exposure_optics(
+    renderer: Renderer,
+    aperture: Option<&Aperture>,
+    shutter: Shutter,
+) -> Result<(), RenderError> {
+    let what = match (aperture, shutter.is_instant()) {
+        _ if renderer.is_path_tracing() => return Ok(()),
+        (None, true) => return Ok(()),
+        (Some(_), _) => "an aperture (depth of field)",
+        (None, false) => "a shutter that takes time",
+    };
+    Err(RenderError::NeedsPathTracing { what, renderer: renderer.name() })
+}
+
+/// Checks that a renderer supports lenses, and that the rays match the image.
+fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> Result<(), RenderError> {
+    if !renderer.traces_visibility(true) {
+        let (lens, renderer) = (lens.optics().lens().name(), renderer.name());
+        return Err(RenderError::LensRenderer { lens, renderer });
+    }
+    let (expected, found) = ([view.width, view.height], lens.size());
+    if found != expected || lens.samples() < samples {
+        return Err(RenderError::LensRays { expected, samples, found, found_samples: lens.samples() });
+    }
+    Ok(())
+}
+
+/// Texels along the side of a shadow map: about three texels for two pixels of a square image of the same area.
+fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
+    match cfg.shadow_size {
+        0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
+        n => n.clamp(64, 8192).next_multiple_of(BLOCK),
+    }
+}
+
+/// Number of triangles of all meshes, at their level of detail.
+fn triangle_count(cfg: RasterCfg, shot: &RenderRequest<'_>) -> usize {
+    let RenderRequest { scene, poses, view, .. } = *shot;
+    if !cfg.lod {
+        return scene.triangle_count();
+    }
+    let projection = Projection::from(view);
+    let count = |(instance, pose): (&Instance, &PoseF32)| {
+        let mesh = instance.mesh().filter(|_| Layer::for_instance(instance, cfg.groups) != Layer::Hidden)?;
+        let level = select_level(&projection, instance, &view.world_from_camera.inverse_times(pose));
+        Some(mesh.level(usize::from(level)).triangles().len())
+    };
+    scene.instances().iter().zip(poses).filter_map(count).sum()
+}
+
+/// Approximate time of a frame \[ns\]: decides if another thread pays off.
+pub(crate) fn estimate_cost_ns(cfg: RasterCfg, shot: &RenderRequest<'_>, frame: &FrameMut<'_>) -> usize {
+    let RenderRequest { scene, view, .. } = *shot;
+    let wants_color = frame.wants(Stage::Color);
+    let (pixels, triangles) = (view.width.saturating_mul(view.height), triangle_count(cfg, shot));
+    let shadows = if wants_color && cfg.shadows {
+        let texels = shadow_side(cfg, view).pow(2);
+        scene.lights.len().min(MAX_SHADOWS) * (2 * texels + 20 * triangles) + 5 * pixels
+    } else {
+        0
+    };
+    pixels.saturating_mul(if wants_color { 15 } else { 8 }) + 20 * triangles + shadows
+}

@@ -1,0 +1,50 @@
+//! Post-processing of rendered images: imperfections of the camera, then noise of the numbers that it sends.
+
+use super::cfg::CameraCfg;
+use super::image_noise::ImageNoise;
+use super::imperfection::{ImageContext, Imperfections};
+use crate::error::SensorError;
+use crate::sensor::SensorContext;
+use kinetoscope_exec::ThreadPool;
+use kinetoscope_render::RenderJob;
+use kinetoscope_render::RngKey;
+use kinetoscope_render::ToneCurve;
+
+/// Imperfections and noise of a camera, applied to its rendered images.
+#[derive(Clone, Debug)]
+pub(super) struct SensorNoiseModel {
+    imperfections: Imperfections,
+    tone: ToneCurve,
+    noise: Option<ImageNoise>,
+    /// One per thread.
+    workers: Vec<()>,
+    pool: ThreadPool,
+}
+
+impl SensorNoiseModel {
+    /// Creates the model that `cfg` describes, with `period` \[s\] between images; `None` for a perfect camera.
+    pub(super) fn new(cfg: &CameraCfg, context: &SensorContext, period: f64) -> Result<Option<Self>, SensorError> {
+        let noise = ImageNoise::new(cfg, period)?;
+        cfg.imperfections.check(cfg.channels)?;
+        let any = noise.is_some() || !cfg.imperfections.is_empty();
+        Ok(any.then(|| Self {
+            imperfections: cfg.imperfections.clone(),
+            tone: cfg.raster.tone,
+            noise,
+            workers: vec![(); context.threads.max(1)],
+            pool: context.pool.clone(),
+        }))
+    }
+
+    /// Applies imperfections and noise to images in which misses are infinite; each image is processed by one thread.
+    pub(super) fn apply(&mut self, jobs: &mut [RenderJob<'_>], tickets: &[RngKey]) {
+        let Self { imperfections, tone, noise, workers, pool } = self;
+        let noise = noise.as_ref();
+        pool.for_each(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
+            imperfections.apply(frame, *tone, ImageContext { view: shot.view, rays: shot.lens, rng_key: ticket });
+            if let Some(noise) = noise {
+                noise.apply(frame, ticket);
+            }
+        });
+    }
+}

@@ -1,0 +1,89 @@
+//! Locations of the named elements of a file and of the files it includes.
+
+use kinetoscope_scene::source_location::SourceLocation;
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Maximum number of files that are read; MuJoCo rejects a file that is included twice.
+const MAX_INCLUDED_FILES: usize = 100;
+
+/// Locations of the named elements of a file.
+pub(super) struct SourceLocations {
+    file: SourceLocation,
+    /// Locations by kind and name.
+    named: HashMap<(String, String), SourceLocation>,
+}
+
+impl SourceLocations {
+    /// Searches `text`, the content of `file`. Elements that this search misses are located at the first line of the
+    /// file.
+    pub(super) fn of(text: &str, file: &Path) -> Self {
+        let mut places = Self { file: SourceLocation::new(file, 1), named: HashMap::new() };
+        places.add(text, file, file.parent().unwrap_or(Path::new("")), &mut 0);
+        places
+    }
+
+    fn add(&mut self, text: &str, file: &Path, folder: &Path, files: &mut usize) {
+        *files += 1;
+        let Ok(document) = roxmltree::Document::parse(text) else { return };
+        let shared = Arc::new(file.to_path_buf());
+        for node in document.descendants().filter(roxmltree::Node::is_element) {
+            let tag = node.tag_name().name();
+            if tag == "include"
+                && let Some(path) = node.attribute("file").map(|name| folder.join(name))
+                && *files < MAX_INCLUDED_FILES
+                && let Ok(text) = std::fs::read_to_string(&path)
+            {
+                self.add(&text, &path, folder, files);
+            }
+            let Some(name) = node.attribute("name") else { continue };
+            let section = node.parent().map_or("", |parent| parent.tag_name().name());
+            // In these sections the kind is that of the section, in bodies that of the element.
+            let kind = match section {
+                "actuator" | "equality" | "tendon" => section,
+                _ if tag == "freejoint" => "joint",
+                _ => tag,
+            };
+            let line = document.text_pos_at(node.range().start).row;
+            let key = (kind.to_string(), name.to_string());
+            self.named.entry(key).or_insert_with(|| SourceLocation { file: Arc::clone(&shared), line });
+        }
+    }
+
+    /// Location of the `kind` called `name`; the first line of the file if the search missed it.
+    pub(super) fn get(&self, kind: &str, name: &str) -> SourceLocation {
+        self.named.get(&(kind.to_string(), name.to_string())).unwrap_or(&self.file).clone()
+    }
+
+    /// Location of the first line of the file.
+    pub(super) fn file(&self) -> SourceLocation {
+        self.file.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn by_kind_and_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let part = dir.path().join("part.xml");
+        std::fs::write(&part, "<mujocoinclude>\n\n<body name='b'/></mujocoinclude>").unwrap();
+        let file = dir.path().join("whole.xml");
+        let text = "<mujoco><worldbody>\n<body name='a'><freejoint name='f'/>\n<joint name='a'/></body>\n\
+                    <include file='part.xml'/></worldbody>\n<actuator><motor name='a'/></actuator></mujoco>";
+        let places = SourceLocations::of(text, &file);
+        for (kind, name, expected) in [
+            ("body", "a", SourceLocation::new(&file, 2)),
+            ("joint", "f", SourceLocation::new(&file, 2)),
+            ("joint", "a", SourceLocation::new(&file, 3)),
+            ("body", "b", SourceLocation::new(&part, 3)),
+            ("actuator", "a", SourceLocation::new(&file, 5)),
+            ("joint", "none", SourceLocation::new(&file, 1)),
+        ] {
+            assert_eq!(places.get(kind, name), expected, "{kind} {name}");
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Renders snapshots on the thread of the viewer.
+
+use super::canvas::Canvas;
+use super::color;
+use super::merged_scene::{MARKER_GROUP, MergedScene, shown_envs};
+use super::overlay::{Overlays, in_overview};
+use super::pick::Selection;
+use super::snapshot::{EnvSelection, Snapshot};
+use super::trail::Trails;
+use kinetoscope_render::frame::FrameMut;
+use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest};
+use kinetoscope_render::{RenderError, View};
+use kinetoscope_scene::Marker;
+
+/// Radius of the marker at a selected point \[pixels\].
+const SELECTION_RADIUS: f32 = 4.0;
+
+/// Renders images of snapshots. It reuses its buffers, so one instance should serve all images of a window.
+#[derive(Debug)]
+pub struct SceneRenderer {
+    rasterizer: ParallelRenderer,
+    cfg: RasterCfg,
+    assembly: MergedScene,
+}
+
+/// Contents of an image besides the scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ViewOptions<'a> {
+    /// Environments in the image.
+    pub envs: EnvSelection,
+    /// Overlays.
+    pub overlays: Overlays,
+    /// Selected point.
+    pub selection: Option<&'a Selection>,
+    /// Trails of bodies.
+    pub trails: Option<&'a Trails>,
+    /// Mouse spring: its environment and its two ends in the environment frame \[m\].
+    pub spring: Option<(usize, [[f64; 3]; 2])>,
+}
+
+impl SceneRenderer {
+    /// Creates a renderer with `threads` threads and four samples per pixel.
+    pub fn new(threads: usize) -> Self {
+        let cfg = RasterCfg::default();
+        Self { rasterizer: ParallelRenderer::new(cfg, threads), cfg, assembly: MergedScene::default() }
+    }
+
+    /// Limits the number of threads for the next images.
+    pub fn set_max_threads(&mut self, most: usize) {
+        self.rasterizer.use_threads(most);
+    }
+
+    /// Number of samples per pixel.
+    pub(crate) fn samples(&self) -> u8 {
+        self.cfg.samples
+    }
+
+    /// Sets the number of samples per pixel, 1 or 4.
+    pub fn set_samples(&mut self, samples: u8) {
+        self.cfg.samples = samples;
+    }
+
+    /// Renders a snapshot through `view`, whose pose is in the frame of the overview. A single environment stays at its
+    /// place in the overview. The canvas is resized to the view.
+    ///
+    /// # Errors
+    /// The view is invalid, or the renderer failed.
+    pub fn draw(
+        &mut self,
+        snapshot: &Snapshot,
+        view: &View,
+        look: &ViewOptions<'_>,
+        canvas: &mut Canvas,
+    ) -> Result<(), RenderError> {
+        canvas.resize(view.width, view.height);
+        let mut markers = look.overlays.markers(snapshot, look.envs);
+        if let Some((picked, pose)) = look.selection.and_then(|picked| Some((picked, picked.pose(snapshot)?))) {
+            markers.push((picked.env, Marker::axes(pose, 0.12)));
+        }
+        if let Some((picked, env)) = look.selection.and_then(|picked| Some((picked, snapshot.envs.get(picked.env)?))) {
+            // The marker is visible even if the frame of the body is inside of the body.
+            let point = picked.current_point(snapshot);
+            let [.., depth] = view.world_from_camera.apply_inverse(in_overview(env, point).map(|x| x as f32));
+            let ball = Marker::sphere(point, SELECTION_RADIUS * depth / view.fx, color::SELECTION);
+            markers.extend((depth > view.near).then_some((picked.env, ball)));
+        }
+        if let Some((env, [from, to])) = look.spring {
+            let way = [0, 1, 2].map(|k| to[k] - from[k]);
+            markers.extend(Marker::arrow(from, way, color::SELECTION).map(|marker| (env, marker)));
+        }
+        self.assembly.update(snapshot, look.envs, &markers);
+        let lights = shown_envs(snapshot, look.envs).next().map(|(_, env)| env.snapshot.lights.as_slice());
+        if let Some(scene) = &self.assembly.scene {
+            let groups = look.overlays.geom_groups() | 1 << MARKER_GROUP;
+            self.rasterizer.set_cfg(RasterCfg { groups, ..self.cfg });
+            let shot = RenderRequest { scene, poses: &self.assembly.poses, view, lights, lens: None, previous: None };
+            let frame = FrameMut { color: Some(canvas.bytes_mut()), ..FrameMut::default() };
+            self.rasterizer.render(&mut [(shot, frame)]).map_err(|(_, error)| error)?;
+        }
+        if let Some(trails) = look.trails.filter(|_| look.overlays.trails) {
+            trails.draw(snapshot, look.envs, view, canvas);
+        }
+        look.overlays.draw_on_top(snapshot, look.envs, view, canvas);
+        Ok(())
+    }
+
+    /// Returns the object at a pixel, or `None` for the sky. Markers are ignored.
+    pub fn pick(
+        &mut self,
+        snapshot: &Snapshot,
+        view: &View,
+        look: &ViewOptions<'_>,
+        [x, y]: [f64; 2],
+    ) -> Option<Selection> {
+        self.assembly.update(snapshot, look.envs, &[]);
+        let scene = self.assembly.scene.as_ref()?;
+        // A view of this single pixel, with the same rays.
+        let (column, row) = (x.floor() as f32, y.floor() as f32);
+        let pixel = View { width: 1, height: 1, cx: view.cx - column, cy: view.cy - row, ..*view };
+        let (mut mask, mut position) = ([0], [0.0; 3]);
+        let frame = FrameMut { mask: Some(&mut mask), position: Some(&mut position), ..FrameMut::default() };
+        // A single pixel costs nothing, so full detail is used.
+        self.rasterizer.set_cfg(RasterCfg { groups: look.overlays.geom_groups(), lod: false, ..self.cfg });
+        let shot = RenderRequest {
+            scene,
+            poses: &self.assembly.poses,
+            view: &pixel,
+            lights: None,
+            lens: None,
+            previous: None,
+        };
+        self.rasterizer.render(&mut [(shot, frame)]).ok()?;
+        let &(env, instance) = self.assembly.instance_sources.get(usize::try_from(mask[0] - 1).ok()?)?;
+        Selection::new(snapshot, env, instance, position)
+    }
+}
