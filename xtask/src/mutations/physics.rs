@@ -95,7 +95,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "physics",
         "Jacobian of a joint that moved already",
         "robot/src/kinematics/jacobian.rs",
-        ["pose *= joint.before;", "pose *= joint.before * joint.moved(positions);"],
+        ["pose *= joint.parent_from_joint;", "pose *= joint.parent_from_joint * joint.transform(positions);"],
         &["jacobian", "virtual_work"],
     ),
     Mutation::of(
@@ -103,8 +103,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "velocity at a point with the arm of the wrong sign",
         "sim/src/capture/motion.rs",
         [
-            "vector(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference(data, body)))",
-            "vector(data.cvel(), 6 * body + 3) - angular.cross(&(point - reference(data, body)))",
+            "vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body)))",
+            "vector_at(data.cvel(), 6 * body + 3) - angular.cross(&(point - reference_point(data, body)))",
         ],
         &["centre_of_percussion", "falling_rod"],
     ),
@@ -182,7 +182,10 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "physics",
         "friction cone always a pyramid",
         "sim/src/mjcf/write.rs",
-        ["if o.cone == Cone::Elliptic { \"elliptic\" }", "if o.cone == Cone::Elliptic { \"pyramidal\" }"],
+        [
+            "if o.cone == FrictionCone::Elliptic { \"elliptic\" }",
+            "if o.cone == FrictionCone::Elliptic { \"pyramidal\" }",
+        ],
         &["rest_depth", "stick_creep"],
     ),
     Mutation::of(
@@ -302,7 +305,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "physics",
         "IMU at rest feels nothing",
         "sensors/src/imu.rs",
-        ["acceleration + self.gravity_bias, spin_up", "acceleration, spin_up"],
+        ["acceleration + self.gravity_bias, angular_acceleration", "acceleration, angular_acceleration"],
         &["imu_turntable", "imu_pendulum"],
     ),
     Mutation::of(
