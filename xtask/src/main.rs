@@ -9,6 +9,7 @@
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
+//! | `language`, `spelling` | checks of words, retired names and spelling |
 //! | `examples`, `same_images` | the table of example runs, and the comparison of their images |
 //! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
 //! | `mutations` | the lists of code mutations |
@@ -22,6 +23,7 @@ mod dependencies;
 mod docs_check;
 mod examples;
 mod import_cycles;
+mod language;
 mod mutate;
 mod mutations;
 mod own_time;
@@ -34,6 +36,7 @@ mod run;
 mod same_images;
 mod setup;
 mod source_check;
+mod spelling;
 mod svg;
 mod test;
 mod wheel;

@@ -72,7 +72,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
             "self.place(joint.child, parent_body, body_from_joint);",
             "self.place(joint.child, parent_body, body_from_parent);",
         ],
-        &["centre_of_percussion", "falling_rod"],
+        &["center_of_percussion", "falling_rod"],
     ),
     Mutation::of(
         "physics",
@@ -106,7 +106,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
             "vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body)))",
             "vector_at(data.cvel(), 6 * body + 3) - angular.cross(&(point - reference_point(data, body)))",
         ],
-        &["centre_of_percussion", "falling_rod"],
+        &["center_of_percussion", "falling_rod"],
     ),
     Mutation {
         name: "no centripetal acceleration",
@@ -268,7 +268,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "force and torque exchanged",
         "sim/src/wrenches.rs",
         ["force.iter().chain(torque)", "torque.iter().chain(force)"],
-        &["tilted_inertia", "centre_of_percussion", "parallel_axis"],
+        &["tilted_inertia", "center_of_percussion", "parallel_axis"],
     ),
     Mutation::of(
         "physics",
