@@ -17,7 +17,7 @@ use kinetoscope::sensors::camera::{Camera, CameraConvention, SegmentLevel, Segme
 use launcher::arm::ArmWithHand;
 use launcher::panel::{self, CameraChannels, grid, tile};
 use launcher::views::SensorWindow;
-use launcher::{Launcher, MainLoop, PathFlags, Renderer, StopRequest, picture, waiting};
+use launcher::{Launcher, MainLoop, PathFlags, Renderer, StopRequest, image_file, render_progress};
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -276,7 +276,8 @@ impl ImageWriter {
                 window.announce(&format!("Ray tracing: {:.0} %", 100.0 * share));
             }
         };
-        match waiting::render_with_progress(camera.progress(), None, on_update, || camera.images().map(|_| ())) {
+        match render_progress::render_with_progress(camera.progress(), None, on_update, || camera.images().map(|_| ()))
+        {
             Err(_) if self.end.is_set() => return Ok(false),
             drawn => drawn?,
         }
@@ -298,7 +299,7 @@ impl ImageWriter {
                     grid(&CameraChannels { mask: &mask, ..views })
                 }
             });
-            let depth = picture::finite_range(views.depth.iter().copied());
+            let depth = image_file::finite_range(views.depth.iter().copied());
             let mut ids: Vec<i32> = views.mask.to_vec();
             ids.sort_unstable();
             ids.dedup();
@@ -314,12 +315,12 @@ impl ImageWriter {
         }
         let image = tile(&panels);
         if let (Some(out), Some(name)) = (&self.out, &name) {
-            picture::write_png(&out.join(name), &image)?;
+            image_file::write_png(&out.join(name), &image)?;
             if self.raw {
                 let file = |channel: &str| out.join(format!("{channel}_{step}.npy"));
-                picture::write_npy(&file("depth"), &camera.depth()?)?;
-                picture::write_npy(&file("mask"), &camera.mask()?)?;
-                picture::write_npy(&file("normal"), &camera.normal()?)?;
+                image_file::write_npy(&file("depth"), &camera.depth()?)?;
+                image_file::write_npy(&file("mask"), &camera.mask()?)?;
+                image_file::write_npy(&file("normal"), &camera.normal()?)?;
             }
         }
         if let Some(window) = &mut self.window {

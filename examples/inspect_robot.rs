@@ -7,7 +7,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::urdf::Strictness;
 use kinetoscope::sim::DriveType;
 use kinetoscope::sim::inspect::{InspectCfg, RobotReport, inspect};
-use launcher::still::LiveViewFlags;
+use launcher::live_view::LiveViewFlags;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -27,7 +27,7 @@ use kinetoscope::sim::RigidObjectId;
 use launcher::motion::MotionPlayer;
 use launcher::panel::{self, CameraChannels};
 use launcher::trial::{self, ImageSeries, TrialResults};
-use launcher::{Launcher, MainLoop, grip, picture};
+use launcher::{Launcher, MainLoop, grip, image_file};
 use nalgebra::{Point3, Vector3};
 use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -278,7 +278,7 @@ impl CubeDetector {
     fn write_image(&self, sim: &SimulationManager, out: &Option<std::path::PathBuf>, look: usize) -> launcher::Result {
         let Some(out) = out else { return Ok(()) };
         let views = CameraChannels::of(sim.sensor(self.camera)?, 0)?;
-        picture::write_png(&out.join(format!("visual_servo_camera_{look}.png")), &panel::grid(&views))
+        image_file::write_png(&out.join(format!("visual_servo_camera_{look}.png")), &panel::grid(&views))
     }
 }
 

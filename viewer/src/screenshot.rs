@@ -254,7 +254,7 @@ mod tests {
             ("taken.png", "File", ""),
         ];
         let rows = rows.map(|(name, kind, part)| (name, sim.screenshot(folder.path().join(name)), kind, [part]));
-        kinetoscope_testkit::refusal::assert_errors(rows);
+        kinetoscope_testkit::error_tables::assert_errors(rows);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }
