@@ -353,7 +353,7 @@ fn packages() {
     assert_eq!(run(&[&file]).code, 2);
     assert_eq!(run(&[&file, "--package", &format!("pkg={}", elsewhere.display())]).code, 0);
     let wrong = run(&[&file, "--package", "pkg=no_such_folder"]);
-    assert!(wrong.code == 2 && wrong.err.contains("no_such_folder is no folder"), "{}", wrong.err);
+    assert!(wrong.code == 2 && wrong.err.contains("no_such_folder is not a folder"), "{}", wrong.err);
 }
 
 #[test]
@@ -369,7 +369,7 @@ fn refusals() {
         (vec![SR5, "--no-such-flag"], "--no-such-flag"),
         (vec![SR5, "--package", "x"], "NAME=DIR"),
         (vec![SR5, "--qpos", "JOINT1"], "NAME=VALUE"),
-        (vec![SR5, "--qpos", "JOINT1=one"], "\"one\" is no number"),
+        (vec![SR5, "--qpos", "JOINT1=one"], "\"one\" is not a number (rad or m)"),
         (vec![SR5, "--qpos", "JOINT1=nan"], "not finite"),
         (vec![SR5, "--qpos", "JOINT1=1,JOINT1=2"], "two positions"),
         (vec![SR5, "--qpos", "joint2=1"], "there is no joint \"joint2\"; candidates: \"JOINT2\""),
@@ -443,7 +443,7 @@ fn mjcf_file() {
     assert!((json["total_mass"].as_f64().unwrap() - 52.135).abs() < 1e-3);
     assert_eq!(json["columns"].as_array().unwrap().len(), 6 + 12);
     for (args, says) in [
-        (vec![file.as_str(), SR5], "stands alone"),
+        (vec![file.as_str(), SR5], "an MJCF file cannot be combined with other files"),
         (vec!["no_such_file.xml"], "no_such_file.xml"),
         (vec![file.as_str(), "--package", "mine=."], "--package mine"),
         (vec![&folder.write("torn.xml", "<mujoco><worldbody>"), "--floating-base"], "torn.xml"),
