@@ -50,7 +50,7 @@ pub(crate) struct Args {
 const HELP: &str = "\
 Examples:
   kinetoscope replay run.mcap                     in a window; --serve: in a browser
-  kinetoscope replay run.mcap --out pictures --at 0,1.5,3
+  kinetoscope replay run.mcap --out images --at 0,1.5,3
   kinetoscope replay run.mcap --verify --scene scene.toml
 
 Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 shown or drawn, with warnings (something of the
