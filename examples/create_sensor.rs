@@ -80,7 +80,9 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> launcher::Result {
     let renderer = match (args.enable_rt, args.launcher.renderer) {
         (true, Renderer::Raster) => {
-            return Err("--enable-rt asks for rays: use it with --renderer rt, fast-rt or hybrid, or without".into());
+            return Err(
+                "--enable-rt traces rays: use it with --renderer rt, fast-rt or hybrid, or without --renderer".into()
+            );
         }
         (true, Renderer::Auto) => Renderer::Rt,
         (_, renderer) => renderer,
@@ -177,7 +179,7 @@ fn run(args: &Args) -> launcher::Result {
         sim.cfg().num_threads()
     );
     println!(
-        "{step} steps x {} environments, pictures included: {rate:.0} environment steps per second\n",
+        "{step} steps x {} environments, rendering included: {rate:.0} environment steps per second\n",
         sim.num_envs()
     );
     recording.finish(&mut sim)?;

@@ -102,7 +102,7 @@ fn run(args: &Args) -> launcher::Result {
     }
     let all = out.join("lenses.png");
     image_file::write_png(&all, &tile(&pictures))?;
-    println!("{} pictures, side by side in {}", pictures.len(), all.display());
+    println!("{} images, side by side in {}", pictures.len(), all.display());
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),

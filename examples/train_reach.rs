@@ -142,7 +142,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     if let Some(out) = &args.launcher.out {
         write_curve(&rows, out)?;
         render_final_poses(&mut env, &policy, test_seed, &out.join("train_reach_all.png"))?;
-        println!("Curve and picture written to {}", out.display());
+        println!("Curve and image written to {}", out.display());
     }
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),

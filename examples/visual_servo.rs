@@ -86,7 +86,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result<bool> {
     if !args.miscalibrated.is_finite() {
-        return Err(format!("--miscalibrated {}: it must be a distance in metres", args.miscalibrated).into());
+        return Err(format!("--miscalibrated {}: it must be a distance in meters", args.miscalibrated).into());
     }
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 0.005,
@@ -213,7 +213,7 @@ fn mask_id(sim: &SimulationManager, name: &str) -> launcher::Result<i32> {
         .mask_ids()
         .iter()
         .find(|id| id.object == name)
-        .ok_or(format!("nothing is called {name:?} in masks"))?;
+        .ok_or(format!("no entity of the masks is called {name:?}"))?;
     Ok(id.id)
 }
 
