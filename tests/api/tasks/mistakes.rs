@@ -149,7 +149,7 @@ fn terms_in_steps() {
                 let EnvError::NotFinite { env: 0, column, .. } = &error else { panic!("{error}") };
                 assert!(!good && column == "x", "{error}");
                 env.reset(None, None).unwrap();
-                assert!(env.step(&actions).is_ok(), "goes on after a reset");
+                assert!(env.step(&actions).is_ok(), "continues after a reset");
             }
         }
     }

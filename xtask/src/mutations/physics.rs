@@ -5,7 +5,7 @@ use super::Mutation;
 pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
-        "inertia turned the wrong way",
+        "inertia rotated the wrong way",
         "robot/src/inertia.rs",
         [
             "inertia: rotation.matrix() * self.inertia * rotation.matrix().transpose(),",
@@ -22,7 +22,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     ),
     Mutation::of(
         "physics",
-        "centre of mass of fused links not moved",
+        "center of mass of fused links not moved",
         "robot/src/inertia.rs",
         ["com: self.com + d * (other.mass / mass),", "com: self.com + d * (0.5 * other.mass / mass),"],
         &["parallel_axis", "gravity_torques"],
@@ -100,7 +100,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     ),
     Mutation::of(
         "physics",
-        "velocity at a point with the arm of the wrong sign",
+        "velocity at a point with the wrong sign of the lever arm",
         "sim/src/capture/motion.rs",
         [
             "vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body)))",
@@ -111,15 +111,15 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation {
         name: "no centripetal acceleration",
         file: "sim/src/capture/motion.rs",
-        search: "let acceleration = spatial + turning.cross(&velocity) + gravity;",
+        search: "let acceleration = spatial + angular.cross(&velocity) + gravity;",
         replacement: "let acceleration = spatial + gravity;",
         tests: ("api", &["sensors::imu"]),
     },
     Mutation {
         name: "wrench of a joint about another point",
         file: "sim/src/capture/motion.rs",
-        search: "let torque = vector(data.cfrc_int(), 6 * body) + arm.cross(&force);",
-        replacement: "let torque = vector(data.cfrc_int(), 6 * body) - arm.cross(&force);",
+        search: "let torque = vector_at(data.cfrc_int(), 6 * body) + arm.cross(&force);",
+        replacement: "let torque = vector_at(data.cfrc_int(), 6 * body) - arm.cross(&force);",
         tests: ("api", &["sensors::wrench"]),
     },
     Mutation {
@@ -251,7 +251,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     ),
     Mutation::of(
         "physics",
-        "velocity of the centre of mass with the arm of the wrong sign",
+        "velocity of the center of mass with the wrong sign of the lever arm",
         "sim/src/objects/robot_state.rs",
         ["body_pose(data, body).translation.vector - com", "com - body_pose(data, body).translation.vector"],
         &["tumbling_projectile"],
