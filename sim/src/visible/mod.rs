@@ -31,7 +31,7 @@ use crate::body_pose::BodyFrame;
 use crate::light_cfg::LightCfg;
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::GroundCfg;
-use kinetoscope_mujoco::{Data, Model, ObjectKind};
+use kinetoscope_mujoco::{Data, Model, ObjectKind, mjcf_keywords};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::shape::Shape;
@@ -106,6 +106,15 @@ fn element_poses(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
         Anchor::Site(site) => (sites.0[site], sites.1[site]),
         Anchor::World => ([0.0; 3], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
     }
+}
+
+/// Messages about actuators with a slider-crank, whose rods only MuJoCo's viewers draw.
+fn slider_cranks(model: &Model) -> impl Iterator<Item = String> + '_ {
+    let cranks = |kind: &i32| mjcf_keywords::transmission(*kind) == Some("cranksite");
+    model.actuator_trntype().iter().enumerate().filter(move |(_, kind)| cranks(kind)).map(|(actuator, _)| {
+        let name = model.name(ObjectKind::Actuator, actuator).unwrap_or_else(|| actuator.to_string());
+        format!("the rods of the slider-crank of actuator {name} are not rendered")
+    })
 }
 
 impl VisualScene {
@@ -213,6 +222,7 @@ impl VisualScene {
             RenderScene::empty()
         });
         left_out.extend(lighting::set_lighting(model, look, &mut scene));
+        left_out.extend(slider_cranks(model));
         Self {
             scene: Arc::new(scene),
             anchors,
@@ -286,8 +296,8 @@ impl VisualScene {
         &self.ids
     }
 
-    /// Messages about elements that are not rendered: textures or meshes that cannot be read, and signed distance
-    /// fields, which cameras do not support.
+    /// Messages about elements that are not rendered: textures or meshes that cannot be read, and what cameras do not
+    /// support: signed distance fields and the rods of slider-cranks.
     pub fn omitted(&self) -> &[String] {
         &self.left_out
     }

@@ -69,6 +69,24 @@ const PATHS: &str = r#"<mujoco><compiler autolimits="true"/><worldbody>
     <spatial name="string" width="0.005" range="0 2"><site site="right"/><site site="ball"/></spatial>
     <fixed name="sum"><joint joint="lift" coef="1"/></fixed></tendon></mujoco>"#;
 
+/// The rods of a slider-crank are not rendered: a message names the actuator. Control: the same model with a motor at the
+/// joint.
+///
+/// Root cause once: rods were missing from images without a message.
+#[test]
+fn slider_crank() {
+    let model = |actuator: &str| {
+        let mjcf = format!(
+            r#"<mujoco><worldbody><site name="slider"/><body pos="0 0 1"><joint name="turn"/><geom size="0.1"/>
+               <site name="crank" pos="0.1 0 0"/></body></worldbody><actuator>{actuator}</actuator></mujoco>"#
+        );
+        VisualScene::of_model(&mj::compile(&mjcf, &[]).expect("compiles").into_model())
+    };
+    let rods = model(r#"<general name="piston" cranksite="crank" slidersite="slider" cranklength="1"/>"#);
+    assert_eq!(rods.omitted(), ["the rods of the slider-crank of actuator piston are not rendered"]);
+    assert_eq!(model(r#"<motor joint="turn"/>"#).omitted(), [""; 0]);
+}
+
 /// A tendon around a cylinder touches it at tangent points: at 60 degrees from the axis to a point two radii away.
 /// Between these points it is half as wide. A pulley has no segment. Tendons of group 3, transparent tendons and sums
 /// of joint positions are not rendered. A taut string is straight.
