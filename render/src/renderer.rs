@@ -260,7 +260,7 @@ mod tests {
             assert_eq!(read(&text).unwrap(), renderer, "{text}");
         }
         for (text, said) in [
-            ("renderer = 'fast_raytraced'", "there is no renderer \"fast_raytraced\"; known are \"fast_ray_traced\""),
+            ("renderer = 'fast_raytraced'", "unknown renderer \"fast_raytraced\"; known names: \"fast_ray_traced\""),
             ("renderer.ray_traced.sample = 3", "unknown field `sample`"),
             ("renderer.ray_traced.samples = -3", "invalid value: integer `-3`"),
             ("renderer.hybrid = {}", "renderer \"hybrid\" has no numbers: its name is enough"),

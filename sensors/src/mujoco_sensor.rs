@@ -286,7 +286,7 @@ mod tests {
         // A state of another scene.
         let mut sensor = MujocoSensorCfg::default().build(&context()).unwrap();
         let short = SceneState { sensordata: Some(Array2::zeros((2, 10))), ..SceneState::new(2) };
-        assert!(sensor.update(&short).unwrap_err().to_string().contains("values of the engine's sensors"));
+        assert!(sensor.update(&short).unwrap_err().to_string().contains("values of MuJoCo sensors"));
         assert!(sensor.update(&SceneState::new(2)).unwrap_err().to_string().contains("sensordata"));
     }
 }

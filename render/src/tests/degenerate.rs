@@ -74,7 +74,7 @@ fn invalid_scenes() {
     let with = |shape: Shape, id| RenderScene::new(vec![Instance::new(shape, Material::default(), id)]);
     assert!(matches!(with(Sphere { radius: 1.0 }.into(), 0), Err(RenderSceneError::ZeroMaskId { instance: 0 })));
     let error = with(Box { half: [1., 0., 1.] }.into(), 1).unwrap_err();
-    assert_eq!(error.to_string(), "instance 0, a box, has a size of 0; sizes are positive and finite");
+    assert_eq!(error.to_string(), "instance 0, a box, has a size of 0; sizes must be positive and finite");
 }
 
 #[test]

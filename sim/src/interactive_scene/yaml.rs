@@ -110,7 +110,7 @@ mod tests {
             ("a: 1\nb: ~\n", 2, "nothing is said here"),
             ("- 1\n", 1, "not a list"),
             ("word\n", 1, "no table"),
-            ("a: !cup 5\n", 1, "the tag !cup is not for scene files"),
+            ("a: !cup 5\n", 1, "scene files do not support the tag !cup"),
         ] {
             let read = |root: Option<Node>| table(root.as_ref()).map(|_| ());
             let error = parse(yaml, &DIALECT).and_then(read).unwrap_err();

@@ -274,7 +274,9 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
         let body = model.site_bodyid()[site] as usize;
         let mut name = names.sites[site].clone();
         while frames.iter().any(|frame| frame.name.strip_prefix(uid).is_some_and(|rest| rest[1..] == *name)) {
-            let message = format!("part {uid:?}: the site {name:?} is called as a body; its frame is \"{name}.site\"");
+            let message = format!(
+                "MJCF part {uid:?}: the site {name:?} has the same name as a body; its frame is named \"{name}.site\""
+            );
             diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, None, message));
             name.push_str(".site");
         }

@@ -162,7 +162,7 @@ impl VisualScene {
                     Ok(shape) => vec![VisualPart { shape, material: surfaces.of_geom(geom) }],
                     Err(reason) => {
                         let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| geom.to_string());
-                        left_out.push(format!("geom {name} is not drawn: {reason}"));
+                        left_out.push(format!("geom {name} is not rendered: {reason}"));
                         Vec::new()
                     }
                 },
@@ -188,7 +188,7 @@ impl VisualScene {
                     frame_from_instance,
                 };
                 if let Err(reason) = instance.validate() {
-                    left_out.push(format!("geom {geom} is not drawn: {reason}"));
+                    left_out.push(format!("geom {geom} is not rendered: {reason}"));
                     continue;
                 }
                 instances.push(instance);
@@ -201,14 +201,14 @@ impl VisualScene {
             let like = Instance { body, ..Instance::new(Plane { half: [1.0; 2] }, Material::default(), mask_id) };
             let like = Instance { name: Arc::clone(name), ..like };
             if let Err(reason) = deforming.add(model, &surfaces, drawable, &like, &mut instances) {
-                left_out.push(format!("{} {name} is not drawn: {reason}", drawable.class()));
+                left_out.push(format!("{} {name} is not rendered: {reason}", drawable.class()));
             }
             anchors.resize(instances.len(), Anchor::World);
         }
         for (site, identity) in identities.sites() {
             let Some(instance) = geom::of_site(model, site, identity, surfaces.of_site(site)) else { continue };
             if let Err(reason) = instance.validate() {
-                left_out.push(format!("site {site} is not drawn: {reason}"));
+                left_out.push(format!("site {site} is not rendered: {reason}"));
                 continue;
             }
             instances.push(instance);
@@ -216,7 +216,7 @@ impl VisualScene {
         }
         // Every instance was checked, but the triangles may still be too many for 31 bits.
         let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
-            left_out.push(format!("nothing is drawn: {error}"));
+            left_out.push(format!("the scene is not rendered: {error}"));
             anchors.clear();
             deforming = DeformingInstances::default();
             RenderScene::empty()

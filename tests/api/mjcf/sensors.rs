@@ -258,7 +258,7 @@ fn sites() {
     let mut sim = empty(2);
     let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.1, 0.2, -0.4]);
     let part = sim.add_mjcf(MjcfPartCfg { init_pose, ..MjcfPartCfg::text("m", MACHINE) }).unwrap();
-    assert!(count_diagnostics(&sim, &["the site \"plate\" is called as a body"]) > 0);
+    assert!(count_diagnostics(&sim, &["the site \"plate\" has the same name as a body"]) > 0);
     let targets = SITES.iter().map(|site| TargetFrameCfg::for_bodies(format!("m/{site}"))).collect();
     let frames = sim.add_sensor("frames", FrameTransformerCfg::new("m/elbow", targets)).unwrap();
     let extrinsics = Extrinsics { parent: Some("m/palm".into()), ..Default::default() };

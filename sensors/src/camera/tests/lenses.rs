@@ -60,7 +60,7 @@ fn files() {
         assert_eq!(toml::from_str::<CameraCfg>(&text).unwrap(), cfg, "{text}");
     }
     for (text, said) in [
-        ("lens = 'equidistent'", "there is no lens \"equidistent\"; known are \"equidistant\""),
+        ("lens = 'equidistent'", "unknown lens \"equidistent\"; known names: \"equidistant\""),
         ("lens.opencv.k7 = 1.0", "unknown field `k7`"),
         ("lens = {}", "a lens is a table with its name"),
         ("lens = { opencv = {}, pinhole = {} }", "one lens only"),

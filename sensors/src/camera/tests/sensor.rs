@@ -192,7 +192,7 @@ fn channel_names() {
     assert_eq!(Channels::from_names(&owned).unwrap().names(), ["color", "mask"]);
     assert_eq!(Channels::from_names::<&str>(&[]).unwrap(), Channels::default());
     let error = Channels::from_names(&["depth", "distance_to_image"]).unwrap_err().to_string();
-    assert!(error.starts_with("there is no channel \"distance_to_image\"; known are \"distance_to_"), "{error}");
+    assert!(error.starts_with("unknown channel \"distance_to_image\"; known names: \"distance_to_"), "{error}");
     assert!(Channels::from_names(&["RGB"]).unwrap_err().to_string().contains("\"rgb\""));
     assert_eq!(Channels::ALL.bytes_per_pixel(), 4 + 4 + 4 + 4 + 12 + 12 + 12 + 4 + 8);
 }
