@@ -16,11 +16,11 @@ mod view;
 #[path = "../../src/excerpt.rs"]
 mod excerpt;
 #[allow(dead_code, reason = "only its tests are run")]
-#[path = "../../src/file_kind.rs"]
-mod file_kind;
-#[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/field_names.rs"]
 mod field_names;
+#[allow(dead_code, reason = "only its tests are run")]
+#[path = "../../src/file_kind.rs"]
+mod file_kind;
 #[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/progress.rs"]
 mod progress;
