@@ -100,7 +100,7 @@ fn left_out_sensors() {
     }
     assert_ne!(sensor.value("first/angle").unwrap(), sensor.value("second/angle").unwrap(), "the control");
     let named = MujocoSensorCfg { sensors: Some(vec!["first/all".into()]), ..Default::default() };
-    assert_error(sim.add_sensor("none", named), "", &["no MuJoCo sensor \"first/all\"; known are \"first/"]);
+    assert_error(sim.add_sensor("none", named), "", &["unknown MuJoCo sensor \"first/all\"; known names: \"first/"]);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn unique_names() {
     }
     let object = RigidObjectCfg { uid: "m".into(), ..Default::default() };
     assert_error(sim.add_rigid_object(object), "DuplicateUid", &[]);
-    assert_error(sim.entities().mjcf_id("n"), "", &["known are \"m\""]);
+    assert_error(sim.entities().mjcf_id("n"), "", &["known names: \"m\""]);
 }
 
 /// Elements of 4.x that cannot be written back are refused by name, never left out; unsupported sensors are left out.

@@ -314,5 +314,5 @@ fn welded_frames() {
     }
     sim.add_sensor("w", wrench("m/arm")).unwrap();
     let unknown = FrameTransformerCfg::new("m/elbwo", vec![]);
-    assert_error(sim.add_sensor("f", unknown), "", &["known are \"m/elbow\""]);
+    assert_error(sim.add_sensor("f", unknown), "", &["known names: \"m/elbow\""]);
 }

@@ -176,7 +176,7 @@ fn in_building() {
             "1: entity ",
             "[entities.eye]\ntype = \"camera\"\nextrinsics.parent = \"bal\"\n[entities.ball]\ntype = \"rigid_object\""
                 .into(),
-            "\"eye\"|\"bal\"|known are \"ball\"",
+            "\"eye\"|\"bal\"|known names: \"ball\"",
         ),
         (
             "4: entity ",
