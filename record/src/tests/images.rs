@@ -107,7 +107,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
         "gif" => {
             let known: std::collections::BTreeSet<_> = pixels.iter().collect();
             assert!(known.len() <= 256, "{} colors", known.len());
-            assert_eq!(bytes("rgb"), color, "so many are a palette");
+            assert_eq!(bytes("rgb"), color, "as many colors as fit into a palette are exact");
         }
         "mp4" => {
             // ITU-R BT.709, 8 bits, limited range: half of rounding, and the error of constants with 16 bits.

@@ -1,10 +1,10 @@
-"""Says as JSON what frames an animation has: their times in milliseconds and their bytes. Read by Pillow, or by PyAV."""
+"""Prints the frames of an animation as JSON: times in milliseconds, and pixels. Read by Pillow or PyAV."""
 
 import sys
 
 import av
 from PIL import Image, ImageSequence
-from told import tell
+from reader_output import print_json
 
 
 def pillow(path):
@@ -60,4 +60,4 @@ def ffmpeg(path):
 
 
 path = sys.argv[1]
-tell({"frames": ffmpeg(path) if path.endswith(".mp4") else pillow(path)})
+print_json({"frames": ffmpeg(path) if path.endswith(".mp4") else pillow(path)})

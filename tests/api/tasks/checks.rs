@@ -146,7 +146,7 @@ fn broken_tasks() {
             |f| matches!(f, Finding::ActionClamping(apart) if apart.what == "reward"),
             "beyond their bounds",
         ),
-        (Fault::NeverRestarts, |f| matches!(f, Finding::NoAutoReset { .. }), "no other began"),
+        (Fault::NeverRestarts, |f| matches!(f, Finding::NoAutoReset { .. }), "no new one began"),
         (Fault::WrongFinalObservations, |f| matches!(f, Finding::FinalObservation { .. }), "final_observations"),
         (Fault::NanReward, |f| matches!(f, Finding::Reward { env: 2, value, .. } if value.is_nan()), "reward"),
         (Fault::StepFails, |f| matches!(f, Finding::UnexpectedError { what, .. } if what == "step 4"), "step 4"),
