@@ -15,7 +15,7 @@ fn good_tasks() {
     let found = check(&mut Carts::new(3, 1.0, 20), 7);
     assert!(found.iter().all(is_accepted) && found.len() == 2, "{found:?}");
     let messages: Vec<String> = found.iter().map(ToString::to_string).collect();
-    assert!(messages[0].contains("a column too many") && messages[1].contains("no number"), "{messages:?}");
+    assert!(messages[0].contains("one column too many") && messages[1].contains("a NaN action"), "{messages:?}");
 }
 
 /// Faults of an environment that the check must detect.
