@@ -208,7 +208,7 @@ fn more_than_thirty_robots() {
     }
     assert!(sim.diverged().is_empty());
     let message = sim.entities().robot_id("r99").unwrap_err().to_string();
-    assert!(message.contains("no robot \"r99\"") && message.contains("\"r0\""), "{message}");
+    assert!(message.contains("unknown robot \"r99\"") && message.contains("\"r0\""), "{message}");
 }
 
 #[test]

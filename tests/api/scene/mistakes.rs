@@ -141,7 +141,7 @@ fn values() {
         // Numbers out of range, and dates.
         (2, "[simulation]\nphysics_dt = 1e999", "1e999|out of range"),
         (2, "[simulation]\nseed = 99999999999999999999", "99999999999999999999|out of range"),
-        (2, "[simulation]\nphysics_dt = 2026-01-01", "2026-01-01|nowhere"),
+        (2, "[simulation]\nphysics_dt = 2026-01-01", "2026-01-01|unexpected date"),
     ];
     assert_rows("dir/scene.toml", toml, rows);
 }
