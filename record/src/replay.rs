@@ -135,7 +135,9 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Rep
     }
     for source in states.iter().chain(&targets) {
         if archive.steps(&source.stream.name)? != steps {
-            return Err(archive.malformed(format!("{} has other rows than the rest", source.stream.name)));
+            return Err(
+                archive.malformed(format!("the rows of {} differ from those of the other streams", source.stream.name))
+            );
         }
         archive.check(source, steps.len())?;
     }

@@ -43,7 +43,7 @@ enum Content {
 pub struct RecordedTopic {
     /// Name, such as `/env_0/arm/joint_states`, for archives too.
     pub name: String,
-    /// Message type, or `numbers` or `pictures` for an archive.
+    /// Message type, or `numbers` or `images` for an archive.
     pub kind: String,
     /// Number of messages or rows.
     pub count: u64,

@@ -73,7 +73,7 @@ pub(super) fn topics(archive: &RecordedArrays) -> Result<Vec<RecordedTopic>> {
             count.ok_or_else(|| archive.malformed(format!("the array {}/step is missing", stream.name)))? as u64;
         let fields: Vec<String> = stream.parts.iter().flat_map(|part| part.fields.iter().cloned()).collect();
         for env in &stream.env_ids {
-            let kind = if fields.is_empty() { "pictures" } else { "numbers" };
+            let kind = if fields.is_empty() { "images" } else { "numbers" };
             let name = format!("/env_{env}/{}", stream.name);
             topics.push(RecordedTopic { name, kind: kind.into(), count, fields: fields.clone() });
         }
