@@ -53,7 +53,7 @@ fn bad_files() {
     }
     for text in ["", "no xml", "<mujoco><asset><mesh file=\"none.obj\"/></asset></mujoco>"] {
         let reported = refused(MjcfPartCfg::text("part", text));
-        assert!(reported.contains("MJCF part \"part\": text: MuJoCo refuses"), "{reported}");
+        assert!(reported.contains("part \"part\": text: MuJoCo refuses"), "{reported}");
     }
 }
 
