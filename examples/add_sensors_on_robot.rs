@@ -110,7 +110,7 @@ fn run(args: &Args) -> launcher::Result {
     if let Some(out) = &args.launcher.out {
         launcher::make_folder(out)?;
         write_images(&mut scene, out)?;
-        println!("Pictures written to {}", out.display());
+        println!("Images written to {}", out.display());
     }
     recording.finish(scene.sim_mut())?;
     args.launcher.write_report(&report(&scene, &totals, &heights, (step, dt, rate))?)?;

@@ -17,7 +17,7 @@ use kinetoscope::sensors::camera::{Camera, CameraConvention, SegmentLevel, Segme
 use launcher::arm::ArmWithHand;
 use launcher::panel::{self, CameraChannels, grid, tile};
 use launcher::views::SensorWindow;
-use launcher::{Launcher, MainLoop, PathFlags, Renderer, StopRequest, picture, waiting};
+use launcher::{Launcher, MainLoop, PathFlags, Renderer, StopRequest, image_file, render_progress};
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -80,7 +80,9 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> launcher::Result {
     let renderer = match (args.enable_rt, args.launcher.renderer) {
         (true, Renderer::Raster) => {
-            return Err("--enable-rt asks for rays: use it with --renderer rt, fast-rt or hybrid, or without".into());
+            return Err(
+                "--enable-rt traces rays: use it with --renderer rt, fast-rt or hybrid, or without --renderer".into()
+            );
         }
         (true, Renderer::Auto) => Renderer::Rt,
         (_, renderer) => renderer,
@@ -177,7 +179,7 @@ fn run(args: &Args) -> launcher::Result {
         sim.cfg().num_threads()
     );
     println!(
-        "{step} steps x {} environments, pictures included: {rate:.0} environment steps per second\n",
+        "{step} steps x {} environments, rendering included: {rate:.0} environment steps per second\n",
         sim.num_envs()
     );
     recording.finish(&mut sim)?;
@@ -276,7 +278,8 @@ impl ImageWriter {
                 window.announce(&format!("Ray tracing: {:.0} %", 100.0 * share));
             }
         };
-        match waiting::render_with_progress(camera.progress(), None, on_update, || camera.images().map(|_| ())) {
+        match render_progress::render_with_progress(camera.progress(), None, on_update, || camera.images().map(|_| ()))
+        {
             Err(_) if self.end.is_set() => return Ok(false),
             drawn => drawn?,
         }
@@ -298,7 +301,7 @@ impl ImageWriter {
                     grid(&CameraChannels { mask: &mask, ..views })
                 }
             });
-            let depth = picture::finite_range(views.depth.iter().copied());
+            let depth = image_file::finite_range(views.depth.iter().copied());
             let mut ids: Vec<i32> = views.mask.to_vec();
             ids.sort_unstable();
             ids.dedup();
@@ -314,12 +317,12 @@ impl ImageWriter {
         }
         let image = tile(&panels);
         if let (Some(out), Some(name)) = (&self.out, &name) {
-            picture::write_png(&out.join(name), &image)?;
+            image_file::write_png(&out.join(name), &image)?;
             if self.raw {
                 let file = |channel: &str| out.join(format!("{channel}_{step}.npy"));
-                picture::write_npy(&file("depth"), &camera.depth()?)?;
-                picture::write_npy(&file("mask"), &camera.mask()?)?;
-                picture::write_npy(&file("normal"), &camera.normal()?)?;
+                image_file::write_npy(&file("depth"), &camera.depth()?)?;
+                image_file::write_npy(&file("mask"), &camera.mask()?)?;
+                image_file::write_npy(&file("normal"), &camera.normal()?)?;
             }
         }
         if let Some(window) = &mut self.window {

@@ -17,7 +17,7 @@ use kinetoscope::render::lens::{
 };
 use kinetoscope::sensors::camera::{Camera, CameraInfo, PointFrame};
 use launcher::panel::tile;
-use launcher::{Launcher, MainLoop, PathFlags, Renderer, picture};
+use launcher::{Launcher, MainLoop, PathFlags, Renderer, image_file};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -101,8 +101,8 @@ fn run(args: &Args) -> launcher::Result {
         lenses.push(report);
     }
     let all = out.join("lenses.png");
-    picture::write_png(&all, &tile(&pictures))?;
-    println!("{} pictures, side by side in {}", pictures.len(), all.display());
+    image_file::write_png(&all, &tile(&pictures))?;
+    println!("{} images, side by side in {}", pictures.len(), all.display());
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
@@ -225,12 +225,12 @@ fn write_images(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(im
     let color: Vec<u8> = camera.color()?.index_axis(Axis(0), 0).iter().copied().collect();
     let seconds = start.elapsed().as_secs_f64();
     let size = [width, height];
-    let picture = picture::color_image(size, &color);
+    let picture = image_file::color_image(size, &color);
     let mut files = vec![format!("{name}.png"), format!("{name}_distance.png")];
-    picture::write_png(&out.join(&files[0]), &picture)?;
+    image_file::write_png(&out.join(&files[0]), &picture)?;
     let distance: Vec<f32> = camera.distance()?.index_axis(Axis(0), 0).iter().copied().collect();
-    let range = picture::finite_range(distance.iter().copied()).unwrap_or([0.0, 1.0]);
-    picture::write_png(&out.join(&files[1]), &picture::depth_image(size, &distance, range))?;
+    let range = image_file::finite_range(distance.iter().copied()).unwrap_or([0.0, 1.0]);
+    image_file::write_png(&out.join(&files[1]), &image_file::depth_image(size, &distance, range))?;
     if let Ok(info) = camera.camera_info(name, 0) {
         files.push(format!("{name}.yaml"));
         info.write(&out.join(format!("{name}.yaml")))?;

@@ -7,7 +7,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::urdf::Strictness;
 use kinetoscope::sim::DriveType;
 use kinetoscope::sim::inspect::{InspectCfg, RobotReport, inspect};
-use launcher::still::LiveViewFlags;
+use launcher::live_view::LiveViewFlags;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -48,11 +48,11 @@ struct Args {
 
 const HELP: &str = "\
 Several files: two are the components `arm` and `hand`, more are `part1`, `part2` and so on; fixed joints such as
-`arm_TO_hand_CONNECTOR` hang each from the tip of the one before. A relative FILE that does not exist is looked for
-among the assets of this crate. MuJoCo compiles an MJCF file; what it made of it is reported.
+`arm_TO_hand_CONNECTOR` attach each component to the tip of the previous one. A relative FILE that does not exist is
+looked up in the assets of this crate. MuJoCo compiles an MJCF file; the compiled model is reported.
 
 JSON: SI units, quaternions w x y z, gravity (0, 0, -9.81). `links` and `joints` have fixed ones too; `pose` is
-x y z qw qx qy qz in the world; `com` of a link is in its frame, `inertia` about the centre of mass in link axes, `axis` in
+x y z qw qx qy qz in the world; `com` of a link is in its frame, `inertia` about the center of mass in link axes, `axis` in
 the frame of the joint. `mass_matrix` and `gravity_torque` have one row per joint of `joint_names`; `columns` names all rows,
 with --floating-base first base.vx .. base.wz (velocity of the root in world axes, angular velocity in its own axes),
 and last those of floating and planar joints. An MJCF file's armature is in `mass_matrix`. null where there is no value.
@@ -136,7 +136,10 @@ fn cfg(args: &Args) -> Result<InspectCfg, String> {
     let (floating_base, qpos) = (args.floating_base, args.qpos.clone());
     if let Some(mjcf) = files.iter().find(|file| is_mjcf(file)) {
         if files.len() > 1 {
-            return Err(format!("{} is a whole robot: an MJCF file stands alone", mjcf.display()));
+            return Err(format!(
+                "{} is a complete robot: an MJCF file cannot be combined with other files",
+                mjcf.display()
+            ));
         }
         if let Some((name, _)) = args.package.first() {
             let file = mjcf.display();
@@ -179,11 +182,11 @@ fn package(text: &str) -> Result<(String, PathBuf), String> {
 
 fn folder(text: &str) -> Result<PathBuf, String> {
     let folder = PathBuf::from(text);
-    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is no folder")) }
+    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is not a folder")) }
 }
 
 fn position(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.rsplit_once('=').ok_or("write NAME=VALUE,NAME=VALUE, such as joint1=0.5,joint2=-1")?;
-    let value = value.trim().parse().map_err(|_| format!("{value:?} is no number of radians or metres"))?;
+    let value = value.trim().parse().map_err(|_| format!("{value:?} is not a number (rad or m)"))?;
     Ok((name.trim().to_owned(), value))
 }

@@ -16,8 +16,8 @@ use kinetoscope::scene::PoseF32;
 use kinetoscope::scene::pose::to_row;
 use kinetoscope::sensors::camera::{CameraConvention, look_at_pose};
 use kinetoscope::sim::OffscreenScene;
-use launcher::still::LiveViewFlags;
-use launcher::{PathFlags, Renderer, picture, waiting};
+use launcher::live_view::LiveViewFlags;
+use launcher::{PathFlags, Renderer, image_file, render_progress};
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -148,7 +148,7 @@ fn run(args: &Args) -> launcher::Result {
         args.time_limit.map(Duration::try_from_secs_f64).transpose().map_err(|e| format!("--time-limit: {e}"))?;
     let (start, mut images) = (Instant::now(), 0u32);
     let progress = rasterizer.progress().clone();
-    waiting::render_with_progress(
+    render_progress::render_with_progress(
         &progress,
         limit,
         |_| (),
@@ -171,9 +171,9 @@ fn run(args: &Args) -> launcher::Result {
         rasterizer.set_renderer(Known::Raster);
         rasterizer.render(&mut [(still.render_request(&view), raster.as_mut())]).map_err(|(_, error)| error)?;
         let both = [&raster, &frame].map(|frame| frame.color.as_deref().unwrap_or_default());
-        picture::write_png(
+        image_file::write_png(
             &args.out.join(format!("raster-and-{}.png", args.renderer.name())),
-            &picture::side_by_side([view.width, view.height], both),
+            &image_file::side_by_side([view.width, view.height], both),
         )?;
     }
     let meta = json!({
@@ -266,18 +266,18 @@ fn write_images(args: &Args, view: &View, frame: &Frame) -> launcher::Result {
         return Err("a channel was not drawn".into());
     };
     let size = [view.width, view.height];
-    let range = picture::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
+    let range = image_file::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
     let file = |name: &str| args.out.join(name);
-    picture::write_png(&file("color.png"), &picture::color_image(size, color))?;
-    picture::write_png(&file("depth.png"), &picture::depth_image(size, depth, range))?;
-    picture::write_png(&file("mask.png"), &picture::mask_image(size, mask))?;
-    picture::write_png(&file("normal.png"), &picture::normal_image(size, normal))?;
+    image_file::write_png(&file("color.png"), &image_file::color_image(size, color))?;
+    image_file::write_png(&file("depth.png"), &image_file::depth_image(size, depth, range))?;
+    image_file::write_png(&file("mask.png"), &image_file::mask_image(size, mask))?;
+    image_file::write_png(&file("normal.png"), &image_file::normal_image(size, normal))?;
     if args.raw {
         let (w, h) = (view.width, view.height);
-        picture::write_npy(&file("color.npy"), &ArrayView3::from_shape((h, w, 4), color)?)?;
-        picture::write_npy(&file("depth.npy"), &ArrayView2::from_shape((h, w), depth)?)?;
-        picture::write_npy(&file("mask.npy"), &ArrayView2::from_shape((h, w), mask)?)?;
-        picture::write_npy(&file("normal.npy"), &ArrayView3::from_shape((h, w, 3), normal)?)?;
+        image_file::write_npy(&file("color.npy"), &ArrayView3::from_shape((h, w, 4), color)?)?;
+        image_file::write_npy(&file("depth.npy"), &ArrayView2::from_shape((h, w), depth)?)?;
+        image_file::write_npy(&file("mask.npy"), &ArrayView2::from_shape((h, w), mask)?)?;
+        image_file::write_npy(&file("normal.npy"), &ArrayView3::from_shape((h, w, 3), normal)?)?;
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ use kinetoscope::scene::{KeyedRng, Marker};
 use kinetoscope::sensors::camera::colormap::mask_color;
 use kinetoscope::sensors::camera::{Camera, CameraConvention, PointFrame};
 use kinetoscope::sim::RigidObjectId;
-use launcher::{Launcher, MainLoop, cloud, picture, stage};
+use launcher::{Launcher, MainLoop, cloud, image_file, stage};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -236,24 +236,24 @@ fn save(
     let (class_of, numbers) = classes(sim);
     let class = |id: &i32| class_of.get(id).and_then(|class| numbers.get(class)).copied().unwrap_or(0);
     let semantic: Vec<i32> = mask.iter().map(class).collect();
-    let range = picture::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
+    let range = image_file::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
     let pictures = [
-        ("rgb", picture::color_image(size, &color)),
-        ("depth", picture::depth_image(size, &depth, range)),
-        ("normals", picture::normal_image(size, &normal)),
-        ("instance_segmentation", picture::mask_image(size, &mask)),
-        ("semantic_segmentation", picture::mask_image(size, &semantic)),
+        ("rgb", image_file::color_image(size, &color)),
+        ("depth", image_file::depth_image(size, &depth, range)),
+        ("normals", image_file::normal_image(size, &normal)),
+        ("instance_segmentation", image_file::mask_image(size, &mask)),
+        ("semantic_segmentation", image_file::mask_image(size, &semantic)),
     ];
     let mut files = Vec::new();
     for (name, picture) in &pictures {
         let file = format!("{name}_{env}_{step}.png");
-        picture::write_png(&out.join(&file), picture)?;
+        image_file::write_png(&out.join(&file), picture)?;
         files.push(file);
     }
     let depth_file = format!("depth_{env}_{step}.npy");
-    picture::write_npy(&out.join(&depth_file), &camera.depth()?.index_axis(Axis(0), env))?;
+    image_file::write_npy(&out.join(&depth_file), &camera.depth()?.index_axis(Axis(0), env))?;
     let mask_file = format!("instance_segmentation_{env}_{step}.npy");
-    picture::write_npy(&out.join(&mask_file), &camera.mask()?.index_axis(Axis(0), env))?;
+    image_file::write_npy(&out.join(&mask_file), &camera.mask()?.index_axis(Axis(0), env))?;
     files.extend([depth_file, mask_file]);
     Ok(files)
 }

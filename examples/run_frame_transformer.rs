@@ -92,7 +92,7 @@ fn run(args: &Args) -> launcher::Result {
         let reach = sim.cfg().env_origins().iter().fold(0.0, |far: f64, x| far.max(x.abs()));
         let eye = [1.3 + 1.6 * reach, 1.5 + 1.6 * reach, 1.0 + reach];
         stage::write(&mut sim, &markers, eye, [0.0, 0.0, 0.35], &file)?;
-        println!("Picture written to {}", file.display());
+        println!("Image written to {}", file.display());
     }
     recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({

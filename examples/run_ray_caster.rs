@@ -135,7 +135,7 @@ fn run(args: &Args) -> launcher::Result {
         let reach = origins.iter().fold(SIDE / 2.0, |far: f64, x| far.max(x.abs() + 1.5));
         let (markers, file) = (sim.scene().markers(), out.join("run_ray_caster.png"));
         stage::write(&mut sim, &markers, [1.3 * reach, 1.6 * reach, 1.2 * reach], [0.6, 0.7, -0.5], &file)?;
-        println!("Picture written to {}", file.display());
+        println!("Image written to {}", file.display());
     }
     recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({

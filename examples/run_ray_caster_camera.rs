@@ -12,7 +12,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::terrain::RoughTerrain;
 use kinetoscope::sensors::camera::{CameraConvention, PointFrame};
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCamera, RayCasterCameraCfg};
-use launcher::{Launcher, MainLoop, cloud, picture};
+use launcher::{Launcher, MainLoop, cloud, image_file};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -110,7 +110,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("\n{} points; they lie on the terrain to {worst:.1e} m, {} beside it", points.len(), beside.len());
     println!("Seen by the camera again, they are {error:.1e} pixels off at most");
     if args.save {
-        let range = picture::finite_range(points.iter().map(|p| p[2])).unwrap_or([0.0, 1.0]);
+        let range = image_file::finite_range(points.iter().map(|p| p[2])).unwrap_or([0.0, 1.0]);
         let colored: Vec<_> = points.iter().map(|p| (*p, gray(p[2], range))).collect();
         cloud::write_ply(&out.join("ray_caster_camera_points.ply"), &colored)?;
         files.push("ray_caster_camera_points.ply".into());
@@ -177,20 +177,20 @@ fn save(camera: &RayCasterCamera, env: usize, step: u64, out: &Path) -> launcher
     };
     let (depth, distance) = (of(camera.depth()), of(camera.distance()));
     let normal: Vec<f32> = camera.normal().index_axis(Axis(0), env).iter().copied().collect();
-    let range = |numbers: &[f32]| picture::finite_range(numbers.iter().copied()).unwrap_or([0.0, 1.0]);
+    let range = |numbers: &[f32]| image_file::finite_range(numbers.iter().copied()).unwrap_or([0.0, 1.0]);
     let pictures = [
-        ("distance_to_image_plane", picture::depth_image(size, &depth, range(&depth))),
-        ("distance_to_camera", picture::depth_image(size, &distance, range(&distance))),
-        ("normals", picture::normal_image(size, &normal)),
+        ("distance_to_image_plane", image_file::depth_image(size, &depth, range(&depth))),
+        ("distance_to_camera", image_file::depth_image(size, &distance, range(&distance))),
+        ("normals", image_file::normal_image(size, &normal)),
     ];
     let mut files = Vec::new();
     for (name, picture) in &pictures {
         let file = format!("{name}_{env}_{step}.png");
-        picture::write_png(&out.join(&file), picture)?;
+        image_file::write_png(&out.join(&file), picture)?;
         files.push(file);
     }
     let file = format!("distance_to_image_plane_{env}_{step}.npy");
-    picture::write_npy(&out.join(&file), &camera.depth().index_axis(Axis(0), env))?;
+    image_file::write_npy(&out.join(&file), &camera.depth().index_axis(Axis(0), env))?;
     files.push(file);
     Ok(files)
 }

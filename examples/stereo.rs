@@ -14,7 +14,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
 use kinetoscope::sensors::camera::colormap::depth_color;
 use kinetoscope::sensors::camera::{Camera, CameraConvention, StereoCamera, StereoCameraCfg};
-use launcher::{Launcher, MainLoop, PathFlags, cloud, picture};
+use launcher::{Launcher, MainLoop, PathFlags, cloud, image_file};
 use nalgebra::Point3;
 use serde_json::json;
 use std::process::ExitCode;
@@ -89,10 +89,13 @@ fn run(args: &Args) -> launcher::Result {
     let pair = StereoFrame::from_camera(stereo, args.camera_id)?;
     let size = [args.width, args.height];
     let files = ["stereo_left.png", "stereo_right.png", "stereo_disparity.png", "stereo_points.ply"];
-    let pictures =
-        [picture::color_image(size, &pair.left), picture::color_image(size, &pair.right), pair.disparity_image(size)];
+    let pictures = [
+        image_file::color_image(size, &pair.left),
+        image_file::color_image(size, &pair.right),
+        pair.disparity_image(size),
+    ];
     for (file, picture) in files.iter().zip(&pictures) {
-        picture::write_png(&out.join(file), picture)?;
+        image_file::write_png(&out.join(file), picture)?;
     }
     let points = pair.points(args.width);
     if points.is_empty() {
@@ -100,7 +103,7 @@ fn run(args: &Args) -> launcher::Result {
     }
     cloud::write_ply(&out.join(files[3]), &points)?;
     let (compared, error) = pair.disparity_error(args.width);
-    let range = picture::finite_range(pair.disparity.iter().copied().filter(|d| *d > 0.0));
+    let range = image_file::finite_range(pair.disparity.iter().copied().filter(|d| *d > 0.0));
     let [low, high] = range.unwrap_or([0.0; 2]);
     println!("\nDisparities from {low:.2} to {high:.2} pixels; {} points", points.len());
     println!(
@@ -233,7 +236,7 @@ impl StereoFrame {
     /// Disparity image: near (large disparity) is red, far blue, no disparity black.
     fn disparity_image(&self, [width, height]: [usize; 2]) -> RgbImage {
         let seen = self.disparity.iter().copied().filter(|d| *d > 0.0);
-        let range = picture::finite_range(seen).unwrap_or([0.0, 1.0]);
+        let range = image_file::finite_range(seen).unwrap_or([0.0, 1.0]);
         RgbImage::from_fn(width as u32, height as u32, |x, y| {
             let d = self.disparity[y as usize * width + x as usize];
             Rgb(if d > 0.0 { depth_color(d, range) } else { [0; 3] })

@@ -11,7 +11,7 @@ use clap::Parser;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{LightKindCfg, SurfaceCfg};
-use launcher::{Launcher, MainLoop, PathFlags, picture};
+use launcher::{Launcher, MainLoop, PathFlags, image_file};
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -118,7 +118,7 @@ fn run(args: &Args) -> launcher::Result {
     let camera = sim.sensor(camera)?;
     let color: Vec<u8> = camera.color()?.index_axis(Axis(0), 0).iter().copied().collect();
     let mask: Vec<i32> = camera.mask()?.index_axis(Axis(0), 0).iter().copied().collect();
-    picture::write_png(&out.join("surfaces.png"), &picture::color_image([args.width, args.height], &color))?;
+    image_file::write_png(&out.join("surfaces.png"), &image_file::color_image([args.width, args.height], &color))?;
     let means: serde_json::Map<_, _> = sim
         .scene()
         .mask_ids()

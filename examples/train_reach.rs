@@ -24,7 +24,7 @@ use kinetoscope::scene::{KeyedRng, Marker};
 use kinetoscope::tasks::{
     CommandTerm, Env, EnvBuilder, EnvCfg, ObservationTerm, RewardTerm, TermContext, TermResult, VectorEnv, terms,
 };
-use launcher::{Launcher, MainLoop, curve, picture, stage, trial};
+use launcher::{Launcher, MainLoop, curve, image_file, stage, trial};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -142,7 +142,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     if let Some(out) = &args.launcher.out {
         write_curve(&rows, out)?;
         render_final_poses(&mut env, &policy, test_seed, &out.join("train_reach_all.png"))?;
-        println!("Curve and picture written to {}", out.display());
+        println!("Curve and image written to {}", out.display());
     }
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),
@@ -354,5 +354,5 @@ fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
     std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     let reached: Vec<f64> = rows.iter().map(|row| row[2]).collect();
     let drawn = curve::plot("share of targets reached while trying changes, by iteration", &reached);
-    picture::write_png(&out.join("curve.png"), &drawn)
+    image_file::write_png(&out.join("curve.png"), &drawn)
 }

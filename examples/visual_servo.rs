@@ -27,7 +27,7 @@ use kinetoscope::sim::RigidObjectId;
 use launcher::motion::MotionPlayer;
 use launcher::panel::{self, CameraChannels};
 use launcher::trial::{self, ImageSeries, TrialResults};
-use launcher::{Launcher, MainLoop, grip, picture};
+use launcher::{Launcher, MainLoop, grip, image_file};
 use nalgebra::{Point3, Vector3};
 use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result<bool> {
     if !args.miscalibrated.is_finite() {
-        return Err(format!("--miscalibrated {}: it must be a distance in metres", args.miscalibrated).into());
+        return Err(format!("--miscalibrated {}: it must be a distance in meters", args.miscalibrated).into());
     }
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 0.005,
@@ -213,7 +213,7 @@ fn mask_id(sim: &SimulationManager, name: &str) -> launcher::Result<i32> {
         .mask_ids()
         .iter()
         .find(|id| id.object == name)
-        .ok_or(format!("nothing is called {name:?} in masks"))?;
+        .ok_or(format!("no entity of the masks is called {name:?}"))?;
     Ok(id.id)
 }
 
@@ -278,7 +278,7 @@ impl CubeDetector {
     fn write_image(&self, sim: &SimulationManager, out: &Option<std::path::PathBuf>, look: usize) -> launcher::Result {
         let Some(out) = out else { return Ok(()) };
         let views = CameraChannels::of(sim.sensor(self.camera)?, 0)?;
-        picture::write_png(&out.join(format!("visual_servo_camera_{look}.png")), &panel::grid(&views))
+        image_file::write_png(&out.join(format!("visual_servo_camera_{look}.png")), &panel::grid(&views))
     }
 }
 

@@ -6,14 +6,14 @@ use kinetoscope_sim::SimulationManager;
 /// A recording that viewers can play with [`Play::play`](kinetoscope_viewer::Play::play).
 ///
 /// ```no_run
-/// use kinetoscope::RecordedFilm;
+/// use kinetoscope::RecordingPlayback;
 /// use kinetoscope::prelude::*;
 /// use kinetoscope::record::{Film, Recording};
 /// use kinetoscope::viewer::Play;
 ///
 /// let (film, mut sim) = Film::of(&Recording::open("run.mcap")?, None)?;
 /// let window = sim.open_window()?;
-/// sim.play(&mut RecordedFilm(film), &mut || window.is_open())?;
+/// sim.play(&mut RecordingPlayback(film), &mut || window.is_open())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

@@ -13,14 +13,14 @@ const PYTHON: &str = "KINETOSCOPE_PYTHON4";
 
 /// The python of the baselines; `None` with a message if there is no such python, or if this build is for another
 /// MuJoCo version.
-pub(crate) fn python(rivals: &str) -> Option<OsString> {
+pub(crate) fn python(baselines: &str) -> Option<OsString> {
     if BUILD_VERSION != SupportedVersion::V4 {
-        eprintln!("  without {rivals}: the rivals have MuJoCo 4, and this build is for 2.2.2");
+        eprintln!("  without {baselines}: MuJoCo 4 is needed, and this build is for 2.2.2");
         return None;
     }
     let python = std::env::var_os(PYTHON);
     if python.is_none() {
-        eprintln!("  without {rivals}: {PYTHON} does not name a python that can import mujoco 4");
+        eprintln!("  without {baselines}: {PYTHON} is not set to a Python that can import mujoco 4");
     }
     python
 }
@@ -57,13 +57,13 @@ impl Process {
         let mut process =
             Command::new(python).arg(path).arg(file).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let commands = process.stdin.take();
-        let answers = BufReader::new(process.stdout.take().ok_or("the rival has no standard output")?);
+        let answers = BufReader::new(process.stdout.take().ok_or("the baseline has no standard output")?);
         Ok(Self { script, process, commands, answers, _job: folder })
     }
 
     /// Sends a line and waits for the answer.
     pub(crate) fn request(&mut self, command: &str) -> BenchResult<String> {
-        let commands = self.commands.as_mut().ok_or("the rival has ended")?;
+        let commands = self.commands.as_mut().ok_or("the baseline has exited")?;
         writeln!(commands, "{command}")?;
         commands.flush()?;
         let mut line = String::new();

@@ -57,7 +57,7 @@ impl Contender for Quadrupeds {
         if let Some(feet) = self.feet {
             let forces = self.sim.sensor(feet)?.net_forces_w();
             if !(0..ENVS).all(|env| (0..4).any(|foot| forces[(env, foot, 2)] > 1.0)) {
-                return Err("a quadruped stands on no foot".into());
+                return Err("a quadruped has no foot contact".into());
             }
         }
         Ok(took)

@@ -219,7 +219,7 @@ fn same_physics(sides: &mut [&mut dyn Contender]) -> BenchResult<()> {
     if states.windows(2).all(|pair| pair[0] == pair[1]) {
         return Ok(());
     }
-    Err("ours and a rival are in different states: they did not do the same work".into())
+    Err("Kinetoscope and the baseline are in different states: they did different work".into())
 }
 
 /// Median; NaN for an empty list.

@@ -122,7 +122,7 @@ impl Contender for ModelPerEnv {
         let time = start.elapsed();
         // Checks that the work was done.
         if self.editors.iter_mut().any(|editor| editor.body_mass_mut() == self.masses) {
-            return Err("the rival changed no mass".into());
+            return Err("the baseline changed no mass".into());
         }
         Ok(time)
     }
@@ -169,7 +169,7 @@ impl Contender for FirstModelPerEnv {
             }
             time += start.elapsed();
             if editors.iter_mut().any(|editor| editor.body_mass_mut() == self.masses) {
-                return Err("the rival changed no mass".into());
+                return Err("the baseline changed no mass".into());
             }
         }
         Ok(time)

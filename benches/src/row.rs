@@ -76,7 +76,7 @@ impl Row {
 pub(crate) fn table(rows: &[Row]) -> String {
     let mut out = format!(
         "{:<13} {:<44} {:>7} {:>7} {:>12} {:>12} {:<11} {:<22} {:>6}\n",
-        "bench", "case", "threads", "MuJoCo", "ours", "rival", "unit", "rival is", "ratio"
+        "bench", "case", "threads", "MuJoCo", "ours", "baseline", "unit", "baseline name", "ratio"
     );
     for row in rows {
         let number = |value: Option<f64>, digits| value.map_or("-".into(), |x| format!("{x:.digits$}"));

@@ -211,7 +211,7 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let [width, height] = SIZE;
     let mut rows = Vec::new();
     if let Some([pictures, factor]) = window {
-        let row = Row::new("view", case(&format!("window of {width} x {height}")), "pictures/s", cores(), pictures);
+        let row = Row::new("view", case(&format!("window of {width} x {height}")), "images/s", cores(), pictures);
         rows.push(row.against("wanted", TARGET_FPS, pictures / TARGET_FPS).with_target_ratio(1.0));
         let row = Row::new("view", case("physics meanwhile"), "x real time", cores(), factor);
         rows.push(row.against("real time", 1.0, factor).with_target_ratio(TARGET_REAL_TIME_FACTOR));

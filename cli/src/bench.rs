@@ -44,7 +44,7 @@ environment diverged.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if !(args.seconds > 0.0 && args.seconds <= 3600.0) {
-        return Err(format!("--seconds {}: give more than 0 and at most 3600", args.seconds).into());
+        return Err(format!("--seconds {}: must be more than 0 and at most 3600", args.seconds).into());
     }
     let setup = Setup { default_envs: 64, ..Setup::moving(args.num_envs, args.threads, &args.spawn) };
     let mut model = args.model.build(&setup)?;
@@ -70,8 +70,8 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let stopped = diverged.len();
     if let Some(first) = diverged.first().filter(|_| stopped == num_envs) {
         return Err(format!(
-            "the simulation diverged in all {num_envs} environments, in environment {} in {first}: there is no rate of \
-             steps. Contacts that overlap at the start, light links on stiff drives or a long time step are the usual causes",
+            "the simulation diverged in all {num_envs} environments, in environment {} in {first}: no step rate can \
+             be measured. Contacts that overlap at the start, light links on stiff drives or a long time step are the usual causes",
             first.env.0
         )
         .into());
@@ -86,15 +86,13 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     );
     println!("  {batch_steps_per_second:>12.0} steps of all environments per second");
     if stopped > 0 {
-        println!(
-            "  {stopped} of {num_envs} environments diverged and stood still from then on: the rates are too high"
-        );
+        println!("  {stopped} of {num_envs} environments diverged and stopped: the rates are too high");
     }
     for one in &diverged {
         eprintln!("warning: environment {} diverged: {one}", one.env.0);
     }
     let images_per_second = images_per_second(&mut rasterizer, still.render_request(&view), args.seconds)?;
-    println!("pictures of {} x {} with color, depth, mask and normals", view.width, view.height);
+    println!("images of {} x {} with color, depth, mask and normals", view.width, view.height);
     println!("  {images_per_second:>12.1} per second");
     Ok(if warned || !diverged.is_empty() { CommandStatus::Warned } else { CommandStatus::Done })
 }

@@ -25,7 +25,7 @@ pub(crate) enum Channel {
 /// The file cannot be written, or its name does not end in `.png`.
 pub(crate) fn write(frame: &Frame, channel: Channel, [width, height]: [usize; 2], path: &Path) -> Result<()> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-        return Err(format!("{}: pictures are written as PNG; give a name that ends in .png", path.display()).into());
+        return Err(format!("{}: images are written as PNG; use a file name that ends in .png", path.display()).into());
     }
     let depths = frame.depth.as_deref().unwrap_or_default();
     let finite = depths.iter().copied().filter(|d| d.is_finite());

@@ -25,12 +25,12 @@ pub(crate) struct Args {
 
 const HELP: &str = "\
 Examples:
-  kinetoscope check arm.urdf hand.urdf            the hand hangs from the tip of the arm
+  kinetoscope check arm.urdf hand.urdf            the hand is attached to the tip of the arm
   kinetoscope check arm.urdf --qpos hinge=0.5     inertia and torques at another position
   kinetoscope check humanoid.xml --floating-base --json humanoid.json
-  kinetoscope check scene.toml                    each robot of a scene, and what else there is
+  kinetoscope check scene.toml                    each robot of a scene, and the other entities
 
-Exit codes: 0 nothing is odd; 1 with warnings; 2 refused.";
+Exit codes: 0 no warnings; 1 with warnings; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let mut cfg = InspectCfg { floating_base: args.model.floating_base, qpos: args.qpos.clone(), ..Default::default() };
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
 fn mjcf_scene(args: &Args) -> Result<CommandStatus> {
     args.refuse_positions()?;
     let model = args.model.build(&Setup::STATIC)?;
-    let Some(part) = model.mjcf else { return Err("the file is no scene".into()) };
+    let Some(part) = model.mjcf else { return Err("the file is not a scene".into()) };
     let report = MjcfReport::of(&args.model.file_names(), &model.sim.mjcf_part(part));
     args.write_json(|| serde_json::to_string_pretty(&report.json()))?;
     print(&report);
@@ -103,6 +103,6 @@ fn print(report: &dyn std::fmt::Display) {
 
 fn parse_joint_position(text: &str) -> std::result::Result<(String, f64), String> {
     let (name, value) = text.rsplit_once('=').ok_or("write NAME=VALUE,NAME=VALUE, such as joint1=0.5,joint2=-1")?;
-    let value = value.trim().parse().map_err(|_| format!("{value:?} is no number of radians or metres"))?;
+    let value = value.trim().parse().map_err(|_| format!("{value:?} is not a number (rad or m)"))?;
     Ok((name.trim().to_owned(), value))
 }

@@ -28,7 +28,9 @@ Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or le
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if !args.force && !is_empty(&args.out)? {
-        return Err(format!("{}: is not empty; name another folder, or add --force", args.out.display()).into());
+        return Err(
+            format!("{}: the folder is not empty; choose another folder, or add --force", args.out.display()).into()
+        );
     }
     let model = args.model.build(&Setup::STATIC)?;
     let left_out = model.sim.dump(&args.out)?;

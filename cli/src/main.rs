@@ -33,20 +33,20 @@ struct Args {
 
 const HELP: &str = "\
 Examples:
-  kinetoscope check arm.urdf hand.urdf          tree, joints, masses, dynamics, and everything odd in the files
-  kinetoscope convert arm.urdf -o arm_mjcf      MJCF for both lines of MuJoCo, with its meshes
-  kinetoscope render humanoid.xml -o out.png    a picture
-  kinetoscope view arm.urdf                     a window in which it moves; --serve for a browser
-  kinetoscope view humanoid.xml --floating-base a robot that is not bolted to the world
+  kinetoscope check arm.urdf hand.urdf          tree, joints, masses, dynamics, and problems in the files
+  kinetoscope convert arm.urdf -o arm_mjcf      MJCF for both supported MuJoCo versions, with meshes
+  kinetoscope render humanoid.xml -o out.png    an image
+  kinetoscope view arm.urdf                     simulation in a window; --serve for a browser
+  kinetoscope view humanoid.xml --floating-base a robot on a free base
   kinetoscope view scene.toml                   a scene of robots, objects and sensors
-  kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
-  kinetoscope plot run.mcap                     what was recorded; --topic, --field and --out plot it
+  kinetoscope bench arm.urdf --num-envs 64      steps and images per second on this machine
+  kinetoscope plot run.mcap                     list the topics; --topic, --field and --out plot values
   kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
-  kinetoscope recover run.mcap                  a whole file of what a recording has left that was killed
+  kinetoscope recover run.mcap                  complete the file of an interrupted recording
 
-Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or broken off.
-FILE: URDF files, an MJCF file, or a scene file (TOML, YAML, JSON). One that is relative and does not exist is looked for
-among the bundled assets (sr5/SR5.urdf, ...).";
+Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or aborted.
+FILE: URDF files, an MJCF file, or a scene file (TOML, YAML, JSON). A relative path that does not exist is looked up in
+the bundled assets (sr5/SR5.urdf, ...).";
 
 /// Subcommands; each is implemented in the module of its name.
 #[derive(Debug, Subcommand)]

@@ -36,7 +36,7 @@ pub(crate) struct ModelArgs {
 pub(crate) struct SpawnArgs {
     /// Initial height of the robot's lowest collision point above the ground [default: 0 with --floating-base; else the
     /// root link starts at height 0]
-    #[arg(long, alias = "spawn_height", value_name = "METRES", allow_negative_numbers = true)]
+    #[arg(long, alias = "spawn_height", value_name = "METERS", allow_negative_numbers = true)]
     pub(crate) spawn_height: Option<f64>,
     /// Omit the ground
     #[arg(long, alias = "no_ground")]
@@ -172,11 +172,11 @@ impl ModelArgs {
         };
         let file = files[at].display();
         let (what, whole) = match kinds[at] {
-            FileKind::Scene => ("a scene file", "a scene"),
-            _ => ("an MJCF file", "a model"),
+            FileKind::Scene => ("a scene file", "a complete scene"),
+            _ => ("an MJCF file", "a complete model"),
         };
         if files.len() > 1 {
-            return Err(format!("{file}: {what} is {whole} of its own: give it alone, or URDF files only").into());
+            return Err(format!("{file}: {what} is {whole}: give it alone, or give URDF files only").into());
         }
         let package = self.package.first().map(|(name, _)| format!("--package {name}"));
         let strict = self.strict.then(|| "--strict".to_string());
@@ -196,7 +196,7 @@ impl ModelArgs {
     /// Errors of the files, or flags that do not apply to a scene.
     pub(crate) fn build(&self, setup: &Setup) -> Result<Model> {
         if let Some(height) = setup.spawn_height.filter(|height| !height.is_finite()) {
-            return Err(format!("--spawn-height {height}: give a height in metres, such as 0.1").into());
+            return Err(format!("--spawn-height {height}: must be a height in meters, such as 0.1").into());
         }
         match self.files()? {
             Files::Urdf(urdf) => {
@@ -311,5 +311,5 @@ fn parse_package(text: &str) -> std::result::Result<(String, PathBuf), String> {
 
 fn parse_folder(text: &str) -> std::result::Result<PathBuf, String> {
     let folder = PathBuf::from(text);
-    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is no folder")) }
+    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is not a folder")) }
 }

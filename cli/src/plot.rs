@@ -2,6 +2,7 @@
 
 use crate::command_status::{CommandStatus, Result};
 use crate::field_names::{group_fields, matches_pattern};
+use crate::scene_report::counted;
 use kinetoscope::record::{FieldSelector, RecordedTopic, Recording};
 use kinetoscope::viewer::plot::{self, Plot, Series};
 use std::io::Write;
@@ -56,7 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let listed = if warned { CommandStatus::Warned } else { CommandStatus::Done };
     if args.topic.is_empty() {
         if args.out.is_some() || !args.field.is_empty() {
-            return Err("--topic: say of which topic; without --out and --field all of them are listed".into());
+            return Err("--topic is required with --out or --field; without these flags, all topics are listed".into());
         }
         list(&recording, &recording.topics().iter().collect::<Vec<_>>());
         return Ok(listed);
@@ -66,13 +67,13 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if args.field.is_empty() {
         if args.out.is_some() {
             let fields: Vec<String> = topics.iter().flat_map(|topic| group_fields(&topic.fields)).collect();
-            return Err(format!("--field: say which numbers; there are {}", fields.join(", ")).into());
+            return Err(format!("--field is required with --out; fields: {}", fields.join(", ")).into());
         }
         list(&recording, &topics);
         return Ok(listed);
     }
     let Some(out) = &args.out else {
-        return Err("--out: say where the plot goes, to a name that ends in .svg or .png".into());
+        return Err("--out is required with --field: a file name that ends in .svg or .png".into());
     };
     let mut wanted = Vec::new();
     for topic in &topics {
@@ -102,14 +103,15 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     plot.size = [args.width, args.height];
     for (wanted, samples) in wanted.iter().zip(samples) {
         if samples.values.is_empty() {
-            eprintln!("warning: there is no {} in any message of {}", wanted.field, wanted.topic);
+            eprintln!("warning: no message of {} contains {}", wanted.topic, wanted.field);
             warned = true;
         }
         let name = if names.len() == 1 { wanted.field.clone() } else { format!("{} {}", wanted.topic, wanted.field) };
         plot.series.push(Series::new(name, samples.times.into_iter().zip(samples.values).map(|(t, x)| [t, x])));
     }
     plot::write(&plot, out)?;
-    println!("{}: {} curves, {} points", out.display(), plot.series.len(), count_points(&plot));
+    let curves = counted(plot.series.len(), "curve", "curves");
+    println!("{}: {curves}, {}", out.display(), counted(count_points(&plot), "point", "points"));
     Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
@@ -123,7 +125,8 @@ fn list(recording: &Recording, topics: &[&RecordedTopic]) {
     // A closed pipe, as with `| head`, is not an error.
     let _ = writeln!(out, "{}", recording.path().display());
     for &RecordedTopic { name, kind, count, fields } in topics {
-        let _ = writeln!(out, "{name}   {kind}, {count} times");
+        let messages = if *count == 1 { "message" } else { "messages" };
+        let _ = writeln!(out, "{name}   {kind}, {count} {messages}");
         for field in group_fields(fields) {
             let _ = writeln!(out, "    {field}");
         }

@@ -18,10 +18,11 @@ pub(crate) struct Args {
 
 const HELP: &str = "\
 Examples:
-  kinetoscope recover run.mcap                makes run.mcap of run.mcap.part, and takes that away
+  kinetoscope recover run.mcap                completes run.mcap from run.mcap.part and removes the latter
   kinetoscope recover run.mcap -o saved.mcap
 
-Exit codes: 0 everything that was written whole is in the file; 1 something in between is damaged: what was left stays; 2 refused.";
+Exit codes: 0 all complete messages are in the file; 1 the partial file is damaged: its undamaged messages are
+in the file, and the partial file is kept; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let is_left = args.file.extension().is_some_and(|end| end == "part");
@@ -32,7 +33,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     match recovered.damage {
         None => Ok(CommandStatus::Done),
         Some(damage) => {
-            eprintln!("warning: behind them something is damaged ({damage}); what was left is still there");
+            eprintln!(
+                "warning: the partial file is damaged ({damage}): only its undamaged messages were recovered, and it was kept"
+            );
             Ok(CommandStatus::Warned)
         }
     }

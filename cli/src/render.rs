@@ -164,7 +164,7 @@ impl RenderArgs {
     /// An invalid number of paths, or any number of paths without path tracing.
     pub(crate) fn rasterizer(&self) -> Result<ParallelRenderer> {
         if let Some(samples) = self.samples.filter(|_| self.renderer != RenderMethod::Rt) {
-            return Err(format!("--samples {samples}: paths are of --renderer rt").into());
+            return Err(format!("--samples {samples} requires --renderer rt").into());
         }
         let renderer = match self.renderer {
             RenderMethod::Raster => Renderer::Raster,
@@ -203,5 +203,5 @@ pub(crate) fn images_per_second(
             return Ok(f64::from(pictures) / elapsed);
         }
     };
-    progress::with_progress("pictures", move || Some(start.elapsed().as_secs_f64() / seconds), draw)
+    progress::with_progress("images", move || Some(start.elapsed().as_secs_f64() / seconds), draw)
 }

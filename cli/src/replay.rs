@@ -50,7 +50,7 @@ pub(crate) struct Args {
 const HELP: &str = "\
 Examples:
   kinetoscope replay run.mcap                     in a window; --serve: in a browser
-  kinetoscope replay run.mcap --out pictures --at 0,1.5,3
+  kinetoscope replay run.mcap --out images --at 0,1.5,3
   kinetoscope replay run.mcap --verify --scene scene.toml
 
 Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 shown or drawn, with warnings (something of the
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
         return verify(args);
     }
     if let Some(seconds) = args.seconds.filter(|seconds| !(*seconds > 0.0 && *seconds < 1e9)) {
-        return Err(format!("--seconds {seconds}: give more than 0").into());
+        return Err(format!("--seconds {seconds}: must be more than 0").into());
     }
     let recording = Recording::open(&args.file)?;
     let mut warned = !recording.warnings().is_empty();
@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if !film.joints_without_data().is_empty() {
         warned = true;
         eprintln!(
-            "warning: nothing was recorded of {}: they stay where they begin",
+            "warning: no recorded state of {}: they keep their initial state",
             film.joints_without_data().join(", ")
         );
     }
@@ -139,7 +139,7 @@ fn show(args: &Args, mut film: Playback, mut sim: SimulationManager) -> Result<(
     match &args.serve {
         Some(address) => {
             let served = sim.serve_with(address, ServeCfg { speed: Some(Speed::REAL_TIME), ..ServeCfg::default() })?;
-            println!("Look at {}; Ctrl+C ends it.", served.url());
+            println!("Open {} in a browser; Ctrl+C ends the replay.", served.url());
             sim.play(&mut film, &mut || keep_playing())?;
             served.close(&mut sim)?;
         }
@@ -149,7 +149,7 @@ fn show(args: &Args, mut film: Playback, mut sim: SimulationManager) -> Result<(
             println!("A window shows {}: closing it, or Ctrl+C here, ends it.", args.file.display());
             sim.play(&mut film, &mut || window.is_open() && keep_playing())?;
             if let Some(reason) = window.closed().as_ref().and_then(Closed::error) {
-                return Err(format!("the window is gone: {reason}").into());
+                return Err(format!("the window was lost: {reason}").into());
             }
             window.close();
         }

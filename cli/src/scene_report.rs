@@ -88,7 +88,7 @@ impl MjcfReport {
 
 impl fmt::Display for MjcfReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}   (a scene: its bodies and joints are not those of one robot)", self.file)?;
+        writeln!(f, "{}   (a scene, not a single robot)", self.file)?;
         writeln!(
             f,
             "{}, {}, {}, {}, {}",
@@ -106,7 +106,7 @@ impl fmt::Display for MjcfReport {
         }
         for (name, body) in names.iter().zip(&self.bodies) {
             let joints: Vec<String> = body.joints.iter().map(|(name, kind)| format!("{name} ({kind})")).collect();
-            let joints = if body.mocap { "moved by hand (mocap)".to_owned() } else { joints.join(", ") };
+            let joints = if body.mocap { "mocap body".to_owned() } else { joints.join(", ") };
             writeln!(f, "{name:<width$}  {:>12.6}  {}", body.mass, if joints.is_empty() { "-" } else { &joints })?;
         }
         for (what, names) in [("Actuators", &self.actuators), ("Sensors", &self.sensors)] {
@@ -211,6 +211,7 @@ fn kind_of(entity: &EntityCfg) -> &'static str {
     }
 }
 
-fn counted(n: usize, one: &str, many: &str) -> String {
+/// Returns a number with its noun.
+pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }

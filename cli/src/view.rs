@@ -62,13 +62,13 @@ Examples:
   kinetoscope view arm.urdf --serve               in a browser, at http://127.0.0.1:8080
   kinetoscope view arm.urdf --record run.mcap
 
-Exit codes: 0 shown until a good end; 1 the same, with warnings (something was repaired or ignored, an environment diverged); 2
-refused, or the display was lost.";
+Exit codes: 0 ended normally; 1 ended normally, with warnings (something was repaired or ignored, an environment diverged);
+2 refused, or the display was lost.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let [slow, fast] = Speed::FACTOR_RANGE;
     if !(slow..=fast).contains(&args.speed) {
-        return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
+        return Err(format!("--speed {}: must be {slow} to {fast}; 1 is real time", args.speed).into());
     }
     let setup = Setup { arena_space: args.arena_space, ..Setup::moving(args.num_envs, args.threads, &args.spawn) };
     let model = args.model.build(&setup)?;
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
         println!("Recorded to {recorded}");
     }
     if let Some(reason) = closed().as_ref().and_then(Closed::error) {
-        return Err(format!("the window is gone after {step} steps: {reason}").into());
+        return Err(format!("the window was lost after {step} steps: {reason}").into());
     }
     let diverged = sim.diverged();
     for one in &diverged {
@@ -140,8 +140,8 @@ fn no_window(error: &WindowError, names: &str) -> String {
             let of = |variable: &Option<String>| variable.clone().unwrap_or_else(|| "not set".into());
             format!(
                 "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which \
-                 Wayland desktops have too (XWayland); or look at it in a browser, also from another machine: kinetoscope \
-                 view {names} --serve; or have a picture of it: kinetoscope render {names} -o out.png",
+                 Wayland desktops provide as XWayland; or view it in a browser, also from another machine: kinetoscope \
+                 view {names} --serve; or render an image: kinetoscope render {names} -o out.png",
                 of(display),
                 of(wayland),
             )

@@ -105,7 +105,7 @@ pub(crate) struct Launcher {
 
 fn rate(text: &str) -> std::result::Result<(String, u64), String> {
     let (name, steps) = text.rsplit_once('=').ok_or("write NAME=STEPS, such as camera=30")?;
-    let steps = steps.trim().parse().map_err(|_| format!("{steps:?} is no number of steps"))?;
+    let steps = steps.trim().parse().map_err(|_| format!("{steps:?} is not a number of steps"))?;
     Ok((name.trim().to_owned(), steps))
 }
 

@@ -46,7 +46,7 @@ where
     let padding = (FIXED + header.len() + 1).next_multiple_of(ALIGN) - (FIXED + header.len() + 1);
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
-    let length = u16::try_from(header.len()).map_err(|_| io::Error::other("more axes than the format has room for"))?;
+    let length = u16::try_from(header.len()).map_err(|_| io::Error::other("too many axes for the .npy format"))?;
     to.write_all(b"\x93NUMPY\x01\x00")?;
     to.write_all(&length.to_le_bytes())?;
     to.write_all(header.as_bytes())?;

@@ -53,7 +53,7 @@ impl<'a> CameraChannels<'a> {
 
 /// The data of one environment in a channel.
 fn slice<T, D: RemoveAxis>(channel: ArrayView<'_, T, D>, row: usize) -> super::Result<&[T]> {
-    channel.index_axis_move(Axis(0), row).to_slice().ok_or_else(|| "pictures are not in C order".into())
+    channel.index_axis_move(Axis(0), row).to_slice().ok_or_else(|| "images are not in C order".into())
 }
 
 /// A 2 x 2 grid of color, depth, mask and normals with titles.

@@ -87,7 +87,7 @@ mod recorded {
             // A holder of the lock, such as the record button, reports the same failure itself.
             let failure = self.files.try_lock().ok().and_then(|files| files.failure(sim));
             if let Some(why) = &failure {
-                eprintln!("--record {why}; nothing is recorded any more");
+                eprintln!("--record {why}; recording has stopped");
             }
             self.reported = failure.is_some();
         }
@@ -131,7 +131,7 @@ impl Launcher {
     pub(crate) fn start_recording(&self, _: &mut SimulationManager) -> Result<Recording> {
         match self.record {
             Some(_) => {
-                Err("--record: this build does not record; build with the features `record` and `view`, which are on by default"
+                Err("--record: this build does not record; build with the features `record` and `viewer`, which are on by default"
                     .into())
             }
             None => Ok(Recording),

@@ -8,7 +8,7 @@ use kinetoscope::prelude::*;
 pub(crate) struct SpawnFlags {
     /// Height of the lowest collision point of the robot above the ground at the start, in meters. The default is the
     /// pose of the example or of the MJCF file
-    #[arg(long, alias = "spawn_height", value_name = "METRES", allow_negative_numbers = true)]
+    #[arg(long, alias = "spawn_height", value_name = "METERS", allow_negative_numbers = true)]
     spawn_height: Option<f64>,
     /// Leave out the ground: the robot falls
     #[arg(long, alias = "no_ground")]
@@ -22,7 +22,7 @@ impl SpawnFlags {
     /// The height is not finite.
     pub(crate) fn apply(self, simulation: &mut SimulationManagerCfg, robot: &mut RobotCfg) -> super::Result {
         if let Some(height) = self.spawn_height.filter(|height| !height.is_finite()) {
-            return Err(format!("--spawn-height {height}: give a height in metres, such as 0.1").into());
+            return Err(format!("--spawn-height {height}: must be a height in meters, such as 0.1").into());
         }
         robot.ground_clearance = self.spawn_height.or(robot.ground_clearance);
         if self.no_ground {

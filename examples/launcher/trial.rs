@@ -155,7 +155,7 @@ impl ImageSeries {
         let camera = sim.sensor(self.camera)?;
         let (height, width) = camera.image_shape();
         let color = camera.color()?;
-        let color = color.as_slice().ok_or("the picture is not in one piece")?;
+        let color = color.as_slice().ok_or("the image is not contiguous")?;
         let file = out.join(format!("{}_{}.png", self.name, self.taken));
         image_file::write_png(&file, &image_file::color_image([width, height], color))
     }

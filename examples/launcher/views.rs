@@ -138,7 +138,7 @@ mod shown {
                     let _ = self.window.0.set(window);
                     install_resume_handle(sim);
                 }
-                Err(error) => println!("{error}\nGoing on without a window, as with --headless."),
+                Err(error) => println!("{error}\nThe example continues without a window, as with --headless."),
             }
         }
 
@@ -196,7 +196,7 @@ impl Launcher {
     pub(crate) fn serve(&self, _: &mut SimulationManager) -> Result {
         match self.serve_address() {
             Some(_) => {
-                Err("--serve: this build has no views; build with the feature `view`, which is on by default".into())
+                Err("--serve: this build has no views; build with the feature `viewer`, which is on by default".into())
             }
             None => Ok(()),
         }
@@ -209,7 +209,7 @@ impl Launcher {
     pub(crate) fn screenshot(&self, _: &mut SimulationManager, _: &str) -> Result {
         match self.out {
             Some(_) => {
-                Err("--out: this build has no views; build with the feature `view`, which is on by default".into())
+                Err("--out: this build has no views; build with the feature `viewer`, which is on by default".into())
             }
             None => Ok(()),
         }
@@ -223,7 +223,9 @@ impl Launcher {
     /// Prints that this build opens no window, except with `--headless`.
     pub(crate) fn open_window(&self, _: &mut SimulationManager) {
         if !self.headless {
-            println!("This build has no window (its feature `view` is off).\nGoing on without, as with --headless.");
+            println!(
+                "This build has no window (the feature `viewer` is off).\nThe example continues without a window, as with --headless."
+            );
         }
     }
 }

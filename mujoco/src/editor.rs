@@ -23,14 +23,14 @@ const UNCOMPARED_PREFIXES: [&str; 12] =
 /// Arrays on which MuJoCo's memory accesses depend cannot be written from outside:
 ///
 /// ```
-/// # use kinetoscope_mujoco::{self as mj, Editor};
+/// # use kinetoscope_mujoco::{self as mj, ModelEditor};
 /// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
-/// Editor::new(&model).unwrap().body_mass_mut();
+/// ModelEditor::new(&model).unwrap().body_mass_mut();
 /// ```
 /// ```compile_fail,E0624
-/// # use kinetoscope_mujoco::{self as mj, Editor};
+/// # use kinetoscope_mujoco::{self as mj, ModelEditor};
 /// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
-/// Editor::new(&model).unwrap().body_simple_mut();
+/// ModelEditor::new(&model).unwrap().body_simple_mut();
 /// ```
 #[derive(Debug)]
 pub struct ModelEditor {

@@ -27,7 +27,7 @@
 //!
 //! ```
 //! use kinetoscope_render::frame::{Channels, Frame};
-//! use kinetoscope_render::{RasterCfg, Rasterizer, View};
+//! use kinetoscope_render::{RasterCfg, ImageRenderer, View};
 //! use kinetoscope_scene::shape::Sphere;
 //! use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene};
 //!
@@ -35,7 +35,7 @@
 //! let scene = RenderScene::new(vec![Instance::new(Sphere { radius: 0.5 }, red, 1)])?;
 //! let view = View::look_at([64, 48], 0.8, [2.0, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0])?;
 //! let mut frame = Frame::new(64, 48, Channels { depth: true, mask: true, ..Channels::NONE });
-//! Rasterizer::new(RasterCfg::default()).render(&scene, &[PoseF32::IDENTITY], &view, &mut frame)?;
+//! ImageRenderer::new(RasterCfg::default()).render(&scene, &[PoseF32::IDENTITY], &view, &mut frame)?;
 //!
 //! let (depth, mask) = (frame.depth.ok_or("no depth")?, frame.mask.ok_or("no mask")?);
 //! let center = 24 * 64 + 32;

@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 /// [`RenderError::Canceled`](crate::visibility::RenderError::Canceled).
 ///
 /// ```
-/// use kinetoscope_render::ParallelRasterizer;
+/// use kinetoscope_render::ParallelRenderer;
 /// use kinetoscope_render::RasterCfg;
 ///
-/// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
+/// let rasterizer = ParallelRenderer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();
 /// // On another thread, during rendering:
 /// println!("{} of {} paths, {:?} left", progress.samples(), progress.total(), progress.remaining());
 /// progress.cancel();
-/// assert!(progress.is_cancelled());
+/// assert!(progress.is_canceled());
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct RenderProgress(Arc<Counters>);

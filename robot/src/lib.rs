@@ -20,7 +20,7 @@
 //! | [`diagnostic`] | warnings about input that is odd but usable |
 //!
 //! ```
-//! use kinetoscope_robot::dynamics::{Configuration, Kinematics};
+//! use kinetoscope_robot::dynamics::{Configuration, Dynamics};
 //! use kinetoscope_robot::urdf::{UrdfCfg, assemble};
 //! use nalgebra::Vector3;
 //! # let urdf = std::env::temp_dir().join(format!("kinetoscope-cart-{}.urdf", std::process::id()));
@@ -33,7 +33,7 @@
 //! // A cart of 2 kg on a vertical rail.
 //! let robot = assemble(&UrdfCfg::single(&urdf))?.description;
 //! # std::fs::remove_file(&urdf)?;
-//! let dynamics = Kinematics::new(&robot, &Configuration::zero(&robot))?;
+//! let dynamics = Dynamics::new(&robot, &Configuration::zero(&robot))?;
 //! let effort = dynamics.gravity_torque(&Vector3::new(0.0, 0.0, -9.81));
 //! assert!((effort[0] - 2.0 * 9.81).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

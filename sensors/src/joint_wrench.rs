@@ -36,7 +36,7 @@ pub struct JointWrenchCfg {
 /// Shapes: N environments, B links.
 ///
 /// Both are in the axes of the link and about its origin: the joint frame on the child side, as URDF defines it. For
-/// [`JointWrenchCfg::body_state`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
+/// [`JointWrenchCfg::frames`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
 /// force and `T` the torque about the origin of the link; the frame is at `p` with the rotation `R` in the link. The
 /// force is then `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, wherever the frame is.
 ///

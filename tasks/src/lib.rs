@@ -49,7 +49,7 @@
 //!     }))
 //!     .event(EventTerm::on_reset("scatter", move |sim, dice| {
 //!         for die in dice {
-//!             let start = array![[die.between(-0.5, 0.5)]];
+//!             let start = array![[die.uniform_range(-0.5, 0.5)]];
 //!             sim.robot_mut(cart).write_qpos(&start, Some(&[JointIndex(0)]), Some(&[die.env()]))?;
 //!         }
 //!         Ok(())

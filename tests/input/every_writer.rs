@@ -196,7 +196,7 @@ fn joint_writers() {
         let mut robot = sim.robot_mut(ids.robot);
         call(&mut robot, &table(good, 0), None, Some(&[])).unwrap();
         call(&mut robot, &Array2::zeros((ENVS, 0)), Some(&[]), None).unwrap();
-        assert_eq!(written_state(&sim, ids), before, "{name}: nothing is asked for");
+        assert_eq!(written_state(&sim, ids), before, "{name}: an empty selection changes nothing");
         call(&mut sim.robot_mut(ids.robot), &table(&good[..1], 1), Some(&[JointIndex(1)]), Some(&[EnvId(2)])).unwrap();
         assert_ne!(written_state(&sim, ids), before, "{name}: the control");
     }

@@ -112,7 +112,7 @@ fn pendulum() {
     assert_eq!(code, 0, "{:?}", warnings(&json));
     assert_close("mass matrix", numbers(&json["mass_matrix"][0]), [I + M * L * L], ROUNDING);
     assert_close("gravity torque", numbers(&json["gravity_torque"]), [-M * 9.81 * L * Q.cos()], ROUNDING * 10.0);
-    assert_close("centre of mass", numbers(&json["com"]), [L * Q.cos(), 0.0, -L * Q.sin()], ROUNDING);
+    assert_close("center of mass", numbers(&json["com"]), [L * Q.cos(), 0.0, -L * Q.sin()], ROUNDING);
     let tool = &json["links"][2];
     assert_eq!((tool["name"].as_str(), tool["parent"].as_str()), (Some("tool"), Some("arm")));
     assert_eq!((&tool["mass"], &tool["com"], &tool["inertia"]), (&Value::from(0.0), &Value::Null, &Value::Null));
@@ -294,7 +294,7 @@ fn warnings_of_the_simulation() {
             "robot.urdf:9: element-ignored"
         ]
     );
-    assert_eq!(json["links"][1]["inertia"][0][0], 9.0, "nothing is repaired here");
+    assert_eq!(json["links"][1]["inertia"][0][0], 9.0, "the inertia is reported unchanged");
     assert_eq!(json["total_mass"], 2.0);
 
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
@@ -307,7 +307,7 @@ fn warnings_of_the_simulation() {
     assert_eq!(simulated, reported);
 
     let still = folder.urdf(&["<link name=\"base\"/>"]);
-    assert_eq!(run(&[&still]).code, 0, "what stands still needs no mass");
+    assert_eq!(run(&[&still]).code, 0, "a fixed link needs no mass");
     assert_eq!(warnings(&report(&[&still, "--floating_base"]).1), ["robot.urdf:2: massless-link"]);
 }
 
@@ -353,7 +353,7 @@ fn packages() {
     assert_eq!(run(&[&file]).code, 2);
     assert_eq!(run(&[&file, "--package", &format!("pkg={}", elsewhere.display())]).code, 0);
     let wrong = run(&[&file, "--package", "pkg=no_such_folder"]);
-    assert!(wrong.code == 2 && wrong.err.contains("no_such_folder is no folder"), "{}", wrong.err);
+    assert!(wrong.code == 2 && wrong.err.contains("no_such_folder is not a folder"), "{}", wrong.err);
 }
 
 #[test]
@@ -369,7 +369,7 @@ fn refusals() {
         (vec![SR5, "--no-such-flag"], "--no-such-flag"),
         (vec![SR5, "--package", "x"], "NAME=DIR"),
         (vec![SR5, "--qpos", "JOINT1"], "NAME=VALUE"),
-        (vec![SR5, "--qpos", "JOINT1=one"], "\"one\" is no number"),
+        (vec![SR5, "--qpos", "JOINT1=one"], "\"one\" is not a number (rad or m)"),
         (vec![SR5, "--qpos", "JOINT1=nan"], "not finite"),
         (vec![SR5, "--qpos", "JOINT1=1,JOINT1=2"], "two positions"),
         (vec![SR5, "--qpos", "joint2=1"], "unknown joint \"joint2\"; candidates: \"JOINT2\""),
@@ -418,7 +418,7 @@ fn mjcf_file() {
     let folder = Folder::new();
     let file = folder.write("robot.xml", MJCF);
     let (code, json) = report(&[&file, "--qpos", "turn=0.4"]);
-    assert_eq!(code, 1, "the equality that is no mimic is said");
+    assert_eq!(code, 1, "the unsupported equality is reported");
     assert_eq!(names(&json["joint_names"]), ["turn", "swing", "line", "curve"]);
     let qpos = [0.4, 30f64.to_radians(), 0.1 + 2.0 * 0.4, 0.1 + 3.0 * 0.16];
     assert_close("positions", numbers(&json["qpos"]), qpos, MUJOCO);
@@ -443,7 +443,7 @@ fn mjcf_file() {
     assert!((json["total_mass"].as_f64().unwrap() - 52.135).abs() < 1e-3);
     assert_eq!(json["columns"].as_array().unwrap().len(), 6 + 12);
     for (args, says) in [
-        (vec![file.as_str(), SR5], "stands alone"),
+        (vec![file.as_str(), SR5], "an MJCF file cannot be combined with other files"),
         (vec!["no_such_file.xml"], "no_such_file.xml"),
         (vec![file.as_str(), "--package", "mine=."], "--package mine"),
         (vec![&folder.write("torn.xml", "<mujoco><worldbody>"), "--floating-base"], "torn.xml"),

@@ -180,7 +180,7 @@ fn robots() {
         assert_eq!(before, state(&sim), "{what}");
         sim.update(2);
         calm.update(2);
-        assert_eq!(bits(&sim), bits(&calm), "{what}: the simulation goes on");
+        assert_eq!(bits(&sim), bits(&calm), "{what}: the simulation continues");
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }

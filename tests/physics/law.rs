@@ -78,7 +78,10 @@ impl Measurements {
         (tolerance, why): (f64, &str),
     ) {
         assert!(self.rows.iter().all(|row| row.quantity != quantity), "two rows are called {quantity:?}");
-        assert!(tolerance.is_finite() && tolerance >= 0.0 && expected.is_finite(), "{quantity}: no such tolerance");
+        assert!(
+            tolerance.is_finite() && tolerance >= 0.0 && expected.is_finite(),
+            "{quantity}: the tolerance and the expected number must be finite"
+        );
         // Not `error > tolerance`, so that a measured NaN fails.
         let pass = (measured - expected).abs() <= tolerance;
         let [quantity, unit, why] = [quantity, unit, why].map(str::to_string);

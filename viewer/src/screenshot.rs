@@ -37,7 +37,7 @@ impl Default for ScreenshotCfg {
 #[non_exhaustive]
 pub enum ScreenshotError {
     /// The file name extension is not `.png`.
-    #[error("{path}: pictures of the stage are not written as .{end}; give a name that ends in .png")]
+    #[error("{path}: unsupported image format .{end}; use a file name that ends in .png")]
     Extension {
         /// Path of the image file.
         path: PathBuf,
@@ -45,7 +45,7 @@ pub enum ScreenshotError {
         end: String,
     },
     /// The folder of the file does not exist.
-    #[error("{path}: there is no folder {folder} to write it to; make it first")]
+    #[error("{path}: the folder {folder} does not exist; create it first")]
     NoFolder {
         /// Path of the image file.
         path: PathBuf,
@@ -61,7 +61,7 @@ pub enum ScreenshotError {
         error: Arc<std::io::Error>,
     },
     /// A side of the image is zero or too long.
-    #[error("a picture of {width} x {height} pixels: 1 to {most} would do for both")]
+    #[error("invalid image size {width} x {height}; both sides must be 1 to {most} pixels")]
     Size {
         /// Pixels per row.
         width: usize,
@@ -71,7 +71,7 @@ pub enum ScreenshotError {
         most: usize,
     },
     /// The environment does not exist.
-    #[error("there is no environment {env}; there are {count}, from 0")]
+    #[error("environment {env} does not exist; the simulation has {count}, numbered from 0")]
     Environment {
         /// Index of the requested environment.
         env: usize,
@@ -79,7 +79,7 @@ pub enum ScreenshotError {
         count: usize,
     },
     /// The renderer returned an error.
-    #[error("the stage cannot be drawn: {0}")]
+    #[error("rendering failed: {0}")]
     Draw(RenderError),
 }
 
@@ -250,11 +250,11 @@ mod tests {
             ("a.jpg", "Extension", ""),
             ("a", "Extension", ""),
             ("a.png.part", "Extension", ""),
-            ("no/such/a.png", "NoFolder", "no/such to write it"),
+            ("no/such/a.png", "NoFolder", "no/such does not exist"),
             ("taken.png", "File", ""),
         ];
         let rows = rows.map(|(name, kind, part)| (name, sim.screenshot(folder.path().join(name)), kind, [part]));
-        kinetoscope_testkit::refusal::assert_errors(rows);
+        kinetoscope_testkit::error_tables::assert_errors(rows);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

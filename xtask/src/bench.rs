@@ -50,13 +50,13 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
     let both = [prepare(MujocoVersion::Debian)?, prepare(MujocoVersion::Wheel)?];
     let python = python::with_mujoco(repo);
     if python.is_none() {
-        eprintln!("note: rivals in Python are left out");
+        eprintln!("note: Python baselines are skipped");
     }
     if args.name.as_deref().is_none_or(|name| CAMERA_BENCHES.contains(&name)) {
         setup::try_to_have(Requirement::OsMesa);
         for module in CAMERA_BASELINES {
             if python.as_ref().is_some_and(|python| !module.install(python)) {
-                eprintln!("note: that rival is left out");
+                eprintln!("note: this baseline is skipped");
             }
         }
     }
@@ -144,7 +144,7 @@ fn tables(rows: &[Value]) -> XtaskResult<String> {
     for bench in benches {
         let _ = writeln!(out, "## {bench}\n");
         out.push_str(
-            "| case | unit | threads | MuJoCo | ours | rival | | ratio |\n|---|---|--:|---|--:|--:|---|--:|\n",
+            "| case | unit | threads | MuJoCo | ours | baseline | | ratio |\n|---|---|--:|---|--:|--:|---|--:|\n",
         );
         for row in rows.iter().filter(|row| row["bench"] == bench) {
             let _ = writeln!(
@@ -192,13 +192,13 @@ fn heading(machine: &str) -> String {
     let rivals: Vec<&str> = CAMERA_BASELINES.iter().flat_map(|module| module.packages).copied().collect();
     format!(
         "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}. `cargo xtask bench` measures \
-         everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the rival ran in one run, \
+         everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the baseline ran in one run, \
          in turns. Numbers are medians of the turns; so is the ratio, which is taken turn by turn and need not be that of the \
-         medians. `ratio > 1`: ours is faster. `-`: there is no rival, it was not on the machine, or it has another MuJoCo. \
-         A rival that is called `aim`, `wanted` or `limit` is no program but what we ask of ourselves. Rows of `trace` in \
-         percent say where the time goes: what the same work takes that leaves something out, in turns with all of it.\n\n`plain` pictures have one sample per pixel and no shadows, `full` ones four and shadows; `MuJoCo on OSMesa` is \
-         `mujoco.Renderer` at its best settings, `by hand` the same library with as few passes as there can be. `scans` are \
-         height scans, whose rays are parallel; `fans` are rays from one point.\n\nRivals in Python: {}, and \
+         medians. `ratio > 1`: ours is faster. `-`: there is no baseline, it was not on the machine, or it has another MuJoCo. \
+         The baselines `aim`, `wanted` and `limit` are our own targets, not programs. Rows of `trace` in \
+         percent show where the time goes: the time of the same work without one part, in turns with the whole work.\n\n`plain` images have one sample per pixel and no shadows, `full` images four and shadows; `MuJoCo on OSMesa` is \
+         `mujoco.Renderer` at its best settings, `by hand` is the same library with as few passes as possible. `scans` are \
+         height scans with parallel rays; `fans` are rays from one point.\n\nPython baselines: {}, and \
          the `mujoco` of the row.\n",
         rivals.join(", ")
     )

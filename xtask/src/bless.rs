@@ -27,7 +27,7 @@ pub(crate) fn run(repo: &Repo, args: &BlessArgs) -> XtaskResult {
     if status.trim().is_empty() {
         println!("\nno golden changed");
     } else {
-        println!("\nchanged; look at each (`git diff`, pictures in a viewer) before you commit:");
+        println!("\nchanged; look at each (`git diff`, images in a viewer) before you commit:");
         print!("{status}");
     }
     Ok(())

@@ -62,8 +62,18 @@ impl Context<'_> {
 const STAGES: &[Stage] = &[
     Stage { name: "setup", what: "what the machine lacks", when: When::Always, run: install },
     Stage { name: "fmt", what: "formatting", when: When::Always, run: fmt },
-    Stage { name: "arrows", what: "rooms and their arrows", when: When::Always, run: |c| dependencies::run(c.repo) },
-    Stage { name: "circles", what: "circles of files", when: When::Always, run: |c| import_cycles::run(c.repo) },
+    Stage {
+        name: "arrows",
+        what: "dependencies between crates",
+        when: When::Always,
+        run: |c| dependencies::run(c.repo),
+    },
+    Stage {
+        name: "circles",
+        what: "import cycles between files",
+        when: When::Always,
+        run: |c| import_cycles::run(c.repo),
+    },
     Stage { name: "rules", what: "rules of the tree", when: When::Always, run: rules },
     Stage {
         name: "docs",
@@ -89,7 +99,7 @@ const STAGES: &[Stage] = &[
         run: |c| clippy(&c.wheel()?, &test::version_dependent_packages()),
     },
     Stage { name: "test-4", what: "tests, MuJoCo 4", when: When::Wheel, run: wheel_test },
-    Stage { name: "physics", what: "the page of numbers, both lines", when: When::Wheel, run: physics },
+    Stage { name: "physics", what: "the physics page, both MuJoCo versions", when: When::Wheel, run: physics },
     Stage {
         name: "examples-4",
         what: "examples, MuJoCo 4",
@@ -240,7 +250,7 @@ fn demo(context: &Context<'_>) -> XtaskResult {
 /// Parses the command line of the README, so that CI runs exactly the documented command.
 fn readme_test(context: &Context<'_>) -> XtaskResult {
     let cli = docs_check::parse(TEST_COMMAND).map_err(|e| Failure::new(e.to_string()))?;
-    let args = cli.test_args().ok_or_else(|| Failure::new(format!("`{TEST_COMMAND}` is no test command")))?;
+    let args = cli.test_args().ok_or_else(|| Failure::new(format!("`{TEST_COMMAND}` is not a test command")))?;
     // Without a version in the command, CI tests 2.2.2 here and ignores a MUJOCO_DIR of the caller: another stage tests
     // the other version.
     test::run(context.repo, &TestArgs { mujoco: Some(args.mujoco.unwrap_or(MujocoVersion::Debian)), ..args.clone() })

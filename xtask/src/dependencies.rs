@@ -71,12 +71,11 @@ fn dependencies(metadata: &Value) -> impl Iterator<Item = (&str, &Value)> {
 
 fn differences(written: &BTreeSet<Dependency>, used: &BTreeMap<Dependency, String>) -> Vec<String> {
     let unwritten = used.iter().filter(|(arrow, _)| !written.contains(*arrow)).map(|((from, to), kind)| {
-        format!("{from} -> {to} ({kind} dependency in its Cargo.toml) is not among the arrows of {PAGE}")
+        format!("{from} -> {to} ({kind} dependency in its Cargo.toml) is not in the `arrows` block of {PAGE}")
     });
-    let unused = written
-        .iter()
-        .filter(|arrow| !used.contains_key(*arrow))
-        .map(|(from, to)| format!("{from} -> {to} is among the arrows of {PAGE}, but {from} does not depend on {to}"));
+    let unused = written.iter().filter(|arrow| !used.contains_key(*arrow)).map(|(from, to)| {
+        format!("{from} -> {to} is in the `arrows` block of {PAGE}, but {from} does not depend on {to}")
+    });
     unwritten.chain(unused).collect()
 }
 
@@ -93,7 +92,7 @@ fn cycle(arrows: &BTreeSet<Dependency>) -> Option<String> {
         }
     }
     let names: Vec<String> = left.iter().map(|(from, to)| format!("{from} -> {to}")).collect();
-    (!names.is_empty()).then(|| format!("arrows must point down only, these lead into a circle: {}", names.join(", ")))
+    (!names.is_empty()).then(|| format!("dependencies must be acyclic; these form a cycle: {}", names.join(", ")))
 }
 
 /// Dependencies from a registry that bypass the table in the root's Cargo.toml, which gives the reasons.
@@ -163,7 +162,7 @@ mod tests {
         for (arrows, named) in [
             ("sim -> scene  # poses\ntests -> sim", None),
             ("sim -> scene", Some("tests -> sim (build dependency")),
-            ("sim -> scene\ntests -> sim\nscene -> sim", Some("scene -> sim is among")),
+            ("sim -> scene\ntests -> sim\nscene -> sim", Some("scene -> sim is in the `arrows` block")),
         ] {
             let found = findings(arrows);
             assert_eq!(found.len(), usize::from(named.is_some()), "{found:?}");

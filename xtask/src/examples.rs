@@ -80,7 +80,7 @@ const TABLE: &[ExampleRun] = &[
     row("create_robot", &[0], "--headless --steps 20 --record {out}/create_robot.hdf5"),
     // Recordings of an example without a camera: the stage works, and a camera that does not exist is an error.
     row("create_robot", &[0], "--headless --num-envs 2 --steps 50 --record {out}/create_robot.apng"),
-    row("create_robot", &[2], "--headless --steps 1 --record {out}/none.mp4 --record-view nobody"),
+    row("create_robot", &[2], "--headless --steps 1 --record {out}/none.mp4 --record-view missing"),
     row("create_robot", &[2], "--headless --steps 1 --record-view stage"),
     row("run_camera", &[0], "--headless --num-envs 2 --steps 60 --record {out}/stage.mp4 --record-view stage"),
     row("run_camera", &[0], "--headless --num-envs 2 --steps 60 --record {out}/camera.webp --record-view camera"),
@@ -304,7 +304,7 @@ const TABLE: &[ExampleRun] = &[
     row("render_model", &[2], "assets/sr5/SR5.urdf --renderer rt --rt-samples 0 --out {out}/none"),
     row("render_model", &[2], "{out}/there_is_no_such_file.xml --out {out}/none"),
     row("render_model", &[2], "{out}/malformed.urdf --out {out}/none"),
-    row("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --camera nobody"),
+    row("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --camera missing"),
     row("render_model", &[2], "assets/sr5/SR5.urdf --out {out}/none --msaa 3"),
     row("render_model", &[0], "assets/sr5/SR5.urdf --headless --width 64 --height 48 --out {out}/small"),
     row("render_model", &[0], "assets/sr5/SR5.urdf --out {out}/served --serve 127.0.0.1:0 --steps 20"),

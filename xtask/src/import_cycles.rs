@@ -16,9 +16,9 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
     let findings: Vec<String> = import_cycles(&text_files(&repo.root))
         .into_iter()
         .filter(|circle| circle.len() > MAX_CYCLE_FILES)
-        .map(|circle| format!("{} files use each other: {}", circle.len(), circle.join(", ")))
+        .map(|circle| format!("{} files import each other: {}", circle.len(), circle.join(", ")))
         .collect();
-    no_findings("circles of more than 5 files; move what both sides need into a file of its own", &findings)
+    no_findings("import cycles of more than 5 files; move the shared items into a separate file", &findings)
 }
 
 /// All cycles, the largest first.

@@ -125,7 +125,7 @@ fn check_search_texts(root: &Path) -> XtaskResult {
     for Mutation { name, file, search, replacement, .. } in mutations::all() {
         let times = read(&root.join(file))?.matches(search).count();
         if times != 1 || search == replacement {
-            findings.push(format!("{name}: its text stands {times} times in {file}, not once: {search:?}"));
+            findings.push(format!("{name}: its search text occurs {times} times in {file}, not once: {search:?}"));
         }
     }
     no_findings("mutations that do not fit the code (xtask/src/mutations)", &findings)
@@ -142,7 +142,7 @@ pub(crate) fn check(root: &Path) -> XtaskResult {
     if findings.is_empty() && rows != count {
         findings.push(format!("{rows} rows for {count} mutations"));
     }
-    no_findings("docs/mutations.md is of another list: cargo xtask mutate", &findings)
+    no_findings("docs/mutations.md does not match the list of mutations: cargo xtask mutate", &findings)
 }
 
 /// Cargo arguments that select the tests of a mutation.
@@ -225,7 +225,7 @@ mod tests {
         let all: Vec<&Mutation> = mutations::all().collect();
         assert!(all.len() >= 80);
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        check_search_texts(&root).expect("every text stands once");
+        check_search_texts(&root).expect("every search text occurs once");
         for (k, mutation) in all.iter().enumerate() {
             assert!(all[..k].iter().all(|other| other.name != mutation.name), "{}", mutation.name);
             assert!(!mutation.tests.1.is_empty(), "{}", mutation.name);

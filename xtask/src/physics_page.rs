@@ -12,7 +12,7 @@ const GROUPS: [(&str, &str); 5] = [
     ("articulated", "Mechanisms"),
     ("drives", "Drives"),
     ("contacts", "Contacts and sensors"),
-    ("numerical", "Numerical promises"),
+    ("numerical", "Numerical guarantees"),
 ];
 /// Share of its tolerance by which a number may differ, without a reason, between two machines or two supported MuJoCo
 /// versions.
@@ -192,7 +192,7 @@ pub(crate) fn page(runs: &[PhysicsRun]) -> XtaskResult<String> {
     };
     let mut out = format!(
         "# Laws of physics\n\nWritten by `cargo xtask physics-report`; do not edit. {} laws, each with a closed form, a \
-         conservation law, a symmetry or a promise of sameness, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls}\n\nThe derivation of a law, and where its \
+         conservation law, a symmetry or a reproducibility guarantee, run through URDF files, manager, robots and objects on MuJoCo {}: {} numbers, {}. {controls}\n\nThe derivation of a law, and where its \
          tolerance comes from, stand at the head of its file. A number is as true on another machine if it differs by less than a \
          tenth of its tolerance; that is what CI asks of this page.\n",
         laws.len(),
@@ -224,7 +224,7 @@ pub(crate) fn page(runs: &[PhysicsRun]) -> XtaskResult<String> {
     out.push_str(&differences(&rows, &versions)?);
     let plots = plots(runs);
     if !plots.is_empty() {
-        out.push_str("\n## Pictures\n");
+        out.push_str("\n## Plots\n");
         for (law, plot) in plots {
             let _ = write!(out, "\n![{}](physics/{law}.svg)\n", plot.title);
         }
@@ -312,12 +312,12 @@ fn differences(rows: &[&Row], versions: &[&str]) -> XtaskResult<String> {
         }
     }
     crate::run::no_findings(
-        "numbers differ between the lines of MuJoCo by more than a tenth of the tolerance, and the law does not say why \
-         (`lines_differ`)",
+        "numbers differ between the MuJoCo versions by more than a tenth of the tolerance, and the law gives no reason \
+         (`versions_differ`)",
         &unexplained,
     )?;
     crate::run::no_findings(
-        "laws say why the lines of MuJoCo differ in a number (`lines_differ_in`) in which they agree",
+        "laws give a reason for a difference between the MuJoCo versions (`versions_differ_in`), but the versions agree",
         &needless,
     )?;
     Ok(if some { out } else { String::new() })
@@ -393,16 +393,18 @@ fn outdated_differences(page: &str, now: &str, runs: &[PhysicsRun]) -> Vec<Strin
     let mut findings = Vec::new();
     for new in &is {
         match was.iter().find(|old| same(old, new)) {
-            None => findings.push(format!("{} ({}): that the lines differ is not on the page", new[0], new[1])),
+            None => findings
+                .push(format!("{} ({}): the page does not list this difference between the versions", new[0], new[1])),
             Some(old) if !near(old, new) => {
                 let [old, new] = [old, new].map(|cells| cells[2..4].join(" and "));
-                findings.push(format!("differences of the lines: {old} on the page, {new} now"));
+                findings.push(format!("difference between the versions: {old} on the page, {new} now"));
             }
             Some(_) => {}
         }
     }
     let gone = |old: &&Vec<String>| !is.iter().any(|new| same(old, new));
-    findings.extend(was.iter().filter(gone).map(|old| format!("{} ({}): the lines no longer differ", old[0], old[1])));
+    findings
+        .extend(was.iter().filter(gone).map(|old| format!("{} ({}): the versions no longer differ", old[0], old[1])));
     findings
 }
 

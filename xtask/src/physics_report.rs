@@ -55,7 +55,7 @@ pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> XtaskResult {
     let mut failed = Ok(());
     let mut progress = Progress::new(VERSIONS.len());
     for line in VERSIONS {
-        progress.begin(&format!("the laws of physics on the line {line:?} of MuJoCo"));
+        progress.begin(&format!("the laws of physics, MuJoCo version {line:?}"));
         let ready = setup::prepare(repo, Requirements { version: Some(line), extras: &[] })?;
         let rows = fresh_folder(repo, line)?;
         let tests = ready.cargo().env(VARIABLE, rows).args(["test", "--package", "kinetoscope", "--test", "physics"]);
@@ -114,7 +114,7 @@ fn compare(repo: &Repo, runs: &[PhysicsRun]) -> XtaskResult {
     physics_page::page(runs)?;
     let mut findings = physics_page::outdated_statements(&repo.read(PAGE)?, runs);
     findings.extend(outdated_plots(&repo.root.join(PLOTS), &plot_files(runs)?)?);
-    no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
+    no_findings(&format!("{PAGE} is outdated; `cargo xtask physics-report` rewrites it"), &findings)
 }
 
 /// Differences between the folder of the plots and the plots of the report: missing, outdated and superfluous files.
@@ -132,7 +132,7 @@ fn outdated_plots(folder: &Path, pictures: &[(String, String)]) -> XtaskResult<V
     for file in files {
         let name = file.map_err(fail)?.file_name().to_string_lossy().into_owned();
         if pictures.iter().all(|(known, _)| *known != name) {
-            findings.push(format!("{PLOTS}/{name} is a picture of no law"));
+            findings.push(format!("{PLOTS}/{name} belongs to no law"));
         }
     }
     Ok(findings)
@@ -161,7 +161,7 @@ mod tests {
         let found = look(&[of("top", 2.0), of("bounce", 2.0)]);
         assert!(found.len() == 1 && found[0].contains("top.svg shows other curves"), "{found:?}");
         let found = look(&pictures[..1]);
-        assert!(found.len() == 1 && found[0].contains("bounce.svg is a picture of no law"), "{found:?}");
+        assert!(found.len() == 1 && found[0].contains("bounce.svg belongs to no law"), "{found:?}");
         let found = look(&[of("top", 1.0), of("bounce", 2.0), of("fall", 1.0)]);
         assert!(found.len() == 1 && found[0].contains("fall.svg is not there"), "{found:?}");
     }

@@ -55,7 +55,7 @@ fn download(target: &Path, folder: &Path) -> XtaskResult {
         .and_then(|()| {
             let is_wheel = |path: &PathBuf| path.extension().is_some_and(|end| end == "whl");
             let mut files = fs::read_dir(&scratch).map_err(fail)?.flatten().map(|entry| entry.path());
-            let wheel = files.find(is_wheel).ok_or_else(|| Failure::new(format!("{PACKAGE} is no wheel")))?;
+            let wheel = files.find(is_wheel).ok_or_else(|| Failure::new(format!("{PACKAGE} is not a wheel")))?;
             Cmd::new("python3").args(["-m", "zipfile", "-e"]).args([&wheel, &scratch]).output()?;
             fs::rename(scratch.join(INSIDE), folder).map_err(fail)
         });

@@ -42,7 +42,7 @@ pub(crate) fn check(ours: &Path, other: &Path, different_lighting: bool) -> Resu
         here.iter().filter(|name| different_lighting && (name.starts_with("color") || name.starts_with("sensor_views")))
     {
         if read(ours, picture)? == read(other, picture)? {
-            return Err(format!("{picture} of {} and {} are one picture", ours.display(), other.display()));
+            return Err(format!("{picture} of {} and {} are the same image", ours.display(), other.display()));
         }
     }
     Ok(())
@@ -79,7 +79,7 @@ fn compare(ours: &(Array, Array), other: &(Array, Array)) -> Result<(usize, usiz
     if [&ours.1.0, &other.0.0, &other.1.0].into_iter().any(|other| other != shape) {
         return Err(format!("shapes differ from {shape:?}"));
     }
-    let [.., height, width] = shape[..] else { return Err("not pictures".into()) };
+    let [.., height, width] = shape[..] else { return Err("not images".into()) };
     let pictures = shape.iter().product::<usize>() / (height * width).max(1);
     let near = |a: f32, b: f32, part: f32| a == b || (a - b).abs() <= part * a.abs();
     let (mut compared, mut different) = (0, 0);
@@ -145,7 +145,7 @@ mod tests {
         let said = |other| verdict(other).expect_err("they differ");
         assert!(said(folder(0.001, 8, "other")).contains("differ at 2 of 4 pixels"));
         assert!(said(folder(0.0, 9, "other")).contains("differ at 2 of 4 pixels"));
-        assert!(said(folder(0.0, 8, "ours")).contains("are one picture"));
+        assert!(said(folder(0.0, 8, "ours")).contains("are the same image"));
         assert!(said(tempfile::tempdir().expect("a scratch folder")).contains("has []"));
     }
 }

@@ -157,7 +157,7 @@ impl Requirement {
             }
             Self::Models => "the models that come with MuJoCo (humanoid.xml)",
             Self::Pip => "python3 with pip (MuJoCo 4 is downloaded with it)",
-            Self::Venv => "python3 with venv (rivals in Python are installed with it)",
+            Self::Venv => "python3 with venv (used to install the Python baselines)",
             Self::OsMesa => {
                 "OSMesa, Mesa's software renderer (MuJoCo's own cameras draw with it; gone from Mesa 25.1 on)"
             }
@@ -341,7 +341,7 @@ fn is_interactive() -> bool {
 
 /// Reads the user's answer; an empty line means yes.
 fn confirmed() -> XtaskResult<bool> {
-    eprint!("go on? [Y/n] ");
+    eprint!("continue? [Y/n] ");
     let mut answer = String::new();
     std::io::stdin().read_line(&mut answer).map_err(|e| Failure::new(format!("the answer: {e}")))?;
     Ok(is_yes(&answer))

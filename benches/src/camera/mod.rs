@@ -10,7 +10,7 @@
 //! use one core and are compared with one thread.
 //!
 //! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; reflections are off
-//! on both sides. "MuJoCo on OSMesa" is `mujoco.BaselineRenderer` at its best settings (see `rivals/mujoco_osmesa.py`). "OSMesa
+//! on both sides. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings (see `rivals/mujoco_osmesa.py`). "OSMesa
 //! by hand" calls the library with two passes instead of three, which that class does not offer. Shadow maps have the
 //! default size of each side, 4096 texels in MuJoCo and at most 1024 in ours. Another row reduces MuJoCo's shadow maps
 //! to the size of ours.
@@ -78,7 +78,7 @@ struct Baselines {
 
 impl Baselines {
     fn new() -> Self {
-        let python = python("rivals of the cameras");
+        let python = python("camera baselines");
         let all =
             [BaselineRenderer::OsMesa, BaselineRenderer::OsMesaTwoPass, BaselineRenderer::Tiny, BaselineRenderer::Warp];
         let missing =
@@ -253,8 +253,12 @@ fn stepping(settings: &Settings, rivals: &Baselines, scene: &Scene) -> BenchResu
             contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &Work { look: Quality::Defaults, ..plain })?;
         let rates = contest.run(2.0 * settings.seconds)?;
         rows.push(rates.row(name("plain"), 2, ours, (BaselineRenderer::OsMesa, osmesa)).with_target_ratio(10.0));
-        let defaults =
-            rates.row(name("full, rival at its defaults"), 2, ours_full, (BaselineRenderer::OsMesa, osmesa_defaults));
+        let defaults = rates.row(
+            name("full, baseline at its defaults"),
+            2,
+            ours_full,
+            (BaselineRenderer::OsMesa, osmesa_defaults),
+        );
         rows.push(defaults.with_target_ratio(50.0));
     }
     Ok(rows)

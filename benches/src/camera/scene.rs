@@ -141,7 +141,7 @@ impl Scene {
             if covered > share { nearest = distance_scale } else { farthest = distance_scale }
         }
         if (covered - share).abs() > 0.01 {
-            return Err(format!("{} covers {:.0} % of the picture at best", self.name, 100.0 * covered).into());
+            return Err(format!("{} covers {:.0} % of the image at best", self.name, 100.0 * covered).into());
         }
         std::fs::write(&self.file, with_camera(&self.mjcf, &self.view([1, 1])?)?)?;
         Ok(self)

@@ -147,7 +147,7 @@ impl Contender for OurRenderer<'_> {
 /// Renderers of the baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BaselineRenderer {
-    /// `mujoco.BaselineRenderer`, MuJoCo's renderer with its public API.
+    /// `mujoco.Renderer`, MuJoCo's renderer with its public API.
     OsMesa,
     /// The same library, called directly with the minimum number of passes.
     OsMesaTwoPass,

@@ -68,7 +68,7 @@ fn strict_and_packages() {
         ("render arm.urdf -o a.png --strict", "a second <material>"),
         ("check root.urdf", "does not exist"),
         ("check none.urdf --asset-root assets", "give its folder by --package NAME=DIR or ROS_PACKAGE_PATH"),
-        ("check root.urdf --asset-root none", "none is no folder"),
+        ("check root.urdf --asset-root none", "none is not a folder"),
         ("check pendulum.xml --strict", "--strict: pendulum.xml is an MJCF file"),
         ("check pendulum.xml --asset-root assets", "--asset-root: pendulum.xml is an MJCF file"),
     ]);
@@ -166,8 +166,8 @@ fn refusals() {
     shell.assert_refused(&[
         ("unknown", "unknown"),
         ("check no_such.urdf", "no such file"),
-        ("check arm.urdf pendulum.xml", "an MJCF file is a model of its own"),
-        ("check arm.urdf scene.toml", "a scene file is a scene of its own"),
+        ("check arm.urdf pendulum.xml", "an MJCF file is a complete model: give it alone"),
+        ("check arm.urdf scene.toml", "a scene file is a complete scene: give it alone"),
         ("check scene.toml --qpos hinge=1", "--qpos hinge"),
         ("check scene.toml --package a=.", "--package a"),
         ("bench scene.toml --floating-base", "--floating-base"),

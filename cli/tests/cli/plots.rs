@@ -39,7 +39,7 @@ fn closed_form() {
         for (env, start) in STARTS.into_iter().enumerate() {
             let said =
                 shell.run_ok(&format!("plot {name} --topic /joint_states --env {env} --field position[x] -o plot.svg"));
-            assert!(said.contains("1 curves, 301 points"), "{said}");
+            assert!(said.contains("1 curve, 301 points"), "{said}");
             let curves = curves(&std::fs::read_to_string(shell.path("plot.svg")).unwrap());
             assert_eq!((curves.len(), curves[0].len()), (1, 301));
             // Curves and labels are rounded to hundredths of a pixel: 3 s on more than 600 pixels, 2 starts on more
@@ -62,7 +62,7 @@ fn lists_and_refusals() {
     record(&shell.path("run.npz"));
     let out = shell.run_ok("plot run.npz");
     for line in
-        ["/env_1/cart/joint_states   numbers, 301 times", "    position[x]", "    pose[cart/world, cart/cart].qw"]
+        ["/env_1/cart/joint_states   numbers, 301 messages", "    position[x]", "    pose[cart/world, cart/cart].qw"]
     {
         assert!(out.lines().any(|found| found == line), "{line}: {out}");
     }

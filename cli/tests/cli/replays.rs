@@ -131,7 +131,7 @@ fn pages_and_refusals() {
         ("replay run.mcap --scene no_such.toml", "no_such.toml"),
     ]);
     let mut running = RunningCommand::start(&mut shell.command("replay run.mcap --serve 127.0.0.1:0"));
-    assert!(running.line().contains("Ctrl+C ends it"));
+    assert!(running.line().contains("Ctrl+C ends the replay"));
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
 }

@@ -1,11 +1,11 @@
 //! Reading of recordings: their topics, and numbers over time.
 //!
 //! ```no_run
-//! use kinetoscope_record::{Recording, Wanted};
+//! use kinetoscope_record::{Recording, FieldSelector};
 //!
 //! let recording = Recording::open("run.mcap")?;
 //! let topic = recording.topic("arm/joint_states", None)?;
-//! let samples = recording.samples(&[Wanted::new(&topic.name, "position[J1]")])?;
+//! let samples = recording.time_series(&[FieldSelector::new(&topic.name, "position[J1]")])?;
 //! println!("{} numbers", samples[0].values.len());
 //! # Ok::<(), kinetoscope_record::RecordError>(())
 //! ```

@@ -1,6 +1,6 @@
 use super::*;
 use crate::tests::*;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
 /// A mass of 1 kg that slides on a spring of 40 N/m, without friction.

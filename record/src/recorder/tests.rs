@@ -120,7 +120,7 @@ fn full_disk_images() {
         sim.add_sensor("camera", camera).unwrap();
         sim
     };
-    let images = |folder: &Path| kinetoscope_testkit::needs::files_below(folder, "png");
+    let images = |folder: &Path| kinetoscope_testkit::test_resources::files_below(folder, "png");
     let whole = folder.path().join("whole");
     let bytes = record_to_a_full_disk(&mut simulation(), &whole, usize::MAX).unwrap().bytes;
     assert!(images(&whole).len() > 20 && bytes > 5000, "{bytes} bytes in {}", images(&whole).len());
@@ -260,7 +260,7 @@ fn panic_of_the_thread() {
     });
     sim.update(20);
     sim.observers_mut().get(recorder).unwrap().wait_until_written();
-    kinetoscope_testkit::refusal::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
+    kinetoscope_testkit::error_tables::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
 }
 
 /// Root cause: arrivals were counted, but the shown values were copied. They differ if the state is written while
@@ -345,7 +345,7 @@ fn absurd_numbers() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = falling(1);
     let refused = sim.record(RecorderCfg { packets: usize::MAX, ..RecorderCfg::new(&path) });
-    kinetoscope_testkit::refusal::assert_error(refused, &format!("TooLarge {{ packets: {}", usize::MAX), &[]);
+    kinetoscope_testkit::error_tables::assert_error(refused, &format!("TooLarge {{ packets: {}", usize::MAX), &[]);
     let cfg = RecorderCfg { period_steps: u64::MAX, ..RecorderCfg::new(&path) };
     assert_eq!(record(&mut sim, cfg, |sim| sim.update(5)).packets, 1);
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0]);

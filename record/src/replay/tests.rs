@@ -2,7 +2,7 @@ use super::*;
 use crate::tests::*;
 use kinetoscope_robot::description::LinkId;
 use kinetoscope_sim::{SimulationManagerCfg, WrenchFrame};
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::worlds::sr5;
 use std::fs::File;
 

@@ -1,7 +1,7 @@
 //! Recordings that cannot be begun, and their errors.
 
 use super::*;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 use std::fs;
 
 /// A file name for each format that is a file.

@@ -264,6 +264,6 @@ fn stage_alone() {
         (OverviewCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..OverviewCfg::default() }, "from"),
     ] {
         let cfg = RecorderCfg { overview: stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
-        kinetoscope_testkit::refusal::assert_error(sim.record(cfg), "Stage", &[wrong]);
+        kinetoscope_testkit::error_tables::assert_error(sim.record(cfg), "Stage", &[wrong]);
     }
 }

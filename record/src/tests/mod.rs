@@ -33,7 +33,7 @@ pub(crate) use serde_json::{Value, json};
 pub(crate) use std::path::{Path, PathBuf};
 
 pub(crate) use archives::{falling, member, numbers_of, rows};
-use kinetoscope_testkit::needs::{python_readers, read_json};
+use kinetoscope_testkit::test_resources::{python_readers, read_json};
 use std::borrow::Borrow;
 use tempfile::TempDir;
 

@@ -196,7 +196,7 @@ fn own_task() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = task().into_sim();
     let cfg = RecorderCfg::new(&path).with_topics([Topic::TaskResults]);
-    kinetoscope_testkit::refusal::assert_error(sim.record(cfg.clone()), "NoTask", &["Env"]);
+    kinetoscope_testkit::error_tables::assert_error(sim.record(cfg.clone()), "NoTask", &["Env"]);
     record(&mut sim, RecorderCfg::new(&path), |sim| sim.update(3));
     assert!(Recording::open(&path).unwrap().topic("task", None).is_err());
 

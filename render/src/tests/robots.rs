@@ -23,7 +23,7 @@ const SR5: [(&str, [f64; 3], [f64; 3]); 7] = [
 
 /// Meshes of the SR5's links, which all tests share.
 static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
-    let folder = kinetoscope_testkit::needs::robot("rokae_description/urdf/SR5.urdf")
+    let folder = kinetoscope_testkit::test_resources::robot("rokae_description/urdf/SR5.urdf")
         .with_file_name("../meshes/xMateSR5/visual");
     SR5.map(|(name, ..)| {
         let mesh = load(&folder.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
@@ -71,8 +71,8 @@ fn vendor_sr5_links() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn textures_of_anymal() {
-    let meshes =
-        kinetoscope_testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf").with_file_name("../meshes");
+    let meshes = kinetoscope_testkit::test_resources::robot("anymal_c_simple_description/urdf/anymal.urdf")
+        .with_file_name("../meshes");
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
     let [base, top, bottom, face] =

@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use kinetoscope_scene::Pose;
-/// use kinetoscope_robot::kinematics::Tip;
+/// use kinetoscope_robot::kinematics::TipFrame;
 ///
 /// // 0.12 m in front of the flange, moved by the arm.
-/// let tip = Tip::of_part("arm").at("ee_link").with_tcp(Pose::translation(0.0, 0.0, 0.12));
+/// let tip = TipFrame::of_part("arm").at("ee_link").with_tcp(Pose::translation(0.0, 0.0, 0.12));
 /// # let _ = tip;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

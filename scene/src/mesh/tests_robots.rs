@@ -1,7 +1,7 @@
 //! Tests of the vendors' meshes against values of independent readers.
 #![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
 
-use kinetoscope_testkit::needs::{files_below, robots_dir};
+use kinetoscope_testkit::test_resources::{files_below, robots_dir};
 use std::path::PathBuf;
 
 use super::builder::{cross, dot, sub};

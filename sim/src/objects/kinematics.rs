@@ -176,7 +176,7 @@ impl Robot<'_> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use kinetoscope_robot::kinematics::{IkCfg, Tip};
+    /// use kinetoscope_robot::kinematics::{IkCfg, TipFrame};
     /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
     /// use kinetoscope_robot::urdf::UrdfCfg;
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-arm-{}.urdf", std::process::id()));
@@ -196,7 +196,7 @@ impl Robot<'_> {
     ///     ..Default::default()
     /// })?;
     /// # std::fs::remove_file(&urdf)?;
-    /// let hand = Tip::of_part("arm").with_tcp(kinetoscope_scene::Pose::translation(0.3, 0.0, 0.0));
+    /// let hand = TipFrame::of_part("arm").with_tcp(kinetoscope_scene::Pose::translation(0.3, 0.0, 0.0));
     /// let robot = sim.robot(arm);
     /// let targets = robot.compute_fk(&array![[0.4, 0.9]], hand, None)?;
     /// let found = robot.compute_ik(&targets, hand, &IkCfg::default(), None, None)?;

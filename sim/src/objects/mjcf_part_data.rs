@@ -23,13 +23,13 @@ use std::sync::Arc;
 /// those of the scene; diagnostics report the differences.
 ///
 /// ```
-/// use kinetoscope_sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
+/// use kinetoscope_sim::{MjcfPartCfg, SimulationManager, SimulationManagerCfg};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 /// let pendulum = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
 ///     <joint name="hinge" axis="0 1 0"/><geom size="0.05" pos="0.3 0 0"/></body></worldbody>
 ///   <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>"#;
-/// let part = sim.add_mjcf(MjcfCfg::text("pendulum", pendulum))?;
+/// let part = sim.add_mjcf(MjcfPartCfg::text("pendulum", pendulum))?;
 /// let motor = sim.mjcf_part(part).actuator_ids(&["motor"])?;
 /// sim.mjcf_part_mut(part).set_ctrl(&ndarray::array![[0.1]], Some(&motor), None)?;
 /// sim.update(10);

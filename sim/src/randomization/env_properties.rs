@@ -143,13 +143,13 @@ impl<'a> EnvPropertiesMut<'a> {
     ///
     /// ```
     /// use kinetoscope_sim::{
-    ///     Draw, EnvId, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
+    ///     RandomizationOp, EnvId, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
     /// };
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
     /// let shape = ObjectShape::cube(0.1);
     /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape, ..Default::default() })?;
-    /// let draw = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.5, 2.0]));
+    /// let draw = Randomization::new().with(Property::Mass, "cube", RandomizationOp::Scale([0.5, 2.0]));
     /// sim.properties_mut().randomize(&draw, None)?;
     /// let mass = sim.properties().of(EnvId(2))?.get(Property::Mass, "cube")?.to_vec();
     /// let snapshot = sim.snapshot(None)?;

@@ -45,16 +45,16 @@ pub struct RandomizationTerm {
 ///
 /// ```
 /// use kinetoscope_sim::{
-///     Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
+///     RandomizationOp, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
 /// };
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
 /// let shape = ObjectShape::cube(0.1);
 /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape, mass: Some(2.0), ..Default::default() })?;
 /// let randomization = Randomization::new()
-///     .with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]))
-///     .with(Property::Friction, "cube|ground", Draw::Set([0.4, 1.0]))
-///     .with(Property::Gravity, "gravity", Draw::Add([-0.1, 0.1]));
+///     .with(Property::Mass, "cube", RandomizationOp::Scale([0.8, 1.2]))
+///     .with(Property::Friction, "cube|ground", RandomizationOp::Set([0.4, 1.0]))
+///     .with(Property::Gravity, "gravity", RandomizationOp::Add([-0.1, 0.1]));
 /// sim.properties_mut().randomize(&randomization, None)?;
 /// let mass = sim.properties().of(kinetoscope_sim::EnvId(3))?.get(Property::Mass, "cube")?[0];
 /// assert!((1.6..2.4).contains(&mass));

@@ -23,7 +23,7 @@ fn compare_with_huge_buffers(sim: &mut SimulationManager, steps: u32, contacts: 
             most = most.max(most_contacts(sim.batch()));
         }
     }
-    assert_eq!(reference.buffer_growths(), 0, "the reference had room");
+    assert_eq!(reference.buffer_growths(), 0, "the reference did not grow its buffers");
     assert!(most >= contacts, "{most} contacts");
     assert_quiet(sim);
 }

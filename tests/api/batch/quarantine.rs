@@ -53,7 +53,7 @@ fn one_of_64() {
         assert_eq!(batch.read(17, bits_of), fresh.read(0, bits_of), "{what}: revived");
         batch.step(20);
         fresh.step(20);
-        assert_eq!(batch.read(17, bits_of), fresh.read(0, bits_of), "{what}: and goes on");
+        assert_eq!(batch.read(17, bits_of), fresh.read(0, bits_of), "{what}: and continues");
     }
 }
 
@@ -130,7 +130,7 @@ fn no_revival() {
     assert_eq!(sim.diverged(), diverged);
     assert_eq!(sim.warnings().counts()["mujoco-bad-position"], counts["mujoco-bad-position"]);
     sim.update(5);
-    assert_eq!(sim.diverged(), diverged, "it stands still");
+    assert_eq!(sim.diverged(), diverged, "it does not move");
     assert!((sim.time()[1] - 0.05).abs() < 1e-12);
     for value in [0.4, 1e300, 0.2] {
         put(&mut sim, robot, value, 1);

@@ -72,7 +72,7 @@ fn with_followers() {
     let bound = export.bound.unwrap();
     let step: f64 = between(&export.xml, "timestep=\"", "\"").parse().unwrap();
     assert!(step >= 1e-3 && step < bound, "a step of {step} s, and {bound} s is stable");
-    assert!(export.xml.contains("accelerates more slowly"), "what was given up is said");
+    assert!(export.xml.contains("accelerates more slowly"), "the diagnostics name the approximation");
     for h in [step, 0.5 * step, 0.1 * step] {
         let [hold, reach] = [0.0, 0.5].map(|offset| export.run(h, (2.0 / h) as usize, offset).unwrap());
         // Without a limit a drive approaches its target at kp e / kd: 10 / s x 0.5 rad; a follower is 1.05 times as
@@ -121,7 +121,7 @@ fn without_followers() {
     let (files, drive) = (TempFiles::default(), tutorial_gains("a.*", "h.*"));
     let chain = worlds::text_robot(&files, "robot", &urdf(&arm_and_hand()));
     let export = export(RobotCfg { drive, init_qpos: vec![("a2".into(), 0.4)], ..chain });
-    let bound = export.bound.expect("drives have limits: both lines name a step");
+    let bound = export.bound.expect("drives have limits: both MuJoCo versions give a largest step");
     for h in [1e-3, 0.01, 0.05] {
         assert!(export.run(h, 1000, 0.0).unwrap() < 1e-3, "{h}");
         // On 2.2.2, velocity-implicit: stable up to the named step, with and without saturation.

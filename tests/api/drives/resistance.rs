@@ -73,7 +73,7 @@ fn rotor_inertia() {
     let read = world.view().armature();
     assert_eq!(read, Array2::from_elem((ENVS, 2), rotor));
     world.robot().set_armature(&read, None, None).unwrap();
-    assert_eq!(world.sim.properties().bytes(EnvId(0)).unwrap(), 0, "nothing is another");
+    assert_eq!(world.sim.properties().bytes(EnvId(0)).unwrap(), 0, "no property was changed");
 }
 
 /// The damping of a joint is independent of its drive's; a drive without stiffness and damping is a row without effort.

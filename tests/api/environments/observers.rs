@@ -118,7 +118,7 @@ fn resets_and_writes() {
     assert_eq!(read_log(&diary), [(2, SimEvent::Reset { env_ids: vec![EnvId(1)] })]);
     sim.update(1);
     let written = SimEvent::Written { env_ids: vec![EnvId(0), EnvId(1)] };
-    assert_eq!(read_log(&diary)[1..], [(2, written.clone())], "told once, before the step");
+    assert_eq!(read_log(&diary)[1..], [(2, written.clone())], "reported once, before the step");
     sim.update(1);
     assert_eq!(read_log(&diary).len(), 2, "and not again");
     sim.restore(&snapshot, None).unwrap();

@@ -31,7 +31,7 @@ fn same_bits() {
         assert!(all_bits(&sim) == there, "the state is back");
         assert!((snapshot.time()[0] - 5.0).abs() < 1e-9 && sim.time() == snapshot.time());
         sim.update(300);
-        assert!(all_bits(&sim) == end, "and goes on as before");
+        assert!(all_bits(&sim) == end, "and continues bit-identically");
 
         // A new manager of the same program, with another number of threads.
         let (mut fresh, _) = world(SimulationManagerCfg { threads: Some(3), ..settings });
@@ -194,7 +194,7 @@ fn diverged() {
     assert_eq!(sim.diverged(), reason);
     let before = sim.batch().read(1, bits_of);
     sim.update(5);
-    assert_eq!(sim.batch().read(1, bits_of), before, "it stands still");
+    assert_eq!(sim.batch().read(1, bits_of), before, "it does not move");
     assert!((sim.time()[0] - 0.30).abs() < 1e-9 && (sim.time()[1] - 0.20).abs() < 1e-9);
 }
 
@@ -302,7 +302,7 @@ fn with_properties() {
         assert!(all_bits(sim) == there && all_values(sim) == properties_at_snapshot, "back, in every bit");
         assert_eq!(sim.properties().bytes(EnvId(1)).unwrap(), 0, "what was nominal is shared again");
         sim.update(80);
-        assert!(all_bits(sim) == end, "and goes on as before");
+        assert!(all_bits(sim) == end, "and continues bit-identically");
         sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
         assert!(all_values(sim) == next, "the next draw is the next one");
         // Restored gains still count as randomized: a randomized gain persists when a plain state is restored, a set

@@ -267,7 +267,8 @@ fn exported_for_2_2_2() {
     ] {
         let message =
             format!("MJCF part \"new\": {what}: left out of robot.mjcf2.xml, because MuJoCo 2.2.2 does not support it");
-        let at = said.iter().position(|m| *m == message).unwrap_or_else(|| panic!("not said: {message}: {said:#?}"));
+        let at =
+            said.iter().position(|m| *m == message).unwrap_or_else(|| panic!("not reported: {message}: {said:#?}"));
         said.swap_remove(at);
         assert!(read("robot.mjcf2.xml").contains(&format!("<!-- {message} -->")), "a comment, too");
         assert!(read("diagnostics.txt").contains(&message));

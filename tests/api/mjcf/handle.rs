@@ -31,7 +31,7 @@ fn reads_and_writes() {
     sim.mjcf_part_mut(part).write_qpos(&row, Some(&[EnvId(1)])).unwrap();
     let now = sim.mjcf_part(part).qpos();
     assert_eq!((now.row(0), now[(1, 0)]), (start.row(0), 0.5));
-    assert_eq!(now[(1, 9)], 1.0, "quaternions are normalised");
+    assert_eq!(now[(1, 9)], 1.0, "quaternions are normalized");
 
     sim.mjcf_part_mut(part).set_ctrl(&array![[0.7]], Some(&[ActuatorIndex(0)]), Some(&[EnvId(2)])).unwrap();
     assert_eq!(sim.mjcf_part(part).ctrl(), array![[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.7, 0.0, 0.0]]);

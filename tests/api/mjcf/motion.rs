@@ -159,7 +159,7 @@ fn meshes() {
     let (here, there) = (corners(sim.batch().model()), corners(&alone));
     assert_eq!((here.len(), there.len()), (12, 12));
     for ((at, texture), (expected_at, expected_texture)) in here.iter().zip(&there) {
-        let single = Tolerance::absolute(2e-7, "single precision of 0.5 m, 3e-8: centred by MuJoCo and in the scene");
+        let single = Tolerance::absolute(2e-7, "single precision of 0.5 m, 3e-8: centered by MuJoCo and in the scene");
         assert_close("corner", at, expected_at, single);
         assert_eq!(texture, expected_texture);
     }

@@ -90,7 +90,7 @@ fn every_sample() {
         };
         let plain = compiled_alone(file);
         let model = sim.batch().model();
-        assert_eq!(plain.option_differences(model), [], "{name}: the judge has other options");
+        assert_eq!(plain.option_differences(model), [], "{name}: the reference has other options");
         assert_eq!((model.nq(), model.nv(), model.nu()), (plain.nq(), plain.nv(), plain.nu()), "{name}");
         let mass = |m: &Model| m.body_mass().iter().sum::<f64>();
         for found in [mass(model), sim.mjcf_part(part).total_mass()] {

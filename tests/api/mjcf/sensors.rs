@@ -287,7 +287,7 @@ fn sites() {
             if *site == "palm" {
                 // A camera without its own placement looks along the site's z axis.
                 let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::World);
-                assert!((0..3).all(|k| (at[(env, k)] - position[k]).abs() < 1e-12), "the camera stands on the site");
+                assert!((0..3).all(|k| (at[(env, k)] - position[k]).abs() < 1e-12), "the camera is at the site");
                 let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::Ros).to_owned();
                 is_there("camera", pose_of_row(&at, env), rotation);
                 is_there("handle", pose_of_row(&sim.mjcf_part(part).site_pose("palm").unwrap(), env), rotation);

@@ -130,7 +130,7 @@ fn excluded_objects() {
     sim.exclude_collision("ball", "block").unwrap();
     let model = sim.batch().model().clone();
     sim.exclude_collision("block", "ball").unwrap();
-    assert!(sim.batch().model().ptr_eq(&model), "known already: nothing is compiled");
+    assert!(sim.batch().model().ptr_eq(&model), "cached: nothing is compiled");
     stand(&mut sim, ids, [0.2, 0.1]);
 }
 

@@ -26,7 +26,7 @@ fn poses() {
     let there = Array3::from_shape_fn((2, 3, 7), |(e, k, c)| [e as f64, k as f64, 5.0, 0.0, 0.0, 2.0, 0.0][c]);
     sim.rigid_object_group_mut(id).write_pose(&there, None).unwrap();
     let mut pose = sim.rigid_object_group(id).pose();
-    assert_eq!(pose[(1, 2, 5)], 1.0, "normalised");
+    assert_eq!(pose[(1, 2, 5)], 1.0, "normalized");
     for (k, object) in objects(&sim, id).into_iter().enumerate() {
         assert_eq!(sim.rigid_object(object).pose(), pose.index_axis(Axis(1), k));
     }

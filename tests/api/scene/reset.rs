@@ -38,7 +38,7 @@ fn written_state_stays() {
     let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
     let height = |env: usize| scanner.pos_w()[(env, 2)];
     assert!((height(1) - height(0) - 0.25).abs() < 1e-12, "{} {}", height(0), height(1));
-    assert!(scene.sim().time().iter().all(|time| *time > 0.0), "time goes on");
+    assert!(scene.sim().time().iter().all(|time| *time > 0.0), "the time is not reset");
 
     // `reset_to_default` restores everything.
     scene.reset_to_default(None).unwrap();

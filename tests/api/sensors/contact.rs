@@ -91,7 +91,7 @@ fn leaning_plank() {
         let matrices = [sensor.force_matrix_w(), sensor.friction_matrix_w().unwrap()];
         let [normal_force, friction, point] =
             [matrices[0], matrices[1], sensor.contact_point_matrix_w().unwrap()].map(|matrix| {
-                assert!(matrix.index_axis(Axis(2), 1).iter().all(|x| *x == 0.0), "the ground is a metre below");
+                assert!(matrix.index_axis(Axis(2), 1).iter().all(|x| *x == 0.0), "the ground is a meter below");
                 let plank = matrix.index_axis(Axis(2), 0);
                 assert_eq!(plank.index_axis(Axis(0), 0), plank.index_axis(Axis(0), 1), "the same in both environments");
                 Vector3::from_fn(|k, _| plank[(0, 0, k)])

@@ -1,6 +1,6 @@
 //! The number of threads, environments and processes does not change a bit.
 
-use super::tasks::{all_terms_task, cfg, policy};
+use super::bundled::{all_terms_task, cfg, policy};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Shard;

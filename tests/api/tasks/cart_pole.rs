@@ -1,6 +1,6 @@
 //! A task equals, bit for bit, a hand-written loop over the plain API.
 
-use super::tasks::{cfg, world};
+use super::bundled::{cfg, world};
 use kinetoscope::ndarray::{Array1, Array2, Axis, array, concatenate};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::KeyedRng;

@@ -1,6 +1,6 @@
 //! `kinetoscope_tasks::check` finds nothing in valid tasks, and the fault of broken ones.
 
-use super::tasks::{all_terms_task, cart_env, cart_task, cfg, world};
+use super::bundled::{all_terms_task, cart_env, cart_task, cfg, world};
 use super::vector_env::Carts;
 use kinetoscope::ndarray::{Array2, ArrayView2, s};
 use kinetoscope::tasks::{Env, EnvCfg, EnvError, Finding, Space, Step, StepInfo, VectorEnv, check};

@@ -1,6 +1,6 @@
 //! Rewards and observations, compared with Newton's law.
 
-use super::tasks::{cart_env, cart_task, cfg, world};
+use super::bundled::{cart_env, cart_task, cfg, world};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::tasks::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};

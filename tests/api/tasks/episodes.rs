@@ -1,6 +1,6 @@
 //! Starts and ends of episodes, and the observations at them.
 
-use super::tasks::{all_terms_task, cart_env, cart_task, cfg, idle, policy, world};
+use super::bundled::{all_terms_task, cart_env, cart_task, cfg, idle, policy, world};
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::tasks::{

@@ -1,6 +1,6 @@
 //! Mistakes of users give typed errors, and a reset recovers from them.
 
-use super::tasks::{cart_task, cfg, idle, world};
+use super::bundled::{cart_task, cfg, idle, world};
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::tasks::{
     ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EnvError, EventMode, EventTerm, Noise, ObservationTerm,
@@ -22,7 +22,7 @@ fn ones(name: &str) -> ObservationTerm {
 }
 
 fn cart(num_envs: usize, cfg: EnvCfg) -> EnvBuilder {
-    let (sim, robot) = world(super::tasks::cfg(num_envs, 1), false);
+    let (sim, robot) = world(super::bundled::cfg(num_envs, 1), false);
     cart_task(sim, robot, cfg)
 }
 
@@ -149,7 +149,7 @@ fn terms_in_steps() {
                 let EnvError::NotFinite { env: 0, column, .. } = &error else { panic!("{error}") };
                 assert!(!good && column == "x", "{error}");
                 env.reset(None, None).unwrap();
-                assert!(env.step(&actions).is_ok(), "goes on after a reset");
+                assert!(env.step(&actions).is_ok(), "continues after a reset");
             }
         }
     }

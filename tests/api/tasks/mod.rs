@@ -1,13 +1,13 @@
 //! Tasks, compared with loops over the plain API, with closed forms, and with themselves in other batches.
 
 mod batches;
+mod bundled;
 mod cart_pole;
 mod checks;
 mod closed_forms;
 mod episodes;
 mod mistakes;
 mod observations;
-mod tasks;
 mod terms;
 mod train_reach;
 mod vector_env;

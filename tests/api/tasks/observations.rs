@@ -1,6 +1,6 @@
 //! Observations: spaces, names, noise, clips, scales, and sensors of the simulation.
 
-use super::tasks::{cart_task, cfg, idle, world};
+use super::bundled::{cart_task, cfg, idle, world};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::tasks::{Env, EnvBuilder, EnvCfg, EnvError, Noise, ObservationTerm, Space};

@@ -1,6 +1,6 @@
 //! Library terms, evaluated in known states.
 
-use super::tasks::{cfg, idle};
+use super::bundled::{cfg, idle};
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
@@ -242,7 +242,7 @@ fn root_state() {
 #[test]
 fn effort_squares() {
     let (mut sim, _) = floater(1, false);
-    let cart = sim.add_robot(mjcf_robot("cart", &super::tasks::cart(true))).unwrap();
+    let cart = sim.add_robot(mjcf_robot("cart", &super::bundled::cart(true))).unwrap();
     let squares = terms::joint_torques_l2(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
     let mut env = begin(task(sim, cart).reward(squares));
     env.sim_mut().robot_mut(cart).set_qpos_target(&array![[0.1, -0.2]], None, None).unwrap();

@@ -1,6 +1,6 @@
 //! One generic loop over different implementations of batched environments.
 
-use super::tasks::{cart_env, cart_task, cfg, world};
+use super::bundled::{cart_env, cart_task, cfg, world};
 use kinetoscope::ndarray::{Array1, Array2, ArrayView2, Axis, array};
 use kinetoscope::tasks::{EnvCfg, EnvError, Space, Step, StepInfo, VectorEnv};
 

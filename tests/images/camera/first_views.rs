@@ -96,5 +96,5 @@ fn of_mjcf() {
     let (azimuth, elevation) = (way[1].atan2(way[0]).to_degrees(), way[2].atan2(way[0].hypot(way[1])).to_degrees());
     assert!((azimuth - 30.0).abs() < 1e-6 && (elevation + 20.0).abs() < 1e-6, "{azimuth} {elevation}");
     let distance = way.iter().map(|x| x * x).sum::<f64>().sqrt();
-    assert!((1.5..5.0).contains(&distance), "{distance} m from a table of a metre");
+    assert!((1.5..5.0).contains(&distance), "{distance} m from a table of 1 m");
 }

@@ -18,7 +18,7 @@ fn covered_share(still: &OffscreenScene) -> f64 {
     let mut frame = Frame::new(64, 48, Channels { color: true, mask: true, ..Channels::default() });
     ImageRenderer::new(RasterCfg::default()).render_request(&still.render_request(&view), &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap();
-    assert!(color.as_chunks::<4>().0.iter().any(|c| c != &color[..4]), "an image of one colour");
+    assert!(color.as_chunks::<4>().0.iter().any(|c| c != &color[..4]), "an image of one color");
     let mask = frame.mask.unwrap();
     mask.iter().filter(|&&m| m != 0).count() as f64 / mask.len() as f64
 }

@@ -198,7 +198,7 @@ fn check(name: &str, files: &TempFiles, mjcf: &str, eye: [f64; 3], target: [f64;
     assert!(agreement.brightness > 0.97 && agreement.hue < 0.06, "{name}: {agreement:?}");
     let exchanged = Images { color: images.color.iter().map(|&[r, g, b]| [b, r, g]).collect(), ..images };
     let wrong = compare(&theirs, &exchanged, &mask_of);
-    assert!(wrong.hue > 1.5 * agreement.hue, "{name}: exchanged colours go unnoticed: {wrong:?}");
+    assert!(wrong.hue > 1.5 * agreement.hue, "{name}: exchanged colors go unnoticed: {wrong:?}");
     // Control: a camera that looks 5 mm past the target.
     let aside = our_images(&file, eye, [target[0] + 0.005, target[1], target[2] + 0.005]).0;
     let wrong = compare(&theirs, &aside, &mask_of);

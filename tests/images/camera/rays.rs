@@ -197,5 +197,5 @@ fn one_centimetre() {
         camera.ray(u, v).is_some_and(|hit| (f64::from(depth[*k]) / hit.depth - 1.0).abs() > 1e-4)
     };
     let wrong = (0..SIZE[0] * SIZE[1]).filter(wrong).count();
-    assert!(wrong > 1000, "only {wrong} pixels tell a centimetre");
+    assert!(wrong > 1000, "only {wrong} pixels tell a centimeter");
 }

@@ -81,7 +81,7 @@ fn assert_near_with(what: &str, found: &Mass, expected: &Mass, [tolerance, of_te
         Vector3::from_vec(moments)
     };
     assert!((found.0 - mass).abs() <= tolerance * mass, "{what}: mass {} instead of {mass}", found.0);
-    assert!((found.1 - expected.1).amax() <= tolerance, "{what}: centre {} instead of {}", found.1, expected.1);
+    assert!((found.1 - expected.1).amax() <= tolerance, "{what}: center {} instead of {}", found.1, expected.1);
     let (found_moments, expected_moments) = (moments(found), moments(expected));
     let off = (found_moments - expected_moments).amax();
     assert!(off <= tolerance * size, "{what}: moments {found_moments} instead of {expected_moments}");

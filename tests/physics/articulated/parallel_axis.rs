@@ -127,22 +127,22 @@ fn holds() {
             m.row(&format!("mass, {name}"), "kg", mass, turned.mass, rounding);
             m.control(&format!("mass, {name}"), "without head and tail", trunk.mass);
             for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-                let quantity = format!("centre of mass, {axis}, {name}");
+                let quantity = format!("center of mass, {axis}, {name}");
                 m.row(&quantity, "m", com[k], turned.com[k], rounding);
                 m.control(&quantity, "without head and tail", trunk.com[k]);
                 let quantity = format!("angular velocity by a torque, {axis}, {name}");
                 m.row(&quantity, "rad/s", spin[k], turned.spin[k], rounding);
-                m.control(&quantity, "with all centres of mass in one point", no_arms.spin[k]);
+                m.control(&quantity, "with all centers of mass in one point", no_arms.spin[k]);
                 // The frame rotates about the center of mass, which is at rest.
                 let (quantity, at_frame) =
                     (format!("velocity of the frame by a torque, {axis}, {name}"), spin.cross(&-com));
                 m.row(&quantity, "m/s", at_frame[k], turned.velocity[k], rounding);
-                m.control(&quantity, "with all centres of mass in one point", no_arms.velocity[k]);
+                m.control(&quantity, "with all centers of mass in one point", no_arms.velocity[k]);
                 let quantity = format!("velocity by a force, {axis}, {name}");
                 m.row(&quantity, "m/s", 1e-3 * FORCE[k] / mass, driven.velocity[k], rounding);
                 m.control(&quantity, "without head and tail", trunk.velocity[k]);
             }
-            let quantity = format!("turn by a force in the centre of mass, {name}");
+            let quantity = format!("rotation by a force in the center of mass, {name}");
             m.row(&quantity, "rad/s", 0.0, driven.spin.norm(), rounding);
             m.control(&quantity, "with a torque", turned.spin.norm());
         }

@@ -48,6 +48,6 @@ fn holds() {
         let expected = MASS * force / total;
         let lifted = scale_readings(MASS, passive(), force)[0];
         m.row("force on the load in a lift", "N", expected, lifted, (1e-6 * expected, "tolerance of the solver"));
-        m.control("force on the load in a lift", "in a lift that stands", found[0]);
+        m.control("force on the load in a lift", "in a stationary lift", found[0]);
     });
 }

@@ -99,7 +99,7 @@ fn holds() {
                 let form = expected_moments(at, RADIUS);
                 let of = |what: &str| format!("{what} {place}, {name}");
                 let (whole, either) = center_moments(at, RADIUS);
-                let pixels = "centres of pixels along the silhouette";
+                let pixels = "pixel centers along the silhouette";
                 // Differences of numbers of this size have rounding errors.
                 let edge = (whole.area - form.area).abs() * (1.0 + 1e-12) + either;
                 m.row(&of("area"), "pixels", form.area, ball.area, (edge, pixels));

@@ -26,7 +26,7 @@ fn collide(impact: f64, restitution: f64, drag: f64) -> [Vector3<f64>; 2] {
 
 #[test]
 fn holds() {
-    law(module_path!(), "v₂ = v cos α along the centres, v₁ = v sin α across", |m| {
+    law(module_path!(), "v₂ = v cos α along the line of centers, v₁ = v sin α across", |m| {
         let impact = RADIUS;
         let alpha = (impact / (2.0 * RADIUS)).asin();
         let [cue, other] = collide(impact, 1.0, 0.0);
@@ -34,7 +34,7 @@ fn holds() {
         let [full_cue, full_other] = collide(0.0, 1.0, 0.0);
         let turn = |v: &Vector3<f64>| v.y.atan2(v.x);
         let solver = (2e-8 * alpha.cos(), "the solver's 1e-8 of the impulse, on each ball");
-        let bounce = (0.01, "the line of centres turns while they touch");
+        let bounce = (0.01, "the line of centers rotates during the contact");
         m.row("speed of the struck ball", "m/s", alpha.cos(), other.norm(), bounce);
         m.row("direction of the struck ball", "rad", -alpha, turn(&other), bounce);
         m.row("speed of the cue ball", "m/s", alpha.sin(), cue.norm(), bounce);

@@ -48,12 +48,12 @@ fn holds() {
                 SupportedVersion::V2 => (4e-6, "ω h of what order 2 leaves at 1 ms"),
                 SupportedVersion::V4 => (1e-8, "orientation of order 4, (ω h)⁴ ω t/120, times the offset"),
             };
-            m.row(&format!("centre of mass, {axis}"), "m", expected[k], place[k], tolerance);
+            m.row(&format!("center of mass, {axis}"), "m", expected[k], place[k], tolerance);
         }
-        m.control("centre of mass, z", "without gravity", extrapolated_com(false, com).z);
+        m.control("center of mass, z", "without gravity", extrapolated_com(false, com).z);
         let central = extrapolated_com(true, [0.0; 3]);
-        m.control("centre of mass, x", "without the offset", central.x);
-        m.control("centre of mass, y", "without the offset", central.y);
+        m.control("center of mass, x", "without the offset", central.x);
+        m.control("center of mass, y", "without the offset", central.y);
         m.versions_differ(
             "RK4 turns free bodies with order 2 in 2.2.2 and with order 4 in 4.x (law order_of_free_rotation)",
         );

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// Maximum number of queued commands. [`Viewer::send`] returns `false` beyond it.
 const MAX_QUEUED_COMMANDS: usize = 4096;
 /// Reason for a command that could not be [sent](Viewer::send).
-pub(crate) const NOT_STEPPING: &str = "the simulation takes no commands: the program does not step it";
+pub(crate) const NOT_STEPPING: &str = "the simulation accepts no commands because the program does not step it";
 
 /// Shared command queue and newest snapshot. Locks are held only to move a pointer or a command, never to render or to
 /// step.

@@ -52,7 +52,7 @@ impl RecordButton {
     pub(super) fn set_recording(&self, sim: &mut SimulationManager, on: bool) -> Result<(), String> {
         match self.0.try_lock() {
             Ok(mut recording) => recording.set(sim, on),
-            Err(_) => Err("the recording is busy just now: press again".into()),
+            Err(_) => Err("the recording is busy; press again".into()),
         }
     }
 

@@ -102,10 +102,10 @@ impl ViewController {
 
     /// Starts or stops the recording on behalf of a viewer.
     fn record(&mut self, sim: &mut SimulationManager, viewer: u64, on: bool) -> Result<(), String> {
-        let button = self.button.as_ref().ok_or("there is no record button here: the program has given none")?;
+        let button = self.button.as_ref().ok_or("cannot record: the program has not set a record button")?;
         let was = button.state(sim).is_some_and(|state| state.on);
         if was && !on && self.recorded_by.is_none() {
-            return Err("the program itself records this, and ends it".into());
+            return Err("the program started this recording; only the program can stop it".into());
         }
         button.set_recording(sim, on)?;
         if !on {
@@ -230,7 +230,7 @@ impl ViewController {
             }
             Command::SetTarget { robot, joint, env, value } => {
                 if !sim.entities().robot_ids().iter().any(|(_, known)| *known == robot) {
-                    return Err("there is no such robot in this simulation".into());
+                    return Err("the robot does not belong to this simulation".into());
                 }
                 let envs = env.map(|env| [env]);
                 let envs = envs.as_ref().map(<[EnvId; 1]>::as_slice);
@@ -248,7 +248,7 @@ impl ViewController {
             }
             Command::Release => self.release(sim, viewer),
             Command::Record(on) => self.record(sim, viewer, on)?,
-            Command::Seek(_) => return Err("this is no recording: only what was recorded has a time line".into()),
+            Command::Seek(_) => return Err("seeking needs a recording; a running simulation has no timeline".into()),
         }
         Ok(())
     }

@@ -27,7 +27,7 @@ use std::sync::Arc;
 #[non_exhaustive]
 pub enum PlotError {
     /// The file name extension is neither `.svg` nor `.png`.
-    #[error("{path}: plots are not written as .{end}; give a name that ends in .svg or .png")]
+    #[error("{path}: unsupported plot format .{end}; use a file name that ends in .svg or .png")]
     Extension {
         /// Path of the plot file.
         path: PathBuf,

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use super::*;
-use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::error_tables::assert_error;
 
 fn sine(points: u32) -> Plot {
     let wave = (0..points).map(|k| f64::from(k) * 2.0 / f64::from(points)).map(|t| [t, 0.3 * (5.0 * t).sin()]);

@@ -29,7 +29,7 @@ pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
         return Ok(local(port));
     }
     let reason = match wanted {
-        None => format!("{port:?} is no port: ports are 0 to 65535"),
+        None => format!("invalid port {port:?}: ports are 0 to 65535"),
         Some(_) => format!("{host:?} is neither an IP address of this machine nor localhost"),
     };
     let port = wanted.unwrap_or(DEFAULT_PORT);
@@ -50,7 +50,10 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
             let next = next_free(SocketAddr::new(ip, DEFAULT_PORT - 1));
             Err(ServeError::Address {
                 given: address.to_string(),
-                reason: format!("port {} needs rights that this program has not", address.port()),
+                reason: format!(
+                    "listening on port {} needs privileges that this program does not have",
+                    address.port()
+                ),
                 candidates: next.iter().map(ToString::to_string).collect(),
             })
         }
@@ -111,9 +114,9 @@ mod tests {
             assert_eq!(parse(given).expect(given).to_string(), expected, "{given:?}");
         }
         for (given, says, candidate) in [
-            ("127.0.0.1:99999", "is no port", "127.0.0.1:8080"),
+            ("127.0.0.1:99999", "invalid port", "127.0.0.1:8080"),
             ("example.org:8080", "neither an IP address", "127.0.0.1:8080"),
-            ("localhost:eighty", "is no port", "127.0.0.1:8080"),
+            ("localhost:eighty", "invalid port", "127.0.0.1:8080"),
             ("1.2.3:70", "neither an IP address", "127.0.0.1:70"),
             ("-1", "neither an IP address", "127.0.0.1:8080"),
         ] {

@@ -66,7 +66,7 @@ pub(super) enum Seen {
 impl Command {
     /// Parses and validates a command. Returns the reason of a failure as a text.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
-        let command: Self = serde_json::from_str(text).map_err(|error| format!("not understood: {error}"))?;
+        let command: Self = serde_json::from_str(text).map_err(|error| format!("invalid command: {error}"))?;
         command.check()?;
         Ok(command)
     }
@@ -76,11 +76,11 @@ impl Command {
         // A larger mouse motion between two images is implausible.
         const FAR: f64 = 100.0;
         let within = |value: f64, what: &str| {
-            if value.abs() <= FAR { Ok(()) } else { Err(format!("{what} is {value}: -{FAR} to {FAR} would do")) }
+            if value.abs() <= FAR { Ok(()) } else { Err(format!("{what} is {value}; it must be -{FAR} to {FAR}")) }
         };
         let inside = |value: f64, what: &str| {
             let found = (0.0..=1.0).contains(&value);
-            if found { Ok(()) } else { Err(format!("{what} is {value}: the picture goes from 0 to 1")) }
+            if found { Ok(()) } else { Err(format!("{what} is {value}; it must be 0 to 1")) }
         };
         match self {
             Self::Select { x, y } | Self::Grab { x, y } => inside(*x, "x").and_then(|()| inside(*y, "y")),
@@ -115,13 +115,13 @@ mod tests {
             assert_eq!(Command::parse(text), Ok(expected), "{text}");
         }
         for (text, says) in [
-            ("", "not understood"),
-            ("pause", "not understood"),
-            ("[]", "not understood"),
+            ("", "invalid command"),
+            ("pause", "invalid command"),
+            ("[]", "invalid command"),
             (&"[".repeat(10_000), ""),
             (r#"{"do":"fly"}"#, "unknown variant `fly`, expected one of `seen`"),
-            (r#"{"do":"environment","env":-1}"#, "not understood"),
-            (r#"{"do":"target","robot":"a","joint":"b","value":1e999}"#, "not understood"),
+            (r#"{"do":"environment","env":-1}"#, "invalid command"),
+            (r#"{"do":"target","robot":"a","joint":"b","value":1e999}"#, "invalid command"),
             (r#"{"do":"target","robot":"a","joint":"b"}"#, "missing field `value`"),
             (r#"{"do":"orbit","dx":1e300,"dy":0}"#, "dx is"),
             (r#"{"do":"zoom","by":-101}"#, "by is -101"),

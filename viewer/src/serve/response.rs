@@ -41,18 +41,18 @@ impl Status {
 
     fn explanation(self) -> &'static str {
         match self {
-            Self::BadRequest => "This is no request that is understood here.",
+            Self::BadRequest => "Malformed request.",
             Self::Forbidden => {
-                "Not allowed. Open the address that the program printed, with its token where it has one; pages of other \
-                 sites may not come here."
+                "Not allowed. Open the address that the program printed, including the token if it has one; requests from \
+                 other websites are refused."
             }
-            Self::NotFound => "There is nothing here: the page is at /.",
-            Self::MethodNotAllowed => "Only GET is answered here.",
+            Self::NotFound => "Not found: the page is at /.",
+            Self::MethodNotAllowed => "Only GET and HEAD are supported.",
             Self::Timeout => "The request took too long.",
-            Self::UpgradeRequired => "This is for WebSockets of version 13.",
+            Self::UpgradeRequired => "This endpoint requires WebSocket version 13.",
             Self::HeadTooLarge => "The request is too large.",
-            Self::ServiceUnavailable => "There are as many viewers as may be: close one, and load this page again.",
-            Self::InternalError => "Something is broken here.",
+            Self::ServiceUnavailable => "The maximum number of viewers is reached: close one and reload this page.",
+            Self::InternalError => "Internal server error.",
         }
     }
 }

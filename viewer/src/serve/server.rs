@@ -73,8 +73,8 @@ impl Server {
         show: Arc<dyn ViewBackend>,
         max_viewers: usize,
     ) -> Result<Self, ServeError> {
-        let no_thread = |error: std::io::Error| ServeError::System(format!("no thread for it: {error}"));
-        listener.set_nonblocking(true).map_err(no_thread)?;
+        let failed = |what: &'static str| move |error: std::io::Error| ServeError::System(format!("{what}: {error}"));
+        listener.set_nonblocking(true).map_err(failed("cannot make the socket non-blocking"))?;
         let house = Arc::new(ServerContext {
             policy: door,
             backend: show,
@@ -85,7 +85,7 @@ impl Server {
         });
         let inside = Arc::clone(&house);
         let thread = std::thread::Builder::new().name("view-listen".into());
-        let thread = thread.spawn(move || listen(&listener, &inside)).map_err(no_thread)?;
+        let thread = thread.spawn(move || listen(&listener, &inside)).map_err(failed("cannot start a thread"))?;
         Ok(Self { house, thread: Some(thread) })
     }
 

@@ -14,7 +14,7 @@ pub(super) const OVERLAYS: [Overlay; 9] = [
     ("contacts", "contact forces", |o| &mut o.contacts),
     ("frames", "frames", |o| &mut o.frames),
     ("joints", "joint axes", |o| &mut o.joints),
-    ("masses", "centres of mass", |o| &mut o.centers_of_mass),
+    ("masses", "centers of mass", |o| &mut o.centers_of_mass),
     ("names", "names", |o| &mut o.names),
     ("trails", "trails", |o| &mut o.trails),
     ("sensors", "sensors", |o| &mut o.sensors),
@@ -119,14 +119,14 @@ pub(super) fn find_joint<'a>(names: &'a Names, robot: &str, joint: &str) -> Resu
     if of_robot.is_empty() {
         let robots: Vec<&str> =
             joints_by_robot(names).filter_map(|(_, joints)| Some(split_name(joints.first()?).0)).collect();
-        return Err(format!("there is no robot {robot:?} with joints; there are {robots:?}"));
+        return Err(format!("unknown robot {robot:?}; robots with joints: {robots:?}"));
     }
     let found = of_robot.iter().find(|name| split_name(name).1 == joint).copied();
     let found = found.ok_or_else(|| {
         let joints: Vec<&str> = of_robot.iter().map(|name| split_name(name).1).collect();
         format!("robot {robot:?} has no joint {joint:?}; it has {joints:?}")
     })?;
-    if found.accepts_target { Ok(found) } else { Err(format!("joint {joint:?} has no drive of its own")) }
+    if found.accepts_target { Ok(found) } else { Err(format!("joint {joint:?} has no drive or mimics another joint")) }
 }
 
 /// Returns the joints of each robot, with the index of its first joint.

@@ -192,7 +192,7 @@ impl ViewerSession {
     fn select_camera(&mut self, name: Option<String>) -> Result<(), String> {
         let known = self.with_newest(|_, snapshot| snapshot.names.cameras.clone()).unwrap_or_default();
         if let Some(name) = name.as_ref().filter(|name| !known.contains(name)) {
-            return Err(format!("there is no camera {name:?}; there are {known:?}"));
+            return Err(format!("unknown camera {name:?}; cameras: {known:?}"));
         }
         self.camera = name;
         self.view_revision += 1;
@@ -202,7 +202,7 @@ impl ViewerSession {
     fn set_overlay(&mut self, name: &str, on: bool) -> Result<(), String> {
         let Some((.., of)) = state::OVERLAYS.iter().find(|(known, ..)| *known == name) else {
             let known: Vec<&str> = state::OVERLAYS.iter().map(|(known, ..)| *known).collect();
-            return Err(format!("there is no overlay {name:?}; there are {known:?}"));
+            return Err(format!("unknown overlay {name:?}; overlays: {known:?}"));
         };
         *of(&mut self.overlays) = on;
         self.view_revision += 1;
@@ -223,7 +223,7 @@ impl ViewerSession {
     fn resize(&mut self, width: usize, height: usize) -> Result<(), String> {
         let [least, most] = SIDE_RANGE;
         if ![width, height].iter().all(|side| (least..=4 * most).contains(side)) {
-            return Err(format!("{width} x {height}: pictures have sides of {least} to {} pixels", 4 * most));
+            return Err(format!("invalid image size {width} x {height}; sides must be {least} to {} pixels", 4 * most));
         }
         // Larger images are rendered at lower resolution with the same aspect ratio.
         let by_pixels = (MAX_PIXELS as f64 / (width * height) as f64).sqrt();
@@ -234,7 +234,7 @@ impl ViewerSession {
     }
 
     fn set_target(&self, robot: &str, joint: &str, value: f64) -> Result<(), String> {
-        let snapshot = self.viewer.newest().ok_or("nothing is known of the simulation yet")?;
+        let snapshot = self.viewer.newest().ok_or("the simulation has no snapshot yet")?;
         let found = state::find_joint(&snapshot.names, robot, joint)?;
         let (robot, joint) = (found.robot, found.joint);
         self.send(control::Command::SetTarget { robot, joint, env: self.env(), value })
@@ -270,7 +270,7 @@ impl ViewerSession {
         let Some(pull) = &self.mouse_spring else {
             // The previously grabbed body is released.
             self.send_as_session(control::Command::Release)?;
-            return Err("there is nothing here that can be pulled at".into());
+            return Err("no body to pull at this point".into());
         };
         let picked = pull.selection().clone();
         self.select(Some(picked))?;
@@ -407,7 +407,7 @@ impl ViewSession for ViewerSession {
             Command::Speed { factor: Some(factor) } => {
                 let [slow, fast] = Speed::FACTOR_RANGE;
                 if !(slow..=fast).contains(&factor) {
-                    return Err(format!("speed {factor}: {slow} to {fast} would do"));
+                    return Err(format!("invalid speed {factor}; use {slow} to {fast}"));
                 }
                 self.send(control::Command::SetSpeed(Speed::Factor(factor)))
             }

@@ -137,15 +137,15 @@ impl<S: Read + Write> WebSocketSession<'_, S> {
         let message = match self.socket.read() {
             Ok(message) => message,
             Err(Error::Io(error)) if is_timeout(&error) => return Ok(()),
-            Err(Error::Capacity(_)) => return self.close(CloseCode::Size, "commands are short"),
-            Err(Error::Utf8(_)) => return self.close(CloseCode::Invalid, "commands are UTF-8"),
-            Err(Error::Protocol(_)) => return self.close(CloseCode::Protocol, "not as RFC 6455 says"),
+            Err(Error::Capacity(_)) => return self.close(CloseCode::Size, "the command is too long"),
+            Err(Error::Utf8(_)) => return self.close(CloseCode::Invalid, "commands must be UTF-8"),
+            Err(Error::Protocol(_)) => return self.close(CloseCode::Protocol, "violation of RFC 6455"),
             Err(_) => return Err(SessionEnded),
         };
         self.last_received = Instant::now();
         match message {
             Message::Text(text) => self.handle_text(&text),
-            Message::Binary(_) => self.close(CloseCode::Unsupported, "commands are text"),
+            Message::Binary(_) => self.close(CloseCode::Unsupported, "commands must be text"),
             Message::Close(_) => {
                 // The close response is already queued and only has to be sent.
                 let _ = self.socket.flush();

@@ -584,9 +584,9 @@ impl App {
             Some(looks) if looks.lens.is_pinhole() => format!("camera {name}, environment {env}"),
             // The window image is rasterized without the lens; the panel traces the rays of the lens.
             Some(looks) => {
-                format!("camera {name} without its {} lens (I: with it), environment {env}", looks.lens.name())
+                format!("camera {name} without its {} lens (I: with the lens), environment {env}", looks.lens.name())
             }
-            None => format!("free view: camera {name} does not look at environment {env}"),
+            None => format!("free view: camera {name} does not observe environment {env}"),
         }
     }
 

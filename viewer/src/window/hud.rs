@@ -44,7 +44,7 @@ pub(super) fn draw_status(
     let run = &snapshot.run;
     let time = snapshot.envs.get(env).map_or(0.0, |env| env.snapshot.time);
     let wanted = match run.speed {
-        Speed::Unlimited => "free".into(),
+        Speed::Unlimited => "unlimited".into(),
         Speed::Factor(factor) => format!("{factor}x"),
     };
     let measured = run.measured_speed.map_or_else(String::new, |speed| format!(", {speed:.2}x"));
@@ -55,7 +55,7 @@ pub(super) fn draw_status(
     };
     let state = if run.paused { "paused".into() } else { format!("speed {wanted}{measured}") };
     let mut lines = vec![format!("{time:.3} s   step {}   {state}", run.steps), format!("{which}   {view}")];
-    lines.push(format!("{frames_per_second:.0} pictures per second   H: help"));
+    lines.push(format!("{frames_per_second:.0} fps   H: help"));
     let color = if run.paused { YELLOW } else { WHITE };
     canvas.text(&lines.join("\n"), [8, 6], FONT, color);
     let diverged = snapshot.envs.iter().filter(|env| env.snapshot.diverged.is_some()).count();
@@ -66,7 +66,7 @@ pub(super) fn draw_status(
         below += 18;
     }
     if let Some(refused) = refused {
-        canvas.text(&format!("not done: {refused}"), [8, below], SMALL, YELLOW);
+        canvas.text(&format!("refused: {refused}"), [8, below], SMALL, YELLOW);
     }
 }
 

@@ -57,7 +57,7 @@ pub enum WindowError {
     /// No X display is set, or the connection to it failed.
     #[error(
         "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which Wayland \
-         desktops have too (XWayland), or run without a window: the examples with --headless, or with --serve for a \
+         desktops provide as XWayland, or run without a window: the examples with --headless, or with --serve for a \
          browser",
         quoted(.display), quoted(.wayland)
     )]
@@ -70,7 +70,7 @@ pub enum WindowError {
         wayland: Option<String>,
     },
     /// The operating system could not start a thread, or the thread ended early.
-    #[error("no window can be opened: no thread for it: {0}")]
+    #[error("no window can be opened: its thread failed: {0}")]
     Thread(String),
 }
 
@@ -99,7 +99,7 @@ impl Closed {
             Self::ByUser | Self::WithSimulation => None,
             Self::DisplayLost(reason) => Some(reason),
             Self::Crashed => {
-                Some("its thread panicked, which is a mistake in Kinetoscope: please report what stands above")
+                Some("its thread panicked, which is a bug in Kinetoscope: please report the message above")
             }
         }
     }
@@ -254,7 +254,7 @@ fn spawn_window<T: Send + 'static>(
         Ok(Err(error)) => Err(error),
         Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&DisplayError::Unresponsive)),
         Err(mpsc::RecvTimeoutError::Disconnected) => {
-            Err(WindowError::Thread("it ended before the window was there".into()))
+            Err(WindowError::Thread("it ended before the window was open".into()))
         }
     }
 }

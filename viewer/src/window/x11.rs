@@ -69,15 +69,15 @@ pub(super) enum DisplayError {
     Connect(#[from] x11rb::errors::ConnectError),
     #[error("the connection to the display was lost: {0}")]
     Lost(#[from] ConnectionError),
-    #[error("the display refuses: {0}")]
+    #[error("the display refused a request: {0}")]
     Reply(#[from] ReplyError),
-    #[error("the display refuses: {0}")]
+    #[error("the display refused a request: {0}")]
     Id(#[from] ReplyOrIdError),
     #[error("the display has not answered for {} s", TIMEOUT.as_secs())]
     Unresponsive,
     #[error("the connection to the display cannot be watched: {0}")]
     Watch(#[from] std::io::Error),
-    #[error("the display shows no 8-bit red, green and blue in pixels of 32 bits")]
+    #[error("the display has no 32-bit pixel format with 8 bits per color")]
     Colors,
 }
 

@@ -5,7 +5,7 @@ use super::Mutation;
 pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
-        "inertia turned the wrong way",
+        "inertia rotated the wrong way",
         "robot/src/inertia.rs",
         [
             "inertia: rotation.matrix() * self.inertia * rotation.matrix().transpose(),",
@@ -22,7 +22,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     ),
     Mutation::of(
         "physics",
-        "centre of mass of fused links not moved",
+        "center of mass of fused links not moved",
         "robot/src/inertia.rs",
         ["com: self.com + d * (other.mass / mass),", "com: self.com + d * (0.5 * other.mass / mass),"],
         &["parallel_axis", "gravity_torques"],
@@ -72,7 +72,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
             "self.place(joint.child, parent_body, body_from_joint);",
             "self.place(joint.child, parent_body, body_from_parent);",
         ],
-        &["centre_of_percussion", "falling_rod"],
+        &["center_of_percussion", "falling_rod"],
     ),
     Mutation::of(
         "physics",
@@ -95,31 +95,31 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "physics",
         "Jacobian of a joint that moved already",
         "robot/src/kinematics/jacobian.rs",
-        ["pose *= joint.before;", "pose *= joint.before * joint.moved(positions);"],
+        ["pose *= joint.parent_from_joint;", "pose *= joint.parent_from_joint * joint.transform(positions);"],
         &["jacobian", "virtual_work"],
     ),
     Mutation::of(
         "physics",
-        "velocity at a point with the arm of the wrong sign",
+        "velocity at a point with the wrong sign of the lever arm",
         "sim/src/capture/motion.rs",
         [
-            "vector(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference(data, body)))",
-            "vector(data.cvel(), 6 * body + 3) - angular.cross(&(point - reference(data, body)))",
+            "vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body)))",
+            "vector_at(data.cvel(), 6 * body + 3) - angular.cross(&(point - reference_point(data, body)))",
         ],
-        &["centre_of_percussion", "falling_rod"],
+        &["center_of_percussion", "falling_rod"],
     ),
     Mutation {
         name: "no centripetal acceleration",
         file: "sim/src/capture/motion.rs",
-        search: "let acceleration = spatial + turning.cross(&velocity) + gravity;",
+        search: "let acceleration = spatial + angular.cross(&velocity) + gravity;",
         replacement: "let acceleration = spatial + gravity;",
         tests: ("api", &["sensors::imu"]),
     },
     Mutation {
         name: "wrench of a joint about another point",
         file: "sim/src/capture/motion.rs",
-        search: "let torque = vector(data.cfrc_int(), 6 * body) + arm.cross(&force);",
-        replacement: "let torque = vector(data.cfrc_int(), 6 * body) - arm.cross(&force);",
+        search: "let torque = vector_at(data.cfrc_int(), 6 * body) + arm.cross(&force);",
+        replacement: "let torque = vector_at(data.cfrc_int(), 6 * body) - arm.cross(&force);",
         tests: ("api", &["sensors::wrench"]),
     },
     Mutation {
@@ -182,7 +182,10 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "physics",
         "friction cone always a pyramid",
         "sim/src/mjcf/write.rs",
-        ["if o.cone == Cone::Elliptic { \"elliptic\" }", "if o.cone == Cone::Elliptic { \"pyramidal\" }"],
+        [
+            "if o.cone == FrictionCone::Elliptic { \"elliptic\" }",
+            "if o.cone == FrictionCone::Elliptic { \"pyramidal\" }",
+        ],
         &["rest_depth", "stick_creep"],
     ),
     Mutation::of(
@@ -248,7 +251,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     ),
     Mutation::of(
         "physics",
-        "velocity of the centre of mass with the arm of the wrong sign",
+        "velocity of the center of mass with the wrong sign of the lever arm",
         "sim/src/objects/robot_state.rs",
         ["body_pose(data, body).translation.vector - com", "com - body_pose(data, body).translation.vector"],
         &["tumbling_projectile"],
@@ -265,7 +268,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "force and torque exchanged",
         "sim/src/wrenches.rs",
         ["force.iter().chain(torque)", "torque.iter().chain(force)"],
-        &["tilted_inertia", "centre_of_percussion", "parallel_axis"],
+        &["tilted_inertia", "center_of_percussion", "parallel_axis"],
     ),
     Mutation::of(
         "physics",
@@ -302,7 +305,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "physics",
         "IMU at rest feels nothing",
         "sensors/src/imu.rs",
-        ["acceleration + self.gravity_bias, spin_up", "acceleration, spin_up"],
+        ["acceleration + self.gravity_bias, angular_acceleration", "acceleration, angular_acceleration"],
         &["imu_turntable", "imu_pendulum"],
     ),
     Mutation::of(

@@ -35,7 +35,7 @@ pub(super) const RECORDING: &[Mutation] = &[
         "kinetoscope-record",
         "actions of the row before repeated",
         "record/src/replay.rs",
-        ["self.act(sim, row)?;", "self.act(sim, row.saturating_sub(1))?;"],
+        ["self.apply_actions(sim, row)?;", "self.apply_actions(sim, row.saturating_sub(1))?;"],
         &["replay::tests::"],
     ),
     Mutation::of(

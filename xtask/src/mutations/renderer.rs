@@ -25,7 +25,7 @@ pub(super) const RENDERER: &[Mutation] = &[
         "right eye of a pair on the left",
         "sensors/src/camera/stereo/rectify.rs",
         ["projection[(0, 3)] = 0.0 - pixels.fx * beside;", "projection[(0, 3)] = pixels.fx * beside;"],
-        &["camera::tests::stereo::opencv_pairs"],
+        &["camera::tests::stereo::opencv_stereo_cameras"],
     ),
     Mutation::of(
         "kinetoscope-render",

@@ -38,14 +38,14 @@ pub(super) const SENSORS: &[Mutation] = &[
         "kinetoscope-sensors",
         "dropout loses what it should keep",
         "sensors/src/noise.rs",
-        ["self.randoms[env].uniform() >= self.dropout", "self.randoms[env].uniform() < self.dropout"],
+        ["self.rngs[env].uniform() >= self.dropout", "self.rngs[env].uniform() < self.dropout"],
         &["sampling::tests::dropout"],
     ),
     Mutation::of(
         "kinetoscope-sensors",
         "measurement from the instant of a write replaces it",
         "sensors/src/delay.rs",
-        ["*captured > self.refreshed[env]", "*captured >= self.refreshed[env]"],
+        ["*captured > self.last_refresh[env]", "*captured >= self.last_refresh[env]"],
         &["sampling::tests::refresh"],
     ),
     Mutation::of(

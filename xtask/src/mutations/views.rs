@@ -8,7 +8,7 @@ pub(super) const VIEWS: &[Mutation] = &[
         "slow motion is fast",
         "viewer/src/control/real_time_clock.rs",
         ["* self.dt / factor);", "* self.dt * factor);"],
-        &["control::pace::tests::waits"],
+        &["control::real_time_clock::tests::waits"],
     ),
     Mutation::of(
         "kinetoscope-viewer",
@@ -22,14 +22,14 @@ pub(super) const VIEWS: &[Mutation] = &[
         "view moves with the mouse, not against it",
         "viewer/src/scene_view/orbit_camera.rs",
         ["self.shift((up * dy - right * dx) * scale);", "self.shift((up * dy + right * dx) * scale);"],
-        &["stage::eye::tests::drags"],
+        &["scene_view::orbit_camera::tests::drags"],
     ),
     Mutation::of(
         "kinetoscope-viewer",
         "contact force on the selected body with the wrong sign",
         "viewer/src/scene_view/pick.rs",
         ["contact.bodies.iter().zip([-1.0, 1.0])", "contact.bodies.iter().zip([1.0, -1.0])"],
-        &["stage::tests::selected_cube"],
+        &["scene_view::tests::selected_cube"],
     ),
     Mutation::of(
         "kinetoscope-viewer",
@@ -43,8 +43,8 @@ pub(super) const VIEWS: &[Mutation] = &[
         "film shows the frame after the time",
         "viewer/src/control/view_controller/playback.rs",
         [
-            "partition_point(|frame| *frame <= self.now).saturating_sub(1)",
-            "partition_point(|frame| *frame <= self.now).min(self.times.len() - 1)",
+            "partition_point(|frame| *frame <= self.time).saturating_sub(1)",
+            "partition_point(|frame| *frame <= self.time).min(self.times.len() - 1)",
         ],
         &["playback::tests::seek_step_and_play"],
     ),

@@ -84,7 +84,7 @@ fn refusals() {
         (json!({"do": "overlay", "name": "ghosts", "on": true}), "contacts"),
         (json!({"do": "speed", "factor": -1.0}), "0.001"),
         (json!({"do": "size", "width": 1e9 as u64, "height": 3}), "pixels"),
-        (json!({"do": "grab", "x": 0.01, "y": 0.99}), "nothing here"),
+        (json!({"do": "grab", "x": 0.01, "y": 0.99}), "no body to pull at this point"),
         (json!({"do": "grab", "x": 2.0, "y": 0.5}), "0 to 1"),
         (json!({"do": "select", "x": 0.5}), "missing field `y`"),
     ]);

@@ -44,9 +44,9 @@ pub enum SegmentLevel {
 /// Assignment of entities to classes.
 ///
 /// ```
-/// use kinetoscope_sensors::camera::{SegmentLevel, Segmentation, SegmentationCfg, Thing};
+/// use kinetoscope_sensors::camera::{SegmentLevel, Segmentation, SegmentationCfg, SegmentedEntity};
 ///
-/// let thing = |id, object: &str| Thing { id, object: object.into(), link: None, class: "object".into() };
+/// let thing = |id, object: &str| SegmentedEntity { id, object: object.into(), link: None, class: "object".into() };
 /// let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture")]);
 /// let all = Segmentation::new([thing(1, "table"), thing(2, "shelf"), thing(3, "cube")], &cfg)?;
 /// assert_eq!(all.segments(SegmentLevel::Semantic)[0].name, "furniture");

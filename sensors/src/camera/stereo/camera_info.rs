@@ -44,7 +44,7 @@ impl StereoCameraCfg {
     /// # let (left, right) = (eye("left", 324.1, 0.0), eye("right", 319.8, -34.8));
     /// // From files: `CameraInfo::read("left.yaml".as_ref())?`.
     /// let [left, right] = [CameraInfo::parse(&left, "left.yaml")?, CameraInfo::parse(&right, "right.yaml")?];
-    /// let mut cfg = StereoCameraCfg::of_infos(&left, &right)?;
+    /// let mut cfg = StereoCameraCfg::from_camera_infos(&left, &right)?;
     /// cfg.camera.update_period = 1.0 / 30.0;
     /// // P of the right camera has -34.8 = -580 b.
     /// assert!((cfg.left_to_right_pos[0] - 0.06).abs() < 1e-12);

@@ -24,10 +24,10 @@ pub trait PlaybackSource {
 #[non_exhaustive]
 pub enum PlayError {
     /// The recording has no frames.
-    #[error("there is nothing to show: not a single moment was recorded")]
+    #[error("nothing to show: the recording has no frames")]
     NoFrames,
     /// The time stamps are not finite or not in ascending order.
-    #[error("there is nothing to show: the times of a film must be finite and in ascending order")]
+    #[error("nothing to show: the frame times must be finite and in ascending order")]
     InvalidTimes,
     /// A frame cannot be shown.
     #[error("{0}")]
@@ -156,12 +156,12 @@ impl Playhead {
             }
             Command::Reset(_) => self.seek_frame(0),
             Command::Seek(time) if time.is_finite() => self.seek(time),
-            Command::Seek(time) => return Err(format!("{time} is no time to go to")),
+            Command::Seek(time) => return Err(format!("cannot seek to {time}: the time must be finite")),
             Command::Release => {}
             Command::SetTarget { .. } | Command::Drag { .. } => {
-                return Err("this is a recording: nothing in it can be moved".into());
+                return Err("a recording cannot be modified".into());
             }
-            Command::Record(_) => return Err("this is a recording: its file is there already".into()),
+            Command::Record(_) => return Err("a recording cannot be recorded again".into()),
         }
         Ok(())
     }
@@ -350,7 +350,7 @@ mod tests {
     fn refusals() {
         playing(|viewer| {
             for (command, words) in [
-                (Command::Seek(f64::NAN), "no time"),
+                (Command::Seek(f64::NAN), "cannot seek to NaN"),
                 (Command::SetSpeed(Speed::Factor(0.0)), "factor"),
                 (
                     Command::Drag { env: kinetoscope_sim::EnvId(0), body: 0, anchor: [0.0; 3], target: [0.0; 3] },

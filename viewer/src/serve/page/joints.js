@@ -54,7 +54,7 @@ class Joints {
     if (!joint.driven) {
       const follows = document.createElement("span");
       follows.className = "follows";
-      follows.textContent = "no drive of its own";
+      follows.textContent = "passive or mimic";
       element.append(follows);
       return row;
     }

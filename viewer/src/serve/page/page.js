@@ -108,7 +108,7 @@ async function show(buffer) {
       $("panel-note").textContent = `environment ${about.environment}`;
     }
   } catch (error) {
-    console.error("a picture could not be shown", error);
+    console.error("an image could not be shown", error);
   } finally {
     // A hidden tab acknowledges no images, so the server renders none until the tab is visible.
     if (document.hidden) unseen += 1; else send({ do: "seen", what: "picture" });
@@ -130,7 +130,7 @@ function options(select, entries) {
 function build() {
   const envs = Array.from({ length: contents.environments }, (_, k) => [String(k), `${k}`]);
   options($("environment"), envs.length > 1 ? [["all", `all ${envs.length}`], ...envs] : envs);
-  options($("speed"), [...SPEEDS.map((s) => [String(s), s === 1 ? "real time" : `${s} ×`]), ["max", "unbounded"]]);
+  options($("speed"), [...SPEEDS.map((s) => [String(s), s === 1 ? "real time" : `${s} ×`]), ["max", "unlimited"]]);
   options($("camera"), contents.cameras.map((c) => [c, c]));
   $("camera-card").hidden = contents.cameras.length === 0;
   $("panel").hidden = true;
@@ -207,7 +207,7 @@ function select(selected) {
       return key;
     });
     if (whose) $("forces-title").replaceChildren(`Contact force on ${whose}`, ...keys);
-    else $("forces-title").textContent = "Contact force on what is selected: click on a body";
+    else $("forces-title").textContent = "Contact force on the selection: click on a body";
   }
   if (whose && selected.force !== null) history.forces.add(state.time, selected.force);
 }
@@ -251,7 +251,7 @@ setInterval(() => {
 setInterval(() => {
   const now = performance.now();
   arrivals = arrivals.filter((at) => now - at < 2000);
-  $("fps").textContent = `${(arrivals.length / 2).toFixed(0)} /s`;
+  $("fps").textContent = (arrivals.length / 2).toFixed(0);
 }, 500);
 
 connect();
