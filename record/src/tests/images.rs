@@ -126,7 +126,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
                 close(red, 128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
             }
             assert_eq!((bytes("y").len(), bytes("u").len()), (pixels.len(), pixels.len() / 4));
-            assert_eq!(frame["colour"], json!([1, 13, 1, "tv"]));
+            assert_eq!(frame["color"], json!([1, 13, 1, "tv"]));
         }
         _ => panic!("{end}: its frames are not checked"),
     }

@@ -35,7 +35,7 @@ def ffmpeg(path):
                 rows, step = bytes(plane), plane.line_size
                 planes.append(b"".join(rows[k * step : k * step + width] for k in range(height)).hex())
             about = stream.codec_context
-            colour = [int(about.color_primaries), int(about.color_trc), int(about.colorspace), {1: "tv", 2: "pc"}[int(about.color_range)]]
+            color = [int(about.color_primaries), int(about.color_trc), int(about.colorspace), {1: "tv", 2: "pc"}[int(about.color_range)]]
             frames.append({
                 "from": milliseconds(frame.pts, stream.time_base),
                 "until": milliseconds(frame.pts + frame.duration, stream.time_base),
@@ -43,7 +43,7 @@ def ffmpeg(path):
                 "y": planes[0],
                 "u": planes[1],
                 "v": planes[2],
-                "colour": colour,
+                "color": color,
             })
         assert milliseconds(stream.duration, stream.time_base) == frames[-1]["until"], stream.duration
         # As FFmpeg finds it in the stream, and as the file says it. Of 20 pictures in a second, each of four squares of 3072 bits and
