@@ -196,7 +196,7 @@ fn more_than_thirty_robots() {
         let added = sim.add_robot(cfg);
         assert_eq!(added.is_ok(), i < 30, "{i}");
         if let Err(error) = added {
-            assert!(error.to_string().contains("30 robots and articulations are the most"), "{error}");
+            assert!(error.to_string().contains("at most 30 robots and articulations"), "{error}");
         }
     }
     sim.update(100);
@@ -208,7 +208,7 @@ fn more_than_thirty_robots() {
     }
     assert!(sim.diverged().is_empty());
     let message = sim.entities().robot_id("r99").unwrap_err().to_string();
-    assert!(message.contains("no robot \"r99\"") && message.contains("\"r0\""), "{message}");
+    assert!(message.contains("unknown robot \"r99\"") && message.contains("\"r0\""), "{message}");
 }
 
 #[test]

@@ -385,7 +385,7 @@ impl<'a> MjcfPartMut<'a> {
         places: &[usize],
         env_ids: Option<&[EnvId]>,
     ) -> Result<EnvRows<'v>> {
-        let of = |_| format!("part {:?}", self.data.uid());
+        let of = |_| format!("MJCF part {:?}", self.data.uid());
         let table = ArgumentSpec {
             argument,
             meaning: "environments, joint positions or velocities",

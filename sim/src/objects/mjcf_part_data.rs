@@ -137,7 +137,7 @@ impl MjcfData {
             error: Box::new(error),
         })?;
         let names = PartNames::of_model(&model);
-        let named = EntityLabel { kind: "part", uid: cfg.uid.clone() };
+        let named = EntityLabel { kind: "MJCF part", uid: cfg.uid.clone() };
         let surfaces = SurfaceCfg::assign(&cfg.surfaces, &names.bodies, "body", named)?;
         let (stem, source) = (format!("part{index}_"), SourceLocation::new(&cfg.path, 1));
         let of =
@@ -147,7 +147,14 @@ impl MjcfData {
             .and_then(|document| Ok((document, of.files()?)))
             .map_err(|error| Error::MjcfAttach { uid: cfg.uid.clone(), file, error: Box::new(error) })?;
         let left_out = document.sensors_left_out();
-        diagnostics.extend(setting_warnings(&format!("part {:?}", cfg.uid), &text, &cfg.path, &model, scene, left_out));
+        diagnostics.extend(setting_warnings(
+            &format!("MJCF part {:?}", cfg.uid),
+            &text,
+            &cfg.path,
+            &model,
+            scene,
+            left_out,
+        ));
         let frames = frames(&cfg.uid, &model, &names, diagnostics);
         let is_kept = |s: &usize| left_out.iter().all(|(other, _)| other != s);
         let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();

@@ -29,7 +29,7 @@ fn bad_files() {
         (
             "bad.xml",
             "<mujoco>\n<worldbody>\n<body>\n<geom sise=\"1\"/>\n</body></worldbody></mujoco>",
-            &["part \"part\"", "bad.xml", "sise", "geom", "line 4"][..],
+            &["MJCF part \"part\"", "bad.xml", "sise", "geom", "line 4"][..],
         ),
         (
             "mass.xml",
@@ -83,7 +83,7 @@ fn left_out_sensors() {
             (7, "u", "the type user"),
             (8, "sensor4", "force of the world body, which contains the whole scene"),
         ] {
-            let text = format!("odd.xml:{line}: part {uid:?}: sensor {name:?}: {what}");
+            let text = format!("odd.xml:{line}: MJCF part {uid:?}: sensor {name:?}: {what}");
             assert_eq!(count_diagnostics(&sim, &[&text, "[element-ignored]"]), 1, "{text}: {:#?}", sim.diagnostics());
         }
     }
@@ -100,7 +100,7 @@ fn left_out_sensors() {
     }
     assert_ne!(sensor.value("first/angle").unwrap(), sensor.value("second/angle").unwrap(), "the control");
     let named = MujocoSensorCfg { sensors: Some(vec!["first/all".into()]), ..Default::default() };
-    assert_error(sim.add_sensor("none", named), "", &["no MuJoCo sensor \"first/all\"; known are \"first/"]);
+    assert_error(sim.add_sensor("none", named), "", &["unknown MuJoCo sensor \"first/all\"; known names: \"first/"]);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn unique_names() {
     }
     let object = RigidObjectCfg { uid: "m".into(), ..Default::default() };
     assert_error(sim.add_rigid_object(object), "DuplicateUid", &[]);
-    assert_error(sim.entities().mjcf_id("n"), "", &["known are \"m\""]);
+    assert_error(sim.entities().mjcf_id("n"), "", &["known names: \"m\""]);
 }
 
 /// Elements of 4.x that cannot be written back are refused by name, never left out; unsupported sensors are left out.
@@ -195,7 +195,7 @@ fn scene_files() {
     assert_eq!(scene.mjcf_part("m").unwrap().actuator_names().len(), 3);
     assert_eq!(scene.sensor::<MujocoSensor>("own").unwrap().values().dim(), (1, 3));
     scene.mjcf_part_mut("m").unwrap().set_ctrl(&array![[0.1, 0.2, 0.3]], None, None).unwrap();
-    assert_eq!(scene.robot("m").unwrap_err().to_string(), "\"m\" is a MJCF part, not a robot");
+    assert_eq!(scene.robot("m").unwrap_err().to_string(), "\"m\" is an MJCF part, not a robot");
     // A scene file is unchanged by writing and reading it again.
     let cfg = SceneCfg::from_file(&file).unwrap();
     let again = SceneCfg::from_toml(&cfg.to_toml(&EntityTypes::default()).unwrap(), "x.toml", &EntityTypes::default());
@@ -266,7 +266,7 @@ fn exported_for_2_2_2() {
         "sensor \"height\": the type e_potential",
     ] {
         let message =
-            format!("part \"new\": {what}: MuJoCo 2.2.2 does not know it, and it is left out of robot.mjcf2.xml");
+            format!("MJCF part \"new\": {what}: left out of robot.mjcf2.xml, because MuJoCo 2.2.2 does not support it");
         let at =
             said.iter().position(|m| *m == message).unwrap_or_else(|| panic!("not reported: {message}: {said:#?}"));
         said.swap_remove(at);

@@ -81,28 +81,28 @@ fn kinds() {
         (3, "@terrain\nheights.stairs = {}", "stairs|`pyramid_stairs`"),
         (3, "@terrain\nheights = 3", "rows of heights|generator"),
         // A variant must be named: by its name alone, or as a table with one key.
-        (3, "@ray_caster\npattern = {}", "nothing is named|`grid`|`lidar`|`pinhole`"),
-        (3, "@ray_caster\npattern = \"grid\"", "`grid`|too little|{ grid = ... }"),
+        (3, "@ray_caster\npattern = {}", "empty table|`grid`|`lidar`|`pinhole`"),
+        (3, "@ray_caster\npattern = \"grid\"", "`grid`|needs a value|{ grid = ... }"),
         (3, "@ray_caster\npattern = \"gird\"", "`gird`|one of `grid`"),
         (3, "@ray_caster\npattern = 3", "integer `3`|one of `grid`"),
-        (3, "@ray_caster\npattern = { grid = {},\n lidar = {} }", "`grid`, `lidar` are 2|one of"),
+        (3, "@ray_caster\npattern = { grid = {},\n lidar = {} }", "2 keys (`grid`, `lidar`)|one of"),
         (3, "@ray_caster\npattern.grid = 1", "integer `1`|a table of `resolution`|`size`"),
         (3, "@ray_caster\npattern.grid.order = \"zz\"", "zz|`xy`|`yx`"),
-        (4, "@ray_caster\n\nalignment = {}", "nothing is named|`base`|`yaw`|`world`"),
+        (4, "@ray_caster\n\nalignment = {}", "empty table|`base`|`yaw`|`world`"),
         (3, "@ray_caster\nalignment = { yaw = 3 }", "`yaw`|its name alone"),
         (3, "@ray_caster\ntargets = {}", "`static_only`|`named`|`everything`"),
         (4, "@ray_caster\n[entities.s.targets]\nnammed = [\"a\"]", "nammed|`named`"),
         (3, "@camera\nintrinsics = {}", "`pixels`|`aperture`|`fovy`"),
         (3, "@camera\nintrinsics.fovi = {}", "fovi|`fovy`"),
         (3, "@camera\nintrinsics.pixels = { fx = 1.0 }", "missing field `fy`"),
-        (4, "@camera\n\nextrinsics.placement = {}", "nothing is named|`pose`|`look_at`"),
+        (4, "@camera\n\nextrinsics.placement = {}", "empty table|`pose`|`look_at`"),
         (3, "@camera\ndepth_miss = \"infinity\"", "infinity|`inf`|`far`|`zero`"),
         (3, "@camera\nraster = 4", "integer `4`|a table of `samples`"),
         (3, "@imu\nsampling.noise = { lin_acc_b = 3 }", "integer `3`|a table of `std`"),
         (5, "@frame_transformer\nsource = \"a\"\ntargets = [\n{},\n]", "missing field `bodies`"),
         (5, "@frame_transformer\nsource = \"a\"\ntargets = [\n\"b\"]", "\"b\"|a table of `bodies`"),
-        (3, "@rigid_object\nshape = {}", "nothing is named|`box`|`sphere`|`capsule`"),
-        (3, "@rigid_object\nshape = \"box\"", "`box`|too little|{ box = ... }"),
+        (3, "@rigid_object\nshape = {}", "empty table|`box`|`sphere`|`capsule`"),
+        (3, "@rigid_object\nshape = \"box\"", "`box`|needs a value|{ box = ... }"),
         (3, "@rigid_object\nshape.box = {}", "missing field `size`"),
         (3, "@rigid_object\nshape.box.size = [1, 2]", "array of length 3"),
         (4, "@robot\nurdf = \"a\"\ndrive.model = {}", "`implicit`|`actuator`"),
@@ -110,7 +110,7 @@ fn kinds() {
         (4, "@robot\nurdf = \"a\"\ndrive.actuators.\".*\" = \"dc_motor\"", "{ dc_motor = ... }"),
         // A motor has no default that fits other motors.
         (4, "@robot\nurdf = \"a\"\ndrive.actuators.\".*\".dc_motor = {}", "missing field `saturation_effort`"),
-        (2, "[simulation]\ncone = {}", "nothing is named|`pyramidal`|`elliptic`"),
+        (2, "[simulation]\ncone = {}", "empty table|`pyramidal`|`elliptic`"),
     ];
     assert_rows("dir/scene.toml", toml, rows);
 }
@@ -143,9 +143,9 @@ fn values() {
         (3, "exclude_collisions = [\n[\"a\", \"b\"],\n[\"a\"]]", "array of length 2"),
         (1, "exclude_collisions = [[\"a\", 3]]", "integer `3`|string"),
         // Numbers out of range, and dates.
-        (2, "[simulation]\nphysics_dt = 1e999", "1e999|beyond"),
-        (2, "[simulation]\nseed = 99999999999999999999", "99999999999999999999|beyond"),
-        (2, "[simulation]\nphysics_dt = 2026-01-01", "2026-01-01|nowhere"),
+        (2, "[simulation]\nphysics_dt = 1e999", "1e999|out of range"),
+        (2, "[simulation]\nseed = 99999999999999999999", "99999999999999999999|out of range"),
+        (2, "[simulation]\nphysics_dt = 2026-01-01", "2026-01-01|unexpected date"),
     ];
     assert_rows("dir/scene.toml", toml, rows);
 }
@@ -160,9 +160,9 @@ fn in_yaml() {
         (4, "entities:\n  c:\n    # first\n    type: camara\n", "\"c\"|`camera`|`ray_caster`"),
         (2, "entities:\n  c:\n    width: 2\n", "\"c\"|type"),
         (2, "simulation:\n  num_envs: two\n", "two"),
-        (2, "simulation:\n  num_envs:\n", "nothing is said"),
+        (2, "simulation:\n  num_envs:\n", "the value is null"),
         (3, "simulation:\n  num_envs: 1\n  num_envs: 2\n", "duplicate"),
-        (2, "simulation:\n  physics_dt: 1e999\n", "beyond"),
+        (2, "simulation:\n  physics_dt: 1e999\n", "out of range"),
         (3, "simulation:\n  lights:\n    - {kind: spott}\n", "`directional`|`point`|`spot`"),
         (2, "simulation:\n\tnum_envs: 1\n", ""),
         (2, "simulation: [1, 2\n", ""),
@@ -180,7 +180,7 @@ fn in_building() {
             "1: entity ",
             "[entities.eye]\ntype = \"camera\"\nextrinsics.parent = \"bal\"\n[entities.ball]\ntype = \"rigid_object\""
                 .into(),
-            "\"eye\"|\"bal\"|known are \"ball\"",
+            "\"eye\"|\"bal\"|known names: \"ball\"",
         ),
         (
             "4: entity ",

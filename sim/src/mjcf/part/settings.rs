@@ -61,7 +61,7 @@ fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<Top
 }
 
 /// Warns about settings of a file that the scene overrides for all of its parts, and about sensors that are left out.
-/// `owner` names the part in the messages, such as `part "arm"`.
+/// `owner` names the part in the messages, such as `MJCF part "arm"`.
 pub(crate) fn setting_warnings(
     owner: &str,
     text: &str,
