@@ -8,8 +8,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-const SUPPORTED: &str = "supported are MuJoCo 2.2.2 (Debian 12: apt-get install libmujoco-dev) and MuJoCo 4.x \
-    (set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so*, for example the unpacked PyPI wheel mujoco-core)";
+const SUPPORTED: &str = "supported versions: MuJoCo 2.2.2 (Debian 12: apt-get install libmujoco-dev) and MuJoCo 4.x \
+                         (set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so*, for example the unpacked \
+                         PyPI wheel mujoco-core)";
 
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DIR");
@@ -69,7 +70,7 @@ impl Installation {
         let found = Self { include, library, version_header };
         if version_header != 222 && found.major() != 4 {
             return Err(format!(
-                "{} is of MuJoCo version {version_header}, which is not supported; {SUPPORTED}",
+                "{} belongs to MuJoCo {version_header}, which is not supported; {SUPPORTED}",
                 header.display()
             ));
         }

@@ -27,12 +27,12 @@ pub struct AssetNotFound {
 
 impl std::fmt::Display for AssetNotFound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "asset {} is not there; tried ", self.asset.display())?;
+        write!(f, "asset {} was not found; tried ", self.asset.display())?;
         for (i, place) in self.tried.iter().enumerate() {
             let comma = if i == 0 { "" } else { ", " };
             write!(f, "{comma}{}", place.display())?;
         }
-        write!(f, "; set KINETOSCOPE_ASSETS to the folder that holds it")
+        write!(f, "; set KINETOSCOPE_ASSETS to the folder that contains it")
     }
 }
 

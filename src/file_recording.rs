@@ -98,7 +98,7 @@ impl FileRecording {
                 Ok(())
             }
             Err(error) => {
-                self.status = format!("{name}: broken off");
+                self.status = format!("{name}: aborted");
                 Err(error)
             }
         }
@@ -145,7 +145,7 @@ impl RecordControl for FileRecording {
             return RecordingState { on: false, text: self.status.clone() };
         };
         let rows = recorder.summary().packets;
-        let how = recorder.failure().map_or_else(|| format!("{rows} rows"), |why| format!("broken off: {why}"));
+        let how = recorder.failure().map_or_else(|| format!("{rows} rows"), |why| format!("aborted: {why}"));
         RecordingState { on: true, text: format!("{}: {how}", name(path)) }
     }
 }
@@ -182,6 +182,6 @@ mod tests {
         let of = |path: &str, k| numbered(Path::new(path), k).display().to_string();
         assert_eq!([1, 2, 13].map(|k| of("a/run.mcap", k)), ["a/run.mcap", "a/run-2.mcap", "a/run-13.mcap"]);
         assert_eq!(of("pictures", 2), "pictures-2");
-        assert_eq!(of("..", 2), "..", "what has no name gets none");
+        assert_eq!(of("..", 2), "..", "a path without a file name stays unchanged");
     }
 }

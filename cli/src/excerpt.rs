@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn underlined_word() {
         let (arms, zeros) = ("<joint name=\"arm\" parent=\"arm\"/>", "<box size=\"0.5 0 0.25\" rgba=\"0\"/>");
-        let mujoco = "robot \"arm\": MuJoCo refuses the model: unrecognized attribute: 'sise'; Element 'geom', line 3";
+        let mujoco = "robot \"arm\": MuJoCo rejected the model: unrecognized attribute: 'sise'; Element 'geom', line 3";
         for (line, message, before) in [
             ("  <geom type=\"box\" sise=\"1\"/>", mujoco, "  <geom type=\"box\" "),
             (arms, "joint \"arm\": no link", "<joint name=\""),

@@ -2,7 +2,7 @@
 //!
 //! Scoped threads of the standard library can borrow, too, but start and end with each job. That would cost about
 //! 0.05 ms and a few allocations, several times per image.
-#![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
+#![allow(unsafe_code, reason = "persistent workers run jobs that borrow from the caller")]
 
 use crate::spin_limit::SpinLimit;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

@@ -99,10 +99,10 @@ model_arrays! {
     body_parentid: i32, "Parent of each body, (nbody,).";
     body_rootid: i32, "Root of each body's tree, (nbody,).";
     body_weldid: i32, "Body each body is welded to, (nbody,).";
-    body_mocapid: i32, "Index of each body among those moved by hand, -1 for others, (nbody,).";
+    body_mocapid: i32, "Mocap index of each body, -1 for others, (nbody,).";
     body_mass: f64, "Mass \\[kg\\], (nbody,).";
     body_inertia: f64, "Principal moments of inertia \\[kg m²\\], (nbody, 3).";
-    body_ipos: f64, "Centre of mass in the body frame \\[m\\], (nbody, 3).";
+    body_ipos: f64, "Center of mass in the body frame \\[m\\], (nbody, 3).";
     body_iquat: f64, "Principal axes in the body frame, wxyz, (nbody, 4).";
     body_pos: f64, "Position in the parent body's frame \\[m\\], (nbody, 3).";
     body_quat: f64, "Orientation in the parent body's frame, wxyz, (nbody, 4).";
@@ -128,7 +128,7 @@ model_arrays! {
     geom_dataid: i32, "Mesh or height field of each geom, -1 for none, (ngeom,).";
     geom_matid: i32, "Material of each geom, -1 for none, (ngeom,).";
     geom_group: i32, "Group of each geom, (ngeom,).";
-    geom_rgba: f32, "Colours, (ngeom, 4).";
+    geom_rgba: f32, "Colors (RGBA), (ngeom, 4).";
     cam_fovy: f64, "Vertical fields of view \\[deg\\], (ncam,).";
     actuator_gainprm: f64, "Gain parameters, (nu, mjNGAIN).";
     actuator_biasprm: f64, "Bias parameters, (nu, mjNBIAS).";
@@ -147,7 +147,7 @@ model_arrays! {
     dof_solref: f64, "Reference of friction, (nv, mjNREF).";
     dof_solimp: f64, "Impedance of friction, (nv, mjNIMP).";
     geom_condim: i32, "Dimension of contacts, (ngeom,).";
-    geom_priority: i32, "Whose contact parameters count, (ngeom,).";
+    geom_priority: i32, "Priority of the contact parameters, (ngeom,): the geom with the higher priority sets them.";
     geom_solmix: f64, "Weights in the mixing of contact parameters, (ngeom,).";
     geom_solref: f64, "Reference of contacts, (ngeom, mjNREF).";
     geom_solimp: f64, "Impedance of contacts, (ngeom, mjNIMP).";
@@ -155,7 +155,7 @@ model_arrays! {
     geom_quat: f64, "Orientations in the body frame, wxyz, (ngeom, 4).";
     geom_friction: f64, "Sliding, torsional and rolling friction, (ngeom, 3).";
     geom_margin: f64, "Distances at which contacts are found \\[m\\], (ngeom,).";
-    geom_gap: f64, "Distances at which contacts do not act yet \\[m\\], (ngeom,).";
+    geom_gap: f64, "Width of the distance range in which a contact is detected but exerts no force \\[m\\], (ngeom,).";
     geom_fluid: f64, "Parameters of fluid forces, (ngeom, mjNFLUID).";
     site_type: i32, "Site types, as those of geoms, (nsite,).";
     site_bodyid: i32, "Body of each site, (nsite,).";
@@ -164,14 +164,14 @@ model_arrays! {
     site_size: f64, "Sizes, (nsite, 3).";
     site_pos: f64, "Positions in the body frame \\[m\\], (nsite, 3).";
     site_quat: f64, "Orientations in the body frame, wxyz, (nsite, 4).";
-    site_rgba: f32, "Colours, (nsite, 4).";
-    cam_mode: i32, "How each camera follows, (ncam,).";
+    site_rgba: f32, "Colors (RGBA), (nsite, 4).";
+    cam_mode: i32, "Tracking mode of each camera, (ncam,).";
     cam_bodyid: i32, "Body of each camera, (ncam,).";
     cam_targetbodyid: i32, "Body each camera looks at, -1 for none, (ncam,).";
     cam_pos: f64, "Positions in the body frame \\[m\\], (ncam, 3).";
     cam_quat: f64, "Orientations in the body frame, wxyz, (ncam, 4).";
-    cam_ipd: f64, "Distances between the eyes \\[m\\], (ncam,).";
-    light_mode: i32, "How each light follows, (nlight,).";
+    cam_ipd: f64, "Interpupillary distances \\[m\\], (ncam,).";
+    light_mode: i32, "Tracking mode of each light, (nlight,).";
     light_bodyid: i32, "Body of each light, (nlight,).";
     light_targetbodyid: i32, "Body each light shines at, -1 for none, (nlight,).";
     light_pos: f64, "Positions in the body frame \\[m\\], (nlight, 3).";
@@ -183,9 +183,9 @@ model_arrays! {
     pair_solref: f64, "Reference of contacts, (npair, mjNREF).";
     pair_solimp: f64, "Impedance of contacts, (npair, mjNIMP).";
     pair_margin: f64, "Distances at which contacts are found \\[m\\], (npair,).";
-    pair_gap: f64, "Distances at which contacts do not act yet \\[m\\], (npair,).";
+    pair_gap: f64, "Width of the distance range in which a contact is detected but exerts no force \\[m\\], (npair,).";
     pair_friction: f64, "Friction in all directions, (npair, 5).";
-    exclude_signature: i32, "Bodies that never collide, as MuJoCo packs them, (nexclude,); see [`Model::excluded_bodies`].";
+    exclude_signature: i32, "Excluded body pairs in MuJoCo's packed form, (nexclude,); see [`Model::excluded_bodies`].";
     eq_type: i32, "Equality types, (neq,).";
     eq_obj1id: i32, "First objects of equalities, (neq,).";
     eq_obj2id: i32, "Second objects of equalities, -1 for none, (neq,).";
@@ -196,7 +196,7 @@ model_arrays! {
     tendon_num: i32, "Number of points of each tendon's path, (ntendon,).";
     tendon_matid: i32, "Material of each tendon, -1 for none, (ntendon,).";
     tendon_group: i32, "Group of each tendon, (ntendon,).";
-    tendon_width: f64, "Drawn widths \\[m\\], (ntendon,).";
+    tendon_width: f64, "Rendered widths \\[m\\], (ntendon,).";
     tendon_solref_lim: f64, "Reference of limits, (ntendon, mjNREF).";
     tendon_solimp_lim: f64, "Impedance of limits, (ntendon, mjNIMP).";
     tendon_solref_fri: f64, "Reference of friction, (ntendon, mjNREF).";
@@ -206,11 +206,11 @@ model_arrays! {
     tendon_stiffness: f64, "Stiffness of springs, (ntendon,).";
     tendon_damping: f64, "Viscous damping, (ntendon,).";
     tendon_lengthspring: f64, "Lengths at which springs are at rest \\[m\\], (ntendon,); on 4.x the two ends, (ntendon, 2).";
-    tendon_rgba: f32, "Colours, (ntendon, 4).";
+    tendon_rgba: f32, "Colors (RGBA), (ntendon, 4).";
     wrap_type: i32, "Kinds of path points, (nwrap,).";
     wrap_objid: i32, "Objects of path points, (nwrap,).";
     wrap_prm: f64, "Divisors, coefficients or side sites of path points, (nwrap,).";
-    actuator_trntype: i32, "What each actuator acts on, (nactuator,).";
+    actuator_trntype: i32, "Transmission type of each actuator, (nactuator,).";
     actuator_dyntype: i32, "Activation dynamics of each actuator, (nactuator,).";
     actuator_gaintype: i32, "Gain of each actuator, (nactuator,).";
     actuator_biastype: i32, "Bias of each actuator, (nactuator,).";
@@ -230,16 +230,16 @@ model_arrays! {
     sensor_refid: i32, "Reference frame of each sensor, -1 for the world, (nsensor,).";
     sensor_dim: i32, "Number of values of each sensor, (nsensor,).";
     sensor_adr: i32, "First value of each sensor, (nsensor,).";
-    sensor_cutoff: f64, "Largest value of each sensor, 0 for none, (nsensor,).";
+    sensor_cutoff: f64, "Cutoff of each sensor value, 0 for no cutoff, (nsensor,).";
     sensor_noise: f64, "Standard deviations, which MuJoCo does not use by itself, (nsensor,).";
 }
 
 model_flags! {
-    jnt_limited, "Whether joint `index` has limits.";
-    tendon_limited, "Whether tendon `index` has limits.";
-    actuator_ctrllimited, "Whether control `index` is clamped.";
-    actuator_forcelimited, "Whether the force of actuator `index` is clamped.";
-    actuator_actlimited, "Whether the activation of actuator `index` is clamped.";
+    jnt_limited, "True if joint `index` has limits.";
+    tendon_limited, "True if tendon `index` has limits.";
+    actuator_ctrllimited, "True if control `index` is clamped.";
+    actuator_forcelimited, "True if the force of actuator `index` is clamped.";
+    actuator_actlimited, "True if the activation of actuator `index` is clamped.";
 }
 
 model_arrays_mut! {
@@ -255,9 +255,9 @@ data_arrays! {
     qpos: f64, "Positions, (nq,).";
     qvel: f64, "Velocities, (nv,).";
     qacc: f64, "Accelerations of the last solve, (nv,).";
-    qacc_warmstart: f64, "Accelerations the solver starts from, (nv,).";
+    qacc_warmstart: f64, "Accelerations from which the solver starts (warm start), (nv,).";
     ctrl: f64, "Control inputs, (nu,).";
-    qfrc_applied: f64, "Applied generalised forces, (nv,).";
+    qfrc_applied: f64, "Applied generalized forces, (nv,).";
     xfrc_applied: f64, "Applied forces and torques on bodies, (nbody, 6).";
     actuator_force: f64, "Force of each actuator, (nu,).";
     qfrc_actuator: f64, "Actuator forces, (nv,).";
@@ -266,13 +266,13 @@ data_arrays! {
     qfrc_passive: f64, "Passive forces, (nv,).";
     xpos: f64, "Body positions \\[m\\], (nbody, 3).";
     xquat: f64, "Body orientations, wxyz, (nbody, 4).";
-    xipos: f64, "Centres of mass \\[m\\], (nbody, 3).";
+    xipos: f64, "Centers of mass \\[m\\], (nbody, 3).";
     xanchor: f64, "Anchors of joints \\[m\\], (njnt, 3).";
     xaxis: f64, "Axes of joints, (njnt, 3).";
-    cvel: f64, "Spatial velocities about the subtree's centre of mass, (nbody, 6).";
-    cacc: f64, "Spatial accelerations about the subtree's centre of mass, minus gravity, (nbody, 6); see [`Data::rne_post_constraint`].";
-    cfrc_int: f64, "Torques and forces that parents exert on bodies, about the subtree's centre of mass, (nbody, 6); see [`Data::rne_post_constraint`].";
-    subtree_com: f64, "Centres of mass of subtrees \\[m\\], (nbody, 3).";
+    cvel: f64, "Spatial velocities about the subtree's center of mass, (nbody, 6).";
+    cacc: f64, "Spatial accelerations about the subtree's center of mass, minus gravity, (nbody, 6); see [`Data::rne_post_constraint`].";
+    cfrc_int: f64, "Torques and forces that parents exert on bodies, about the subtree's center of mass, (nbody, 6); see [`Data::rne_post_constraint`].";
+    subtree_com: f64, "Centers of mass of subtrees \\[m\\], (nbody, 3).";
     light_xpos: f64, "Light positions \\[m\\], (nlight, 3).";
     light_xdir: f64, "Light directions, (nlight, 3).";
     cam_xpos: f64, "Camera positions \\[m\\], (ncam, 3).";
@@ -281,14 +281,14 @@ data_arrays! {
     geom_xmat: f64, "Geom rotation matrices, row-major, (ngeom, 9).";
     efc_type: i32, "Kind of each constraint row, (nefc,).";
     efc_id: i32, "Object of each constraint row, (nefc,).";
-    efc_pos: f64, "Residual of each constraint row (metres or radians by its kind), (nefc,).";
-    efc_force: f64, "Force of each constraint row, (nefc,), as [`Data::step2`] or [`Data::forward`] solved it; after [`Data::step1`] alone, MuJoCo 4 has not written it yet and it means nothing.";
+    efc_pos: f64, "Residual of each constraint row (meters or radians, depending on its type), (nefc,).";
+    efc_force: f64, "Force of each constraint row, (nefc,), as [`Data::step2`] or [`Data::forward`] solved it. After [`Data::step1`] alone, its content is undefined on MuJoCo 4.";
     contact: mujoco_sys::mjContact, "Contacts, (ncon,).";
     act: f64, "Activations of actuators with a state, (na,).";
     site_xpos: f64, "Site positions \\[m\\], (nsite, 3).";
     site_xmat: f64, "Site rotation matrices, row-major, (nsite, 9).";
-    mocap_pos: f64, "Positions of bodies moved by hand \\[m\\], (nmocap, 3).";
-    mocap_quat: f64, "Orientations of bodies moved by hand, wxyz, (nmocap, 4).";
+    mocap_pos: f64, "Positions of mocap bodies \\[m\\], (nmocap, 3).";
+    mocap_quat: f64, "Orientations of mocap bodies, wxyz, (nmocap, 4).";
     sensordata: f64, "Readings of MuJoCo's own sensors, (nsensordata,).";
     ten_wrapadr: i32, "First point of each tendon's path in `wrap_xpos`, (ntendon,).";
     ten_wrapnum: i32, "Number of points of each tendon's path, (ntendon,).";

@@ -161,7 +161,10 @@ impl Data {
     /// # Panics
     /// The model was compiled separately, or its buffers have other sizes.
     pub fn set_model(&mut self, model: Model) {
-        assert!(model.is_compatible_with(&self.model), "a model of other sizes");
+        assert!(
+            model.is_compatible_with(&self.model),
+            "the model was compiled separately, or its buffers have other sizes"
+        );
         self.model = model;
     }
 

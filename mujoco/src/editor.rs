@@ -58,7 +58,7 @@ macro_rules! edited_arrays {
     ($($visibility:vis $name:ident: $element:ty;)*) => {
         impl ModelEditor {
             $(
-                #[doc = concat!("MuJoCo's array of the model that is being made, for writing: `", stringify!($name), "`.")]
+                #[doc = concat!("MuJoCo's array of the edited model, for writing: `", stringify!($name), "`.")]
                 $visibility fn $name(&mut self) -> &mut [$element] {
                     // SAFETY: the copy is alive, and `ModelEditor`, its only owner, is borrowed mutably.
                     unsafe { fields::$name(self.copy.0.as_ptr()) }
@@ -119,7 +119,7 @@ impl ModelEditor {
     /// # Panics
     /// `model` comes from another compilation than the model of this editor.
     pub fn load(&mut self, model: &Model) {
-        assert!(std::ptr::eq(model.compiled(), self.base.compiled()), "a model of another scene");
+        assert!(std::ptr::eq(model.compiled(), self.base.compiled()), "the model was compiled from another scene");
         for field in &self.fields {
             // SAFETY: a field of models of these sizes; nothing writes to a shared model.
             let from = unsafe { bytes(model.header(), field) };
@@ -243,7 +243,7 @@ impl ModelEditor {
     /// # Panics
     /// `like` comes from another compilation.
     pub fn model(&self, like: &Model) -> Model {
-        assert!(std::ptr::eq(like.compiled(), self.base.compiled()), "a model of another scene");
+        assert!(std::ptr::eq(like.compiled(), self.base.compiled()), "the model was compiled from another scene");
         let changed = |field: &&ModelArray| {
             // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
             let mine = unsafe { bytes(self.copy.header(), field) };
@@ -410,7 +410,11 @@ mod tests {
         editor.load(&model);
         assert_eq!(editor.model(&model).own_arrays().count(), 0);
         editor.set_constants().expect("fits");
-        assert_eq!(editor.model(&model).own_arrays().count(), 0, "constants of an unchanged model are those it has");
+        assert_eq!(
+            editor.model(&model).own_arrays().count(),
+            0,
+            "recomputed constants of an unchanged model equal its own constants"
+        );
         editor.load(&edited);
         assert_eq!(differences(&editor.model(&model), &edited), Vec::<String>::new());
     }
@@ -456,7 +460,7 @@ mod tests {
         if cfg!(mj4) {
             assert_eq!(editor.set_center_of_mass(4, [0.03, 0.0, 0.01]), Err(DiagonalInertia));
             #[cfg(mj4)]
-            assert_ne!(centred.header().nC, shifted.header().nC, "there is no room for it");
+            assert_ne!(centred.header().nC, shifted.header().nC, "the entry is not stored in the sparse matrix");
         } else {
             let mut editor = ModelEditor::new(&centred).expect("small");
             editor.set_center_of_mass(4, [0.03, 0.0, 0.01]).expect("room");

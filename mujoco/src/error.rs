@@ -61,7 +61,7 @@ impl std::fmt::Display for CompileError {
         if let Some(source) = &self.source_location {
             write!(f, "{source}: ")?;
         }
-        write!(f, "MuJoCo refuses the model: {}", self.message)
+        write!(f, "MuJoCo rejected the model: {}", self.message)
     }
 }
 
@@ -78,12 +78,12 @@ fn newer_version_hint(message: &str) -> String {
     let version = version_string();
     match unknown.introduced_in() {
         Some(since) => format!(
-            ". MuJoCo {since} was the first that knows it; this program was built for {version}: build it with MUJOCO_DIR set \
-             to the folder of MuJoCo 4"
+            ". This keyword needs MuJoCo {since} or newer, but this program was built for {version}: build it with \
+             MUJOCO_DIR set to the folder of MuJoCo 4"
         ),
         None => format!(
-            ". If it is no mistake, the file is for a newer MuJoCo than {version}, for which this program was built: build it \
-             with MUJOCO_DIR set to the folder of MuJoCo 4"
+            ". If the keyword is correct, the file needs a newer MuJoCo than {version}, for which this program was \
+             built: build it with MUJOCO_DIR set to the folder of MuJoCo 4"
         ),
     }
 }

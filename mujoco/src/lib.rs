@@ -31,7 +31,7 @@
 //! assert!(data.qpos()[2] < 0.0, "free fall");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-#![allow(unsafe_code, reason = "the wall to MuJoCo")]
+#![allow(unsafe_code, reason = "FFI boundary to MuJoCo")]
 
 mod arrays;
 mod compile;

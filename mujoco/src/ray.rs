@@ -58,7 +58,7 @@ impl Data {
         groups: u32,
         distances: &mut [f64],
     ) -> Result<(), EngineError> {
-        assert_eq!(directions.len(), distances.len(), "as many distances as directions");
+        assert_eq!(directions.len(), distances.len(), "directions and distances differ in length");
         #[cfg(mj4)]
         {
             let groups: [u8; mj::mjNGROUP as usize] = std::array::from_fn(|k| u8::from(groups >> k & 1 == 1));

@@ -55,7 +55,7 @@ fn small_buffers() {
     assert_eq!(small.buffers().arena_bytes, if cfg!(mj4) { arena_bytes } else { 0 });
     let mut data = Data::new(&small).expect("small");
     data.forward().expect("fits");
-    assert_eq!(data.ne(), 1, "the equality is there");
+    assert_eq!(data.ne(), 1, "the equality is active");
 }
 
 #[test]
@@ -76,10 +76,10 @@ fn multi_ray() {
     let mut distances = vec![f64::NAN; directions.len()];
     let done = data.multi_ray(origin, &directions, 1, &mut distances);
     if cfg!(not(mj4)) {
-        assert!(done.expect_err("there is none").to_string().contains("mj_multiRay"));
+        assert!(done.expect_err("mj_multiRay is missing before 4.x").to_string().contains("mj_multiRay"));
         return;
     }
-    done.expect("4.x has it");
+    done.expect("mj_multiRay exists in 4.x");
     let mut hits = 0;
     for (direction, distance) in directions.iter().zip(distances) {
         let one = data.ray(origin, *direction, 1).expect("a ray");
@@ -121,7 +121,7 @@ fn forces_before_integration() {
     let mut spare = Vec::new();
     data.rne_post_constraint(&now, &mut spare).expect("solves");
     assert!(far(&data) < 1e-12, "{:?} instead of {expected:?}", data.cfrc_int());
-    assert_eq!(data.qvel(), later, "what it was given is left as it was");
+    assert_eq!(data.qvel(), later, "the given input must not change");
     // Control: velocities of another time give wrong forces.
     data.rne_post_constraint(&later, &mut spare).expect("solves");
     assert!(far(&data) > 1.0, "{:?}", data.cfrc_int());

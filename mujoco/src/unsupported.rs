@@ -33,24 +33,24 @@ impl Model {
             }};
         }
         let header = self.header();
-        let whole = [("flex", header.nflex, "a shape that deforms"), ("plugin", header.nplugin, "code of its own")];
+        let whole = [("flex", header.nflex, "a deformable (flex) body"), ("plugin", header.nplugin, "a plugin")];
         if let Some((element, _, what)) = whole.into_iter().find(|(_, count, _)| *count > 0) {
             return Some(UnsupportedFeature { element, index: 0, what });
         }
         let numbers = [
-            ("joint", array!(jnt_stiffnesspoly), self.njnt(), "a stiffness of higher order"),
-            ("joint", array!(dof_dampingpoly), self.nv(), "a damping of higher order"),
+            ("joint", array!(jnt_stiffnesspoly), self.njnt(), "nonlinear (polynomial) stiffness"),
+            ("joint", array!(dof_dampingpoly), self.nv(), "nonlinear (polynomial) damping"),
             ("joint", array!(jnt_springyield), self.njnt(), "springyield"),
             ("geom", array!(geom_surfacevel), self.ngeom(), "surfacevel"),
             ("geom", array!(geom_adhesion), self.ngeom(), "adhesion"),
             ("pair", array!(pair_adhesion), self.npair(), "adhesion"),
             ("pair", array!(pair_solreffriction), self.npair(), "solreffriction"),
-            ("tendon", array!(tendon_stiffnesspoly), self.ntendon(), "a stiffness of higher order"),
-            ("tendon", array!(tendon_dampingpoly), self.ntendon(), "a damping of higher order"),
+            ("tendon", array!(tendon_stiffnesspoly), self.ntendon(), "nonlinear (polynomial) stiffness"),
+            ("tendon", array!(tendon_dampingpoly), self.ntendon(), "nonlinear (polynomial) damping"),
             ("tendon", array!(tendon_springyield), self.ntendon(), "springyield"),
             ("actuator", array!(actuator_delay), self.nactuator(), "delay"),
             ("actuator", array!(actuator_damping), self.nactuator(), "damping"),
-            ("actuator", array!(actuator_dampingpoly), self.nactuator(), "a damping of higher order"),
+            ("actuator", array!(actuator_dampingpoly), self.nactuator(), "nonlinear (polynomial) damping"),
             ("actuator", array!(actuator_armature), self.nactuator(), "armature"),
         ];
         for (element, values, count, what) in numbers {
@@ -116,7 +116,7 @@ impl Model {
             // A rangefinder of 4.x may output more than a distance.
             let word = super::mjcf_keywords::sensor(self.sensor_type()[sensor]);
             let several = word.is_some_and(|word| word.word == "rangefinder") && self.sensor_dim()[sensor] != 1;
-            several.then_some("rangefinder data other than a distance")
+            several.then_some("rangefinder output other than the distance")
         }
         #[cfg(not(mj4))]
         {

@@ -53,7 +53,7 @@ impl Model {
             let values = unsafe { std::slice::from_raw_parts(array_pointer(compiled, &field), field.bytes) };
             let mut values = values.to_vec();
             for weld in welds {
-                assert!(self.is_weld(weld.equality), "equality {} is no weld", weld.equality);
+                assert!(self.is_weld(weld.equality), "equality {} is not a weld", weld.equality);
                 if field.name == "eq_active" {
                     values[weld.equality] = 1;
                     continue;

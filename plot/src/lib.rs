@@ -90,7 +90,7 @@ pub struct SizeError {
 impl fmt::Display for SizeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { width, height, min_size: least, max_size: most } = self;
-        write!(f, "a plot of {width} x {height} pixels: {least} to {most} would do for both")
+        write!(f, "a plot of {width} x {height} pixels: both must be from {least} to {most}")
     }
 }
 

@@ -34,8 +34,8 @@ fn colors_of_many_curves() {
     let apart =
         |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt();
     for (k, color) in colors.iter().enumerate() {
-        assert!(apart(*color, [255; 3]) > 80.0, "{color:?} is seen on white");
-        assert!(colors[..k].iter().all(|other| apart(*color, *other) > 40.0), "{color:?} is like another");
+        assert!(apart(*color, [255; 3]) > 80.0, "{color:?} differs from white");
+        assert!(colors[..k].iter().all(|other| apart(*color, *other) > 40.0), "{color:?} differs from all others");
     }
     assert_eq!(colors.len(), 24);
 }
@@ -83,5 +83,5 @@ fn logarithms() {
 #[test]
 fn sizes() {
     let plot = Plot { size: [20, 540], ..sine(50) };
-    assert_eq!(plot.to_svg().unwrap_err().to_string(), "a plot of 20 x 540 pixels: 200 to 16384 would do for both");
+    assert_eq!(plot.to_svg().unwrap_err().to_string(), "a plot of 20 x 540 pixels: both must be from 200 to 16384");
 }

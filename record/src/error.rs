@@ -12,7 +12,7 @@ pub type Result<T, E = RecordError> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum RecordError {
     /// The output path exists already.
-    #[error("{path}: there is such a file already; choose another name, or set `overwrite`")]
+    #[error("{path}: this path exists already; choose another name, or set `overwrite`")]
     Exists {
         /// The file or folder.
         path: PathBuf,
@@ -33,7 +33,7 @@ pub enum RecordError {
     },
     /// No format has this file name extension.
     #[error(
-        "{path}: nothing is recorded as .{extension}; known are {}, and a name without end for a folder of PNG files",
+        "{path}: unknown format .{extension}; known formats: {}, and a name without extension for a folder of PNG files",
         extensions_text()
     )]
     Format {
@@ -53,7 +53,7 @@ pub enum RecordError {
         feature: &'static str,
     },
     /// The format does not support a topic that was requested by name.
-    #[error("{path}: {} has no place for {topic}", .format.name())]
+    #[error("{path}: {} does not support {topic}", .format.name())]
     UnsupportedTopic {
         /// The file.
         path: PathBuf,
@@ -71,7 +71,7 @@ pub enum RecordError {
         path: PathBuf,
     },
     /// The overview image cannot be drawn.
-    #[error("the picture of the stage: {what}")]
+    #[error("the overview image: {what}")]
     Overview {
         /// Reason, or the invalid number.
         what: String,
@@ -95,7 +95,7 @@ pub enum RecordError {
         found: String,
     },
     /// The format does not support images of this size.
-    #[error("{path}: {} has no pictures of {width} x {height} pixels: {supported}", .format.name())]
+    #[error("{path}: {} does not support images of {width} x {height} pixels: {supported}", .format.name())]
     UnsupportedSize {
         /// The file.
         path: PathBuf,
@@ -109,7 +109,10 @@ pub enum RecordError {
         supported: String,
     },
     /// The format requires a whole number of rows per second.
-    #[error("{path}: with `every` {every} there are {found:.3} rows per second, which is no whole number; {}", rate_advice(.candidates))]
+    #[error(
+        "{path}: with `every` {every} there are {found:.3} rows per second, but the format needs a whole number; {}",
+        rate_advice(.candidates)
+    )]
     UnsupportedRate {
         /// The file.
         path: PathBuf,
@@ -122,8 +125,8 @@ pub enum RecordError {
     },
     /// A stream is missing in an environment of a dataset, whose rows must be complete.
     #[error(
-        "{path}: every row of a dataset has everything, but {stream} is not in environment {env}; record environments and topics \
-         that go together"
+        "{path}: every row of a dataset must be complete, but {stream} is not in environment {env}; record environments and \
+         topics that match"
     )]
     MissingStream {
         /// The folder.
@@ -134,7 +137,7 @@ pub enum RecordError {
         env: usize,
     },
     /// There is no entity, topic or field of this name.
-    #[error("there is no {what} {name:?}{}", candidates_text(.candidates))]
+    #[error("unknown {what} {name:?}{}", candidates_text(.candidates))]
     UnknownName {
         /// Kind of name.
         what: &'static str,
@@ -144,7 +147,7 @@ pub enum RecordError {
         candidates: Vec<String>,
     },
     /// A name is ambiguous.
-    #[error("there is more than one {what} {name:?}: {}; say which", .found.join(", "))]
+    #[error("{what} {name:?} is ambiguous: it may be any of {}; give the full name", .found.join(", "))]
     Ambiguous {
         /// Kind of name.
         what: &'static str,
@@ -154,19 +157,19 @@ pub enum RecordError {
         found: Vec<String>,
     },
     /// The type of a sensor does not provide its channels.
-    #[error("sensor {sensor:?} cannot be recorded: its type says nothing of its channels (Sensor::sampled)")]
+    #[error("sensor {sensor:?} cannot be recorded: its type provides no channels (Sensor::sampled)")]
     NoChannels {
         /// Name of the sensor.
         sensor: String,
     },
     /// A camera renders none of the recorded environments.
-    #[error("sensor {sensor:?} is in none of the environments that are recorded")]
+    #[error("sensor {sensor:?} is not in any recorded environment")]
     SensorNotInEnvs {
         /// Name of the sensor.
         sensor: String,
     },
     /// Two streams would have the same name in the file.
-    #[error("{path}: two things that are recorded are called {name:?} there; choose topics, or rename one of them")]
+    #[error("{path}: two recorded streams have the name {name:?}; choose topics, or rename one of them")]
     DuplicateName {
         /// The file.
         path: PathBuf,
@@ -175,7 +178,7 @@ pub enum RecordError {
     },
     /// The packet pool is larger than the limit.
     #[error(
-        "{packets} packets of {bytes} bytes are more than the {max_bytes} bytes that a pool may have; choose fewer packets"
+        "{packets} packets of {bytes} bytes exceed the limit of the packet pool, {max_bytes} bytes; choose fewer packets"
     )]
     PoolTooLarge {
         /// [`RecorderCfg::packets`](crate::RecorderCfg::packets).
@@ -186,7 +189,7 @@ pub enum RecordError {
         max_bytes: u64,
     },
     /// An environment does not exist, or is listed twice.
-    #[error("environment {env} is not one of {count}, or is named twice")]
+    #[error("environment {env} does not exist or is named twice; there are {count} environments")]
     Env {
         /// Index of the environment.
         env: usize,
@@ -204,7 +207,7 @@ pub enum RecordError {
         min: u64,
     },
     /// A recorded stream was removed or has another shape.
-    #[error("{path}: {stream} is not what it was when the recording began: something was added to the scene")]
+    #[error("{path}: {stream} has changed since the recording began, because the scene has changed")]
     StreamChanged {
         /// The file.
         path: PathBuf,
@@ -240,7 +243,7 @@ pub enum RecordError {
         what: String,
     },
     /// An animation or a dataset has no frame.
-    #[error("{path}: there is no frame: {why}")]
+    #[error("{path}: the recording has no frame: {why}")]
     NoFrame {
         /// The file or folder.
         path: PathBuf,
@@ -248,7 +251,7 @@ pub enum RecordError {
         why: &'static str,
     },
     /// The writer thread panicked.
-    #[error("{path}: the thread that writes has panicked")]
+    #[error("{path}: the writer thread panicked")]
     Panicked {
         /// The file or folder.
         path: PathBuf,
@@ -280,28 +283,28 @@ impl RecordError {
 }
 
 fn candidates_text(candidates: &[String]) -> String {
-    if candidates.is_empty() { String::new() } else { format!("; known are {}", candidates.join(", ")) }
+    if candidates.is_empty() { String::new() } else { format!("; known names: {}", candidates.join(", ")) }
 }
 
 fn advice(recoverable: &bool) -> &'static str {
     match recoverable {
-        true => "`kinetoscope recover` (record::recover) makes a whole file of it, or set `overwrite`",
-        false => "keep what you need of it under another name, delete it, or set `overwrite`",
+        true => "`kinetoscope recover` (record::recover) makes a complete file of it, or set `overwrite`",
+        false => "rename it to keep it, delete it, or set `overwrite`",
     }
 }
 
 fn write_error_text(error: &Option<String>) -> String {
-    error.as_ref().map_or_else(String::new, |error| format!("; nor can the file be written: {error}"))
+    error.as_ref().map_or_else(String::new, |error| format!("; the file cannot be written either: {error}"))
 }
 
 fn partial_file_text(kept: &Option<PathBuf>) -> String {
-    kept.as_ref().map_or_else(String::new, |kept| format!("; what was recorded until then is in {}", kept.display()))
+    kept.as_ref().map_or_else(String::new, |kept| format!("; the recording up to that point is in {}", kept.display()))
 }
 
 fn rate_advice(near: &[u64]) -> String {
     let near: Vec<String> = near.iter().map(u64::to_string).collect();
     match near.is_empty() {
         true => "choose another physics_dt".into(),
-        false => format!("{} would do", near.join(", ")),
+        false => format!("valid values of `every`: {}", near.join(", ")),
     }
 }

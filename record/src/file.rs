@@ -75,7 +75,7 @@ impl PartialFile {
             return Err(RecordError::Exists { path: path.into() });
         }
         if path.is_dir() {
-            let error = io::Error::new(io::ErrorKind::IsADirectory, "this is a folder, and no file replaces it");
+            let error = io::Error::new(io::ErrorKind::IsADirectory, "this is a folder; a file cannot replace it");
             return Err(RecordError::file(path, error));
         }
         let begin = || {

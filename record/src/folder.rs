@@ -28,7 +28,7 @@ impl PartialFolder {
         // Removes a separator at the end.
         let path: PathBuf = path.components().collect();
         if path.file_name().is_none() {
-            let error = io::Error::new(io::ErrorKind::InvalidInput, "a folder needs a name of its own");
+            let error = io::Error::new(io::ErrorKind::InvalidInput, "the path has no folder name");
             return Err(RecordError::file(&path, error));
         }
         let part = partial_path_of(&path);
@@ -67,7 +67,7 @@ impl PartialFolder {
     /// Renames the complete folder to its final name.
     pub(crate) fn commit(&self) -> io::Result<()> {
         if !self.is_available(&self.path)? {
-            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a folder of that name has appeared meanwhile"));
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a folder of that name was created meanwhile"));
         }
         // A replaced folder is set aside until the new one has its name, so that one of them exists at any time.
         let aside = match self.path.symlink_metadata() {

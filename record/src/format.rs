@@ -47,7 +47,7 @@ struct FormatInfo {
 const ALL: [FormatInfo; 9] = [
     FormatInfo { format: Format::Mcap, extension: "mcap", name: "an MCAP file", supports: |_| true },
     FormatInfo { format: Format::Npz, extension: "npz", name: "a NumPy archive", supports: |_| true },
-    FormatInfo { format: Format::Images, extension: "", name: "a folder of pictures", supports: is_png_image },
+    FormatInfo { format: Format::Images, extension: "", name: "a folder of images", supports: is_png_image },
     FormatInfo { format: Format::LeRobot, extension: "lerobot", name: "a LeRobot dataset", supports },
     FormatInfo {
         format: Format::Hdf5,

@@ -125,7 +125,7 @@ pub(crate) fn io_error(error: McapError) -> io::Error {
 }
 
 fn finished() -> io::Error {
-    io::Error::other("the file is finished already")
+    io::Error::other("the file was finished already")
 }
 
 /// Converts a time to nanoseconds; negative times become 0.

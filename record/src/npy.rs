@@ -57,7 +57,7 @@ where
     D: Dimension,
 {
     let head = header(S::Elem::ELEMENT, array.shape());
-    to.write_all(&head.ok_or_else(|| io::Error::other("more axes than the format has room for"))?)?;
+    to.write_all(&head.ok_or_else(|| io::Error::other("more axes than the .npy format supports"))?)?;
     let mut bytes = Vec::with_capacity(array.len() * size_of::<S::Elem>());
     for &number in array {
         number.append_le_bytes(&mut bytes);

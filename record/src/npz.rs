@@ -260,11 +260,10 @@ impl FormatWriter for NpzWriter {
     }
 
     fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64> {
-        let storage = self.storage.take().ok_or_else(|| io::Error::other("finished twice"))?;
+        let storage = self.storage.take().ok_or_else(|| io::Error::other("the archive was finished twice"))?;
         let mut archive = ZipWriter::new(BufWriter::with_capacity(1 << 16, storage));
         let header = |element, shape: &[usize]| {
-            npy::header(element, shape)
-                .ok_or_else(|| WriteError::limit("an array has more axes than NumPy has room for"))
+            npy::header(element, shape).ok_or_else(|| WriteError::limit("an array has more axes than NumPy supports"))
         };
         let about = format!("{:#}\n", self.metadata);
         archive.add(METADATA, b"", &mut about.as_bytes())?;

@@ -57,11 +57,11 @@ impl OverviewRenderer {
     pub(crate) fn new(sim: &mut SimulationManager, cfg: &OverviewCfg) -> Result<Self> {
         let wrong = |what: String| RecordError::Overview { what };
         if !(cfg.fps.is_finite() && cfg.fps > 0.0) {
-            return Err(wrong(format!("its rate is {} Hz: it must be above 0", cfg.fps)));
+            return Err(wrong(format!("the rate is {} Hz; it must be above 0", cfg.fps)));
         }
         let [width, height] = cfg.size;
         if !(1..=View::MAX_SIDE).contains(&width) || !(1..=View::MAX_SIDE).contains(&height) {
-            return Err(wrong(format!("{width} x {height} pixels; both sides are 1 to {}", View::MAX_SIDE)));
+            return Err(wrong(format!("{width} x {height} pixels; both must be from 1 to {}", View::MAX_SIDE)));
         }
         let still = OffscreenScene::overview(sim, None, &[])?;
         let first = still.first_view(cfg.size);

@@ -62,15 +62,13 @@ impl Playback {
         let packed = match scene {
             Some(sim) => scene_file::pack(sim)?.0,
             None => recording.attachment(SCENE_ARCHIVE)?.ok_or_else(|| {
-                malformed("it does not hold its scene; give a scene that is built as the recorded one was")
+                malformed("it does not contain its scene; pass a scene that is built as the recorded one was")
             })?,
         };
         let (sim, part) = scene_file::unpack(&packed, recording.path())?;
         let film = Self::in_scene(recording, &sim, part)?;
         if film.times.is_empty() {
-            return Err(malformed(
-                "nothing that moves in its scene was recorded; record joint states, poses or states",
-            ));
+            return Err(malformed("no motion of its scene was recorded; record joint states, poses or states"));
         }
         Ok((film, sim))
     }

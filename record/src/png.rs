@@ -37,7 +37,7 @@ impl PngWriter {
     fn encode(&mut self, [width, height]: [usize; 2], color: ExtendedColorType) -> WriteResult<&[u8]> {
         self.file.clear();
         let side = |side: usize| {
-            u32::try_from(side).map_err(|_| WriteError::limit("a side of a PNG file has less than 4294967296 pixels"))
+            u32::try_from(side).map_err(|_| WriteError::limit("a side of a PNG image has less than 4294967296 pixels"))
         };
         let encoder = PngEncoder::new(&mut self.file);
         encoder.write_image(&self.pixels, side(width)?, side(height)?, color).map_err(io::Error::other)?;

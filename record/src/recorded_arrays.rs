@@ -68,13 +68,13 @@ impl RecordedArrays {
     /// Opens an archive from any source; `path` is its name in error messages.
     pub(crate) fn from_reader(path: &Path, from: impl From + 'static) -> Result<Self> {
         let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
-        let none = "this is no NumPy archive of a recorder, or is damaged";
+        let none = "this is not a NumPy archive of a recorder, or it is damaged";
         let mut file = ZipReader::open(from).map_err(|error| read_error(path, none, error))?;
         let about = file.read(METADATA).map_err(|error| read_error(path, none, error))?;
         let about = about.and_then(|about| serde_json::from_slice(&about).ok());
-        let about: Value = about.ok_or_else(|| malformed("it does not say what is in it (recording.json)"))?;
+        let about: Value = about.ok_or_else(|| malformed("it has no description of its content (recording.json)"))?;
         if !file.names().any(|name| name == INITIAL_STATE) {
-            return Err(malformed("it has no state to begin with (start.snapshot)"));
+            return Err(malformed("it has no initial state (start.snapshot)"));
         }
         let names: Vec<String> = file.names().filter_map(|name| name.strip_suffix(".npy")).map(String::from).collect();
         let mut arrays = BTreeMap::new();
@@ -109,7 +109,7 @@ impl RecordedArrays {
     fn numbers(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
         let data = self.member(&format!("{name}.npy"))?;
         let Some((descr, _, data)) = data.as_deref().and_then(npy::parse) else {
-            return Err(self.malformed(format!("{name} is no array")));
+            return Err(self.malformed(format!("{name} is not an array")));
         };
         let numbers: Vec<f64> = match descr {
             "<f8" => data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect(),
@@ -120,7 +120,7 @@ impl RecordedArrays {
         // The product of the other axes must not overflow, even if one axis is empty.
         let filled: Vec<usize> = shape.iter().copied().filter(|length| *length > 0).collect();
         if product(shape) != Some(numbers.len()) || product(&filled).is_none() {
-            return Err(self.malformed(format!("{name} has not as many numbers as its shape says")));
+            return Err(self.malformed(format!("the number of values of {name} does not match its shape")));
         }
         Ok(numbers)
     }
@@ -140,7 +140,7 @@ impl RecordedArrays {
 
     /// Shape and values of an array.
     pub(crate) fn array(&self, name: &str) -> Result<(&[usize], &[f64])> {
-        let array = self.arrays.get(name).ok_or_else(|| self.malformed(format!("there is no array {name}")))?;
+        let array = self.arrays.get(name).ok_or_else(|| self.malformed(format!("the array {name} is missing")))?;
         if array.numbers.get().is_none() {
             // Another thread may have set the same values meanwhile.
             let _ = array.numbers.set(self.numbers(name, &array.shape)?);
@@ -159,7 +159,7 @@ impl RecordedArrays {
             let shape = [&[rows, source.stream.env_ids.len()][..], &part.shape].concat();
             let found = self.array(&name)?.0;
             if *found != shape {
-                return Err(self.malformed(format!("{name} has shape {found:?}; here it would be {shape:?}")));
+                return Err(self.malformed(format!("{name} has shape {found:?}; expected {shape:?}")));
             }
         }
         Ok(())

@@ -249,7 +249,7 @@ impl Recorder {
         let path = self.cfg.path.display();
         match self.reason.get() {
             Some(why) => Some(format!("{path}: {why}")),
-            None => self.has_failed().then(|| format!("{path}: the thread that writes has ended")),
+            None => self.has_failed().then(|| format!("{path}: the writer thread has ended")),
         }
     }
 
@@ -300,7 +300,7 @@ impl Recorder {
             (Some(failure), Err(written)) => (failure, written),
             (None, Err(WriterFailure { error, partial_path: kept })) => match error {
                 None => {
-                    let error = Arc::new(std::io::Error::other("the recording was broken off"));
+                    let error = Arc::new(std::io::Error::other("the recording was aborted"));
                     return Err(RecordError::File { path, error, partial_file: kept });
                 }
                 Some(WriteError::Io(error)) => {

@@ -46,12 +46,12 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
     let mut locked = lock_partial_file(&left)?.ok_or_else(missing)?;
     let failed_to_read = |error| RecordError::file(&left, error);
     let nothing =
-        |why: String| RecordError::Malformed { path: left.clone(), what: format!("nothing of it can be read: {why}") };
+        |why: String| RecordError::Malformed { path: left.clone(), what: format!("it cannot be recovered: {why}") };
     let mut magic = Vec::new();
     let mut head = (&mut locked).take(mcap::MAGIC.len() as u64);
     head.read_to_end(&mut magic).map_err(failed_to_read)?;
     if magic != mcap::MAGIC {
-        return Err(nothing("this is no MCAP file".into()));
+        return Err(nothing("this is not an MCAP file".into()));
     }
     locked.seek(SeekFrom::Start(0)).map_err(failed_to_read)?;
     // Removes the remainder of an earlier attempt that was killed.
@@ -66,7 +66,7 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
         Err(CopyError::Write(error)) => return Err(failed(error)),
     };
     if recovered.messages == 0 {
-        return Err(nothing(recovered.damage.unwrap_or_else(|| "there is no whole message in it".into())));
+        return Err(nothing(recovered.damage.unwrap_or_else(|| "it has no complete message".into())));
     }
     writer.finish().map_err(failed)?;
     writer.into_inner().flush().map_err(|error| RecordError::file(to, error))?;

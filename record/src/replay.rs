@@ -61,12 +61,12 @@ impl ReplayResult {
 impl fmt::Display for ReplayResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.difference {
-            None => write!(f, "the same in {} steps: {} numbers, bit for bit", self.steps, self.values),
+            None => write!(f, "identical in {} steps: {} values, bit for bit", self.steps, self.values),
             Some(Difference { step, env, array, column, recorded, replayed: found, state_written: written }) => {
                 write!(f, "first different at step {step} in environment {env}: {array}, column {column}, ")?;
                 write!(f, "was {recorded:e}, now {found:e}")?;
                 if *written {
-                    f.write_str("; somebody wrote to the state there, which is no action")?;
+                    f.write_str("; the state was written there, which is not an action")?;
                 }
                 Ok(())
             }
@@ -131,11 +131,13 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Rep
     }
     // A NaN fails this check, too.
     if !steps.windows(2).all(|pair| [0.0, 1.0].contains(&(pair[1] - pair[0]))) {
-        return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
+        return Err(archive.malformed("it does not contain every step: record with `every: 1`".into()));
     }
     for source in states.iter().chain(&targets) {
         if archive.steps(&source.stream.name)? != steps {
-            return Err(archive.malformed(format!("{} has other rows than the rest", source.stream.name)));
+            return Err(
+                archive.malformed(format!("the rows of {} differ from those of the other streams", source.stream.name))
+            );
         }
         archive.check(source, steps.len())?;
     }

@@ -72,13 +72,13 @@ pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, Mj
     let mut stage = Value::Null;
     for (name, data) in &files {
         if name == SETTINGS {
-            stage = serde_json::from_slice(data).map_err(|_| malformed("stage.json is no JSON"))?;
+            stage = serde_json::from_slice(data).map_err(|_| malformed("stage.json is not valid JSON"))?;
             continue;
         }
         // A recorder writes no names that lead out of the folder.
         let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
         if !inside {
-            return Err(malformed(&format!("{name:?} is no name of a file in it")));
+            return Err(malformed(&format!("{name:?} is not a valid file name")));
         }
         let file = folder.path().join(name);
         if let Some(parent) = file.parent() {
@@ -87,7 +87,7 @@ pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, Mj
         fs::write(&file, data).map_err(failed)?;
     }
     let number = |name: &str| stage[name].as_u64().and_then(|number| usize::try_from(number).ok());
-    let num_envs = number("num_envs").ok_or_else(|| malformed("it does not say how many environments there are"))?;
+    let num_envs = number("num_envs").ok_or_else(|| malformed("it does not contain the number of environments"))?;
     let arena_space = stage["arena_space"].as_f64().unwrap_or(SimulationManagerCfg::default().arena_space);
     let mjcf = folder.path().join(MJCF[usize::from(BUILD_VERSION == SupportedVersion::V4)]);
     // Older recordings lack the ground settings. Their ground is the plane of the MJCF.

@@ -264,7 +264,7 @@ impl SceneTracker {
         });
         let omitted = (!self.omitted.is_empty()).then(|| {
             let envs = list(self.omitted.iter().map(usize::to_string).collect());
-            format!("how environments {envs} look, for viewers (more than {} MiB in all)", MAX_BYTES >> 20)
+            format!("the appearance of environments {envs}, for viewers (more than {} MiB in all)", MAX_BYTES >> 20)
         });
         lost.into_iter().chain(deforming).chain(omitted).collect()
     }

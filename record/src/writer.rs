@@ -26,7 +26,7 @@ pub(crate) enum WriteError {
     #[error("{0}")]
     Limit(String),
     /// An animation or a dataset has no frame; the text says what every frame needs.
-    #[error("there is no frame: {0}")]
+    #[error("the recording has no frame: {0}")]
     NoFrame(&'static str),
 }
 

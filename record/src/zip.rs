@@ -212,7 +212,7 @@ impl<'s> ZipReader<'s> {
     pub(crate) fn open(from: impl ReadSeek + 's) -> io::Result<Self> {
         let mut reader = Self { from: Box::new(from), files: Vec::new() };
         let length = reader.from.seek(SeekFrom::End(0))?;
-        let none = || invalid_data("this is no such archive, or it is not whole");
+        let none = || invalid_data("this is not an archive of a recorder, or it is incomplete");
         let tail = reader.bytes(length.checked_sub(END_LEN).ok_or_else(none)?, END_LEN, length)?;
         let is_end = number(&tail, 20, 4) == Some(END.into()) && number(&tail, 0, 4) == Some(LOCATOR_64.into());
         let end = number(&tail, 8, 8).filter(|_| is_end).ok_or_else(none)?;
@@ -227,7 +227,7 @@ impl<'s> ZipReader<'s> {
     /// Reads `count` bytes at offset `at`, within the file of size `length`.
     fn bytes(&mut self, at: u64, count: u64, length: u64) -> io::Result<Vec<u8>> {
         if at.checked_add(count).is_none_or(|end| end > length) {
-            return Err(invalid_data("its directory leads out of it"));
+            return Err(invalid_data("its directory points beyond the file"));
         }
         let mut bytes = vec![0; usize::try_from(count).map_err(|_| invalid_data("it is larger than memory"))?];
         self.from.seek(SeekFrom::Start(at))?;
@@ -283,7 +283,7 @@ impl<'s> ZipReader<'s> {
             DEFLATED => {
                 DeflateDecoder::new(packed).take(file.uncompressed_size.saturating_add(1)).read_to_end(&mut data)?
             }
-            _ => return Err(invalid_data("it is packed otherwise than recorders do")),
+            _ => return Err(invalid_data("it uses an unsupported compression method")),
         };
         let whole = data.len() as u64 == file.uncompressed_size && crc_of(&data) == file.crc;
         if whole { Ok(data) } else { Err(invalid_data(&format!("{} is damaged", file.name))) }
@@ -390,6 +390,6 @@ mod tests {
         assert!(read_stored(&shared).is_none() && read_all(&shared).is_none());
         let name = bytes.windows(12).position(|name| name == b"meshes/a.obj").unwrap();
         bytes[name + 12 + 20 + 5] ^= 1;
-        assert_eq!(read_all(&bytes), None, "what is packed is compared with its checksum too");
+        assert_eq!(read_all(&bytes), None, "deflated files are checked, too");
     }
 }

@@ -58,17 +58,17 @@ impl Aperture {
             return wrong("focal_length", focal_length, "positive and finite");
         }
         if f_number.is_nan() || f_number <= 0.0 {
-            return wrong("f_number", f_number, "positive; infinite is an opening without a size");
+            return wrong("f_number", f_number, "positive; infinity means a pinhole");
         }
         if focus_distance.is_nan() || focus_distance <= focal_length {
-            return wrong("focus_distance", focus_distance, "larger than the focal length; infinite is possible");
+            return wrong("focus_distance", focus_distance, "larger than the focal length; infinity is allowed");
         }
         // Far wider than any lens; its square is finite in single precision.
         if self.diameter() > 1e6 {
             return wrong(
                 "f_number",
                 f_number,
-                "such that the opening, focal length / f_number, is at most 1e6 m wide",
+                "such that the aperture diameter, focal_length / f_number, is at most 1e6 m",
             );
         }
         Ok(())

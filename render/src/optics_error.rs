@@ -17,9 +17,9 @@ pub enum OpticsError {
     /// The mapping of a lens folds back on itself, or has a pole, before the edge of the image or the lens's largest
     /// angle: pixels would have two directions.
     #[error(
-        "the mapping of the {lens} lens cannot be inverted: it folds back, or nears a pole, {:.2} degrees from the optical axis, at \
-         radius {radius:.4} of the normalised picture (times fx: in pixels), and {requirement}; check the coefficients, make the picture \
-         smaller, or end the lens before with max_angle",
+        "the mapping of the {lens} lens cannot be inverted: it folds back, or approaches a pole, {:.2} degrees from the optical \
+         axis, at radius {radius:.4} of the normalized image (times fx: in pixels), but {requirement}; check the coefficients, \
+         reduce the image size, or limit the lens with max_angle",
         .angle.to_degrees()
     )]
     LensFolds {
@@ -33,16 +33,13 @@ pub enum OpticsError {
         requirement: String,
     },
     /// No pixel of the image lies in the domain of the lens.
-    #[error("no pixel of the picture is within what the {lens} lens sees; check the intrinsics and max_angle")]
+    #[error("no pixel of the image is in the domain of the {lens} lens; check the intrinsics and max_angle")]
     NoVisiblePixel {
         /// Name of the lens.
         lens: &'static str,
     },
     /// The rays of all intrinsics of a lens do not fit into memory.
-    #[error(
-        "{tables} different intrinsics behind a lens need {bytes} bytes of rays, which do not fit into memory (at most {limit} \
-         bytes)"
-    )]
+    #[error("the lens rays of {tables} different intrinsics need {bytes} bytes of memory; the limit is {limit} bytes")]
     LensMemory {
         /// Number of different intrinsics.
         tables: usize,

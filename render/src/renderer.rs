@@ -188,7 +188,7 @@ impl<'de> Visitor<'de> for RendererVisitor {
     type Value = Renderer;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the name of a renderer, or a table with ray_traced")
+        f.write_str("the name of a renderer, or a table whose only key is ray_traced")
     }
 
     fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Renderer, E> {
@@ -209,10 +209,10 @@ impl<'de> Visitor<'de> for RendererVisitor {
                     seed: paths.seed.unwrap_or(seed),
                 }
             }
-            _ => return Err(A::Error::custom(format!("renderer {name:?} has no numbers: its name is enough"))),
+            _ => return Err(A::Error::custom(format!("renderer {name:?} has no parameters; give only its name"))),
         };
         match map.next_key::<String>()? {
-            Some(other) => Err(A::Error::custom(format!("one renderer only: {name:?} or {other:?}"))),
+            Some(other) => Err(A::Error::custom(format!("two renderers are given: {name:?} and {other:?}; keep one"))),
             None => Ok(renderer),
         }
     }
@@ -260,12 +260,12 @@ mod tests {
             assert_eq!(read(&text).unwrap(), renderer, "{text}");
         }
         for (text, said) in [
-            ("renderer = 'fast_raytraced'", "there is no renderer \"fast_raytraced\"; known are \"fast_ray_traced\""),
+            ("renderer = 'fast_raytraced'", "unknown renderer \"fast_raytraced\"; known names: \"fast_ray_traced\""),
             ("renderer.ray_traced.sample = 3", "unknown field `sample`"),
             ("renderer.ray_traced.samples = -3", "invalid value: integer `-3`"),
-            ("renderer.hybrid = {}", "renderer \"hybrid\" has no numbers: its name is enough"),
+            ("renderer.hybrid = {}", "renderer \"hybrid\" has no parameters; give only its name"),
             ("renderer = {}", "a renderer is a name, or a table"),
-            ("renderer = { ray_traced = {}, raster = {} }", "one renderer only"),
+            ("renderer = { ray_traced = {}, raster = {} }", "two renderers are given"),
             ("renderer = 3", "the name of a renderer"),
         ] {
             let error = read(text).unwrap_err().to_string();

@@ -79,8 +79,8 @@ pub fn fuse(
             DiagnosticKind::MasslessLink,
             lightest.source.clone(),
             format!(
-                "link {:?} moves but has no mass; MuJoCo needs some, so it gets {MASSLESS_MASS} kg and \
-                 {MASSLESS_MOMENT} kg m² (not counted in total_mass)",
+                "link {:?} moves but has no mass; MuJoCo requires a positive mass, so the link gets {MASSLESS_MASS} kg \
+                 and {MASSLESS_MOMENT} kg m² (not counted in total_mass)",
                 lightest.name
             ),
         ));
@@ -107,14 +107,14 @@ fn warn_invalid_inertias(
         }
         if let Err(fault) = own.check() {
             let outcome = match (body.links.len() > 1, body_is_faulty) {
-                (true, false) => "sound after fusing with the links it is fixed to",
-                (true, true) => "repaired after fusing with the links it is fixed to",
+                (true, false) => "valid after merging with the links attached by fixed joints",
+                (true, true) => "repaired after merging with the links attached by fixed joints",
                 (false, _) => "repaired",
             };
             diagnostics.push(Diagnostic::new(
                 DiagnosticKind::InertiaRepaired,
                 inertial.source.clone(),
-                format!("link {:?}: {fault}; {outcome}, in the MJCF only", described.name),
+                format!("link {:?}: {fault}; {outcome}, in the generated MJCF only", described.name),
             ));
         }
     }

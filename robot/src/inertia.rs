@@ -47,7 +47,7 @@ pub struct RigidInertia {
 #[non_exhaustive]
 pub enum InertiaFault {
     /// A number is infinite or not a number.
-    #[error("mass, centre of mass or inertia is not finite")]
+    #[error("mass, center of mass or inertia is not finite")]
     NotFinite,
     /// The mass is negative, zero, or too small for MuJoCo.
     #[error("the mass {mass} kg is not positive")]
@@ -65,7 +65,9 @@ pub enum InertiaFault {
         smallest: f64,
     },
     /// The two smaller principal moments do not add up to the largest.
-    #[error("principal moments {a:.6e} + {b:.6e} < {c:.6e} kg m²: no rigid body has them")]
+    #[error(
+        "principal moments {a:.6e} + {b:.6e} < {c:.6e} kg m²: they violate the triangle inequality of a rigid body"
+    )]
     Triangle {
         /// Smallest principal moment \[kg m²\].
         a: f64,
@@ -192,7 +194,7 @@ impl RigidInertia {
         };
         let mut done = vec![format!("{fault}")];
         if fault == InertiaFault::NotFinite {
-            done.push("such numbers were set to 0".to_owned());
+            done.push("numbers that are not finite were set to 0".to_owned());
         }
         if fixed.mass < MUJOCO_MIN_MASS {
             fixed.mass = REPAIR_MASS;
@@ -356,7 +358,7 @@ mod tests {
             unsnapped += usize::from(raw[1] + raw[2] < raw[0]);
             faults += usize::from(plate.check().is_err() || !mujoco_accepts(&plate));
         }
-        assert!(unsnapped > 100, "the control shows that rounding matters: {unsnapped}");
+        assert!(unsnapped > 100, "control: rounding matters: {unsnapped}");
         assert_eq!(faults, 0);
     }
 
@@ -411,7 +413,7 @@ mod tests {
                         assert_eq!(fixed.check(), Ok(()), "{broken:?} -> {fixed:?}: {what}");
                         assert!(mujoco_accepts(&fixed), "{broken:?} -> {fixed:?}");
                         assert_eq!(what.is_empty(), broken.check().is_ok());
-                        assert_eq!(fixed.repaired().1, "", "a repair holds");
+                        assert_eq!(fixed.repaired().1, "", "a repaired inertia is valid");
                     }
                 }
             }

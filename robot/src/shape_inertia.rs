@@ -117,7 +117,7 @@ pub fn complete(
     if let MissingInertia::Density(density) = missing
         && !(density.is_finite() && density > 0.0)
     {
-        let expected = "a density must be positive and finite, in kg/m³; or take MissingInertia::Minimal";
+        let expected = "a density must be positive and finite, in kg/m³; alternatively use MissingInertia::Minimal";
         return Err(ShapeInertiaError::Density { value: density, expected });
     }
     for link in &mut description.links {
@@ -178,7 +178,10 @@ fn complete_partial(
         None => solid_ball_inertial(link, mass, given.density.unwrap_or(WATER_DENSITY)),
     };
     if shapes.is_none() && given.inertia.is_none() && mass > 0.0 {
-        warn("it has no shapes, so its inertia is that of a ball of its mass and the density of water".to_owned());
+        warn(
+            "the link has no shapes, so its inertia was set to that of a sphere of its mass with the density of water"
+                .to_owned(),
+        );
     }
     inertial.source = given.source.clone();
     // A given tensor is about the given origin, or else about the origin of the link.
@@ -235,14 +238,20 @@ fn replace_implausible_inertias(
             && gyration > MAX_GYRATION_RATIO * shapes.reach_of_all(link, &own.com, hulls);
         let far = || {
             let (gyration, reach) = (format_short(gyration), format_short(shapes.reach(&own.com)));
-            format!("its radius of gyration is {gyration} m, and its shapes reach {reach} m from its centre of mass")
+            format!(
+                "its radius of gyration is {gyration} m, but its shapes reach only {reach} m from its center of mass"
+            )
         };
         let why = match fault {
             Some(fault @ InertiaFault::NotPositiveDefinite { .. }) => fault.to_string(),
             Some(InertiaFault::Triangle { .. }) if is_far => far(),
             None if is_far && is_free => far(),
             _ if is_far => {
-                let message = format!("link {:?}: {}; no such body has this inertia, which was kept", link.name, far());
+                let message = format!(
+                    "link {:?}: {}; this inertia is implausible for the shapes, but was kept",
+                    link.name,
+                    far()
+                );
                 let (kind, source) = (DiagnosticKind::InertiaImplausible, inertial.source.clone());
                 diagnostics.push(Diagnostic::new(kind, source, message));
                 continue;
@@ -259,7 +268,8 @@ fn replace_implausible_inertias(
             format!("({}) kg m²", [moments[0], moments[1], moments[2]].map(format_short).join(", "))
         };
         let message = format!(
-            "link {:?}: {why}; its principal moments {} were replaced by {}, those of its {} shapes with its mass of {} kg",
+            "link {:?}: {why}; its principal moments {} were replaced by {}, computed from its {} shapes and its mass \
+             of {} kg",
             link.name,
             moments(&own),
             moments(&RigidInertia::from_inertial(&replaced)),

@@ -98,7 +98,7 @@ impl AtomicFile {
     /// # Errors
     /// The path is taken, or the file cannot be renamed.
     pub fn persist_noclobber(&mut self) -> io::Result<()> {
-        let exists = || io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name has appeared meanwhile");
+        let exists = || io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name was created in the meantime");
         match fs::hard_link(&self.temp_path, &self.path) {
             Ok(()) => fs::remove_file(&self.temp_path)?,
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(exists()),

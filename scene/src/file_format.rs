@@ -22,7 +22,7 @@ fn quaternion<E: Error>([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, E
     let length = quaternion.norm();
     if !(length.is_finite() && length > 1e-9) {
         return Err(E::custom(format_args!(
-            "[{w}, {x}, {y}, {z}] is no rotation: a quaternion w, x, y, z must be finite and not zero"
+            "[{w}, {x}, {y}, {z}] is not a rotation: a quaternion w, x, y, z must be finite and not zero"
         )));
     }
     // Normalizing leaves an error of a few units in the last place. Normalizing again would change these bits.
@@ -271,7 +271,7 @@ pub mod or_false {
         type Value = Option<T>;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("the value itself, or false for none")
+            f.write_str("a value, or false to disable it")
         }
 
         fn visit_bool<E: Error>(self, value: bool) -> Result<Self::Value, E> {
@@ -360,12 +360,15 @@ mod tests {
     fn errors() {
         for (text, part) in [
             (r#"{"pose": [1, 2, 3]}"#, "array of length 7"),
-            (r#"{"pose": [1, 2, 3, 0, 0, 0, 0]}"#, "no rotation"),
+            (
+                r#"{"pose": [1, 2, 3, 0, 0, 0, 0]}"#,
+                "is not a rotation: a quaternion w, x, y, z must be finite and not zero",
+            ),
             (r#"{"pose": {"pos": [1, 2, 3], "rpy": [0, 0, 0]}}"#, "rpy_deg"),
             (r#"{"pose": {"quat_wxyz": [1, 0, 0, 0], "rpy_deg": [0, 0, 0]}}"#, "not both"),
             (r#"{"pose": 1}"#, "[x, y, z, qw, qx, qy, qz]"),
             (r#"{"rotation": [1, 0, 0]}"#, "array of length 4"),
-            (r#"{"thickness": true}"#, "or false for none"),
+            (r#"{"thickness": true}"#, "a value, or false to disable it"),
             (r#"{"pairs": [1]}"#, "a table of names"),
         ] {
             let message = from_str::<All>(text).unwrap_err().to_string();

@@ -113,7 +113,7 @@ pub enum TextureError {
         bytes: usize,
     },
     /// A cube texture is not six squares.
-    #[error("a cube texture is six squares from top to bottom, not {width} x {height}")]
+    #[error("a cube texture must be six squares from top to bottom; this image is {width} x {height}")]
     NotSixSquares {
         /// Width \[pixels\].
         width: u32,
@@ -262,10 +262,10 @@ mod tests {
         assert!((table[188] - 0.5029).abs() < 5e-5, "{}", table[188]);
         assert!((table[10] - 10.0 / 255.0 / 12.92).abs() < 1e-9, "on the line: {}", table[10]);
         assert!((decode_srgb(0.5) - 0.214_041).abs() < 1e-6, "{}", decode_srgb(0.5));
-        assert_eq!((decode_srgb(-1.0), decode_srgb(7.0)), (0.0, 1.0), "held within the scale");
+        assert_eq!((decode_srgb(-1.0), decode_srgb(7.0)), (0.0, 1.0), "clamped to 0..=1");
         // Round trip of every byte.
         assert!((0..=255).all(|byte: u8| linear_to_srgb8(table[byte as usize]) == byte));
-        assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "brighter is more");
+        assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "the table must increase");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// A name that is not in a list of known names.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("there is no {what} {name:?}; {}", format_known(.candidates))]
+#[error("unknown {what} {name:?}; {}", format_known(.candidates))]
 pub struct UnknownName {
     /// Kind of the name, such as `joint`.
     pub what: &'static str,
@@ -22,7 +22,7 @@ pub struct UnknownName {
 
 fn format_known(candidates: &[String]) -> String {
     let quoted: Vec<String> = candidates.iter().map(|name| format!("{name:?}")).collect();
-    if quoted.is_empty() { "there are none".into() } else { format!("known are {}", quoted.join(", ")) }
+    if quoted.is_empty() { "no names are defined".into() } else { format!("known names: {}", quoted.join(", ")) }
 }
 
 /// Error in the application of patterns to a list of names.
@@ -53,7 +53,7 @@ pub enum PatternError {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The pattern matches no name.
-    #[error("pattern \"{pattern}\" matches no {what} (the whole name must match, case counts); {}", format_candidates(.candidates, *.total))]
+    #[error("pattern \"{pattern}\" matches no {what} (the whole name must match, case-sensitively); {}", format_candidates(.candidates, *.total))]
     NoMatch {
         /// The pattern as written.
         pattern: String,
@@ -251,7 +251,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 pub fn format_candidates(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {
-        0 => "there are none".to_owned(),
+        0 => "no names are defined".to_owned(),
         _ if total > candidates.len() => format!("closest of {total}: {quoted}"),
         _ => format!("candidates: {quoted}"),
     }
@@ -288,12 +288,12 @@ mod tests {
         let names: Vec<String> = (0..100).map(|i| format!("joint_{i}")).collect();
         for (error, parts) in [
             (select(&["JOINT1"], &JOINTS, "joint"), &["\"JOINT1\" matches no joint", "candidates: \"joint1\""][..]),
-            (select(&["joint"], &JOINTS, "joint"), &["whole name"]),
+            (select(&["joint"], &JOINTS, "joint"), &["the whole name must match, case-sensitively"]),
             (
                 select(&["joint[12]", "joint2"], &JOINTS, "joint"),
                 &["joint \"joint2\" is matched by both \"joint[12]\" and \"joint2\""],
             ),
-            (select::<_, &str>(&["a"], &[], "joint"), &["there are none"]),
+            (select::<_, &str>(&["a"], &[], "joint"), &["no names are defined"]),
             // Long lists are cut.
             (select(&["Joint_42"], &names, "joint"), &["closest of 100: \"joint_42\""]),
         ] {

@@ -125,7 +125,10 @@ mod tests {
         near(own.rotate_inverse(v), pose.rotation.inverse() * vector);
         near(own.apply(v), (pose * Point3::from(vector)).coords);
         near(own.apply_inverse(v), pose.inverse_transform_point(&Point3::from(vector)).coords);
-        assert!((own.rotate(v)[0] - own.rotate_inverse(v)[0]).abs() > 0.1, "the control: the two differ");
+        assert!(
+            (own.rotate(v)[0] - own.rotate_inverse(v)[0]).abs() > 0.1,
+            "control: rotation and inverse rotation differ"
+        );
     }
 
     #[test]

@@ -136,13 +136,13 @@ pub struct RenderScene {
 #[non_exhaustive]
 pub enum RenderSceneError {
     /// A mask id is 0.
-    #[error("instance {instance} has mask id 0, which means that nothing was hit")]
+    #[error("instance {instance} has mask id 0, which is reserved for the background")]
     ZeroMaskId {
         /// Index of the instance.
         instance: usize,
     },
     /// A size is not positive and finite.
-    #[error("instance {instance}, a {shape}, has a size of {size}; sizes are positive and finite")]
+    #[error("instance {instance}, a {shape}, has a size of {size}; sizes must be positive and finite")]
     Size {
         /// Index of the instance.
         instance: usize,
@@ -152,7 +152,9 @@ pub enum RenderSceneError {
         size: f32,
     },
     /// A number of a material is not finite, or its refractive index is outside of 1 to 10.
-    #[error("the material of instance {instance} has a number that is not finite")]
+    #[error(
+        "the material of instance {instance} has a number that is not finite, or a refractive index outside 1..=10"
+    )]
     Material {
         /// Index of the instance.
         instance: usize,
@@ -251,7 +253,7 @@ impl RenderScene {
         (instance.shape, instance.visible) = (shape, visible);
         assert!(
             same_kind && triangles == instance.mesh().map(|mesh| mesh.triangles().len()),
-            "instance {index} keeps its kind of shape and its number of triangles"
+            "instance {index} must keep its kind of shape and its number of triangles"
         );
         (self.texture_scales[index], self.texture_offsets[index]) = instance.texture_map();
     }

@@ -138,7 +138,7 @@ pub struct StateDims {
 impl StateDims {
     /// Name of the entries of an axis, for messages.
     fn label(axis: &'static str) -> &'static str {
-        if axis == "engine_values" { "values of the engine's sensors" } else { axis }
+        if axis == "engine_values" { "values of MuJoCo sensors" } else { axis }
     }
 }
 
@@ -414,7 +414,7 @@ mod tests {
     fn own_scenes() {
         let own = || EnvScene(Some(Arc::new(RenderScene::empty())));
         let (red, large) = (own(), own());
-        assert!(red != large && red == red.clone(), "the same in memory, or not");
+        assert!(red != large && red == red.clone(), "equality compares the memory");
         let with =
             |own: [&EnvScene; 3]| SceneState { own_scenes: own.map(Clone::clone).into(), ..state(200.0, [1; 3]) };
         let nothing = EnvScene::default();

@@ -98,6 +98,6 @@ mod tests {
         assert_eq!(format!("{:?}", StateFields::default()), "Requires(nothing)");
         assert_eq!(StateFields::present_in(&SceneState::new(2)), StateFields::NONE);
         let all = StateFields::NAMES.iter().fold(StateFields::NONE, |sum, (field, _)| sum | *field);
-        assert_eq!(all.names().count(), StateFields::NAMES.len(), "every field has a bit of its own");
+        assert_eq!(all.names().count(), StateFields::NAMES.len(), "every field has its own bit");
     }
 }

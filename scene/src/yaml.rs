@@ -154,7 +154,7 @@ impl Builder<'_> {
             }
             Event::SequenceEnd | Event::MappingEnd => {
                 let Some(OpenNode { line, content, anchor, begin }) = self.open.pop() else {
-                    return Err("something ends that did not begin".into());
+                    return Err("a list or table ends without a beginning".into());
                 };
                 let value = match content {
                     Content::List(list) => Value::List(list.into()),
@@ -163,11 +163,11 @@ impl Builder<'_> {
                 self.close(Node { line, value }, anchor, begin)?;
             }
             Event::Alias(_) if !self.dialect.aliases => {
-                return Err(format!("aliases are not for {}", self.dialect.files));
+                return Err(format!("{} do not support aliases", self.dialect.files));
             }
             Event::Alias(anchor) => {
                 let known = self.anchors.get(&anchor).cloned();
-                let (value, size) = known.ok_or("an alias of something that has not ended")?;
+                let (value, size) = known.ok_or("an alias inside its own anchor")?;
                 self.count_bytes(size)?;
                 self.reject_as_key()?;
                 self.place(Node { line, value })?;
@@ -187,7 +187,7 @@ impl Builder<'_> {
     }
 
     fn refused(&self, tag: &Tag) -> String {
-        format!("the tag {}{} is not for {}", tag.handle, tag.suffix, self.dialect.files)
+        format!("{} do not support the tag {}{}", self.dialect.files, tag.handle, tag.suffix)
     }
 
     fn begin(&mut self, line: usize, content: Content, anchor: usize, tag: Option<&Tag>) -> Result<(), String> {
@@ -195,7 +195,7 @@ impl Builder<'_> {
             return Err(self.refused(tag));
         }
         if self.open.len() == MAX_DEPTH {
-            return Err(format!("there are more than {MAX_DEPTH} lists and tables within each other"));
+            return Err(format!("lists and tables nest deeper than {MAX_DEPTH} levels"));
         }
         self.reject_as_key()?;
         let begin = self.count_bytes(0)?;
@@ -218,7 +218,7 @@ impl Builder<'_> {
     fn reject_as_key(&self) -> Result<(), String> {
         match self.open.last() {
             Some(OpenNode { content: Content::Table { key: None, .. }, .. }) => {
-                Err("a key is a word, not a list or a table".into())
+                Err("a key must be a scalar, not a list or a table".into())
             }
             _ => Ok(()),
         }
@@ -240,7 +240,7 @@ impl Builder<'_> {
                 (Some((name, line)), value) => entries.push((name, Node { line, value })),
                 (None, Value::Scalar(Scalar { text, .. })) => {
                     if !names.insert(text.clone()) {
-                        return Err(format!("{text:?} is there twice (duplicate key)"));
+                        return Err(format!("duplicate key {text:?}"));
                     }
                     *key = Some((text, node.line));
                 }
@@ -319,11 +319,14 @@ mod tests {
     fn dialects() {
         let strict = YamlFeatures { aliases: false, tags: true, ..ALL };
         let error = parse("a: &a 1\nb: *a\n", &strict).unwrap_err();
-        assert_eq!(error, YamlError { line: 2, column: 4, message: "aliases are not for these files".into() });
+        assert_eq!(error, YamlError { line: 2, column: 4, message: "these files do not support aliases".into() });
         assert!(parse("a: !cup 1\nb: !!opencv-matrix {rows: 3}\n", &strict).is_ok());
         for (text, tag) in [("a: !cup 1\n", "!cup"), ("b: !!set {rows: 3}\n", "set"), ("b: ! [1]\n", "!")] {
             let error = parse(text, &ALL).unwrap_err();
-            assert!(error.message.contains(tag) && error.message.ends_with("is not for these files"), "{error:?}");
+            assert!(
+                error.message.starts_with("these files do not support the tag ") && error.message.ends_with(tag),
+                "{error:?}"
+            );
         }
         let text = parse("a: !!str 1\n", &ALL).unwrap();
         assert_eq!(text, parse("a: '1'\n", &ALL).unwrap());
@@ -336,13 +339,13 @@ mod tests {
         let bomb: String = (0..40).map(|k| format!("k{k}: &k{k} [{}]\n", vec![item(k); 9].join(", "))).collect();
         for (yaml, line, needle) in [
             ("a: 1\n---\nb: 2\n", 2, "second document"),
-            ("a:\n  [1]: 2\n", 2, "a key is a word"),
-            ("a: &a b\n*a : 2\n", 2, "a key is a word"),
-            ("a: 1\nb: 2\na: 3\n", 3, "\"a\" is there twice"),
+            ("a:\n  [1]: 2\n", 2, "a key must be a scalar"),
+            ("a: &a b\n*a : 2\n", 2, "a key must be a scalar"),
+            ("a: 1\nb: 2\na: 3\n", 3, "duplicate key \"a\""),
             ("a: [1\n", 2, ""),
             ("a: *b\n", 1, ""),
-            ("a: &b [*b]\n", 1, "has not ended"),
-            (&deep, 1, "within each other"),
+            ("a: &b [*b]\n", 1, "inside its own anchor"),
+            (&deep, 1, "nest deeper"),
             (&bomb, 8, "64 MiB"),
         ] {
             let error = parse(yaml, &ALL).unwrap_err();

@@ -22,11 +22,11 @@ pub(crate) fn check_offset(field: &str, offset: &Pose) -> Result<(), SensorError
     let numbers = || offset.translation.vector.iter().chain(offset.rotation.coords.iter());
     let wrong = |value, expected| Err(SensorError::OutOfRange { field: field.into(), value, expected });
     if let Some(&value) = numbers().find(|x| !x.is_finite()) {
-        return wrong(value, "every number of it must be finite");
+        return wrong(value, "every number must be finite");
     }
     let length = offset.rotation.coords.norm();
     if (length - 1.0).abs() > 1e-6 {
-        return wrong(length, "that is the length of its quaternion, which must be 1");
+        return wrong(length, "this is the length of its quaternion, which must be 1");
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ pub enum SensorError {
         dt: f64,
     },
     /// The sensor panicked during a measurement.
-    #[error("a panic broke its measurement off")]
+    #[error("the sensor panicked during a measurement")]
     Panicked,
     /// The update period is negative, infinite or not a number.
     #[error("update_period is {update_period} s; it must be 0 (every step) or a positive number")]
@@ -39,7 +39,7 @@ pub enum SensorError {
         nearest: f64,
     },
     /// An index is out of range.
-    #[error("there is no {what} {index}: there are {count}, counted from 0")]
+    #[error("{what} {index} does not exist; there are {count} (0 to {})", count.saturating_sub(1))]
     IndexOutOfRange {
         /// Kind of item.
         what: &'static str,
@@ -49,7 +49,7 @@ pub enum SensorError {
         count: usize,
     },
     /// The state lacks fields that the sensor requires.
-    #[error("the {sensor} sensor was given a state without {missing}")]
+    #[error("the state lacks {missing}, which the {sensor} sensor requires")]
     MissingFields {
         /// Kind of sensor.
         sensor: &'static str,
@@ -57,7 +57,7 @@ pub enum SensorError {
         missing: StateFields,
     },
     /// The state does not belong to the scene that the sensor was built for.
-    #[error("the state has {found} {what}, the sensor was built for {expected}")]
+    #[error("the state has {found} {what}, but the sensor was built for {expected}")]
     WrongShape {
         /// Kind of item.
         what: &'static str,
@@ -67,7 +67,7 @@ pub enum SensorError {
         found: usize,
     },
     /// A name is unknown.
-    #[error("there is no {what} {name:?}; {}", known_names(.candidates))]
+    #[error("unknown {what} {name:?}; {}", known_names(.candidates))]
     UnknownName {
         /// Kind of item.
         what: &'static str,
@@ -77,7 +77,7 @@ pub enum SensorError {
         candidates: Vec<String>,
     },
     /// A name without its prefix matches several items.
-    #[error("{what} {name:?} may be any of {}; give the full name", quoted(.candidates))]
+    #[error("{what} {name:?} is ambiguous: it may be any of {}; give the full name", quoted(.candidates))]
     AmbiguousName {
         /// Kind of item.
         what: &'static str,
@@ -100,13 +100,13 @@ pub enum SensorError {
         expected: &'static str,
     },
     /// A contact sensor has no bodies.
-    #[error("there are no bodies to watch; give patterns of their names{}", if .candidates.is_empty() { String::new() } else { format!(", such as {}", quoted(.candidates)) })]
+    #[error("the contact sensor has no bodies; add patterns of body names{}", if .candidates.is_empty() { String::new() } else { format!(", such as {}", quoted(.candidates)) })]
     NoBodies {
         /// Names of existing bodies.
         candidates: Vec<String>,
     },
     /// The configuration selects nothing to measure.
-    #[error("the {sensor} sensor would measure nothing: {field}: there is no {what}; {}", known_names(.candidates))]
+    #[error("the {sensor} sensor has nothing to measure: no {what} is selected by {field}; {}", known_names(.candidates))]
     EmptySelection {
         /// Kind of sensor.
         sensor: &'static str,
@@ -118,7 +118,7 @@ pub enum SensorError {
         candidates: Vec<String>,
     },
     /// The filter of a contact sensor matches only its single watched body.
-    #[error("the filter {filter:?} means only {body:?}, the one body that is watched: it does not touch itself")]
+    #[error("the filter {filter:?} matches only {body:?}, the only watched body; a body has no contact with itself")]
     SelfFilter {
         /// Name of the body.
         body: String,
@@ -127,7 +127,8 @@ pub enum SensorError {
     },
     /// A contact sensor reports forces by filter, but has no filters.
     #[error(
-        "{field} tells forces apart by filter, and there are no filters; name counterparts in `filters` (the sum over all of them is {total_channel}, which is always there)"
+        "{field} reports forces per filter, but there are no filters; name counterparts in `filters` (the sum over all \
+         counterparts is always available as {total_channel})"
     )]
     NoFilters {
         /// Name of the configuration field.
@@ -146,7 +147,7 @@ pub enum SensorError {
         moving_link: String,
     },
     /// Two items of a sensor have the same name.
-    #[error("there are two {what}s called {name:?}; give each a name of its own")]
+    #[error("there are two {what}s with the name {name:?}; give them different names")]
     DuplicateName {
         /// Kind of item.
         what: &'static str,
@@ -155,8 +156,8 @@ pub enum SensorError {
     },
     /// History and latency do not fit into memory.
     #[error(
-        "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; make history_length \
-         or latency_steps smaller"
+        "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; reduce history_length \
+         or latency_steps"
     )]
     TooLarge {
         /// Measurements to keep in each environment.
@@ -170,7 +171,7 @@ pub enum SensorError {
     #[error(transparent)]
     Camera(#[from] CameraError),
     /// An error of one camera of a stereo camera.
-    #[error("the {side} eye: {error}")]
+    #[error("the {side} camera: {error}")]
     StereoCamera {
         /// `left` or `right`.
         side: &'static str,
@@ -198,7 +199,7 @@ fn quoted(names: &[String]) -> String {
 }
 
 fn known_names(candidates: &[String]) -> String {
-    if candidates.is_empty() { "there are none".into() } else { format!("known are {}", quoted(candidates)) }
+    if candidates.is_empty() { "no names are defined".into() } else { format!("known names: {}", quoted(candidates)) }
 }
 
 impl From<kinetoscope_scene::pattern::UnknownName> for SensorError {

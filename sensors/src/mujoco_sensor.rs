@@ -261,20 +261,19 @@ mod tests {
         let error = sensor.value("pos").unwrap_err().to_string();
         assert!(error.contains("\"a/pos\", \"b/pos\""), "{error}");
         let error = sensor.value("b/tuch").unwrap_err().to_string();
-        assert!(error.starts_with("there is no MuJoCo sensor \"b/tuch\"; known are \"b/touch\""), "{error}");
+        assert!(error.starts_with("unknown MuJoCo sensor \"b/tuch\"; known names: \"b/touch\""), "{error}");
     }
 
     #[test]
     fn mistakes() {
         let wrong = |cfg: MujocoSensorCfg| cfg.build(&context()).unwrap_err().to_string();
         // Root cause: an empty list was accepted, which created a sensor without values.
-        let nothing =
-            "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
+        let nothing = "the MuJoCo sensor has nothing to measure: no MuJoCo sensor is selected by sensors; known names: \"a/pos\",";
         assert!(wrong(cfg(&[])).starts_with(nothing), "{}", wrong(cfg(&[])));
         let without_sensors = SensorContext { engine_sensors: [].into(), ..context() };
         let error = MujocoSensorCfg::default().build(&without_sensors).unwrap_err();
         assert!(matches!(&error, SensorError::EmptySelection { candidates, .. } if candidates.is_empty()), "{error}");
-        assert!(wrong(cfg(&["pso"])).starts_with("there is no MuJoCo sensor \"pso\"; known are \"pos\""));
+        assert!(wrong(cfg(&["pso"])).starts_with("unknown MuJoCo sensor \"pso\"; known names: \"pos\""));
         assert!(wrong(cfg(&["a/.*", "pos"])).contains("matched by both"));
         let noise = BTreeMap::from([("values".to_string(), NoiseCfg::default())]);
         let noisy = |patterns| MujocoSensorCfg {
@@ -282,11 +281,11 @@ mod tests {
             ..cfg(patterns)
         };
         assert!(noisy(&["pos"]).build(&context()).is_ok());
-        assert!(noisy(&["quat"]).build(&context()).is_err(), "noise would make it no rotation");
+        assert!(noisy(&["quat"]).build(&context()).is_err(), "a noisy quaternion is no longer a rotation");
         // A state of another scene.
         let mut sensor = MujocoSensorCfg::default().build(&context()).unwrap();
         let short = SceneState { sensordata: Some(Array2::zeros((2, 10))), ..SceneState::new(2) };
-        assert!(sensor.update(&short).unwrap_err().to_string().contains("values of the engine's sensors"));
+        assert!(sensor.update(&short).unwrap_err().to_string().contains("values of MuJoCo sensors"));
         assert!(sensor.update(&SceneState::new(2)).unwrap_err().to_string().contains("sensordata"));
     }
 }

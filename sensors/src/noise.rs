@@ -168,7 +168,7 @@ fn columns(name: &str, channels: &[SampleChannel]) -> Result<(Range<usize>, [f64
     }
     let noisy = channels.iter().filter(|c| c.noisy).map(|c| c.name);
     Err(SensorError::UnknownName {
-        what: "channel that can have noise",
+        what: "noise channel",
         name: name.into(),
         candidates: closest_names(name, noisy).into_iter().map(str::to_owned).collect(),
     })

@@ -217,9 +217,9 @@ mod tests {
         assert_eq!(due, [vec![4, 8, 12, 16, 20], vec![7, 11, 15, 19]]);
         // A quarantined environment one step before its due step would otherwise make every block one step long.
         let phases = schedule(0.1, 0.005).phases(2);
-        assert_eq!(phases.due_in([19, 5]), 1, "running, it is due in a step");
+        assert_eq!(phases.due_in([19, 5]), 1, "a running environment is due in one step");
         assert_eq!(phases.due_in([Phases::QUARANTINED, 5]), 15);
-        assert_eq!(phases.due_in([Phases::QUARANTINED; 2]), 20, "nothing is due where nothing runs");
+        assert_eq!(phases.due_in([Phases::QUARANTINED; 2]), 20, "without a running environment, one period");
     }
 
     #[test]

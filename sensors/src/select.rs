@@ -117,7 +117,7 @@ mod tests {
         assert_eq!([found(&["b/.*", "a/RF_FOOT"]), found(&["cube", "x/y"])], [[2, 1], [3, 4]]);
         assert_eq!(found(&["{ENV}/b/.*", "{ENV_REGEX_NS}/RF_FOOT"]), [2, 1]);
         let wrong = |patterns: &[&str]| select(patterns, &names, "body").unwrap_err().to_string();
-        assert!(wrong(&["F_FOOT"]).starts_with("there is no body \"F_FOOT\"; known are \"LF_FOOT\""));
+        assert!(wrong(&["F_FOOT"]).starts_with("unknown body \"F_FOOT\"; known names: \"LF_FOOT\""));
         assert!(wrong(&["cube", "c.*"]).contains("matched by both"));
         assert!(wrong(&["(cube"]).contains("not a regular expression"));
     }

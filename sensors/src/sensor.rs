@@ -224,8 +224,11 @@ mod tests {
         assert_eq!([context.body("{ENV}/tip"), context.body("{ENV_REGEX_NS}/right/base")], [Ok(1), Ok(2)]);
         assert!(context.body("{ENVS}/tip").is_err());
         let error = context.body("base").unwrap_err().to_string();
-        assert_eq!(error, "body \"base\" may be any of \"left/base\", \"right/base\"; give the full name");
+        assert_eq!(
+            error,
+            "body \"base\" is ambiguous: it may be any of \"left/base\", \"right/base\"; give the full name"
+        );
         let error = context.body("tpi").unwrap_err().to_string();
-        assert!(error.starts_with("there is no body \"tpi\"; known are \"left/tip\""), "{error}");
+        assert!(error.starts_with("unknown body \"tpi\"; known names: \"left/tip\""), "{error}");
     }
 }

@@ -434,7 +434,7 @@ impl CompiledScene {
             diagnostics.push(Diagnostic::new(
                 DiagnosticKind::InitialOverlap,
                 None,
-                format!("{a:?} and {b:?} overlap in the initial pose and never collide with each other"),
+                format!("{a:?} and {b:?} overlap in the initial pose; collisions between them are disabled"),
             ));
         }
         let threads = cfg.num_threads();

@@ -118,7 +118,7 @@ impl EntitySet {
         if found.is_empty() {
             let known = names.iter().map(String::as_str).chain(["world"]).chain(self.robots.iter().map(|r| r.uid()));
             let candidates = pattern::closest_names(name, known).into_iter().map(String::from).collect();
-            return Err(Error::UnknownName { what: "body called", name: name.into(), candidates });
+            return Err(Error::UnknownName { what: "body", name: name.into(), candidates });
         }
         Ok(Some(found))
     }

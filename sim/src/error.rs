@@ -25,7 +25,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// The observer was removed, or is handling an event right now.
-    #[error("this observer was taken away, or is being told of something right now")]
+    #[error("this observer was removed, or is handling an event right now")]
     ObserverUnavailable,
     /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
@@ -115,7 +115,7 @@ pub enum Error {
     #[error(transparent)]
     Compile(#[from] CompileError),
     /// MuJoCo rejects an attached MJCF file; its message names element and line.
-    #[error("{}", with_position_first(&format_args!("part {uid:?}"), .file, .error))]
+    #[error("{}", with_position_first(&format_args!("MJCF part {uid:?}"), .file, .error))]
     MjcfFile {
         /// Uid of the attached MJCF file.
         uid: String,
@@ -137,7 +137,7 @@ pub enum Error {
         error: Box<RobotFileError>,
     },
     /// An MJCF file has an element that cannot be attached to a scene.
-    #[error("part {uid:?}: {file}: {error}")]
+    #[error("MJCF part {uid:?}: {file}: {error}")]
     MjcfAttach {
         /// Uid of the attached MJCF file.
         uid: String,
@@ -148,7 +148,7 @@ pub enum Error {
         error: Box<PartError>,
     },
     /// Name patterns for an attached MJCF file are invalid or match nothing.
-    #[error("part {uid:?}: {error}")]
+    #[error("MJCF part {uid:?}: {error}")]
     MjcfNames {
         /// Uid of the attached MJCF file.
         uid: String,
@@ -203,22 +203,22 @@ pub enum Error {
     DuplicateUid(String),
     /// A uid is unusable as a part of MJCF or file names.
     #[error(
-        "the uid {0:?} is not usable: it must have 1 to 64 characters, no slash, backslash or control character, and not be a dot or two"
+        "the uid {0:?} is not usable: it must have 1 to 64 characters, no slash, backslash or control character, and must not be \".\" or \"..\""
     )]
     InvalidUid(String),
     /// The overview of all environments cannot be rendered.
-    #[error("the overview cannot be drawn: {0}; choose fewer environments")]
+    #[error("the overview cannot be rendered: {0}; choose fewer environments")]
     Overview(String),
     /// The object or the base of the robot is fixed and cannot be moved.
     #[error(
-        "{0:?} is fixed where its init_pose says; make an object BodyType::Dynamic (or Kinematic, to move it by hand), give \
-         a robot fix_base: false, to move it"
+        "{0:?} is fixed at its init_pose; to move it, make an object BodyType::Dynamic (or Kinematic, to set its pose \
+         directly), or give a robot fix_base: false"
     )]
     FixedBody(String),
     /// The operation needs a dynamic object, and this object is kinematic or static.
     #[error(
-        "{argument}: {object:?} is not BodyType::Dynamic: it has no velocity, mass or force of its own; write the pose of one \
-         that is Kinematic"
+        "{argument}: {object:?} is not BodyType::Dynamic, so it has no velocity, mass or force; to move a Kinematic object, \
+         set its pose"
     )]
     NotDynamic {
         /// Name of the method or argument.
@@ -228,11 +228,11 @@ pub enum Error {
     },
     /// The scene has more robots than contact bits.
     #[error(
-        "{0} robots and articulations are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)"
+        "a scene can have at most {0} robots and articulations: MuJoCo has 31 contact bits to tell self-collisions from others"
     )]
     TooManyRobots(usize),
     /// A name does not exist.
-    #[error("there is no {what} {name:?}; {}", candidates_sentence(.candidates))]
+    #[error("unknown {what} {name:?}; {}", candidates_sentence(.candidates))]
     UnknownName {
         /// Type of the item that was looked up.
         what: &'static str,
@@ -242,7 +242,7 @@ pub enum Error {
         candidates: Vec<String>,
     },
     /// An entity of a scene has another type than requested.
-    #[error("{name:?} is a {found}, not a {wanted}")]
+    #[error("{name:?} is {}, not {}", with_article(.found), with_article(.wanted))]
     EntityType {
         /// The entity.
         name: String,
@@ -263,7 +263,7 @@ pub enum Error {
         error: Box<Error>,
     },
     /// A collision exclusion of a scene file is invalid.
-    #[error("{at}: pair that never collides: {error}")]
+    #[error("{at}: collision exclusion: {error}")]
     Exclusion {
         /// File and line of the declaration.
         at: SourceLocation,
@@ -310,7 +310,7 @@ pub enum Error {
         second: usize,
     },
     /// A list contains an item twice.
-    #[error("{argument} names {item} twice (places {first} and {second} of its list); name it once")]
+    #[error("{argument} names {item} twice (positions {first} and {second} of the list); name it once")]
     RepeatedItem {
         /// Name of the argument.
         argument: &'static str,
@@ -365,9 +365,8 @@ pub enum Error {
     },
     /// The joint has no drive in the model.
     #[error(
-        "{argument}: joint {joint:?} of {robot} has no drive in the model, since it was added with the drive type none, or \
-         its file says that nothing drives the joint; add it with another one, and call set_drive_type where joints shall be \
-         passive"
+        "{argument}: joint {joint:?} of {robot} has no drive in the model, because it was added with the drive type none, or \
+         its file leaves it passive; add the robot with another drive type, and make joints passive with set_drive_type"
     )]
     NotDriven {
         /// Name of the method.
@@ -491,10 +490,16 @@ fn with_position_first(of: &dyn std::fmt::Display, file: &str, error: &dyn std::
 
 fn candidates_sentence(candidates: &[String]) -> String {
     if candidates.is_empty() {
-        return "there are none".into();
+        return "no names are defined".into();
     }
     let names: Vec<String> = candidates.iter().map(|c| format!("{c:?}")).collect();
-    format!("known are {}", names.join(", "))
+    format!("known names: {}", names.join(", "))
+}
+
+/// Returns the noun with its indefinite article.
+fn with_article(noun: &str) -> String {
+    let vowel_sound = noun.starts_with(['a', 'e', 'i', 'o', 'u']) || noun.starts_with("MJCF");
+    format!("{} {noun}", if vowel_sound { "an" } else { "a" })
 }
 
 impl From<ShapeInertiaError> for Error {

@@ -77,7 +77,7 @@ fn unsupported_elements(mjcf: &Mjcf, target: SupportedVersion, file: &str) -> Ve
         let lines = part.lines(target);
         let message = |left_out| {
             let uid = part.uid();
-            format!("part {uid:?}: {left_out}: MuJoCo {version} does not know it, and it is left out of {file}")
+            format!("MJCF part {uid:?}: {left_out}: left out of {file}, because MuJoCo {version} does not support it")
         };
         let say = |left_out| Diagnostic::new(DiagnosticKind::ExportReduced, lines.source.clone(), message(left_out));
         lines.omitted.iter().map(say).collect::<Vec<_>>()
@@ -155,9 +155,9 @@ fn prepare_for_plain_mujoco(
         // MuJoCo solves couplings before its implicit damping slows the drivers, so followers run away from them. The
         // explicit integrator does not have this problem.
         mjcf.option.integrator = Integrator::Euler;
-        (explicit, ": joints that follow others (mimic) and stiff drives do not go together in implicit integrators.")
+        (explicit, ": implicit integrators are unstable with stiff drives and mimic joints.")
     } else if target == SupportedVersion::V2 {
-        (implicit, "; saturated drives are sluggish.")
+        (implicit, "; saturated drives respond slowly.")
     } else if limited {
         (explicit.min(implicit), ", where drives saturate at their force limits.")
     } else {
@@ -173,8 +173,8 @@ fn prepare_for_plain_mujoco(
     }
     let warning = (!heavier.is_empty()).then(|| {
         format!(
-            "{}: its drives have an armature of {step} s times their damping in the export, so that plain MuJoCo is stable with \
-             followers (mimic) at a time step of {step} s; a drive at its effort limit accelerates more slowly for that",
+            "{}: the export adds {step} s times their damping to the armature of the drives, so that plain MuJoCo is stable \
+             with mimic joints at a time step of {step} s; a drive at its effort limit therefore accelerates more slowly",
             heavier.join(", ")
         )
     });
@@ -185,8 +185,10 @@ fn prepare_for_plain_mujoco(
     // At this time step the robot holds its start pose in any viewer.
     let holds_up_to = if followers { explicit } else { implicit };
     if mjcf.option.timestep > 0.9 * holds_up_to {
-        mjcf.comments
-            .push(format!("The time step is smaller than the simulation's {} s for that.", mjcf.option.timestep));
+        mjcf.comments.push(format!(
+            "The time step is smaller than the simulation's {} s, so that the robot holds its start pose.",
+            mjcf.option.timestep
+        ));
         mjcf.option.timestep = two_digits(0.9 * holds_up_to);
     }
     let (start, model) = (&simulation.initial_state, simulation.batch.model());

@@ -99,7 +99,7 @@ impl LightCfg {
             return fail("lights.kind.dome.intensity", &intensity, expected);
         }
         if !self.position.iter().all(|x| x.abs() <= 1e6) {
-            let expected = "each coordinate must be within 1e6 metres";
+            let expected = "each coordinate must be within 1e6 meters";
             return fail("lights.position", &self.position.as_slice(), expected);
         }
         if !(self.direction.iter().all(|x| x.is_finite()) && self.direction.norm() > 0.0) {

@@ -407,7 +407,7 @@ impl SimulationManager {
 
     #[track_caller]
     pub(crate) fn index_of(&self, manager: u64, index: usize) -> usize {
-        assert!(manager == self.serial, "this handle is of another SimulationManager");
+        assert!(manager == self.serial, "this handle belongs to another SimulationManager");
         index
     }
 

@@ -226,7 +226,7 @@ impl<'a> ObserversMut<'a> {
 impl SimulationManager {
     #[track_caller]
     fn slot_index<O>(&self, id: ObserverId<O>) -> Result<usize> {
-        assert!(id.manager == self.serial, "this handle is of another SimulationManager");
+        assert!(id.manager == self.serial, "this handle belongs to another SimulationManager");
         let place = self.observers.slots.iter().position(|seat| seat.number == id.number);
         place.filter(|&i| self.observers.slots[i].observer.is_some()).ok_or(Error::ObserverUnavailable)
     }

@@ -260,7 +260,7 @@ impl<'a> SceneViewMut<'a> {
             return Err(Error::Config {
                 field: "set_camera_view",
                 value: format!("{eye:?}, {target:?}"),
-                expected: "eye and target must be finite and apart from each other, in metres",
+                expected: "eye and target must be finite and different, in meters",
             });
         }
         let changes = self.sim.viewpoint.map_or(0, |view| view.revision) + 1;

@@ -348,7 +348,7 @@ impl SensorList {
     /// The handle belongs to another manager.
     #[track_caller]
     pub(crate) fn index_of<S>(&self, id: SensorId<S>) -> usize {
-        assert!(id.manager == self.manager, "this handle is of another SimulationManager");
+        assert!(id.manager == self.manager, "this handle belongs to another SimulationManager");
         id.index
     }
 
@@ -374,7 +374,7 @@ impl SensorList {
         let sensor = entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault_error(fault))?;
         let any: &dyn Any = sensor;
         any.downcast_ref::<S>().ok_or_else(|| Error::UnknownName {
-            what: "sensor of this type called",
+            what: "sensor of the requested type",
             name: entry.uid.clone(),
             candidates: Vec::new(),
         })

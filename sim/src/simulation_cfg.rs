@@ -179,12 +179,12 @@ impl SimulationManagerCfg {
             return fail("threads", &threads, "it must be 1 to 1024; leave it out to use every core");
         }
         if !(self.arena_space.is_finite() && self.arena_space >= 0.0) {
-            return fail("arena_space", &self.arena_space, "it must be a distance >= 0 in metres");
+            return fail("arena_space", &self.arena_space, "it must be a distance >= 0 in meters");
         }
         if let Some(ground) = &self.ground
             && !positive(ground.half_size)
         {
-            return fail("ground.half_size", &ground.half_size, "it must be above 0 metres");
+            return fail("ground.half_size", &ground.half_size, "it must be above 0 meters");
         }
         if let Some(ground) = &self.ground
             && !ground.color.iter().all(|c| (0.0..=1.0).contains(c))

@@ -109,33 +109,31 @@ impl fmt::Display for RunDifference {
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoEnvironments => f.write_str("there is no environment: there must be at least one"),
-            Self::UnexpectedError { what, error } => write!(f, "{what} was refused, which has to work: {error}"),
-            Self::MissingError { what } => write!(f, "{what} was taken, and has to be an error"),
+            Self::NoEnvironments => f.write_str("the batch has no environment; it needs at least one"),
+            Self::UnexpectedError { what, error } => write!(f, "{what} returned an error, but must succeed: {error}"),
+            Self::MissingError { what } => write!(f, "{what} was accepted, but must return an error"),
             Self::Shape { what, found, expected } => {
                 write!(f, "{what} has shape {found:?}; it must have {expected:?}")
             }
             Self::OutOfSpace { when, env, column, value, bounds: [low, high] } => {
-                write!(
-                    f,
-                    "{when}, environment {env}: {column} is {value}, and its space is finite numbers from {low} to {high}"
-                )
+                write!(f, "{when}, environment {env}: {column} is {value}; it must be finite and from {low} to {high}")
             }
             Self::Reward { when, env, value } => {
                 write!(f, "{when}, environment {env}: the reward is {value}; it must be finite")
             }
             Self::FinalObservation { when, env } => write!(
                 f,
-                "{when}, environment {env}: the episode goes on, but final_observations are not what observations are"
+                "{when}, environment {env}: the episode goes on, but final_observations differ from observations"
             ),
             Self::NoAutoReset { when, env } => write!(
                 f,
-                "{when}, environment {env}: the episode ended and no other began; observations must be the first ones of the next"
+                "{when}, environment {env}: the episode ended and no new one began; observations must be the first ones of the \
+                 next episode"
             ),
-            Self::NotReproducible(apart) => write!(f, "the same seed and actions give other numbers: {apart}"),
+            Self::NotReproducible(apart) => write!(f, "the same seed and actions give different results: {apart}"),
             Self::MaskedReset(apart) => write!(f, "a reset of other environments changed this one: {apart}"),
             Self::Interference(apart) => write!(f, "actions of another environment changed this one: {apart}"),
-            Self::ActionClamping(apart) => write!(f, "actions beyond their bounds are not the bounds: {apart}"),
+            Self::ActionClamping(apart) => write!(f, "actions beyond their bounds do not act as the bounds: {apart}"),
         }
     }
 }
@@ -164,7 +162,7 @@ impl fmt::Display for Finding {
 /// assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
 /// # }
 /// ```
-#[must_use = "what is found is only in what this gives"]
+#[must_use = "findings are only returned, not printed"]
 pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
     let n = env.num_envs();
     if n == 0 {
@@ -270,7 +268,7 @@ fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Ve
     let (seen, acted) = (env.observation_space().clone(), env.action_space().clone());
     let begin =
         env.reset(None, Some(plan.seed)).map_err(|error| report_error("a reset with a seed", &error, found)).ok()?;
-    if !has_shape("what reset gives", begin.shape(), &[n, seen.len()], found) {
+    if !has_shape("the observation array of a reset", begin.shape(), &[n, seen.len()], found) {
         return None;
     }
     check_bounds(&begin, &seen, "after the reset", found);
@@ -282,7 +280,7 @@ fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Ve
             let mask: Vec<bool> = (0..n).map(|env| env % 2 == 1).collect();
             let given =
                 env.reset(Some(&mask), None).map_err(|error| report_error("a reset by mask", &error, found)).ok()?;
-            if !has_shape("what reset by mask gives", given.shape(), &[n, seen.len()], found) {
+            if !has_shape("the observation array of a reset by mask", given.shape(), &[n, seen.len()], found) {
                 return None;
             }
             // The rows of environments that were not reset repeat their last observations.
@@ -366,8 +364,8 @@ fn check_invalid_calls<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mu
     wrong("a mask that is too long", env.reset(Some(&vec![true; n + 1]), None).is_ok());
     let middle = RunVariant { seed, ..RunVariant::default() }.actions(env.action_space(), n, 0);
     for (what, shape) in [
-        ("a table of actions with a row too many", (n + 1, width)),
-        ("a table of actions with a column too many", (n, width + 1)),
+        ("an action array with one row too many", (n + 1, width)),
+        ("an action array with one column too many", (n, width + 1)),
     ] {
         // After an error the environments may be without an episode.
         if env.reset(None, Some(seed)).is_err() {
@@ -379,7 +377,7 @@ fn check_invalid_calls<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mu
     if width > 0 && env.reset(None, Some(seed)).is_ok() {
         let mut actions = middle;
         actions[(0, 0)] = f64::NAN;
-        wrong("an action that is no number", env.step(actions.view()).is_ok());
+        wrong("a NaN action", env.step(actions.view()).is_ok());
     }
 }
 

@@ -36,7 +36,7 @@ impl CommandTerm {
         match values.iter().position(|value| !value.is_finite()) {
             None => Ok(values),
             Some(k) => {
-                let what = format!("what the command term {:?} draws", self.name);
+                let what = format!("the value of the command term {:?}", self.name);
                 let (env, column) = (dice.env().0, self.columns[k].clone());
                 Err(EnvError::NotFinite { what, env, column, value: values[k] })
             }

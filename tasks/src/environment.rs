@@ -230,7 +230,7 @@ impl Env {
     fn clamp_actions(&self, actions: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         let (found, expected) = (actions.shape().to_vec(), vec![self.num_envs(), self.action_space.len()]);
         if found != expected {
-            let what = "the table of actions".into();
+            let what = "the action array".into();
             return Err(EnvError::Shape {
                 what,
                 found,

@@ -32,7 +32,7 @@ pub enum TermKind {
 impl TermKind {
     /// Label of the result of a term's function, for error messages.
     pub(crate) fn result_label(self, name: &str) -> String {
-        format!("what the {self} term {name:?} gives")
+        format!("the result of the {self} term {name:?}")
     }
 }
 
@@ -67,13 +67,13 @@ pub enum EnvError {
         expected: &'static str,
     },
     /// A task has no column of a kind that it needs.
-    #[error("there is no {kind} term; a task needs at least one")]
+    #[error("the task has no {kind} column; add at least one {kind} term")]
     NoTerm {
         /// The missing kind of term.
         kind: TermKind,
     },
     /// The name of a term is empty or contains a slash, the separator of keys and column names.
-    #[error("{kind} term {name:?}: a name must not be empty, and without a slash")]
+    #[error("{kind} term {name:?}: a name must not be empty or contain a slash")]
     TermName {
         /// The kind of the term.
         kind: TermKind,
@@ -81,7 +81,7 @@ pub enum EnvError {
         name: String,
     },
     /// Two terms of one kind have the same name.
-    #[error("there are two {kind} terms called {name:?}; give each a name of its own")]
+    #[error("there are two {kind} terms with the name {name:?}; give them different names")]
     RepeatedTerm {
         /// Their kind.
         kind: TermKind,
@@ -89,7 +89,7 @@ pub enum EnvError {
         name: String,
     },
     /// Two columns of one term have the same name.
-    #[error("two columns are called {column:?}; give each a name of its own")]
+    #[error("there are two columns with the name {column:?}; give them different names")]
     RepeatedColumn {
         /// Their name.
         column: String,
@@ -116,7 +116,7 @@ pub enum EnvError {
         error: TermError,
     },
     /// There is no such name.
-    #[error("there is no {what} {name:?}; there are: {}", .candidates.join(", "))]
+    #[error("unknown {what} {name:?}; known names: {}", .candidates.join(", "))]
     UnknownName {
         /// Kind of name.
         what: &'static str,

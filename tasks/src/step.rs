@@ -79,7 +79,7 @@ impl fmt::Display for EndReason {
             Self::Diverged(why) => write!(f, "diverged: {why}"),
             Self::Term(name) => f.write_str(name),
             Self::TimeLimit => f.write_str("time limit"),
-            Self::Reset => f.write_str("reset by somebody else"),
+            Self::Reset => f.write_str("reset from outside the task"),
         }
     }
 }

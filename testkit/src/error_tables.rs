@@ -8,7 +8,7 @@ fn finding<T, E: Debug + Display>(result: Result<T, E>, variant: &str, parts: &[
     let (shown, text) = (format!("{error:?}"), error.to_string());
     let missing: Vec<&&str> = parts.iter().filter(|part| !text.contains(**part)).collect();
     let is_right = shown.starts_with(variant) && missing.is_empty();
-    (!is_right).then(|| format!("{shown} does not begin with {variant:?}, or {text:?} lacks {missing:?}"))
+    (!is_right).then(|| format!("{shown} must begin with {variant:?}, and {text:?} must contain {missing:?}"))
 }
 
 #[track_caller]
@@ -49,7 +49,7 @@ pub fn assert_errors_unchanged<'a, S, F, W, M, T, E, V, P>(
         findings.extend(wrong.map(|wrong| format!("{what}: {wrong}")));
         let after = fingerprint(state);
         if after != before {
-            findings.push(format!("{what}: something changed"));
+            findings.push(format!("{what}: the rejected call changed the state"));
             before = after;
         }
     }
@@ -62,5 +62,5 @@ pub fn assert_error<T, E: Debug + Display>(result: Result<T, E>, kind: &str, par
     let Err(error) = result else { panic!("accepted, expected {kind} {parts:?}") };
     let (shown, text) = (format!("{error:?}"), error.to_string());
     assert!(shown.contains(kind), "{shown} is not {kind}");
-    assert!(parts.iter().all(|part| text.contains(part)), "{text:?} lacks one of {parts:?}");
+    assert!(parts.iter().all(|part| text.contains(part)), "{text:?} must contain all of {parts:?}");
 }

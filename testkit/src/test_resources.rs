@@ -26,13 +26,13 @@ fn robot_folders() -> impl Iterator<Item = PathBuf> {
 pub fn robots_dir() -> PathBuf {
     robot_folders()
         .find(|dir| dir.is_dir())
-        .unwrap_or_else(|| panic!("no folder of real robots: run `cargo xtask test`, or set {ROBOTS_VARIABLE}"))
+        .unwrap_or_else(|| panic!("no folder of robot models: run `cargo xtask test`, or set {ROBOTS_VARIABLE}"))
 }
 
 /// File of a real robot; `path` is relative to the folder of robots.
 pub fn robot(path: &str) -> PathBuf {
     robot_folders().map(|dir| dir.join(path)).find(|file| file.is_file()).unwrap_or_else(|| {
-        panic!("no folder of real robots has {path}: run `cargo xtask test`, or set {ROBOTS_VARIABLE}")
+        panic!("no folder of robot models contains {path}: run `cargo xtask test`, or set {ROBOTS_VARIABLE}")
     })
 }
 
@@ -60,9 +60,9 @@ pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
 }
 
 fn python(variable: &str) -> PathBuf {
-    std::env::var_os(variable)
-        .map(PathBuf::from)
-        .unwrap_or_else(|| panic!("{variable} names no Python: run `cargo xtask test`, which makes one"))
+    std::env::var_os(variable).map(PathBuf::from).unwrap_or_else(|| {
+        panic!("{variable} does not name a Python interpreter: run `cargo xtask test`, which creates one")
+    })
 }
 
 /// Python interpreter that reads recordings.

@@ -372,7 +372,7 @@ fn refusals() {
         (vec![SR5, "--qpos", "JOINT1=one"], "\"one\" is not a number (rad or m)"),
         (vec![SR5, "--qpos", "JOINT1=nan"], "not finite"),
         (vec![SR5, "--qpos", "JOINT1=1,JOINT1=2"], "two positions"),
-        (vec![SR5, "--qpos", "joint2=1"], "there is no joint \"joint2\"; candidates: \"JOINT2\""),
+        (vec![SR5, "--qpos", "joint2=1"], "unknown joint \"joint2\"; candidates: \"JOINT2\""),
         (vec![SR5, "--qpos", "EE_FIXED=1"], "is fixed"),
         (vec![SR5, "--json", "no/such/folder/report.json"], "no/such/folder/report.json"),
     ] {

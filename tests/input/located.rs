@@ -88,7 +88,7 @@ fn elements() {
         let text = write(&mjcf, BUILD_VERSION);
         let Err(LoadError::Compile(error)) = compile(&text.xml, &[]) else { panic!("{what}: accepted") };
         let message = text.locate(error).to_string();
-        let expected = format!("robot.urdf:{line}: MuJoCo refuses the model: ");
+        let expected = format!("robot.urdf:{line}: MuJoCo rejected the model: ");
         // Depending on its version, MuJoCo reads the mass properties with the body or with the inertial element.
         let near = *line == 20 && message.starts_with("robot.urdf:21: ");
         assert!(near || message.starts_with(&expected), "{what}: {message}");

@@ -67,7 +67,7 @@ fn messages() {
         (robot.joint_ids("arm").unwrap_err().to_string(), ["control part \"arm\"", "\"wrist\""]),
         (robot.link_pose("link2").unwrap_err().to_string(), ["link \"link2\"", "\"l2\""]),
         (sim.entities().robot_id("R").unwrap_err().to_string(), ["robot \"R\"", "\"r\""]),
-        (self::sim(1).entities().robot_id("r").unwrap_err().to_string(), ["robot \"r\"", "there are none"]),
+        (self::sim(1).entities().robot_id("r").unwrap_err().to_string(), ["robot \"r\"", "no names are defined"]),
     ] {
         assert!(expected.iter().all(|part| message.contains(part)), "{expected:?} in {message:?}");
     }

@@ -17,6 +17,12 @@ const FORBID_UNSAFE: [&str; 7] = [
 ];
 const MAX_LINES: usize = 800;
 /// First folders of absolute paths that exist on one machine only.
+/// Largest number of public methods of `SimulationManager`; further ones belong to its views and handles.
+const MAX_MANAGER_METHODS: usize = 45;
+
+/// Largest number of names in the prelude.
+const MAX_PRELUDE_NAMES: usize = 45;
+
 const FOREIGN_FOLDERS: [&str; 3] = ["home", "root", "work"];
 /// Larger files are data.
 const MAX_TEXT_BYTES: u64 = 1 << 20;
@@ -41,6 +47,7 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
     findings.extend(long_files(&files));
     findings.extend(stubs(&files));
     findings.extend(foreign_paths(&files));
+    findings.extend(large_api(&files));
     findings.extend(dependencies_without_reason(&repo.read("Cargo.toml")?));
     no_findings("rules of the tree are broken", &findings)
 }
@@ -123,6 +130,45 @@ fn long_files(files: &[TextFile]) -> Vec<String> {
         .filter(|(_, lines)| *lines > MAX_LINES)
         .map(|(file, lines)| format!("{}: {lines} lines, the limit is {MAX_LINES}", file.path))
         .collect()
+}
+
+/// Reports a manager with too many methods, and a prelude with too many names.
+fn large_api(files: &[TextFile]) -> Vec<String> {
+    let methods = files.iter().filter(|file| file.path.starts_with("sim/src/")).map(|file| manager_methods(&file.text));
+    let names = files.iter().filter(|file| file.path == "src/lib.rs").map(|file| prelude_names(&file.text));
+    let limits: [(&str, usize, usize, &str); 2] = [
+        ("SimulationManager", methods.sum(), MAX_MANAGER_METHODS, "public methods; move some to its views"),
+        ("the prelude in src/lib.rs", names.sum(), MAX_PRELUDE_NAMES, "names; leave out the rarely used ones"),
+    ];
+    let too_many = limits.into_iter().filter(|(_, count, limit, _)| count > limit);
+    too_many.map(|(what, count, limit, advice)| format!("{what} has {count} {advice} (limit {limit})")).collect()
+}
+
+/// Number of public methods in the `impl SimulationManager` blocks of a formatted file, without those of `internals`.
+fn manager_methods(text: &str) -> usize {
+    let (mut inside, mut internal, mut count) = (false, false, 0);
+    for line in text.lines() {
+        match line {
+            "impl SimulationManager {" => inside = true,
+            "}" => inside = false,
+            _ if line.trim_start().starts_with("#[cfg(feature = \"internals\")]") => internal = true,
+            _ if inside && (line.starts_with("    pub fn ") || line.starts_with("    pub unsafe fn ")) => {
+                count += usize::from(!std::mem::take(&mut internal));
+            }
+            _ => internal &= line.trim_start().starts_with(['#', '/']),
+        }
+    }
+    count
+}
+
+/// Number of names that `pub mod prelude` of a formatted file exports.
+fn prelude_names(text: &str) -> usize {
+    let prelude = text.lines().skip_while(|line| *line != "pub mod prelude {").take_while(|line| *line != "}");
+    let code = code_only(&prelude.collect::<Vec<_>>().join("\n"));
+    let statements = code.split(';').filter_map(|statement| Some(statement.split_once("pub use ")?.1));
+    let names =
+        statements.map(|path| path.split_once('{').map_or(path, |(_, list)| list.trim_end().trim_end_matches('}')));
+    names.flat_map(|list| list.split(',')).filter(|name| !name.trim().is_empty()).count()
 }
 
 fn stubs(files: &[TextFile]) -> Vec<String> {
@@ -359,6 +405,28 @@ mod tests {
         assert!(long_files(&file("a.rs", &"\n".repeat(800))).is_empty());
         assert_eq!(long_files(&file("a.rs", &"\n".repeat(801))).len(), 1);
         assert!(long_files(&file("a.xml", &"\n".repeat(801))).is_empty());
+    }
+
+    #[test]
+    fn api_size() {
+        let method = |k: usize| format!("    pub fn method_{k}(&self) {{}}\n");
+        let manager = |count: usize, more: &str| {
+            let methods: String = (0..count).map(method).collect();
+            file("sim/src/manager.rs", &format!("impl SimulationManager {{\n{methods}{more}}}\npub fn free() {{}}\n"))
+        };
+        assert!(large_api(&manager(45, "    fn private() {}\n")).is_empty());
+        assert!(large_api(&manager(45, "    #[cfg(feature = \"internals\")]\n    pub fn batch() {}\n")).is_empty());
+        assert_eq!(large_api(&manager(45, &method(46))).len(), 1);
+        let prelude = |count: usize| {
+            let names: Vec<String> = (2..count).map(|k| format!("Name{k}")).collect();
+            let text = format!(
+                "pub mod prelude {{\n    pub use crate::a;\n    pub use b::C;\n    pub use d::{{{}}};\n}}",
+                names.join(", ")
+            );
+            file("src/lib.rs", &text)
+        };
+        assert!(large_api(&prelude(45)).is_empty());
+        assert_eq!(large_api(&prelude(46)).len(), 1);
     }
 
     #[test]

@@ -67,7 +67,7 @@ fn strict_and_packages() {
         ("check arm.urdf --strict", "error: link \"rod\": a second <material>, the first is at arm.urdf:5"),
         ("render arm.urdf -o a.png --strict", "a second <material>"),
         ("check root.urdf", "does not exist"),
-        ("check none.urdf --asset-root assets", "give its folder by --package NAME=DIR or ROS_PACKAGE_PATH"),
+        ("check none.urdf --asset-root assets", "set its folder with --package NAME=DIR or ROS_PACKAGE_PATH"),
         ("check root.urdf --asset-root none", "none is not a folder"),
         ("check pendulum.xml --strict", "--strict: pendulum.xml is an MJCF file"),
         ("check pendulum.xml --asset-root assets", "--asset-root: pendulum.xml is an MJCF file"),
@@ -351,5 +351,5 @@ fn newer_mjcf() {
     }
     // Control: a keyword that no supported MuJoCo version has.
     let err = shell.run_refused("render wrong.xml -o a.png");
-    assert!(err.contains("wrong.xml:2") && err.contains("If it is no mistake") == is_old, "{err}");
+    assert!(err.contains("wrong.xml:2") && err.contains("If the keyword is correct") == is_old, "{err}");
 }

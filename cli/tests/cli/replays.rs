@@ -100,7 +100,7 @@ fn verification() {
     });
     for file in ["run.npz", "run.mcap"] {
         let out = shell.run_ok(&format!("replay {file} --verify --scene cart.toml"));
-        assert!(out.contains("the same in 50 steps"), "{out}");
+        assert!(out.contains("identical in 50 steps"), "{out}");
     }
     let (out, err, code) = shell.run("replay pushed.npz --verify --scene cart.toml");
     assert_eq!((err.as_str(), code), ("", 1), "{out}");
@@ -121,7 +121,7 @@ fn pages_and_refusals() {
         assert!(out.contains("http://127.0.0.1:"), "{out}");
     }
     shell.assert_refused(&[
-        ("replay bare.mcap", "does not hold its scene"),
+        ("replay bare.mcap", "does not contain its scene"),
         ("replay run.mcap", "DISPLAY"),
         ("replay run.mcap --out out --at 9", "from 0 s to 0.2"),
         ("replay run.mcap --out out", "--at"),

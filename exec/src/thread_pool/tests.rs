@@ -45,7 +45,7 @@ fn slots_and_hook() {
         assert_eq!(slots.iter().sum::<usize>(), hooked.load(Ordering::Relaxed));
         most = most.max(slots.iter().sum());
     }
-    assert!(most > 1, "the control: a worker helped");
+    assert!(most > 1, "control: a worker took part");
     let run = || pool.run(3, |slot| assert!(slot != 0, "fails on purpose"));
     assert!(catch_unwind(AssertUnwindSafe(run)).is_err());
     pool.run(3, |_| ());

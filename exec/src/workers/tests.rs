@@ -64,7 +64,7 @@ fn borrowed_data() {
         assert!(parts.iter().flatten().all(|&number| number == round));
         helped += others.into_inner();
     }
-    assert!(helped > 0, "the control: a helper wrote");
+    assert!(helped > 0, "control: a worker took part");
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn end_of_threads() {
     let threads = Workers::default();
     numbers(&threads, 3, 5, None);
     let shared = Arc::downgrade(&threads.shared);
-    assert_eq!(shared.strong_count(), 3, "its owner and two threads");
+    assert_eq!(shared.strong_count(), 3, "one reference of the pool and one per worker");
     drop(threads);
     assert_eq!(shared.strong_count(), 0);
 }
@@ -146,9 +146,9 @@ fn panics_of_two_callers() {
             now.store(true, Ordering::Relaxed);
             while !first.is_finished() {
                 let run = catch_unwind(AssertUnwindSafe(|| threads.run(2, &|_| ())));
-                assert!(run.is_ok(), "round {round}: the panic of another caller's work");
+                assert!(run.is_ok(), "round {round}: a panic of another caller's job arrived here");
             }
-            assert!(first.join().unwrap_or(false), "round {round}: its own panic did not reach it");
+            assert!(first.join().unwrap_or(false), "round {round}: the panic of its own job did not reach the caller");
         });
     }
 }

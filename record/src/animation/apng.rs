@@ -28,7 +28,7 @@ pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
 fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> WriteResult {
     let length: usize = data.iter().map(|part| part.len()).sum();
     let length = u32::try_from(length)
-        .map_err(|_| WriteError::limit("a frame of a PNG file has at most 4 GiB; make pictures smaller"))?;
+        .map_err(|_| WriteError::limit("a frame of a PNG file has at most 4 GiB; use smaller images"))?;
     to.write_all(&length.to_be_bytes())?;
     to.write_all(kind)?;
     let mut crc = crc32fast::Hasher::new();

@@ -57,7 +57,9 @@ impl H264Encoder {
         let even = size.iter().all(|side| *side > 0 && side % 2 == 0);
         if !even || !HIGHEST.supports_size(squares) {
             let [most, all] = HIGHEST.max_size();
-            return Err(format!("even numbers would do for both, up to {most} pixels and {all} in all"));
+            return Err(format!(
+                "both sides must be even numbers, up to {most} pixels, with up to {all} pixels in all"
+            ));
         }
         let planes = YuvFrame::new(squares);
         Ok(Self {

@@ -119,7 +119,7 @@ impl FormatWriter for Animation {
     fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
         self.encode_pending(None)?;
         let Some(mut file) = self.file.take().filter(|_| self.first.is_some()) else {
-            return Err(WriteError::NoFrame("the camera has measured nothing"));
+            return Err(WriteError::NoFrame("the camera captured no image"));
         };
         self.encoder.finish(&mut file)?;
         file.flush()?;
@@ -147,7 +147,7 @@ fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64
     let fits = N::try_from(found).ok().filter(|_| found <= most);
     let longest = most as f64 / per_second;
     fits.ok_or_else(|| {
-        WriteError::limit(format!("a frame of this format is shown for {longest} s at most: record more often"))
+        WriteError::limit(format!("a frame of this format lasts at most {longest} s; record more often"))
     })
 }
 
@@ -164,7 +164,7 @@ fn check_sides<N: TryFrom<usize>>(size: [usize; 2], most: usize) -> std::result:
     let side = |side: usize| N::try_from(side).ok().filter(|_| (1..=most).contains(&side));
     match size.map(side) {
         [Some(width), Some(height)] => Ok([width, height]),
-        _ => Err(format!("1 to {most} pixels would do for both")),
+        _ => Err(format!("both sides must be from 1 to {most} pixels")),
     }
 }
 
@@ -178,9 +178,9 @@ mod tests {
         let shown = |k: u32| [f64::from(k) / 30.0, f64::from(k + 1) / 30.0];
         let all: Vec<u64> = (0..30).map(|k| duration(shown(k), 100.0, 9).unwrap()).collect();
         assert_eq!((all[..3].to_vec(), all.iter().sum::<u64>()), (vec![3, 4, 3], 100));
-        assert_eq!(duration::<u16>([1.0, 1.0], 100.0, 9).unwrap(), 1, "there is no frame that is not shown");
+        assert_eq!(duration::<u16>([1.0, 1.0], 100.0, 9).unwrap(), 1, "every frame is shown");
         assert_eq!(duration::<u16>([1.0, 656.35], 100.0, 65_535).unwrap(), 65_535);
         let error = duration::<u16>([1.0, 656.36], 100.0, 65_535).unwrap_err().to_string();
-        assert!(error.contains("655.35 s at most"), "{error}");
+        assert!(error.contains("at most 655.35 s"), "{error}");
     }
 }

@@ -138,7 +138,7 @@ impl Encoder for Mp4 {
             self.offset = self.length_at + 8;
         }
         let coded = self.stream.encode(rgba);
-        let too_large = || WriteError::limit("a picture of an MP4 file has less than 4 GiB; make pictures smaller");
+        let too_large = || WriteError::limit("a frame of an MP4 file has less than 4 GiB; use smaller images");
         let length = u32::try_from(coded.unit.len()).map_err(|_| too_large())?;
         out.write_all(&length.to_be_bytes())?;
         out.write_all(coded.unit)?;

@@ -46,7 +46,7 @@ impl Webp {
         let after = self.length + 8 + (length + length % 2) as u64;
         let known = u32::try_from(length).ok().filter(|_| after <= MAX_LENGTH);
         let known = known
-            .ok_or_else(|| WriteError::limit("a WebP file has at most 4 GiB; record less, or as .apng or .mp4"))?;
+            .ok_or_else(|| WriteError::limit("a WebP file has at most 4 GiB; record less, or use .apng or .mp4"))?;
         out.write_all(kind)?;
         out.write_all(&known.to_le_bytes())?;
         parts.iter().try_for_each(|part| out.write_all(part))?;

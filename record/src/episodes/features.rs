@@ -159,7 +159,7 @@ impl Features {
         all.frame_stream = base.ok_or_else(|| RecordError::UnsupportedTopic {
             path: path.into(),
             format,
-            topic: "sensors alone: frames are rows of joints or objects".into(),
+            topic: "a recording of sensors only; its frames are rows of joints or objects".into(),
         })?;
         let mut names: Vec<&str> = all.names().collect();
         names.sort_unstable();

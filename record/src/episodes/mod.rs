@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub(crate) use features::{Features, Role, supports};
 
 /// Explanation of a recording without any frame.
-pub(crate) const NO_FRAME: &str = "every one needs all that is measured, and the action after it";
+pub(crate) const NO_FRAME: &str = "every frame needs a value of each stream and the action that follows";
 
 /// Writer of a dataset. Its environments are numbered by their index in [`environments`].
 pub(crate) trait DatasetWriter: Send {

@@ -212,8 +212,8 @@ pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> WriteResult {
 
 /// Converts a size or a count to the signed type of the format: 32 bits in pages, 64 bits elsewhere.
 fn checked_int<N: TryFrom<u64>>(number: u64) -> WriteResult<N> {
-    let too_large = "bytes or rows are more than a page or a table of a Parquet file may have";
-    let error = |_| WriteError::limit(format!("{number} {too_large}; make pictures smaller, or episodes shorter"));
+    let too_large = "bytes or rows exceed the limit of a page or table of a Parquet file";
+    let error = |_| WriteError::limit(format!("{number} {too_large}; use smaller images or shorter episodes"));
     N::try_from(number).map_err(error)
 }
 

@@ -156,13 +156,13 @@ fn without_a_scene() {
     let all = recorded(&path, false);
     let recording = Recording::open(&path).unwrap();
     let error = Playback::open(&recording, None).unwrap_err().to_string();
-    assert!(error.contains("does not hold its scene"), "{error}");
+    assert!(error.contains("does not contain its scene"), "{error}");
     let (mut film, mut sim) = Playback::open(&recording, Some(&busy())).unwrap();
     let largest = largest_difference(&mut film, &mut sim, &all);
     assert!(largest.0 < 1e-9, "{largest:?}");
     // A scene without these names.
     let error = Playback::open(&recording, Some(&falling(2))).unwrap_err().to_string();
-    assert!(error.contains("nothing that moves"), "{error}");
+    assert!(error.contains("no motion of its scene was recorded"), "{error}");
 }
 
 /// Joints without recorded values are listed.
@@ -204,6 +204,6 @@ fn damaged_scenes() {
         archive.add(name, b"", &mut &b"x"[..]).unwrap();
         let bytes = archive.finish().unwrap().into_inner();
         let error = scene_file::unpack(&bytes, path).unwrap_err().to_string();
-        assert!(error.contains("no name of a file"), "{error}");
+        assert!(error.contains("is not a valid file name"), "{error}");
     }
 }

@@ -35,7 +35,9 @@ pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Re
     let bytes = file.metadata().map_err(failed)?.len();
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
     let truncated = || {
-        malformed("it ends in the middle; `kinetoscope recover` (record::recover) makes a whole file of what a killed recorder left".into())
+        let text = "it is truncated; `kinetoscope recover` (record::recover) makes a complete file of the partial file of a \
+                    killed recorder";
+        malformed(text.into())
     };
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
@@ -69,7 +71,7 @@ pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Re
                     Record::Message { header, data } => {
                         let Some(channel) = channels.get(&header.channel_id) else {
                             return Err(malformed(format!(
-                                "a message is of channel {}, which is not there",
+                                "a message refers to channel {}, which does not exist",
                                 header.channel_id
                             )));
                         };
@@ -83,7 +85,7 @@ pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Re
                 }
             }
             Err(McapError::UnexpectedEof) => return Err(truncated()),
-            Err(McapError::BadMagic) => return Err(malformed("this is no MCAP file, or it is not whole".into())),
+            Err(McapError::BadMagic) => return Err(malformed("this is not an MCAP file, or it is incomplete".into())),
             Err(error) => return Err(malformed(error.to_string())),
         }
     }
@@ -138,10 +140,10 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     let mut warnings = Vec::new();
     let mut topic = |(name, TopicScan { kind, count, fields, unread, first_unread, .. })| {
         if unread == count {
-            warnings.push(format!("{name} is left out: none of its {count} messages is a {kind}"));
+            warnings.push(format!("{name} is left out: none of its {count} messages can be read as {kind}"));
         } else if unread > 0 {
             warnings.push(format!(
-                "{name} lacks {unread} of its {count} messages, which are no {kind}; the first is message {first_unread}"
+                "{name} lacks {unread} of its {count} messages, which cannot be read as {kind}; the first is message {first_unread}"
             ));
         }
         RecordedTopic { name, kind, count, fields }

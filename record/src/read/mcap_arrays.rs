@@ -167,7 +167,7 @@ pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
                     start = Some(attachment.data.into_owned());
                 } else if attachment.name == METADATA {
                     let json: Option<Value> = serde_json::from_slice(&attachment.data).ok();
-                    let json = json.ok_or_else(|| malformed(format!("{METADATA} is no JSON")))?;
+                    let json = json.ok_or_else(|| malformed(format!("{METADATA} is not valid JSON")))?;
                     dt = json["physics_dt"].as_f64().filter(|dt| *dt > 0.0).unwrap_or_default();
                     streams =
                         json["streams"].as_array().into_iter().flatten().filter_map(StreamAssembler::of).collect();
@@ -197,7 +197,7 @@ pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
             let first = *begun.entry(env).or_insert(time);
             (time.saturating_sub(first) as f64 / 1e9 / dt).round()
         };
-        let mismatch = || malformed(format!("{} is not what {METADATA} says of it", channel.topic));
+        let mismatch = || malformed(format!("{} does not match its description in {METADATA}", channel.topic));
         if name == "tf" {
             let Some(message) = reads.read(data) else { return Err(mismatch()) };
             let poses = transforms(&message);
@@ -240,7 +240,7 @@ pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
     let (about, start) = (about.ok_or_else(|| missing(METADATA))?, start.ok_or_else(|| missing(INITIAL_STATE))?);
     let mut arrays = Arrays::new();
     for mut stream in streams {
-        stream.end_row().ok_or_else(|| malformed(format!("{} has not every environment", stream.name)))?;
+        stream.end_row().ok_or_else(|| malformed(format!("{} lacks an environment", stream.name)))?;
         let count = stream.steps.len();
         if count == 0 {
             continue;

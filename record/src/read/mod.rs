@@ -43,7 +43,7 @@ enum Content {
 pub struct RecordedTopic {
     /// Name, such as `/env_0/arm/joint_states`, for archives too.
     pub name: String,
-    /// Message type, or `numbers` or `pictures` for an archive.
+    /// Message type, or `numbers` or `images` for an archive.
     pub kind: String,
     /// Number of messages or rows.
     pub count: u64,
@@ -94,10 +94,10 @@ impl Recording {
             }
             _ if path.extension().is_some_and(|end| end == "part") => {
                 return Err(malformed(
-                    "this recording was not finished; `kinetoscope recover` (record::recover) makes a whole file of a .mcap.part",
+                    "this recording was not finished; `kinetoscope recover` (record::recover) makes a complete file of a .mcap.part",
                 ));
             }
-            _ => return Err(malformed("recordings that can be read are called .mcap or .npz")),
+            _ => return Err(malformed("only .mcap or .npz recordings can be read")),
         };
         Ok(Self { path: path.into(), topics, warnings, content })
     }
@@ -176,7 +176,7 @@ impl Recording {
                 None => self.topic(topic, None)?,
             };
             if !topic.fields.iter().any(|known| known == field) {
-                let what = "number that can be read, called";
+                let what = "field";
                 let candidates = nearest(field, &topic.fields);
                 return Err(RecordError::UnknownName { what, name: format!("{field} in {}", topic.name), candidates });
             }

@@ -69,10 +69,11 @@ pub(super) fn topics(archive: &RecordedArrays) -> Result<Vec<RecordedTopic>> {
     let mut topics = Vec::new();
     for stream in streams(archive) {
         let count = archive.shape(&format!("{}/step", stream.name)).and_then(|shape| shape.first()).copied();
-        let count = count.ok_or_else(|| archive.malformed(format!("there is no array {}/step", stream.name)))? as u64;
+        let count =
+            count.ok_or_else(|| archive.malformed(format!("the array {}/step is missing", stream.name)))? as u64;
         let fields: Vec<String> = stream.parts.iter().flat_map(|part| part.fields.iter().cloned()).collect();
         for env in &stream.env_ids {
-            let kind = if fields.is_empty() { "pictures" } else { "numbers" };
+            let kind = if fields.is_empty() { "images" } else { "numbers" };
             let name = format!("/env_{env}/{}", stream.name);
             topics.push(RecordedTopic { name, kind: kind.into(), count, fields: fields.clone() });
         }
@@ -87,7 +88,7 @@ pub(super) fn samples(archive: &RecordedArrays, wanted: &[FieldSelector]) -> Res
     let streams = streams(archive);
     let mut samples = Vec::with_capacity(wanted.len());
     for FieldSelector { topic, field } in wanted {
-        let missing = || archive.malformed(format!("there is no {field} in {topic}"));
+        let missing = || archive.malformed(format!("{topic} has no {field}"));
         let of_env = |stream: &RecordedStream<'_>| {
             stream.env_ids.iter().position(|env| *topic == format!("/env_{env}/{}", stream.name))
         };
@@ -119,7 +120,7 @@ fn times(
     let array = if of_forces && archive.shape(&forces).is_some() { forces } else { format!("{}/time", stream.name) };
     let steps = archive.steps(stream.name)?;
     let dt = archive.metadata["physics_dt"].as_f64().filter(|dt| *dt > 0.0);
-    let dt = dt.ok_or_else(|| archive.malformed("it does not say its time step".into()))?;
+    let dt = dt.ok_or_else(|| archive.malformed("it does not contain its time step".into()))?;
     let env = stream.env_ids.get(row).copied().unwrap_or_default();
     let column = |array: &str| -> Result<Vec<f64>> {
         (0..steps.len()).map(|k| Ok(archive.rows(array, k)?.get((row, 0)).copied().unwrap_or(f64::NAN))).collect()

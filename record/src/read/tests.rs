@@ -102,7 +102,7 @@ fn unknown_names() {
             "",
             &["/env_0/left/joint_states, /env_0/right/joint_states"],
         );
-        assert_error(recording.topic("left/joint_state", None), "", &["known are /left/joint_states"]);
+        assert_error(recording.topic("left/joint_state", None), "", &["known names: /left/joint_states"]);
         assert_error(recording.topic("left/joint_states", Some(2)), "", &["environment 2"]);
         assert_eq!(recording.topic("/left/joint_states", Some(1)).unwrap().name, "/env_1/left/joint_states");
         let wanted = |topic: &str, field: &str| recording.time_series(&[FieldSelector::new(topic, field)]);

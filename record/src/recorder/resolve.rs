@@ -69,7 +69,7 @@ pub(super) fn resolve(
             return Err(RecordError::UnsupportedTopic { path: cfg.path.clone(), format, topic: format!("{topic:?}") });
         }
         let no_place =
-            |source: &StreamSource| format!("{} ({} has no place for it)", source.stream.name, format.name());
+            |source: &StreamSource| format!("{} ({} does not support it)", source.stream.name, format.name());
         left_out.extend(without.iter().map(no_place));
         for source in supported {
             match sources.iter().find(|known| known.stream.name == source.stream.name) {
@@ -127,7 +127,7 @@ fn set_periods(sources: &mut [StreamSource], cfg: &RecorderCfg, format: Format) 
             return Err(RecordError::OutOfRange { field: "a number of steps in rates", value: 0, min: 1 });
         }
         if matches!(format, Format::LeRobot | Format::Hdf5) {
-            let topic = format!("a rate of its own for {name:?}: frames have one, `every`");
+            let topic = format!("a separate rate for {name:?}; all frames have the rate of `every`");
             return Err(RecordError::UnsupportedTopic { path: cfg.path.clone(), format, topic });
         }
         let is_of = |source: &&mut StreamSource| {

@@ -345,7 +345,7 @@ fn absurd_numbers() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = falling(1);
     let refused = sim.record(RecorderCfg { packets: usize::MAX, ..RecorderCfg::new(&path) });
-    kinetoscope_testkit::error_tables::assert_error(refused, &format!("TooLarge {{ packets: {}", usize::MAX), &[]);
+    kinetoscope_testkit::error_tables::assert_error(refused, &format!("PoolTooLarge {{ packets: {}", usize::MAX), &[]);
     let cfg = RecorderCfg { period_steps: u64::MAX, ..RecorderCfg::new(&path) };
     assert_eq!(record(&mut sim, cfg, |sim| sim.update(5)).packets, 1);
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0]);
@@ -410,7 +410,7 @@ fn damage() {
     // No complete message.
     std::fs::write(&part, &whole[..200]).unwrap();
     let error = recover(&path).unwrap_err().to_string();
-    assert!(error.contains("nothing of it can be read"), "{error}");
+    assert!(error.contains("it cannot be recovered"), "{error}");
     assert_eq!(names(&folder), ["run.mcap.part"]);
 }
 

@@ -145,13 +145,13 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Re
     let RecorderCfg { path, period_steps: every, overwrite, task, .. } = cfg;
     let features = Arc::new(Features::of(path, Format::Hdf5, streams, name_of)?);
     if !features.numbers.iter().any(|feature| feature.role == Role::Action) {
-        let topic = "a run that nobody acts in: record targets of joints, or states with controls".into();
+        let topic = "a recording without actions; record joint targets, or states with controls".into();
         return Err(RecordError::UnsupportedTopic { path: path.clone(), format: Format::Hdf5, topic });
     }
     // Each image is one chunk of the file.
     let too_large = |[width, height]: [usize; 2]| 3 * width as u128 * height as u128 > u128::from(u32::MAX);
     if let Some([width, height]) = features.images.iter().map(|picture| picture.size).find(|size| too_large(*size)) {
-        let fits = "three bytes for each pixel must be less than 4 GiB".into();
+        let fits = "three bytes per pixel must be less than 4 GiB".into();
         return Err(RecordError::UnsupportedSize {
             path: path.clone(),
             format: Format::Hdf5,

@@ -184,7 +184,7 @@ impl StreamSource {
             return None;
         };
         if distortion.is_none() {
-            return Some(format!("{camera}/camera_info (ROS has no words for its lens)"));
+            return Some(format!("{camera}/camera_info (ROS has no model of its lens)"));
         }
         let error = rectifications(sim.entities().sensor_by_uid(uid).ok()?)?.err()?;
         Some(format!("R and P of {camera}/camera_info ({error})"))

@@ -86,14 +86,20 @@ fn configurations() {
         (with(Topic::channel("imu", "depth")), &["imu/depth"]),
         (RecorderCfg { period_steps: 0, ..run() }, &["every", "at least 1"]),
         (RecorderCfg { packets: 1, ..run() }, &["packets", "at least 2"]),
-        (RecorderCfg { period_steps: 3, ..new("run.lerobot") }, &["run.lerobot", "33.333", "2, 4, 1 would do"]),
-        (new("run.lerobot").with_topics([Topic::Sensor("imu".into())]), &["no place", "sensors alone"]),
+        (
+            RecorderCfg { period_steps: 3, ..new("run.lerobot") },
+            &["run.lerobot", "33.333", "valid values of `every`: 2, 4, 1"],
+        ),
+        (
+            new("run.lerobot").with_topics([Topic::Sensor("imu".into())]),
+            &["does not support", "a recording of sensors only"],
+        ),
         (RecorderCfg { envs: Some(vec![EnvId(3)]), ..run() }, &["environment 3"]),
         (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..run() }, &["twice"]),
         (RecorderCfg { topics: vec![], ..run() }, &["nothing to record"]),
         (RecorderCfg { envs: Some(vec![]), ..run() }, &["number of envs is 0", "at least 1"]),
         (new("run.avi"), &ends),
-        (new("run.apng").with_topics([Topic::JointStates("arm".into())]), &["no place", "JointStates"]),
+        (new("run.apng").with_topics([Topic::JointStates("arm".into())]), &["does not support", "JointStates"]),
     ];
     let mut world = World::new(1, 1);
     for (cfg, parts) in rows {
@@ -104,7 +110,7 @@ fn configurations() {
     }
     // Root cause: a topic was looked up by its name alone, so that an IMU called `tf` was written as transforms.
     world.sim.add_sensor("tf", ImuCfg::on("cube")).unwrap();
-    assert_error(world.sim.record(run()), "SameName { path", &["\"tf\""]);
+    assert_error(world.sim.record(run()), "DuplicateName { path", &["\"tf\""]);
     assert!(names(&folder).is_empty(), "nothing was left");
     // Control: arrays of archives have names of their own.
     record_steps(&mut world, new("run.npz"), 0);

@@ -107,7 +107,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
         "gif" => {
             let known: std::collections::BTreeSet<_> = pixels.iter().collect();
             assert!(known.len() <= 256, "{} colors", known.len());
-            assert_eq!(bytes("rgb"), color, "so many are a palette");
+            assert_eq!(bytes("rgb"), color, "as many colors as fit into a palette are exact");
         }
         "mp4" => {
             // ITU-R BT.709, 8 bits, limited range: half of rounding, and the error of constants with 16 bits.
@@ -126,7 +126,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
                 close(red, 128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
             }
             assert_eq!((bytes("y").len(), bytes("u").len()), (pixels.len(), pixels.len() / 4));
-            assert_eq!(frame["colour"], json!([1, 13, 1, "tv"]));
+            assert_eq!(frame["color"], json!([1, 13, 1, "tv"]));
         }
         _ => panic!("{end}: its frames are not checked"),
     }
@@ -264,6 +264,6 @@ fn stage_alone() {
         (OverviewCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..OverviewCfg::default() }, "from"),
     ] {
         let cfg = RecorderCfg { overview: stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
-        kinetoscope_testkit::error_tables::assert_error(sim.record(cfg), "Stage", &[wrong]);
+        kinetoscope_testkit::error_tables::assert_error(sim.record(cfg), "Overview", &[wrong]);
     }
 }

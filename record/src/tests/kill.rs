@@ -103,7 +103,7 @@ fn kill_once(folder: &Path, kill: u32) {
             // No data was a second old, and no message was complete: the partial file remains, and no file gets the
             // name.
             let said = error.to_string();
-            let begun = ["there is no whole message", "this is no MCAP file", "entity not found"];
+            let begun = ["it has no complete message", "this is not an MCAP file", "entity not found"];
             assert!(old == 0 && begun.iter().any(|what| said.contains(what)), "step {old}: {said}");
             assert!(!path.exists());
             println!("kill {kill} after {life:?}: nothing was written yet");

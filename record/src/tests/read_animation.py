@@ -1,10 +1,10 @@
-"""Says as JSON what frames an animation has: their times in milliseconds and their bytes. Read by Pillow, or by PyAV."""
+"""Prints the frames of an animation as JSON: times in milliseconds, and pixels. Read by Pillow or PyAV."""
 
 import sys
 
 import av
 from PIL import Image, ImageSequence
-from told import tell
+from reader_output import print_json
 
 
 def pillow(path):
@@ -35,7 +35,7 @@ def ffmpeg(path):
                 rows, step = bytes(plane), plane.line_size
                 planes.append(b"".join(rows[k * step : k * step + width] for k in range(height)).hex())
             about = stream.codec_context
-            colour = [int(about.color_primaries), int(about.color_trc), int(about.colorspace), {1: "tv", 2: "pc"}[int(about.color_range)]]
+            color = [int(about.color_primaries), int(about.color_trc), int(about.colorspace), {1: "tv", 2: "pc"}[int(about.color_range)]]
             frames.append({
                 "from": milliseconds(frame.pts, stream.time_base),
                 "until": milliseconds(frame.pts + frame.duration, stream.time_base),
@@ -43,7 +43,7 @@ def ffmpeg(path):
                 "y": planes[0],
                 "u": planes[1],
                 "v": planes[2],
-                "colour": colour,
+                "color": color,
             })
         assert milliseconds(stream.duration, stream.time_base) == frames[-1]["until"], stream.duration
         # As FFmpeg finds it in the stream, and as the file says it. Of 20 pictures in a second, each of four squares of 3072 bits and
@@ -60,4 +60,4 @@ def ffmpeg(path):
 
 
 path = sys.argv[1]
-tell({"frames": ffmpeg(path) if path.endswith(".mp4") else pillow(path)})
+print_json({"frames": ffmpeg(path) if path.endswith(".mp4") else pillow(path)})

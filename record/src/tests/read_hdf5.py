@@ -1,13 +1,13 @@
-"""Says as JSON what is in an HDF5 file as robomimic has them, read by h5py."""
+"""Prints the content of a robomimic HDF5 file as JSON, read by h5py."""
 
 import json
 import sys
 
 import h5py
 import numpy as np
-from told import tell
+from reader_output import print_json
 
-told = {"episodes": []}
+output = {"episodes": []}
 # As robomimic opens it.
 with h5py.File(sys.argv[1], "r", swmr=True, libver="latest") as file:
     assert list(file) == ["data"]
@@ -43,7 +43,7 @@ with h5py.File(sys.argv[1], "r", swmr=True, libver="latest") as file:
 
         demo.visititems(visit)
         assert set(demo["obs"]) == set(demo["next_obs"])
-        told["episodes"].append({"env": int(demo.attrs["env_id"]), "frames": frames, "numbers": low, "images": images})
-    assert int(data.attrs["total"]) == sum(episode["frames"] for episode in told["episodes"])
-told["about"] = about
-tell(told)
+        output["episodes"].append({"env": int(demo.attrs["env_id"]), "frames": frames, "numbers": low, "images": images})
+    assert int(data.attrs["total"]) == sum(episode["frames"] for episode in output["episodes"])
+output["about"] = about
+print_json(output)

@@ -1,4 +1,4 @@
-"""Says as JSON what is in a LeRobot dataset, read by pyarrow, and checks it against LeRobot's own reader where there is one."""
+"""Prints the content of a LeRobot dataset as JSON, read by pyarrow, and checks it with LeRobot's own reader if installed."""
 
 import io
 import json
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 from PIL import Image
-from told import tell
+from reader_output import print_json
 
 root = Path(sys.argv[1])
 info = json.loads((root / "meta/info.json").read_text())
@@ -30,7 +30,7 @@ def pixels(picture):
 
 
 judged = "next.reward" in info["features"]
-rows, told = [], []
+rows, output = [], []
 for number, episode in enumerate(episodes):
     assert episode["episode_index"] == number and episode["tasks"] == [tasks.to_pydict()["__index_level_0__"][0]]
     path = info["data_path"].format(chunk_index=episode["data/chunk_index"], file_index=episode["data/file_index"])
@@ -49,12 +49,12 @@ for number, episode in enumerate(episodes):
         rows.append(frame)
     if judged:
         assert info["features"]["next.done"] == {"dtype": "bool", "shape": [1], "names": None}
-        told.append([{
+        output.append([{
             "state": frame["observation.state"], "reward": float(frame["next.reward"]), "done": frame["next.done"],
         } for frame in frames])
-        assert all(frame["done"] in (True, False) for frame in told[-1])
+        assert all(frame["done"] in (True, False) for frame in output[-1])
         continue
-    told.append([{
+    output.append([{
         "state": frame["observation.state"],
         "action": frame["action"],
         "cube": frame["observation.environment_state"],
@@ -90,4 +90,4 @@ else:
             expected = pixels(row[name]).transpose(2, 0, 1).astype(np.float32) / 255 if name in images else np.asarray(row[name], value.dtype)
             np.testing.assert_array_equal(value, expected, err_msg=name)
     read = len(dataset)
-tell({"episodes": told, "fps": info["fps"], "features": sorted(info["features"]), "states": info["features"]["observation.state"]["names"], "task": episodes[0]["tasks"][0], "read_by_lerobot": read})
+print_json({"episodes": output, "fps": info["fps"], "features": sorted(info["features"]), "states": info["features"]["observation.state"]["names"], "task": episodes[0]["tasks"][0], "read_by_lerobot": read})

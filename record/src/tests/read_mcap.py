@@ -1,4 +1,4 @@
-"""Says as JSON what the last messages of a recording hold, read by the packages mcap, mcap-ros2-support and Pillow."""
+"""Prints the last messages of a recording as JSON, read by the packages mcap, mcap-ros2-support and Pillow."""
 
 import io
 import struct
@@ -7,7 +7,7 @@ import sys
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from PIL import Image
-from told import tell, weighed
+from reader_output import print_json, weighed
 
 last, counts = {}, {}
 transforms = {}
@@ -49,7 +49,7 @@ info = last["/env_1/camera/camera_info"][1]
 assert (info.width, info.height, list(info.d)) == (depth.width, depth.height, [0.0] * 5)
 assert pose("env_0", "world")[3:] == [1, 0, 0, 0]
 links = [frame for frame in transforms if frame.startswith("env_1/arm/")]
-tell({
+print_json({
     "names": list(joints.name),
     "position": list(joints.position),
     "velocity": list(joints.velocity),

@@ -1,16 +1,16 @@
-"""Says as JSON what the last rows of a recording hold, read by NumPy."""
+"""Prints the last rows of a recording as JSON, read by NumPy."""
 
 import json
 import sys
 
 import numpy as np
-from told import tell, weighed
+from reader_output import print_json, weighed
 
 with np.load(sys.argv[1], allow_pickle=False) as file:
     about = json.loads(file["recording.json"])
     others = ("recording.json", "start.snapshot", "scene.zip", "notes.jsonl")
     arrays = {name: file[name] for name in file.files if name not in others}
-    assert file["notes.jsonl"] == b"", "nobody had anything to say"
+    assert file["notes.jsonl"] == b"", "there are no notes"
 assert "cube" in [mask["name"] for mask in about["mask_ids"]]
 
 streams = {stream["name"]: stream for stream in about["streams"]}
@@ -24,7 +24,7 @@ depth = arrays["camera/depth"][-1, 1]
 assert depth.dtype == np.float32 and arrays["camera/color"].dtype == np.uint8
 finite = depth[np.isfinite(depth)].astype(np.float64)
 last = {name: array[-1, 1] for name, array in arrays.items() if array.ndim > 2}
-tell({
+print_json({
     "names": names,
     "position": last["arm/joint_states/positions"].tolist(),
     "velocity": last["arm/joint_states/velocities"].tolist(),

@@ -1,12 +1,12 @@
-"""Says as JSON what a recording draws of an environment: points of every entity where the recorded transforms put them in the end,
-read by the packages mcap and mcap-ros2-support."""
+"""Prints the scene of an environment as JSON: points of each entity, placed by the last recorded transforms. Read by the packages
+mcap and mcap-ros2-support."""
 
 import sys
 
 import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from told import tell
+from reader_output import print_json
 
 
 def matrix(position, orientation):
@@ -22,7 +22,7 @@ def matrix(position, orientation):
 
 
 def outline(size):
-    """Middles of the sides of a box: ends of the axes of what is round."""
+    """Returns the centers of the sides of a box, which are the ends of the axes of round shapes."""
     half = np.array([size.x, size.y, size.z]) / 2
     return np.concatenate([np.diag(half), -np.diag(half)])
 
@@ -41,7 +41,7 @@ with open(path, "rb") as file:
                 t = transform.transform
                 frames[transform.child_frame_id] = matrix(t.translation, t.rotation)
 
-told = []
+output = []
 for time, update in updates[f"/{env}/scene"]:
     (deletion,) = update.deletions
     assert deletion.type == 1
@@ -75,5 +75,5 @@ for time, update in updates[f"/{env}/scene"]:
             "corners": corners,
             "color": [float(x) for x in (shape.color.r, shape.color.g, shape.color.b, shape.color.a)],
         }
-    told.append({"time": time, "entities": entities})
-tell({"updates": told, "counts": {topic: count for topic, count in counts.items() if topic.endswith("/scene")}})
+    output.append({"time": time, "entities": entities})
+print_json({"updates": output, "counts": {topic: count for topic, count in counts.items() if topic.endswith("/scene")}})

@@ -1,4 +1,4 @@
-"""Says as JSON what the last messages of sensors hold: points, forces of contact, pictures, names. Read by mcap, mcap-ros2-support, Pillow."""
+"""Prints the last sensor messages as JSON: points, contact forces, images, names. Read by mcap, mcap-ros2-support, Pillow."""
 
 import io
 import struct
@@ -7,7 +7,7 @@ import sys
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from PIL import Image
-from told import tell, weighed
+from reader_output import print_json, weighed
 
 last, frames, about = {}, {}, {}
 with open(sys.argv[1], "rb") as file:
@@ -45,7 +45,7 @@ def vector(v):
 
 
 def words(topic, encoding, size):
-    """The words of four bytes of a picture."""
+    """Returns the data of an image as 32-bit words."""
     _, image = of(topic, "sensor_msgs/msg/Image")
     assert (image.encoding, image.step) == (encoding, size * image.width), (image.encoding, image.step)
     return struct.unpack(f"<{len(image.data) // 4}I", bytes(image.data))
@@ -74,7 +74,7 @@ infos = [of(f"/env_1/pair/{eye}/camera_info", "sensor_msgs/msg/CameraInfo")[1] f
 projections = [[round(x, 9) for x in info.p] for info in infos]
 _, fish = of("/env_1/fish/camera_info", "sensor_msgs/msg/CameraInfo")
 
-tell({
+print_json({
     "fish": [fish.distortion_model, list(fish.d), list(fish.k)],
     "infos": sorted(topic for topic in last if topic.startswith("/env_1") and topic.endswith("camera_info")),
     "projections": projections,

@@ -82,7 +82,7 @@ fn run(recordings: &[(&Path, u64)]) -> Vec<ExpectedEpisode> {
     all.retain(|episode| !episode.rewards.is_empty());
     let is_long = |episode: &ExpectedEpisode| episode.ended && episode.rewards.len() == EPISODE as usize;
     assert!(all.iter().any(is_long) && all.iter().any(|episode| episode.ended && !is_long(episode)), "{all:?}");
-    assert!(all.iter().any(|episode| !episode.ended), "one is broken off: {all:?}");
+    assert!(all.iter().any(|episode| !episode.ended), "one episode has not ended: {all:?}");
     all
 }
 

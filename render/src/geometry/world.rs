@@ -251,7 +251,7 @@ impl RayWorld {
     /// If there are fewer poses than instances in the scene.
     #[track_caller]
     pub fn place(&mut self, poses: &[PoseF64]) {
-        assert!(poses.len() >= self.targets.instances, "poses of another scene");
+        assert!(poses.len() >= self.targets.instances, "fewer poses than instances of the scene");
         if !self.fixed.is_at(&self.targets, poses) {
             self.fixed = Arc::new(FixedTargets::new(&self.targets, poses));
         }
@@ -285,7 +285,7 @@ impl RayWorld {
     /// If `hits` and `rays` differ in length.
     #[track_caller]
     pub fn cast(&mut self, rays: &[Ray], max_distance: f64, hits: &mut [RayHit]) {
-        assert_eq!(rays.len(), hits.len(), "as many hits as rays");
+        assert_eq!(rays.len(), hits.len(), "the numbers of rays and hits must be equal");
         hits.fill(RayHit::MISS);
         let level = self.level;
         at_level!(level, s => self.cast_at(s, rays, max_distance, hits));

@@ -105,7 +105,7 @@ macro_rules! lenses {
                         lens: self.name(),
                         angle: domain.angle,
                         radius: domain.radius,
-                        requirement: format!("it is to see {:.2} degrees (max_angle)", wanted.to_degrees()),
+                        requirement: format!("max_angle is {:.2} degrees", wanted.to_degrees()),
                     }),
                     _ => Ok(domain),
                 }
@@ -132,7 +132,7 @@ macro_rules! lenses {
             type Value = Lens;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a lens, or a table with one")
+                f.write_str("the name of a lens, or a table whose only key is the name of a lens")
             }
 
             fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Lens, E> {
@@ -141,13 +141,16 @@ macro_rules! lenses {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Lens, A::Error> {
                 let Some(name) = map.next_key::<String>()? else {
-                    return Err(A::Error::custom("a lens is a table with its name, such as { opencv = { k1 = -0.3 } }"));
+                    let message = "a lens table needs the name of the lens as its key: { opencv = { k1 = -0.3 } }";
+                    return Err(A::Error::custom(message));
                 };
                 let lens = match Lens::from_name(&name).map_err(A::Error::custom)? {
                     $(Lens::$Name(_) => Lens::$Name(map.next_value()?),)*
                 };
                 match map.next_key::<String>()? {
-                    Some(other) => Err(A::Error::custom(format!("one lens only: {name:?} or {other:?}"))),
+                    Some(other) => {
+                        Err(A::Error::custom(format!("two lenses are given: {name:?} and {other:?}; keep one")))
+                    }
                     None => Ok(lens),
                 }
             }

@@ -41,7 +41,7 @@ macro_rules! fisheye {
         #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct $Name {
-            #[doc = concat!("Nothing is seen farther from the optical axis than this angle \\[rad\\]: ", $allowed, ".")]
+            #[doc = concat!("Largest visible angle from the optical axis \\[rad\\]: ", $allowed, ".")]
             pub max_angle: f64,
         }
 

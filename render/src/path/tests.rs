@@ -233,7 +233,7 @@ fn lights() {
         let dim = Tolerance {
             absolute: 1e-8,
             relative: 1e-5,
-            derivation: "pixels of micrometres, lights in single precision",
+            derivation: "pixels of micrometers, lights in single precision",
         };
         assert_number(&format!("{light:?}"), mean_light(&scene, &ONE, &view, 4, 3).0, expected, dim);
     }

@@ -17,7 +17,7 @@ pub(crate) struct MotionVectors {
 }
 
 /// Projection from a camera's optical frame to pixels.
-#[expect(clippy::large_enum_variant, reason = "there is one for a picture; a box would be an allocation for each")]
+#[expect(clippy::large_enum_variant, reason = "one value per image; a box would need an allocation for each image")]
 #[derive(Clone, Copy, Debug)]
 enum PreviousProjection {
     /// fx, fy, cx, cy \[pixels\].

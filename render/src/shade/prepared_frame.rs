@@ -315,7 +315,7 @@ pub fn check_exposure_optics(
         _ if renderer.is_path_tracing() => return Ok(()),
         (None, true) => return Ok(()),
         (Some(_), _) => "an aperture (depth of field)",
-        (None, false) => "a shutter that takes time",
+        (None, false) => "an exposure time or a rolling shutter",
     };
     Err(RenderError::NeedsPathTracing { what, renderer: renderer.name() })
 }

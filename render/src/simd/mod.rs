@@ -92,7 +92,7 @@ pub(crate) const DOUBLES: usize = 8;
 pub(crate) fn as_lanes<T>(x: &[T]) -> &[T; LANES] {
     match x.first_chunk() {
         Some(x) => x,
-        None => panic!("fewer than sixteen"),
+        None => panic!("a slice of fewer than sixteen elements"),
     }
 }
 
@@ -101,7 +101,7 @@ pub(crate) fn as_lanes<T>(x: &[T]) -> &[T; LANES] {
 fn as_lanes_mut<T>(x: &mut [T]) -> &mut [T; LANES] {
     match x.first_chunk_mut() {
         Some(x) => x,
-        None => panic!("fewer than sixteen"),
+        None => panic!("a slice of fewer than sixteen elements"),
     }
 }
 

@@ -60,12 +60,12 @@ fn invalid_input() {
     for samples in [0, 1 << 17] {
         let error = good.with(|still| still.renderer = paths(samples, 1)).try_draw().unwrap_err();
         assert_eq!(error, RenderError::Paths { samples, limit: Renderer::MAX_SAMPLES });
-        assert_eq!(error.to_string(), format!("{samples} paths per pixel; 1 to 65536 are possible"));
+        assert_eq!(error.to_string(), format!("invalid number of paths per pixel: {samples}; it must be 1 to 65536"));
     }
     let mut short = vec![0.0; 5];
     let mut frame = FrameMut { depth: Some(&mut short), ..FrameMut::default() };
     let error = ImageRenderer::default().render_request(&good.request(), &mut frame).unwrap_err();
-    assert_eq!(error.to_string(), "the depth buffer has 5 numbers; the picture needs 768");
+    assert_eq!(error.to_string(), "the depth buffer has 5 elements; the image needs 768");
     assert_eq!(View::look_at([8, 8], 1.0, [1.; 3], [1.; 3], [0., 0., 1.]), Err(RenderError::LookAt));
 }
 
@@ -74,7 +74,7 @@ fn invalid_scenes() {
     let with = |shape: Shape, id| RenderScene::new(vec![Instance::new(shape, Material::default(), id)]);
     assert!(matches!(with(Sphere { radius: 1.0 }.into(), 0), Err(RenderSceneError::ZeroMaskId { instance: 0 })));
     let error = with(Box { half: [1., 0., 1.] }.into(), 1).unwrap_err();
-    assert_eq!(error.to_string(), "instance 0, a box, has a size of 0; sizes are positive and finite");
+    assert_eq!(error.to_string(), "instance 0, a box, has a size of 0; sizes must be positive and finite");
 }
 
 #[test]

@@ -81,7 +81,7 @@ fn lens_images() {
                 }
             };
             let images = assert_same_bits(&format!("{}, {renderer:?}", lens.name()), (1, &still), &[2, 3], &[1]);
-            assert!(images[0].flow().iter().flatten().any(|x| x.is_finite() && *x != 0.0), "things move");
+            assert!(images[0].flow().iter().flatten().any(|x| x.is_finite() && *x != 0.0), "the instances move");
         }
     }
 }
@@ -122,7 +122,7 @@ fn channels() {
         TestFrame { channels, cfg, ..TestFrame::new(humanoid(), view) }.draw()
     };
     let (all, one) = (still(Channels::ALL, 4), still(Channels::ALL, 1));
-    assert!(all.bits_but_color() == one.bits_but_color(), "multisampling is for the colour only");
+    assert!(all.bits_but_color() == one.bits_but_color(), "multisampling changes color only");
     assert!(all.color() != one.color());
     assert!(still(Channels { depth: true, ..Channels::default() }, 4).depth() == all.depth());
     assert!(still(Channels { color: true, ..Channels::default() }, 4).color() == all.color());

@@ -54,7 +54,7 @@ fn check(
         let found = image.flow()[k].map(f64::from);
         let infinite = found == [f64::INFINITY; 2];
         if *id == 0 {
-            assert!(infinite, "{what}: nothing is there: {found:?}");
+            assert!(infinite, "{what}: a pixel without a surface has finite flow: {found:?}");
             continue;
         }
         let point = Point3::from(image.position()[k].map(f64::from));
@@ -64,7 +64,7 @@ fn check(
         match seen(to_f64_pose(&old.world_from_camera).inverse() * then, here, point.coords.norm()) {
             PreviousVisibility::Either => {}
             PreviousVisibility::Unseen => {
-                assert!(infinite, "{what}: it was not seen: {found:?}");
+                assert!(infinite, "{what}: a point that was not visible before has finite flow: {found:?}");
                 counts[1] += 1;
             }
             PreviousVisibility::At(there, factors) => {
@@ -178,7 +178,10 @@ fn homography() {
     for (flow, id) in unmoved.flow().iter().zip(unmoved.mask()) {
         assert_eq!(*flow, if *id == 0 { [f32::INFINITY; 2] } else { [0.0; 2] });
     }
-    assert!(still.draw().flow().iter().flatten().all(|&x| x == f32::INFINITY), "there is no frame before");
+    assert!(
+        still.draw().flow().iter().flatten().all(|&x| x == f32::INFINITY),
+        "without a previous frame, flow is infinite"
+    );
 }
 
 #[test]

@@ -152,7 +152,7 @@ fn wide_poles() {
     assert!(
         matches!(error, OpticsError::LensFolds { angle, radius, .. } if (angle, radius) == (domain.angle, domain.radius))
     );
-    assert!(error.to_string().contains("it folds back, or nears a pole, 36.03 degrees"), "{error}");
+    assert!(error.to_string().contains("it folds back, or approaches a pole, 36.03 degrees"), "{error}");
     // An image that ends before the pole is valid, and so is a whole image if `max_angle` ends the lens before the
     // pole.
     let middle = PixelIntrinsics { cx: 70.0, cy: 70.0, ..pixels };

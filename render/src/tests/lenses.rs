@@ -190,7 +190,7 @@ fn folds() {
         assert!(LensRays::new(&middle, [100, 100], 1).is_ok());
         let error = LensRays::new(&optics, [200, 200], 1).unwrap_err();
         assert!(matches!(error, OpticsError::LensFolds { radius, .. } if (radius - domain.radius).abs() < 1e-12));
-        assert!(error.to_string().contains("at radius 0.8607 of the normalised picture"), "{error}");
+        assert!(error.to_string().contains("at radius 0.8607 of the normalized image"), "{error}");
     }
     // A larger `max_angle` is rejected at once; a smaller one leaves the rest dark.
     let short = |max_angle| Lens::from(OpenCv { k1: -0.2, max_angle: Some(max_angle), ..OpenCv::default() });

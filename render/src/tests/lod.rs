@@ -86,7 +86,7 @@ impl<'a> Truth<'a> {
         // count.
         let reach = MAX_SHIFT_PIXELS * FINE_PER_PIXEL as f64 + std::f64::consts::FRAC_1_SQRT_2;
         let middle = (FINE_PER_PIXEL + 1) as f64 / 2.0;
-        assert!(reach < middle + 1.0, "one fine pixel beside the pixel is enough");
+        assert!(reach < middle + 1.0, "a margin of one fine pixel is enough");
         let within = |k: &usize| ((k % width) as f64 - middle).hypot((k / width) as f64 - middle) <= reach;
         let near = (0..(FINE_PER_PIXEL + 2) * width).filter(within).collect();
         Self { view: &still.view, plain: still.draw(), fine, near }

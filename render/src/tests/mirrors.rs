@@ -172,7 +172,7 @@ fn first_mirror() {
     assert_eq!(off.color(), draw(LightingSpace::Linear, [0.0; 2]).color(), "reflections are off");
     let changed = |sum, reflectances| {
         let (image, plain) = (draw(sum, reflectances), draw(sum, [0.0; 2]));
-        assert_eq!(image.bits_but_color(), plain.bits_but_color(), "only the colour mirrors");
+        assert_eq!(image.bits_but_color(), plain.bits_but_color(), "reflections change color only");
         [1, 2].map(|id| {
             let pixels = (0..image.mask().len()).filter(|&k| image.mask()[k] == id);
             pixels.filter(|&k| image.color()[k] != plain.color()[k]).count()
@@ -214,7 +214,7 @@ fn rays_that_miss() {
             assert_eq!(culled.color()[k], followed.color()[k], "{sum:?}, pixel {k}");
             (pixels, _) = (pixels + 1, colors.insert(culled.color()[k]));
         }
-        assert!(pixels > 5000 && colors.len() > 2, "{pixels} pixels of {} colours", colors.len());
+        assert!(pixels > 5000 && colors.len() > 2, "{pixels} pixels of {} colors", colors.len());
     }
 }
 

@@ -239,7 +239,7 @@ fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize 
         });
         let fine = agrees(hit) || beside.any(|by| at(k, by).is_some_and(agrees));
         let kind = still.scene.instances()[hit.instance].shape.name();
-        assert!(fine, "{place}, {kind}: {hit:?}, drawn {mask} {depth} {normal:?}");
+        assert!(fine, "{place}, {kind}: {hit:?}, rendered {mask} {depth} {normal:?}");
         assert!((normal.norm() - 1.0).abs() < 1e-5, "{place}: unit normal");
         assert!((shading.norm() - 1.0).abs() < 1e-5, "{place}: unit shading normal");
         let from_eye = position - V::from(view.world_from_camera.translation.map(f64::from));

@@ -184,9 +184,10 @@ fn invalid_requests() {
     // Renderers without path tracing name the renderer to use.
     let good = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };
     let slow = Shutter { row_time: 1e-4, exposure_time: 0.0 };
-    for (aperture, shutter, expected) in
-        [(Some(good), Shutter::default(), "an aperture (depth of field)"), (None, slow, "a shutter that takes time")]
-    {
+    for (aperture, shutter, expected) in [
+        (Some(good), Shutter::default(), "an aperture (depth of field)"),
+        (None, slow, "an exposure time or a rolling shutter"),
+    ] {
         for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
             let still = TestFrame { renderer, aperture, shutter, shutter_open: None, ..tracer(1, slow, 0.0, 0.0) };
             let error = still.try_draw().unwrap_err();

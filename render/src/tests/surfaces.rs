@@ -53,7 +53,7 @@ fn material_albedo() {
             for (id, found) in image.mask().iter().zip(image.albedo()) {
                 seen[*id as usize] += 1;
                 let Some(own) = (*id as usize).checked_sub(1).map(|k| colors[k]) else {
-                    assert_eq!(*found, [0; 4], "nothing is there");
+                    assert_eq!(*found, [0; 4], "the albedo of a miss is 0");
                     continue;
                 };
                 let same = (0..3).all(|c| (f32::from(found[c]) - 255.0 * own[c]).abs() <= 1.0);

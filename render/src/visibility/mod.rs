@@ -12,7 +12,7 @@ pub use view::View;
 #[non_exhaustive]
 pub enum RenderError {
     /// The image is empty or too large.
-    #[error("a picture of {width} x {height} pixels cannot be drawn; both sides are 1 to {limit}")]
+    #[error("an image of {width} x {height} pixels cannot be rendered; both sides must be 1 to {limit}")]
     Size {
         /// Pixels per row.
         width: usize,
@@ -22,7 +22,9 @@ pub enum RenderError {
         limit: usize,
     },
     /// Focal lengths or the principal point are invalid.
-    #[error("intrinsics fx {fx}, fy {fy}, cx {cx}, cy {cy}: all must be finite, fx and fy positive")]
+    #[error(
+        "intrinsics fx {fx}, fy {fy}, cx {cx}, cy {cy}: all must be finite and below 1e7 in magnitude, fx and fy at least 0.001"
+    )]
     Intrinsics {
         /// Focal length along x \[pixels\].
         fx: f32,
@@ -34,10 +36,10 @@ pub enum RenderError {
         cy: f32,
     },
     /// Markers of sensors cannot be added to the scene.
-    #[error("what sensors show cannot be drawn into the picture: {0}")]
+    #[error("sensor markers cannot be added to the scene: {0}")]
     Markers(String),
     /// The range of depths is empty or invalid.
-    #[error("near {near} m and far {far} m: both must be finite, with 0 < near < far")]
+    #[error("near {near} m and far {far} m: both must be finite, with 1e-6 <= near < far")]
     Range {
         /// Smallest depth \[m\].
         near: f32,
@@ -67,7 +69,7 @@ pub enum RenderError {
         found: usize,
     },
     /// A buffer has the wrong length.
-    #[error("the {channel} buffer has {found} numbers; the picture needs {expected}")]
+    #[error("the {channel} buffer has {found} elements; the image needs {expected}")]
     BufferSize {
         /// Name of the channel.
         channel: &'static str,
@@ -77,10 +79,10 @@ pub enum RenderError {
         found: usize,
     },
     /// Eye and target of a view coincide, or are not finite.
-    #[error("the eye and the target of a view are the same point, or not finite")]
+    #[error("the camera position and the target of a view are the same point, or not finite")]
     LookAt,
     /// The number of paths per pixel is out of range.
-    #[error("{samples} paths per pixel; 1 to {limit} are possible")]
+    #[error("invalid number of paths per pixel: {samples}; it must be 1 to {limit}")]
     Paths {
         /// Paths per pixel.
         samples: u32,
@@ -88,7 +90,7 @@ pub enum RenderError {
         limit: u32,
     },
     /// The number of bounces is out of range.
-    #[error("{max_bounces} bounces; 0 to {limit} are possible")]
+    #[error("invalid number of bounces: {max_bounces}; it must be 0 to {limit}")]
     Bounces {
         /// Number of bounces.
         max_bounces: u32,
@@ -97,7 +99,8 @@ pub enum RenderError {
     },
     /// The renderer draws straight lines only, but the lens bends them.
     #[error(
-        "the {lens} lens bends straight lines, which {renderer} does not; use renderer: FastRayTraced, Hybrid or RayTraced"
+        "the renderer {renderer} supports pinhole cameras only, not the {lens} lens; use renderer: FastRayTraced, Hybrid or \
+         RayTraced"
     )]
     LensRenderer {
         /// Name of the lens.
@@ -106,9 +109,7 @@ pub enum RenderError {
         renderer: &'static str,
     },
     /// A feature needs path tracing, but the renderer has none.
-    #[error(
-        "{what}: colours come from paths all over the lens and the exposure, and {renderer} follows none; use renderer: RayTraced"
-    )]
+    #[error("{what} needs path tracing, which the renderer {renderer} does not support; use renderer: RayTraced")]
     NeedsPathTracing {
         /// Name of the feature.
         what: &'static str,
@@ -116,7 +117,10 @@ pub enum RenderError {
         renderer: &'static str,
     },
     /// Ambient occlusion is enabled for a renderer that does not support it.
-    #[error("{rays} rays for ambient occlusion: {renderer} casts none; use renderer: Hybrid (RayTraced needs none)")]
+    #[error(
+        "{rays} rays for ambient occlusion, which the renderer {renderer} does not support; use renderer: Hybrid (RayTraced \
+         includes ambient occlusion)"
+    )]
     Occlusion {
         /// Rays per sample.
         rays: u16,
@@ -143,7 +147,7 @@ pub enum RenderError {
     },
     /// The poses at shutter opening are more recent than the opening.
     #[error(
-        "the shutter opens {span} s before the picture's instant, but where things were is known from {age} s before"
+        "the shutter opens {span} s before the time stamp of the image, but the oldest known poses are from {age} s before it"
     )]
     ShutterPoses {
         /// Age of the poses at the time stamp of the image \[s\].
@@ -152,7 +156,7 @@ pub enum RenderError {
         span: f64,
     },
     /// Rendering was canceled by [`RenderProgress::cancel`](crate::progress::RenderProgress::cancel).
-    #[error("the picture was broken off after {samples} of {total} paths")]
+    #[error("rendering was canceled after {samples} of {total} paths")]
     Canceled {
         /// Number of traced paths.
         samples: u64,
@@ -161,7 +165,7 @@ pub enum RenderError {
     },
     /// The rays of a lens do not match the image.
     #[error(
-        "rays of a lens for {found:?} pixels with {found_samples} samples, but the picture has {expected:?} pixels and needs \
+        "the lens rays are for {found:?} pixels with {found_samples} samples, but the image has {expected:?} pixels and needs \
          {samples}"
     )]
     LensRays {
@@ -175,13 +179,13 @@ pub enum RenderError {
         found_samples: u8,
     },
     /// The exposure compensation is out of range.
-    #[error("an exposure of {stops} stops; it must be -20 to 20")]
+    #[error("exposure compensation of {stops} stops; it must be -20 to 20")]
     ExposureCompensation {
         /// Exposure compensation in stops.
         stops: f32,
     },
     /// The number of samples is not supported.
-    #[error("{samples} samples per pixel; 1 and 4 are possible")]
+    #[error("invalid number of samples per pixel: {samples}; it must be 1 or 4")]
     Samples {
         /// Samples per pixel.
         samples: u8,

@@ -54,7 +54,7 @@ pub enum DynamicsError {
         found: usize,
     },
     /// A number of the configuration is infinite or not a number.
-    #[error("{what} has a number that is not finite")]
+    #[error("{what} must not contain NaN or infinity")]
     NotFinite {
         /// Name of the field.
         what: &'static str,

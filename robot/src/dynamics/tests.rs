@@ -346,7 +346,7 @@ fn mass_matrix() {
         // Columns by the Newton-Euler algorithm.
         for j in 0..n {
             let column = k.inverse_dynamics(&DVector::zeros(n), &unit(n, j), &NO_GRAVITY);
-            let limit = Tolerance::mixed(1e-13, "rounding of Newton and Euler against sums of inertias");
+            let limit = Tolerance::mixed(1e-13, "rounding of recursive Newton-Euler against sums of inertias");
             assert_vector("column of the mass matrix", &column, m.column(j), limit);
         }
         let energy: f64 = bodies(&robot, &at)

@@ -19,7 +19,7 @@ pub enum KinematicsError {
         link: String,
     },
     /// A control part ends in several links.
-    #[error("control part {part:?} ends in several links: {}; say which with Tip::at", quoted(.links))]
+    #[error("control part {part:?} has several end links: {}; select one with Tip::at", quoted(.links))]
     AmbiguousTip {
         /// Name of the part.
         part: String,
@@ -38,8 +38,9 @@ pub enum KinematicsError {
     },
     /// A joint that moves the link follows a polynomial coupling, which inverse kinematics does not support.
     #[error(
-        "joint {joint:?}, which moves link {link:?}, is held on a curve by an equality of its MJCF file; inverse kinematics \
-         knows followers by a line only: name a link that it does not move, or a part whose joints it does not follow"
+        "joint {joint:?}, which moves link {link:?}, follows another joint by a nonlinear joint equality of its MJCF \
+         file; inverse kinematics supports linear mimic joints only: select a link that this joint does not move, or a \
+         control part that does not contain its leading joint"
     )]
     PolynomialCoupling {
         /// Name of the following joint.
@@ -58,7 +59,7 @@ pub enum KinematicsError {
         expected: &'static str,
     },
     /// A list has the wrong length.
-    #[error("{what} has {found} numbers, one for each of {expected} joints is needed")]
+    #[error("{what}: expected {expected} numbers, one per joint; found {found}")]
     WrongLength {
         /// Name of the list.
         what: &'static str,
@@ -68,7 +69,7 @@ pub enum KinematicsError {
         found: usize,
     },
     /// A number is infinite or not a number.
-    #[error("{what} has a number that is not finite")]
+    #[error("{what} must not contain NaN or infinity")]
     NotFinite {
         /// Name of the value.
         what: &'static str,
@@ -80,5 +81,9 @@ fn quoted(names: &[String]) -> String {
 }
 
 fn movers_sentence(movers: &[String]) -> String {
-    if movers.is_empty() { "it stands fixed".into() } else { format!("those that do are {}", quoted(movers)) }
+    if movers.is_empty() {
+        "the link is fixed to the base".into()
+    } else {
+        format!("joints that move it: {}", quoted(movers))
+    }
 }

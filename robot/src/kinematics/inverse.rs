@@ -62,7 +62,7 @@ impl IkSolver {
                 Some(variable) => format!("not moved by variable {variable}"),
                 None => "without joints".into(),
             };
-            let expected = "every variable must move it: see Chain::held";
+            let expected = "every variable must move the frame: hold the other variables with Chain::held";
             return Err(KinematicsError::OutOfRange { field: "the chain", value, expected });
         }
         cfg.validate(joints)?;
@@ -112,7 +112,7 @@ impl IkSolver {
         }
         if (target.rotation.norm() - 1.0).abs() > 1e-6 {
             let value = format!("{:?}", kinetoscope_scene::pose::to_wxyz(&target.rotation));
-            let expected = "it must be a quaternion of length 1";
+            let expected = "it must be a unit quaternion w, x, y, z";
             return Err(KinematicsError::OutOfRange { field: "the rotation of the target", value, expected });
         }
         Ok(self.search(target, initial))

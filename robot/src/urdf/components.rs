@@ -64,7 +64,7 @@ fn check(component: &ComponentCfg) -> Result<(), UrdfError> {
     };
     let unusable = |text: &str| text.chars().any(char::is_control);
     if component.name.trim().is_empty() || unusable(&component.name) {
-        return invalid("a component needs a visible name, such as \"arm\"");
+        return invalid("a component needs a name with visible characters, such as \"arm\"");
     }
     if component.prefix.as_deref().is_some_and(unusable) {
         return invalid("the prefix has a control character");

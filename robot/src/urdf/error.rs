@@ -32,7 +32,7 @@ pub enum UrdfError {
         source: std::io::Error,
     },
     /// The file exceeds the size limit.
-    #[error("{}: is larger than {limit} bytes; a URDF holds no mesh data, is this the right file?", path.display())]
+    #[error("{}: is larger than {limit} bytes; a URDF file contains no mesh data, so check that this is the right file", path.display())]
     FileTooLarge {
         /// Path of the file.
         path: PathBuf,
@@ -64,7 +64,10 @@ pub enum UrdfError {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The file has a document type declaration, which could define entities.
-    #[error("{at}: <!DOCTYPE> and entities are refused: no robot needs them and they can exhaust memory; delete it")]
+    #[error(
+        "{at}: <!DOCTYPE> and entities are not allowed: robots do not need them, and they can exhaust memory; delete \
+         the declaration"
+    )]
     Doctype {
         /// Location in the file.
         at: SourceLocation,
@@ -151,7 +154,8 @@ pub enum UrdfError {
     },
     /// A `<geometry>` has more than one element.
     #[error(
-        "{at}: {owner}: <geometry> holds one shape, and <{found}> is its second element, the first is at {first}; keep one"
+        "{at}: {owner}: <geometry> must contain one shape, but <{found}> is its second element, the first is at \
+         {first}; keep one"
     )]
     GeometryRepeated {
         /// Location of the second element.
@@ -177,7 +181,7 @@ pub enum UrdfError {
         kind: &'static str,
     },
     /// A joint type does not exist in URDF.
-    #[error("{at}: joint \"{joint}\": there is no type \"{found}\"; {}", format_candidates(.candidates, .candidates.len()))]
+    #[error("{at}: joint \"{joint}\": unknown type \"{found}\"; {}", format_candidates(.candidates, .candidates.len()))]
     JointTypeUnknown {
         /// Location of the joint element.
         at: SourceLocation,
@@ -189,7 +193,7 @@ pub enum UrdfError {
         candidates: Vec<String>,
     },
     /// A shape does not exist in URDF.
-    #[error("{at}: {owner}: there is no shape <{found}>; {}", format_candidates(.candidates, .candidates.len()))]
+    #[error("{at}: {owner}: unknown shape <{found}>; {}", format_candidates(.candidates, .candidates.len()))]
     ShapeUnknown {
         /// Location of the shape element.
         at: SourceLocation,
@@ -215,7 +219,7 @@ pub enum UrdfError {
     /// A link is the child of two joints.
     #[error(
         "{second}: joint \"{second_joint}\" has child \"{link}\", which is already the child of joint \
-         \"{first_joint}\" at {first}; a link hangs from one joint"
+         \"{first_joint}\" at {first}; a link can have only one parent joint"
     )]
     MultipleParents {
         /// Name of the link.
@@ -246,7 +250,7 @@ pub enum UrdfError {
         total: usize,
     },
     /// Joints form a cycle.
-    #[error("{at}: joint \"{joint}\" closes a circle of links: {}; a URDF is a tree", chain(.links))]
+    #[error("{at}: joint \"{joint}\" closes a kinematic loop: {}; a URDF must be a tree", chain(.links))]
     Cycle {
         /// Location of the joint of the cycle that comes first in the file.
         at: SourceLocation,
@@ -282,7 +286,7 @@ pub enum UrdfError {
         total: usize,
     },
     /// Joints mimic each other, or a joint mimics itself.
-    #[error("{at}: joint \"{joint}\" mimics itself: {}; one joint of the circle must be free", chain(.joints))]
+    #[error("{at}: joint \"{joint}\" mimics itself: {}; one joint of the cycle must not be a mimic joint", chain(.joints))]
     MimicCycle {
         /// Location of the mimic element of the joint.
         at: SourceLocation,
@@ -314,7 +318,7 @@ pub enum UrdfError {
         link: String,
     },
     /// The mesh file of a collision does not exist.
-    #[error("{at}: link \"{link}\": collision mesh \"{uri}\" does not exist{}; looked at:{}", remark(.hint), lines(.tried))]
+    #[error("{at}: link \"{link}\": collision mesh \"{uri}\" does not exist{}; searched:{}", remark(.hint), lines(.tried))]
     MeshMissing {
         /// Location of the collision element.
         at: SourceLocation,
@@ -329,8 +333,8 @@ pub enum UrdfError {
     },
     /// The package of a collision mesh was not found.
     #[error(
-        "{at}: link \"{link}\": package \"{package}\" of \"{uri}\" was found nowhere; give its folder by \
-         UrdfCfg::packages or ROS_PACKAGE_PATH; looked at:{}", lines(.tried)
+        "{at}: link \"{link}\": package \"{package}\" of \"{uri}\" was not found; set its folder with \
+         UrdfCfg::packages or ROS_PACKAGE_PATH; searched:{}", lines(.tried)
     )]
     PackageUnknown {
         /// Location of the collision element.
@@ -395,7 +399,7 @@ pub enum UrdfError {
         candidates: Vec<String>,
     },
     /// The parents of components form a cycle.
-    #[error("components are each other's parents: {}; one must have no parent", chain(.components))]
+    #[error("the components form a cycle of parents: {}; one component must have no parent", chain(.components))]
     ComponentCycle {
         /// Components of the cycle.
         components: Vec<String>,
@@ -457,7 +461,7 @@ pub enum UrdfError {
         total: usize,
     },
     /// The URDF model rejected a file that passed all checks: a defect of this program.
-    #[error("{}: the URDF model refused this file, which is a defect of this program; please report it: {source}", path.display())]
+    #[error("{}: the URDF library (urdf-rs) rejected the normalized file, which is a defect of this program; please report it: {source}", path.display())]
     Model {
         /// Path of the file.
         path: PathBuf,

@@ -34,9 +34,9 @@ pub(super) fn read_inertial(
     let (Some(mass), Some(moments)) = (mass, moments) else {
         let at = reader.source(node);
         let done = match (mass, moments) {
-            (Some(_), _) => "the inertia is that of the link's shapes",
-            (None, Some(_)) => "the mass is that of the link's shapes",
-            (None, None) => "mass and inertia are those of the link's shapes",
+            (Some(_), _) => "the inertia is computed from the link's shapes",
+            (None, Some(_)) => "the mass is computed from the link's shapes",
+            (None, None) => "mass and inertia are computed from the link's shapes",
         };
         if let Some(error) = missing {
             reader.warn_or_fail(DiagnosticKind::InertialIncomplete, at, error, done)?;

@@ -146,7 +146,7 @@ fn read_axis(
     }
     if (norm - 1.0).abs() > AXIS_TOLERANCE {
         let at = reader.attribute_source(axis, "xyz");
-        let message = format!("{owner}: the axis {} has length {norm:.6}; it was normalised", format_numbers(&xyz));
+        let message = format!("{owner}: the axis {} has length {norm:.6}; it was normalized", format_numbers(&xyz));
         reader.warn(DiagnosticKind::AxisNormalized, at, message);
     }
     let length = xyz.map(|c| (c / largest).powi(2)).iter().sum::<f64>().sqrt();

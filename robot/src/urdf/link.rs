@@ -102,7 +102,7 @@ impl Materials {
     pub(super) fn check(&mut self, reader: &mut Reader<'_>) {
         for (name, source) in &self.referenced {
             if !self.defined.contains_key(name) {
-                let message = format!("material \"{name}\" is defined nowhere; the visual keeps the default look");
+                let message = format!("material \"{name}\" is not defined; the visual keeps the default appearance");
                 reader.warn(DiagnosticKind::MaterialUndefined, source.clone(), message);
             }
         }
@@ -122,7 +122,7 @@ fn read_material_values(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str
             && found.iter().any(|c| !(0.0..=1.0).contains(c))
         {
             let at = reader.attribute_source(color, "rgba");
-            let message = format!("{owner}: the color {} leaves 0..1; it was clamped", format_numbers(&found));
+            let message = format!("{owner}: the color {} is outside 0..1; it was clamped", format_numbers(&found));
             reader.warn(DiagnosticKind::ColorClamped, at, message);
             rgba = Some(found.map(|c| c.clamp(0.0, 1.0)));
         }
@@ -315,7 +315,7 @@ fn read_box(reader: &mut Reader<'_>, shape: Node<'_, '_>, owner: &str, xml: &mut
         return Err(missing(reader, shape, owner, "size", "size=\"0.1 0.1 0.1\""));
     };
     write_attribute(xml, "size", &format_numbers(&size));
-    check_size(reader, shape, owner, "size", &size, "must be positive, full edge lengths in metres")
+    check_size(reader, shape, owner, "size", &size, "must be positive, full edge lengths in meters")
 }
 
 fn read_mesh(
@@ -349,7 +349,7 @@ fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64
     };
     let Ok(Some(scale)) = reader.number(mesh, "scale") else { return Err(error) };
     let at = reader.attribute_source(mesh, "scale");
-    reader.warn_or_fail(DiagnosticKind::ScaleUniform, at, error, "it holds for all three axes")?;
+    reader.warn_or_fail(DiagnosticKind::ScaleUniform, at, error, "the value is used for all three axes")?;
     Ok(Some([scale; 3]))
 }
 
@@ -362,10 +362,10 @@ fn read_size(
     xml: &mut String,
 ) -> Result<bool, UrdfError> {
     let Some(size) = reader.number(shape, name)? else {
-        return Err(missing(reader, shape, owner, name, "a positive number of metres, such as \"0.1\""));
+        return Err(missing(reader, shape, owner, name, "a positive number of meters, such as \"0.1\""));
     };
     write_attribute(xml, name, &format_number(size));
-    check_size(reader, shape, owner, name, &[size], "must be positive, in metres")
+    check_size(reader, shape, owner, name, &[size], "must be positive, in meters")
 }
 
 /// Checks sizes. Negative sizes are errors; sizes of 0 give `false`.

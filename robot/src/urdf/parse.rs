@@ -123,7 +123,7 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
             "mujoco" => pass.meshdir = pass.meshdir.take().or(meshdir(&reader, node)?),
             skipped if IGNORED_ELEMENTS.contains(&skipped) => {}
             other => {
-                let message = format!("<{other}> is no element of URDF and was ignored");
+                let message = format!("<{other}> is not a URDF element and was ignored");
                 let at = reader.source(node);
                 reader.warn(DiagnosticKind::ElementIgnored, at, message);
             }
@@ -144,7 +144,7 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
     let refused = |source| UrdfError::Model { path: path.to_path_buf(), source };
     let robot = urdf_rs::read_from_string(&normalised).map_err(|e| refused(e.into()))?;
     if !pass.matches_model(&robot) {
-        return Err(refused("its model has other links or joints than the file".into()));
+        return Err(refused("the links or joints of the parsed model differ from those of the file".into()));
     }
     Ok(UrdfFile {
         path: reader.file,
@@ -236,7 +236,7 @@ fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfErr
             "mujocoinclude" | "include" => "this is a part of another file",
             "COLLADA" => "this is a mesh, a URDF names it in <mesh filename=\"...\"/>",
             "robots" | "model" | "world" => "export one robot as URDF",
-            _ => "is this the right file?",
+            _ => "check that this is the right file",
         };
         return Err(UrdfError::WrongRoot { at: reader.source(root), found: found.to_owned(), advice });
     }

@@ -183,7 +183,8 @@ impl<'c> Resolver<'c> {
     fn package(&mut self, rest: &str) -> Resolved {
         let (package, file) = rest.split_once('/').unwrap_or((rest, ""));
         if package.is_empty() || file.is_empty() {
-            let problem = "it has no package or no file; write package://name_of_package/meshes/part.stl".to_owned();
+            let problem =
+                "the package or the file is missing; write package://name_of_package/meshes/part.stl".to_owned();
             return Resolved::Unsupported { problem };
         }
         let file = file.trim_start_matches('/');

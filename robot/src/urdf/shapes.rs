@@ -42,8 +42,8 @@ impl<'f> ShapeConverter<'f> {
             && !std::mem::replace(&mut self.warned_about_empty_package, true)
         {
             let message = format!(
-                "\"{uri}\" has no package, it was read as {}; write package://name_of_package/.. or file:///path (further \
-                 such addresses of this file are read alike)",
+                "\"{uri}\" has no package and was resolved to {}; write package://name_of_package/.. or file:///path \
+                 (further such URIs of this file are resolved in the same way)",
                 path.display()
             );
             diagnostics.push(Diagnostic::new(DiagnosticKind::AddressRepaired, at.clone(), message));
@@ -134,7 +134,7 @@ impl<'f> ShapeConverter<'f> {
                 Resolved::Found(path) => texture = Some(path),
                 missing => {
                     let (_, why) = describe(missing, filename);
-                    let message = format!("link \"{link}\": texture \"{filename}\" {why}; the colour is used");
+                    let message = format!("link \"{link}\": texture \"{filename}\" {why}; the color is used instead");
                     diagnostics.push(Diagnostic::new(DiagnosticKind::TextureMissing, source.clone(), message));
                 }
             }
@@ -153,10 +153,10 @@ fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
         Resolved::Found(path) => (path, "exists".to_owned()),
         Resolved::Missing { most_likely: guess, tried, hint } => {
             let hint = hint.map(|h| format!(" ({h})")).unwrap_or_default();
-            (guess, format!("does not exist{hint}, looked at {}", format_first(&tried)))
+            (guess, format!("does not exist{hint}; searched {}", format_first(&tried)))
         }
         Resolved::PackageUnknown { package, guess, tried } => {
-            (guess, format!("is in package \"{package}\", which was found nowhere, looked at {}", format_first(&tried)))
+            (guess, format!("is in package \"{package}\", which was not found; searched {}", format_first(&tried)))
         }
         Resolved::Empty => (PathBuf::new(), "is empty".to_owned()),
         Resolved::Unsupported { problem } => (PathBuf::from(uri), format!("cannot be read: {problem}")),

@@ -42,8 +42,8 @@ pub(super) fn repair(
     for _ in 0..MAX_PREFIXES {
         let Error::UnknownNamespace(prefix, position) = &error else { break };
         let message = format!(
-            "the XML prefix \"{prefix}\" is bound to no namespace; its elements and attributes were ignored \
-             (<robot xmlns:{prefix}=\"http://..\"> would bind it)"
+            "the XML prefix \"{prefix}\" has no namespace declaration; its elements and attributes were ignored \
+             (declare it with <robot xmlns:{prefix}=\"http://..\">)"
         );
         found.push(Diagnostic::new(DiagnosticKind::NamespaceUnbound, SourceLocation::new(path, position.row), message));
         repaired.insert_str(insert_at, &format!(" xmlns:{prefix}=\"unbound:{prefix}\""));

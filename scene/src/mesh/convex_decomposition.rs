@@ -104,7 +104,7 @@ pub fn convex_decomposition(
     cfg.check()?;
     if hull.max_vertices > MAX_VERTICES {
         let (field, value) = ("max_vertices", hull.max_vertices as f64);
-        return Err(HullError::InvalidCfg { field, value, expected: "4 to 4096 for a mesh in pieces" });
+        return Err(HullError::InvalidCfg { field, value, expected: "4 to 4096 for convex decomposition" });
     }
     if mesh.triangles.len() > MAX_TRIANGLES {
         return Err(HullError::TooManyTriangles { found: mesh.triangles.len(), most: MAX_TRIANGLES });
@@ -580,6 +580,6 @@ mod tests {
             assert!((prism.signed_volume() / volume - 1.0).abs() < 1e-4, "{} {volume}", prism.signed_volume());
         }
         let edge = TriMesh::from_triangles(vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], vec![[0, 1, 2]]);
-        assert!(crate::mesh::prisms(&edge, 0.01).unwrap().is_empty(), "an edge has no side");
+        assert!(crate::mesh::prisms(&edge, 0.01).unwrap().is_empty(), "an edge has no prism");
     }
 }

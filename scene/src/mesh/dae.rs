@@ -175,7 +175,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         let Some(id) = url.trim().strip_prefix('#') else {
             return Err(self.ctx.unsupported(format!("{}: reference {url:?} into another document", line(node))));
         };
-        self.by_id(id).ok_or_else(|| self.ctx.invalid(line(node), format!("nothing in this file has the id {id:?}")))
+        self.by_id(id).ok_or_else(|| self.ctx.invalid(line(node), format!("no element of this file has the id {id:?}")))
     }
 
     pub(super) fn by_id(&self, id: &str) -> Option<Node<'a, 'i>> {
@@ -184,7 +184,7 @@ impl<'a, 'i> Dae<'a, 'i> {
 
     fn visit(&mut self, node: Node<'a, 'i>, parent: &Affine, depth: usize) -> Result<(), MeshError> {
         if depth > MAX_DEPTH {
-            return Err(self.ctx.invalid(line(node), format!("nodes nest deeper than {MAX_DEPTH}, or in a circle")));
+            return Err(self.ctx.invalid(line(node), format!("nodes nest deeper than {MAX_DEPTH}, or in a cycle")));
         }
         self.nodes_seen += 1;
         if self.nodes_seen > MAX_NODES {
@@ -272,8 +272,9 @@ impl<'a, 'i> Dae<'a, 'i> {
         for word in texts.flat_map(str::split_ascii_whitespace) {
             let shown = || word.chars().take(32).collect::<String>();
             out.push(
-                word.parse()
-                    .map_err(|e| self.ctx.invalid_with_source(line(node), format!("{:?} is no number", shown()), e))?,
+                word.parse().map_err(|e| {
+                    self.ctx.invalid_with_source(line(node), format!("{:?} is not a number", shown()), e)
+                })?,
             );
         }
         Ok(out)
@@ -294,7 +295,7 @@ impl<'a, 'i> Dae<'a, 'i> {
             Some(text) => text.trim().parse::<u32>().map(|n| n as usize).map_err(|e| {
                 self.ctx.invalid_with_source(
                     line(node),
-                    format!("{name}={text:?} of the accessor is no whole number"),
+                    format!("{name}={text:?} of the accessor is not a whole number"),
                     e,
                 )
             }),
@@ -326,7 +327,7 @@ impl<'a, 'i> Dae<'a, 'i> {
                 let text = input.attribute(name).unwrap_or("0");
                 let number = text.trim().parse::<u32>();
                 number.map_err(|e| {
-                    self.ctx.invalid_with_source(line(input), format!("{name}={text:?} is no whole number"), e)
+                    self.ctx.invalid_with_source(line(input), format!("{name}={text:?} is not a whole number"), e)
                 })
             };
             let (column, set) = (number("offset")? as usize, number("set")?);

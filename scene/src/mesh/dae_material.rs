@@ -71,7 +71,7 @@ impl<'a, 'i> Dae<'a, 'i> {
                         Err(_) => self.exactly(colour)?,
                     };
                     if !rgba.iter().all(|x| x.is_finite()) {
-                        return Err(self.ctx.invalid(line(colour), "colour is not finite; expected 0..=1"));
+                        return Err(self.ctx.invalid(line(colour), "color is not finite; expected 0..=1"));
                     }
                     look.rgba = rgba.map(|x| x.clamp(0.0, 1.0) as f32);
                 }

@@ -50,7 +50,7 @@ pub enum MeshError {
         source: Option<Box<dyn Error + Send + Sync>>,
     },
     /// An index is out of range.
-    #[error("{}: {at}: index {index} is out of range, there are {count}", path.display())]
+    #[error("{}: {at}: index {index} is out of range; the number of elements is {count}", path.display())]
     IndexOutOfRange {
         /// The mesh file.
         path: PathBuf,

@@ -47,11 +47,11 @@ fn read_glb(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
         Ok(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
     };
     if bytes.len() >= 4 && !bytes.starts_with(b"glTF") {
-        return Err(ctx.invalid("byte 0", "no GLB: the file must begin with \"glTF\""));
+        return Err(ctx.invalid("byte 0", "not a GLB file: the file must begin with \"glTF\""));
     }
     let (version, total) = (word(4)?, word(8)? as usize);
     if version != 2 {
-        return Err(ctx.unsupported(format!("glTF version {version}; expected 2, so version {version}")));
+        return Err(ctx.unsupported(format!("glTF version {version} (expected 2)")));
     }
     if total > bytes.len() {
         return Err(ctx.truncated("GLB", total as u64, bytes.len() as u64));
@@ -71,7 +71,7 @@ fn read_glb(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
         }
         at = end;
     }
-    let json = json.ok_or_else(|| ctx.invalid("GLB", "no JSON chunk; the first chunk must be one"))?;
+    let json = json.ok_or_else(|| ctx.invalid("GLB", "no JSON chunk; the first chunk must be JSON"))?;
     read_json(ctx, json, bin)
 }
 
@@ -140,7 +140,7 @@ impl Reader<'_> {
     fn children(&self, value: &Value, key: &str, at: &str) -> Result<Vec<usize>, MeshError> {
         let index = |v: &Value| {
             let index = v.as_u64().and_then(|n| usize::try_from(n).ok());
-            index.ok_or_else(|| self.gltf.ctx.invalid(at, format!("{key:?} holds something that is no index")))
+            index.ok_or_else(|| self.gltf.ctx.invalid(at, format!("{key:?} contains a value that is not an index")))
         };
         array(value, key).iter().map(index).collect()
     }
@@ -156,7 +156,7 @@ impl Reader<'_> {
         let node = self.gltf.element_at("nodes", index, at)?;
         let at = format!("node {index}");
         if depth > MAX_DEPTH {
-            let what = format!("nodes nest deeper than {MAX_DEPTH}, or in a circle");
+            let what = format!("nodes nest deeper than {MAX_DEPTH}, or in a cycle");
             return Err(self.gltf.ctx.invalid(at, what));
         }
         self.nodes_seen += 1;
@@ -223,7 +223,10 @@ impl Reader<'_> {
         let n = positions.len();
         for (name, length) in [("NORMAL", normals.as_ref().map(Vec::len)), ("TEXCOORD", uvs.as_ref().map(Vec::len))] {
             if length.is_some_and(|l| l != n) {
-                let what = format!("{n} of POSITION and {} of {name}; expected as many", length.unwrap_or(0));
+                let what = format!(
+                    "POSITION has {n} elements, but {name} has {}; expected the same number",
+                    length.unwrap_or(0)
+                );
                 return Err(ctx.invalid(at, what));
             }
         }

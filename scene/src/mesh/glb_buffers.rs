@@ -69,7 +69,7 @@ impl<'a> Gltf<'a> {
         let bytes: Cow<'a, [u8]> = match (buffer.get("uri").and_then(Value::as_str), self.bin) {
             (Some(uri), _) => Cow::Owned(self.uri_bytes(uri, &name)?),
             (None, Some(bin)) if index == 0 => Cow::Borrowed(bin),
-            (None, _) => return Err(self.ctx.invalid(name, "no \"uri\", and the file has no binary chunk")),
+            (None, _) => return Err(self.ctx.invalid(name, "\"uri\" is missing, and the file has no binary chunk")),
         };
         if bytes.len() < expected {
             return Err(self.ctx.truncated(name, expected as u64, bytes.len() as u64));

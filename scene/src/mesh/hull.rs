@@ -96,7 +96,9 @@ fn check(cfg: &HullCfg) -> Result<(), HullError> {
         return fault("tolerance", cfg.tolerance, "0 or more and less than 1");
     }
     match cfg.min_thickness {
-        Some(t) if !(t > 0.0 && t.is_finite()) => fault("min_thickness", t, "a positive length or None"),
+        Some(t) if !(t > 0.0 && t.is_finite()) => {
+            fault("min_thickness", t, "a positive length, or None (false in a scene file)")
+        }
         _ => Ok(()),
     }
 }

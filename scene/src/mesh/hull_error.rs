@@ -17,7 +17,7 @@ pub enum HullError {
         expected: &'static str,
     },
     /// A field of the configuration of convex pieces is out of its range.
-    #[error("PiecesCfg::{field} is {value}; expected {expected}")]
+    #[error("ConvexDecompositionCfg::{field} is {value}; expected {expected}")]
     InvalidDecomposition {
         /// Name of the field.
         field: &'static str,
@@ -39,7 +39,10 @@ pub enum HullError {
         source: InvalidMesh,
     },
     /// A mesh has too many triangles to be cut into convex pieces.
-    #[error("{found} triangles; at most {most} are cut into convex pieces: simplify the mesh, or let its hull collide")]
+    #[error(
+        "{found} triangles; convex decomposition supports at most {most}: simplify the mesh, or use its convex hull \
+         for collisions"
+    )]
     TooManyTriangles {
         /// Number of triangles.
         found: usize,
@@ -73,7 +76,10 @@ pub enum HullError {
         count: usize,
     },
     /// All points are on a line, within the tolerance.
-    #[error("the points lie on a line: they leave it by {deviation:e} m, the tolerance is {tolerance:e} m")]
+    #[error(
+        "the points are collinear: their largest distance from a line is {deviation:e} m, the tolerance is \
+         {tolerance:e} m"
+    )]
     Collinear {
         /// Largest distance from the line \[m\].
         deviation: f64,
@@ -82,8 +88,8 @@ pub enum HullError {
     },
     /// All points are in a plane, within the tolerance, and no thickness is configured.
     #[error(
-        "the points lie in a plane: they leave it by {deviation:e} m, the tolerance is {tolerance:e} m; \
-         HullCfg::min_thickness would thicken them"
+        "the points are coplanar: their largest distance from a plane is {deviation:e} m, the tolerance is \
+         {tolerance:e} m; set HullCfg::min_thickness to thicken them"
     )]
     Coplanar {
         /// Largest distance from the plane \[m\].

@@ -60,7 +60,7 @@ pub(super) fn read(path: &Path, ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<V
             "map_Kd" | "map_kd" => {
                 let name = without_options(rest);
                 if name.is_empty() {
-                    return Err(ctx.invalid(at(), "map_Kd names no image"));
+                    return Err(ctx.invalid(at(), "map_Kd has no file name"));
                 }
                 material.texture = Some(TextureSource::File(beside(path, name)));
             }

@@ -113,7 +113,7 @@ fn ascii(ctx: &ReadContext<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
             other => {
                 let shown: String = other.chars().take(32).collect();
                 let what = format!(
-                    "unknown word {shown:?}; expected solid, facet, outer, vertex, endloop, endfacet or endsolid"
+                    "unknown keyword {shown:?}; expected solid, facet, outer, vertex, endloop, endfacet or endsolid"
                 );
                 return Err(ctx.invalid(at(), what));
             }
@@ -181,7 +181,7 @@ mod tests {
             ("VERTEX 0 1e0 -0", "", "line 8: facet with 2 vertices; expected 3"),
             ("1e0", "inf", "facet that ends at line 8: vertex position [0.0, inf, -0.0] is not finite"),
             ("endsolid part", "", "line 15: the file ends without \"endsolid\""),
-            ("VERTEX", "vortex", "line 6: unknown word \"vortex\""),
+            ("VERTEX", "vortex", "line 6: unknown keyword \"vortex\""),
         ] {
             let error = load(TEXT.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
             assert!(error.starts_with(&format!("part.STL: {expected}")), "{error}");

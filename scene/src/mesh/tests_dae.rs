@@ -166,14 +166,22 @@ fn materials() {
 fn errors() {
     let text = document("", "", TRIANGLE, HERE);
     for (from, to, expected) in [
-        ("1 0 2 0</p>", "1 0 4 0</p>", "line 15, <triangles>, POSITION index: index 4 is out of range, there are 4"),
-        ("1 0 2 0</p>", "1 0 2 1</p>", "line 15, <triangles>, NORMAL index: index 1 is out of range, there are 1"),
+        (
+            "1 0 2 0</p>",
+            "1 0 4 0</p>",
+            "line 15, <triangles>, POSITION index: index 4 is out of range; the number of elements is 4",
+        ),
+        (
+            "1 0 2 0</p>",
+            "1 0 2 1</p>",
+            "line 15, <triangles>, NORMAL index: index 1 is out of range; the number of elements is 1",
+        ),
         ("1 0 2 0</p>", "1 0</p>", "line 15, <triangles>: 2 corners in <p>; expected a multiple of 3"),
-        ("1 0 2 0</p>", "1 0 x 0</p>", "line 17, <p>: \"x\" is no number"),
+        ("1 0 2 0</p>", "1 0 x 0</p>", "line 17, <p>: \"x\" is not a number"),
         ("0 1 0 1 1 0<", "0 1 0 1 1 nan<", "no triangles"),
         ("0 1 0 1 1 0<", "0 inf 0 1 1 0<", "line 15, <triangles>: vertex position [NaN, inf, NaN] is not finite"),
         ("count=\"4\" stride=\"3\"", "count=\"5\" stride=\"3\"", "line 6, <source>: accessor of 5 rows of 3"),
-        ("url=\"#g\"", "url=\"#h\"", "line 19, <instance_geometry>: nothing in this file has the id \"h\""),
+        ("url=\"#g\"", "url=\"#h\"", "line 19, <instance_geometry>: no element of this file has the id \"h\""),
         ("url=\"#g\"", "url=\"a.dae#g\"", "line 19, <instance_geometry>: reference \"a.dae#g\" into another document"),
         ("<node>", "<node><skew>1</skew>", "line 19, <skew>: the transform <skew> is not supported"),
         ("<node>", "<node id=\"r\"><instance_node url=\"#r\"/>", "line 19, <node>: nodes nest deeper than 64"),

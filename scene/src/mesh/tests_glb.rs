@@ -76,7 +76,7 @@ fn check(mesh: &TriMesh) {
     assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
     let wood = &mesh.materials[0];
     assert_eq!((wood.name.as_str(), wood.rgba[0], wood.rgba[2], wood.rgba[3]), ("wood", 1.0, 0.0, 1.0));
-    assert!((wood.rgba[1] - 0.7354).abs() < 1e-4, "0.5 of the light is 188 of 255 on the screen");
+    assert!((wood.rgba[1] - 0.7354).abs() < 1e-4, "linear 0.5 is 188 of 255 in sRGB");
     assert_eq!((mesh.materials[1].name.as_str(), mesh.materials[1].rgba[3]), ("material 1", 0.5));
 }
 
@@ -107,7 +107,7 @@ fn square() {
 fn errors() {
     let draco = "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"scene\"";
     let most = "\"count\": 18446744073709551615";
-    let index = "mesh 0, primitive 0, index into accessors: index 9 is out of range, there are 6";
+    let index = "mesh 0, primitive 0, index into accessors: index 9 is out of range; the number of elements is 6";
     let infinite = "mesh 0, primitive 0, triangle 0: vertex position [inf, 0.0, 0.0] is not finite";
     for (from, to, expected) in [
         ("\"scene\"", draco, "the required glTF extension \"KHR_draco_mesh_compression\" is not supported"),

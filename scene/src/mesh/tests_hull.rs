@@ -41,7 +41,7 @@ fn outside(hull: &TriMesh, points: &[[f32; 3]]) -> f64 {
 fn verify(points: &[[f32; 3]], cfg: &HullCfg) -> TriMesh {
     let hull = convex_hull(points, cfg).unwrap();
     hull.validate().unwrap();
-    assert_eq!(convex_hull(points, cfg).unwrap(), hull, "not the same twice");
+    assert_eq!(convex_hull(points, cfg).unwrap(), hull, "the hull must be deterministic");
     let edges: HashSet<(u32, u32)> = hull.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
     assert_eq!(edges.len(), 3 * hull.triangles.len(), "an edge is used twice in one direction");
     assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "not closed");

@@ -32,8 +32,8 @@ fn faces() {
 fn libraries() {
     let files = TempFiles::default();
     let lib = "newmtl unused\nKd 1 1 0\nnewmtl blue\nKd 0 0 1\nmap_Kd tex/blue.png\nnewmtl red\nKd 1 0 0\n";
-    files.write("my colours.mtl", lib);
-    let text = format!("mtllib missing.mtl\nmtllib my colours.mtl\n{SQUARE}usemtl red\nf 2 3 4\n");
+    files.write("my colors.mtl", lib);
+    let text = format!("mtllib missing.mtl\nmtllib my colors.mtl\n{SQUARE}usemtl red\nf 2 3 4\n");
     let mesh = load(&files.write("part.obj", text)).unwrap();
     assert_eq!(mesh.submeshes.len(), 2);
     assert_eq!((mesh.submeshes[0].triangles.clone(), mesh.submeshes[1].triangles.clone()), (0..3, 3..4));
@@ -48,11 +48,11 @@ fn errors() {
         ("v 0 0 x\n", "line 1: \"x\" is not a number"),
         ("v 0 0 0\nv 1 0 0\nf 1\n", "line 3: face with 1 corners; expected 3 or more"),
         ("v 0 0 0\nv 1 0 0\nf 1 2\n", "no triangles; a mesh needs at least one"),
-        ("v 0 0 0\nv 1 0 0\nf 1 3\n", "line 3, v index: index 3 is out of range, there are 2"),
-        ("v 0 0 0\nf 1 1 2\n", "line 2, v index: index 2 is out of range, there are 1"),
-        ("v 0 0 0\nf 1 1 0\n", "line 2, v index: index 0 is out of range, there are 1"),
-        ("v 0 0 0\nf 1 1 -2\n", "line 2, v index: index -2 is out of range, there are 1"),
-        ("v 0 0 0\nf 1/9 1 1\n", "line 2, vt index: index 9 is out of range, there are 0"),
+        ("v 0 0 0\nv 1 0 0\nf 1 3\n", "line 3, v index: index 3 is out of range; the number of elements is 2"),
+        ("v 0 0 0\nf 1 1 2\n", "line 2, v index: index 2 is out of range; the number of elements is 1"),
+        ("v 0 0 0\nf 1 1 0\n", "line 2, v index: index 0 is out of range; the number of elements is 1"),
+        ("v 0 0 0\nf 1 1 -2\n", "line 2, v index: index -2 is out of range; the number of elements is 1"),
+        ("v 0 0 0\nf 1/9 1 1\n", "line 2, vt index: index 9 is out of range; the number of elements is 0"),
         ("v 0 0 0\nf 1//-9223372036854775808 1 1\n", "line 2, vn index: index -9223372036854775808 is out"),
         ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "line 4: vertex position [0.0, NaN, 0.0] is not finite"),
         ("v 0 0 0\n", "no triangles; a mesh needs at least one"),

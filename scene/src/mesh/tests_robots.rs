@@ -1,5 +1,5 @@
 //! Tests of the vendors' meshes against values of independent readers.
-#![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
+#![allow(clippy::excessive_precision, reason = "numbers as the reference reader printed them")]
 
 use kinetoscope_testkit::test_resources::{files_below, robots_dir};
 use std::path::PathBuf;

@@ -10,7 +10,7 @@ use crate::Pose;
 #[non_exhaustive]
 pub enum InvalidMesh {
     /// The number of normals or texture coordinates differs from the number of positions.
-    #[error("{count} {what} for {positions} positions; expected as many")]
+    #[error("{count} {what} for {positions} positions; expected the same number")]
     Length {
         /// "normals" or "texture coordinates".
         what: &'static str,
@@ -28,7 +28,7 @@ pub enum InvalidMesh {
         index: usize,
     },
     /// A triangle refers to a missing vertex.
-    #[error("triangle {triangle} refers to vertex {index}, but there are {positions}")]
+    #[error("triangle {triangle} refers to vertex {index}, but the mesh has {positions} vertices")]
     Index {
         /// Index of the triangle.
         triangle: usize,
@@ -39,7 +39,8 @@ pub enum InvalidMesh {
     },
     /// The parts do not cover the triangles consecutively.
     #[error(
-        "part {part} covers triangles {found_start}..{found_end}; expected it to begin at {expected_start}, and the last to end at {triangles}"
+        "submesh {part} covers triangles {found_start}..{found_end}; submeshes must be contiguous: this one must begin \
+         at {expected_start}, and the last one must end at {triangles}"
     )]
     Submeshes {
         /// Index of the part (one past the last if triangles are left over).
@@ -54,7 +55,7 @@ pub enum InvalidMesh {
         triangles: usize,
     },
     /// A part refers to a missing material.
-    #[error("part {part} names material {material}, but there are {materials}")]
+    #[error("submesh {part} uses material {material}, but the mesh has {materials} materials")]
     Material {
         /// Index of the part.
         part: usize,
@@ -232,11 +233,11 @@ mod tests {
     fn faults() {
         type Change = fn(&mut TriMesh);
         let rows: [(Change, &str); 5] = [
-            (|m| m.triangles[2][1] = 9, "triangle 2 refers to vertex 9, but there are 4"),
+            (|m| m.triangles[2][1] = 9, "triangle 2 refers to vertex 9, but the mesh has 4 vertices"),
             (|m| m.positions[3][0] = f32::NAN, "position 3 is not finite"),
-            (|m| m.uvs = Some(vec![]), "0 texture coordinates for 4 positions; expected as many"),
-            (|m| m.submeshes[0].material = Some(0), "part 0 names material 0, but there are 0"),
-            (|m| m.submeshes.clear(), "part 0 covers triangles 0..0"),
+            (|m| m.uvs = Some(vec![]), "0 texture coordinates for 4 positions; expected the same number"),
+            (|m| m.submeshes[0].material = Some(0), "submesh 0 uses material 0, but the mesh has 0 materials"),
+            (|m| m.submeshes.clear(), "submesh 0 covers triangles 0..0"),
         ];
         for (change, fault) in rows {
             let mut mesh = corner();

@@ -133,8 +133,10 @@ mod tests {
         // Positions in single precision: 2^-24 of 10 m, on sides of 0.25 m.
         let pose = from_xyz_rpy([7.0, -9.0, 3.0], [0.3, -0.4, 0.5]);
         let turned = pose.rotation.to_rotation_matrix();
-        let moved =
-            brick(size).transformed(&pose).volume_integrals().unwrap_or_else(|| panic!("bits of shared corners agree"));
+        let moved = brick(size)
+            .transformed(&pose)
+            .volume_integrals()
+            .unwrap_or_else(|| panic!("shared corners must have equal bits"));
         assert!((moved.volume / volume - 1.0).abs() < 1e-5, "{}", moved.volume);
         assert!((moved.center - (pose * nalgebra::Point3::from(middle)).coords).norm() < 1e-5);
         let expected = turned.matrix() * own * turned.matrix().transpose();

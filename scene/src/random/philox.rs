@@ -95,6 +95,6 @@ mod tests {
             let others: Vec<f64> = (0..50_000).flat_map(|k| key.normals([x + k, y, z, w])).collect();
             assert!(product(&normals, &others).abs() < 6.0 / root, "{key:?} {:?}", [x, y, z, w]);
         }
-        assert!((product(&normals, &normals) - 1.0).abs() < 0.05, "the control: with itself");
+        assert!((product(&normals, &normals) - 1.0).abs() < 0.05, "control: correlation with itself");
     }
 }

@@ -182,7 +182,7 @@ impl RenderMesh {
     /// The mesh is not [deformable](Self::deformable), or there are fewer positions or normals than vertices.
     #[track_caller]
     pub fn deform(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]]) {
-        let Some(deformation) = self.deformation.clone() else { panic!("the mesh was not prepared to be deformed") };
+        let Some(deformation) = self.deformation.clone() else { panic!("the mesh was not built as deformable") };
         for (k, &source) in deformation.sources.iter().enumerate() {
             let normal = normals[source as usize];
             self.positions[k] = positions[source as usize];

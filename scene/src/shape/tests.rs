@@ -20,7 +20,7 @@ fn all() -> Vec<Shape> {
 #[test]
 fn tessellations() {
     let volumes = [0.0, 0.524, 0.13404, 0.02513, 0.10053, 0.048, 0.10077, 2.8];
-    assert_eq!(all().len(), Shape::MODULES.len(), "one of each");
+    assert_eq!(all().len(), Shape::MODULES.len(), "one shape of each kind");
     assert_eq!(all()[5].name(), "box");
     for (shape, volume) in all().iter().zip(volumes) {
         let mesh = shape.tessellate(128);
@@ -86,8 +86,8 @@ fn deformable_meshes() {
     let expected = of(&moved, &mesh.triangles);
     assert_eq!(of(drawn.positions(), drawn.triangles()), expected);
     assert_eq!(of(drawn.normals(), drawn.triangles()), of(&normals, &mesh.triangles));
-    assert_eq!(drawn.uvs(), before.uvs(), "textures move along");
-    assert_ne!(of(before.positions(), before.triangles()), expected, "the control: not deformed");
+    assert_eq!(drawn.uvs(), before.uvs(), "texture coordinates stay the same");
+    assert_ne!(of(before.positions(), before.triangles()), expected, "control: the original is not deformed");
     assert_eq!(of(before.positions(), before.triangles()), of(&mesh.positions, &mesh.triangles));
     let distance = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>().sqrt();
     for c in drawn.clusters() {
@@ -296,5 +296,5 @@ fn area_samplings() {
             assert!(shape.face(&found, &ray) < crate::RenderScene::IDS_OF_PRIMITIVE as usize);
         }
     }
-    assert_eq!(sampled, 4, "planes, balls, cylinders and boxes");
+    assert_eq!(sampled, 4, "planes, spheres, cylinders and boxes");
 }

@@ -35,7 +35,10 @@ pub enum TerrainError {
         expected: &'static str,
     },
     /// A side is not a whole number of cells.
-    #[error("{terrain}: a side of {side} m is no whole number of cells of {cell} m; {nearest} m would be")]
+    #[error(
+        "{terrain}: a side of {side} m is not a whole number of cells of {cell} m; the nearest valid side is {nearest} \
+         m"
+    )]
     Cells {
         /// Name of the generator.
         terrain: &'static str,
@@ -48,7 +51,7 @@ pub enum TerrainError {
     },
     /// A height field has more points than can be drawn.
     #[error(
-        "{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} can be drawn: choose larger cells"
+        "{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} are supported: choose larger cells"
     )]
     TooMany {
         /// Name of the generator.
@@ -60,7 +63,8 @@ pub enum TerrainError {
     },
     /// The range contains no multiple of the step.
     #[error(
-        "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; 0 m to {step} m has two"
+        "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; widen the range, for \
+         example to 0 m .. {step} m"
     )]
     NoHeightInRange {
         /// Lowest height \[m\].
@@ -75,11 +79,7 @@ pub enum TerrainError {
 /// Returns an error for a number that is not positive and finite.
 fn positive(terrain: &'static str, field: &'static str, value: f64) -> Result<(), TerrainError> {
     let fine = value.is_finite() && value > 0.0;
-    if fine {
-        Ok(())
-    } else {
-        Err(TerrainError::Number { terrain, field, value, expected: "it must be above 0 metres" })
-    }
+    if fine { Ok(()) } else { Err(TerrainError::Number { terrain, field, value, expected: "it must be above 0 m" }) }
 }
 
 /// Returns an error for a number that is not finite.

@@ -51,7 +51,7 @@ fn stairs() {
     let expected: Vec<f64> = (0..21).map(|k| f64::from(k / 3).min(5.0)).collect();
     assert_eq!(profile, expected);
     assert!((heights[(20, 20)] - 0.75).abs() < 1e-12);
-    assert_eq!(heights, heights.t(), "the same from both sides");
+    assert_eq!(heights, heights.t(), "the heights must be symmetric");
     assert_eq!(heights[(0, 20)], 0.0);
 }
 
@@ -65,8 +65,8 @@ fn refusals() {
     for (terrain, says) in [
         (RoughTerrain { cell: 0.0, ..rough() }, "cell is 0"),
         (RoughTerrain { size: [f64::NAN, 1.0], ..rough() }, "size is NaN"),
-        (RoughTerrain { size: [1.05, 1.0], ..rough() }, "1 m would be"),
-        (RoughTerrain { size: [0.05, 1.0], ..rough() }, "0.2 m would be"),
+        (RoughTerrain { size: [1.05, 1.0], ..rough() }, "the nearest valid side is 1 m"),
+        (RoughTerrain { size: [0.05, 1.0], ..rough() }, "the nearest valid side is 0.2 m"),
         (RoughTerrain { size: [1e6, 1e6], ..rough() }, "too many"),
         (RoughTerrain { size: [f64::MAX, 1.0], cell: 1e-300, ..rough() }, "too many"),
         (RoughTerrain { step: -1.0, ..rough() }, "step is -1"),

@@ -141,7 +141,7 @@ impl CameraCfg {
         }
         if holes.as_ref().is_some_and(|holes| holes.baseline != 0.0) && !self.lens.is_pinhole() {
             return Err(CameraError::PinholeOnly {
-                what: "shadows of a projector (holes with a baseline other than 0)",
+                what: "projector shadows (holes with a baseline other than 0)",
                 lens,
             });
         }

@@ -8,11 +8,11 @@ use kinetoscope_render::RenderError;
 #[non_exhaustive]
 pub enum CameraError {
     /// Size, intrinsics, depth range or number of samples are invalid.
-    #[error("the camera cannot see: {0}")]
+    #[error("invalid camera view: {0}")]
     View(RenderError),
     /// The image of an environment cannot be rendered. It is rendered again after the next capture, or at the next read
     /// if rendering was cancelled.
-    #[error("environment {env} cannot be drawn: {error}")]
+    #[error("environment {env} cannot be rendered: {error}")]
     Render {
         /// The environment.
         env: usize,
@@ -37,7 +37,7 @@ pub enum CameraError {
         columns: usize,
     },
     /// The position of the camera and its target coincide, or a number is not finite.
-    #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite and apart")]
+    #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite, and they must differ")]
     LookAt {
         /// Position of the camera \[m\].
         eye: [f64; 3],
@@ -83,7 +83,7 @@ pub enum CameraError {
         enabled: Vec<&'static str>,
     },
     /// Disparity needs parallel cameras side by side with equal fx, fy and cy.
-    #[error("disparity is defined for a rectified pair of eyes: {what} is {value}, it must be {expected}")]
+    #[error("disparity needs a rectified stereo camera: {what} is {value}; it must be {expected}")]
     NotRectified {
         /// Name of the number.
         what: &'static str,
@@ -93,7 +93,7 @@ pub enum CameraError {
         expected: String,
     },
     /// The images of the stereo pair cannot be rectified.
-    #[error("the pictures of these eyes cannot be rectified: {what} is {value}, it must be {expected}")]
+    #[error("this stereo camera cannot be rectified: {what} is {value}; it must be {expected}")]
     NotRectifiable {
         /// Name of the number.
         what: &'static str,
@@ -103,7 +103,7 @@ pub enum CameraError {
         expected: &'static str,
     },
     /// Two calibrations do not belong to a left and a right camera.
-    #[error("these are no calibrations of a left and a right eye: {what} is {value}; it must be {expected}")]
+    #[error("the calibrations do not belong to a stereo camera: {what} is {value}; it must be {expected}")]
     NotAStereoPair {
         /// Name of the number.
         what: &'static str,
@@ -113,7 +113,7 @@ pub enum CameraError {
         expected: String,
     },
     /// A feature is only defined for pinhole cameras.
-    #[error("{what}: only of a pinhole camera, and this one has the lens {lens}; leave it out, or the lens")]
+    #[error("{what}: supported only by pinhole cameras, but this camera has the lens {lens}; remove one of the two")]
     PinholeOnly {
         /// Name of the feature.
         what: &'static str,
@@ -121,7 +121,7 @@ pub enum CameraError {
         lens: &'static str,
     },
     /// A feature needs an optical axis, which the lens does not have.
-    #[error("{what}: the lens {lens} has no optical axis; take it away, or choose another lens")]
+    #[error("{what} needs an optical axis, which the lens {lens} does not have; remove it, or choose another lens")]
     NoAxis {
         /// Name of the feature.
         what: &'static str,
@@ -130,13 +130,13 @@ pub enum CameraError {
     },
     /// Flow is combined with latency, dropout or a history.
     #[error(
-        "flow is from the picture before to the one now: a camera with flow has no latency_steps, dropout or history_length"
+        "flow relates two consecutive images: a camera with flow cannot have latency_steps, dropout or history_length"
     )]
     FlowWithLatency,
     /// The shutter is open for longer than the time between images.
     #[error(
-        "the shutter takes {span} s, from the first light to the last row, and there is a picture every {period} s; make \
-         row_time, exposure_time or the picture's height smaller, or update_period larger"
+        "the shutter span is {span} s, from the first light to the last row, but the image period is {period} s; reduce \
+         row_time, exposure_time or the image height, or increase update_period"
     )]
     ShutterTooSlow {
         /// Span of the shutter, from the first light to the last row \[s\].
@@ -145,7 +145,9 @@ pub enum CameraError {
         period: f64,
     },
     /// Flow is combined with a shutter of nonzero span.
-    #[error("flow is from one instant to another: a camera with flow has a shutter of one instant")]
+    #[error(
+        "flow relates two instants: a camera with flow needs a shutter of one instant (row_time and exposure_time 0)"
+    )]
     FlowWithShutterSpan,
     /// A mask id is invalid.
     #[error("mask id {id} {problem}")]
@@ -156,7 +158,7 @@ pub enum CameraError {
         problem: &'static str,
     },
     /// The pose of an instance is not finite, so it has no box.
-    #[error("the pose of the thing with mask id {id} in environment {env} is not finite: it has no box")]
+    #[error("the pose of the entity with mask id {id} in environment {env} is not finite, so it has no box")]
     EntityPose {
         /// The environment.
         env: usize,
@@ -165,9 +167,9 @@ pub enum CameraError {
     },
     /// The images of all environments do not fit into memory.
     #[error(
-        "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes{} do not fit into memory \
+        "images of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes{} do not fit into memory \
          (at most {limit} bytes)",
-        if *.path_tracing_bytes > 0 { format!(", with {} bytes for paths,", .path_tracing_bytes) } else { String::new() }
+        if *.path_tracing_bytes > 0 { format!(", with {} bytes for path tracing,", .path_tracing_bytes) } else { String::new() }
     )]
     Memory {
         /// Number of environments.
@@ -185,8 +187,8 @@ pub enum CameraError {
     },
     /// History and frames in flight do not fit into memory.
     #[error(
-        "{images} past pictures and {pending_frames} captures on their way, in each of {views} environments, do not fit into \
-         memory (at most {limit} bytes); make history_length or latency_steps smaller"
+        "{images} images of history and {pending_frames} frames in flight, in each of {views} environments, do not fit into \
+         memory (at most {limit} bytes); reduce history_length or latency_steps"
     )]
     HistoryMemory {
         /// Images in the history.
@@ -199,10 +201,10 @@ pub enum CameraError {
         limit: u64,
     },
     /// The camera was built without a scene.
-    #[error("the camera was built without a scene to look at")]
+    #[error("the camera was built without a scene")]
     NoScene,
     /// Nothing was captured yet.
-    #[error("the camera has not seen environment {env} yet; it does after the first reset or update")]
+    #[error("the camera has not captured environment {env} yet; reset or update it first")]
     NothingCaptured {
         /// The environment.
         env: usize,

@@ -45,7 +45,9 @@ impl ImageNoise {
         let of = |channel: &str| {
             let mut found = named.clone().filter(|(name, _)| *name == channel).map(|(_, noise)| *noise);
             match (found.next(), found.next()) {
-                (_, Some(_)) => Err(SensorError::Pattern(format!("the noise of {channel:?} is given by two names"))),
+                (_, Some(_)) => Err(SensorError::Pattern(format!(
+                    "the noise of {channel:?} is given twice, by two names of the channel"
+                ))),
                 (noise, None) => Ok(noise),
             }
         };

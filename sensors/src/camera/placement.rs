@@ -113,7 +113,8 @@ pub trait CameraPlacement: PlaceRows {
     ) -> Result<(), SensorError> {
         let rows = self.env_rows().selected_rows(env_ids)?;
         let n = rows.len();
-        let points = one_each("eyes", eye, n)?.zip(one_each("targets", target, n)?).zip(one_each("ups", up, n)?);
+        let points =
+            one_each("eye positions", eye, n)?.zip(one_each("targets", target, n)?).zip(one_each("up vectors", up, n)?);
         let poses: Result<Vec<Pose>, _> = points.map(|((eye, target), up)| look_at_pose(*eye, *target, *up)).collect();
         self.place_rows(&rows, &poses?, PoseFrame::Parent)
     }

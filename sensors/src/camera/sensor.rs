@@ -401,8 +401,8 @@ impl Camera {
             ("environments with a time", envs, state.time.len()),
             ("environments with instances", envs, instance_poses.nrows()),
             ("instances", self.scene.instances().len(), instance_poses.ncols()),
-            ("environments with lamps", envs, lights.nrows()),
-            ("lamps", self.scene.lights.len(), lights.ncols()),
+            ("environments with lights", envs, lights.nrows()),
+            ("lights", self.scene.lights.len(), lights.ncols()),
         ];
         let of_bodies = state.body_poses.as_ref().filter(|_| self.is_attached()).map(|poses| {
             let (found, bodies, numbers) = poses.dim();

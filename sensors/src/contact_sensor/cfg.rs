@@ -97,7 +97,7 @@ impl SensorCfg for ContactSensorCfg {
         }
         if !(self.force_threshold >= 0.0 && self.force_threshold.is_finite()) {
             let (field, value) = ("force_threshold".into(), self.force_threshold);
-            return Err(SensorError::OutOfRange { field, value, expected: "it must be 0 N or more" });
+            return Err(SensorError::OutOfRange { field, value, expected: "it must be finite and at least 0 N" });
         }
         if self.track_friction_forces && self.filters.is_empty() {
             return Err(SensorError::NoFilters { field: "track_friction_forces", total_channel: "friction_forces_w" });

@@ -144,8 +144,8 @@ fn mistakes() {
         |filter: &str, of: &str| ContactSensorCfg { filters: vec![filter.into()], ..ContactSensorCfg::for_bodies(of) };
     let friction = ContactSensorCfg { track_friction_forces: true, ..ContactSensorCfg::for_bodies("cube") };
     for (cfg, start, parts) in [
-        (ContactSensorCfg::for_bodies("foot"), "there is no body \"foot\"; known are", ["LF_FOOT", ""]),
-        (ContactSensorCfg::default(), "there are no bodies to watch", ["dog/base", ""]),
+        (ContactSensorCfg::for_bodies("foot"), "unknown body \"foot\"; known names: ", ["LF_FOOT", ""]),
+        (ContactSensorCfg::default(), "the contact sensor has no bodies", ["dog/base", ""]),
         (friction, "", ["`filters`", "friction_forces_w"]),
         (filtered("grond", "cube"), "", ["\"ground\"", ""]),
     ] {

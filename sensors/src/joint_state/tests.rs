@@ -90,7 +90,7 @@ fn phases() {
 fn mistakes() {
     let far = JointStateCfg { joints: Some(vec!["a".into(), "d".into()]), ..Default::default() };
     let error = far.build(&context()).unwrap_err();
-    assert_eq!(error.to_string(), "there is no joint \"d\"; known are \"a\", \"b\", \"c\"");
+    assert_eq!(error.to_string(), "unknown joint \"d\"; known names: \"a\", \"b\", \"c\"");
     let period = JointStateCfg { sampling: sampling(0.007, 0), ..Default::default() };
     assert!(matches!(period.build(&context()), Err(SensorError::PeriodNotMultiple { .. })));
     let rounded =
@@ -107,7 +107,7 @@ fn mistakes() {
     assert_eq!(sensor.update(&small), Err(wrong));
     let error = sensor.update(&SceneState::new(3)).unwrap_err();
     assert!(matches!(error, SensorError::MissingFields { .. }));
-    assert_eq!(error.to_string(), "the joint state sensor was given a state without joint_efforts, joint_state");
+    assert_eq!(error.to_string(), "the state lacks joint_efforts, joint_state, which the joint state sensor requires");
     assert_eq!(sensor.positions(), before);
     // Root cause: an empty list was accepted, which created a sensor without values.
     let nothing = JointStateCfg { joints: Some(vec![]), ..JointStateCfg::default() };

@@ -29,7 +29,7 @@ pub enum RayError {
         limit: usize,
     },
     /// The numbers of ray origins and directions differ.
-    #[error("a custom pattern has {starts} starts and {directions} directions; give as many of both")]
+    #[error("a custom pattern has {starts} starts and {directions} directions; the two numbers must be equal")]
     Lengths {
         /// Number of origins.
         starts: usize,
@@ -38,8 +38,8 @@ pub enum RayError {
     },
     /// A ray has no direction, or a number that is not finite.
     #[error(
-        "ray {ray} of the {pattern} pattern begins at {start:?} and goes along {direction:?}; a ray needs finite numbers \
-             and a direction other than zero"
+        "ray {ray} of the {pattern} pattern has the origin {start:?} and the direction {direction:?}; a ray needs finite \
+         numbers and a direction other than zero"
     )]
     Ray {
         /// Name of the pattern.

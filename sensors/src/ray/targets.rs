@@ -91,16 +91,16 @@ fn matched_instances(
             let own = context.own_scenes.iter().filter_map(|own| own.0.as_deref());
             std::iter::once(scene).chain(own).any(|scene| scene.instances().get(index).is_some_and(|i| i.visible))
         });
-        at_least_one(patterns.len(), Selection { sensor: "ray", field: "targets", what: "thing to hit" }, &shown)?;
+        at_least_one(patterns.len(), Selection { sensor: "ray", field: "targets", what: "ray target" }, &shown)?;
         for pattern in patterns {
-            matching(pattern, &shown, "thing to hit")?;
+            matching(pattern, &shown, "ray target")?;
         }
     }
     let names = names_of(&|_| true);
-    at_least_one(patterns.len(), Selection { sensor: "ray", field: "targets", what: "thing to hit" }, &names)?;
+    at_least_one(patterns.len(), Selection { sensor: "ray", field: "targets", what: "ray target" }, &names)?;
     let mut named = vec![false; names.len()];
     for pattern in patterns {
-        matching(pattern, &names, "thing to hit")?.into_iter().for_each(|index| named[index] = true);
+        matching(pattern, &names, "ray target")?.into_iter().for_each(|index| named[index] = true);
     }
     let is_named = |name: &str| names.binary_search_by(|n| n.as_str().cmp(name)).is_ok_and(|index| named[index]);
     Ok(scene.instances().iter().map(|i| is_named(&i.name)).collect())

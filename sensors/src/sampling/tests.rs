@@ -265,7 +265,7 @@ fn first_env() {
 fn mistakes() {
     let wrong = |cfg: SamplingCfg| try_built(&context(2), &cfg).unwrap_err();
     let text = wrong(with_noise("c", NoiseCfg::white(1.0))).to_string();
-    assert_eq!(text, "there is no channel that can have noise \"c\"; known are \"a\", \"b\"");
+    assert_eq!(text, "unknown noise channel \"c\"; known names: \"a\", \"b\"");
     assert!(matches!(wrong(with_noise("n", NoiseCfg::white(1.0))), SensorError::UnknownName { .. }));
     let default = NoiseCfg::default;
     for bad in [-1.0, f64::NAN, f64::INFINITY, 1e101] {

@@ -121,8 +121,8 @@ pub fn warn_if_unstable(
             DiagnosticKind::ActuatorUnstable,
             None,
             format!(
-                "robot {:?}: explicit actuators with these gains and torque-speed lines are stable up to a time step of \
-                 {largest:.3e} s at the start positions, and the time step is {dt} s; use DriveModel::Implicit, smaller gains \
+                "robot {:?}: explicit actuators with these gains and torque-speed lines are stable below a time step of \
+                 {largest:.3e} s at the start positions, but the time step is {dt} s; use DriveModel::Implicit, smaller gains \
                  or more substeps",
                 description.name
             ),

@@ -72,7 +72,7 @@ impl std::str::FromStr for DriveType {
     fn from_str(name: &str) -> Result<Self, String> {
         Self::ALL.iter().copied().find(|t| t.mode().name() == name).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|t| t.mode().name()).collect();
-            format!("unknown drive type {name:?}; known are {}", known.join(", "))
+            format!("unknown drive type {name:?}; known types: {}", known.join(", "))
         })
     }
 }

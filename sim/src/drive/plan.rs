@@ -211,13 +211,13 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
             format!("the usable range of {:?} is {:.4} .. {:.4}", driver_joint.name, narrowed[0], narrowed[1])
         } else {
             released.push((i, d));
-            format!("they leave no range for {:?}, so they were ignored", driver_joint.name)
+            format!("these limits leave no range for {:?} and were ignored", driver_joint.name)
         };
         diagnostics.push(Diagnostic::new(
             DiagnosticKind::MimicRangeClipped,
             joint.limit.as_ref().map(|l| l.source.clone()),
             format!(
-                "joint {:?} follows {:?} by {multiplier} beyond its own limits {} .. {}: {outcome}",
+                "joint {:?} mimics {:?} with multiplier {multiplier} beyond its own limits {} .. {}: {outcome}",
                 joint.name, driver_joint.name, limit[0], limit[1]
             ),
         ));
@@ -270,7 +270,7 @@ fn set_initial_positions(
                 DiagnosticKind::FollowerStartsBeyondLimits,
                 joint.source.clone(),
                 format!(
-                    "joint {:?}: it starts at {initial:.4}, where what it follows puts it, outside of {low:.4} .. {high:.4}",
+                    "joint {:?}: it starts at {initial:.4}, implied by the joint that it follows, outside of {low:.4} .. {high:.4}",
                     joint.name
                 ),
             ));

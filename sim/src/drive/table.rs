@@ -395,7 +395,7 @@ impl DriveState {
 /// valid one.
 pub(crate) fn flat_error(numbers: &[f64], drives: usize) -> Option<&'static str> {
     let Some((settings, rest)) = numbers.split_at_checked(10 * drives) else {
-        return Some("drives have fewer numbers than they need");
+        return Some("the array is too short for the drives");
     };
     for &[kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, low, high] in
         settings.as_chunks::<10>().0
@@ -410,7 +410,7 @@ pub(crate) fn flat_error(numbers: &[f64], drives: usize) -> Option<&'static str>
             return Some("a drive type is unknown");
         }
         if low.is_nan() || high.is_nan() || low > high {
-            return Some("a range of targets is none");
+            return Some("a target range is empty or not a number");
         }
     }
     rest.iter().any(|x| !x.is_finite()).then_some("a target, an effort or an applied force is not finite")

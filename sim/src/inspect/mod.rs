@@ -60,7 +60,7 @@ pub enum InspectError {
     #[error(transparent)]
     Load(Box<Error>),
     /// A position is given for a joint that does not exist.
-    #[error("qpos: there is no joint {name:?}; {}", format_candidates(.candidates, *.total))]
+    #[error("qpos: unknown joint {name:?}; {}", format_candidates(.candidates, *.total))]
     JointUnknown {
         /// The name given.
         name: String,

@@ -57,13 +57,13 @@ impl RobotReport {
         )?;
         let com = self
             .com
-            .map(|c| format!(", centre of mass in the world ({}) m", c.map(|x| format_number(x, 4)).join(", ")));
+            .map(|c| format!(", center of mass in the world ({}) m", c.map(|x| format_number(x, 4)).join(", ")));
         writeln!(f, "total mass {} kg{}", format_number(self.total_mass, 6), com.unwrap_or_default())?;
 
         write!(f, "\nLinks\n\n{}", self.tree())?;
         let inertias = self.inertia_table();
         if !inertias.rows.is_empty() {
-            write!(f, "\nPrincipal moments of inertia about the centre of mass (kg m²)\n\n{inertias}")?;
+            write!(f, "\nPrincipal moments of inertia about the center of mass (kg m²)\n\n{inertias}")?;
         }
         if movable > 0 {
             write!(f, "\nMovable joints (axis in the joint frame, SI units)\n\n{}", self.joint_table())?;
@@ -86,7 +86,7 @@ impl RobotReport {
             }
         }
         let by_child: HashMap<&str, &JointReport> = self.joints.iter().map(|j| (j.child.as_str(), j)).collect();
-        let mut table = Table::new("<link <joint <type >mass_[kg] <?centre_of_mass_in_link_[m]");
+        let mut table = Table::new("<link <joint <type >mass_[kg] <?center_of_mass_in_link_[m]");
         while let Some((link, trunk, branch)) = open.pop() {
             let joint = by_child.get(link.name.as_str());
             table.push([
@@ -161,7 +161,7 @@ impl RobotReport {
     }
 
     fn dynamics_table(&self) -> Table {
-        let mut table = Table::new("<coordinate >position >inertia >to_hold_still");
+        let mut table = Table::new("<coordinate >position >inertia >gravity_effort");
         let positions: HashMap<&str, f64> =
             self.joint_names.iter().map(String::as_str).zip(self.qpos.iter().copied()).collect();
         for (i, (column, torque)) in self.columns.iter().zip(&self.gravity_torque).enumerate() {

@@ -95,7 +95,7 @@ impl SceneCfg {
             let name = strip_env_prefix(name);
             let (kind, table) = types.write(entity).ok_or_else(|| {
                 let known: Vec<&str> = types.names().collect();
-                fail(name, format!("its kind is none of {}; add it with EntityTypes::with_sensor", known.join(", ")))
+                fail(name, format!("its type is not one of {}; add it with EntityTypes::with_sensor", known.join(", ")))
             })?;
             let mut written = toml::Table::new();
             written.insert("type".into(), kind.into());

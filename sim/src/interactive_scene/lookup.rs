@@ -22,7 +22,7 @@ impl InteractiveScene {
         let name = strip_env_prefix(name);
         let found = self.entities.iter().find(|(known, _)| known == name);
         found.map(|(_, handle)| handle).ok_or_else(|| Error::UnknownName {
-            what: "entity of the scene called",
+            what: "scene entity",
             name: name.into(),
             candidates: closest_names(name, self.keys()).into_iter().map(String::from).collect(),
         })

@@ -74,7 +74,7 @@ impl<'de> Deserializer<'de> for Value<'de> {
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueError> {
         let span = self.0.span();
-        let out_of_range = |number: &str| de::Error::custom(format!("the number {number} is beyond all that fit"));
+        let out_of_range = |number: &str| de::Error::custom(format!("the number {number} is out of range"));
         let read = match self.0.into_inner() {
             DeValue::String(text) => visitor.visit_string(text.into_owned()),
             DeValue::Integer(number) => {
@@ -90,7 +90,9 @@ impl<'de> Deserializer<'de> for Value<'de> {
                 _ => Err(out_of_range(number.as_str())),
             },
             DeValue::Boolean(yes) => visitor.visit_bool(yes),
-            DeValue::Datetime(when) => Err(de::Error::custom(format!("the date `{when}` is expected nowhere"))),
+            DeValue::Datetime(when) => {
+                Err(de::Error::custom(format!("unexpected date `{when}`; scene files have no dates")))
+            }
             DeValue::Array(array) => visitor.visit_seq(ArrayItems(array.into_iter())),
             DeValue::Table(table) => visitor.visit_map(TableEntries::new(table)),
         };
@@ -142,8 +144,8 @@ impl<'de> Deserializer<'de> for Value<'de> {
                         let chosen = EnumVariant { name: name.get_ref(), content: Some(Value(content)) };
                         visitor.visit_enum(chosen).map_err(|error| error.at(&at))
                     }
-                    (None, _) => wrong("nothing is named here".into()),
-                    _ => wrong(format!("`{}` are {}", names.join("`, `"), names.len())),
+                    (None, _) => wrong("empty table".into()),
+                    _ => wrong(format!("{} keys (`{}`)", names.len(), names.join("`, `"))),
                 }
             }
             other => wrong(format!("invalid type: {}", describe(&other))),
@@ -236,9 +238,8 @@ impl<'a> VariantContent<'a> {
     /// Content of a variant that must have one.
     fn value(self) -> Result<Value<'a>, ValueError> {
         let name = self.name;
-        self.value.ok_or_else(|| {
-            de::Error::custom(format!("`{name}` alone says too little, expected a table: {{ {name} = ... }}"))
-        })
+        self.value
+            .ok_or_else(|| de::Error::custom(format!("`{name}` needs a value, expected a table: {{ {name} = ... }}")))
     }
 }
 
@@ -250,7 +251,7 @@ impl<'de> VariantAccess<'de> for VariantContent<'de> {
         if matches!(value.get_ref(), DeValue::Table(table) if table.is_empty()) {
             return Ok(());
         }
-        let message = format!("`{}` has nothing to set, expected its name alone", self.name);
+        let message = format!("`{}` has no fields, expected its name alone", self.name);
         Err(ValueError { message, span: Some(value.span()) })
     }
 

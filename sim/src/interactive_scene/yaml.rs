@@ -21,7 +21,7 @@ pub(super) fn table(root: Option<&Node>) -> Result<DeTable<'_>, YamlError> {
         Value::List(_) => Err(error(*line, "a scene is a table of `simulation` and `entities`, not a list".into())),
         Value::Scalar(Scalar { text, kind: ScalarKind::Null }) if text.is_empty() => Ok(DeTable::new()),
         Value::Scalar(Scalar { text, .. }) => {
-            Err(error(*line, format!("{text:?} is no table of `simulation` and `entities`")))
+            Err(error(*line, format!("{text:?} is not a table of `simulation` and `entities`")))
         }
     }
 }
@@ -44,7 +44,7 @@ fn value_of(node: &Node) -> Result<Spanned<DeValue<'_>>, YamlError> {
         Value::List(list) => DeValue::Array(list.iter().map(value_of).collect::<Result<_, _>>()?),
         Value::Scalar(Scalar { text, kind }) => match kind {
             ScalarKind::Null => {
-                let nothing = "nothing is said here; leave it out, or say false where something is not to be";
+                let nothing = "the value is null; leave the key out, or write false to disable a feature";
                 return Err(error(node.line, nothing.into()));
             }
             ScalarKind::Bool(yes) => DeValue::Boolean(*yes),
@@ -106,11 +106,11 @@ mod tests {
     #[test]
     fn refusals() {
         for (yaml, line, needle) in [
-            ("a: 1\nb:\n", 2, "nothing is said here"),
-            ("a: 1\nb: ~\n", 2, "nothing is said here"),
+            ("a: 1\nb:\n", 2, "the value is null"),
+            ("a: 1\nb: ~\n", 2, "the value is null"),
             ("- 1\n", 1, "not a list"),
-            ("word\n", 1, "no table"),
-            ("a: !cup 5\n", 1, "the tag !cup is not for scene files"),
+            ("word\n", 1, "not a table"),
+            ("a: !cup 5\n", 1, "scene files do not support the tag !cup"),
         ] {
             let read = |root: Option<Node>| table(root.as_ref()).map(|_| ());
             let error = parse(yaml, &DIALECT).and_then(read).unwrap_err();

@@ -85,7 +85,8 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Mj
         free.damping = cfg.linear_damping;
     } else if matches!(purpose, MjcfDialect::Export(_)) {
         mjcf.comments.push(format!(
-            "{}: linear damping {} N s/m and angular damping {} N m s/rad are not in this file: a free joint has one.",
+            "{}: linear damping {} N s/m and angular damping {} N m s/rad are not written, because a free joint has a \
+             single damping value.",
             cfg.uid, cfg.linear_damping, cfg.angular_damping
         ));
     }

@@ -106,8 +106,7 @@ impl FreeBodyMut<'_> {
                 return Err(Error::Config {
                     field: argument,
                     value: format!("{:?} in row {row}", &pose[3..]),
-                    expected: "the last four numbers must be a quaternion w, x, y, z of a length that is not zero and not \
-                               beyond all numbers",
+                    expected: "the last four numbers must be a quaternion w, x, y, z with a finite length above 0",
                 });
             }
         }

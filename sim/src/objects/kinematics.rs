@@ -443,7 +443,7 @@ fn target_error(error: CameraError, envs: usize) -> Error {
         other => Error::Config {
             field: "target of compute_ik",
             value: other.to_string(),
-            expected: "it must be rows of x, y, z, qw, qx, qy, qz",
+            expected: "expected an array with 7 columns: x, y, z, qw, qx, qy, qz",
         },
     }
 }

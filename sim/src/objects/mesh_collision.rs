@@ -47,14 +47,15 @@ impl MeshCollision {
         match self {
             Self::Hull => Ok(()),
             _ if !matches!(cfg.shape, ObjectShape::Mesh { .. }) => {
-                fail("only an ObjectShape::Mesh collides in pieces or triangles; leave it MeshCollision::Hull")
+                fail("only an ObjectShape::Mesh supports pieces or triangles; use MeshCollision::Hull for other shapes")
             }
             Self::Pieces(ConvexDecompositionCfg { max_pieces, tolerance }) => {
                 let good = (1..=1024).contains(max_pieces) && *tolerance > 0.0 && tolerance.is_finite();
                 if good { Ok(()) } else { fail("max_pieces must be 1 to 1024, the tolerance a length above 0 m") }
             }
             Self::Triangles { .. } if cfg.body_type == BodyType::Dynamic => fail(
-                "exact triangles are for BodyType::Static and Kinematic; choose MeshCollision::Pieces for what moves",
+                "MeshCollision::Triangles requires BodyType::Static or Kinematic; use MeshCollision::Pieces for a \
+                 dynamic body",
             ),
             Self::Triangles { thickness } if !(thickness.is_finite() && (1e-5..=1e3).contains(thickness)) => {
                 fail("the thickness must be 1e-5 to 1e3 m")
@@ -80,8 +81,8 @@ impl MeshCollision {
                 DiagnosticKind::OpenMesh,
                 None,
                 format!(
-                    "object {uid:?}: {}: the surface is open: what collides is the surface, seen from where its triangles turn \
-                     counter-clockwise, and not all that is behind it; close the mesh, or choose MeshCollision::Hull",
+                    "object {uid:?}: {}: the surface is open, so only its front faces (counter-clockwise triangles) \
+                     collide and the volume behind it does not; close the mesh, or use MeshCollision::Hull",
                     path.display()
                 ),
             ));
@@ -96,8 +97,8 @@ impl MeshCollision {
                         DiagnosticKind::CoarsePieces,
                         None,
                         format!(
-                            "object {uid:?}: {}: {count} convex pieces are up to {depth:.2e} m off the surface; the tolerance is \
-                             {:.2e} m",
+                            "object {uid:?}: {}: {count} convex pieces deviate up to {depth:.2e} m from the surface; \
+                             the tolerance is {:.2e} m",
                             path.display(),
                             cfg.tolerance
                         ),
@@ -109,9 +110,9 @@ impl MeshCollision {
                 let prisms = prisms(mesh, *thickness)
                     .map_err(|source| failed(MeshError::Hull { path: path.to_owned(), source }))?;
                 if prisms.is_empty() || prisms.len() > Self::MAX_TRIANGLES {
-                    let value = format!("Triangles of a mesh of {} triangles with an area", prisms.len());
-                    let expected =
-                        "1 to 2000 triangles can be exact; choose MeshCollision::Pieces, a terrain, or a coarser mesh";
+                    let value = format!("Triangles for a mesh with {} triangles of nonzero area", prisms.len());
+                    let expected = "MeshCollision::Triangles supports 1 to 2000 triangles; use MeshCollision::Pieces, \
+                                    a terrain, or a coarser mesh";
                     return Err(Error::Config { field: "mesh_collision", value, expected });
                 }
                 if prisms.len() < mesh.triangles.len() {
@@ -119,7 +120,9 @@ impl MeshCollision {
                     diagnostics.push(Diagnostic::new(
                         DiagnosticKind::CoarsePieces,
                         None,
-                        format!("object {uid:?}: {path}: {left_out} triangles are too thin to collide, and left out"),
+                        format!(
+                            "object {uid:?}: {path}: {left_out} triangles are too thin for collision and are omitted"
+                        ),
                     ));
                 }
                 Ok(prisms.into_iter().map(Arc::new).collect())

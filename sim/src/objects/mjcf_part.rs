@@ -331,7 +331,7 @@ impl<'a> MjcfPartMut<'a> {
         let (file, names) = (&self.data.model, &self.data.names.bodies);
         let by_hand: Vec<usize> = (1..file.nbody()).filter(|&b| file.body_mocapid()[b] >= 0).collect();
         let found = by_hand.iter().find(|&&b| names[b] == body).ok_or_else(|| Error::UnknownName {
-            what: "body moved by hand (mocap) called",
+            what: "mocap body",
             name: body.into(),
             candidates: pattern::closest_names(body, by_hand.iter().map(|&b| names[b].as_str()))
                 .into_iter()
@@ -385,10 +385,10 @@ impl<'a> MjcfPartMut<'a> {
         places: &[usize],
         env_ids: Option<&[EnvId]>,
     ) -> Result<EnvRows<'v>> {
-        let of = |_| format!("part {:?}", self.data.uid());
+        let of = |_| format!("MJCF part {:?}", self.data.uid());
         let table = ArgumentSpec {
             argument,
-            meaning: "environments, numbers of the joints",
+            meaning: "environments, joint positions or velocities",
             columns: places.len(),
             column_label: &of,
         };
@@ -405,7 +405,7 @@ fn normalize_quaternion(argument: &'static str, row: &mut [f64], first: usize) -
         return Err(Error::Config {
             field: argument,
             value: format!("{quaternion:?} in columns {first} to {}", first + 3),
-            expected: "a quaternion w, x, y, z must have a length that is not zero and not beyond all numbers",
+            expected: "a quaternion w, x, y, z must have a finite length above 0",
         });
     }
     quaternion.iter_mut().for_each(|q| *q /= norm);

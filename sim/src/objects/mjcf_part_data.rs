@@ -137,7 +137,7 @@ impl MjcfData {
             error: Box::new(error),
         })?;
         let names = PartNames::of_model(&model);
-        let named = EntityLabel { kind: "part", uid: cfg.uid.clone() };
+        let named = EntityLabel { kind: "MJCF part", uid: cfg.uid.clone() };
         let surfaces = SurfaceCfg::assign(&cfg.surfaces, &names.bodies, "body", named)?;
         let (stem, source) = (format!("part{index}_"), SourceLocation::new(&cfg.path, 1));
         let of =
@@ -147,7 +147,14 @@ impl MjcfData {
             .and_then(|document| Ok((document, of.files()?)))
             .map_err(|error| Error::MjcfAttach { uid: cfg.uid.clone(), file, error: Box::new(error) })?;
         let left_out = document.sensors_left_out();
-        diagnostics.extend(setting_warnings(&format!("part {:?}", cfg.uid), &text, &cfg.path, &model, scene, left_out));
+        diagnostics.extend(setting_warnings(
+            &format!("MJCF part {:?}", cfg.uid),
+            &text,
+            &cfg.path,
+            &model,
+            scene,
+            left_out,
+        ));
         let frames = frames(&cfg.uid, &model, &names, diagnostics);
         let is_kept = |s: &usize| left_out.iter().all(|(other, _)| other != s);
         let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
@@ -274,7 +281,9 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
         let body = model.site_bodyid()[site] as usize;
         let mut name = names.sites[site].clone();
         while frames.iter().any(|frame| frame.name.strip_prefix(uid).is_some_and(|rest| rest[1..] == *name)) {
-            let message = format!("part {uid:?}: the site {name:?} is called as a body; its frame is \"{name}.site\"");
+            let message = format!(
+                "MJCF part {uid:?}: the site {name:?} has the same name as a body; its frame is named \"{name}.site\""
+            );
             diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, None, message));
             name.push_str(".site");
         }

@@ -44,8 +44,8 @@ impl ObjectMesh {
                     DiagnosticKind::OpenMesh,
                     None,
                     format!(
-                        "object {uid:?}: {}: the surface is open, encloses nothing, or is inside out in a part; mass, centre \
-                         of mass and moments are those of its convex hull",
+                        "object {uid:?}: {}: the surface is open, encloses no volume, or is partly inside out; mass, \
+                         center of mass and inertia are computed from its convex hull",
                         path.display()
                     ),
                 ));

@@ -126,7 +126,7 @@ impl RigidObjectData {
             Err(Error::Config { field, value: format!("{value:?}"), expected })
         };
         if !cfg.shape.sizes().iter().all(|s| s.is_finite() && (1e-6..=1e6).contains(s)) {
-            return fail("shape", &cfg.shape, "every size must be 1e-6 to 1e6 metres, every scale 1e-6 to 1e6");
+            return fail("shape", &cfg.shape, "every size must be 1e-6 to 1e6 m, every scale 1e-6 to 1e6");
         }
         if !(cfg.density.is_finite() && cfg.density > 0.0) {
             return fail("density", &cfg.density, "it must be above 0 kg/m³, such as 1000 for water");
@@ -134,7 +134,7 @@ impl RigidObjectData {
         if let Some(mass) = cfg.mass
             && !(mass.is_finite() && mass >= 0.0)
         {
-            return fail("mass", &mass, "it must be a finite number >= 0 in kilograms");
+            return fail("mass", &mass, "it must be a finite mass >= 0 kg");
         }
         if let Some(com) = cfg.center_of_mass
             && !com.iter().all(|x| x.is_finite())
@@ -155,17 +155,17 @@ impl RigidObjectData {
                 return fail(field, &value, "it must be a finite number >= 0");
             }
             if value > 0.0 && cfg.body_type != BodyType::Dynamic {
-                return fail(field, &value, "only what is BodyType::Dynamic is damped; leave it 0");
+                return fail(field, &value, "only a BodyType::Dynamic object is damped; leave it 0");
             }
         }
         if let Some(restitution) = cfg.restitution
             && !(restitution::MIN_RESTITUTION..=1.0).contains(&restitution)
         {
-            let expected = "it must be 0.14 to 1; leave it out for contacts that hardly bounce";
+            let expected = "it must be 0.14 to 1; omit it for contacts with hardly any bounce";
             return fail("restitution", &restitution, expected);
         }
         if !(cfg.contact_margin.is_finite() && cfg.contact_margin >= 0.0) {
-            return fail("contact_margin", &cfg.contact_margin, "it must be a distance >= 0 in metres");
+            return fail("contact_margin", &cfg.contact_margin, "it must be a distance >= 0 m");
         }
         if let Some(friction) = cfg.friction
             && !friction.iter().all(|f| f.is_finite() && *f >= 0.0)
@@ -181,7 +181,8 @@ impl RigidObjectData {
         let mass_properties = MassProperties::of(&cfg, mesh.as_ref());
         let MassProperties { mass, moments, .. } = mass_properties;
         if cfg.body_type == BodyType::Dynamic && !(mass.is_finite() && mass > 1e-12 && moments.min() > 1e-14) {
-            let expected = "MuJoCo moves nothing lighter than 1e-12 kg or with a moment below 1e-14 kg m²";
+            let expected =
+                "MuJoCo requires a mass above 1e-12 kg and principal moments above 1e-14 kg m² for a moving body";
             return fail("mass", &mass, expected);
         }
         Ok(Self { cfg, mask_id, mesh, mass_properties })

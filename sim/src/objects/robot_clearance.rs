@@ -70,8 +70,8 @@ impl RobotData {
             robot.move_initial_pose_z(clearance - height);
         } else {
             let message = format!(
-                "{}: no link has a collision shape: ground_clearance {clearance} is ignored, and the ground does not hold \
-                 the robot",
+                "{}: no link has a collision shape, so ground_clearance {clearance} is ignored and the ground does not \
+                 support the robot",
                 robot.label()
             );
             diagnostics.push(Diagnostic::new(DiagnosticKind::ClearanceIgnored, None, message));

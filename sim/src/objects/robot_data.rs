@@ -77,11 +77,12 @@ impl RobotData {
     ) -> Result<Self> {
         check_pose("init_pose", &cfg.init_pose)?;
         if let Some(clearance) = cfg.ground_clearance.filter(|clearance| !clearance.is_finite()) {
-            let (value, expected) = (clearance.to_string(), "it must be a finite height in metres, such as 0");
+            let (value, expected) = (clearance.to_string(), "it must be a finite height in meters, such as 0");
             return Err(Error::Config { field: "ground_clearance", value, expected });
         }
         if !(0.0..=1.0).contains(&cfg.soft_limit_factor) {
-            let (value, expected) = (cfg.soft_limit_factor.to_string(), "the share of a joint's range must be 0 to 1");
+            let (value, expected) =
+                (cfg.soft_limit_factor.to_string(), "the fraction of a joint's range must be 0 to 1");
             return Err(Error::Config { field: "soft_limit_factor", value, expected });
         }
         for component in &cfg.urdf.components {
@@ -223,7 +224,7 @@ pub(crate) fn describe_robot(
         return Ok((None, description, diagnostics));
     };
     if !cfg.urdf.components.is_empty() {
-        let expected = "a robot is one MJCF file, or made of URDF files; leave out mjcf or the components of urdf";
+        let expected = "a robot comes from one MJCF file or from URDF files; remove mjcf or the components of urdf";
         return Err(Error::Config { field: "mjcf", value: format!("{:?}", file.path), expected });
     }
     let mut found = Vec::new();

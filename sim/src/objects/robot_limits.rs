@@ -121,10 +121,10 @@ impl RobotMut<'_> {
                 }
                 // The range must contain a finite target.
                 if ends[low] == f64::INFINITY {
-                    return refuse(low, "below infinity".into());
+                    return refuse(low, "a number below infinity".into());
                 }
                 if ends[high] == f64::NEG_INFINITY {
-                    return refuse(high, "above minus infinity".into());
+                    return refuse(high, "a number above minus infinity".into());
                 }
             }
         }
@@ -203,7 +203,7 @@ impl RobotMut<'_> {
                 let value = values[column];
                 explicit.model.law().check(&change(table.drives[drive].initial, value)).map_err(|expected| {
                     let of = format!("joint {:?}", self.data.joint_names()[joint]);
-                    let expected = format!("right for its model: {expected}");
+                    let expected = format!("accepted by its drive model: {expected}");
                     Error::OutOfRange { argument, row, column, item: of, value, expected }
                 })?;
             }

@@ -118,14 +118,14 @@ impl Terrain {
             cfg.heights.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         ];
         if range.iter().any(|height| height.abs() > 1e6) {
-            return fail("heights", &range, "they must be within 1e6 metres of 0");
+            return fail("heights", &range, "every height must be between -1e6 m and 1e6 m");
         }
         let length = |x: &f64| x.is_finite() && (1e-6..=1e6).contains(x);
         if !cfg.size.iter().all(length) {
-            return fail("size", &cfg.size, "both lengths must be 1e-6 to 1e6 metres");
+            return fail("size", &cfg.size, "both lengths must be 1e-6 to 1e6 m");
         }
         if !length(&cfg.thickness) {
-            return fail("thickness", &cfg.thickness, "it must be 1e-6 to 1e6 metres");
+            return fail("thickness", &cfg.thickness, "it must be 1e-6 to 1e6 m");
         }
         if let Some(friction) = cfg.friction
             && !friction.iter().all(|f| f.is_finite() && *f >= 0.0)

@@ -49,7 +49,9 @@ impl TryFrom<TerrainFile> for TerrainCfg {
                 (generator.heights().map_err(|error| error.to_string())?, generator.size())
             }
             Heights::Generated(_) => {
-                return Err("heights of a generator have its size; leave out the `size` beside `heights`".into());
+                return Err(
+                    "a height generator defines the size of the terrain; remove the `size` beside `heights`".into()
+                );
             }
         };
         Ok(Self { uid, heights, size, thickness, init_pose, friction, rgba, surface })
@@ -92,13 +94,14 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
         let generator = TerrainGenerator::deserialize(MapAccessDeserializer::new(&mut keys));
         if !keys.any {
             return Err(A::Error::custom(
-                "no generator is named; name one, such as { rough = { seed = 7 } }: `rough`, `slope` or `pyramid_stairs`",
+                "`heights` names no generator; use `rough`, `slope` or `pyramid_stairs`, such as \
+                 { rough = { seed = 7 } }",
             ));
         }
         let generator = generator?;
         match map.next_key::<IgnoredAny>()? {
             None => Ok(Heights::Generated(generator)),
-            Some(_) => Err(A::Error::custom("heights come from one generator, and here are two")),
+            Some(_) => Err(A::Error::custom("`heights` names two generators; keep one")),
         }
     }
 }

@@ -141,10 +141,10 @@ impl SimulationManager {
             Err(Error::Config { field: "weld", value: format!("{:?}", [&cfg.first, &cfg.second]), expected })
         };
         if first == second || one == other && one != 0 {
-            return fail("the two must be different bodies; what a fixed joint holds is one body");
+            return fail("the two must be different bodies; links connected by fixed joints are one body");
         }
         if one == other {
-            return fail("one of the two must move by itself: both are fixed or moved by hand");
+            return fail("at least one of the two bodies must be dynamic; both are fixed or kinematic");
         }
         let second_is_fixed = other == 0;
         let mut contents = self.entities.clone();

@@ -43,7 +43,7 @@ pub enum RandomizationError {
         expected: &'static str,
     },
     /// Gains or limits of a drive are invalid for its explicit model.
-    #[error("environment {env}: what the drive of {name:?} would have is not right for its model: {expected}")]
+    #[error("environment {env}: the drive model of {name:?} does not accept the new gains or limits: {expected}")]
     Model {
         /// Index of the environment.
         env: usize,
@@ -61,7 +61,7 @@ pub enum RandomizationError {
         reason: &'static str,
     },
     /// The number of values is not that of the property.
-    #[error("{property} of {name:?} is {expected} numbers, not {found}")]
+    #[error("{property} of {name:?} needs {expected} numbers, found {found}")]
     Width {
         /// Name of the property.
         property: &'static str,
@@ -73,7 +73,7 @@ pub enum RandomizationError {
         expected: usize,
     },
     /// The scene of an environment cannot be rendered.
-    #[error("environment {env} cannot be drawn as it would be: {error}")]
+    #[error("environment {env}: its scene cannot be rendered: {error}")]
     EnvScene {
         /// Index of the environment.
         env: usize,
@@ -84,8 +84,9 @@ pub enum RandomizationError {
     /// The center of mass of a body cannot be moved. MuJoCo 4.x keeps only the diagonal of the inertia matrix of a
     /// freely moving body with its center of mass at its origin.
     #[error(
-        "environment {env}: the centre of mass of {name:?} cannot be moved: it is nominally in the origin, and MuJoCo 4.x \
-         keeps only the diagonal of such a body's inertia matrix; give the body a nominal centre of mass beside its origin"
+        "environment {env}: the center of mass of {name:?} cannot be changed: its nominal value is the body's origin, \
+         and MuJoCo 4.x stores only the diagonal of such a body's inertia matrix; give the body a nominal center of \
+         mass that differs from its origin"
     )]
     DiagonalInertia {
         /// Index of the environment.

@@ -139,18 +139,20 @@ impl Property {
     /// Description of the elements that have the property, for messages.
     pub(super) fn element_description(self) -> &'static str {
         match self {
-            Self::Mass | Self::CenterOfMass | Self::Inertia => "body that moves and is called",
-            Self::Friction | Self::TorsionalFriction | Self::RollingFriction => "body or ground that collides, called",
-            Self::JointDamping | Self::Armature => "joint called",
+            Self::Mass | Self::CenterOfMass | Self::Inertia => "moving body",
+            Self::Friction | Self::TorsionalFriction | Self::RollingFriction => "colliding body or ground",
+            Self::JointDamping | Self::Armature => "joint",
             Self::DryFriction => {
-                "joint that can have dry friction (a robot's drive.friction makes room for it, 0 will do) called"
+                "joint with dry friction (a robot's joints have it if drive.friction is set; 0 is enough)"
             }
-            Self::Gravity => "gravity called",
-            Self::Stiffness | Self::DriveDamping | Self::MaxEffort => "joint with an implicit drive called",
-            Self::Size => "body with a box, ball, capsule, cylinder or ellipsoid called",
-            Self::Color => "body or terrain called",
-            Self::Position | Self::Rotation => "static object called",
-            Self::LinearDamping | Self::AngularDamping => "body that moves freely and is called",
+            Self::Gravity => "gravity entry",
+            Self::Stiffness | Self::DriveDamping | Self::MaxEffort => {
+                "joint with an implicit or explicit drive (not DriveModel::Actuator)"
+            }
+            Self::Size => "body with a box, sphere, capsule, cylinder or ellipsoid",
+            Self::Color => "body or terrain",
+            Self::Position | Self::Rotation => "static object",
+            Self::LinearDamping | Self::AngularDamping => "body with a free joint",
         }
     }
 
@@ -180,7 +182,7 @@ impl Property {
             }
             Self::Size => {
                 let good = |(x, nominal): (&f64, &f64)| (1e-6..=1e6).contains(x) || (*nominal == 0.0 && *x == 0.0);
-                (!values.iter().zip(nominal).all(good)).then_some("every size must be 1e-6 to 1e6 metres")
+                (!values.iter().zip(nominal).all(good)).then_some("every size must be 1e-6 to 1e6 m")
             }
             Self::Color => {
                 (!all(|x| (0.0..=1.0).contains(&x))).then_some("each of red, green, blue and opacity must be 0 to 1")
@@ -188,12 +190,12 @@ impl Property {
             Self::Rotation => {
                 let length = values.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let good = (length - 1.0).abs() <= 1e-6;
-                (!good).then_some("it must be a quaternion w, x, y, z of length 1")
+                (!good).then_some("it must be a unit quaternion w, x, y, z")
             }
             Self::CenterOfMass | Self::Gravity | Self::Position => {
                 (!all(f64::is_finite)).then_some("every number must be finite")
             }
-            Self::MaxEffort => (!all(|x| x >= 0.0)).then_some("it must be a number >= 0; infinity is no limit"),
+            Self::MaxEffort => (!all(|x| x >= 0.0)).then_some("it must be a number >= 0; infinity means no limit"),
             _ => (!all(|x| x.is_finite() && x >= 0.0)).then_some("it must be a finite number >= 0"),
         }
     }

@@ -159,17 +159,17 @@ fn sizes(kind: i32) -> usize {
 fn no_size_reason(kind: i32) -> Option<&'static str> {
     match kind as u32 {
         mj::mjGEOM_MESH => Some(
-            "it is a mesh, whose vertices MuJoCo keeps once for all that is made of it, with the hull, frame and boxes that \
-             follow from them; add the object (or the body) once for each scale and put aside those that an environment does \
-             not use, or give it boxes, balls, capsules, cylinders or ellipsoids to collide",
+            "its shape is a mesh, and MuJoCo stores the vertices, hull, frame and bounds of a mesh once for all \
+             environments; add one object (or body) per scale and move the unused ones away, or use boxes, spheres, \
+             capsules, cylinders or ellipsoids as collision shapes",
         ),
         mj::mjGEOM_HFIELD => Some(
-            "it is a height field, whose heights and extent MuJoCo keeps in one place for all environments; lay several \
-             terrains side by side and start environments on different ones",
+            "its shape is a height field, and MuJoCo stores its heights and extent once for all environments; place \
+             several terrains side by side and start environments on different ones",
         ),
-        mj::mjGEOM_PLANE => Some(
-            "it is a plane, which touches things everywhere, whatever its size; let a box of the wanted size stand for it",
-        ),
+        mj::mjGEOM_PLANE => {
+            Some("its shape is a plane, whose collision ignores the size; use a box of the required size instead")
+        }
         _ => None,
     }
 }

@@ -76,7 +76,7 @@ impl<'b> ByteReader<'b> {
 
     pub(super) fn text(&mut self) -> Result<String, Malformed> {
         let count = self.count(1)?;
-        String::from_utf8(self.take(count)?.to_vec()).map_err(|_| Malformed("a text is not UTF-8"))
+        String::from_utf8(self.take(count)?.to_vec()).map_err(|_| Malformed("a string is not UTF-8"))
     }
 
     pub(super) fn numbers(&mut self) -> Result<Vec<f64>, Malformed> {

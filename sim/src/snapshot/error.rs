@@ -7,13 +7,13 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum SnapshotError {
     /// The file is not a snapshot.
-    #[error("{path}: not a snapshot; snapshots are files that Snapshot::save wrote")]
+    #[error("{path}: not a snapshot file written by Snapshot::save")]
     NotASnapshot {
         /// Path of the file.
         path: PathBuf,
     },
     /// The file ends too early.
-    #[error("{path}: the file ends after {bytes} bytes of {expected}; it was not copied as a whole")]
+    #[error("{path}: the file is truncated: {bytes} of {expected} bytes")]
     Truncated {
         /// Path of the file.
         path: PathBuf,
@@ -23,7 +23,7 @@ pub enum SnapshotError {
         expected: u64,
     },
     /// The checksum or the length does not match the content.
-    #[error("{path}: the file is damaged: its content is not what was saved")]
+    #[error("{path}: the file is damaged: its checksum does not match")]
     Damaged {
         /// Path of the file.
         path: PathBuf,
@@ -39,7 +39,9 @@ pub enum SnapshotError {
         supported: u32,
     },
     /// The file was saved with another MuJoCo version, which would continue with other bits.
-    #[error("{path}: saved with MuJoCo {found}; this program runs MuJoCo {running}, which would go on differently")]
+    #[error(
+        "{path}: saved with MuJoCo {found}, but this program runs MuJoCo {running}, which would continue differently"
+    )]
     MujocoVersion {
         /// Path of the file.
         path: PathBuf,
@@ -49,7 +51,7 @@ pub enum SnapshotError {
         running: String,
     },
     /// The checksum is right, but the content is not a snapshot: another program wrote it.
-    #[error("{path}: {what}, though the checksum is right: not written by Snapshot::save")]
+    #[error("{path}: {what}, although the checksum matches: the file was not written by Snapshot::save")]
     Malformed {
         /// Path of the file.
         path: PathBuf,
@@ -64,7 +66,8 @@ pub enum SnapshotError {
     },
     /// The snapshot has another number of environments than the number to restore.
     #[error(
-        "the snapshot holds {saved} environments, and {requested} are to be restored; take as many, or one for all"
+        "the snapshot holds {saved} environments, but {requested} are to be restored; use a snapshot of {requested} \
+         environments, or of a single one for all"
     )]
     EnvCount {
         /// Number of environments in the snapshot.

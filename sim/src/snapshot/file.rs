@@ -116,10 +116,10 @@ fn read_content(reader: &mut ByteReader<'_>) -> Result<Snapshot, Malformed> {
     let layout = StateLayout::from_lines(lines);
     let entries = (0..reader.count(8)?).map(|_| read_entry(reader, layout.drives())).collect::<Result<Vec<_>, _>>()?;
     if !reader.0.is_empty() {
-        return Err(Malformed("something stands after the last environment"));
+        return Err(Malformed("data follows the last environment"));
     }
     if !entries.iter().all(|entry| entry.state.has_same_lengths(&entries[0].state)) {
-        return Err(Malformed("environments have different numbers of numbers"));
+        return Err(Malformed("environments have states of different sizes"));
     }
     Ok(Snapshot { layout: Arc::new(layout), entries: entries.into() })
 }
@@ -177,7 +177,7 @@ fn read_entry(reader: &mut ByteReader<'_>, drive_count: usize) -> Result<EnvEntr
     };
     let steps = |reader: &mut ByteReader<'_>| match reader.u64()? {
         steps if steps <= MAX_STEPS => Ok(steps),
-        _ => Err(Malformed("a count of steps is larger than any run's")),
+        _ => Err(Malformed("a step count is out of range")),
     };
     let size = |reader: &mut ByteReader<'_>| {
         usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))
@@ -191,12 +191,12 @@ fn read_entry(reader: &mut ByteReader<'_>, drive_count: usize) -> Result<EnvEntr
         return Err(Malformed(what));
     }
     let wrenches = finite(reader, "a wrench is not finite")?;
-    let wrenches = Wrenches::from_flat(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
+    let wrenches = Wrenches::from_flat(&wrenches).ok_or(Malformed("a wrench is incomplete"))?;
     // An index, and a list of seven numbers with its length.
     let welds = (0..reader.count(8 * 9)?).map(|_| read_weld(reader)).collect::<Result<Vec<_>, _>>()?;
     let draws = match reader.u64()? {
         draws if draws <= MAX_STEPS => draws,
-        _ => return Err(Malformed("a count of draws is larger than any run's")),
+        _ => return Err(Malformed("a randomization count is out of range")),
     };
     // Two texts and a list with their lengths, and a number.
     let own = (0..reader.count(8 + 8 + 4 + 8)?).map(|_| read_property(reader)).collect::<Result<Vec<_>, _>>()?;
@@ -230,23 +230,23 @@ fn read_property(reader: &mut ByteReader<'_>) -> Result<NamedValue, Malformed> {
     let property = property.ok_or(Malformed("a property is unknown"))?;
     let (name, nth, value) = (reader.text()?, reader.u32()?, reader.numbers()?);
     if value.len() != property.width() {
-        return Err(Malformed("a property has not all its numbers"));
+        return Err(Malformed("a property is incomplete"));
     }
     // The scene decides which numbers of a size must be 0.
     match property.invalid_reason(&value, &value) {
         None => Ok(NamedValue { property, name, nth, value: value.into() }),
-        Some(_) => Err(Malformed("a property has a value that cannot be")),
+        Some(_) => Err(Malformed("a property has an invalid value")),
     }
 }
 
 fn read_weld(reader: &mut ByteReader<'_>) -> Result<Weld, Malformed> {
     let equality = usize::try_from(reader.u64()?).map_err(|_| Malformed("a number is too large for this machine"))?;
-    let pose: [f64; 7] = reader.numbers()?.try_into().map_err(|_| Malformed("a weld has not all its numbers"))?;
+    let pose: [f64; 7] = reader.numbers()?.try_into().map_err(|_| Malformed("a weld is incomplete"))?;
     let length = pose[3..].iter().map(|q| q * q).sum::<f64>();
     if pose.iter().all(|number| number.is_finite()) && (length - 1.0).abs() < 1e-6 {
         Ok(Weld { equality, pose })
     } else {
-        Err(Malformed("the pose of a weld is none"))
+        Err(Malformed("the pose of a weld is invalid"))
     }
 }
 
@@ -390,7 +390,7 @@ mod tests {
         }
         assert!(refused > 100 && stepped > 1000, "{refused} {stepped}");
         env.load_state(&like);
-        assert_eq!(env.save_state(), like, "what was restored meanwhile left nothing behind");
+        assert_eq!(env.save_state(), like, "restoring leaves no trace of the intermediate state");
     }
 
     /// Error of a snapshot with changed entries.

@@ -72,7 +72,7 @@ impl StateLayout {
             return None;
         }
         let count = self.0.len().max(scene.0.len());
-        let at = |lines: &[String], i: usize| lines.get(i).cloned().unwrap_or_else(|| "nothing more".into());
+        let at = |lines: &[String], i: usize| lines.get(i).cloned().unwrap_or_else(|| "no further element".into());
         let first = (0..count).find(|&i| self.0.get(i) != scene.0.get(i)).unwrap_or(0);
         Some(format!("it has {}, this scene has {}", at(&self.0, first), at(&scene.0, first)))
     }

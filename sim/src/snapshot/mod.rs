@@ -89,7 +89,7 @@ impl Snapshot {
         }
         let like = simulation.batch.read(0, |env| env.save_state());
         if !self.entries.iter().all(|entry| entry.state.has_same_lengths(&like)) {
-            let difference = "its states have other numbers of numbers".into();
+            let difference = "its states have different sizes".into();
             return Err(SnapshotError::OtherScene { difference }.into());
         }
         match self.entries.len() {

@@ -26,13 +26,13 @@ impl SavedProperties {
             let elements = tables.elements(values[0].property);
             for NamedValue { property, name, nth, value } in values {
                 let element = elements.get(&(name.as_str(), *nth)).copied().ok_or_else(|| {
-                    let difference = format!("it has {} of {name:?}, this scene has none", property.name());
+                    let difference = format!("it has {} of {name:?}, which this scene does not have", property.name());
                     SnapshotError::OtherScene { difference }
                 })?;
                 let nominal = tables.nominal(*property, element);
                 let has_none = |(number, nominal): (&f64, &f64)| *nominal == 0.0 && *number != 0.0;
                 let other_shape = *property == Property::Size && value.iter().zip(nominal).any(has_none);
-                let other_shape = other_shape.then_some("numbers of a size that the shape does not have must be 0");
+                let other_shape = other_shape.then_some("size components that the shape does not use must be 0");
                 if let Some(expected) = property.invalid_reason(value, nominal).or(other_shape) {
                     let (property, name, value) = (property.name(), name.clone(), value.to_vec());
                     return Err(RandomizationError::Value { env, property, name, value, expected }.into());

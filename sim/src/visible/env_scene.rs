@@ -67,9 +67,9 @@ mod tests {
             let (size, color) = ([(0, &size[..])].into(), [red, 0.0, 0.0, 1.0]);
             visible.env_scene(&model, &size, &[(0, &color[..])].into())
         };
-        let error = look([0.1, 0.0, 0.3], 0.5).expect_err("no box is flat");
+        let error = look([0.1, 0.0, 0.3], 0.5).expect_err("a box has three nonzero sizes");
         assert!(matches!(error, RenderSceneError::Size { shape: "box", .. }), "{error}");
-        let error = look([0.1, 0.2, 0.3], f64::NAN).expect_err("no colour");
+        let error = look([0.1, 0.2, 0.3], f64::NAN).expect_err("not a color");
         assert!(matches!(error, RenderSceneError::Material { .. }), "{error}");
         // Control.
         assert!(look([0.4, 0.2, 0.3], 0.5).is_ok_and(|own| own.0.is_some()));

@@ -37,9 +37,9 @@ impl<'a> GeomShapes<'a> {
                 Mesh { mesh: data.and_then(|data| self.mesh(data)).ok_or("its mesh has no triangles")? }.into()
             }
             mj::mjGEOM_HFIELD => {
-                data.and_then(|data| self.height_field(data)).ok_or("its height field cannot be drawn")?.into()
+                data.and_then(|data| self.height_field(data)).ok_or("its height field cannot be rendered")?.into()
             }
-            kind => return shape_from_size(kind, size).ok_or("cameras do not draw signed distance fields"),
+            kind => return shape_from_size(kind, size).ok_or("cameras do not render signed distance fields"),
         })
     }
 

@@ -116,7 +116,7 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
         Ok(image) => scene.skybox = Some(image),
         Err(reason) => {
             let name = file.name(ObjectKind::Texture, texture).unwrap_or_else(|| texture.to_string());
-            return Some(format!("the skybox {name} is not drawn: {reason}"));
+            return Some(format!("the skybox {name} is not rendered: {reason}"));
         }
     }
     if look.is_mujoco() {
@@ -222,7 +222,7 @@ mod tests {
             let shown = scene(change, false);
             assert_eq!((shown.headlight, shown.ambient, shown.sky), (alone.headlight, alone.ambient, alone.sky));
             assert_eq!((shown.lighting_space, shown.horizon), (LightingSpace::Display, alone.horizon));
-            assert_eq!((shown.skybox.as_ref(), active(&shown)), (alone.skybox.as_ref(), 1), "the file's lamp");
+            assert_eq!((shown.skybox.as_ref(), active(&shown)), (alone.skybox.as_ref(), 1), "the file's light");
         }
         let two: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.push(LightCfg::default());
         let none: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.clear();

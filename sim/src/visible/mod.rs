@@ -31,7 +31,7 @@ use crate::body_pose::BodyFrame;
 use crate::light_cfg::LightCfg;
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::GroundCfg;
-use kinetoscope_mujoco::{Data, Model, ObjectKind};
+use kinetoscope_mujoco::{Data, Model, ObjectKind, mjcf_keywords};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::shape::Shape;
@@ -108,6 +108,15 @@ fn element_poses(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
     }
 }
 
+/// Messages about actuators with a slider-crank, whose rods only MuJoCo's viewers draw.
+fn slider_cranks(model: &Model) -> impl Iterator<Item = String> + '_ {
+    let cranks = |kind: &i32| mjcf_keywords::transmission(*kind) == Some("cranksite");
+    model.actuator_trntype().iter().enumerate().filter(move |(_, kind)| cranks(kind)).map(|(actuator, _)| {
+        let name = model.name(ObjectKind::Actuator, actuator).unwrap_or_else(|| actuator.to_string());
+        format!("the rods of the slider-crank of actuator {name} are not rendered")
+    })
+}
+
 impl VisualScene {
     /// Creates the scene of the geoms of `model` with the lighting of MuJoCo's renderer. Each body has one mask id,
     /// each geom of the world its own.
@@ -153,7 +162,7 @@ impl VisualScene {
                     Ok(shape) => vec![VisualPart { shape, material: surfaces.of_geom(geom) }],
                     Err(reason) => {
                         let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| geom.to_string());
-                        left_out.push(format!("geom {name} is not drawn: {reason}"));
+                        left_out.push(format!("geom {name} is not rendered: {reason}"));
                         Vec::new()
                     }
                 },
@@ -179,7 +188,7 @@ impl VisualScene {
                     frame_from_instance,
                 };
                 if let Err(reason) = instance.validate() {
-                    left_out.push(format!("geom {geom} is not drawn: {reason}"));
+                    left_out.push(format!("geom {geom} is not rendered: {reason}"));
                     continue;
                 }
                 instances.push(instance);
@@ -192,14 +201,14 @@ impl VisualScene {
             let like = Instance { body, ..Instance::new(Plane { half: [1.0; 2] }, Material::default(), mask_id) };
             let like = Instance { name: Arc::clone(name), ..like };
             if let Err(reason) = deforming.add(model, &surfaces, drawable, &like, &mut instances) {
-                left_out.push(format!("{} {name} is not drawn: {reason}", drawable.class()));
+                left_out.push(format!("{} {name} is not rendered: {reason}", drawable.class()));
             }
             anchors.resize(instances.len(), Anchor::World);
         }
         for (site, identity) in identities.sites() {
             let Some(instance) = geom::of_site(model, site, identity, surfaces.of_site(site)) else { continue };
             if let Err(reason) = instance.validate() {
-                left_out.push(format!("site {site} is not drawn: {reason}"));
+                left_out.push(format!("site {site} is not rendered: {reason}"));
                 continue;
             }
             instances.push(instance);
@@ -207,12 +216,13 @@ impl VisualScene {
         }
         // Every instance was checked, but the triangles may still be too many for 31 bits.
         let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
-            left_out.push(format!("nothing is drawn: {error}"));
+            left_out.push(format!("the scene is not rendered: {error}"));
             anchors.clear();
             deforming = DeformingInstances::default();
             RenderScene::empty()
         });
         left_out.extend(lighting::set_lighting(model, look, &mut scene));
+        left_out.extend(slider_cranks(model));
         Self {
             scene: Arc::new(scene),
             anchors,
@@ -286,8 +296,8 @@ impl VisualScene {
         &self.ids
     }
 
-    /// Messages about elements that are not rendered: textures or meshes that cannot be read, and signed distance
-    /// fields, which cameras do not support.
+    /// Messages about elements that are not rendered: textures or meshes that cannot be read, and what cameras do not
+    /// support: signed distance fields and the rods of slider-cranks.
     pub fn omitted(&self) -> &[String] {
         &self.left_out
     }

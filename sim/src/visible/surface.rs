@@ -18,7 +18,7 @@ impl<'a> ModelMaterials<'a> {
         let textures: Vec<Option<Arc<Texture>>> = (0..model.ntex())
             .map(|index| {
                 texture(model, index).unwrap_or_else(|reason| {
-                    left_out.push(format!("texture {index} is not drawn: {reason}"));
+                    left_out.push(format!("texture {index} is not rendered: {reason}"));
                     None
                 })
             })

@@ -53,7 +53,10 @@ impl VisualCache {
 
     /// Reports that an environment is rendered with nominal sizes and colors.
     pub(crate) fn warn_env_scene(&mut self, env: usize, error: &kinetoscope_scene::RenderSceneError) {
-        let message = format!("environment {env} is drawn with nominal sizes and colours: its own cannot be: {error}");
+        let message = format!(
+            "environment {env} is rendered with nominal sizes and colors, because its randomized scene is invalid: \
+             {error}"
+        );
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
     }
 
@@ -64,8 +67,8 @@ impl VisualCache {
             return;
         }
         let message = format!(
-            "robot {:?} has no <visual> that can be drawn: pictures do not show it; give its links some, or write their \
-             <collision> shapes as <visual> too",
+            "robot {:?} has no <visual> that can be rendered, so images do not show it; give its links visuals, or \
+             write their <collision> shapes as <visual> too",
             description.name
         );
         let source = description.link(description.root).source.clone();
@@ -145,7 +148,7 @@ impl VisualCache {
                 self.diagnostics.push(Diagnostic::new(
                     DiagnosticKind::VisualMeshInvalid,
                     of.source.clone(),
-                    format!("{}: the visual mesh is not drawn: {error}", of.name),
+                    format!("{}: the visual mesh is not rendered: {error}", of.name),
                 ));
                 Vec::new()
             }
@@ -184,7 +187,7 @@ impl VisualCache {
             self.diagnostics.push(Diagnostic::new(
                 DiagnosticKind::TextureMissing,
                 of.source.clone(),
-                format!("{}: a texture is not drawn: {reason}", of.name),
+                format!("{}: a texture is not rendered: {reason}", of.name),
             ));
         });
         let texture = texture.ok().map(Arc::new);

@@ -163,7 +163,7 @@ fn batches() {
             rasterizer.render(&mut jobs).unwrap();
             counting.allocations.swap(0, Ordering::Relaxed)
         };
-        assert!(draw() > 0, "the control: the first batch finds no memory yet");
+        assert!(draw() > 0, "the control: the first batch allocates memory");
         assert_settles(&format!("{size:?}, {frames} frames"), draw);
     }
 }

@@ -89,7 +89,7 @@ fn steps() {
         assert_eq!(
             (captured.frame_counts()[0], captured.render_count()),
             (40, 0),
-            "it saw all of it, and drew nothing yet"
+            "every frame is captured and no frame is rendered yet"
         );
     }
 }
@@ -116,7 +116,7 @@ fn images() {
         assert_eq!(
             (all.render_count(), some.render_count()),
             (4 * frames, 3 * frames),
-            "they are drawn when they are due"
+            "frames are rendered when they are due"
         );
     }
 }

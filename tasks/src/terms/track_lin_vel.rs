@@ -12,7 +12,8 @@ pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into
     RewardTerm::new(name, weight, move |now| {
         let (moves, wanted) = (now.sim().robot(robot).root_lin_vel_b(), now.command(&command)?);
         if wanted.ncols() < 2 {
-            return Err(format!("the command {command:?} has {} columns; x and y are wanted of it", wanted.ncols()).into());
+            let found = wanted.ncols();
+            return Err(format!("the command {command:?} has {found} columns; it needs at least two, x and y").into());
         }
         let pairs = moves.rows().into_iter().zip(wanted.rows());
         let square = |k: usize, is: &ndarray::ArrayView1<'_, f64>, to: &ndarray::ArrayView1<'_, f64>| (is[k] - to[k]).powi(2);

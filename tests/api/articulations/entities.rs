@@ -55,8 +55,8 @@ fn names() {
     assert_eq!(names, ["robot/drawer_slide", "cabinet/drawer_slide", "other/drawer_slide"]);
     assert_eq!(sim.entities().robot_id("robot").unwrap(), robot);
     assert_eq!(["cabinet", "other"].map(|uid| sim.entities().articulation_id(uid).unwrap()), [first, second]);
-    assert_error(sim.entities().articulation_id("robot"), "", &["no articulation \"robot\"", "cabinet"]);
-    assert_error(sim.entities().robot_id("cabinet"), "", &["no robot \"cabinet\"", "robot"]);
+    assert_error(sim.entities().articulation_id("robot"), "", &["unknown articulation \"robot\"", "cabinet"]);
+    assert_error(sim.entities().robot_id("cabinet"), "", &["unknown robot \"cabinet\"", "robot"]);
     let view = sim.articulation(second);
     assert_eq!((view.uid(), view.dof(), view.link_names()), ("other", 1, vec!["cabinet", "drawer"]));
     assert!((view.total_mass() - 22.0).abs() < 1e-12);

@@ -455,7 +455,7 @@ fn target_range() {
         let mut world = self::world(&[driver.clone(), follower], gains(100.0, 10.0), weightless());
         let clipped = world.sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::MimicRangeClipped);
         let message = clipped.map(|d| d.message.clone()).collect::<String>();
-        assert!(message.contains("leave no range for \"d\", so they were ignored"), "{what}: {message}");
+        assert!(message.contains("leave no range for \"d\" and were ignored"), "{what}: {message}");
         let limits = world.view().qpos_limits();
         let ends = [0, 1].map(|joint| [0, 1].map(|end| limits[(0, joint, end)]));
         assert_eq!(ends, [[0.0, 0.548], [-0.548, 0.0]], "{what}");

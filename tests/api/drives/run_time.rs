@@ -270,7 +270,10 @@ fn mistakes() {
     let before = settings(&world);
     for (i, (call, parts)) in MISTAKES.iter().enumerate() {
         let message = call(&mut world.robot()).unwrap_err().to_string();
-        assert!(parts.iter().all(|part| message.contains(part)), "mistake {i}: {message:?} lacks one of {parts:?}");
+        assert!(
+            parts.iter().all(|part| message.contains(part)),
+            "mistake {i}: {message:?} must contain all of {parts:?}"
+        );
         assert_eq!(settings(&world), before, "mistake {i}: {message}");
     }
     for (name, call) in SETTERS {

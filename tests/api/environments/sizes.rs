@@ -39,11 +39,11 @@ fn size_of(sim: &SimulationManager, env: usize, name: &str) -> [f64; 3] {
 fn without_size() {
     let mut sim = world();
     let cases = [
-        ("cone", ["it is a mesh", "once for each scale"]),
-        ("part/one", ["it is a mesh", "keeps once for all"]),
-        ("hills", ["it is a height field", "side by side"]),
-        ("ground", ["it is a plane", "a box of the wanted size"]),
-        ("part/shelf", ["it is a plane", "whatever its size"]),
+        ("cone", ["its shape is a mesh", "one object (or body) per scale"]),
+        ("part/one", ["its shape is a mesh", "of a mesh once for all environments"]),
+        ("hills", ["its shape is a height field", "side by side"]),
+        ("ground", ["its shape is a plane", "a box of the required size"]),
+        ("part/shelf", ["its shape is a plane", "whose collision ignores the size"]),
     ];
     for (name, parts) in cases {
         let properties = sim.properties().of(EnvId(1)).unwrap();

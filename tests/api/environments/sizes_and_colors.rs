@@ -410,7 +410,7 @@ fn mistakes() {
         (Property::Color, "cube", &[1.1, 0.0, 0.0, 1.0], &["opacity"]),
         (Property::Color, "cube", &[0.0, -0.1, 0.0, 1.0], &["opacity"]),
         (Property::Color, "cube", &[0.0, 0.0, f64::NAN, 1.0], &["opacity"]),
-        (Property::Size, "cone", &[0.1; 3], &["it is a mesh"]),
+        (Property::Size, "cone", &[0.1; 3], &["its shape is a mesh"]),
         (Property::Size, "cube", &[0.1; 2], &["3 numbers"]),
         (Property::Color, "ground", &[0.1; 4], &["body or terrain"]),
     ];

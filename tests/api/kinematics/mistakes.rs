@@ -31,7 +31,7 @@ fn names() {
     // No joint of the part moves the link, and no joint moves the root. Their poses can still be computed.
     let above = ["robot \"robot\"", "control part \"hand\"", "\"link4\"", "\"JOINT1\"", "\"JOINT4\""];
     assert_says(ik(TipFrame::of_part("hand").at("link4")), &above);
-    assert_says(ik(TipFrame::of_part("arm").at("base_link")), &["\"base_link\"", "it stands fixed"]);
+    assert_says(ik(TipFrame::of_part("arm").at("base_link")), &["\"base_link\"", "the link is fixed to the base"]);
     assert_eq!(robot.jacobian(TipFrame::of_part("arm").at("base_link"), None, None).unwrap().dim(), (2, 6, 6));
     // A part of followers only, whose error names the drivers; and a part without joints.
     for (part, joints, parts) in [

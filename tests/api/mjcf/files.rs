@@ -29,7 +29,7 @@ fn bad_files() {
         (
             "bad.xml",
             "<mujoco>\n<worldbody>\n<body>\n<geom sise=\"1\"/>\n</body></worldbody></mujoco>",
-            &["part \"part\"", "bad.xml", "sise", "geom", "line 4"][..],
+            &["MJCF part \"part\"", "bad.xml", "sise", "geom", "line 4"][..],
         ),
         (
             "mass.xml",
@@ -53,7 +53,7 @@ fn bad_files() {
     }
     for text in ["", "no xml", "<mujoco><asset><mesh file=\"none.obj\"/></asset></mujoco>"] {
         let reported = refused(MjcfPartCfg::text("part", text));
-        assert!(reported.contains("part \"part\": text: MuJoCo refuses"), "{reported}");
+        assert!(reported.contains("part \"part\": text: MuJoCo rejected the model"), "{reported}");
     }
 }
 
@@ -79,11 +79,11 @@ fn left_out_sensors() {
     let parts = uids.map(|uid| sim.add_mjcf(MjcfPartCfg::file(uid, &path)).unwrap());
     for uid in uids {
         for (line, name, what) in [
-            (5, "all", "subtreecom of the world, which holds the whole scene"),
+            (5, "all", "subtreecom of the world body, which contains the whole scene"),
             (7, "u", "the type user"),
-            (8, "sensor4", "force of the world"),
+            (8, "sensor4", "force of the world body, which contains the whole scene"),
         ] {
-            let text = format!("odd.xml:{line}: part {uid:?}: sensor {name:?}: {what}");
+            let text = format!("odd.xml:{line}: MJCF part {uid:?}: sensor {name:?}: {what}");
             assert_eq!(count_diagnostics(&sim, &[&text, "[element-ignored]"]), 1, "{text}: {:#?}", sim.diagnostics());
         }
     }
@@ -100,7 +100,7 @@ fn left_out_sensors() {
     }
     assert_ne!(sensor.value("first/angle").unwrap(), sensor.value("second/angle").unwrap(), "the control");
     let named = MujocoSensorCfg { sensors: Some(vec!["first/all".into()]), ..Default::default() };
-    assert_error(sim.add_sensor("none", named), "", &["no MuJoCo sensor \"first/all\"; known are \"first/"]);
+    assert_error(sim.add_sensor("none", named), "", &["unknown MuJoCo sensor \"first/all\"; known names: \"first/"]);
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn unique_names() {
     }
     let object = RigidObjectCfg { uid: "m".into(), ..Default::default() };
     assert_error(sim.add_rigid_object(object), "DuplicateUid", &[]);
-    assert_error(sim.entities().mjcf_id("n"), "", &["known are \"m\""]);
+    assert_error(sim.entities().mjcf_id("n"), "", &["known names: \"m\""]);
 }
 
 /// Elements of 4.x that cannot be written back are refused by name, never left out; unsupported sensors are left out.
@@ -135,9 +135,9 @@ fn newer_elements() {
     let cloth = "<worldbody><body name=\"c\" pos=\"0 0 3\"><flexcomp name=\"f\" type=\"grid\" count=\"3 3 1\" spacing=\"0.1 0.1 0.1\" \
                  dim=\"2\" mass=\"1\" radius=\"0.01\"/></body></worldbody>";
     for (inside, after, parts) in [
-        ("", cloth, ["flex \"0\"", "deforms"]),
-        ("stiffness=\"1 2 3\"", "", ["joint \"j\"", "stiffness of higher order"]),
-        ("damping=\"1 -2 0\"", "", ["joint \"j\"", "damping of higher order"]),
+        ("", cloth, ["flex \"0\"", "a deformable (flex) body"]),
+        ("stiffness=\"1 2 3\"", "", ["joint \"j\"", "nonlinear (polynomial) stiffness"]),
+        ("damping=\"1 -2 0\"", "", ["joint \"j\"", "nonlinear (polynomial) damping"]),
         ("", delayed, ["actuator \"a\"", "delay"]),
     ] {
         assert_error(part(inside, after), "MjcfPart", &parts);
@@ -145,7 +145,7 @@ fn newer_elements() {
     for (sensor, what) in [
         ("<contact name=\"x\" geom1=\"g\"/>", "the type contact"),
         ("<jointpos name=\"x\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/>", "delay"),
-        ("<rangefinder name=\"x\" site=\"s\" data=\"dist dir\"/>", "rangefinder data other than a distance"),
+        ("<rangefinder name=\"x\" site=\"s\" data=\"dist dir\"/>", "rangefinder output other than the distance"),
     ] {
         let said = part("", &format!("<sensor>{sensor}</sensor>")).unwrap();
         assert!(said.len() == 1 && said[0].to_string().contains(&format!("sensor \"x\": {what}")), "{said:#?}");
@@ -164,13 +164,13 @@ fn ignored_settings() {
     let mut sim = empty(1);
     sim.add_mjcf(MjcfPartCfg::file("set", files.write("set.xml", text))).unwrap();
     for words in [
-        &["set.xml:3", "timestep is 0.004", "0.002 holds", "[setting-ignored]"][..],
-        &["set.xml:3", "gravity is 0 0 -1.62", "0 0 -9.81 holds"],
-        &["set.xml:3", "integrator is RK4", "Euler holds"],
-        &["set.xml:3", "flag contact is disable", "enable holds"],
-        &["more.xml:3", "cone is elliptic", "pyramidal holds"],
-        &["set.xml:6", "<visual> is left out"],
-        &["1 keyframe(s) are left out"],
+        &["set.xml:3", "timestep is 0.004", "0.002 is used", "[setting-ignored]"][..],
+        &["set.xml:3", "gravity is 0 0 -1.62", "0 0 -9.81 is used"],
+        &["set.xml:3", "integrator is RK4", "Euler is used"],
+        &["set.xml:3", "flag contact is disable", "enable is used"],
+        &["more.xml:3", "cone is elliptic", "pyramidal is used"],
+        &["set.xml:6", "<visual> is ignored"],
+        &["1 keyframe(s) are ignored"],
     ] {
         assert!(count_diagnostics(&sim, words) > 0, "{words:?}: {:#?}", sim.diagnostics());
     }
@@ -179,7 +179,7 @@ fn ignored_settings() {
     // A setting that the file leaves at MuJoCo's default, and that differs in the scene, is reported too.
     let mut other = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() }).unwrap();
     other.add_mjcf(MjcfPartCfg::text("plain", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>")).unwrap();
-    let said = count_diagnostics(&other, &["timestep is 0.002, MuJoCo's default; the scene's 0.01 holds"]);
+    let said = count_diagnostics(&other, &["timestep is 0.002, MuJoCo's default; the scene's value 0.01 is used"]);
     assert_eq!((said, other.diagnostics().len()), (1, 1), "{:#?}", other.diagnostics());
 }
 
@@ -195,7 +195,7 @@ fn scene_files() {
     assert_eq!(scene.mjcf_part("m").unwrap().actuator_names().len(), 3);
     assert_eq!(scene.sensor::<MujocoSensor>("own").unwrap().values().dim(), (1, 3));
     scene.mjcf_part_mut("m").unwrap().set_ctrl(&array![[0.1, 0.2, 0.3]], None, None).unwrap();
-    assert_eq!(scene.robot("m").unwrap_err().to_string(), "\"m\" is a MJCF part, not a robot");
+    assert_eq!(scene.robot("m").unwrap_err().to_string(), "\"m\" is an MJCF part, not a robot");
     // A scene file is unchanged by writing and reading it again.
     let cfg = SceneCfg::from_file(&file).unwrap();
     let again = SceneCfg::from_toml(&cfg.to_toml(&EntityTypes::default()).unwrap(), "x.toml", &EntityTypes::default());
@@ -256,17 +256,17 @@ fn exported_for_2_2_2() {
         "material \"steel\": roughness 0.25",
         "body \"arm\": gravcomp 1",
         "joint \"hinge\": actuatorfrcrange [-3.0, 3.0]",
-        "equality \"hold\": the whole weld, which is between sites",
+        "equality \"hold\": the whole weld, because it connects sites",
         "tendon \"string\": armature 0.2",
         "tendon \"string\": actuatorfrcrange [-2.0, 2.0]",
-        "actuator \"late\": dyntype filterexact, for which filter stands",
+        "actuator \"late\": dyntype filterexact (replaced by filter)",
         "sensor \"effort\": the type jointactuatorfrc",
         "sensor \"energy\": the type e_kinetic",
         "sensor \"tension\": the type tendonactuatorfrc",
         "sensor \"height\": the type e_potential",
     ] {
         let message =
-            format!("part \"new\": {what}: MuJoCo 2.2.2 does not know it, and it is left out of robot.mjcf2.xml");
+            format!("MJCF part \"new\": {what}: left out of robot.mjcf2.xml, because MuJoCo 2.2.2 does not support it");
         let at =
             said.iter().position(|m| *m == message).unwrap_or_else(|| panic!("not reported: {message}: {said:#?}"));
         said.swap_remove(at);

@@ -21,7 +21,7 @@ fn reads_and_writes() {
     assert_eq!(read.qpos_columns(&["free", "shoulder"]).unwrap(), [6..13, 0..1]);
     assert_eq!(read.qvel_columns(&["free", "wrist"]).unwrap(), [5..11, 1..4]);
     assert_eq!(read.actuator_ids(&["pu.*"]).unwrap(), [ActuatorIndex(1), ActuatorIndex(2)]);
-    assert_error(read.actuator_ids(&["srevo"]), "", &["part \"m\"", "\"servo\""]);
+    assert_error(read.actuator_ids(&["srevo"]), "", &["MJCF part \"m\"", "\"servo\""]);
     assert_error(read.body_pose("hnad"), "", &["\"hand\""]);
 
     let start = read.qpos();

@@ -183,7 +183,7 @@ fn joints_of_robots() {
     assert_eq!(sensor.controls(), array![[0.0, 0.1, 0.2]]);
     assert_eq!(sensor.forces().row(0).to_vec()[1..], qf.row(0).to_vec()[..2]);
     assert!(qf[(0, 1)].abs() > 1.0, "the control: it carries a load");
-    assert_error(empty(1).add_sensor("none", ActuatorStateCfg::default()), "", &["measure nothing"]);
+    assert_error(empty(1).add_sensor("none", ActuatorStateCfg::default()), "", &["has nothing to measure"]);
 }
 
 /// Masses with their centers in the frame of the arm: the arm's own, and that of the tool, which is welded to the arm
@@ -258,7 +258,7 @@ fn sites() {
     let mut sim = empty(2);
     let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.1, 0.2, -0.4]);
     let part = sim.add_mjcf(MjcfPartCfg { init_pose, ..MjcfPartCfg::text("m", MACHINE) }).unwrap();
-    assert!(count_diagnostics(&sim, &["the site \"plate\" is called as a body"]) > 0);
+    assert!(count_diagnostics(&sim, &["the site \"plate\" has the same name as a body"]) > 0);
     let targets = SITES.iter().map(|site| TargetFrameCfg::for_bodies(format!("m/{site}"))).collect();
     let frames = sim.add_sensor("frames", FrameTransformerCfg::new("m/elbow", targets)).unwrap();
     let extrinsics = Extrinsics { parent: Some("m/palm".into()), ..Default::default() };
@@ -314,5 +314,5 @@ fn welded_frames() {
     }
     sim.add_sensor("w", wrench("m/arm")).unwrap();
     let unknown = FrameTransformerCfg::new("m/elbwo", vec![]);
-    assert_error(sim.add_sensor("f", unknown), "", &["known are \"m/elbow\""]);
+    assert_error(sim.add_sensor("f", unknown), "", &["known names: \"m/elbow\""]);
 }

@@ -85,7 +85,7 @@ fn joined_to_the_world() {
     let bob = sim.robot(id).link_pose("bob").unwrap();
     assert!((0..3).all(|k| (bob[(0, k)] - [0.3 - 0.5, 1.0, 2.0][k]).abs() < 1e-12), "{bob}");
     let free = empty(1).add_robot(RobotCfg { fix_base: false, ..passive(robot("p", text)) });
-    assert_error(free, "", &["joint \"rail\" holds the root body \"cart\"", "fix_base: true"]);
+    assert_error(free, "", &["joint \"rail\" connects the root body \"cart\" to the world", "fix_base: true"]);
 }
 
 /// A massless body fixed in the file gets the minimal mass of a floating base, as a URDF's does, with one diagnostic. A

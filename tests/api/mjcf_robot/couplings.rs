@@ -75,7 +75,7 @@ fn curves_and_circles() {
         (circle.as_str(), None),
     ] {
         let (mut sim, id) = with(1, hand(equalities));
-        assert_eq!(count_diagnostics(&sim, &["no mimic says it"]), 1, "{:?}", sim.diagnostics());
+        assert_eq!(count_diagnostics(&sim, &["is not a linear mimic relation"]), 1, "{:?}", sim.diagnostics());
         let Some(expected) = qpos else {
             assert!(count_diagnostics(&sim, &["joint \"crank\" has no drive"]) > 0, "{:?}", sim.diagnostics());
             // crank = 0.1 + right, right = 0.1 (left + 0.2) and left = -0.15 - 1.5 (crank - 0.1) have one common

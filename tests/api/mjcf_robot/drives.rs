@@ -29,7 +29,7 @@ fn gains_and_limits() {
     assert_eq!((of.armature()[(0, 0)], of.friction()[(0, 5)]), (0.1, 0.3));
     let types = of.drive_types();
     assert_eq!((types[(0, 4)], types[(0, 5)]), (DriveType::Force, DriveType::None));
-    assert_reported(&sim, &["the place of the actuators \"p\", \"m\", \"v\", \"m2\""]);
+    assert_reported(&sim, &["joint drives replace the actuators \"p\", \"m\", \"v\", \"m2\""]);
     assert_reported(&sim, &["actuator \"t\" acts on the tendon \"both\""]);
 
     // The configuration overrides the named joints; a named joint without an actuator is driven too.
@@ -75,7 +75,7 @@ fn followers() {
     let b = of.joint_id("b").unwrap();
     assert_eq!((of.stiffness(), of.damping()), (array![[0.0, 122.5, 0.0]], array![[0.0, 9.0, 0.0]]));
     assert_eq!((of.qf_limits()[(0, 1)], of.drive_types()[(0, 1)]), (60.0, DriveType::Force));
-    assert_reported(&sim, &["actuator \"pa\"", "\"a\" follows \"b\""]);
+    assert_reported(&sim, &["actuator \"pa\"", "\"a\" is a mimic joint of \"b\""]);
     sim.robot_mut(id).set_qpos_target(&array![[0.3]], Some(&[b]), None).unwrap();
     sim.update(2000);
     let qpos = sim.robot(id).qpos();
@@ -86,7 +86,7 @@ fn followers() {
     let (sim, id) = with(1, robot("r", &CHAIN.replace("0 -0.5 0 0 0", "0 -0.5 0.1 0 0")));
     assert!(sim.robot(id).drive_types().iter().all(|kind| *kind == DriveType::None));
     for name in ["pa", "pc"] {
-        assert_reported(&sim, &[&format!("actuator {name:?}"), "an equality holds"]);
+        assert_reported(&sim, &[&format!("actuator {name:?}"), "a joint equality that is not a mimic relation"]);
     }
 }
 
@@ -140,7 +140,7 @@ fn gripper() {
     let (sim, id) = with(1, robot("r", &GRIPPER.replace('%', "-1")));
     assert_eq!(sim.robot(id).drive_types()[(0, 0)], DriveType::None);
     assert_eq!(sim.robot(id).stiffness(), Array2::<f64>::zeros((1, 2)));
-    assert_reported(&sim, &["actuator \"grip\"", "never moves \"left\""]);
+    assert_reported(&sim, &["actuator \"grip\"", "its effort on \"left\" is always zero"]);
 }
 
 /// The scale of a control is not part of the gains, and each difference between a drive and the actuator is reported.
@@ -155,12 +155,18 @@ fn differences() {
         (r#"range="0 0.05""#, with_scaled(r#"ctrlrange="0 255""#), servo, infinite, "0 .. 255 does not limit"),
         ("", with_scaled(r#"ctrlrange="0 255""#), servo, infinite, "its ctrlrange"),
         ("", with_scaled(r#"forcerange="0 5""#), servo, 5.0, "its forcerange 0 .. 5 became -5 .. 5"),
-        ("", with_scaled(r#"dyntype="filter" dynprm="0.1""#), servo, infinite, "its activation (filter)"),
+        ("", with_scaled(r#"dyntype="filter" dynprm="0.1""#), servo, infinite, "its activation dynamics (filter)"),
         ("", r#"gainprm="2" ctrlrange="-1 3" forcerange="-5 5""#.into(), plain, 5.0, "-2 .. 6 became -6 .. 6"),
         ("", r#"gainprm="2" ctrlrange="-1 1" forcerange="-5 5""#.into(), plain, 2.0, ""),
-        ("", r#"biastype="affine" gainprm="5" biasprm="1 -5 0""#.into(), plain, infinite, "no servo and no motor"),
+        (
+            "",
+            r#"biastype="affine" gainprm="5" biasprm="1 -5 0""#.into(),
+            plain,
+            infinite,
+            "neither a position or velocity servo nor a motor",
+        ),
         ("", r#"gaintype="affine" gainprm="5 1 0""#.into(), plain, infinite, "gaintype affine"),
-        ("", r#"gear="0""#.into(), (0.0, 0.0), infinite, "never moves"),
+        ("", r#"gear="0""#.into(), (0.0, 0.0), infinite, "its effort on \"j\" is always zero"),
     ] {
         let text = format!(
             r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="1"/>
@@ -171,9 +177,9 @@ fn differences() {
         let of = sim.robot(id);
         let found = (of.stiffness()[(0, 0)], of.damping()[(0, 0)]);
         assert_eq!((found, of.qf_limits()[(0, 0)]), (gains, limit), "{actuator}");
-        let all = count_diagnostics(&sim, &["differs from its drive"]);
+        let all = count_diagnostics(&sim, &["differs from the drive that replaces it"]);
         let expected = usize::from(!words.is_empty());
-        let named = count_diagnostics(&sim, &["differs from its drive", "actuator \"x\"", words]);
+        let named = count_diagnostics(&sim, &["differs from the drive that replaces it", "actuator \"x\"", words]);
         assert_eq!((all, named), (expected, expected), "{actuator}: {:#?}", sim.diagnostics());
     }
 }

@@ -20,7 +20,7 @@ fn unnamed_elements() {
     // The joint named joint0 in the file keeps its name; the unnamed joint before it gets another.
     assert_eq!(sim.robot(id).joint_names(), ["joint0_", "joint0", "joint2"]);
     let links = ["body1", "joint1", "body3", "joint1.site"];
-    assert_eq!(sim.robot(id).link_names(), links, "a site that is called as a body");
+    assert_eq!(sim.robot(id).link_names(), links, "a site with the same name as a body");
     assert!(sim.diagnostics().iter().any(|d| d.kind == DiagnosticKind::NameClash));
 }
 
@@ -93,7 +93,7 @@ fn humanoid() {
         mjcf: Some(MjcfFile::new(kinetoscope_testkit::test_resources::sample_model(name))),
         ..Default::default()
     };
-    assert_error(empty(1).add_robot(of_file("humanoid/22_humanoids.xml")), "", &["bodies in its world"]);
+    assert_error(empty(1).add_robot(of_file("humanoid/22_humanoids.xml")), "", &["top-level bodies"]);
     let (mut sim, id) = with(2, of_file("humanoid/humanoid.xml"));
     let of = sim.robot(id);
     assert_eq!((of.dof(), of.qpos().dim(), of.root_pose().dim()), (21, (2, 21), (2, 7)));

@@ -57,9 +57,13 @@ fn no_robots() {
     let several = "<body name='a'><geom size='1'/></body><body name='b'><joint/><geom size='1'/></body><body><geom size='1'/></body>";
     for (inside, kind, says) in [
         ("<geom size='1'/>", "NoBody", ""),
-        (several, "SeveralRoots", "3 bodies in its world (\"a\", \"b\", \"body3\")"),
-        ("<body><geom size='1'/></body>", "NoJoint", "such a file is a scene"),
-        ("<body><freejoint/><geom size='1'/></body>", "NoJoint", "such a file is a scene"),
+        (several, "MultipleRoots", "3 top-level bodies (\"a\", \"b\", \"body3\")"),
+        ("<body><geom size='1'/></body>", "NoJoint", "add the file with add_mjcf (entity type mjcf) instead"),
+        (
+            "<body><freejoint/><geom size='1'/></body>",
+            "NoJoint",
+            "add the file with add_mjcf (entity type mjcf) instead",
+        ),
         ("<body mocap='true' name='m'><body><joint/><geom size='1'/></body></body>", "MocapBody", "\"m\""),
     ] {
         let (error, said) = refusal_reason(&format!("<mujoco><worldbody>{inside}</worldbody></mujoco>"));
@@ -75,19 +79,22 @@ fn named_elements() {
                 <site name='s'/>%</body></body><site name='w'/></worldbody>";
     let string = |to: &str| format!("<tendon><spatial name='t'><site site='s'/><site site='{to}'/></spatial></tendon>");
     let site = "<body><site name='s2' pos='0 0 1'/></body>";
-    let acts = ["robot.xml:4: robot \"robot\": actuator \"m\" acts on ", "such a file is a scene"];
+    let acts = [
+        "robot.xml:4: robot \"robot\": actuator \"m\" acts on ",
+        "add the file with add_mjcf (entity type mjcf) instead",
+    ];
     let actuator = |of: &str| format!("{}\n<actuator>{of}</actuator>", string("s2"));
     let rows = [
         (
             "<body><joint name='ball' type='ball'/><geom size='1'/></body>",
             String::new(),
-            &["tree.xml:5: joint \"ball\" is a ball"][..],
+            &["tree.xml:5: joint \"ball\" is a ball joint"][..],
             "",
         ),
         (site, actuator("<motor name='m' site='s'/>"), &acts, "a site"),
         (site, actuator("<motor name='m' tendon='t'/>"), &acts, "the spatial tendon \"t\""),
         (site, actuator("<general name='m' cranksite='s' slidersite='s2' cranklength='1'/>"), &acts, "a cranksite"),
-        ("", string("w"), &["robot.xml:3: robot \"robot\": tendon \"t\" needs \"w\" in the file's world"], ""),
+        ("", string("w"), &["robot.xml:3: robot \"robot\": tendon \"t\" refers to \"w\" of <worldbody>"], ""),
     ];
     assert_errors(rows.map(|(inside, after, parts, target)| {
         files.write("tree.xml", format!("<mujocoinclude>\n{}</mujocoinclude>", tree.replace('%', inside)));
@@ -108,8 +115,8 @@ fn world_of_the_file() {
     let (sim, _) = with(1, robot("r", text));
     assert_eq!((sim.batch().model().ngeom(), sim.batch().model().npair()), (2, 0));
     for words in [
-        "robot \"r\": what stands in the file's world is no part of it: geom \"floor\", site \"mark\", light \"sun\"",
-        "sensor \"seen\": site \"mark\", which a robot leaves out",
+        "robot \"r\": elements directly in <worldbody> are not imported: geom \"floor\", site \"mark\", light \"sun\"",
+        "sensor \"seen\": site \"mark\", which a robot does not import",
     ] {
         assert_eq!(count_diagnostics(&sim, &[words]), 1, "{words}: {:#?}", sim.diagnostics());
     }
@@ -123,12 +130,12 @@ const NO_BITS: &str = r#"contype="0" conaffinity="0""#;
 #[test]
 fn ground() {
     let (pair, exclude) = (r#"<pair geom1="foot" geom2="floor"/>"#, r#"<exclude body1="world" body2="b"/>"#);
-    let paired = ["\"foot\"", "\"floor\"", "pairs with what stands"];
+    let paired = ["\"foot\"", "\"floor\"", "contact pairs with geoms of <worldbody> are not imported"];
     let floor = r#"<geom name="floor" type="plane" size="1 1 1"/>"#;
     for (bits, floor, contact, stands, words, said) in [
         (NO_BITS, floor, pair, true, &paired[..], 1),
-        (NO_BITS, floor, "", false, &["pairs with"], 0),
-        (NO_BITS, "", "", false, &["pairs with"], 0),
+        (NO_BITS, floor, "", false, &["contact pairs with"], 0),
+        (NO_BITS, "", "", false, &["contact pairs with"], 0),
         ("", floor, exclude, true, &["body \"b\" collides with the scene"], 1),
         ("", "", "", true, &["collides with the scene"], 0),
         (r#"contype="0" conaffinity="1""#, "", "", true, &["collides with the scene"], 0),

@@ -117,7 +117,7 @@ fn excluded_objects() {
     };
     let (mut sim, ids) = stack();
     for (one, other) in [("bal", "block"), ("block", "bal"), ("ground", "bal")] {
-        assert_error(sim.exclude_collision(one, other), "UnknownName { what: \"body called\"", &["\"ball\""]);
+        assert_error(sim.exclude_collision(one, other), "UnknownName { what: \"body\"", &["\"ball\""]);
     }
     for name in ["ball", "world"] {
         assert_error(sim.exclude_collision(name, name), "Config { field: \"exclude_collision\"", &[]);

@@ -128,9 +128,9 @@ fn writes() {
 fn places() {
     let (mut sim, shelf, _) = moved::shelf(2, 0.5);
     let rows = [
-        ("length", (Property::Rotation, "shelf", &[1.0, 1.0, 0.0, 0.0][..]), "", ["length 1"]),
+        ("length", (Property::Rotation, "shelf", &[1.0, 1.0, 0.0, 0.0][..]), "", ["unit quaternion"]),
         ("infinite", (Property::Position, "shelf", &[f64::INFINITY, 0.0, 0.0]), "", ["finite"]),
-        ("moves", (Property::Position, "ball", &[0.0; 3]), "", ["static object called"]),
+        ("moves", (Property::Position, "ball", &[0.0; 3]), "", ["static object \"ball\""]),
     ];
     let pose = |sim: &SimulationManager| sim.rigid_object(shelf).pose();
     assert_errors_unchanged(&mut sim, pose, rows, |sim, (property, name, value)| {

@@ -67,7 +67,7 @@ fn mistakes() {
     assert!(matches!(scene.robot_mut("zebra"), Err(Error::EntityType { .. })));
     assert!(matches!(scene.sensor_mut::<Camera>("touch"), Err(Error::EntityType { .. })));
     let message = scene.rigid_object("zebre").unwrap_err().to_string();
-    let start = "there is no entity of the scene called \"zebre\"; known are \"zebra\", ";
+    let start = "unknown scene entity \"zebre\"; known names: \"zebra\", ";
     assert!(message.starts_with(start) && message.contains("apple") && message.contains("touch"), "{message}");
     for cfg in [two_cubes().with("zebra", cube(2.0)), two_cubes().with("{ENV}/touch", cube(2.0))] {
         assert!(matches!(InteractiveScene::new(cfg), Err(Error::DuplicateUid(_))));

@@ -73,6 +73,6 @@ fn handles_of_another_manager() {
     ];
     for act in uses {
         let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| act(&mut other, id))).unwrap_err();
-        assert_eq!(*panic.downcast::<&str>().unwrap(), "this handle is of another SimulationManager");
+        assert_eq!(*panic.downcast::<&str>().unwrap(), "this handle belongs to another SimulationManager");
     }
 }

@@ -115,9 +115,9 @@ fn names() {
     );
     // The message texts of two errors.
     let text = rejected(sim, &JointStateCfg { joints: some("JOINT7"), ..Default::default() }).to_string();
-    assert!(text.contains("no joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
+    assert!(text.contains("unknown joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
     let text = rejected(sim, &frames("cub", &["cube"])).to_string();
-    assert!(text.contains("no body \"cub\"; known are \"cube\""), "{text}");
+    assert!(text.contains("unknown body \"cub\"; known names: \"cube\""), "{text}");
     let same = frames("cube", &["cube", "cube"]);
     refuses!(sim, SensorError::DuplicateName { what: "target frame", name } if name == "cube" => same);
     // A fused link has no joint to measure.

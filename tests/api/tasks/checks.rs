@@ -15,7 +15,7 @@ fn good_tasks() {
     let found = check(&mut Carts::new(3, 1.0, 20), 7);
     assert!(found.iter().all(is_accepted) && found.len() == 2, "{found:?}");
     let messages: Vec<String> = found.iter().map(ToString::to_string).collect();
-    assert!(messages[0].contains("a column too many") && messages[1].contains("no number"), "{messages:?}");
+    assert!(messages[0].contains("one column too many") && messages[1].contains("a NaN action"), "{messages:?}");
 }
 
 /// Faults of an environment that the check must detect.
@@ -146,7 +146,7 @@ fn broken_tasks() {
             |f| matches!(f, Finding::ActionClamping(apart) if apart.what == "reward"),
             "beyond their bounds",
         ),
-        (Fault::NeverRestarts, |f| matches!(f, Finding::NoAutoReset { .. }), "no other began"),
+        (Fault::NeverRestarts, |f| matches!(f, Finding::NoAutoReset { .. }), "no new one began"),
         (Fault::WrongFinalObservations, |f| matches!(f, Finding::FinalObservation { .. }), "final_observations"),
         (Fault::NanReward, |f| matches!(f, Finding::Reward { env: 2, value, .. } if value.is_nan()), "reward"),
         (Fault::StepFails, |f| matches!(f, Finding::UnexpectedError { what, .. } if what == "step 4"), "step 4"),

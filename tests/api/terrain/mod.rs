@@ -191,7 +191,7 @@ fn mistakes() {
         ("ground", bumps(), "taken"),
         ("a/b", bumps(), "not usable"),
         ("other", with_height((3, 7), f64::NAN), "heights[3, 7] (terrain \"other\") is NaN"),
-        ("other", with_height((0, 0), 1e9), "within 1e6 metres"),
+        ("other", with_height((0, 0), 1e9), "between -1e6 m and 1e6 m"),
         ("other", of_shape((1, 5)), "at least 2 rows"),
         ("other", of_shape((0, 0)), "at least 2 rows"),
         ("other", of_shape((3000, 3000)), "at most 4194304 points"),

@@ -108,6 +108,6 @@ fn refused() {
     assert!(text(OffscreenScene::of_mjcf(&path, Some(&[0.0, 0.0]))).contains("[1]"));
     assert!(text(OffscreenScene::of_mjcf(&path, Some(&[f64::NAN]))).contains("finite"));
     let still = OffscreenScene::of_mjcf(&path, Some(&[0.5])).unwrap();
-    assert!(still.camera("front").unwrap_err().to_string().contains("there are none"));
+    assert!(still.camera("front").unwrap_err().to_string().contains("no names are defined"));
     assert!(OffscreenScene::of_mjcf(files.write("broken.xml", "<mujoco><worldbody><geom size="), None).is_err());
 }

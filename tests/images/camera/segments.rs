@@ -60,7 +60,7 @@ fn classes() {
         assert_eq!(colors[(env, v, u, 3)] == 0, id == 0);
     }
     let error = sim.scene().segmentation(&SegmentationCfg::labeled(&[("tabl", "x")])).unwrap_err().to_string();
-    assert!(error.starts_with("labels: there is no object or link \"tabl\"; known are \"table\""), "{error}");
+    assert!(error.starts_with("labels: unknown object or link \"tabl\"; known names: \"table\""), "{error}");
     assert!(SegmentedEntity::from(&sim.scene().mask_ids()[0]).name() == "ground");
 }
 

@@ -127,7 +127,7 @@ fn refused_surfaces() {
         }
     }
     let error = sim.add_mjcf(part(vec![named("bel", SurfaceCfg::glass())])).unwrap_err().to_string();
-    assert!(error.contains("part \"part\", surfaces") && error.contains("bell"), "{error}");
+    assert!(error.contains("MJCF part \"part\", surfaces") && error.contains("bell"), "{error}");
     let surfaces = vec![named("lefthand", SurfaceCfg::glass())];
     let error = sim.add_robot(RobotCfg { surfaces, ..sr5("robot") }).unwrap_err().to_string();
     assert!(error.contains("robot \"robot\", surfaces") && error.contains("lefthand"), "{error}");

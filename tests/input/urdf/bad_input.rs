@@ -99,8 +99,8 @@ fn mistakes() {
         ("sphere", shape("<sphere radius=\"-1\"/>"), "Value", &["radius must be positive"]),
         ("cylinder", shape("<cylinder radius=\"1\" length=\"0\"/>"), "Value", &["length must be positive"]),
         ("no radius", shape("<cylinder length=\"1\"/>"), "AttributeMissing", &["<cylinder> has no radius"]),
-        ("shape", shape("<cilinder/>"), "ShapeUnknown", &["<cilinder>", "candidates: \"cylinder\""]),
-        ("two shapes", shape("<box size=\"1 1 1\"/><sphere radius=\"1\"/>"), "GeometryRepeated", &[":2: link \"l\": <geometry> holds one shape, and <sphere> is its second element"]),
+        ("shape", shape("<cilinder/>"), "ShapeUnknown", &["unknown shape <cilinder>", "candidates: \"cylinder\""]),
+        ("two shapes", shape("<box size=\"1 1 1\"/><sphere radius=\"1\"/>"), "GeometryRepeated", &[":2: link \"l\": <geometry> must contain one shape, but <sphere> is its second element"]),
         ("no shape", shape(""), "ElementMissing", &["<sphere>"]),
         ("no geometry", link("<collision/>"), "ElementMissing", &["<collision> has no <geometry>"]),
         ("mesh name", shape("<mesh filename=\" \"/>"), "MeshUnnamed", &[":2: link \"l\"", "meshes/part.stl"]),
@@ -120,13 +120,13 @@ fn mistakes() {
         ("unnamed parent", robot("<joint name=\"j\" type=\"fixed\"><parent/><child link=\"b\"/></joint>"), "AttributeMissing", &["<parent> has no link"]),
         ("dangling parent", robot("<joint name=\"j\" type=\"fixed\"><parent link=\"A\"/><child link=\"b\"/></joint>"), "LinkUnknown", &["robot.urdf:2: joint \"j\": parent link \"A\" does not exist; candidates: \"a\", \"b\""]),
         ("dangling child", robot("<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/>\n<child link=\"bb\"/></joint>"), "LinkUnknown", &["robot.urdf:3: joint \"j\": child link \"bb\"", "\"b\""]),
-        ("two parents", three("<joint name=\"j2\" type=\"fixed\"><parent link=\"c\"/><child link=\"b\"/></joint>"), "TwoParents", &["robot.urdf:3: joint \"j2\" has child \"b\"", "\"j1\" at robot.urdf:2"]),
-        ("cycle", three("<joint name=\"j2\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint>"), "Cycle", &["robot.urdf:2: joint \"j1\" closes a circle of links: \"b\" -> \"a\" -> \"b\""]),
+        ("two parents", three("<joint name=\"j2\" type=\"fixed\"><parent link=\"c\"/><child link=\"b\"/></joint>"), "MultipleParents", &["robot.urdf:3: joint \"j2\" has child \"b\"", "\"j1\" at robot.urdf:2"]),
+        ("cycle", three("<joint name=\"j2\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint>"), "Cycle", &["robot.urdf:2: joint \"j1\" closes a kinematic loop: \"b\" -> \"a\" -> \"b\""]),
         ("own parent", robot("<joint name=\"j\" type=\"fixed\"><parent link=\"b\"/><child link=\"b\"/></joint>"), "Cycle", &["\"b\" -> \"b\""]),
         ("no root", "<robot>\n<link name=\"a\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/><child link=\"a\"/></joint></robot>".to_owned(), "Cycle", &[":2: joint \"j\""]),
-        ("several roots", robot(""), "SeveralRoots", &["2 links have no parent joint", "\"a\" (robot.urdf:3), \"b\" (robot.urdf:3)"]),
+        ("several roots", robot(""), "MultipleRoots", &["2 links have no parent joint", "\"a\" (robot.urdf:3), \"b\" (robot.urdf:3)"]),
         // Joints.
-        ("joint type", joint("type=\"revolut\"", ""), "JointTypeUnknown", &["robot.urdf:2: joint \"j\": there is no type \"revolut\"; candidates: \"revolute\""]),
+        ("joint type", joint("type=\"revolut\"", ""), "JointTypeUnknown", &["robot.urdf:2: joint \"j\": unknown type \"revolut\"; candidates: \"revolute\""]),
         ("spherical", joint("type=\"spherical\"", ""), "JointTypeUnknown", &["\"spherical\""]),
         ("no type", joint("", ""), "AttributeMissing", &["joint \"j\": <joint> has no type"]),
         ("no limit", revolute(""), "LimitMissing", &["robot.urdf:2: joint \"j\" is revolute and has no <limit>; add <limit lower=", "continuous"]),
@@ -193,9 +193,9 @@ fn missing_meshes() {
         let mesh = format!("<{element}><geometry><mesh filename=\"{uri}\"/></geometry></{element}>");
         assemble(&UrdfCfg::single(files.write("robot.urdf", link(&mesh))))
     };
-    let unknown = &["package \"not_there\"", "UrdfCfg::packages", "looked at:"];
+    let unknown = &["package \"not_there\"", "UrdfCfg::packages", "searched:"];
     let rows: [(&str, &str, &[&str]); 5] = [
-        ("meshes/a.stl", "MeshMissing", &["meshes/a.stl\" does not exist; looked at:\n"]),
+        ("meshes/a.stl", "MeshMissing", &["meshes/a.stl\" does not exist; searched:\n"]),
         ("../../../b.stl", "MeshMissing", &["b.stl"]),
         ("package://not_there/c.stl", "PackageUnknown", unknown),
         ("https://example.com/d.stl", "UriUnsupported", &["https:// is not supported; use package://"]),
@@ -351,17 +351,32 @@ fn lenient_reading() {
             "no inertia",
             inertial("<mass value=\"1\"/>"),
             InertialIncomplete,
-            &["link \"l\": <inertial> has no <inertia>", "the inertia is that of the link's shapes"],
+            &["link \"l\": <inertial> has no <inertia>", "the inertia is computed from the link's shapes"],
         ),
-        ("no mass", inertial(INERTIA), InertialIncomplete, &["<inertial> has no <mass>", "the mass is that of"]),
-        ("density", inertial("<density value=\"7800\"/>"), InertialIncomplete, &["mass and inertia are those of"]),
+        (
+            "no mass",
+            inertial(INERTIA),
+            InertialIncomplete,
+            &["<inertial> has no <mass>", "the mass is computed from the link's shapes"],
+        ),
+        (
+            "density",
+            inertial("<density value=\"7800\"/>"),
+            InertialIncomplete,
+            &["mass and inertia are computed from the link's shapes"],
+        ),
         (
             "axis",
             joint("type=\"fixed\"", "<axis/>"),
             ElementIgnored,
             &["joint \"j\": <axis> has no xyz", "a fixed joint needs no axis"],
         ),
-        ("scale", shape("<mesh filename=\"a\" scale=\"0.001\"/>"), ScaleUniform, &["there is one", "all three axes"]),
+        (
+            "scale",
+            shape("<mesh filename=\"a\" scale=\"0.001\"/>"),
+            ScaleUniform,
+            &["there is one", "the value is used for all three axes"],
+        ),
     ];
     for (what, text, kind, needles) in rows {
         let file = parse(&text).unwrap_or_else(|e| panic!("{what}: {e}"));

@@ -154,7 +154,7 @@ fn early_failure() {
         if let Some(why) = sim.observers().get(recorder).unwrap().failure() {
             break why;
         }
-        assert!(begun.elapsed() < Duration::from_secs(20), "nothing is said");
+        assert!(begun.elapsed() < Duration::from_secs(20), "no failure was reported");
     };
     assert!(why.contains("run.mcap") && why.contains("no space left on this disk"), "{why}");
     // The final error is the same.

@@ -73,8 +73,7 @@ fn no_rectification() {
     sim.update(1);
     let left_out = sim.finish_recording(recorder).unwrap().left_out;
     for eye in ["left", "right"] {
-        let said =
-            format!("R and P of eyes/{eye}/camera_info (the pictures of these eyes cannot be rectified: how far");
+        let said = format!("R and P of eyes/{eye}/camera_info (this stereo camera cannot be rectified: the x offset");
         assert!(left_out.iter().any(|what| what.starts_with(&said)), "{left_out:?}");
     }
     let recording = Recording::open(&path).unwrap();

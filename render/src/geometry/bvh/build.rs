@@ -376,7 +376,7 @@ mod tests {
         let (tree, order) = Bvh::build(boxes.iter().copied());
         let mut seen = order.clone();
         seen.sort_unstable();
-        assert!(seen.into_iter().eq(0..boxes.len() as u32), "each thing is in one leaf");
+        assert!(seen.into_iter().eq(0..boxes.len() as u32), "each item is in exactly one leaf");
         let (mut stack, mut count) = (TraversalStack::default(), 0);
         const RAYS: usize = 100;
         for k in 0..RAYS {

@@ -96,7 +96,7 @@ fn edges() {
         // From the center of the solid outwards: every ray must hit.
         let origin = [0.185, 0.03, -0.025];
         let ray = Ray { origin, direction: normalize(sub(on_edge, origin)).unwrap() };
-        assert!(nearest_watertight(&ray, &triangles).is_some(), "{ray:?} got out");
+        assert!(nearest_watertight(&ray, &triangles).is_some(), "{ray:?} passed through the closed mesh");
         slipped += usize::from(nearest(&ray, &triangles, 0.0).is_none());
     }
     assert!(slipped > 0, "the control: edges are hit so exactly that the textbook formula misses some");
@@ -212,7 +212,7 @@ fn same_bvh() {
             assert_eq!(format!("{:?}", (&tree, &order)), format!("{again:?}"), "{level:?}");
         }
         order.sort_unstable();
-        assert!(order.into_iter().eq(0..boxes.len() as u32), "everything once");
+        assert!(order.into_iter().eq(0..boxes.len() as u32), "each box is in exactly one leaf");
     }
 }
 

@@ -57,7 +57,7 @@ fn surfaces() {
             // Only every tenth ray: this is the slow part.
             let steps = |to: f64| (0..if k % 10 > 1 { 0 } else { 400 }).map(move |s| to * (f64::from(s) + 0.5) / 400.0);
             let Some((t, normal)) = touch(shape.clone(), ray.origin, ray.direction) else {
-                assert!(!inside, "{name}: a way out is missed");
+                assert!(!inside, "{name}: a ray from inside misses the surface");
                 assert!(steps(40.0).all(|t| off(t) > 0.0), "{name} is missed");
                 continue;
             };

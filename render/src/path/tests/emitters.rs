@@ -206,7 +206,7 @@ fn far_from_own_frame() {
                 "five deviations; translations of 40 m are rounded to 4e-6 m: 4e-5 of the height and of the form factor",
             );
             assert_number(&format!("{angles:?} {ways:?}"), light.0, expected, far);
-            assert!(light.1 < 0.01 * expected, "it can tell a twentieth: {light:?}");
+            assert!(light.1 < 0.01 * expected, "the control: a difference of a twentieth is detected: {light:?}");
         }
         // A light without a size lights the floor, whatever the floor's frame; the panel is not between.
         let normal = there([0.0, 0.0, 1.0]);

@@ -56,7 +56,7 @@ fn near_lights() {
             assert!(x == 0.0 || (sharp - lit).abs() < 1e-5, "{x}: {sharp}, not {lit}");
         }
         let (none, _) = at(Light { cast_shadow: false, ..light(0.0) }, -0.5);
-        assert!((none - open(-0.5)).abs() < 1e-5, "this one casts none");
+        assert!((none - open(-0.5)).abs() < 1e-5, "a light without shadows");
     }
 }
 
@@ -85,7 +85,7 @@ fn directional_lights() {
         assert!(agrees(found, expected), "{x}: {found:?}, not {expected}");
         between += usize::from(expected > 0.1 * whole * 0.54 && !agrees(found, 0.98 * expected));
     }
-    assert!(between >= 4, "the control: {between} places tell a fiftieth");
+    assert!(between >= 4, "the control: {between} places detect a difference of a fiftieth");
 }
 
 /// A glowing rectangle behind the edge of a board: the form factor of its visible part. Source: Howell, B-3; parts on
@@ -111,7 +111,7 @@ fn emissive_rectangle() {
         let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
         let light = mean_light(&scene, &poses, &view, 1024, 0);
         assert!(agrees(light, expected), "{edge}: {light:?}, not {expected}");
-        assert!(!agrees(light, 1.1 * expected), "it can tell a tenth: {light:?}");
+        assert!(!agrees(light, 1.1 * expected), "the control: a difference of a tenth is detected: {light:?}");
     }
 }
 

@@ -165,10 +165,10 @@ fn check(name: &str, mesh: &RenderMesh, most: &[usize]) {
         assert!(there <= error, "{name}: {there} from the mesh to its level, bound {error}");
         assert!(back <= error, "{name}: {back} from a level to the mesh, bound {error}");
         assert!(coarse.len() <= most, "{name}: {} triangles instead of {most}", coarse.len());
-        assert_eq!(borders(&level.mesh), open, "{name}: edges without exactly one neighbour");
+        assert_eq!(borders(&level.mesh), open, "{name}: edges without exactly one neighbor");
         // Control: a level that is moved by twice the bound is detected.
         let moved: Vec<[V; 3]> = coarse.iter().map(|t| t.map(|p| along(p, [1.0, 0.9, 0.8], 2.0 * error))).collect();
-        assert!(farthest(&fine, &moved, 600) > error, "{name}: a level that is elsewhere must be found");
+        assert!(farthest(&fine, &moved, 600) > error, "{name}: control: a displaced level must exceed the bound");
         facing(name, &level.mesh);
     }
     assert_eq!(levels.len(), most.len(), "{name}: number of levels");

@@ -280,7 +280,7 @@ mod tests {
                 let z = if turn < 8 { 1.2 + 0.3 * t } else { 0.1 + 0.03 * (t - 8.0) };
                 let pose = pose([0.5 * t + 0.3, 0.7 * t, 1.1 * t + k as f64], [0.2 * t.sin(), 0.3 * t.cos(), z]);
                 let Some(found) = of(shape.clone(), &pose) else {
-                    assert!(matches!(shape, Shape::Plane(_)), "only planes have a side that is not seen");
+                    assert!(matches!(shape, Shape::Plane(_)), "only planes are one-sided");
                     continue;
                 };
                 let mesh = shape.tessellate(512);

@@ -60,7 +60,7 @@ pub enum CalibrationError {
         problem: String,
     },
     /// The distortion model is unknown.
-    #[error("{file}:{line}: there is no distortion model {model:?}; known are {}", .candidates.join(", "))]
+    #[error("{file}:{line}: unknown distortion model {model:?}; known models: {}", .candidates.join(", "))]
     Model {
         /// Name of the file.
         file: String,
@@ -72,7 +72,7 @@ pub enum CalibrationError {
         candidates: Vec<&'static str>,
     },
     /// The lens has no `camera_info` distortion model.
-    #[error("camera_info cannot say what the {lens} lens does: {reason}")]
+    #[error("camera_info cannot represent the {lens} lens: {reason}")]
     Lens {
         /// Name of the lens.
         lens: &'static str,

@@ -180,8 +180,9 @@ impl CameraInfo {
         };
         let k = get("camera_matrix")?;
         let camera_matrix = Matrix3::from_row_slice(&reader.matrix("camera_matrix", k, [3, 3])?);
-        Intrinsics::from_matrix(&camera_matrix)
-            .map_err(|error| reader.field_error(k.line, "camera_matrix", format!("is of no camera: {error}")))?;
+        Intrinsics::from_matrix(&camera_matrix).map_err(|error| {
+            reader.field_error(k.line, "camera_matrix", format!("is not a valid camera matrix: {error}"))
+        })?;
         let (distortion_model, distortion_coefficients) =
             reader.distortion(find("distortion_model"), get("distortion_coefficients")?)?;
         reader.reject_binning(["binning_x", "binning_y"].map(|name| (name, find(name))))?;
@@ -191,7 +192,7 @@ impl CameraInfo {
         let off = (rectification_matrix * rectification_matrix.transpose() - Matrix3::identity()).amax();
         if off > ROTATION_TOLERANCE || rectification_matrix.determinant() < 0.0 {
             let determinant = rectification_matrix.determinant();
-            let problem = format!("is no rotation: its determinant is {determinant:.4}, its rows are {off:.4} off");
+            let problem = format!("is not a rotation: its determinant is {determinant:.4}, its rows are {off:.4} off");
             return Err(reader.field_error(r.line, "rectification_matrix", problem));
         }
         let p = get("projection_matrix")?;
@@ -307,7 +308,8 @@ fn distortion_of(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), Calibration
         Lens::Equidistant(_) => Ok((DistortionModel::Equidistant, vec![0.0; 4])),
         _ => Err(CalibrationError::Lens {
             lens: lens.name(),
-            reason: "its models are plumb_bob, rational_polynomial (opencv) and equidistant (opencv_fisheye, equidistant)",
+            reason: "the models of camera_info are plumb_bob, rational_polynomial (opencv) and equidistant (opencv_fisheye, \
+                     equidistant)",
         }),
     }
 }
@@ -325,7 +327,7 @@ impl Reader<'_> {
     fn text<'n>(&self, field: &str, node: &'n Node) -> Result<&'n str, CalibrationError> {
         match &node.value {
             Value::Scalar(Scalar { text, .. }) => Ok(text),
-            other => Err(self.field_error(node.line, field, format!("is {}, not a word", other.describe()))),
+            other => Err(self.field_error(node.line, field, format!("is {}, not a string", other.describe()))),
         }
     }
 
@@ -446,8 +448,8 @@ impl Reader<'_> {
             let count = self.count(field, node)?;
             if count > 1 {
                 let problem = format!(
-                    "is {count}: several pixels in one are not supported; give image_width, image_height and camera_matrix of the \
-                     pictures as they come, and no {field}"
+                    "is {count}: binning is not supported; give image_width, image_height and camera_matrix of the binned \
+                     images, and remove {field}"
                 );
                 return Err(self.field_error(node.line, field, problem));
             }
@@ -472,8 +474,8 @@ impl Reader<'_> {
             [(w, width, x), (h, height, y)].map(|(size, all, at)| if size > 0 { size } else { all.saturating_sub(at) });
         if [x, y, w, h] != [0, 0, width, height] {
             let problem = format!(
-                "is {w} x {h} at ({x}, {y}), a part of {width} x {height}, which is not supported; give the numbers of the part and \
-                 no roi: image_width: {w}, image_height: {h}, cx less by {x}, cy less by {y}"
+                "is {w} x {h} at ({x}, {y}), a region of {width} x {height}, which is not supported; give the values of the \
+                 region and remove roi: image_width: {w}, image_height: {h}, cx minus {x}, cy minus {y}"
             );
             return Err(self.field_error(roi.line, "roi", problem));
         }

@@ -124,10 +124,10 @@ impl Segmentation {
         things.sort_by_key(|thing| thing.id);
         let wrong = |id, problem| Err(CameraError::MaskId { id, problem }.into());
         if let Some(nothing) = things.iter().find(|thing| thing.id == 0) {
-            return wrong(nothing.id, "means that nothing was hit");
+            return wrong(nothing.id, "is reserved for the background");
         }
         if let Some(negative) = things.iter().find(|thing| thing.id < 0) {
-            return wrong(negative.id, "is negative; ids count from 1, and -1 is what is not known");
+            return wrong(negative.id, "is negative; ids count from 1, and -1 stands for unknown ids");
         }
         if let Some(pair) = things.windows(2).find(|pair| pair[0].id == pair[1].id) {
             return wrong(pair[0].id, "is given twice");
@@ -286,8 +286,8 @@ mod tests {
             Segmentation::new(things(), &SegmentationCfg::labeled(labels)).unwrap_err().to_string()
         };
         let unknown = error(&[("tabel", "furniture")]);
-        assert!(unknown.starts_with("there is no object or link \"tabel\"; known are \"table\""), "{unknown}");
-        assert!(error(&[("fingerl", "hand")]).contains("known are \"finger_l\""));
+        assert!(unknown.starts_with("unknown object or link \"tabel\"; known names: \"table\""), "{unknown}");
+        assert!(error(&[("fingerl", "hand")]).contains("known names: \"finger_l\""));
         let both = error(&[("arm", "robot"), ("finger_.", "hand")]);
         assert!(both.contains("\"arm/finger_l\" is matched by both \"arm\" and \"finger_.\""), "{both}");
         assert!(error(&[("(", "x")]).contains("not a regular expression"));
@@ -295,8 +295,11 @@ mod tests {
         assert_eq!(error(&[("table", "")]), "mask id 5 has a class without a name");
         let twice = vec![thing(3, "a", None, "b"), thing(3, "c", None, "b")];
         for (things, text) in [
-            (vec![thing(0, "a", None, "b")], "mask id 0 means that nothing was hit"),
-            (vec![thing(-1, "a", None, "b")], "mask id -1 is negative; ids count from 1, and -1 is what is not known"),
+            (vec![thing(0, "a", None, "b")], "mask id 0 is reserved for the background"),
+            (
+                vec![thing(-1, "a", None, "b")],
+                "mask id -1 is negative; ids count from 1, and -1 stands for unknown ids",
+            ),
             (vec![thing(4, "a", None, "")], "mask id 4 has a class without a name"),
             (twice, "mask id 3 is given twice"),
         ] {

@@ -63,16 +63,16 @@ impl StereoCameraCfg {
     pub fn from_camera_infos(left: &CameraInfo, right: &CameraInfo) -> Result<Self, CameraError> {
         if (left.width, left.height) != (right.width, right.height) {
             let size = |info: &CameraInfo| format!("{} x {}", info.width, info.height);
-            let expected = format!("the left one's, {}", size(left));
+            let expected = format!("{}, as of the left camera", size(left));
             return Err(CameraError::NotAStereoPair {
-                what: "the size of the right picture",
+                what: "the size of the right image",
                 value: size(right),
                 expected,
             });
         }
         let baseline = baseline(&left.projection_matrix, &right.projection_matrix)?;
-        let from_left = nearest_rotation("R of the left eye", &left.rectification_matrix)?;
-        let from_right = nearest_rotation("R of the right eye", &right.rectification_matrix)?;
+        let from_left = nearest_rotation("R of the left camera", &left.rectification_matrix)?;
+        let from_right = nearest_rotation("R of the right camera", &right.rectification_matrix)?;
         let mut camera = CameraCfg::default();
         left.apply_to(&mut camera);
         let lens_right = right.lens();
@@ -99,32 +99,31 @@ fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, Camera
     };
     let focal = right[(0, 0)];
     if !(focal > 0.0 && focal.is_finite()) {
-        return wrong("P[0][0] of the right eye", focal, "a focal length, positive and finite".into());
+        return wrong("P[0][0] of the right camera", focal, "a focal length, positive and finite".into());
     }
     if !(right[(0, 3)] < 0.0 && right[(0, 3)].is_finite()) {
-        let expected =
-            "negative, the focal length times minus the distance of the eyes, as of two that were calibrated together";
-        return wrong("P[0][3] of the right eye", right[(0, 3)], expected.into());
+        let expected = "negative: minus the focal length times the baseline, as in a stereo calibration";
+        return wrong("P[0][3] of the right camera", right[(0, 3)], expected.into());
     }
     let zero = [
-        ("P[0][3] of the left eye", left[(0, 3)]),
-        ("P[1][3] of the left eye", left[(1, 3)]),
-        ("P[2][3] of the left eye", left[(2, 3)]),
-        ("P[1][3] of the right eye", right[(1, 3)]),
-        ("P[2][3] of the right eye", right[(2, 3)]),
+        ("P[0][3] of the left camera", left[(0, 3)]),
+        ("P[1][3] of the left camera", left[(1, 3)]),
+        ("P[2][3] of the left camera", left[(2, 3)]),
+        ("P[1][3] of the right camera", right[(1, 3)]),
+        ("P[2][3] of the right camera", right[(2, 3)]),
     ];
     if let Some((what, value)) = zero.into_iter().find(|(_, value)| *value != 0.0) {
         return wrong(what, value, "0".into());
     }
     let alike = [
-        ("P[0][0] of the right eye", (0, 0)),
-        ("P[1][1] of the right eye", (1, 1)),
-        ("P[1][2] of the right eye", (1, 2)),
+        ("P[0][0] of the right camera", (0, 0)),
+        ("P[1][1] of the right camera", (1, 1)),
+        ("P[1][2] of the right camera", (1, 2)),
     ];
     for (what, at) in alike {
         let same = (left[at] - right[at]).abs() <= PIXEL_TOLERANCE;
         if !same {
-            return wrong(what, right[at], format!("the left eye's, {}", left[at]));
+            return wrong(what, right[at], format!("{}, as of the left camera", left[at]));
         }
     }
     Ok(-right[(0, 3)] / focal)
@@ -140,9 +139,9 @@ fn nearest_rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQua
             Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * v_t)))
         }
         _ => {
-            let value =
-                format!("no rotation: its determinant is {:.4}, its rows are {off:.4} off", matrix.determinant());
-            Err(CameraError::NotAStereoPair { what, value, expected: "one".into() })
+            let determinant = matrix.determinant();
+            let value = format!("a matrix with determinant {determinant:.4}, whose rows are {off:.4} off orthonormal");
+            Err(CameraError::NotAStereoPair { what, value, expected: "a rotation".into() })
         }
     }
 }

@@ -79,7 +79,7 @@ impl StereoCamera {
         let angle = self.rig.left_from_right.rotation.angle();
         let wrong = |what, value, expected: String| Err(CameraError::NotRectified { what, value, expected });
         if angle.abs() > ROUNDING {
-            return wrong("the angle between the eyes [rad]", angle, "0".into());
+            return wrong("the angle between the cameras [rad]", angle, "0".into());
         }
         if t.x <= 0.0 {
             return wrong("left_to_right_pos.x [m]", t.x, "positive".into());
@@ -92,12 +92,12 @@ impl StereoCamera {
         for row in 0..self.left().env_ids().len() {
             let (left, right) = (self.left().view_of(row), self.right().view_of(row));
             let lenses = [
-                ("fx of the right eye", left.fx, right.fx),
-                ("fy of the right eye", left.fy, right.fy),
-                ("cy of the right eye", left.cy, right.cy),
+                ("fx of the right camera", left.fx, right.fx),
+                ("fy of the right camera", left.fy, right.fy),
+                ("cy of the right camera", left.cy, right.cy),
             ];
             if let Some((what, left, right)) = lenses.into_iter().find(|(_, left, right)| left != right) {
-                return wrong(what, f64::from(right), format!("the left eye's, {left}"));
+                return wrong(what, f64::from(right), format!("{left}, as of the left camera"));
             }
         }
         Ok(t.x)

@@ -62,15 +62,15 @@ impl Rectification {
         let half = left_from_right.rotation.powf(0.5);
         let level = half.inverse() * between;
         if level.x <= 0.0 {
-            return reject("how far the right eye is to the right of the left one [m]", level.x, "positive");
+            return reject("the x offset of the right camera [m]", level.x, "positive");
         }
         let turn = rotation_to_x_axis(&level);
         let rotations = [turn * half.inverse(), turn * half];
         // Directions of the raw optical axes after the rotation.
         let axes = rotations.map(|rotation| rotation * Vector3::z());
         for (axis, what) in axes.iter().zip([
-            "the angle by which the left eye turns to be rectified [rad]",
-            "the angle by which the right eye turns to be rectified [rad]",
+            "the rectifying rotation of the left camera [rad]",
+            "the rectifying rotation of the right camera [rad]",
         ]) {
             let angle = axis.xy().norm().atan2(axis.z);
             if angle > MAX_AXIS_ROTATION {

@@ -192,7 +192,10 @@ impl fmt::Display for StereoCamera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.rig.left_from_right.translation.into();
         let angle = self.rig.left_from_right.rotation.angle().to_degrees();
-        writeln!(f, "Stereo pair, the right eye at [{x}, {y}, {z}] m of the left one, turned by {angle} degrees")?;
+        writeln!(
+            f,
+            "Stereo camera, the right camera at [{x}, {y}, {z}] m in the frame of the left one, rotated by {angle} degrees"
+        )?;
         writeln!(f, "left:  {}", self.left)?;
         write!(f, "right: {}", self.right)
     }

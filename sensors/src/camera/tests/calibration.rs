@@ -262,21 +262,21 @@ fn refusals() {
     for (from, to, expected) in [
         ("image_width: 64", "image_width: -64", "left.yaml:2: image_width is \"-64\"; it must be a whole number"),
         ("image_height: 48\n", "", "left.yaml: image_height is missing"),
-        ("image_height: 48", "image_height: [48]", "left.yaml:3: image_height is a list of 1, not a word"),
-        ("61.02341", "0.", "left.yaml:5: camera_matrix is of no camera: fx of the lens is 0"),
+        ("image_height: 48", "image_height: [48]", "left.yaml:3: image_height is a list of 1, not a string"),
+        ("61.02341", "0.", "left.yaml:5: camera_matrix is not a valid camera matrix: fx of the lens is 0"),
         ("61.02341", "61.02341, 7", "left.yaml:8: camera_matrix.data has 10 numbers, not the 3 x 3"),
         ("61.02341,  0. ", "61.02341,  0.5", "row 0, column 1 is 0.5"),
         ("61.02341", "sixty", "left.yaml:8: camera_matrix.data has \"sixty\"; it must be a finite number"),
         ("61.02341", ".nan", "it must be a finite number"),
-        ("plumb_bob", "plum_bob", "left.yaml:11: there is no distortion model \"plum_bob\"; known are plumb_bob"),
+        ("plumb_bob", "plum_bob", "left.yaml:11: unknown distortion model \"plum_bob\"; known models: plumb_bob"),
         ("plumb_bob", "equidistant", "left.yaml:12: distortion_coefficients has 5 numbers; equidistant has 4"),
         ("  cols: 5\n", "", "distortion_coefficients has no cols"),
-        ("data: [1., 0., 0.", "data: [1., 0., 0.5", "rectification_matrix is no rotation"),
+        ("data: [1., 0., 0.", "data: [1., 0., 0.5", "rectification_matrix is not a rotation"),
         ("data: [58.01243", "data: [0.", "projection_matrix is singular"),
         ("data: [1., 0., 0.,", "data: [1., 0., 0.", "left.yaml:19: rectification_matrix.data has \"0. 0.\""),
-        ("image_height: 48", "image_height: 48\nimage_height: 49", "left.yaml:4:1: \"image_height\" is there twice"),
+        ("image_height: 48", "image_height: 48\nimage_height: 49", "left.yaml:4:1: duplicate key \"image_height\""),
         ("camera_matrix:", "camera_matrix", "left.yaml:"),
-        ("image_width: 64", "image_width: &w 64\nextra: *w", "aliases"),
+        ("image_width: 64", "image_width: &w 64\nextra: *w", "calibration files do not support aliases"),
     ] {
         assert!(FILE.contains(from), "{from}");
         let error = CameraInfo::parse(&FILE.replacen(from, to, 1), "left.yaml").unwrap_err().to_string();
@@ -289,7 +289,7 @@ fn refusals() {
         (Some("rational_polynomial"), 13, "has 13 numbers; rational_polynomial has 0, 4, 5, 8, 12 or 14"),
         (Some("equidistant"), 8, "has 8 numbers; equidistant has 4"),
         (Some("equidistant"), 0, "has 0 numbers; equidistant has 4"),
-        (Some("fish_eye"), 4, "there is no distortion model \"fish_eye\"; known are fisheye"),
+        (Some("fish_eye"), 4, "unknown distortion model \"fish_eye\"; known models: fisheye"),
     ] {
         let error = distortion(model, count).unwrap_err().to_string();
         assert!(error.contains(expected), "{model:?}, {count}: {error}");
@@ -378,17 +378,17 @@ fn binning_and_roi() {
     }
     let part = roi(320, 200, 200, 300);
     for (text, expected) in [
-        ("binning_x: 2\nbinning_y: 2\n", "wrist.yaml:9: binning_x is 2: several pixels in one are not supported"),
+        ("binning_x: 2\nbinning_y: 2\n", "wrist.yaml:9: binning_x is 2: binning is not supported"),
         ("binning_x: 1\nbinning_y: 4\n", "wrist.yaml:10: binning_y is 4"),
         ("binning_x: -1\n", "wrist.yaml:9: binning_x is \"-1\"; it must be a whole number"),
         (
             "roi: whole\n",
             "wrist.yaml:9: roi is \"whole\", not a table of x_offset, y_offset, height, width and do_rectify",
         ),
-        (&part, "wrist.yaml:9: roi is 300 x 200 at (320, 200), a part of 640 x 480, which is not supported"),
-        (&part, "image_width: 300, image_height: 200, cx less by 320, cy less by 200"),
-        (&roi(0, 0, 479, 640), "roi is 640 x 479 at (0, 0), a part"),
-        (&roi(1, 0, 0, 0), "roi is 639 x 480 at (1, 0), a part"),
+        (&part, "wrist.yaml:9: roi is 300 x 200 at (320, 200), a region of 640 x 480, which is not supported"),
+        (&part, "image_width: 300, image_height: 200, cx minus 320, cy minus 200"),
+        (&roi(0, 0, 479, 640), "roi is 640 x 479 at (0, 0), a region"),
+        (&roi(1, 0, 0, 0), "roi is 639 x 480 at (1, 0), a region"),
     ] {
         let error = with(text).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");

@@ -125,14 +125,14 @@ fn lazy_history() {
     camera.history::<Depth>().unwrap();
     camera.history::<Color>().unwrap();
     camera.depth().unwrap();
-    assert_eq!(camera.render_count(), 3, "10, 9 and 8");
+    assert_eq!(camera.render_count(), 3, "frames 10, 9 and 8");
     camera.update(&state(&[11])).unwrap();
     camera.history::<Depth>().unwrap();
-    assert_eq!(camera.render_count(), 4, "11");
+    assert_eq!(camera.render_count(), 4, "frame 11");
     camera.update(&state(&[12])).unwrap();
     camera.depth().unwrap();
     camera.history::<Depth>().unwrap();
-    assert_eq!(camera.render_count(), 5, "12, once");
+    assert_eq!(camera.render_count(), 5, "frame 12, once");
 }
 
 /// An owner that updates only at due steps gets the same images.
@@ -356,14 +356,18 @@ fn bad_options() {
     let imperfections = Imperfections { holes: Some(Holes::default()), ..Imperfections::default() };
     let channels = Channels { color: true, ..Channels::default() };
     let holes = CameraCfg { imperfections, channels, ..cfg() };
-    let past = "0 past pictures and 4294967296 captures on their way, in each of 2 environments, do not fit into memory (at most \
-                68719476736 bytes); make history_length or latency_steps smaller";
+    let past = "0 images of history and 4294967296 frames in flight, in each of 2 environments, do not fit into memory (at most \
+                68719476736 bytes); reduce history_length or latency_steps";
     let (mask, dept) = (noise("mask", NoiseCfg::white(1.0)), noise("dept", NoiseCfg::white(1.0)));
     for (cfg, exact, text) in [
         (CameraCfg { latency_steps: u32::MAX, ..cfg() }, true, past),
-        (mask, false, "there is no channel that can have noise \"mask\"; known are "),
-        (dept, false, "there is no channel that can have noise \"dept\"; known are \"depth\""),
-        (CameraCfg { noise: twice.into(), ..cfg() }, true, "the noise of \"depth\" is given by two names"),
+        (mask, false, "unknown noise channel \"mask\"; known names: "),
+        (dept, false, "unknown noise channel \"dept\"; known names: \"depth\""),
+        (
+            CameraCfg { noise: twice.into(), ..cfg() },
+            true,
+            "the noise of \"depth\" is given twice, by two names of the channel",
+        ),
         (holes, true, "the camera does not measure depth; it measures color"),
     ] {
         let error = refused(cfg).to_string();

@@ -60,11 +60,11 @@ fn files() {
         assert_eq!(toml::from_str::<CameraCfg>(&text).unwrap(), cfg, "{text}");
     }
     for (text, said) in [
-        ("lens = 'equidistent'", "there is no lens \"equidistent\"; known are \"equidistant\""),
+        ("lens = 'equidistent'", "unknown lens \"equidistent\"; known names: \"equidistant\""),
         ("lens.opencv.k7 = 1.0", "unknown field `k7`"),
-        ("lens = {}", "a lens is a table with its name"),
-        ("lens = { opencv = {}, pinhole = {} }", "one lens only"),
-        ("lens = 3", "the name of a lens, or a table with one"),
+        ("lens = {}", "a lens table needs the name of the lens as its key"),
+        ("lens = { opencv = {}, pinhole = {} }", "two lenses are given"),
+        ("lens = 3", "the name of a lens, or a table whose only key is the name of a lens"),
     ] {
         let error = read(text).unwrap_err().to_string();
         assert!(error.contains(said), "{text}: {error}");

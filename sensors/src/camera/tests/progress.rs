@@ -49,8 +49,8 @@ fn late_and_past() {
         if cancelled {
             camera.progress().cancel();
             for _ in 0..2 {
-                assert!(camera.latest_delivered::<Color>().unwrap_err().to_string().contains("broken off"));
-                assert!(camera.history::<Color>().unwrap_err().to_string().contains("broken off"));
+                assert!(camera.latest_delivered::<Color>().unwrap_err().to_string().contains("rendering was canceled"));
+                assert!(camera.history::<Color>().unwrap_err().to_string().contains("rendering was canceled"));
             }
             camera.progress().resume();
         }
@@ -60,7 +60,7 @@ fn late_and_past() {
         assert_eq!(
             (camera.latest_delivered::<Color>().unwrap(), camera.render_count()),
             (arrived.view(), drawn),
-            "drawn once"
+            "rendered once"
         );
         (arrived, past.to_owned())
     };

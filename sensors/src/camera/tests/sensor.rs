@@ -192,7 +192,7 @@ fn channel_names() {
     assert_eq!(Channels::from_names(&owned).unwrap().names(), ["color", "mask"]);
     assert_eq!(Channels::from_names::<&str>(&[]).unwrap(), Channels::default());
     let error = Channels::from_names(&["depth", "distance_to_image"]).unwrap_err().to_string();
-    assert!(error.starts_with("there is no channel \"distance_to_image\"; known are \"distance_to_"), "{error}");
+    assert!(error.starts_with("unknown channel \"distance_to_image\"; known names: \"distance_to_"), "{error}");
     assert!(Channels::from_names(&["RGB"]).unwrap_err().to_string().contains("\"rgb\""));
     assert_eq!(Channels::ALL.bytes_per_pixel(), 4 + 4 + 4 + 4 + 12 + 12 + 12 + 4 + 8);
 }
@@ -458,7 +458,7 @@ fn bad_configurations() {
     let same = Placement::LookAt { eye: [1.0; 3], target: [1.0; 3], up: [0.0, 0.0, 1.0] };
     assert!(matches!(refused(place(same)), Camera(CameraError::LookAt { .. })));
     let error = refused(on("tpi")).to_string();
-    assert!(error.starts_with("there is no body \"tpi\"; known are \"arm/tip\""), "{error}");
+    assert!(error.starts_with("unknown body \"tpi\"; known names: \"arm/tip\""), "{error}");
 
     let flow = CameraCfg { channels: Channels { flow: true, ..Channels::NONE }, ..cfg() };
     let rays = |lens, imperfections| CameraCfg {
@@ -470,7 +470,7 @@ fn bad_configurations() {
     };
     let vignetting = Imperfections { vignetting: Some(Default::default()), ..Default::default() };
     let holes = Imperfections { holes: Some(Default::default()), ..Default::default() };
-    let what = "shadows of a projector (holes with a baseline other than 0)";
+    let what = "projector shadows (holes with a baseline other than 0)";
     let some = |env_ids: &[usize]| CameraCfg { env_ids: Some(env_ids.to_vec()), ..cfg() };
     for (cfg, expected) in [
         (CameraCfg { channels: Channels::default(), ..cfg() }, CameraError::NoChannels.into()),
@@ -491,10 +491,11 @@ fn bad_configurations() {
     let nothing = crate::SensorContext { scene: None, ..context(2) };
     assert_eq!(cfg().build(&nothing).unwrap_err(), CameraError::NoScene.into());
     // Path tracing keeps 64 bytes per pixel: its result and the input of the denoiser.
-    for (renderer, paths) in [(cfg().renderer, ""), (Renderer::RAY_TRACED, ", with 4096000000 bytes for paths,")] {
+    for (renderer, paths) in [(cfg().renderer, ""), (Renderer::RAY_TRACED, ", with 4096000000 bytes for path tracing,")]
+    {
         let huge = CameraCfg { width: 8000, height: 8000, renderer, ..cfg() };
         let error = huge.build(&context(100)).unwrap_err().to_string();
-        let text = format!("pictures of 100 environments with 8000 x 8000 pixels of 56 bytes{paths} do");
+        let text = format!("images of 100 environments with 8000 x 8000 pixels of 56 bytes{paths} do");
         assert!(error.starts_with(&text), "{error}");
         assert!(!paths.is_empty() || error.starts_with(&(text + " not fit into memory")), "{error}");
     }
@@ -507,11 +508,11 @@ fn bad_readings() {
     assert_eq!(camera.depth().unwrap_err(), CameraError::NothingCaptured { env: 0 }.into());
     camera.reset(&[0], &state(&[0, 0])).unwrap();
     let error = camera.depth().unwrap_err().to_string();
-    assert_eq!(error, "the camera has not seen environment 1 yet; it does after the first reset or update");
+    assert_eq!(error, "the camera has not captured environment 1 yet; reset or update it first");
     camera.reset(&[1], &state(&[0, 0])).unwrap();
     camera.depth().unwrap();
     assert_eq!(camera.color().unwrap_err().to_string(), "the camera does not measure color; it measures depth, mask");
-    assert_eq!(camera.render_count(), 2, "nothing was drawn for the mistake");
+    assert_eq!(camera.render_count(), 2, "the mistake rendered nothing");
     assert!(matches!(camera.point_cloud(2, Default::default()), Err(SensorError::IndexOutOfRange { index: 2, .. })));
 }
 
@@ -523,13 +524,13 @@ fn bad_states() {
     let mut no_lights = good();
     no_lights.visible.as_mut().unwrap().lights = Default::default();
     for (bad, text) in [
-        (SceneState { body_poses: None, ..good() }, "the camera sensor was given a state without poses"),
-        (SceneState { visible: None, ..good() }, "the camera sensor was given a state without visible"),
-        (state(&[1, 1, 1]), "the state has 3 environments, the sensor was built for 2"),
-        (no_lights, "the state has 0 environments with lamps, the sensor was built for 2"),
+        (SceneState { body_poses: None, ..good() }, "the state lacks poses, which the camera sensor requires"),
+        (SceneState { visible: None, ..good() }, "the state lacks visible, which the camera sensor requires"),
+        (state(&[1, 1, 1]), "the state has 3 environments, but the sensor was built for 2"),
+        (no_lights, "the state has 0 environments with lights, but the sensor was built for 2"),
         (
             SceneState { body_poses: Some(ndarray::Array3::zeros((2, 1, 7))), ..good() },
-            "the state has 1 bodies, the sensor was built for 3",
+            "the state has 1 bodies, but the sensor was built for 3",
         ),
     ] {
         assert_eq!(camera.update(&bad).unwrap_err().to_string(), text);
@@ -585,7 +586,7 @@ fn bad_setters() {
     assert_eq!(kinds[5], SensorError::IndexOutOfRange { what: "environment", index: 3, count: 3 });
     assert_eq!(kinds[6], CameraError::DuplicateEnvironment { env: 0 }.into());
     assert_eq!(kinds[4].to_string(), "the camera does not see environment 1; it sees 2, 0");
-    assert_eq!((bits(&camera, 0..2), camera.render_count()), (before, 2), "not even drawn again");
+    assert_eq!((bits(&camera, 0..2), camera.render_count()), (before, 2), "not rendered again");
 
     let mut unborn = on("ball").build(&context).unwrap();
     assert_eq!(unborn.set_world_poses(&good, None, ROS), Err(CameraError::NothingCaptured { env: 0 }.into()));

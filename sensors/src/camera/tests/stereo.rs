@@ -215,9 +215,13 @@ fn disparity_formula() {
 #[test]
 fn lazy_disparity() {
     let mut stereo = of(&pair_of(CameraCfg { update_period: 0.02, ..cfg() }), &context(2));
-    assert_eq!(stereo.left().render_count() + stereo.right().render_count(), 0, "nothing is drawn before it is read");
+    assert_eq!(stereo.left().render_count() + stereo.right().render_count(), 0, "nothing is rendered before a read");
     let address = stereo.disparity().unwrap().as_ptr();
-    assert_eq!((stereo.left().render_count(), stereo.right().render_count()), (2, 0), "disparity is of the left eye");
+    assert_eq!(
+        (stereo.left().render_count(), stereo.right().render_count()),
+        (2, 0),
+        "disparity needs the left camera only"
+    );
     let before = stereo.disparity().unwrap().to_owned();
     let mut due = Vec::new();
     for step in 1..=4 {
@@ -254,7 +258,7 @@ fn independent_noise() {
     assert!(hits > 500 && same < hits / 100, "{same} of {hits}");
     let renderer = Renderer::RayTraced { samples: 2, max_bounces: 2, denoise: false, seed: 3 };
     let [left, right] = one_place(CameraCfg { renderer, ..cfg() });
-    assert!(left.0 == right.0 && left.1 != right.1, "depth has no noise of paths, colour has");
+    assert!(left.0 == right.0 && left.1 != right.1, "path tracing noise affects color, not depth");
 }
 
 /// Root cause: the right camera copied the noise and imperfections of the left one for all channels. No stereo camera
@@ -297,7 +301,7 @@ fn errors_name_the_camera() {
         |baseline| Imperfections { holes: Some(Holes { baseline, ..Holes::default() }), ..Default::default() };
     let camera = CameraCfg { channels: colors, renderer: Renderer::FastRayTraced, ..cfg() };
     let off = "the camera does not measure depth; it measures color";
-    let bent = "shadows of a projector (holes with a baseline other than 0): only of a pinhole camera, and this one has the lens";
+    let bent = "projector shadows (holes with a baseline other than 0): supported only by pinhole cameras, but this camera has the lens";
     let with_depth_noise = CameraCfg { imperfections: of_depth.clone(), ..camera.clone() };
     let imperfections = shadows(Holes::default().baseline);
     let with_shadows = CameraCfg { channels: depths, imperfections, ..camera.clone() };
@@ -308,9 +312,9 @@ fn errors_name_the_camera() {
     // The left camera has only its own imperfections, whatever the right one measures; those of the right camera are
     // kept.
     for (cfg, expected) in [
-        (&left, format!("the left eye: {off}")),
-        (&right, format!("the right eye: {off}")),
-        (&lens, format!("the right eye: {bent} opencv_fisheye")),
+        (&left, format!("the left camera: {off}")),
+        (&right, format!("the right camera: {off}")),
+        (&lens, format!("the right camera: {bent} opencv_fisheye")),
     ] {
         let error = cfg.build(&context).unwrap_err().to_string();
         assert!(error.starts_with(&expected), "{error}");
@@ -356,7 +360,7 @@ fn placement() {
     let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
     assert!(free.set_left_right_intrinsics(&[lens(44.0)], &[lens(-1.0)], None).is_err());
     assert!(free.set_left_right_intrinsics(&[lens(44.0)], &[lens(44.0); 3], None).is_err());
-    assert_eq!(free.left().intrinsic_matrices()[(0, 0, 0)], 40.0, "the left eye was not changed either");
+    assert_eq!(free.left().intrinsic_matrices()[(0, 0, 0)], 40.0, "the left camera did not change either");
     assert!(free.set_local_pose(&there, Some(&[2]), CameraConvention::Ros).is_err());
     assert!(free.look_at(&[[0.0; 3]], &[[0.0; 3]], &[[0.0; 3]], None).is_err());
     assert_eq!(free.left().local_pose(CameraConvention::Ros), untouched);
@@ -374,17 +378,17 @@ fn without_disparity() {
     let moved = |left_to_right_pos| StereoCameraCfg { left_to_right_pos, ..stereo_cfg() };
     let left_to_right_rot = UnitQuaternion::from_euler_angles(0.0, 0.25, 0.0);
     for (cfg, expected) in [
-        (lens(41.0, 52.0, 17.5), "fx of the right eye is 41, it must be the left eye's, 40"),
-        (lens(40.0, 51.0, 17.5), "fy of the right eye is 51"),
-        (lens(40.0, 52.0, 17.0), "cy of the right eye is 17"),
+        (lens(41.0, 52.0, 17.5), "fx of the right camera is 41; it must be 40, as of the left camera"),
+        (lens(40.0, 51.0, 17.5), "fy of the right camera is 51"),
+        (lens(40.0, 52.0, 17.0), "cy of the right camera is 17"),
         (
             StereoCameraCfg { left_to_right_rot, ..stereo_cfg() },
-            "the angle between the eyes [rad] is 0.25, it must be 0",
+            "the angle between the cameras [rad] is 0.25; it must be 0",
         ),
         (moved([0.1, 0.01, 0.0]), "left_to_right_pos.y [m] is 0.01"),
         (moved([0.1, 0.0, -0.01]), "left_to_right_pos.z [m] is -0.01"),
         (moved([-0.1, 0.0, 0.0]), "left_to_right_pos.x [m] is -0.1"),
-        (moved([0.0; 3]), "left_to_right_pos.x [m] is 0, it must be positive"),
+        (moved([0.0; 3]), "left_to_right_pos.x [m] is 0; it must be positive"),
     ] {
         let stereo = of(&cfg, &context);
         let error = stereo.disparity().unwrap_err().to_string();
@@ -396,11 +400,11 @@ fn without_disparity() {
     let blind = of(&StereoCameraCfg { channels_right: Some(Channels::ALL), ..pair_of(camera) }, &context);
     let off = blind.disparity().unwrap_err();
     assert!(matches!(off, SensorError::Camera(CameraError::ChannelOff { channel: "depth", .. })), "{off}");
-    assert!(blind.right().depth().is_ok(), "channels are of each eye");
+    assert!(blind.right().depth().is_ok(), "each camera has its own channels");
     let nowhere = moved([f64::NAN, 0.0, 0.0]).build(&context);
     assert!(matches!(nowhere, Err(SensorError::Camera(CameraError::Pose { .. }))));
     let error = lens(0.0, 1.0, 1.0).build(&context).unwrap_err();
-    assert_eq!(error.to_string(), "the right eye: fx of the lens is 0; it must be positive and finite");
+    assert_eq!(error.to_string(), "the right camera: fx of the lens is 0; it must be positive and finite");
     let SensorError::StereoCamera { side: "right", error } = error else { panic!("{error}") };
     assert!(matches!(*error, SensorError::Camera(CameraError::Optics(OpticsError::Lens { .. }))), "{error}");
 }
@@ -718,13 +722,9 @@ fn calibration_round_trip() {
 #[test]
 fn not_rectifiable() {
     for (left_to_right_pos, angle, expected) in [
-        (
-            [-0.1, 0.0, 0.0],
-            0.0,
-            "how far the right eye is to the right of the left one [m] is -0.1, it must be positive",
-        ),
-        ([0.0; 3], 0.0, "of the left one [m] is 0, it must be positive"),
-        ([0.01, 0.0, 0.2], 0.0, "the angle by which the left eye turns to be rectified [rad] is 1.52"),
+        ([-0.1, 0.0, 0.0], 0.0, "the x offset of the right camera [m] is -0.1; it must be positive"),
+        ([0.0; 3], 0.0, "the x offset of the right camera [m] is 0; it must be positive"),
+        ([0.01, 0.0, 0.2], 0.0, "the rectifying rotation of the left camera [rad] is 1.52"),
         ([0.3, 0.0, 0.0], 3.0, "it must be at most 1.396 (80 degrees)"),
     ] {
         let left_to_right_rot = UnitQuaternion::from_euler_angles(0.0, angle, 0.0);
@@ -733,10 +733,7 @@ fn not_rectifiable() {
         let error = stereo.camera_info("head", 0).unwrap_err();
         assert!(matches!(error, SensorError::Camera(CameraError::NotRectifiable { .. })), "{error}");
         let said = error.to_string();
-        assert!(
-            said.starts_with("the pictures of these eyes cannot be rectified: ") && said.contains(expected),
-            "{said}"
-        );
+        assert!(said.starts_with("this stereo camera cannot be rectified: ") && said.contains(expected), "{said}");
         // Only errors of the disparity mention disparity.
         assert!(!said.contains("disparity") && stereo.disparity().unwrap_err().to_string().contains("disparity"));
     }
@@ -753,20 +750,23 @@ fn not_rectifiable() {
 fn refused_pairs() {
     type Change = fn(&mut CameraInfo, &mut CameraInfo);
     let changes: [(Change, &str); 11] = [
-        (|_, r| r.width = 320, "the size of the right picture is 320 x 480; it must be the left one's, 640 x 480"),
-        (|_, r| r.projection_matrix[(0, 3)] = 0.0, "P[0][3] of the right eye is 0; it must be negative"),
-        (|l, r| std::mem::swap(l, r), "P[0][3] of the right eye is 0; it must be negative"),
-        (|_, r| r.projection_matrix[(0, 3)] = 72.8, "P[0][3] of the right eye is 72.8"),
-        (|_, r| r.projection_matrix[(0, 3)] = f64::NAN, "P[0][3] of the right eye is NaN"),
-        (|l, _| l.projection_matrix[(0, 3)] = -1.0, "P[0][3] of the left eye is -1; it must be 0"),
-        (|_, r| r.projection_matrix[(1, 3)] = 5.0, "P[1][3] of the right eye is 5; it must be 0"),
-        (|_, r| r.projection_matrix[(0, 0)] = 0.0, "P[0][0] of the right eye is 0; it must be a focal length"),
+        (|_, r| r.width = 320, "the size of the right image is 320 x 480; it must be 640 x 480, as of the left camera"),
+        (|_, r| r.projection_matrix[(0, 3)] = 0.0, "P[0][3] of the right camera is 0; it must be negative"),
+        (|l, r| std::mem::swap(l, r), "P[0][3] of the right camera is 0; it must be negative"),
+        (|_, r| r.projection_matrix[(0, 3)] = 72.8, "P[0][3] of the right camera is 72.8"),
+        (|_, r| r.projection_matrix[(0, 3)] = f64::NAN, "P[0][3] of the right camera is NaN"),
+        (|l, _| l.projection_matrix[(0, 3)] = -1.0, "P[0][3] of the left camera is -1; it must be 0"),
+        (|_, r| r.projection_matrix[(1, 3)] = 5.0, "P[1][3] of the right camera is 5; it must be 0"),
+        (|_, r| r.projection_matrix[(0, 0)] = 0.0, "P[0][0] of the right camera is 0; it must be a focal length"),
         (
             |_, r| r.projection_matrix[(1, 1)] = 605.7,
-            "P[1][1] of the right eye is 605.7; it must be the left eye's, 605.65",
+            "P[1][1] of the right camera is 605.7; it must be 605.65, as of the left camera",
         ),
-        (|_, r| r.projection_matrix[(1, 2)] += 1.0, "P[1][2] of the right eye is 241.98"),
-        (|l, _| l.rectification_matrix *= 1.1, "R of the left eye is no rotation: its determinant is 1.3310"),
+        (|_, r| r.projection_matrix[(1, 2)] += 1.0, "P[1][2] of the right camera is 241.98"),
+        (
+            |l, _| l.rectification_matrix *= 1.1,
+            "R of the left camera is a matrix with determinant 1.3310, whose rows are ",
+        ),
     ];
     for (change, expected) in changes {
         let [mut left, mut right] = OpenCvStereo::all().next().unwrap().infos();
@@ -775,7 +775,7 @@ fn refused_pairs() {
         assert!(matches!(error, CameraError::NotAStereoPair { .. }), "{error}");
         let said = error.to_string();
         assert!(
-            said.starts_with("these are no calibrations of a left and a right eye: ") && said.contains(expected),
+            said.starts_with("the calibrations do not belong to a stereo camera: ") && said.contains(expected),
             "{said}"
         );
     }

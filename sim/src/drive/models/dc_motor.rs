@@ -47,15 +47,15 @@ impl ActuatorLaw for DcMotor {
         }
         if !positive(gains.max_velocity) {
             return Err(format!(
-                "max_velocity is {}; a dc_motor needs the speed it has without load, finite and above 0: set \
-                 drive.max_velocity, or the velocity limit of the joint in the URDF",
+                "max_velocity is {}; a dc_motor needs its no-load speed, finite and above 0: set drive.max_velocity, or the \
+                 velocity limit of the joint in the URDF",
                 gains.max_velocity
             ));
         }
         if !gains.max_effort.is_finite() {
             return Err(format!(
-                "max_effort is {}; a dc_motor needs the effort that it can hold, finite: set drive.max_effort, or the effort \
-                 limit of the joint in the URDF",
+                "max_effort is {}; a dc_motor needs its continuous effort, finite: set drive.max_effort, or the effort limit \
+                 of the joint in the URDF",
                 gains.max_effort
             ));
         }

@@ -58,7 +58,7 @@ impl ActuatorLaw for DelayedPd {
     fn check(&self, _gains: &Gains) -> Result<(), String> {
         if self.delay_capacity() > MAX_DELAY_STEPS {
             return Err(format!(
-                "delay and max_delay are up to {} steps; {MAX_DELAY_STEPS} are the most",
+                "the larger of delay and max_delay is {} steps; the maximum is {MAX_DELAY_STEPS}",
                 self.delay_capacity()
             ));
         }

@@ -22,16 +22,14 @@ impl PartWriter<'_> {
         let m = self.model;
         let count = m.nactuator();
         let beyond = |what: &str| self.unsupported("actuator", a, what);
-        let transmission =
-            mjcf_keywords::transmission(m.actuator_trntype()[a]).ok_or_else(|| beyond("a transmission"))?;
-        let dynamics = mjcf_keywords::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("a dyntype"))?;
-        let gain = mjcf_keywords::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
-        let bias = mjcf_keywords::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
+        let transmission = mjcf_keywords::transmission(m.actuator_trntype()[a])
+            .ok_or_else(|| beyond("an unknown transmission type"))?;
+        let dynamics = mjcf_keywords::dynamics(m.actuator_dyntype()[a]).ok_or_else(|| beyond("an unknown dyntype"))?;
+        let gain = mjcf_keywords::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("an unknown gaintype"))?;
+        let bias = mjcf_keywords::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("an unknown biastype"))?;
         let dynamics = match dynamics {
             // The same filter, which MuJoCo 2.2.2 integrates with Euler's rule.
-            "filterexact" if !self.supports_v4("actuator", a, "dyntype filterexact, for which filter stands") => {
-                "filter"
-            }
+            "filterexact" if !self.supports_v4("actuator", a, "dyntype filterexact (replaced by filter)") => "filter",
             known => known,
         };
         let ids = row(m.actuator_trnid(), 2, a);

@@ -216,7 +216,7 @@ impl PartWriter<'_> {
     fn geom(&self, geom: usize) -> Result<Element, PartError> {
         let m = self.model;
         let (kind, sizes) = mjcf_keywords::geom(m.geom_type()[geom])
-            .ok_or_else(|| self.unsupported("geom", geom, "a type that is no plane, hfield, primitive or mesh"))?;
+            .ok_or_else(|| self.unsupported("geom", geom, "a type other than plane, hfield, primitive or mesh"))?;
         let place = pose_row(row(m.geom_pos(), 3, geom), row(m.geom_quat(), 4, geom));
         let place = self.to_scene_body(m.geom_bodyid()[geom], place);
         let mut element =
@@ -266,7 +266,7 @@ impl PartWriter<'_> {
         let m = self.model;
         let (kind, sizes) = mjcf_keywords::geom(m.site_type()[site])
             .filter(|(_, sizes)| *sizes > 0)
-            .ok_or_else(|| self.unsupported("site", site, "a type that is no primitive"))?;
+            .ok_or_else(|| self.unsupported("site", site, "a type other than a primitive"))?;
         let place = pose_row(row(m.site_pos(), 3, site), row(m.site_quat(), 4, site));
         let place = self.to_scene_body(m.site_bodyid()[site], place);
         let element = Element::new("site")
@@ -280,7 +280,7 @@ impl PartWriter<'_> {
     fn camera(&self, camera: usize) -> Result<Element, PartError> {
         let m = self.model;
         let mode = mjcf_keywords::tracking_mode(m.cam_mode()[camera])
-            .ok_or_else(|| self.unsupported("camera", camera, "a mode"))?;
+            .ok_or_else(|| self.unsupported("camera", camera, "an unknown mode"))?;
         let place = pose_row(row(m.cam_pos(), 3, camera), row(m.cam_quat(), 4, camera));
         let element = Element::new("camera")
             .attr("name", self.scoped_name(&self.names.cameras[camera]))
@@ -295,7 +295,7 @@ impl PartWriter<'_> {
     fn light(&self, light: usize) -> Result<Option<Element>, PartError> {
         let m = self.model;
         let mode = mjcf_keywords::tracking_mode(m.light_mode()[light])
-            .ok_or_else(|| self.unsupported("light", light, "a mode"))?;
+            .ok_or_else(|| self.unsupported("light", light, "an unknown mode"))?;
         let values = m.light(light);
         let element = Element::new("light")
             .attr("name", self.scoped_name(&self.names.lights[light]))

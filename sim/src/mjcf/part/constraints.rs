@@ -42,12 +42,12 @@ impl PartWriter<'_> {
     fn equality(&self, e: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
         let kind = mjcf_keywords::equality(m.eq_type()[e])
-            .ok_or_else(|| self.unsupported("equality", e, "a type that is not connect, weld, joint or tendon"))?;
+            .ok_or_else(|| self.unsupported("equality", e, "a type other than connect, weld, joint or tendon"))?;
         let (first, second) = (mj_index(m.eq_obj1id()[e]), mj_index(m.eq_obj2id()[e]));
         let data = row_of(m.eq_data(), m.neq(), e);
         let element = Element::new(kind).attr("name", self.scoped_name(&self.names.equalities[e]));
         let between_sites = m.equality_is_between_sites(e);
-        if between_sites && !self.supports_v4("equality", e, &format!("the whole {kind}, which is between sites")) {
+        if between_sites && !self.supports_v4("equality", e, &format!("the whole {kind}, because it connects sites")) {
             return Ok(None);
         }
         let site = |id: usize| self.scoped_name(&self.names.sites[id]);
@@ -143,7 +143,7 @@ impl PartWriter<'_> {
                     .opt("geom", id.map(|id| self.scoped_name(&self.names.geoms[id])))
                     // MuJoCo stores the index of the side site as a floating-point number.
                     .opt("sidesite", mj_index(parameter.round() as i32).map(site)),
-                None => return Err(self.unsupported("tendon", t, "a path of unknown points")),
+                None => return Err(self.unsupported("tendon", t, "a path with an unknown element type")),
             };
             lines.push(format!("  {}", element.leaf()));
         }

@@ -80,7 +80,7 @@ impl fmt::Display for OmittedElement {
 
 /// Element of a file that a part cannot represent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{element} {name:?} has {what}, which a part of a scene cannot have")]
+#[error("{element} {name:?} cannot be imported into a scene: {what}")]
 pub struct PartError {
     /// Kind of the element, as in MJCF.
     pub element: &'static str,

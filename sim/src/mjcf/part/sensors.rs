@@ -36,11 +36,11 @@ fn unsupported_reason(m: &Model, s: usize) -> Option<String> {
         _ => false,
     };
     if of_the_world {
-        return Some(format!("{} of the world, which holds the whole scene", word.keyword));
+        return Some(format!("{} of the world body, which contains the whole scene", word.keyword));
     }
     let observed = [(m.sensor_objtype()[s], m.sensor_objid()[s]), (m.sensor_reftype()[s], m.sensor_refid()[s])];
     if observed.into_iter().any(|(kind, id)| id >= 0 && kind != 0 && mjcf_keywords::object_type(kind).is_none()) {
-        return Some("an object of a kind that has no frame".into());
+        return Some("an object type without a frame".into());
     }
     m.unsupported_sensor_feature(s).map(Into::into)
 }
@@ -89,7 +89,7 @@ impl PartWriter<'_> {
         if kind == 0 {
             return Ok(None);
         }
-        let unknown = || self.unsupported("sensor", sensor, "an object of a kind that has no frame");
+        let unknown = || self.unsupported("sensor", sensor, "an object type without a frame");
         let kind = mjcf_keywords::object_type(kind).ok_or_else(unknown)?;
         let names = &self.names;
         let name = match kind {

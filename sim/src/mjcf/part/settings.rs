@@ -61,7 +61,7 @@ fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<Top
 }
 
 /// Warns about settings of a file that the scene overrides for all of its parts, and about sensors that are left out.
-/// `owner` names the part in the messages, such as `part "arm"`.
+/// `owner` names the part in the messages, such as `MJCF part "arm"`.
 pub(crate) fn setting_warnings(
     owner: &str,
     text: &str,
@@ -77,7 +77,7 @@ pub(crate) fn setting_warnings(
     let sensors: Vec<&TopLevelElement> = found.iter().filter(|s| s.element.starts_with(SENSOR)).collect();
     for (index, left_out) in sensors_left_out {
         let at = sensors.get(*index).filter(|_| sensors.len() == model.nsensor()).map(|s| s.source.clone());
-        let message = format!("{owner}: {left_out}: it is left out, the rest of the file is not");
+        let message = format!("{owner}: {left_out}: not imported; the rest of the file is used");
         diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
     }
     for difference in model.option_differences(scene) {
@@ -88,30 +88,30 @@ pub(crate) fn setting_warnings(
             DiagnosticKind::SettingIgnored,
             at.map(|s| s.source.clone()),
             format!(
-                "{owner}: option {} is {}{default}; the scene's {} holds",
+                "{owner}: option {} is {}{default}; the scene's value {} is used",
                 difference.name, difference.first, difference.second
             ),
         ));
     }
     let left_out = [
-        ("visual", "pictures have the scene's look, unless it shows this file alone"),
-        ("statistic", "MuJoCo computes the scene's"),
-        ("custom", "a scene has none"),
+        ("visual", "images use the scene's visual settings, unless the scene contains only this file"),
+        ("statistic", "MuJoCo computes the statistics of the whole scene"),
+        ("custom", "custom fields are not supported in a scene"),
     ];
     for (element, why) in left_out {
         let at = found.iter().find(|s| s.element == element);
         if let Some(stated) = at {
-            let message = format!("{owner}: <{element}> is left out: {why}");
+            let message = format!("{owner}: <{element}> is ignored: {why}");
             diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, stated.source.clone(), message));
         }
     }
     let counts = [
-        ("keyframe", model.nkey(), "its numbers are of the file alone"),
-        ("skin", model.nskin(), "bodies are drawn by their geoms"),
+        ("keyframe", model.nkey(), "a keyframe holds the state of the file alone, not of the scene"),
+        ("skin", model.nskin(), "bodies are rendered with their geoms"),
     ];
     for (element, count, why) in counts {
         if count > 0 {
-            let message = format!("{owner}: {count} {element}(s) are left out: {why}");
+            let message = format!("{owner}: {count} {element}(s) are ignored: {why}");
             let at = found.iter().find(|s| s.element == element).map(|s| s.source.clone());
             diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
         }

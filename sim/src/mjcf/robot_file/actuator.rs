@@ -44,10 +44,14 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
     let mut unsaid = Vec::new();
     if !(follows_position || follows_velocity || is_motor) {
         let law = format!("gaintype {gain_type}, biastype {bias_type}, biasprm {:?}", &bias[..3]);
-        unsaid.push(format!("its force is that of no servo and no motor ({law}): its gains are not used"));
+        unsaid.push(format!(
+            "its force law is neither a position or velocity servo nor a motor ({law}); its gains are not used"
+        ));
     }
     if dynamics != "none" {
-        unsaid.push(format!("its activation ({dynamics}) is gone: the drive acts at once on its targets"));
+        unsaid.push(format!(
+            "its activation dynamics ({dynamics}) are not used: the drive follows its targets without delay"
+        ));
     }
     let mut force = None;
     let mut limit = |what: &str, low: f64, high: f64| {

@@ -67,7 +67,7 @@ pub(super) fn of_joints(
             }
             _ => {
                 let message = format!(
-                    "{owner}: equality {:?} holds, but no mimic says it; joint {:?} has no drive",
+                    "{owner}: equality {:?} is kept, but is not a linear mimic relation, so joint {:?} has no drive",
                     names.equalities[equality], names.joints[follower]
                 );
                 diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, source, message));

@@ -78,11 +78,18 @@ pub(super) fn of_joints(
         let mut arms: BTreeMap<usize, MomentArm> = BTreeMap::new();
         for &(joint, coefficient) in &path {
             let Some((driver, ratio)) = mimic_root(couplings, joint) else {
-                notes.push(format!("it has no part in {}, which an equality holds that no mimic says", quoted(joint)));
+                notes.push(format!(
+                    "it does not act on joint {}, because a joint equality that is not a mimic relation constrains it",
+                    quoted(joint)
+                ));
                 continue;
             };
             if driver != joint {
-                notes.push(format!("{} follows {}, whose drive takes its place", quoted(joint), quoted(driver)));
+                notes.push(format!(
+                    "{} is a mimic joint of {}, whose drive replaces the actuator",
+                    quoted(joint),
+                    quoted(driver)
+                ));
             }
             let arm = arms.entry(driver).or_default();
             let (own, force) = (own_limit(joint).unwrap_or(f64::INFINITY), law.force.unwrap_or(f64::INFINITY));
@@ -98,13 +105,16 @@ pub(super) fn of_joints(
         arms.retain(|&driver, arm| {
             let acts = arm.moment_arm.abs() > 1e-12 * arm.abs_sum && law.force != Some(0.0);
             if !acts {
-                notes.push(format!("it never moves {}, so no drive of it is made", quoted(driver)));
+                notes.push(format!(
+                    "its effort on {} is always zero, so this joint gets no drive from it",
+                    quoted(driver)
+                ));
             }
             acts
         });
         if arms.len() > 1 {
             let joints: Vec<String> = arms.keys().map(|&joint| quoted(joint)).collect();
-            notes.push(format!("it moves {} together, and each has a drive of its own", joints.join(", ")));
+            notes.push(format!("it moves the joints {} together, but each gets its own drive", joints.join(", ")));
         }
         for (driver, arm) in arms {
             let force = law.force.map_or(f64::INFINITY, |force| force * arm.moment_arm.abs());
@@ -114,18 +124,18 @@ pub(super) fn of_joints(
             acted.entry(driver).or_default().extend(arm.joints);
         }
         if let Some(tendon) = &tendon {
-            notes.insert(0, format!("acts on the tendon {tendon:?}, and drives of joints take its place"));
+            notes.insert(0, format!("acts on the tendon {tendon:?}; drives of its joints replace it"));
         } else {
             replaced.push(format!("{name:?}"));
         }
         if !notes.is_empty() {
-            let differs = if tendon.is_some() { "" } else { "differs from its drive: " };
+            let differs = if tendon.is_some() { "" } else { "differs from the drive that replaces it: " };
             let message = format!("{owner}: actuator {name:?} {differs}{}", notes.join("; "));
             diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, places.get("actuator", name), message));
         }
     }
     if !replaced.is_empty() {
-        let message = format!("{owner}: drives take the place of the actuators {}", replaced.join(", "));
+        let message = format!("{owner}: joint drives replace the actuators {}", replaced.join(", "));
         diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, places.file(), message));
     }
     for (driver, joints) in acted {
@@ -155,7 +165,7 @@ fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<ActuatorT
             let path = points.map(|p| (model.wrap_objid()[p] as usize, model.wrap_prm()[p])).collect();
             Ok(ActuatorTarget { path, tendon: Some(tendon.clone()) })
         }
-        other => Err(format!("a {}", other.unwrap_or("kind of object that has no name"))),
+        other => Err(format!("a {}", other.unwrap_or("transmission target of an unknown type"))),
     }
 }
 

@@ -5,7 +5,7 @@ use kinetoscope_mujoco::CompileError;
 use kinetoscope_scene::source_location::SourceLocation;
 
 /// Advice on another use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
-const AS_A_PART: &str = "such a file is a scene, or a part of one";
+const AS_A_PART: &str = "add the file with add_mjcf (entity type mjcf) instead";
 
 /// Error of loading an MJCF file as a robot.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -18,20 +18,21 @@ pub enum RobotFileError {
     #[error(transparent)]
     Part(#[from] PartError),
     /// The file has no body.
-    #[error("the file has no body; a robot is one body in the file's world and what hangs on it")]
+    #[error("the file has no body; a robot file has exactly one top-level body, in <worldbody>")]
     NoBody,
     /// The file's world has several child bodies.
-    #[error("the file has {} bodies in its world ({}); a robot is one and what hangs on it: give each a file, or {AS_A_PART}", .roots.len(), format_first(.roots))]
+    #[error("the file has {} top-level bodies ({}), but a robot has exactly one; split the file, or {AS_A_PART}", .roots.len(), format_first(.roots))]
     MultipleRoots {
         /// Names of these bodies.
         roots: Vec<String>,
     },
     /// The file has no hinge and no slide joint.
-    #[error("the file has no hinge and no slide joint, so there is nothing to drive; {AS_A_PART}")]
+    #[error("the file has no hinge or slide joint, so a robot would have no drives; {AS_A_PART}")]
     NoJoint,
     /// A joint is a ball joint, which robots do not support.
     #[error(
-        "{at}: joint {joint:?} is a ball; robots have hinges and slides, and a free joint of the root body: write three hinges, or {AS_A_PART}"
+        "{at}: joint {joint:?} is a ball joint; a robot supports hinge and slide joints, and a free joint of the root \
+         body: replace it by three hinges, or {AS_A_PART}"
     )]
     BallJoint {
         /// Location of the joint.
@@ -40,7 +41,7 @@ pub enum RobotFileError {
         joint: String,
     },
     /// A body is a mocap body.
-    #[error("{at}: body {body:?} is a mocap body, which no joint moves; {AS_A_PART}")]
+    #[error("{at}: body {body:?} is a mocap body, which a robot does not support; {AS_A_PART}")]
     MocapBody {
         /// Location of the body.
         at: SourceLocation,
@@ -49,7 +50,8 @@ pub enum RobotFileError {
     },
     /// The base is configured as free, but a joint attaches the root body to the world.
     #[error(
-        "{at}: joint {joint:?} holds the root body {body:?} in the world, so the base cannot be free; set fix_base: true, or move the joint to a body below"
+        "{at}: joint {joint:?} connects the root body {body:?} to the world, so the base cannot be free; set fix_base: \
+         true, or move the joint to a child body"
     )]
     BaseNotFree {
         /// Location of the joint.
@@ -61,7 +63,8 @@ pub enum RobotFileError {
     },
     /// An actuator acts on a target that drives do not support.
     #[error(
-        "{at}: actuator {actuator:?} acts on {target}; the drives of a robot act on hinges and slides: leave it out, or {AS_A_PART}"
+        "{at}: actuator {actuator:?} acts on {target}, but robot drives act on hinge and slide joints only; remove it, \
+         or {AS_A_PART}"
     )]
     Actuator {
         /// Location of the actuator.
@@ -73,7 +76,8 @@ pub enum RobotFileError {
     },
     /// An element of the robot depends on an element of the file's world, which a robot leaves out.
     #[error(
-        "{at}: {element} {name:?} needs {needs:?} in the file's world, which a robot leaves out: put it into a body, or {AS_A_PART}"
+        "{at}: {element} {name:?} refers to {needs:?} of <worldbody>, which a robot does not import; move it into a \
+         body, or {AS_A_PART}"
     )]
     NeedsWorld {
         /// Location of the element.

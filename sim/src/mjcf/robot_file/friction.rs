@@ -29,7 +29,8 @@ pub(super) fn warn_solver_params(
     let named: Vec<String> = joints.filter(is_soft).map(|joint| format!("{:?}", names.joints[joint])).collect();
     if !named.is_empty() {
         let message = format!(
-            "{owner}: solreffriction and solimpfriction of these joints hold only where no implicit drive is: {}",
+            "{owner}: solreffriction and solimpfriction of these joints are used only while they have no implicit \
+             drive: {}",
             named.join(", ")
         );
         diagnostics.push(Diagnostic::new(DiagnosticKind::SettingIgnored, file.clone(), message));

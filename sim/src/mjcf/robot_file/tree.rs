@@ -155,7 +155,10 @@ impl DescriptionBuilder<'_> {
             let source = self.places.get("site", wanted);
             let name = names.unused(wanted, ".site");
             if name != *wanted {
-                let message = format!("{}: the site {wanted:?} is called as a body; its link is {name:?}", self.owner);
+                let message = format!(
+                    "{}: the site {wanted:?} has the same name as a body; its link is named {name:?}",
+                    self.owner
+                );
                 diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, source.clone(), message));
             }
             links.push(self.link(name, source));

@@ -32,7 +32,7 @@ pub(super) fn check(
     left_out.extend(in_world(model.cam_bodyid(), "camera", &names.cameras));
     left_out.extend(in_world(model.light_bodyid(), "light", &names.lights));
     if !left_out.is_empty() {
-        let message = format!("{owner}: what stands in the file's world is no part of it: {}", left_out.join(", "));
+        let message = format!("{owner}: elements directly in <worldbody> are not imported: {}", left_out.join(", "));
         diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, places.file(), message));
     }
     let needs = |element: &'static str, name: &str, needs: &str| RobotFileError::NeedsWorld {
@@ -79,7 +79,7 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedEl
         // Drives are friction rows or forces of this crate, which MuJoCo's sum over actuators does not include.
         let word = mjcf_keywords::sensor(model.sensor_type()[sensor]).map_or("", |word| word.keyword);
         if matches!(word, "jointactuatorfrc" | "tendonactuatorfrc") {
-            let what = format!("the type {word}, the force of actuators, whose place drives take");
+            let what = format!("the type {word}: it measures actuator forces, and drives replace the actuators");
             left_out.push((
                 sensor,
                 OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property: what },
@@ -99,7 +99,7 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedEl
                 "camera" => (&names.cameras[id], model.cam_bodyid()[id] == 0),
                 _ => return None,
             };
-            is_gone.then(|| format!("{word} {name:?}, which a robot leaves out"))
+            is_gone.then(|| format!("{word} {name:?}, which a robot does not import"))
         });
         if let Some(what) = omitted {
             left_out.push((
@@ -137,23 +137,24 @@ pub(super) fn warn_contacts(
         let more = match colliding.as_slice() {
             [] => String::new(),
             geoms => format!(
-                "; these geoms, which collide in such pairs alone, collide as the others do: {}",
+                "; these geoms collided only in such pairs, and now collide like the other geoms of the robot: {}",
                 geoms.join(", ")
             ),
         };
         say(format!(
-            "pairs with what stands in the file's world are no part of it, nor are their friction and softness: {}{more}",
+            "contact pairs with geoms of <worldbody> are not imported, including their friction and solver parameters: \
+             {}{more}",
             named(&with_world)
         ));
     }
     let own = &omitted_pairs(model, self_collision) - &with_world;
     if !own.is_empty() {
-        say(format!("pairs of its own geoms hold only with self_collision: true: {}", named(&own)));
+        say(format!("contact pairs between its own geoms are used only with self_collision: true: {}", named(&own)));
     }
     for bodies in model.excluded_bodies().filter(|bodies| bodies.contains(&0)) {
         let body = &names.bodies[bodies[0].max(bodies[1])];
         say(format!(
-            "body {body:?} collides with the scene, though the file excludes it from colliding with its world"
+            "body {body:?} collides with the scene, although the file excludes contacts between this body and its world"
         ));
     }
 }

@@ -34,7 +34,7 @@ fn capsules(visible: &VisualScene, data: &Data) -> Vec<([[f64; 3]; 2], f64)> {
     let shown = scene.instances().iter().zip(&poses).filter(|(instance, _)| is_shown(instance));
     shown
         .map(|(instance, pose)| {
-            let Shape::Capsule(capsule) = &instance.shape else { panic!("{:?} is no capsule", instance.shape) };
+            let Shape::Capsule(capsule) = &instance.shape else { panic!("{:?} is not a capsule", instance.shape) };
             let end = |z: f32| pose.apply([0.0, 0.0, z]).map(f64::from);
             ([end(-capsule.half_length), end(capsule.half_length)], f64::from(capsule.radius))
         })
@@ -49,7 +49,10 @@ fn near(found: &[([[f64; 3]; 2], f64)], expected: &[([[f64; 3]; 2], f64)]) {
     };
     let (a, b) = (numbers(found), numbers(expected));
     // Single precision, of lengths below 2 m.
-    assert!(a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}, not {expected:?}");
+    assert!(
+        a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-6),
+        "found {found:?}, expected {expected:?}"
+    );
 }
 
 const PATHS: &str = r#"<mujoco><compiler autolimits="true"/><worldbody>
@@ -68,6 +71,24 @@ const PATHS: &str = r#"<mujoco><compiler autolimits="true"/><worldbody>
     <spatial name="clear" rgba="1 0 0 0"><site site="left"/><site site="hook"/></spatial>
     <spatial name="string" width="0.005" range="0 2"><site site="right"/><site site="ball"/></spatial>
     <fixed name="sum"><joint joint="lift" coef="1"/></fixed></tendon></mujoco>"#;
+
+/// The rods of a slider-crank are not rendered: a message names the actuator. Control: the same model with a motor at the
+/// joint.
+///
+/// Root cause once: rods were missing from images without a message.
+#[test]
+fn slider_crank() {
+    let model = |actuator: &str| {
+        let mjcf = format!(
+            r#"<mujoco><worldbody><site name="slider"/><body pos="0 0 1"><joint name="turn"/><geom size="0.1"/>
+               <site name="crank" pos="0.1 0 0"/></body></worldbody><actuator>{actuator}</actuator></mujoco>"#
+        );
+        VisualScene::of_model(&mj::compile(&mjcf, &[]).expect("compiles").into_model())
+    };
+    let rods = model(r#"<general name="piston" cranksite="crank" slidersite="slider" cranklength="1"/>"#);
+    assert_eq!(rods.omitted(), ["the rods of the slider-crank of actuator piston are not rendered"]);
+    assert_eq!(model(r#"<motor joint="turn"/>"#).omitted(), [""; 0]);
+}
 
 /// A tendon around a cylinder touches it at tangent points: at 60 degrees from the axis to a point two radii away.
 /// Between these points it is half as wide. A pulley has no segment. Tendons of group 3, transparent tendons and sums
@@ -99,7 +120,7 @@ fn tendons() {
     let red = scene.instances().iter().find(|i| i.is_deformable).expect("a tendon").material.rgba;
     assert_eq!(red, [1.0, 0.0, 0.0, 1.0]);
     // The scene of all environments has no visible capsule.
-    assert!(!visible.scene().instances().iter().any(is_shown), "capsules without a place are hidden");
+    assert!(!visible.scene().instances().iter().any(is_shown), "unused capsules are hidden");
 }
 
 /// A string of 2 m between two points that are 1 m apart at the same height hangs as y = a cosh(x / a), where 2 a
@@ -174,7 +195,7 @@ fn skin_of_two_bones() {
     };
     let close = |found: &[[f32; 2]], expected: &[[f32; 2]]| {
         let far = found.iter().flatten().zip(expected.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        assert!(found.len() == expected.len() && far < 1e-6, "{found:?}, not {expected:?}");
+        assert!(found.len() == expected.len() && far < 1e-6, "found {found:?}, expected {expected:?}");
     };
     let up = std::f64::consts::FRAC_PI_2;
     close(&line("0", 0.0), &[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]);

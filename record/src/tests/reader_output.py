@@ -1,11 +1,11 @@
-"""What the scripts that read recordings have in common: how they say numbers."""
+"""Shared functions of the reader scripts: output of numbers."""
 
 import json
 import struct
 
 
 def bits(value):
-    """Numbers with a fraction as texts of their bits: nothing is lost on the way."""
+    """Replaces floats by strings of their bits, which lose nothing."""
     if isinstance(value, float):
         return str(struct.unpack("<Q", struct.pack("<d", value))[0])
     if isinstance(value, list):
@@ -16,10 +16,10 @@ def bits(value):
 
 
 def weighed(numbers):
-    """The sum of numbers, each by its place."""
+    """Sum of the numbers, each weighted by its position, counted from 1."""
     return sum(k * int(x) for k, x in enumerate(numbers, 1))
 
 
-def tell(what):
-    """Says it as JSON."""
-    print(json.dumps(bits(what)))
+def print_json(value):
+    """Prints a value as JSON; floats become strings of their bits."""
+    print(json.dumps(bits(value)))
