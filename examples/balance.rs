@@ -249,7 +249,7 @@ impl RobotModel {
         };
         let Some(Geometry::Sphere { radius }) = link("left_tyre")?.collisions.first().map(|shape| &shape.geometry)
         else {
-            return Err("the left tyre touches the floor with something else than a ball".into());
+            return Err("the left tire does not touch the floor with a ball".into());
         };
         let ((body, height, body_inertia), left, right) =
             (inertial("body")?, inertial("left_tyre")?, inertial("right_tyre")?);
