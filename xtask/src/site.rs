@@ -6,8 +6,8 @@
 //! other files that pages link to         -> target/site/source/*.txt
 //! ```
 //!
-//! Pages link to files of the repository, as people read them there. In the site, a link to a page leads to its chapter,
-//! a link to a crate leads to its API, and any other linked file is copied as text. A link without a target is an error.
+//! Links of the pages are relative paths in the repository. In the site, a link to a page leads to its chapter, a link to
+//! a crate leads to its API, and any other linked file is copied as text. A link without a target is an error.
 
 use crate::run::{Cmd, Failure, Repo, XtaskResult, no_findings};
 use crate::setup::{self, Requirements};
@@ -75,10 +75,7 @@ fn api(repo: &Repo, to: &Path) -> XtaskResult {
     let ready = setup::prepare(repo, Requirements::default())?;
     let cargo = ready.cargo().args(["doc", "--workspace", "--no-deps"]);
     cargo.args(test::features(&["--workspace"])).run()?;
-    let from = repo.target.join("doc");
-    for file in files_below(&from) {
-        copy(&from.join(&file), &to.join(&file))?;
-    }
+    copy_folder(&repo.target.join("doc"), to)?;
     write(
         &to.join("index.html"),
         "<!DOCTYPE html><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"0; url=kinetoscope/index.html\">\n\
@@ -243,9 +240,36 @@ fn copy(from: &Path, to: &Path) -> XtaskResult {
     fs::copy(from, to).map(|_| ()).map_err(fail)
 }
 
+/// Copies a folder with everything in it.
+fn copy_folder(from: &Path, to: &Path) -> XtaskResult {
+    let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", from.display()));
+    for entry in fs::read_dir(from).map_err(fail)? {
+        let entry = entry.map_err(fail)?;
+        let target = to.join(entry.file_name());
+        if entry.file_type().map_err(fail)?.is_dir() {
+            copy_folder(&entry.path(), &target)?;
+        } else {
+            copy(&entry.path(), &target)?;
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Folders with names that other checks skip are copied, too.
+    #[test]
+    fn copied_folder() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        for file in ["from/a.html", "from/target/b.html"] {
+            crate::wheel::tests::write(&dir.path().join(file), "");
+        }
+        assert!(copy_folder(&dir.path().join("from"), &dir.path().join("to")).is_ok());
+        assert!(dir.path().join("to/a.html").is_file() && dir.path().join("to/target/b.html").is_file());
+        assert!(copy_folder(&dir.path().join("gone"), &dir.path().join("to")).is_err());
+    }
 
     #[test]
     fn paths() {
