@@ -91,16 +91,20 @@ fn link(repo: &Repo, site: &Path) -> XtaskResult {
     let mut findings = Vec::new();
     // 404.html is served at any address, so mdbook writes its links in another form.
     let is_page = |file: &String| file.ends_with(".html") && file != "404.html" && !file.starts_with(API);
-    for page in files_below(site).into_iter().filter(is_page) {
-        let path = site.join(&page);
-        let html = fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
-        let html = rewrite_links(&html, |link| match resolver.target(&page, link) {
+    let pages: Vec<String> = files_below(site).into_iter().filter(is_page).collect();
+    let read = |page: &str| {
+        let path = site.join(page);
+        fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
+    };
+    for page in &pages {
+        let (path, html) = (site.join(page), read(page)?);
+        let html = rewrite_links(&html, |link| match resolver.target(page, link) {
             Target::InPlace => Some(link.to_string()),
-            Target::Page(target) => Some(relative(&page, &target) + anchor(link)),
+            Target::Page(target) => Some(relative(page, &target) + anchor(link)),
             Target::File(file) => {
                 let target = format!("{SOURCE}/{file}.txt");
                 copied.insert(file);
-                Some(relative(&page, &target))
+                Some(relative(page, &target))
             }
             Target::Folder => None,
             Target::Missing => {
@@ -113,7 +117,29 @@ fn link(repo: &Repo, site: &Path) -> XtaskResult {
     for file in copied {
         copy(&repo.root.join(&file), &site.join(format!("{SOURCE}/{file}.txt")))?;
     }
+    // The page for printing has all chapters in one file, with other headings.
+    for page in pages.iter().filter(|page| *page != "print.html") {
+        for (target, id) in anchors(page, &read(page)?) {
+            if pages.contains(&target) && !read(&target)?.contains(&format!(" id=\"{id}\"")) {
+                findings.push(format!("{page}: {target} has no heading `#{id}`"));
+            }
+        }
+    }
     no_findings("the book has links without a target", &findings)
+}
+
+/// The pages and ids that a page's links with `#` lead to.
+fn anchors(page: &str, html: &str) -> BTreeSet<(String, String)> {
+    let folder = page.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut found = BTreeSet::new();
+    rewrite_links(html, |link| {
+        if let Some((path, id)) = link.split_once('#').filter(|(path, id)| !path.contains(':') && !id.is_empty()) {
+            let target = if path.is_empty() { Some(page.to_string()) } else { normalized(folder, path) };
+            found.extend(target.map(|target| (target, id.to_string())));
+        }
+        None
+    });
+    found
 }
 
 /// The folder of each package in the repository, with the name of its library; the facade's folder is empty.
@@ -284,6 +310,15 @@ mod tests {
         let html = r#"<a class="x" href="a">1</a> href="b" <img src="c"><a href="d">"#;
         let changed = rewrite_links(html, |link| (link != "d").then(|| link.to_uppercase()));
         assert_eq!(changed, r#"<a class="x" href="A">1</a> href="B" <img src="C"><a>"#);
+    }
+
+    #[test]
+    fn headings() {
+        let html = "<a href=\"#a\"></a> <a href=\"../b.html#c\"></a> <a href=\"https://x.org/#d\"></a> <a href=\"e.html\"></a>";
+        let found: Vec<(String, String)> = anchors("decisions/p.html", html).into_iter().collect();
+        let expected =
+            [("b.html", "c"), ("decisions/p.html", "a")].map(|(page, id)| (page.to_string(), id.to_string()));
+        assert_eq!(found, expected);
     }
 
     /// The targets of all kinds of links, in a repository and a site of a few files.
