@@ -90,7 +90,7 @@ pub(crate) struct SensorList {
     state: SceneState,
     /// Flags of the sensors that are due after the current steps.
     due: Vec<bool>,
-    /// Step count of every environment; [`kinetoscope_sensors::Phases::STANDS`] for a diverged environment.
+    /// Step count of every environment; [`kinetoscope_sensors::Phases::QUARANTINED`] for a diverged environment.
     step_counts: Vec<u64>,
     /// Environments with a written state since the last [`take_written`](Self::take_written).
     written: BTreeSet<usize>,

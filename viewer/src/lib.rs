@@ -1,9 +1,9 @@
 //! Live views of a running simulation: native windows, browser views, screenshots and plots.
 //!
 //! ```text
-//! simulation thread                                viewer thread
-//! SimulationManager -> Conductor -> Snapshot  ==>  Viewer -> Painter -> Canvas
-//!                      Conductor <- Command   <==  Viewer
+//! simulation thread                                         viewer thread
+//! SimulationManager -> ViewController -> Snapshot  ==>  Viewer -> SceneRenderer -> Canvas
+//!                      ViewController <- Command   <==  Viewer
 //! ```
 //!
 //! The [`ViewController`] is an observer of the simulation. It copies the scene state into a [`Snapshot`] at the highest
