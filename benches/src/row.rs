@@ -11,12 +11,12 @@ pub(crate) struct Row {
     pub(crate) bench: String,
     /// Name of the measured case.
     pub(crate) case: String,
-    /// Unit of `ours` and `rival`.
+    /// Unit of `ours` and `baseline`.
     pub(crate) unit: String,
     /// Kinetoscope's number.
     pub(crate) ours: f64,
     /// The baseline's number; `None` if the baseline is not on the machine.
-    pub(crate) rival: Option<f64>,
+    pub(crate) baseline: Option<f64>,
     /// Name of the baseline.
     pub(crate) rival_name: String,
     /// Speed ratio; above 1 our side is better.
@@ -38,7 +38,7 @@ impl Row {
             case: case.into(),
             unit: unit.into(),
             ours,
-            rival: None,
+            baseline: None,
             rival_name: "-".into(),
             ratio: None,
             threads,
@@ -48,9 +48,9 @@ impl Row {
     }
 
     /// Adds the baseline.
-    pub(crate) fn against(mut self, rival_name: &str, rival: f64, ratio: f64) -> Self {
+    pub(crate) fn against(mut self, rival_name: &str, baseline: f64, ratio: f64) -> Self {
         self.rival_name = rival_name.into();
-        self.rival = Some(rival);
+        self.baseline = Some(baseline);
         self.ratio = Some(ratio);
         self
     }
@@ -89,7 +89,7 @@ pub(crate) fn table(rows: &[Row]) -> String {
             row.threads,
             row.mujoco,
             number(Some(row.ours), digits),
-            number(row.rival, digits),
+            number(row.baseline, digits),
             row.unit,
             row.rival_name,
             number(row.ratio, 3),

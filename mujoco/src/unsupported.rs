@@ -56,7 +56,11 @@ impl Model {
         for (element, values, count, what) in numbers {
             // An infinite `springyield` has no effect.
             if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
-                return Some(UnsupportedFeature { element, index: at / (values.len() / count.max(1)).max(1), feature: what });
+                return Some(UnsupportedFeature {
+                    element,
+                    index: at / (values.len() / count.max(1)).max(1),
+                    feature: what,
+                });
             }
         }
         let counts = [

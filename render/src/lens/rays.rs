@@ -178,9 +178,9 @@ impl LensRays {
     pub fn falloff(&self, [x, y]: [usize; 2]) -> f64 {
         let all = self.falloff.get_or_init(|| {
             let [width, height] = self.size;
-            let centre = |k: usize| [(k % width) as f64 + 0.5, (k / width) as f64 + 0.5];
+            let center = |k: usize| [(k % width) as f64 + 0.5, (k / width) as f64 + 0.5];
             let falloff = self.optics.falloff();
-            (0..width * height).map(|k| falloff(centre(k)) as f32).collect()
+            (0..width * height).map(|k| falloff(center(k)) as f32).collect()
         });
         f64::from(all[y * self.size[0] + x])
     }

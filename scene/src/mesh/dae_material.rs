@@ -65,13 +65,13 @@ impl<'a, 'i> Dae<'a, 'i> {
                 let mut look = MeshMaterial { name, rgba: [1.0; 4], texture: None };
                 if let Some(texture) = child(diffuse, "texture") {
                     look.texture = self.image(effect, texture).map(TextureSource::File);
-                } else if let Some(colour) = self.colour(effect, diffuse) {
-                    let rgba: [f64; 4] = match self.exactly::<3>(colour) {
+                } else if let Some(color) = self.color(effect, diffuse) {
+                    let rgba: [f64; 4] = match self.exactly::<3>(color) {
                         Ok([r, g, b]) => [r, g, b, 1.0],
-                        Err(_) => self.exactly(colour)?,
+                        Err(_) => self.exactly(color)?,
                     };
                     if !rgba.iter().all(|x| x.is_finite()) {
-                        return Err(self.ctx.invalid(line(colour), "color is not finite; expected 0..=1"));
+                        return Err(self.ctx.invalid(line(color), "color is not finite; expected 0..=1"));
                     }
                     look.rgba = rgba.map(|x| x.clamp(0.0, 1.0) as f32);
                 }
@@ -83,7 +83,7 @@ impl<'a, 'i> Dae<'a, 'i> {
     }
 
     /// `<color>`, or the `<float4>` or `<float3>` that `<param ref>` names.
-    fn colour(&self, effect: Node<'a, 'i>, diffuse: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+    fn color(&self, effect: Node<'a, 'i>, diffuse: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
         child(diffuse, "color").or_else(|| {
             let name = child(diffuse, "param")?.attribute("ref")?;
             let param = parameter(effect, name)?;

@@ -90,12 +90,12 @@ fn payloads() {
     let (model, loaded) = (alone(ODD), sim.batch().model().clone());
     let com = |model: &Model, body: usize| [0, 1, 2].map(|k| model.body_ipos()[3 * body + k]);
     let hand = [(0.3 * 0.05 + 0.25 * 0.1) / 0.55, 0.0, 0.25 * 0.01 / 0.55];
-    for (name, payload, centre) in [("fore", 0.5, None), ("hand", 0.25, Some(hand)), ("base", 0.0, None)] {
+    for (name, payload, center) in [("fore", 0.5, None), ("hand", 0.25, Some(hand)), ("base", 0.0, None)] {
         let here = loaded.id(ObjectKind::Body, &format!("odd/{name}")).unwrap();
         let there = model.id(ObjectKind::Body, name).unwrap();
         let added = loaded.body_mass()[here] - model.body_mass()[there];
         assert!((added - payload).abs() < 1e-15, "{name}: {added}");
-        let (found, expected) = (com(&loaded, here), centre.unwrap_or(com(&model, there)));
+        let (found, expected) = (com(&loaded, here), center.unwrap_or(com(&model, there)));
         assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{name}: {found:?} {expected:?}");
     }
     assert!((sim.robot(id).total_mass() - 7.2 - 0.75).abs() < 1e-12);
