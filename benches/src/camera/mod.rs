@@ -49,7 +49,7 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     // The benchmark takes minutes, so results are shown as they are measured.
     let mut add = |new: Vec<Row>| {
         for row in &new {
-            let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.rival_name));
+            let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.baseline_name));
             eprintln!("    {}: {:.1} {}{ratio}", row.case, row.ours, row.unit);
         }
         rows.extend(new);

@@ -206,12 +206,7 @@ impl CameraCfg {
         let (images, captures) = (self.history_length, FrameBuffer::max_pending(self, schedule));
         let all = images.saturating_add(captures).saturating_add(1);
         if !fits(images.saturating_add(1), all) {
-            return Err(CameraError::HistoryMemory {
-                images,
-                pending_frames: captures,
-                views,
-                limit: MAX_BYTES,
-            });
+            return Err(CameraError::HistoryMemory { images, pending_frames: captures, views, limit: MAX_BYTES });
         }
         Ok(())
     }

@@ -129,7 +129,7 @@ impl Imperfections {
         if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
             for (pixel, bytes) in color.chunks_exact_mut(4).enumerate() {
                 let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| tone.decode(byte));
-                self.spoil_light(&mut light, &PixelContext { image: picture: image, pixel });
+                self.spoil_light(&mut light, &PixelContext { image, pixel });
                 bytes[..3].copy_from_slice(&light.map(|light| tone.encode(light)));
             }
         }

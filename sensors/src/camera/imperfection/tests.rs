@@ -51,11 +51,7 @@ fn with_effects(imperfections: &Imperfections, byte: u8, image: u64) -> Vec<[u8;
 
 /// Radiance of all pixels and colors of a gray image with imperfections.
 fn radiances(imperfections: &Imperfections, byte: u8, image: u64) -> Vec<f64> {
-    with_effects(imperfections, byte, image)
-        .iter()
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .map(|b| tone().decode(b))
-        .collect()
+    with_effects(imperfections, byte, image).iter().flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().decode(b)).collect()
 }
 
 /// Mean and variance.
@@ -398,7 +394,7 @@ fn remaining_radiance(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
     let image = ImageContext { rays: Some(rays), ..pinhole(&view, &ticket) };
     let shade = |pixel| {
         let mut light = [1.0; 3];
-        Vignetting::default().apply(&mut light, &PixelContext { image: picture: image, pixel });
+        Vignetting::default().apply(&mut light, &PixelContext { image, pixel });
         assert!(light[0] == light[1] && light[1] == light[2]);
         light[0]
     };
