@@ -1,4 +1,4 @@
-//! A baseline in Python: a process that receives commands over pipes (see `rivals/*.py`), one line each way.
+//! A baseline in Python: a process that receives commands over pipes (see `baselines/*.py`), one line each way.
 
 use crate::settings::BenchResult;
 use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion};
@@ -44,7 +44,7 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    /// Starts a script of `rivals/` with a job, which may name files in `folder`.
+    /// Starts a script of `baselines/` with a job, which may name files in `folder`.
     pub(crate) fn start(
         python: &OsString,
         script: &'static str,
@@ -53,7 +53,7 @@ impl Process {
     ) -> BenchResult<Self> {
         let file = folder.path().join("job.json");
         std::fs::write(&file, job.to_string())?;
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("rivals").join(script);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("baselines").join(script);
         let mut process =
             Command::new(python).arg(path).arg(file).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let commands = process.stdin.take();

@@ -88,15 +88,15 @@ impl Order {
     pub(crate) fn create<A, B>(
         self,
         ours: impl FnOnce() -> BenchResult<A>,
-        rival: impl FnOnce() -> BenchResult<B>,
+        start_baseline: impl FnOnce() -> BenchResult<B>,
     ) -> BenchResult<(A, B)> {
         match self {
             Self::OursFirst => {
                 let ours = ours()?;
-                Ok((ours, rival()?))
+                Ok((ours, start_baseline()?))
             }
             Self::BaselineFirst => {
-                let baseline = rival()?;
+                let baseline = start_baseline()?;
                 Ok((ours()?, baseline))
             }
         }

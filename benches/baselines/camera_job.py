@@ -1,4 +1,4 @@
-"""What the rival cameras share: the job they are given, and the answers they give, for benches/src/camera.rs.
+"""What the baseline cameras share: the job they are given, and the answers they give, for benches/src/camera.rs.
 
 SCRIPT JOB.json, then lines on standard input, each answered with one line: `restart`, `block K` (answers with the seconds
 that K steps took; a step draws `images` images), `depth` (answers with the depth image of the first environment as
