@@ -8,12 +8,12 @@ use kinetoscope_sim::SimulationManager;
 /// ```no_run
 /// use kinetoscope::RecordingPlayback;
 /// use kinetoscope::prelude::*;
-/// use kinetoscope::record::{Film, Recording};
+/// use kinetoscope::record::{Playback, Recording};
 /// use kinetoscope::viewer::Play;
 ///
-/// let (film, mut sim) = Film::of(&Recording::open("run.mcap")?, None)?;
+/// let (playback, mut sim) = Playback::open(&Recording::open("run.mcap")?, None)?;
 /// let window = sim.open_window()?;
-/// sim.play(&mut RecordingPlayback(film), &mut || window.is_open())?;
+/// sim.play(&mut RecordingPlayback(playback), &mut || window.is_open())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

@@ -34,7 +34,7 @@ use std::path::Path;
 ///
 /// let cfg = SceneCfg::new(SimulationManagerCfg { num_envs: 2, ..Default::default() })
 ///     .with("cube", RigidObjectCfg { shape: ObjectShape::cube(0.2), ..Default::default() })
-///     .with("touch", ContactSensorCfg::of("{ENV_REGEX_NS}/cube"));
+///     .with("touch", ContactSensorCfg::for_bodies("{ENV_REGEX_NS}/cube"));
 /// assert_eq!(cfg.keys().collect::<Vec<_>>(), ["cube", "touch"]);
 /// ```
 ///
