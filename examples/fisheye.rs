@@ -93,16 +93,16 @@ fn run(args: &Args) -> launcher::Result {
     let rate = progress.env_steps_per_second(step, sim.num_envs());
     recording.finish(&mut sim)?;
 
-    let (mut pictures, mut lenses) = (Vec::new(), Vec::new());
+    let (mut images, mut lenses) = (Vec::new(), Vec::new());
     for ((name, _), camera) in views.iter().zip(cameras) {
-        let (picture, report) = write_images(sim.sensor(camera)?, name, &out)?;
+        let (image, report) = write_images(sim.sensor(camera)?, name, &out)?;
         println!("{name}: {}", summary_line(&report));
-        pictures.push(picture);
+        images.push(image);
         lenses.push(report);
     }
     let all = out.join("lenses.png");
-    image_file::write_png(&all, &tile(&pictures))?;
-    println!("{} images, side by side in {}", pictures.len(), all.display());
+    image_file::write_png(&all, &tile(&images))?;
+    println!("{} images, side by side in {}", images.len(), all.display());
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
@@ -225,9 +225,9 @@ fn write_images(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(im
     let color: Vec<u8> = camera.color()?.index_axis(Axis(0), 0).iter().copied().collect();
     let seconds = start.elapsed().as_secs_f64();
     let size = [width, height];
-    let picture = image_file::color_image(size, &color);
+    let image = image_file::color_image(size, &color);
     let mut files = vec![format!("{name}.png"), format!("{name}_distance.png")];
-    image_file::write_png(&out.join(&files[0]), &picture)?;
+    image_file::write_png(&out.join(&files[0]), &image)?;
     let distance: Vec<f32> = camera.distance()?.index_axis(Axis(0), 0).iter().copied().collect();
     let range = image_file::finite_range(distance.iter().copied()).unwrap_or([0.0, 1.0]);
     image_file::write_png(&out.join(&files[1]), &image_file::depth_image(size, &distance, range))?;
@@ -253,7 +253,7 @@ fn write_images(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(im
         "seconds": seconds,
         "files": files,
     });
-    Ok((picture, report))
+    Ok((image, report))
 }
 
 /// The largest reprojection error of the point map through the lens \[pixels\].

@@ -237,7 +237,7 @@ fn save(
     let class = |id: &i32| class_of.get(id).and_then(|class| numbers.get(class)).copied().unwrap_or(0);
     let semantic: Vec<i32> = mask.iter().map(class).collect();
     let range = image_file::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);
-    let pictures = [
+    let images = [
         ("rgb", image_file::color_image(size, &color)),
         ("depth", image_file::depth_image(size, &depth, range)),
         ("normals", image_file::normal_image(size, &normal)),
@@ -245,9 +245,9 @@ fn save(
         ("semantic_segmentation", image_file::mask_image(size, &semantic)),
     ];
     let mut files = Vec::new();
-    for (name, picture) in &pictures {
+    for (name, image) in &images {
         let file = format!("{name}_{env}_{step}.png");
-        image_file::write_png(&out.join(&file), picture)?;
+        image_file::write_png(&out.join(&file), image)?;
         files.push(file);
     }
     let depth_file = format!("depth_{env}_{step}.npy");

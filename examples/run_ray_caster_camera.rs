@@ -68,7 +68,7 @@ fn run(args: &Args) -> launcher::Result {
     let recording = args.launcher.start_recording(&mut sim)?;
     let progress = MainLoop::new(&args.launcher, 200);
     let (mut step, mut stepping, mut files) = (0, Duration::ZERO, Vec::new());
-    let (mut pictures, mut seen) = (0, 0);
+    let (mut images, mut seen) = (0, 0);
     while !progress.should_stop(step) {
         let start = Instant::now();
         sim.update(1);
@@ -77,7 +77,7 @@ fn run(args: &Args) -> launcher::Result {
         let of = sim.sensor(camera)?;
         let count = of.frame_counts()[args.camera_id];
         if count > seen {
-            (pictures, seen) = (pictures + sim.num_envs(), count);
+            (images, seen) = (images + sim.num_envs(), count);
             progress.print_line(&format!(
                 "step {step}: depth {:?}, distance {:?}, normals {:?}",
                 of.depth().dim(),
@@ -115,9 +115,9 @@ fn run(args: &Args) -> launcher::Result {
         cloud::write_ply(&out.join("ray_caster_camera_points.ply"), &colored)?;
         files.push("ray_caster_camera_points.ply".into());
     }
-    let images_per_second = pictures as f64 / stepping.as_secs_f64().max(1e-9);
+    let images_per_second = images as f64 / stepping.as_secs_f64().max(1e-9);
     println!(
-        "{pictures} images of {} x {}: {images_per_second:.0} per second, stepping included",
+        "{images} images of {} x {}: {images_per_second:.0} per second, stepping included",
         args.width, args.height
     );
     recording.finish(&mut sim)?;
@@ -129,7 +129,7 @@ fn run(args: &Args) -> launcher::Result {
         "width": args.width,
         "height": args.height,
         "camera_id": args.camera_id,
-        "pictures": pictures,
+        "pictures": images,
         "points": points.len(),
         "points_beside_the_terrain": beside.len(),
         "largest_distance_of_points_from_the_terrain": worst,
@@ -178,15 +178,15 @@ fn save(camera: &RayCasterCamera, env: usize, step: u64, out: &Path) -> launcher
     let (depth, distance) = (of(camera.depth()), of(camera.distance()));
     let normal: Vec<f32> = camera.normal().index_axis(Axis(0), env).iter().copied().collect();
     let range = |numbers: &[f32]| image_file::finite_range(numbers.iter().copied()).unwrap_or([0.0, 1.0]);
-    let pictures = [
+    let images = [
         ("distance_to_image_plane", image_file::depth_image(size, &depth, range(&depth))),
         ("distance_to_camera", image_file::depth_image(size, &distance, range(&distance))),
         ("normals", image_file::normal_image(size, &normal)),
     ];
     let mut files = Vec::new();
-    for (name, picture) in &pictures {
+    for (name, image) in &images {
         let file = format!("{name}_{env}_{step}.png");
-        image_file::write_png(&out.join(&file), picture)?;
+        image_file::write_png(&out.join(&file), image)?;
         files.push(file);
     }
     let file = format!("distance_to_image_plane_{env}_{step}.npy");

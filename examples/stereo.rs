@@ -89,13 +89,13 @@ fn run(args: &Args) -> launcher::Result {
     let pair = StereoFrame::from_camera(stereo, args.camera_id)?;
     let size = [args.width, args.height];
     let files = ["stereo_left.png", "stereo_right.png", "stereo_disparity.png", "stereo_points.ply"];
-    let pictures = [
+    let images = [
         image_file::color_image(size, &pair.left),
         image_file::color_image(size, &pair.right),
         pair.disparity_image(size),
     ];
-    for (file, picture) in files.iter().zip(&pictures) {
-        image_file::write_png(&out.join(file), picture)?;
+    for (file, image) in files.iter().zip(&images) {
+        image_file::write_png(&out.join(file), image)?;
     }
     let points = pair.points(args.width);
     if points.is_empty() {

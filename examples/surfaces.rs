@@ -58,7 +58,7 @@ fn materials() -> [(&'static str, [f64; 4], SurfaceCfg); 8] {
 
 fn run(args: &Args) -> launcher::Result {
     let renderer = args.launcher.renderer.for_cameras(args.paths)?;
-    let lamp = LightCfg {
+    let light = LightCfg {
         kind: LightKindCfg::Spot { cutoff_deg: 50.0, exponent: 2.0 },
         position: [0.8, -1.2, 2.2].into(),
         direction: [-0.35, 0.55, -1.0].into(),
@@ -67,7 +67,7 @@ fn run(args: &Args) -> launcher::Result {
         ..LightCfg::default()
     };
     let mut sim = SimulationManager::new(SimulationManagerCfg {
-        lights: vec![lamp],
+        lights: vec![light],
         ..args.launcher.simulation_for_any_renderer()?
     })?;
     const RADIUS: f64 = 0.16;

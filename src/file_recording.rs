@@ -19,12 +19,12 @@ use std::path::{Path, PathBuf};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 /// let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new("run.mcap"))));
-/// let recording = Some(RecordButton::shared(Arc::clone(&files)));
-/// let window = sim.open_window_with(WindowCfg { recording, ..WindowCfg::default() })?;
+/// let record_button = Some(RecordButton::shared(Arc::clone(&files)));
+/// let window = sim.open_window_with(WindowCfg { record_button, ..WindowCfg::default() })?;
 /// while window.is_open() {
 ///     sim.update(1);
 /// }
-/// for recorded in files.lock().unwrap_or_else(PoisonError::into_inner).end(&mut sim)? {
+/// for recorded in files.lock().unwrap_or_else(PoisonError::into_inner).finish(&mut sim)? {
 ///     println!("{recorded}");
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())

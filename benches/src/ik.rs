@@ -284,24 +284,28 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
     let together = measure(plan, &mut [&mut batched, &mut bare])?;
     let each = |side| 1e6 * together.per_step(side) / ENVS as f64;
     let [our_median, their_median] = micros.map(median);
-    let rival = "DLS on mj_jac";
+    let baseline = "DLS on mj_jac";
     Ok(vec![
         Row::new("ik", format!("{name}, mean"), "us/solve", 1, 1e6 * times.per_step(0)).against(
-            rival,
+            baseline,
             1e6 * times.per_step(1),
             times.ratio(0, 1),
         ),
         Row::new("ik", format!("{name}, median"), "us/solve", 1, our_median).against(
-            rival,
+            baseline,
             their_median,
             their_median / our_median,
         ),
         Row::new("ik", format!("{name}, mean of {ENVS} environments in one call"), "us/solve", 1, each(0)).against(
-            rival,
+            baseline,
             each(1),
             together.ratio(0, 1),
         ),
         Row::new("ik", format!("{name}, median out of reach"), "us/solve", 1, median(far)),
-        Row::new("ik", format!("{name}, solved"), "%", 1, solved[0]).against(rival, solved[1], solved[0] / solved[1]),
+        Row::new("ik", format!("{name}, solved"), "%", 1, solved[0]).against(
+            baseline,
+            solved[1],
+            solved[0] / solved[1],
+        ),
     ])
 }

@@ -88,16 +88,16 @@ impl Order {
     pub(crate) fn create<A, B>(
         self,
         ours: impl FnOnce() -> BenchResult<A>,
-        rival: impl FnOnce() -> BenchResult<B>,
+        start_baseline: impl FnOnce() -> BenchResult<B>,
     ) -> BenchResult<(A, B)> {
         match self {
             Self::OursFirst => {
                 let ours = ours()?;
-                Ok((ours, rival()?))
+                Ok((ours, start_baseline()?))
             }
             Self::BaselineFirst => {
-                let rival = rival()?;
-                Ok((ours()?, rival))
+                let baseline = start_baseline()?;
+                Ok((ours()?, baseline))
             }
         }
     }
@@ -126,8 +126,8 @@ impl BothOrders {
     }
 
     /// Speed of `ours` relative to `baseline`: the geometric mean over both orders.
-    pub(crate) fn ratio(&self, ours: usize, rival: usize) -> f64 {
-        self.mean_of(|t| t[rival] / t[ours])
+    pub(crate) fn ratio(&self, ours: usize, baseline: usize) -> f64 {
+        self.mean_of(|t| t[baseline] / t[ours])
     }
 
     /// Geometric mean of [`Times::median_of`] over both orders, for ratios.
@@ -250,9 +250,9 @@ mod tests {
 
     #[test]
     fn a_side_that_takes_twice_as_long_has_half_the_ratio() {
-        let (mut ours, mut rival) = (Sleeper(20), Sleeper(10));
+        let (mut ours, mut baseline) = (Sleeper(20), Sleeper(10));
         let plan = MeasurementCfg { seconds: 0.0, restart_after: 100 };
-        let times = measure(plan, &mut [&mut ours, &mut rival]).expect("sleeps");
+        let times = measure(plan, &mut [&mut ours, &mut baseline]).expect("sleeps");
         assert!((times.ratio(0, 1) - 0.5).abs() < 1e-12);
         assert!((times.per_step(0) - 0.02).abs() < 1e-12);
     }
@@ -266,8 +266,8 @@ mod tests {
                 created.set(created.get() + 50);
                 Ok(Sleeper(created.get()))
             };
-            let (mut ours, mut rival) = order.create(next, next)?;
-            measure(MeasurementCfg { seconds: 0.0, restart_after: 100 }, &mut [&mut ours, &mut rival])
+            let (mut ours, mut baseline) = order.create(next, next)?;
+            measure(MeasurementCfg { seconds: 0.0, restart_after: 100 }, &mut [&mut ours, &mut baseline])
         })
         .expect("sleeps");
         assert!((both.ratio(0, 1) - 1.0).abs() < 1e-12);

@@ -30,8 +30,8 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
                 continue;
             };
             let times = in_both_orders(|order| {
-                let (mut ours, mut rival) = order.create(ours, || Baseline::start(python, &case, envs, threads))?;
-                measure(plan(0.5), &mut [&mut ours, &mut rival])
+                let (mut ours, mut baseline) = order.create(ours, || Baseline::start(python, &case, envs, threads))?;
+                measure(plan(0.5), &mut [&mut ours, &mut baseline])
             })?;
             let rate = |side: usize| times.rate(side, envs);
             rows.push(row(rate(0)).against("mujoco.batch", rate(1), times.ratio(0, 1)));
@@ -47,10 +47,10 @@ impl Baseline {
     fn start(python: &OsString, case: &Case, envs: usize, threads: usize) -> BenchResult<Self> {
         let folder = tempfile::tempdir()?;
         let job = job(case, envs, threads, folder.path())?;
-        let mut rival = Self(Process::start(python, "mujoco_batch.py", &job, folder)?);
+        let mut baseline = Self(Process::start(python, "mujoco_batch.py", &job, folder)?);
         // The baseline answers once its memory is allocated.
-        rival.restart()?;
-        Ok(rival)
+        baseline.restart()?;
+        Ok(baseline)
     }
 }
 

@@ -22,21 +22,21 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let (sim, _) = sr5(ENVS, 1)?;
     let model = sim.batch().model().clone();
     let mut ours = Ours(sim);
-    let mut rival = ModelPerEnv {
+    let mut baseline = ModelPerEnv {
         editors: editors(&model)?,
         masses: model.body_mass().to_vec(),
         model: model.clone(),
         randomizations: 0,
     };
     let plan = MeasurementCfg { seconds: settings.seconds, restart_after: u32::MAX };
-    let times = measure(plan, &mut [&mut ours, &mut rival])?;
+    let times = measure(plan, &mut [&mut ours, &mut baseline])?;
     let micros = |side| times.per_step(side) / ENVS as f64 * 1e6;
     let again = Row::new("randomize", format!("{CASE}, again"), "µs/env", 1, micros(0));
 
-    let (mut ours, mut rival) =
+    let (mut ours, mut baseline) =
         (FirstRandomization, FirstModelPerEnv { masses: model.body_mass().to_vec(), model: model.clone() });
     let plan = MeasurementCfg { seconds: settings.seconds, restart_after: u32::MAX };
-    let firsts = measure(plan, &mut [&mut ours, &mut rival])?;
+    let firsts = measure(plan, &mut [&mut ours, &mut baseline])?;
     let micros_first = |side| firsts.per_step(side) / ENVS as f64 * 1e6;
     let first = Row::new("randomize", format!("{CASE}, first time"), "µs/env", 1, micros_first(0));
 

@@ -113,10 +113,10 @@ fn real_time_factor(recorded: bool, seconds: f64) -> BenchResult<f64> {
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut threads = 0;
     let times = in_both_orders(|order| {
-        let (mut ours, mut rival) = order.create(|| Arms::new(true), || Arms::new(false))?;
+        let (mut ours, mut baseline) = order.create(|| Arms::new(true), || Arms::new(false))?;
         threads = ours.sim.threads();
         let plan = MeasurementCfg { seconds: settings.seconds / 2.0, restart_after: RESTART };
-        let times = measure(plan, &mut [&mut ours, &mut rival]);
+        let times = measure(plan, &mut [&mut ours, &mut baseline]);
         if let Some(recorder) = ours.recorder.take() {
             eprintln!("  {}", ours.sim.finish_recording(recorder)?);
         }

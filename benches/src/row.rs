@@ -11,14 +11,14 @@ pub(crate) struct Row {
     pub(crate) bench: String,
     /// Name of the measured case.
     pub(crate) case: String,
-    /// Unit of `ours` and `rival`.
+    /// Unit of `ours` and `baseline`.
     pub(crate) unit: String,
     /// Kinetoscope's number.
     pub(crate) ours: f64,
     /// The baseline's number; `None` if the baseline is not on the machine.
-    pub(crate) rival: Option<f64>,
+    pub(crate) baseline: Option<f64>,
     /// Name of the baseline.
-    pub(crate) rival_name: String,
+    pub(crate) baseline_name: String,
     /// Speed ratio; above 1 our side is better.
     pub(crate) ratio: Option<f64>,
     /// Number of threads of both sides.
@@ -38,8 +38,8 @@ impl Row {
             case: case.into(),
             unit: unit.into(),
             ours,
-            rival: None,
-            rival_name: "-".into(),
+            baseline: None,
+            baseline_name: "-".into(),
             ratio: None,
             threads,
             mujoco: mj::version_string(),
@@ -48,16 +48,16 @@ impl Row {
     }
 
     /// Adds the baseline.
-    pub(crate) fn against(mut self, rival_name: &str, rival: f64, ratio: f64) -> Self {
-        self.rival_name = rival_name.into();
-        self.rival = Some(rival);
+    pub(crate) fn against(mut self, baseline_name: &str, baseline: f64, ratio: f64) -> Self {
+        self.baseline_name = baseline_name.into();
+        self.baseline = Some(baseline);
         self.ratio = Some(ratio);
         self
     }
 
     /// Adds the name of a baseline that is not on the machine.
-    pub(crate) fn without(mut self, rival_name: &str) -> Self {
-        self.rival_name = rival_name.into();
+    pub(crate) fn without(mut self, baseline_name: &str) -> Self {
+        self.baseline_name = baseline_name.into();
         self
     }
 
@@ -89,9 +89,9 @@ pub(crate) fn table(rows: &[Row]) -> String {
             row.threads,
             row.mujoco,
             number(Some(row.ours), digits),
-            number(row.rival, digits),
+            number(row.baseline, digits),
             row.unit,
-            row.rival_name,
+            row.baseline_name,
             number(row.ratio, 3),
         );
         match row.wanted {
@@ -112,7 +112,7 @@ mod tests {
         let row = Row::new("step", "arm, 64 envs", "env-steps/s", 2, 90.0).against("bare loop", 100.0, 0.9);
         let json = serde_json::to_value(&row).unwrap_or_default();
         let keys: Vec<&String> = json.as_object().map(|o| o.keys().collect()).unwrap_or_default();
-        assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "rival", "rival_name", "threads", "unit"]);
+        assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "baseline", "baseline_name", "threads", "unit"]);
         assert!(table(&[row.clone().with_target_ratio(0.97)]).contains("MISSES"));
         assert!(!table(&[row.with_target_ratio(0.8)]).contains("MISSES"));
     }

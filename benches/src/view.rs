@@ -142,8 +142,8 @@ fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: 
         sim.update(1);
     }
     let elapsed = start.elapsed().as_secs_f64();
-    let pictures = (window.frame_count() - before) as f64;
-    Ok([pictures / elapsed, (sim.observers().steps() - first) as f64 * sim.cfg().physics_dt / elapsed])
+    let images = (window.frame_count() - before) as f64;
+    Ok([images / elapsed, (sim.observers().steps() - first) as f64 * sim.cfg().physics_dt / elapsed])
 }
 
 /// Arms at free speed, with a viewer that takes a quarter of a second per image, or without a viewer.
@@ -210,9 +210,9 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let case = |what: &str| format!("{ENVS} x {} + hand, {what}", arm.name);
     let [width, height] = SIZE;
     let mut rows = Vec::new();
-    if let Some([pictures, factor]) = window {
-        let row = Row::new("view", case(&format!("window of {width} x {height}")), "images/s", cores(), pictures);
-        rows.push(row.against("wanted", TARGET_FPS, pictures / TARGET_FPS).with_target_ratio(1.0));
+    if let Some([images, factor]) = window {
+        let row = Row::new("view", case(&format!("window of {width} x {height}")), "images/s", cores(), images);
+        rows.push(row.against("wanted", TARGET_FPS, images / TARGET_FPS).with_target_ratio(1.0));
         let row = Row::new("view", case("physics meanwhile"), "x real time", cores(), factor);
         rows.push(row.against("real time", 1.0, factor).with_target_ratio(TARGET_REAL_TIME_FACTOR));
     }

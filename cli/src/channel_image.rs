@@ -36,8 +36,8 @@ pub(crate) fn write(frame: &Frame, channel: Channel, [width, height]: [usize; 2]
         Channel::Mask => frame.mask.as_ref().map(|m| mask_color(m[k])),
         Channel::Normal => frame.normal.as_ref().map(|n| normal_color([n[3 * k], n[3 * k + 1], n[3 * k + 2]])),
     };
-    let picture = RgbImage::from_fn(width as u32, height as u32, |x, y| {
+    let image = RgbImage::from_fn(width as u32, height as u32, |x, y| {
         Rgb(color(y as usize * width + x as usize).unwrap_or_default())
     });
-    picture.save(path).map_err(|e| format!("{}: {e}", path.display()).into())
+    image.save(path).map_err(|e| format!("{}: {e}", path.display()).into())
 }

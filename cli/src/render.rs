@@ -194,13 +194,13 @@ pub(crate) fn images_per_second(
 ) -> Result<f64> {
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
-    let (start, mut pictures) = (Instant::now(), 0u32);
+    let (start, mut images) = (Instant::now(), 0u32);
     let draw = || loop {
         rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
-        pictures += 1;
+        images += 1;
         let elapsed = start.elapsed().as_secs_f64();
         if elapsed >= seconds {
-            return Ok(f64::from(pictures) / elapsed);
+            return Ok(f64::from(images) / elapsed);
         }
     };
     progress::with_progress("images", move || Some(start.elapsed().as_secs_f64() / seconds), draw)

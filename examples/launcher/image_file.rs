@@ -27,8 +27,8 @@ where
 }
 
 /// Writes an image as PNG.
-pub(crate) fn write_png(path: &Path, picture: &RgbImage) -> Result {
-    picture.save(path).map_err(|e| format!("{}: {e}", path.display()).into())
+pub(crate) fn write_png(path: &Path, image: &RgbImage) -> Result {
+    image.save(path).map_err(|e| format!("{}: {e}", path.display()).into())
 }
 
 /// RGB image of RGBA bytes; the alpha channel is dropped.

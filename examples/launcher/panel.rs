@@ -60,7 +60,7 @@ fn slice<T, D: RemoveAxis>(channel: ArrayView<'_, T, D>, row: usize) -> super::R
 pub(crate) fn grid(views: &CameraChannels<'_>) -> RgbImage {
     let size = views.size;
     let range = image_file::finite_range(views.depth.iter().copied()).unwrap_or([0.0, 1.0]);
-    let pictures = [
+    let images = [
         ("Color", image_file::color_image(size, views.color)),
         ("Depth", image_file::depth_image(size, views.depth, range)),
         ("Mask", image_file::mask_image(size, views.mask)),
@@ -69,9 +69,9 @@ pub(crate) fn grid(views: &CameraChannels<'_>) -> RgbImage {
     let (width, height) = (size[0] as u32, size[1] as u32);
     let cell = [width + 2 * GAP, height + TITLE + SCALE];
     let mut out = Canvas(RgbImage::from_pixel(2 * cell[0], 2 * cell[1], Rgb([250, 250, 250])));
-    for (k, (title, picture)) in (0u32..).zip(&pictures) {
+    for (k, (title, image)) in (0u32..).zip(&images) {
         let (x, y) = (k % 2 * cell[0] + GAP, k / 2 * cell[1] + TITLE);
-        image::imageops::replace(&mut out.0, picture, i64::from(x), i64::from(y));
+        image::imageops::replace(&mut out.0, image, i64::from(x), i64::from(y));
         out.title(title, [x + width / 2, y - TITLE / 2]);
         if *title == "Depth" {
             out.depth_scale([x, y + height + 3], width, range);
@@ -88,15 +88,15 @@ pub(crate) fn tiled_size(size: [usize; 2], num_envs: usize) -> [usize; 2] {
 }
 
 /// Tiles images of equal size row by row in a grid that is as square as possible.
-pub(crate) fn tile(pictures: &[RgbImage]) -> RgbImage {
-    let Some(first) = pictures.first() else { return RgbImage::default() };
-    let columns = (1..).find(|c| c * c >= pictures.len()).unwrap_or(1);
-    let rows = pictures.len().div_ceil(columns);
+pub(crate) fn tile(images: &[RgbImage]) -> RgbImage {
+    let Some(first) = images.first() else { return RgbImage::default() };
+    let columns = (1..).find(|c| c * c >= images.len()).unwrap_or(1);
+    let rows = images.len().div_ceil(columns);
     let (width, height) = first.dimensions();
     let mut out = RgbImage::from_pixel(columns as u32 * width, rows as u32 * height, Rgb([250, 250, 250]));
-    for (k, picture) in pictures.iter().enumerate() {
+    for (k, image) in images.iter().enumerate() {
         let at = [(k % columns) as i64 * i64::from(width), (k / columns) as i64 * i64::from(height)];
-        image::imageops::replace(&mut out, picture, at[0], at[1]);
+        image::imageops::replace(&mut out, image, at[0], at[1]);
     }
     out
 }

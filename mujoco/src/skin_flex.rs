@@ -137,7 +137,7 @@ impl Model {
     /// # Panics
     /// There is no such tendon.
     #[cfg(mj4)]
-    pub fn tendon_has_curves(&self, tendon: usize) -> bool {
+    pub fn tendon_has_nonlinear_terms(&self, tendon: usize) -> bool {
         let order = mujoco_sys::mjNPOLY as usize;
         let of = |values: &[f64]| values[order * tendon..order * (tendon + 1)].iter().any(|x| *x != 0.0);
         of(array!(self, tendon_stiffnesspoly)) || of(array!(self, tendon_dampingpoly))
@@ -177,7 +177,7 @@ impl Model {
             group: array!(self, flex_group)[flex],
             rgba: &array!(self, flex_rgba)[4 * flex..4 * flex + 4],
             radius: array!(self, flex_radius)[flex],
-            flat: super::arrays::is_set(array!(self, flex_flatskin)[flex]),
+            flat_shading: super::arrays::is_set(array!(self, flex_flatskin)[flex]),
             first_vertex: size(vertex),
             vertices: size(vertices),
             elements: checked_slice(array!(self, flex_elem), data.0, data.1),

@@ -22,7 +22,7 @@ impl Model {
 
     /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
     #[cfg(mj4)]
-    pub fn beyond(&self) -> Option<UnsupportedFeature> {
+    pub fn unsupported_feature(&self) -> Option<UnsupportedFeature> {
         use super::arrays::is_set;
         use mujoco_sys::fields::model as fields;
         /// An array of this model.
@@ -35,7 +35,7 @@ impl Model {
         let header = self.header();
         let whole = [("flex", header.nflex, "a deformable (flex) body"), ("plugin", header.nplugin, "a plugin")];
         if let Some((element, _, what)) = whole.into_iter().find(|(_, count, _)| *count > 0) {
-            return Some(UnsupportedFeature { element, index: 0, what });
+            return Some(UnsupportedFeature { element, index: 0, feature: what });
         }
         let numbers = [
             ("joint", array!(jnt_stiffnesspoly), self.njnt(), "nonlinear (polynomial) stiffness"),
@@ -56,7 +56,11 @@ impl Model {
         for (element, values, count, what) in numbers {
             // An infinite `springyield` has no effect.
             if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
-                return Some(UnsupportedFeature { element, index: at / (values.len() / count.max(1)).max(1), what });
+                return Some(UnsupportedFeature {
+                    element,
+                    index: at / (values.len() / count.max(1)).max(1),
+                    feature: what,
+                });
             }
         }
         let counts = [
@@ -65,15 +69,15 @@ impl Model {
         ];
         for (element, values, one, what) in counts {
             if let Some(index) = values.iter().position(|n| *n != one) {
-                return Some(UnsupportedFeature { element, index, what });
+                return Some(UnsupportedFeature { element, index, feature: what });
             }
         }
         // `actdim` is not written back, so an actuator may have one activation at most.
         if let Some(index) = array!(actuator_actnum).iter().position(|n| *n > 1) {
-            return Some(UnsupportedFeature { element: "actuator", index, what: "several activations" });
+            return Some(UnsupportedFeature { element: "actuator", index, feature: "several activations" });
         }
         if let Some(index) = array!(actuator_history).iter().step_by(2).position(|n| *n > 0) {
-            return Some(UnsupportedFeature { element: "actuator", index, what: "nsample" });
+            return Some(UnsupportedFeature { element: "actuator", index, feature: "nsample" });
         }
         let flags = [
             ("joint", array!(jnt_actgravcomp), "actuatorgravcomp"),
@@ -81,7 +85,7 @@ impl Model {
         ];
         for (element, values, what) in flags {
             if let Some(index) = values.iter().position(|flag| is_set(*flag)) {
-                return Some(UnsupportedFeature { element, index, what });
+                return Some(UnsupportedFeature { element, index, feature: what });
             }
         }
         None
@@ -115,7 +119,7 @@ impl Model {
             }
             // A rangefinder of 4.x may output more than a distance.
             let word = super::mjcf_keywords::sensor(self.sensor_type()[sensor]);
-            let several = word.is_some_and(|word| word.word == "rangefinder") && self.sensor_dim()[sensor] != 1;
+            let several = word.is_some_and(|word| word.keyword == "rangefinder") && self.sensor_dim()[sensor] != 1;
             several.then_some("rangefinder output other than the distance")
         }
         #[cfg(not(mj4))]

@@ -17,7 +17,7 @@ pub enum SupportedVersion {
 pub const BUILD_VERSION: SupportedVersion = SupportedVersion::V2;
 /// MuJoCo version of the headers of this build.
 #[cfg(mj4)]
-pub const TARGET: SupportedVersion = SupportedVersion::V4;
+pub const BUILD_VERSION: SupportedVersion = SupportedVersion::V4;
 
 /// The loaded library has another version than the headers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -26,7 +26,7 @@ pub enum Topic {
     /// Rewards and episode ends of the task in the simulation. A task such as an `Env` publishes them after each of its
     /// steps ([`StepResult`](kinetoscope_sim::StepResult)).
     TaskResults,
-    /// Overview image of all environments, drawn as `RecorderCfg::stage` says. Its name is that of a camera `stage` in
+    /// Overview image of all environments, rendered with the settings of `RecorderCfg::overview`. Its name is that of a camera `stage` in
     /// the first recorded environment.
     ///
     /// [`Everything`](Self::Everything) includes it only in formats of images, and only if there is no camera.

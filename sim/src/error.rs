@@ -366,7 +366,7 @@ pub enum Error {
     /// The joint has no drive in the model.
     #[error(
         "{argument}: joint {joint:?} of {robot} has no drive in the model, because it was added with the drive type none, or \
-         its file leaves it passive; add the robot with another drive type, and make joints passive with set_drive_type"
+         its file leaves it passive; add the entity with another drive type, and make joints passive with set_drive_type"
     )]
     NotDriven {
         /// Name of the method.

@@ -155,8 +155,8 @@ fn tables(rows: &[Value]) -> XtaskResult<String> {
                 row["threads"],
                 row["mujoco"].as_str().map_or_else(|| row["mujoco"].to_string(), str::to_string),
                 number(&row["ours"]),
-                number(&row["rival"]),
-                row["rival_name"].as_str().unwrap_or("-"),
+                number(&row["baseline"]),
+                row["baseline_name"].as_str().unwrap_or("-"),
                 row["ratio"].as_f64().map_or_else(|| "-".to_string(), |ratio| format!("**{ratio:.2}**")),
             );
         }
@@ -189,7 +189,7 @@ fn machine() -> String {
 }
 
 fn heading(machine: &str) -> String {
-    let rivals: Vec<&str> = CAMERA_BASELINES.iter().flat_map(|module| module.packages).copied().collect();
+    let baselines: Vec<&str> = CAMERA_BASELINES.iter().flat_map(|module| module.packages).copied().collect();
     format!(
         "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}. `cargo xtask bench` measures \
          everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the baseline ran in one run, \
@@ -200,7 +200,7 @@ fn heading(machine: &str) -> String {
          `mujoco.Renderer` at its best settings, `by hand` is the same library with as few passes as possible. `scans` are \
          height scans with parallel rays; `fans` are rays from one point.\n\nPython baselines: {}, and \
          the `mujoco` of the row.\n",
-        rivals.join(", ")
+        baselines.join(", ")
     )
 }
 
@@ -209,9 +209,9 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn row(bench: &str, mujoco: &str, rival: Value, ratio: Value) -> Value {
-        json!({"bench": bench, "case": "arm, 64 envs", "unit": "env-steps/s", "ours": 251_000.4, "rival": rival,
-               "rival_name": "mj_step", "ratio": ratio, "threads": 2, "mujoco": mujoco})
+    fn row(bench: &str, mujoco: &str, baseline: Value, ratio: Value) -> Value {
+        json!({"bench": bench, "case": "arm, 64 envs", "unit": "env-steps/s", "ours": 251_000.4, "baseline": baseline,
+               "baseline_name": "mj_step", "ratio": ratio, "threads": 2, "mujoco": mujoco})
     }
 
     #[test]

@@ -21,9 +21,9 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> XtaskResult {
         setup::ask_before_installing();
     }
     let ready = setup::prepare(repo, Requirements::default())?;
-    let pictures = repo.target.join("demo").to_string_lossy().into_owned();
+    let images = repo.target.join("demo").to_string_lossy().into_owned();
     let mut defaults = DEFAULTS.to_vec();
-    defaults.push(("--out", Some(&pictures)));
+    defaults.push(("--out", Some(&images)));
     ready
         .cargo()
         // Paths in the arguments are relative to the user's working directory, not to the repository.

@@ -88,11 +88,11 @@ fn measured(repo: &Repo) -> XtaskResult<Vec<PhysicsRun>> {
 }
 
 fn plot_files(runs: &[PhysicsRun]) -> XtaskResult<Vec<(String, String)>> {
-    let picture = |(law, plot): (String, Plot)| {
+    let image = |(law, plot): (String, Plot)| {
         let text = plot.to_svg().map_err(|e| Failure::new(format!("{law}: {e}")))?;
         Ok((format!("{law}.svg"), text))
     };
-    physics_page::plots(runs).into_iter().map(picture).collect()
+    physics_page::plots(runs).into_iter().map(image).collect()
 }
 
 fn write(repo: &Repo, runs: &[PhysicsRun]) -> XtaskResult {
@@ -118,9 +118,9 @@ fn compare(repo: &Repo, runs: &[PhysicsRun]) -> XtaskResult {
 }
 
 /// Differences between the folder of the plots and the plots of the report: missing, outdated and superfluous files.
-fn outdated_plots(folder: &Path, pictures: &[(String, String)]) -> XtaskResult<Vec<String>> {
+fn outdated_plots(folder: &Path, images: &[(String, String)]) -> XtaskResult<Vec<String>> {
     let mut findings = Vec::new();
-    for (name, text) in pictures {
+    for (name, text) in images {
         match fs::read_to_string(folder.join(name)) {
             Ok(old) if svg::agree(&old, text, MAX_SHIFT_PIXELS) => {}
             Ok(_) => findings.push(format!("{PLOTS}/{name} shows other curves, or other numbers at its axes")),
@@ -131,7 +131,7 @@ fn outdated_plots(folder: &Path, pictures: &[(String, String)]) -> XtaskResult<V
     let Ok(files) = fs::read_dir(folder) else { return Ok(findings) };
     for file in files {
         let name = file.map_err(fail)?.file_name().to_string_lossy().into_owned();
-        if pictures.iter().all(|(known, _)| *known != name) {
+        if images.iter().all(|(known, _)| *known != name) {
             findings.push(format!("{PLOTS}/{name} belongs to no law"));
         }
     }
@@ -151,16 +151,16 @@ mod tests {
             (format!("{name}.svg"), plot.to_svg().expect("a size that can be drawn"))
         };
         let folder = tempfile::tempdir().expect("a scratch folder");
-        let look = |pictures: &[(String, String)]| outdated_plots(folder.path(), pictures).expect("readable");
-        let pictures = [of("top", 1.0), of("bounce", 2.0)];
-        for (name, text) in &pictures {
+        let look = |images: &[(String, String)]| outdated_plots(folder.path(), images).expect("readable");
+        let images = [of("top", 1.0), of("bounce", 2.0)];
+        for (name, text) in &images {
             fs::write(folder.path().join(name), text).expect("writable");
         }
-        assert_eq!(look(&pictures), Vec::<String>::new());
+        assert_eq!(look(&images), Vec::<String>::new());
         // The measured values are twice as large, so the curve has the same shape but other axis labels.
         let found = look(&[of("top", 2.0), of("bounce", 2.0)]);
         assert!(found.len() == 1 && found[0].contains("top.svg shows other curves"), "{found:?}");
-        let found = look(&pictures[..1]);
+        let found = look(&images[..1]);
         assert!(found.len() == 1 && found[0].contains("bounce.svg belongs to no law"), "{found:?}");
         let found = look(&[of("top", 1.0), of("bounce", 2.0), of("fall", 1.0)]);
         assert!(found.len() == 1 && found[0].contains("fall.svg is not there"), "{found:?}");

@@ -38,11 +38,11 @@ pub(crate) fn check(ours: &Path, other: &Path, different_lighting: bool) -> Resu
         }
     }
     let read = |folder: &Path, name: &String| fs::read(folder.join(name)).map_err(|e| format!("{name}: {e}"));
-    for picture in
+    for image in
         here.iter().filter(|name| different_lighting && (name.starts_with("color") || name.starts_with("sensor_views")))
     {
-        if read(ours, picture)? == read(other, picture)? {
-            return Err(format!("{picture} of {} and {} are the same image", ours.display(), other.display()));
+        if read(ours, image)? == read(other, image)? {
+            return Err(format!("{image} of {} and {} are the same image", ours.display(), other.display()));
         }
     }
     Ok(())
@@ -80,12 +80,12 @@ fn compare(ours: &(Array, Array), other: &(Array, Array)) -> Result<(usize, usiz
         return Err(format!("shapes differ from {shape:?}"));
     }
     let [.., height, width] = shape[..] else { return Err("not images".into()) };
-    let pictures = shape.iter().product::<usize>() / (height * width).max(1);
+    let images = shape.iter().product::<usize>() / (height * width).max(1);
     let near = |a: f32, b: f32, part: f32| a == b || (a - b).abs() <= part * a.abs();
     let (mut compared, mut different) = (0, 0);
-    for picture in 0..pictures {
+    for image in 0..images {
         for (y, x) in (1..height.max(2) - 1).flat_map(|y| (1..width.max(2) - 1).map(move |x| (y, x))) {
-            let at = |y: usize, x: usize| (picture * height + y) * width + x;
+            let at = |y: usize, x: usize| (image * height + y) * width + x;
             let k = at(y, x);
             let whole = |((_, depth), (_, mask)): &(Array, Array)| {
                 (0..9).all(|n| {

@@ -49,7 +49,7 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     // The benchmark takes minutes, so results are shown as they are measured.
     let mut add = |new: Vec<Row>| {
         for row in &new {
-            let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.rival_name));
+            let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.baseline_name));
             eprintln!("    {}: {:.1} {}{ratio}", row.case, row.ours, row.unit);
         }
         rows.extend(new);
@@ -126,31 +126,31 @@ impl<'s> Comparison<'s> {
     /// Adds a baseline if it is installed; its depth image must agree with our rasterizer's.
     fn baseline(
         &mut self,
-        rivals: &Baselines,
+        baselines: &Baselines,
         renderer: BaselineRenderer,
         scene: &'s Scene,
         work: &Work,
     ) -> BenchResult<Option<usize>> {
-        self.baseline_for_renderer(rivals, renderer, scene, work, Renderer::Raster)
+        self.baseline_for_renderer(baselines, renderer, scene, work, Renderer::Raster)
     }
 
     /// Adds a baseline that is compared with one of our renderers.
     fn baseline_for_renderer(
         &mut self,
-        rivals: &Baselines,
+        baselines: &Baselines,
         renderer: BaselineRenderer,
         scene: &'s Scene,
         work: &Work,
         by: Renderer,
     ) -> BenchResult<Option<usize>> {
-        let Some(mut rival) = rivals.start(renderer, scene, work)? else { return Ok(None) };
+        let Some(mut baseline) = baselines.start(renderer, scene, work)? else { return Ok(None) };
         let mut ours = OurRenderer::new(scene, &Work { envs: 1, physics: 0, ..*work }, 1, by)?;
-        rival.check_depth(&ours.depth()?, work.size)?;
-        let (ours, theirs) = (scene.triangles(), rival.triangles()?);
+        baseline.check_depth(&ours.depth()?, work.size)?;
+        let (ours, theirs) = (scene.triangles(), baseline.triangles()?);
         if ours != theirs {
             return Err(format!("{} draws {theirs} triangles, ours {ours}", renderer.name()).into());
         }
-        self.sides.push((renderer.images(work) as f64, Box::new(rival)));
+        self.sides.push((renderer.images(work) as f64, Box::new(baseline)));
         Ok(Some(self.sides.len() - 1))
     }
 
@@ -176,20 +176,20 @@ impl Rates {
         self.images[side] / self.times.per_step(side)
     }
 
-    fn row(&self, case: String, threads: usize, ours: usize, rival: (BaselineRenderer, Option<usize>)) -> Row {
+    fn row(&self, case: String, threads: usize, ours: usize, baseline: (BaselineRenderer, Option<usize>)) -> Row {
         let row = Row::new("camera", case, "images/s", threads, self.rate(ours));
-        match rival {
+        match baseline {
             (renderer, None) => row.without(renderer.name()),
-            (renderer, Some(rival)) => {
-                let ratio = self.times.ratio(ours, rival) * self.images[ours] / self.images[rival];
-                row.against(renderer.name(), self.rate(rival), ratio)
+            (renderer, Some(baseline)) => {
+                let ratio = self.times.ratio(ours, baseline) * self.images[ours] / self.images[baseline];
+                row.against(renderer.name(), self.rate(baseline), ratio)
             }
         }
     }
 }
 
 /// Large images in both quality settings: two threads against OSMesa, one thread against the other baselines.
-fn large(settings: &Settings, rivals: &Baselines, scene: &Scene, wanted: [f64; 2]) -> BenchResult<Vec<Row>> {
+fn large(settings: &Settings, baselines: &Baselines, scene: &Scene, wanted: [f64; 2]) -> BenchResult<Vec<Row>> {
     let [width, height] = VGA;
     let name = |look: &str| format!("{}, {width}x{height}, {look}", scene.name);
     eprintln!("  {}, {width}x{height}: {} triangles", scene.name, scene.triangles());
@@ -198,16 +198,16 @@ fn large(settings: &Settings, rivals: &Baselines, scene: &Scene, wanted: [f64; 2
     let mut contest = Comparison::default();
     let ours = contest.ours(scene, &plain, 2)?;
     let ours_full = contest.ours(scene, &full, 2)?;
-    let osmesa = contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &plain)?;
-    let osmesa_full = contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &full)?;
-    let by_hand = contest.baseline(rivals, BaselineRenderer::OsMesaTwoPass, scene, &plain)?;
-    let by_hand_full = contest.baseline(rivals, BaselineRenderer::OsMesaTwoPass, scene, &full)?;
+    let osmesa = contest.baseline(baselines, BaselineRenderer::OsMesa, scene, &plain)?;
+    let osmesa_full = contest.baseline(baselines, BaselineRenderer::OsMesa, scene, &full)?;
+    let by_hand = contest.baseline(baselines, BaselineRenderer::OsMesaTwoPass, scene, &plain)?;
+    let by_hand_full = contest.baseline(baselines, BaselineRenderer::OsMesaTwoPass, scene, &full)?;
     let shadows_as_ours = Work { shadow_size: Some(1024), ..full };
-    let by_hand_small = contest.baseline(rivals, BaselineRenderer::OsMesaTwoPass, scene, &shadows_as_ours)?;
+    let by_hand_small = contest.baseline(baselines, BaselineRenderer::OsMesaTwoPass, scene, &shadows_as_ours)?;
     let copying = contest.sides.len();
     contest.sides.push((1.0, Box::new(CopyLoop::new(2))));
     let rates = contest.run(3.0 * settings.seconds)?;
-    let against = |look: &str, ours, rival| rates.row(name(look), 2, ours, rival);
+    let against = |look: &str, ours, baseline| rates.row(name(look), 2, ours, baseline);
     let mut rows = vec![
         against("plain", ours, (BaselineRenderer::OsMesa, osmesa)).with_target_ratio(wanted[0]),
         against("full", ours_full, (BaselineRenderer::OsMesa, osmesa_full)).with_target_ratio(wanted[1]),
@@ -225,12 +225,12 @@ fn large(settings: &Settings, rivals: &Baselines, scene: &Scene, wanted: [f64; 2
             1.0 / distance,
         ));
     }
-    rows.extend(per_core(settings, rivals, scene, VGA, SMALL_BATCH)?);
+    rows.extend(per_core(settings, baselines, scene, VGA, SMALL_BATCH)?);
     Ok(rows)
 }
 
 /// Stepping and rendering of environments on the whole machine.
-fn stepping(settings: &Settings, rivals: &Baselines, scene: &Scene) -> BenchResult<Vec<Row>> {
+fn stepping(settings: &Settings, baselines: &Baselines, scene: &Scene) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for side in [64, 128, 256] {
         let name = |look: &str| format!("{}, {BATCH} envs, {PHYSICS_STEPS} steps + {side}x{side}, {look}", scene.name);
@@ -248,9 +248,9 @@ fn stepping(settings: &Settings, rivals: &Baselines, scene: &Scene) -> BenchResu
             }
             continue;
         }
-        let osmesa = contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &plain)?;
+        let osmesa = contest.baseline(baselines, BaselineRenderer::OsMesa, scene, &plain)?;
         let osmesa_defaults =
-            contest.baseline(rivals, BaselineRenderer::OsMesa, scene, &Work { look: Quality::Defaults, ..plain })?;
+            contest.baseline(baselines, BaselineRenderer::OsMesa, scene, &Work { look: Quality::Defaults, ..plain })?;
         let rates = contest.run(2.0 * settings.seconds)?;
         rows.push(rates.row(name("plain"), 2, ours, (BaselineRenderer::OsMesa, osmesa)).with_target_ratio(10.0));
         let defaults = rates.row(
@@ -267,7 +267,7 @@ fn stepping(settings: &Settings, rivals: &Baselines, scene: &Scene) -> BenchResu
 /// One thread against the single-threaded baselines.
 fn per_core(
     settings: &Settings,
-    rivals: &Baselines,
+    baselines: &Baselines,
     scene: &Scene,
     size: [usize; 2],
     envs: usize,
@@ -279,10 +279,10 @@ fn per_core(
         let work = Work { size, envs, physics: 0, look, shadow_size: None };
         let mut contest = Comparison::default();
         let ours = contest.ours(scene, &work, 1)?;
-        let warp = contest.baseline(rivals, BaselineRenderer::Warp, scene, &work)?;
+        let warp = contest.baseline(baselines, BaselineRenderer::Warp, scene, &work)?;
         // TinyRenderer has no multisampling.
         let has_tiny = look == Quality::Plain;
-        let tiny = if has_tiny { contest.baseline(rivals, BaselineRenderer::Tiny, scene, &work)? } else { None };
+        let tiny = if has_tiny { contest.baseline(baselines, BaselineRenderer::Tiny, scene, &work)? } else { None };
         let rates = contest.run(settings.seconds)?;
         let row = rates.row(name.clone(), 1, ours, (BaselineRenderer::Warp, warp));
         // The target applies to batches of small images.

@@ -63,17 +63,17 @@ impl Apng {
 
 impl Encoder for Apng {
     fn frame(&mut self, out: &mut Output, rgba: &[u8], shown: [f64; 2]) -> WriteResult {
-        let picture = self.png.encode_rgb(rgba, self.size.map(|side| side as usize))?;
+        let image = self.png.encode_rgb(rgba, self.size.map(|side| side as usize))?;
         if self.frames == 0 {
             out.write_all(SIGNATURE)?;
-            for header in chunks(picture, b"IHDR") {
+            for header in chunks(image, b"IHDR") {
                 chunk(out, b"IHDR", &[header])?;
                 self.count_at = (SIGNATURE.len() + 12 + header.len()) as u64;
             }
             Self::write_count(out, 0)?;
         }
         self.data.clear();
-        chunks(picture, b"IDAT").for_each(|data| self.data.extend_from_slice(data));
+        chunks(image, b"IDAT").for_each(|data| self.data.extend_from_slice(data));
         let milliseconds = duration::<u16>(shown, 1e3, u16::MAX.into())?;
         let [width, height] = self.size.map(u32::to_be_bytes);
         let mut control = self.sequence.to_be_bytes().to_vec();

@@ -15,7 +15,7 @@ const IDR_INTERVAL: u32 = 120;
 /// stream.
 pub(super) struct ParameterSets {
     pub(super) sequence: Vec<u8>,
-    pub(super) picture: Vec<u8>,
+    pub(super) image: Vec<u8>,
 }
 
 /// A coded frame.
@@ -78,7 +78,7 @@ impl H264Encoder {
     /// bytes) of each frame.
     pub(super) fn headers(&self, per_second: u32, frames: impl Iterator<Item = [u32; 2]> + Clone) -> ParameterSets {
         let level = H264Level::lowest_for(self.current.macroblocks, per_second, frames);
-        ParameterSets { sequence: sequence_parameter_set(self.size, level.code), picture: picture_parameter_set() }
+        ParameterSets { sequence: sequence_parameter_set(self.size, level.code), image: picture_parameter_set() }
     }
 
     /// Encodes the next frame from RGBA pixels, without their alpha channel.

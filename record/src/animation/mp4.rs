@@ -111,11 +111,11 @@ impl Mp4 {
     /// Sample description.
     fn sample_entry(&self) -> Vec<u8> {
         let frames = self.frames.iter().map(|frame| [frame.duration, frame.bytes]);
-        let ParameterSets { sequence, picture } = &self.stream.headers(PER_SECOND, frames);
+        let ParameterSets { sequence, image } = &self.stream.headers(PER_SECOND, frames);
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
         // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the first.
         let profile = sequence.get(1..4).unwrap_or_default();
-        let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(picture), picture];
+        let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(image), image];
         let avc = make_box(b"avcC", &avc);
         // Primaries, transfer function and matrix as in the stream, limited range.
         let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);

@@ -74,8 +74,8 @@ impl Encoder for Webp {
         let milliseconds = low_24_bits(duration(shown, 1e3, (1 << 24) - 1)?);
         let place = [0; 6];
         let still = std::mem::take(&mut self.still);
-        let picture = still.get(CHUNKS_OFFSET..).unwrap_or_default();
-        let written = self.chunk(out, b"ANMF", &[&place, &width, &height, &milliseconds, &[DO_NOT_BLEND], picture]);
+        let image = still.get(CHUNKS_OFFSET..).unwrap_or_default();
+        let written = self.chunk(out, b"ANMF", &[&place, &width, &height, &milliseconds, &[DO_NOT_BLEND], image]);
         self.still = still;
         written
     }

@@ -182,12 +182,12 @@ impl Features {
     }
 
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
-        self.numbers.iter().map(|feature| &*feature.name).chain(self.images.iter().map(|picture| &*picture.name))
+        self.numbers.iter().map(|feature| &*feature.name).chain(self.images.iter().map(|image| &*image.name))
     }
 
     /// Width and height of the images of a stream, if it has images.
     pub(crate) fn image_size(&self, stream: usize) -> Option<[usize; 2]> {
-        self.images.iter().find(|picture| picture.stream == stream).map(|picture| picture.size)
+        self.images.iter().find(|image| image.stream == stream).map(|image| image.size)
     }
 }
 

@@ -125,7 +125,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
 
     /// Stores the new values of an environment.
     fn store_values(&mut self, k: usize, streams: &[StreamSchema], packet: &Packet) -> WriteResult {
-        let EnvFrames { env, numbers, images: pictures, .. } = &mut self.envs[k];
+        let EnvFrames { env, numbers, images, .. } = &mut self.envs[k];
         let outcome = self.features.result_stream;
         for (s, (stream, block)) in streams.iter().zip(&packet.streams).enumerate().filter(|(s, _)| Some(*s) != outcome)
         {
@@ -142,18 +142,18 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
                 continue;
             };
             let rgba = block.values.as_u8s().get(range).unwrap_or_default();
-            pictures[s] = Some(Arc::new(self.dataset.encode_image(rgba, size)?));
+            images[s] = Some(Arc::new(self.dataset.encode_image(rgba, size)?));
         }
         Ok(())
     }
 
     /// Frame of the present values, if all streams have a value; actions are filled in later.
     fn present_frame(&self, k: usize) -> Option<EpisodeFrame<D::Image>> {
-        let EnvFrames { numbers, images: pictures, .. } = &self.envs[k];
+        let EnvFrames { numbers, images, .. } = &self.envs[k];
         let numbers = self.features.numbers.iter().map(|feature| feature.values(numbers));
-        let pictures = self.features.images.iter().map(|picture| pictures.get(picture.stream)?.clone());
-        let (numbers, pictures) = (numbers.collect::<Option<_>>()?, pictures.collect::<Option<_>>()?);
-        Some(EpisodeFrame { numbers, images: pictures, reward: 0.0, done: false })
+        let images = self.features.images.iter().map(|image| images.get(image.stream)?.clone());
+        let (numbers, images) = (numbers.collect::<Option<_>>()?, images.collect::<Option<_>>()?);
+        Some(EpisodeFrame { numbers, images, reward: 0.0, done: false })
     }
 
     /// Creates the frame of a row, which waits for its action.

@@ -160,14 +160,14 @@ pub(crate) fn create(
 fn columns(features: &Features) -> Vec<(String, ColumnType)> {
     let numbers =
         features.numbers.iter().map(|feature| (feature.name.clone(), ColumnType::Float32(feature.names.len())));
-    let pictures = features.images.iter().map(|picture| (picture.name.clone(), ColumnType::Image));
+    let images = features.images.iter().map(|image| (image.name.clone(), ColumnType::Image));
     let outcome = [(REWARD, ColumnType::Float32(1)), (DONE, ColumnType::Bool)];
     let outcome =
         outcome.into_iter().filter(|_| features.result_stream.is_some()).map(|(name, kind)| (name.to_string(), kind));
     let common = COMMON.iter().map(|(name, kind)| {
         (name.to_string(), if *kind == "int64" { ColumnType::Int64 } else { ColumnType::Float32(1) })
     });
-    numbers.chain(pictures).chain(outcome).chain(common).collect()
+    numbers.chain(images).chain(outcome).chain(common).collect()
 }
 
 /// Features, as described in `meta/info.json`.
@@ -176,13 +176,13 @@ fn feature_info(features: &Features) -> Map<String, Value> {
         let names = &feature.names;
         (feature.name.clone(), json!({ "dtype": "float32", "shape": [names.len()], "names": names }))
     });
-    let pictures = features.images.iter().map(|picture| {
-        let (names, [width, height]) = (["height", "width", "channels"], picture.size);
-        (picture.name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
+    let images = features.images.iter().map(|image| {
+        let (names, [width, height]) = (["height", "width", "channels"], image.size);
+        (image.name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
     });
     let outcome = [(REWARD, "float32"), (DONE, "bool")].into_iter().filter(|_| features.result_stream.is_some());
     let outcome = outcome.map(|(name, kind)| (name.to_string(), json!({ "dtype": kind, "shape": [1], "names": null })));
-    numbers.chain(pictures).chain(outcome).collect()
+    numbers.chain(images).chain(outcome).collect()
 }
 
 impl DatasetWriter for LeRobotWriter {
@@ -209,7 +209,7 @@ impl DatasetWriter for LeRobotWriter {
         frame: &EpisodeFrame<EncodedImage>,
         _next: &EpisodeFrame<EncodedImage>,
     ) -> WriteResult {
-        let EpisodeFrame { numbers, images: pictures, reward, done } = frame;
+        let EpisodeFrame { numbers, images, reward, done } = frame;
         let judged = self.features.result_stream.is_some();
         let numbers: Vec<Vec<f32>> = numbers.iter().map(|of| of.iter().map(|x| *x as f32).collect()).collect();
         let Some(running) = &mut self.open_episodes[env] else { return Ok(()) };
@@ -218,9 +218,9 @@ impl DatasetWriter for LeRobotWriter {
             let Some(to) = leaves.next() else { break };
             values.iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
         }
-        for picture in pictures {
+        for image in images {
             let (Some(bytes), Some(path)) = (leaves.next(), leaves.next()) else { break };
-            put_bytes(&picture.file, bytes)?;
+            put_bytes(&image.file, bytes)?;
             put_bytes(format!("frame-{:06}.png", running.frames).as_bytes(), path)?;
         }
         if judged && let (Some(rewards), Some(ends)) = (leaves.next(), leaves.next()) {
@@ -240,9 +240,9 @@ impl DatasetWriter for LeRobotWriter {
         running.frames += 1;
         let all = numbers.len();
         self.statistics.iter_mut().zip(&numbers).for_each(|(statistics, values)| statistics.add(values));
-        let of_pictures = self.statistics.iter_mut().skip(all).zip(pictures);
-        of_pictures.for_each(|(statistics, picture)| statistics.add_image(&picture.statistics));
-        let of_outcome = self.statistics.iter_mut().skip(all + pictures.len());
+        let of_pictures = self.statistics.iter_mut().skip(all).zip(images);
+        of_pictures.for_each(|(statistics, image)| statistics.add_image(&image.statistics));
+        let of_outcome = self.statistics.iter_mut().skip(all + images.len());
         let outcome = [*reward as f32, f32::from(u8::from(*done))];
         of_outcome.zip(outcome).for_each(|(statistics, value)| statistics.add(&[value]));
         if running.rows >= FLUSH_ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= FLUSH_BYTES {

@@ -100,8 +100,8 @@ pub(super) fn resolve(
     if sources.is_empty() && !cfg.topics.contains(&Topic::Events) {
         return Err(RecordError::NothingToRecord { path: cfg.path.clone(), format });
     }
-    let pictures: usize = sources.iter().map(|source| source.stream.env_ids.len()).sum();
-    if format.is_animation() && pictures != 1 {
+    let images: usize = sources.iter().map(|source| source.stream.env_ids.len()).sum();
+    if format.is_animation() && images != 1 {
         let names: Vec<String> = sources
             .iter()
             .map(|StreamSource { stream, .. }| format!("{} in {} environments", stream.name, stream.env_ids.len()))

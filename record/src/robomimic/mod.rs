@@ -129,8 +129,8 @@ fn columns(features: &Features) -> (Vec<DatasetColumn>, usize) {
                 true => {}
             }
         }
-        for picture in &features.images {
-            add(format!("{of}/{}", picture.name), ColumnKind::Image(picture.size));
+        for image in &features.images {
+            add(format!("{of}/{}", image.name), ColumnKind::Image(image.size));
         }
     }
     if features.result_stream.is_some() {
@@ -150,7 +150,7 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Re
     }
     // Each image is one chunk of the file.
     let too_large = |[width, height]: [usize; 2]| 3 * width as u128 * height as u128 > u128::from(u32::MAX);
-    if let Some([width, height]) = features.images.iter().map(|picture| picture.size).find(|size| too_large(*size)) {
+    if let Some([width, height]) = features.images.iter().map(|image| image.size).find(|size| too_large(*size)) {
         let fits = "three bytes per pixel must be less than 4 GiB".into();
         return Err(RecordError::UnsupportedSize {
             path: path.clone(),
@@ -284,7 +284,7 @@ fn write(
     episode: &Episode,
     columns: &[DatasetColumn],
     rows: &mut BlockFile,
-    pictures: &mut BlockFile,
+    images: &mut BlockFile,
 ) -> WriteResult {
     let frames = episode.frames;
     let mut groups = BTreeMap::new();
@@ -313,7 +313,7 @@ fn write(
     let dones =
         ends.then(|| demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(write_error)).transpose()?;
     let record = columns.iter().map(DatasetColumn::end).max().unwrap_or(0);
-    let (mut block, mut picture, mut numbers, mut first) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    let (mut block, mut image, mut numbers, mut first) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for place in &episode.blocks {
         rows.read(*place, &mut block)?;
         let count = block.len() / record.max(1);
@@ -337,9 +337,9 @@ fn write(
                 }
                 ColumnKind::Image(_) => {
                     for (frame, cell) in (first..).zip(cells()) {
-                        pictures.read(BlockPosition::from_bytes(cell), &mut picture)?;
+                        images.read(BlockPosition::from_bytes(cell), &mut image)?;
                         // The image is compressed already.
-                        dataset.write_chunk_raw(frame, &picture, 0).map_err(write_error)?;
+                        dataset.write_chunk_raw(frame, &image, 0).map_err(write_error)?;
                     }
                 }
             }

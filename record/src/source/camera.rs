@@ -115,8 +115,8 @@ impl StereoSide {
                 camera.latest_delivered_pose_w(CameraConvention::Ros),
             ));
         }
-        let pictures = sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::latest_delivered);
-        pictures.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
+        let images = sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::latest_delivered);
+        images.map(|taken| (taken.intrinsic_matrices(), taken.pose_w(CameraConvention::Ros)))
     }
 }
 

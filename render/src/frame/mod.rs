@@ -16,7 +16,7 @@ pub trait ListedChannel: Channel {
     fn is_selected(channels: Channels) -> bool;
 
     /// Images of the channel; `None` if it was not rendered.
-    fn view_in(pictures: &Images) -> Option<ImageView<'_, Self>>;
+    fn view_in(images: &Images) -> Option<ImageView<'_, Self>>;
 }
 
 /// View of the images of one channel, shape (views, height, width) or (views, height, width, components).

@@ -56,13 +56,13 @@ impl<'a> TestScene<'a> {
         let mut tracer = RayTracer::default();
         tracer.prepare_geometry(scene, &RayAssetCache::default(), |i| Layer::for_instance(i, u32::MAX));
         tracer.place(scene, poses, None);
-        let (mut lamps, projection) = (SceneLights::default(), Projection::from(view));
-        lamps.prepare(scene, &tracer, &scene.lights, true, &projection, true);
-        Self { scene, tracer, lights: lamps, projection }
+        let (mut lights, projection) = (SceneLights::default(), Projection::from(view));
+        lights.prepare(scene, &tracer, &scene.lights, true, &projection, true);
+        Self { scene, tracer, lights, projection }
     }
 
     fn paths(&self, samples: u32, max_bounces: u32, seed: u32) -> PathTracer<'_> {
-        let Self { scene, tracer, lights: lamps, projection } = self;
+        let Self { scene, tracer, lights, projection } = self;
         let eye = CameraRayGenerator { projection, lens: None, thin_lens: None };
         PathTracer {
             scene,
@@ -72,7 +72,7 @@ impl<'a> TestScene<'a> {
             samples,
             max_bounces,
             seed,
-            lights: lamps,
+            lights,
             strategy: MisStrategy::Both,
         }
     }

@@ -87,7 +87,7 @@ impl ShadowMap {
     /// rendering them. Returns false if no caster shades a receiver.
     pub(super) fn prepare(
         &mut self,
-        lamp: &LightView,
+        light: &LightView,
         receivers: &Extent,
         scene: &RenderScene,
         poses: &[PoseF32],
@@ -103,8 +103,8 @@ impl ShadowMap {
         self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
         self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
         self.side = side;
-        let Some((projection, planes)) = lamp.fit(scene, poses, receivers, side, solid) else { return false };
-        let rotation = lamp.rotation;
+        let Some((projection, planes)) = light.fit(scene, poses, receivers, side, solid) else { return false };
+        let rotation = light.rotation;
         let casts = |i: &Instance| solid(i) && (planes || !matches!(i.shape, Shape::Plane(_)));
         self.texel = 1.0 / projection.fx;
         self.light_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));

@@ -283,7 +283,7 @@ pub(super) fn visible_extents<const N: usize>(
     scene: &RenderScene,
     poses: &[PoseF32],
     shown: impl Fn(&Instance) -> bool,
-    lamps: &[Option<LightView>; N],
+    lights: &[Option<LightView>; N],
 ) -> [Extent; N] {
     let Projection { width, height, fx, fy, cx, cy, near, far, .. } = *projection;
     let (w, h) = (width as f32, height as f32);
@@ -339,9 +339,9 @@ pub(super) fn visible_extents<const N: usize>(
         for point in &mut points[..count] {
             *point = projection.world_from_camera.apply(*point);
         }
-        for (out, lamp) in out.iter_mut().zip(lamps) {
-            if let Some(lamp) = lamp {
-                out.union(&lamp.hull(&points[..count], MAX_LOD_ERROR));
+        for (out, light) in out.iter_mut().zip(lights) {
+            if let Some(light) = light {
+                out.union(&light.hull(&points[..count], MAX_LOD_ERROR));
             }
         }
     }

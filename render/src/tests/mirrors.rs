@@ -237,10 +237,10 @@ fn reflected_eye() {
     let last = instances.len() - 1;
     (instances[last], poses[last]) = (mirror, PoseF32::IDENTITY);
     let kind = LightKind::Point;
-    let lamps = vec![Light::default(), Light { kind, position: [1.0, -1.0, 2.5], ..Light::default() }];
+    let lights = vec![Light::default(), Light { kind, position: [1.0, -1.0, 2.5], ..Light::default() }];
     let scene = |instances: Vec<Instance>| {
         let mut scene = RenderScene::new(instances).unwrap();
-        scene.lights.clone_from(&lamps);
+        scene.lights.clone_from(&lights);
         // The headlight would shine from another place.
         scene.headlight.active = false;
         scene

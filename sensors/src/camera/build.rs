@@ -178,14 +178,14 @@ impl CameraCfg {
             }
             _ => 0,
         };
-        let picture = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
-        let fits = |pictures: usize, captures: usize| {
+        let image = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
+        let fits = |images: usize, captures: usize| {
             let captures = captures.checked_mul(capture.saturating_add(FRAME_OVERHEAD));
-            let pictures = picture.and_then(|bytes| bytes.checked_mul(pictures));
-            let bytes = pictures
+            let images = image.and_then(|bytes| bytes.checked_mul(images));
+            let bytes = images
                 .zip(captures)
-                .and_then(|(pictures, captures)| {
-                    pictures.checked_add(captures)?.checked_mul(views)?.checked_add(accumulator)
+                .and_then(|(images, captures)| {
+                    images.checked_add(captures)?.checked_mul(views)?.checked_add(accumulator)
                 })
                 .filter(|&bytes| bytes as u64 <= MAX_BYTES);
             // Reserves the memory and returns it untouched. A failed reservation is an error; a failed array allocation
@@ -203,15 +203,10 @@ impl CameraCfg {
                 limit: MAX_BYTES,
             });
         }
-        let (pictures, captures) = (self.history_length, FrameBuffer::max_pending(self, schedule));
-        let all = pictures.saturating_add(captures).saturating_add(1);
-        if !fits(pictures.saturating_add(1), all) {
-            return Err(CameraError::HistoryMemory {
-                images: pictures,
-                pending_frames: captures,
-                views,
-                limit: MAX_BYTES,
-            });
+        let (images, captures) = (self.history_length, FrameBuffer::max_pending(self, schedule));
+        let all = images.saturating_add(captures).saturating_add(1);
+        if !fits(images.saturating_add(1), all) {
+            return Err(CameraError::HistoryMemory { images, pending_frames: captures, views, limit: MAX_BYTES });
         }
         Ok(())
     }

@@ -151,8 +151,8 @@ impl Camera {
             shape[axis + 1] = *size;
         }
         let off = || self.channel_off::<C>();
-        let pictures = self.history_images()?.images.images()?.get::<C>().ok_or_else(off)?;
-        ArrayView::from_shape(shape, pictures.to_slice().unwrap_or_default()).map_err(|_| off().into())
+        let images = self.history_images()?.images.images()?.get::<C>().ok_or_else(off)?;
+        ArrayView::from_shape(shape, images.to_slice().unwrap_or_default()).map_err(|_| off().into())
     }
 
     /// Renders the history if the camera has one.

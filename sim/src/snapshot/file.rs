@@ -458,7 +458,7 @@ mod tests {
             assert_eq!(fault(&drive(index, value)), None, "number {index}: {value}");
         }
         assert!(fault(&|state| state.drives.truncate(5)).is_some());
-        assert!(fault(&|state| state.steps = MAX_STEPS + 1).is_some_and(|what| what.contains("steps")));
+        assert!(fault(&|state| state.steps = MAX_STEPS + 1).is_some_and(|what| what.contains("step count")));
         assert_eq!(fault(&|state| state.steps = MAX_STEPS), None);
     }
 
@@ -471,7 +471,9 @@ mod tests {
             assert!(fault(&|own| own.values[0].value = bad.clone().into()).is_some(), "{bad:?}");
         }
         assert!(fault(&|own| own.values[1].value = [0.1, -0.2, 0.0].into()).is_some());
-        assert!(fault(&|own| own.randomizations = MAX_STEPS + 1).is_some_and(|what| what.contains("draws")));
+        assert!(
+            fault(&|own| own.randomizations = MAX_STEPS + 1).is_some_and(|what| what.contains("randomization count"))
+        );
     }
 
     #[test]

@@ -136,20 +136,22 @@ fn to_linear(color: [f32; 3]) -> [f32; 3] {
 }
 
 /// Sum of all dome lights, linear; `None` without a dome light.
-pub(super) fn dome_light_sum(lamps: &[LightCfg]) -> Option<[f32; 3]> {
-    let domes = lamps.iter().filter_map(|lamp| match lamp.kind {
-        LightKindCfg::Dome { intensity } => Some(to_linear(lamp.color.map(|c| c as f32)).map(|c| c * intensity as f32)),
+pub(super) fn dome_light_sum(lights: &[LightCfg]) -> Option<[f32; 3]> {
+    let domes = lights.iter().filter_map(|light| match light.kind {
+        LightKindCfg::Dome { intensity } => {
+            Some(to_linear(light.color.map(|c| c as f32)).map(|c| c * intensity as f32))
+        }
         _ => None,
     });
     domes.reduce(|sum, dome| std::array::from_fn(|k| sum[k] + dome[k]))
 }
 
 /// Copies the poses of the lights in `data`.
-pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
+pub(super) fn read(data: &Data, lights: &[Light], out: &mut [Light]) {
     let (positions, directions) = (data.light_xpos().as_chunks::<3>().0, data.light_xdir().as_chunks::<3>().0);
-    for (index, (to, lamp)) in out.iter_mut().zip(lamps).enumerate() {
+    for (index, (to, light)) in out.iter_mut().zip(lights).enumerate() {
         let position = positions[index].map(|x| x as f32);
-        *to = Light { position, direction: directions[index].map(|x| x as f32), ..*lamp };
+        *to = Light { position, direction: directions[index].map(|x| x as f32), ..*light };
     }
 }
 
@@ -226,10 +228,10 @@ mod tests {
         }
         let two: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.push(LightCfg::default());
         let none: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.clear();
-        for (change, ball, lamps) in [(grounds[0], true, 2), (two, false, 3), (none, false, 1)] {
+        for (change, ball, lights) in [(grounds[0], true, 2), (two, false, 3), (none, false, 1)] {
             let shown = scene(change, ball);
             assert_eq!((shown.headlight, shown.lighting_space), (Headlight::default(), LightingSpace::Linear));
-            assert_eq!((shown.skybox.as_ref(), shown.horizon, active(&shown)), (alone.skybox.as_ref(), None, lamps));
+            assert_eq!((shown.skybox.as_ref(), shown.horizon, active(&shown)), (alone.skybox.as_ref(), None, lights));
         }
     }
 }

@@ -247,12 +247,12 @@ impl VisualScene {
     }
 
     /// Adds the properties of lights that MuJoCo does not have: their radii, by name, and dome lights.
-    pub(crate) fn with_light_cfgs(mut self, model: &Model, lamps: &[LightCfg]) -> Self {
+    pub(crate) fn with_light_cfgs(mut self, model: &Model, lights: &[LightCfg]) -> Self {
         let scene = Arc::make_mut(&mut self.scene);
-        if let Some(light) = lighting::dome_light_sum(lamps) {
+        if let Some(light) = lighting::dome_light_sum(lights) {
             scene.ambient = Hemisphere { sky: light, ground: light };
         }
-        for (index, lamp) in lamps.iter().enumerate() {
+        for (index, lamp) in lights.iter().enumerate() {
             let light = model.id(ObjectKind::Light, &light_name(index)).and_then(|light| scene.lights.get_mut(light));
             if let Some(light) = light {
                 light.radius = lamp.radius as f32;

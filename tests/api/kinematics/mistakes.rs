@@ -111,7 +111,10 @@ fn configurations() {
         (IkCfg { num_seeds: 100_001, ..good() }, &["num_seeds"]),
         (IkCfg { num_seeds: u32::MAX, ..good() }, &["num_seeds", "100000"]),
         (IkCfg { posture: posture(1.0, &[0.1; 5]), ..good() }, &["posture.rest", "5", "6"]),
-        (IkCfg { posture: posture(1.0, &[0.1, 0.1, 0.1, 0.1, 0.1, nan]), ..good() }, &["posture.rest", "finite"]),
+        (
+            IkCfg { posture: posture(1.0, &[0.1, 0.1, 0.1, 0.1, 0.1, nan]), ..good() },
+            &["posture.rest", "NaN or infinity"],
+        ),
         (IkCfg { posture: posture(0.0, &[0.1; 6]), ..good() }, &["posture.gain is 0.0"]),
         (IkCfg { posture: posture(1.1, &[0.1; 6]), ..good() }, &["posture.gain"]),
         (IkCfg { posture: posture(1.5, &[0.1; 6]), ..good() }, &["posture.gain is 1.5"]),

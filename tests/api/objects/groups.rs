@@ -111,8 +111,8 @@ fn refusals() {
     let wide = group.write_velocity(&Array3::zeros((2, 3, 7)), None);
     assert!(matches!(wide, Err(Error::Shape { argument: "write_velocity", expected, .. }) if expected == [2, 3, 6]));
     for (result, [kind, part]) in [
-        (group.write_pose(&poses, twice), ["Repeated {", "first: 0, second: 1"]),
-        (group.write_velocity(&velocities, twice), ["Repeated {", "first: 0, second: 1"]),
+        (group.write_pose(&poses, twice), ["RepeatedItem {", "first: 0, second: 1"]),
+        (group.write_velocity(&velocities, twice), ["RepeatedItem {", "first: 0, second: 1"]),
         (group.write_pose(&poses, Some(&[EnvId(2)])), ["UnknownIndex {", "index: 2"]),
         (group.write_pose(&changed(&poses, (1, 2, 1), nan), None), ["NotFinite {", "row: 1, column: 1"]),
         (group.write_velocity(&changed(&velocities, (0, 1, 4), nan), None), ["NotFinite {", "row: 0, column: 4"]),

@@ -261,7 +261,7 @@ fn refusals() {
         (other("first", "secnd"), "candidates: [\"second\"", ""),
         (other("first", "first"), field, "different bodies"),
         (other("part/trunk", "part/tail"), field, "different bodies"),
-        (other("wall", "world"), field, "must move"),
+        (other("wall", "world"), field, "must be dynamic"),
         (other("first", "arm"), field, "one of its links"),
         (taken, "DuplicateUid(\"first\")", ""),
         (weld("first", "second"), "DuplicateUid(", ""),

@@ -11,9 +11,9 @@ fn sine(points: u32) -> Plot {
 #[test]
 fn ink() {
     let plot = sine(300);
-    let (picture, drawing) = (canvas(&plot).unwrap(), plot.layout().unwrap());
+    let (image, drawing) = (canvas(&plot).unwrap(), plot.layout().unwrap());
     let blue = |x: f64, y: f64| {
-        let [r, g, b] = picture.pixel(x.floor() as usize, y.floor() as usize).unwrap();
+        let [r, g, b] = image.pixel(x.floor() as usize, y.floor() as usize).unwrap();
         r < 128 && g < 190 && b > 150
     };
     for point in &drawing.curves[0].polylines[0] {

@@ -115,14 +115,14 @@ impl Canvas {
         let Ok(_) = Text::with_baseline(text, Point::new(x, y), style, Baseline::Top).draw(self);
     }
 
-    /// Copies `picture` with its top left corner to a pixel, clipped to this image.
-    pub fn draw_image(&mut self, picture: &Self, [x, y]: [usize; 2]) {
+    /// Copies `image` with its top left corner to a pixel, clipped to this image.
+    pub fn draw_image(&mut self, image: &Self, [x, y]: [usize; 2]) {
         let [width, height] = self.size;
-        let [w, h] = picture.size;
+        let [w, h] = image.size;
         let columns = w.min(width.saturating_sub(x));
         for row in 0..h.min(height.saturating_sub(y)) {
             let (to, from) = (4 * ((y + row) * width + x), 4 * row * w);
-            self.bytes[to..to + 4 * columns].copy_from_slice(&picture.bytes[from..from + 4 * columns]);
+            self.bytes[to..to + 4 * columns].copy_from_slice(&image.bytes[from..from + 4 * columns]);
         }
     }
 }

@@ -430,10 +430,10 @@ impl ViewSession for ViewerSession {
     }
 
     fn due_images(&mut self) -> Vec<EncodedImage> {
-        let pictures = self.with_newest(|own, snapshot| {
+        let images = self.with_newest(|own, snapshot| {
             let stage = own.render_scene(snapshot);
             stage.into_iter().chain(own.render_panel(snapshot)).collect()
         });
-        pictures.unwrap_or_default()
+        images.unwrap_or_default()
     }
 }

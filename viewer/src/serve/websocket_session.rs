@@ -125,9 +125,9 @@ impl<S: Read + Write> WebSocketSession<'_, S> {
         if self.unseen_images >= MAX_UNSEEN_IMAGES {
             return Ok(());
         }
-        for picture in self.session.due_images() {
+        for image in self.session.due_images() {
             self.unseen_images += 1;
-            self.send(Message::binary(picture.to_message()))?;
+            self.send(Message::binary(image.to_message()))?;
         }
         Ok(())
     }

@@ -264,20 +264,19 @@ impl XWindow {
     }
 
     fn send(&mut self, canvas: &Canvas) -> Result<(), DisplayError> {
-        let (k, picture) = (self.pixel_scale(), canvas.dimensions());
-        let fits = |old: &ScaledImage| k > 1 && (old.size, old.factor) == (picture, k);
+        let (k, image) = (self.pixel_scale(), canvas.dimensions());
+        let fits = |old: &ScaledImage| k > 1 && (old.size, old.factor) == (image, k);
         if let Some(old) = self.scaled_image.take_if(|old| !fits(old)) {
             self.watch.request(|| old.free(&self.connection))?;
         }
         if let (true, None, Some(format)) = (k > 1, &self.scaled_image, self.format) {
-            let enlarged = self
-                .watch
-                .request(|| ScaledImage::new(&self.connection, self.window, self.depth, format, picture, k))?;
+            let enlarged =
+                self.watch.request(|| ScaledImage::new(&self.connection, self.window, self.depth, format, image, k))?;
             self.scaled_image = Some(enlarged);
         }
         match self.scaled_image.take() {
             Some(enlarged) => {
-                self.put_image(canvas, 1, enlarged.pixmap(), picture)?;
+                self.put_image(canvas, 1, enlarged.pixmap(), image)?;
                 self.watch.request(|| enlarged.show(&self.connection, self.size))?;
                 self.scaled_image = Some(enlarged);
             }

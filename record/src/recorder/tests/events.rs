@@ -135,8 +135,8 @@ fn events_alone() {
     sim.finish_recording(recorder).unwrap();
     let logs = logs(&path);
     assert_eq!(logs.len(), 3, "{logs:?}");
-    let pictures = folder.path().join("run.gif");
-    let error = sim.record(RecorderCfg::new(pictures).with_topics([Topic::Events])).unwrap_err();
+    let images = folder.path().join("run.gif");
+    let error = sim.record(RecorderCfg::new(images).with_topics([Topic::Events])).unwrap_err();
     assert!(matches!(error, RecordError::UnsupportedTopic { .. }), "{error}");
 }
 

@@ -158,8 +158,8 @@ fn sums() {
         (Instance::new(Plane { half: [half; 2] }, emissive(emission), 2), down([x, 0.2, 0.8]))
     };
     let all = [lamp(-0.5, 1.0, 0.1), lamp(0.4, 4.0, 0.15), lamp(1.0, 0.5, 0.3)];
-    let light = |lamps: &[(Instance, PoseF32)]| {
-        let (instances, mut poses): (Vec<_>, Vec<_>) = lamps.iter().cloned().unzip();
+    let light = |lights: &[(Instance, PoseF32)]| {
+        let (instances, mut poses): (Vec<_>, Vec<_>) = lights.iter().cloned().unzip();
         poses.insert(0, PoseF32::IDENTITY);
         mean_light(&on_floor(matt(0.7), instances), &poses, &one_ray_view([1.2, 0.5, 0.4], [0.0; 3]), 512, 0)
     };
@@ -243,8 +243,8 @@ fn both_strategies_after_bounces() {
     let mirror = Material { reflectance: 0.5, ..matt(0.5) };
     for material in [matt(0.8), shiny(), sharp, mirror] {
         let wall = Instance::new(Plane { half: [2.0; 2] }, material.clone(), 2);
-        let lamp = Instance::new(Plane { half: [0.5; 2] }, emissive(4.0), 3);
-        let scene = on_floor(Material { specular: 0.5, shininess: 0.2, ..matt(0.7) }, [wall, lamp]);
+        let light = Instance::new(Plane { half: [0.5; 2] }, emissive(4.0), 3);
+        let scene = on_floor(Material { specular: 0.5, shininess: 0.2, ..matt(0.7) }, [wall, light]);
         // A control: the floor itself does not see the emitter.
         assert_eq!(by_strategies(&scene, &poses, &view, 0, 4)[1].0, 0.0);
         let mut last = 0.0;

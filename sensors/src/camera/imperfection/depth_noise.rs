@@ -48,13 +48,13 @@ impl DepthEffect for DepthNoise {
         within("offset of the depth noise", self.offset, [-1000.0, 1000.0], "it must be -1000 to 1000")
     }
 
-    fn apply(&self, depths: &mut [f32], picture: &ImageContext<'_>) {
-        let (near, far) = (picture.view.near, picture.view.far);
+    fn apply(&self, depths: &mut [f32], image: &ImageContext<'_>) {
+        let (near, far) = (image.view.near, image.view.far);
         for (block, depths) in (0..).zip(depths.chunks_mut(4)) {
             if depths.iter().all(|depth| depth.is_infinite()) {
                 continue;
             }
-            let normals = picture.rng_key.normals(RngStream::DEPTH, block);
+            let normals = image.rng_key.normals(RngStream::DEPTH, block);
             for (depth, normal) in depths.iter_mut().zip(normals).filter(|(depth, _)| depth.is_finite()) {
                 let z = f64::from(*depth);
                 let sigma = self.constant + self.quadratic * (z - self.offset).powi(2);

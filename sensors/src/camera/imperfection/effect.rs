@@ -21,7 +21,7 @@ pub(super) trait DepthEffect {
 
     /// Modifies an image of reaches \[m\], row by row; misses are infinite. The reach is the depth, or the distance
     /// along the ray if rays of the lens do not all go forward.
-    fn apply(&self, depths: &mut [f32], picture: &ImageContext<'_>);
+    fn apply(&self, depths: &mut [f32], image: &ImageContext<'_>);
 }
 
 /// View, lens and random key of an image.
@@ -36,7 +36,7 @@ pub(in crate::camera) struct ImageContext<'a> {
 /// A pixel of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelContext<'a> {
-    pub(super) picture: ImageContext<'a>,
+    pub(super) image: ImageContext<'a>,
     /// Pixel index, row by row from the top left.
     pub(super) pixel: usize,
 }

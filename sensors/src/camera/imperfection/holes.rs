@@ -41,19 +41,19 @@ impl DepthEffect for Holes {
         within("baseline of the holes", self.baseline, [-1000.0, 1000.0], "it must be -1000 to 1000")
     }
 
-    fn apply(&self, depths: &mut [f32], picture: &ImageContext<'_>) {
+    fn apply(&self, depths: &mut [f32], image: &ImageContext<'_>) {
         // Holes are first marked by a negative sign, so that the depths around them stay available.
         if self.max_angle < FRAC_PI_2 {
             let least = self.max_angle.cos();
             for pixel in 0..depths.len() {
-                if incidence_cosine(depths, pixel, picture).is_some_and(|cosine| cosine < least) {
+                if incidence_cosine(depths, pixel, image).is_some_and(|cosine| cosine < least) {
                     depths[pixel] = -depths[pixel].abs();
                 }
             }
         }
         if self.baseline != 0.0 {
-            let projector_disparity = f64::from(picture.view.fx) * self.baseline;
-            depths.chunks_mut(picture.view.width.max(1)).for_each(|row| mark_projector_shadow(row, projector_disparity));
+            let projector_disparity = f64::from(image.view.fx) * self.baseline;
+            depths.chunks_mut(image.view.width.max(1)).for_each(|row| mark_projector_shadow(row, projector_disparity));
         }
         depths.iter_mut().filter(|depth| **depth < 0.0).for_each(|depth| *depth = f32::INFINITY);
     }
@@ -68,8 +68,8 @@ fn inverse_depth(depth: f32) -> Option<f64> {
 ///
 /// On a plane, the inverse depth is a linear function of the ray, and its coefficients n are the normal. Three rays
 /// determine them, by Cramer's rule.
-fn incidence_cosine(depths: &[f32], pixel: usize, picture: &ImageContext<'_>) -> Option<f64> {
-    let width = picture.view.width;
+fn incidence_cosine(depths: &[f32], pixel: usize, image: &ImageContext<'_>) -> Option<f64> {
+    let width = image.view.width;
     let here = inverse_depth(depths[pixel])?;
     // Uses the neighbor with the more similar inverse depth: the other neighbor may be across an edge.
     let nearer = |before: Option<usize>, after: Option<usize>| {
@@ -82,8 +82,8 @@ fn incidence_cosine(depths: &[f32], pixel: usize, picture: &ImageContext<'_>) ->
     let column = pixel % width;
     let beside = nearer((column > 0).then(|| pixel.wrapping_sub(1)), (column + 1 < width).then_some(pixel + 1))?;
     let below = nearer(pixel.checked_sub(width), Some(pixel + width))?;
-    let ray = Vector3::from(picture.ray(pixel));
-    let [a, b] = [beside, below].map(|(other, inverse)| (Vector3::from(picture.ray(other)) - ray, inverse - here));
+    let ray = Vector3::from(image.ray(pixel));
+    let [a, b] = [beside, below].map(|(other, inverse)| (Vector3::from(image.ray(other)) - ray, inverse - here));
     // Differences instead of rays and inverse depths describe the same plane and avoid cancellation.
     let volume = ray.dot(&a.0.cross(&b.0));
     let normal = here * a.0.cross(&b.0) + a.1 * b.0.cross(&ray) + b.1 * ray.cross(&a.0);

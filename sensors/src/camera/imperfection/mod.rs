@@ -124,12 +124,12 @@ impl Imperfections {
     }
 
     /// Applies all imperfections to a frame in which misses are infinite.
-    pub(super) fn apply(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, picture: ImageContext<'_>) {
+    pub(super) fn apply(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, image: ImageContext<'_>) {
         let tone = ToneLut::for_curve(curve);
         if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
             for (pixel, bytes) in color.chunks_exact_mut(4).enumerate() {
                 let mut light = [bytes[0], bytes[1], bytes[2]].map(|byte| tone.decode(byte));
-                self.spoil_light(&mut light, &PixelContext { picture, pixel });
+                self.spoil_light(&mut light, &PixelContext { image, pixel });
                 bytes[..3].copy_from_slice(&light.map(|light| tone.encode(light)));
             }
         }
@@ -137,30 +137,30 @@ impl Imperfections {
             return;
         }
         let [depth, distance] = [frame.depth.as_deref_mut(), frame.distance.as_deref_mut()];
-        let (reach, other) = if picture.clips_by_distance() { (distance, depth) } else { (depth, distance) };
+        let (reach, other) = if image.clips_by_distance() { (distance, depth) } else { (depth, distance) };
         let times = |number: f32, factor: f64| match number.is_finite() {
             true => (f64::from(number) * factor) as f32,
             false => f32::INFINITY,
         };
         match (reach, other) {
             (Some(reach), other) => {
-                self.spoil_depth(reach, &picture);
+                self.spoil_depth(reach, &image);
                 for (pixel, (other, reach)) in other.into_iter().flatten().zip(reach).enumerate() {
-                    *other = times(*reach, picture.clip_depth_conversion(pixel));
+                    *other = times(*reach, image.clip_depth_conversion(pixel));
                 }
             }
             (None, Some(other)) => {
                 for (pixel, number) in other.iter_mut().enumerate() {
                     // At a right angle depth is 0 for any reach, so the reach is unknown and has no effect.
-                    let factor = picture.clip_depth_conversion(pixel).recip();
+                    let factor = image.clip_depth_conversion(pixel).recip();
                     *number = match factor.is_finite() || number.is_infinite() {
                         true => times(*number, factor),
-                        false => picture.view.near,
+                        false => image.view.near,
                     };
                 }
-                self.spoil_depth(other, &picture);
+                self.spoil_depth(other, &image);
                 for (pixel, number) in other.iter_mut().enumerate() {
-                    *number = times(*number, picture.clip_depth_conversion(pixel));
+                    *number = times(*number, image.clip_depth_conversion(pixel));
                 }
             }
             (None, None) => {}

@@ -28,7 +28,7 @@ impl RadianceEffect for ReadNoise {
     }
 
     fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let normals = place.picture.rng_key.normals(RngStream::READ, place.pixel as u32);
+        let normals = place.image.rng_key.normals(RngStream::READ, place.pixel as u32);
         for (light, normal) in light.iter_mut().zip(normals) {
             *light += self.std * normal;
         }

@@ -34,7 +34,7 @@ impl RadianceEffect for ShotNoise {
     }
 
     fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let (ticket, block) = (place.picture.rng_key, place.pixel as u32);
+        let (ticket, block) = (place.image.rng_key, place.pixel as u32);
         let mean = light.map(|light| light * self.electrons);
         // Random numbers are only computed if a channel needs them.
         let normals = mean.iter().any(|mean| *mean >= NORMAL_APPROXIMATION_MIN).then(|| ticket.normals(RngStream::SHOT, block));

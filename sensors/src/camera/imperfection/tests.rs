@@ -42,20 +42,16 @@ fn only(set: impl FnOnce(&mut Imperfections)) -> Imperfections {
 }
 
 /// A gray image with imperfections.
-fn with_effects(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<[u8; 4]> {
+fn with_effects(imperfections: &Imperfections, byte: u8, image: u64) -> Vec<[u8; 4]> {
     let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
     frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
-    imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, pinhole(&view([SIDE; 2], 150.0), &rng_key(picture)));
+    imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, pinhole(&view([SIDE; 2], 150.0), &rng_key(image)));
     frame.color.unwrap().as_chunks().0.to_vec()
 }
 
 /// Radiance of all pixels and colors of a gray image with imperfections.
-fn radiances(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<f64> {
-    with_effects(imperfections, byte, picture)
-        .iter()
-        .flat_map(|p| [p[0], p[1], p[2]])
-        .map(|b| tone().decode(b))
-        .collect()
+fn radiances(imperfections: &Imperfections, byte: u8, image: u64) -> Vec<f64> {
+    with_effects(imperfections, byte, image).iter().flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().decode(b)).collect()
 }
 
 /// Mean and variance.
@@ -123,8 +119,8 @@ fn correlations() {
     let shot = only(|all| all.shot_noise = Some(ShotNoise { electrons: 200.0 }));
     let read = only(|all| all.read_noise = Some(ReadNoise { std: 0.02 }));
     for imperfections in [shot, read] {
-        let errors = |picture| {
-            let lights = radiances(&imperfections, 150, picture);
+        let errors = |image| {
+            let lights = radiances(&imperfections, 150, image);
             lights.into_iter().map(|light| light - tone().decode(150)).collect::<Vec<f64>>()
         };
         let (a, b) = (errors(1), errors(2));
@@ -150,7 +146,7 @@ fn few_electrons() {
         let mut counts = Vec::new();
         for pixel in 0..40_000 {
             let mut light = [light; 3];
-            shot.apply(&mut light, &PixelContext { picture: pinhole(&view, &ticket), pixel });
+            shot.apply(&mut light, &PixelContext { image: pinhole(&view, &ticket), pixel });
             counts.extend(light.map(|light| light * shot.electrons));
         }
         assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
@@ -197,11 +193,11 @@ fn zero_imperfections() {
 }
 
 /// Depths and distances of reaches: the reaches are distances if rays of the lens do not all go forward, else depths.
-fn depths_and_distances(reaches: &[f32], picture: ImageContext<'_>) -> [Vec<f32>; 2] {
+fn depths_and_distances(reaches: &[f32], image: ImageContext<'_>) -> [Vec<f32>; 2] {
     let of_pixel = |(pixel, reach): (usize, &f32)| {
-        let [x, y, z] = picture.ray(pixel);
+        let [x, y, z] = image.ray(pixel);
         let cosine = z / (x * x + y * y + z * z).sqrt();
-        let aside = picture.rays.is_some_and(|rays| rays.optics().lens().name() == "equidistant");
+        let aside = image.rays.is_some_and(|rays| rays.optics().lens().name() == "equidistant");
         let reach = f64::from(*reach);
         match reach.is_finite() {
             true if aside => [(reach * cosine) as f32, reach as f32],
@@ -214,21 +210,21 @@ fn depths_and_distances(reaches: &[f32], picture: ImageContext<'_>) -> [Vec<f32>
 }
 
 /// Reaches with imperfections, computed from both channels and from each channel alone: all results must be equal.
-fn lens_reach_with_effects(imperfections: &Imperfections, reaches: &[f32], picture: ImageContext<'_>) -> Vec<f32> {
-    let seen = |(pixel, reach): (usize, &f32)| if picture.ray(pixel) == [0.0; 3] { f32::INFINITY } else { *reach };
+fn lens_reach_with_effects(imperfections: &Imperfections, reaches: &[f32], image: ImageContext<'_>) -> Vec<f32> {
+    let seen = |(pixel, reach): (usize, &f32)| if image.ray(pixel) == [0.0; 3] { f32::INFINITY } else { *reach };
     let reaches: Vec<f32> = reaches.iter().enumerate().map(seen).collect();
-    let [depths, distances] = depths_and_distances(&reaches, picture);
-    let view = picture.view;
+    let [depths, distances] = depths_and_distances(&reaches, image);
+    let view = image.view;
     let noisy = |depth: bool, distance: bool| {
         let mut frame = Frame::new(view.width, view.height, Channels { depth, distance, ..Channels::default() });
         (frame.depth, frame.distance) = (depth.then(|| depths.clone()), distance.then(|| distances.clone()));
-        imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, picture);
+        imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, image);
         [frame.depth.take(), frame.distance.take()]
     };
     let [found_depths, found_distances] = noisy(true, true).map(Option::unwrap);
     let alone = [noisy(true, false)[0].clone().unwrap(), noisy(false, true)[1].clone().unwrap()];
-    let found = if picture.clips_by_distance() { &found_distances } else { &found_depths };
-    let expected = depths_and_distances(found, picture);
+    let found = if image.clips_by_distance() { &found_distances } else { &found_depths };
+    let expected = depths_and_distances(found, image);
     for (k, all) in [found_depths.clone(), found_distances.clone()].into_iter().enumerate() {
         for pixel in 0..all.len() {
             let (one, expected) = (alone[k][pixel], expected[k][pixel]);
@@ -335,15 +331,15 @@ fn grazing_holes() {
         let (mut inside, mut outside) = (0, 0);
         for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
             let ticket = rng_key(1);
-            let picture = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
-            let ray = |pixel| nalgebra::Vector3::from(picture.ray(pixel));
+            let image = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+            let ray = |pixel| nalgebra::Vector3::from(image.ray(pixel));
             let normal = nalgebra::Vector3::from(normal).normalize();
             // A plane 2 m from the camera; rays that do not reach the plane are misses.
             let depth = |pixel| -2.0 / normal.dot(&ray(pixel));
             let reached = |depth: f64| depth > 0.0 && depth < 1e3;
             let depths: Vec<f32> =
                 (0..80 * 60).map(|k| if reached(depth(k)) { depth(k) as f32 } else { f32::INFINITY }).collect();
-            let found = lens_reach_with_effects(&all, &depths, picture);
+            let found = lens_reach_with_effects(&all, &depths, image);
             let hits = found.iter().zip(&depths).enumerate().filter(|(_, (_, depth))| depth.is_finite());
             for (pixel, (found, depth)) in hits {
                 let angle = (-normal.dot(&ray(pixel)) / ray(pixel).norm()).acos();
@@ -377,9 +373,9 @@ fn lens_depth_noise() {
     let all = only(|all| all.depth_noise = Some(law));
     for rays in lenses(&view) {
         let ticket = rng_key(1);
-        let picture = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+        let image = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
         for z in [0.5f64, 3.0] {
-            let errors: Vec<f64> = lens_reach_with_effects(&all, &[z as f32; 120 * 90], picture)
+            let errors: Vec<f64> = lens_reach_with_effects(&all, &[z as f32; 120 * 90], image)
                 .into_iter()
                 .filter(|found| found.is_finite())
                 .map(|found| f64::from(found) - z)
@@ -395,10 +391,10 @@ fn lens_depth_noise() {
 /// Radiance of a white image with vignetting, by pixel.
 fn remaining_radiance(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
     let (view, ticket) = (view(size, 1.0), rng_key(1));
-    let picture = ImageContext { rays: Some(rays), ..pinhole(&view, &ticket) };
+    let image = ImageContext { rays: Some(rays), ..pinhole(&view, &ticket) };
     let shade = |pixel| {
         let mut light = [1.0; 3];
-        Vignetting::default().apply(&mut light, &PixelContext { picture, pixel });
+        Vignetting::default().apply(&mut light, &PixelContext { image, pixel });
         assert!(light[0] == light[1] && light[1] == light[2]);
         light[0]
     };

@@ -39,7 +39,7 @@ impl RadianceEffect for Vignetting {
     }
 
     fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let factor = 1.0 + self.strength * (place.picture.falloff(place.pixel) - 1.0);
+        let factor = 1.0 + self.strength * (place.image.falloff(place.pixel) - 1.0);
         *light = light.map(|light| factor * light);
     }
 }

@@ -58,9 +58,9 @@ impl StereoCamera {
         let baseline = self.baseline()?;
         let matrices = self.left().latest_delivered_intrinsic_matrices();
         let mut pixels = self.left().latest_delivered::<Depth>()?.to_owned();
-        for (row, mut picture) in pixels.axis_iter_mut(Axis(0)).enumerate() {
+        for (row, mut image) in pixels.axis_iter_mut(Axis(0)).enumerate() {
             let scale = f64::from(matrices[(row, 0, 0)] as f32) * baseline;
-            picture.mapv_inplace(|z| if self.left().is_hit(z) { (scale / f64::from(z)) as f32 } else { 0.0 });
+            image.mapv_inplace(|z| if self.left().is_hit(z) { (scale / f64::from(z)) as f32 } else { 0.0 });
         }
         Ok(pixels)
     }

@@ -117,7 +117,7 @@ impl RayCasterCamera {
             let viewpoint = viewpoints.row(env);
             ImageViewpoint { world_from_camera: viewpoint.parent_from_camera, intrinsics: viewpoint.pixels }
         };
-        let pictures = RayImages {
+        let images = RayImages {
             viewpoints: (0..n).map(taken).collect(),
             depth: Array3::from_elem(shape, miss),
             distance: Array3::from_elem(shape, miss),
@@ -125,7 +125,7 @@ impl RayCasterCamera {
             mask: Array3::zeros(shape),
         };
         let path = summary::path(context, viewpoints.parent);
-        Self { path, rays, model: ImageModel { viewpoints, world_from_parent: vec![None; n], miss, images: pictures } }
+        Self { path, rays, model: ImageModel { viewpoints, world_from_parent: vec![None; n], miss, images } }
     }
 
     /// Images of the latest delivered measurement, in all environments. They equal the shown images, except with a
@@ -135,12 +135,12 @@ impl RayCasterCamera {
         if !self.sampler().has_latency() {
             return Cow::Borrowed(&self.model.images);
         }
-        let mut pictures = self.model.images.clone();
-        for env in 0..pictures.viewpoints.len() {
+        let mut images = self.model.images.clone();
+        for env in 0..images.viewpoints.len() {
             let values = CHANNELS.map(|channel| self.sampler().latest_delivered(channel));
-            pictures.compute(env, values, self.rays.rays(), self.model.miss);
+            images.compute(env, values, self.rays.rays(), self.model.miss);
         }
-        Cow::Owned(pictures)
+        Cow::Owned(images)
     }
 
     /// Shown images.
