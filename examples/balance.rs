@@ -117,8 +117,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
         .collect();
     sim.robot_mut(robot).write_root_pose(&trial::pose_rows(&start), None)?;
     let pushes: Vec<PushSchedule> = (0..sim.num_envs()).map(|env| PushSchedule::sample(&sim, env, args.push)).collect();
-    let (body, tyres) = (sim.robot(robot).link_id("body")?, ["left_tyre", "right_tyre"]);
-    let watched: Vec<usize> = tyres
+    let (body, tires) = (sim.robot(robot).link_id("body")?, ["left_tyre", "right_tyre"]);
+    let watched: Vec<usize> = tires
         .iter()
         .chain(&["body"])
         .map(|link| Ok(sim.sensor(touch)?.find_bodies(&format!("balancer/{link}"))?[0]))
@@ -145,7 +145,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             let readings = SensorReadings {
                 spin: Vector3::from_fn(|k, _| read.ang_vel_b()[(env, k)]),
                 acceleration: Vector3::from_fn(|k, _| read.lin_acc_b()[(env, k)]),
-                grounded: watched[..2].iter().all(|&tyre| forces[(env, tyre, 2)] > 1.0),
+                grounded: watched[..2].iter().all(|&tire| forces[(env, tire, 2)] > 1.0),
             };
             let speed = if args.no_feedback { 0.0 } else { controller.wheels(&readings, &gains, plant.radius) };
             speeds.row_mut(env).fill(speed);
@@ -249,7 +249,7 @@ impl RobotModel {
         };
         let Some(Geometry::Sphere { radius }) = link("left_tyre")?.collisions.first().map(|shape| &shape.geometry)
         else {
-            return Err("the left tyre touches the floor with something else than a ball".into());
+            return Err("the left tire does not touch the floor with a ball".into());
         };
         let ((body, height, body_inertia), left, right) =
             (inertial("body")?, inertial("left_tyre")?, inertial("right_tyre")?);

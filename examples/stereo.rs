@@ -107,9 +107,9 @@ fn run(args: &Args) -> launcher::Result {
     let [low, high] = range.unwrap_or([0.0; 2]);
     println!("\nDisparities from {low:.2} to {high:.2} pixels; {} points", points.len());
     println!(
-        "Where both eyes see the same thing ({compared} points), the right eye's depth is that of a disparity {error:.1e}"
+        "{compared} points are seen by both cameras. The right camera's depth is that of a disparity {error:.1e} pixels"
     );
-    println!("pixels from the left one's, for 9 of 10 points at most");
+    println!("from the left one's, for 9 of 10 points at most");
     println!("Written to {}: {}", out.display(), files.join(", "));
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),

@@ -1,17 +1,9 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-/// Compiles the examples of this page as doc tests.
-#[cfg(all(doctest, feature = "record"))]
-#[doc = include_str!("../docs/recording.md")]
-struct PageOfRecordings;
-
-/// Compiles the examples of this page as doc tests.
-#[cfg(doctest)]
-#[doc = include_str!("../docs/cameras.md")]
-struct PageOfCameras;
-
 pub mod assets;
+#[cfg(doctest)]
+mod book;
 #[cfg(all(feature = "record", feature = "viewer"))]
 mod file_recording;
 #[cfg(all(feature = "record", feature = "viewer"))]

@@ -1,4 +1,4 @@
-"""What the baseline cameras share: the job they are given, and the answers they give, for benches/src/camera.rs.
+"""The job description and the commands that the camera baselines share, for benches/src/camera/sides.rs.
 
 SCRIPT JOB.json, then lines on standard input, each answered with one line: `restart`, `block K` (answers with the seconds
 that K steps took; a step draws `images` images), `depth` (answers with the depth image of the first environment as

@@ -1,7 +1,7 @@
-"""MuJoCo's own renderer on OSMesa (Mesa's software renderer): colour, depth and segmentation of every image.
+"""MuJoCo's own renderer on OSMesa (Mesa's software renderer): color, depth and segmentation of every image.
 
 By `passes`: `api` is `mujoco.Renderer`, MuJoCo's renderer as its documentation shows it, a pass for each of the three;
-`by_hand` is the same library with as few passes as there can be, one for colour and one for depth and segmentation
+`by_hand` is the same library with as few passes as there can be, one for color and one for depth and segmentation
 together, read without copies, for which members of `mujoco.Renderer` are used that are not public.
 
 The looks: `plain` (shadows, reflections, skybox, fog and multisampling off, buffers of the image's size), `full` (the same

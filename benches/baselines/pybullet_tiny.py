@@ -1,6 +1,6 @@
-"""PyBullet's TinyRenderer, which uses one core: colour, depth and segmentation from one call.
+"""PyBullet's TinyRenderer, which uses one core: color, depth and segmentation from one call.
 
-The scene is MuJoCo's, geom by geom, so that all baselines draw the same; colours of materials become plain colours. The looks:
+The scene is MuJoCo's, geom by geom, so that all baselines draw the same; colors of materials become plain colors. The looks:
 `plain` (without shadows), `full` (with shadows; there is no multisampling). See camera_job.py for the commands.
 """
 

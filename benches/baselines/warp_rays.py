@@ -1,4 +1,4 @@
-"""MuJoCo Warp's ray caster on its CPU device, which uses one core: colour, depth and segmentation of all environments.
+"""MuJoCo Warp's ray caster on its CPU device, which uses one core: color, depth and segmentation of all environments.
 
 The looks: `plain` (without shadows), `full` (with shadows and four samples per pixel). See camera_job.py for the commands.
 """

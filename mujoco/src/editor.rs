@@ -456,16 +456,16 @@ mod tests {
             let free = format!(r#"<freejoint/>{inertial}<geom size="0.1"/>"#);
             compile(&base_text().replace(r#"<freejoint/><geom size="0.1"/>"#, &free))
         };
-        let (centred, shifted) = (with_com("0 0 0"), with_com("0.03 0 0.01"));
+        let (centered, shifted) = (with_com("0 0 0"), with_com("0.03 0 0.01"));
         if cfg!(mj4) {
             assert_eq!(editor.set_center_of_mass(4, [0.03, 0.0, 0.01]), Err(DiagonalInertia));
             #[cfg(mj4)]
-            assert_ne!(centred.header().nC, shifted.header().nC, "the entry is not stored in the sparse matrix");
+            assert_ne!(centered.header().nC, shifted.header().nC, "the entry is not stored in the sparse matrix");
         } else {
-            let mut editor = ModelEditor::new(&centred).expect("small");
+            let mut editor = ModelEditor::new(&centered).expect("small");
             editor.set_center_of_mass(4, [0.03, 0.0, 0.01]).expect("room");
             editor.set_constants().expect("fits");
-            assert_eq!(differences(&editor.model(&centred), &shifted), Vec::<String>::new());
+            assert_eq!(differences(&editor.model(&centered), &shifted), Vec::<String>::new());
         }
     }
 

@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_millimetres() {
+    fn whole_millimeters() {
         let depths = [0.0, 0.0014, 0.0016, 1.0, 65.535, 70.0, f32::INFINITY, f32::NAN];
         assert_eq!(depths.map(depth_mm), [0, 1, 2, 1000, 65535, 65535, 0, 0]);
     }

@@ -47,10 +47,10 @@
 //!     .termination(TerminationTerm::new("far", move |now| {
 //!         Ok(now.sim().robot(cart).qpos().column(0).mapv(|x| x.abs() > 1.0))
 //!     }))
-//!     .event(EventTerm::on_reset("scatter", move |sim, dice| {
-//!         for die in dice {
-//!             let start = array![[die.uniform_range(-0.5, 0.5)]];
-//!             sim.robot_mut(cart).write_qpos(&start, Some(&[JointIndex(0)]), Some(&[die.env()]))?;
+//!     .event(EventTerm::on_reset("scatter", move |sim, rngs| {
+//!         for rng in rngs {
+//!             let start = array![[rng.uniform_range(-0.5, 0.5)]];
+//!             sim.robot_mut(cart).write_qpos(&start, Some(&[JointIndex(0)]), Some(&[rng.env()]))?;
 //!         }
 //!         Ok(())
 //!     }))

@@ -1,7 +1,7 @@
 //! Live views of a running simulation: native windows, browser views, screenshots and plots.
 //!
 //! ```text
-//! simulation thread                                         viewer thread
+//! simulation thread                                     viewer thread
 //! SimulationManager -> ViewController -> Snapshot  ==>  Viewer -> SceneRenderer -> Canvas
 //!                      ViewController <- Command   <==  Viewer
 //! ```

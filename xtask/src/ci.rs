@@ -7,7 +7,9 @@ use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci, no_findings};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
-use crate::{dependencies, docs_check, examples, import_cycles, mutate, own_time, source_check, wheel};
+use crate::{
+    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, source_check, spelling, wheel,
+};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -75,6 +77,12 @@ const STAGES: &[Stage] = &[
         run: |c| import_cycles::run(c.repo),
     },
     Stage { name: "rules", what: "rules of the tree", when: When::Always, run: rules },
+    Stage {
+        name: "language",
+        what: "words of comments, messages and pages; spelling",
+        when: When::Always,
+        run: language,
+    },
     Stage {
         name: "docs",
         what: "commands and links of the pages",
@@ -219,6 +227,11 @@ fn rules(context: &Context<'_>) -> XtaskResult {
     mutate::check(&context.repo.root)
 }
 
+fn language(context: &Context<'_>) -> XtaskResult {
+    language::run(context.repo)?;
+    spelling::run(context.repo)
+}
+
 fn fmt(context: &Context<'_>) -> XtaskResult {
     Cmd::new("cargo").args(["fmt", "--all", "--check"]).current_dir(&context.repo.root).run()
 }
@@ -306,7 +319,10 @@ mod tests {
 
     #[test]
     fn quick_run() {
-        assert_eq!(names(true, None), ["setup", "fmt", "arrows", "circles", "rules", "docs", "clippy", "unit"]);
+        assert_eq!(
+            names(true, None),
+            ["setup", "fmt", "arrows", "circles", "rules", "language", "docs", "clippy", "unit"]
+        );
     }
 
     #[test]

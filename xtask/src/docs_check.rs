@@ -1,4 +1,5 @@
-//! Checks of the documentation pages: their commands parse, and their links have targets.
+//! Checks of the documentation pages: their commands parse, their links have targets, the book contains all pages, and
+//! their Rust blocks are compiled as doc tests.
 
 use crate::Cli;
 use crate::run::{Repo, XtaskResult, no_findings};
@@ -10,6 +11,10 @@ const README: &str = "README.md";
 pub(crate) const README_COMMANDS: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
 pub(crate) const TEST_COMMAND: &str = "cargo xtask test";
 const NEEDED: [&str; 3] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md"];
+/// The table of contents of the book.
+const SUMMARY: &str = "docs/SUMMARY.md";
+/// Files that compile the Rust blocks of pages.
+const DOC_TESTS: [&str; 2] = ["src/lib.rs", "src/book.rs"];
 
 pub(crate) fn run(repo: &Repo) -> XtaskResult {
     let mut pages: Vec<String> = files_below(&repo.root).into_iter().filter(|path| is_page(path)).collect();
@@ -17,6 +22,11 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
     pages.sort();
     pages.dedup();
     let mut findings = Vec::new();
+    let chapters = chapters(&repo.read(SUMMARY)?);
+    let mut doc_tests = String::new();
+    for file in DOC_TESTS {
+        doc_tests += &repo.read(file)?;
+    }
     for path in &pages {
         let Ok(page) = repo.read(path) else {
             findings.push(format!("{path} does not exist"));
@@ -26,6 +36,10 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
             findings.extend(missing_commands(&page).into_iter().map(|finding| format!("{path}: {finding}")));
         }
         findings.extend(commands_that_do_not_parse(&page).into_iter().map(|finding| format!("{path}: {finding}")));
+        if path.starts_with("docs/") && path != SUMMARY && !chapters.contains(path) {
+            findings.push(format!("{path} is not a chapter of the book; add it to {SUMMARY}"));
+        }
+        findings.extend(uncompiled_blocks(path, &page, &doc_tests));
         let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
         for link in relative_links(&page) {
             if !repo.root.join(folder).join(&link).exists() {
@@ -39,6 +53,34 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
 /// True for pages of the project: those in the root and in docs/. Pages of bundled robots are excluded.
 fn is_page(path: &str) -> bool {
     path.ends_with(".md") && (!path.contains('/') || path.starts_with("docs/"))
+}
+
+/// Paths of the pages that the table of contents names.
+fn chapters(summary: &str) -> Vec<String> {
+    relative_links(summary).into_iter().map(|link| format!("docs/{link}")).collect()
+}
+
+/// Findings about blocks that rustdoc takes for Rust: pages that no doc test includes, and blocks without a language.
+fn uncompiled_blocks(path: &str, page: &str, doc_tests: &str) -> Vec<String> {
+    let mut findings = Vec::new();
+    let mut in_block = false;
+    let mut has_rust = false;
+    for (number, line) in page.lines().enumerate() {
+        let Some(language) = line.trim_start().strip_prefix("```") else { continue };
+        in_block = !in_block;
+        if in_block && language.is_empty() {
+            findings.push(format!("{path}:{}: a code block without a language; write ```text, ```sh ...", number + 1));
+        }
+        let is_rust = language.split(',').next() == Some("rust");
+        if in_block && is_rust && language.contains("ignore") {
+            findings.push(format!("{path}:{}: an ignored Rust block; write ```rust,no_run", number + 1));
+        }
+        has_rust |= in_block && is_rust;
+    }
+    if has_rust && !doc_tests.contains(&format!("\"../{path}\"")) {
+        findings.push(format!("{path}: its Rust blocks are not compiled; add the page to src/book.rs"));
+    }
+    findings
 }
 
 fn missing_commands(readme: &str) -> Vec<String> {
@@ -139,6 +181,26 @@ mod tests {
         let page = "[a](docs/a.md#part) ![b](b.png \"title\") [c](https://example.org/x) [d](#part) `[e](e.md)`\n\
                     ```\n[f](f.md)\n```\n[g](g.md)";
         assert_eq!(relative_links(page), ["docs/a.md", "b.png", "g.md"]);
+    }
+
+    #[test]
+    fn chapters_of_the_book() {
+        let summary = "# Summary\n\n- [A](a.md)\n    - [B](decisions/b.md)\n";
+        assert_eq!(chapters(summary), ["docs/a.md", "docs/decisions/b.md"]);
+    }
+
+    #[test]
+    fn blocks_that_are_not_compiled() {
+        let doc_tests = "#[doc = include_str!(\"../docs/a.md\")]";
+        for (path, page, count) in [
+            ("docs/a.md", "```rust,no_run\nf();\n```\n```sh\nls\n```", 0),
+            ("docs/b.md", "```sh\nls\n```", 0),
+            ("docs/b.md", "```rust\nf();\n```", 1),
+            ("docs/a.md", "```\nf();\n```", 1),
+            ("docs/a.md", "```rust,ignore\nf();\n```", 1),
+        ] {
+            assert_eq!(uncompiled_blocks(path, page, doc_tests).len(), count, "{path}: {page}");
+        }
     }
 
     #[test]

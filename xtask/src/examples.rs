@@ -469,7 +469,7 @@ fn check_disparity(report: &Value) -> Result<(), String> {
     let (low, high) = (number(report, "disparity_min")?, number(report, "disparity_max")?);
     if !(0.0 < low && low < high) || points < 0.25 * pixels || compared < 0.1 * pixels {
         return Err(format!(
-            "{points} points of {pixels} pixels, {compared} seen by both eyes, disparities from {low} to {high}"
+            "{points} points of {pixels} pixels, {compared} seen by both cameras, disparities from {low} to {high}"
         ));
     }
     if error > 0.1 {

@@ -1,14 +1,15 @@
-//! The project's commands: `cargo xtask demo | test | ci | bench | physics-report | mutate | bless`.
+//! The project's commands: `cargo xtask demo | test | ci | docs | bench | physics-report | mutate | bless`.
 //!
 //! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
 //! MuJoCo, so that it builds before MuJoCo is installed.
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `bench`, `physics_report`, `mutate`, `bless` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
+//! | `language`, `spelling` | checks of words, retired names and spelling |
 //! | `examples`, `same_images` | the table of example runs, and the comparison of their images |
 //! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
 //! | `mutations` | the lists of code mutations |
@@ -22,6 +23,7 @@ mod dependencies;
 mod docs_check;
 mod examples;
 mod import_cycles;
+mod language;
 mod mutate;
 mod mutations;
 mod own_time;
@@ -33,7 +35,9 @@ mod robots;
 mod run;
 mod same_images;
 mod setup;
+mod site;
 mod source_check;
+mod spelling;
 mod svg;
 mod test;
 mod wheel;
@@ -58,6 +62,11 @@ enum Task {
     Test(test::TestArgs),
     /// Run all checks of a change
     Ci(ci::CiArgs),
+    /// Build the book and the API documentation into target/site, a folder that a web server can serve as it is
+    ///
+    /// The first run compiles mdbook into target/tools, which takes some minutes. Links between pages, to the API and to
+    /// source files are checked.
+    Docs(site::DocsArgs),
     /// Compare with the baselines; without a name also writes benches/RESULTS.md
     Bench(bench::BenchArgs),
     /// Check the laws of physics on both supported MuJoCo versions; writes docs/physics.md
@@ -74,6 +83,7 @@ impl Cli {
             Task::Demo(args) => demo::run(repo, args),
             Task::Test(args) => test::run(repo, args),
             Task::Ci(args) => ci::run(repo, args),
+            Task::Docs(args) => site::run(repo, args),
             Task::Bench(args) => bench::run(repo, args),
             Task::PhysicsReport(args) => physics_report::run(repo, args),
             Task::Mutate(args) => mutate::run(repo, args),

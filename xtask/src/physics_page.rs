@@ -131,7 +131,7 @@ fn add(to: &mut PhysicsRun, law: &Value) -> Option<()> {
 pub(crate) fn plots(runs: &[PhysicsRun]) -> Vec<(String, Plot)> {
     let mut found: Vec<(String, Plot, &str)> = Vec::new();
     for (law, plot, mujoco) in runs.iter().flat_map(|run| &run.plots) {
-        let labelled = |series: &Series, mujoco: &str| Series {
+        let labeled = |series: &Series, mujoco: &str| Series {
             name: format!("{}, {mujoco}", series.name),
             points: series.points.clone(),
         };
@@ -145,8 +145,8 @@ pub(crate) fn plots(runs: &[PhysicsRun]) -> Vec<(String, Plot)> {
                 for series in &plot.series {
                     let Some(at) = other.series.iter().position(|old| old.name == series.name) else { continue };
                     if !looks_like(&other.series[at], series) {
-                        other.series[at] = labelled(&other.series[at], first);
-                        other.series.push(labelled(series, mujoco));
+                        other.series[at] = labeled(&other.series[at], first);
+                        other.series.push(labeled(series, mujoco));
                     }
                 }
             }

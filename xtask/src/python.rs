@@ -1,7 +1,9 @@
 //! Python environments for comparisons with other programs. One has the MuJoCo of the wheel, for the baselines of the
-//! benchmarks and for MuJoCo's own renderer as a reference of our images. Another has readers of our recordings.
+//! benchmarks and for MuJoCo's own renderer as a reference of our images. Another has readers of our recordings. A third
+//! has the spelling checker.
 
 use crate::run::{Cmd, Repo, XtaskResult};
+use crate::setup::{self, Requirement};
 use crate::wheel;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +24,9 @@ const READERS: &[&str] = &[
     "pyarrow==26.0.1",
     "h5py==3.16.0",
 ];
+
+/// The version of the spelling checker. Other versions have other word lists.
+const TYPOS_VERSION: &str = "1.52.0";
 
 /// The OpenGL bindings of MuJoCo's renderer.
 pub(crate) const OPENGL: Module = Module { name: "OpenGL", packages: &["PyOpenGL==3.1.10"] };
@@ -88,6 +93,29 @@ pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
         return Some(python);
     }
     eprintln!("note: no python with {} could be made", READERS.join(" "));
+    None
+}
+
+/// The program `typos` in a virtual environment below the target folder; `None` with a note if it cannot be installed.
+/// Its package on PyPI contains the compiled program.
+pub(crate) fn typos(repo: &Repo) -> Option<PathBuf> {
+    let venv = repo.target.join("typos-venv");
+    let program = venv.join("bin/typos");
+    let is_ready = || {
+        let version = Cmd::new(&program).arg("--version").output().unwrap_or_default();
+        String::from_utf8_lossy(&version).split_whitespace().last() == Some(TYPOS_VERSION)
+    };
+    if is_ready() {
+        return Some(program);
+    }
+    setup::try_to_have(Requirement::Pip);
+    setup::try_to_have(Requirement::Venv);
+    let package = format!("typos=={TYPOS_VERSION}");
+    let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run();
+    if made.is_ok_and(|()| pip_install(&venv.join("bin/python"), &[&package]).is_ok()) && is_ready() {
+        return Some(program);
+    }
+    eprintln!("note: {package} could not be installed");
     None
 }
 

@@ -458,7 +458,7 @@ mod tests {
 
     #[test]
     fn reasons() {
-        let toml = "[workspace.dependencies]\n# Rooms.\nscene = { path = \"scene\" }\n\
+        let toml = "[workspace.dependencies]\n# Crates.\nscene = { path = \"scene\" }\n\
             clap = { version = \"4\", features = [\n  \"derive\",\n] } # flags\nserde = \"1\"\nregex = \"1\" #\n\
             [workspace.lints.rust]\nfoo = 1\n";
         let findings = dependencies_without_reason(toml);

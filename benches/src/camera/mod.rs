@@ -10,7 +10,7 @@
 //! use one core and are compared with one thread.
 //!
 //! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; reflections are off
-//! on both sides. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings (see `baselines/mujoco_osmesa.py`). "OSMesa
+//! on both sides. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings (`baselines/mujoco_osmesa.py`). "OSMesa
 //! by hand" calls the library with two passes instead of three, which that class does not offer. Shadow maps have the
 //! default size of each side, 4096 texels in MuJoCo and at most 1024 in ours. Another row reduces MuJoCo's shadow maps
 //! to the size of ours.

@@ -4,9 +4,9 @@
 //! recording. A frame contains the last measurements and the action that follows: the targets of the next step. The
 //! last row of an episode, which no action follows, is therefore no frame.
 //!
-//! The result of a task step ([`StreamKind::TaskResult`](crate::stream::StreamKind::TaskResult)) belongs to the action of the previous
-//! frame. A frame therefore waits for results until the second row after it. If a frame lasts longer than a step of the
-//! task, its rewards are summed.
+//! The result of a task step ([`StreamKind::TaskResult`](crate::stream::StreamKind::TaskResult)) belongs to the action
+//! of the previous frame. A frame therefore waits for results until the second row after it. If a frame lasts longer
+//! than a step of the task, its rewards are summed.
 
 mod features;
 

@@ -33,9 +33,9 @@ fn folder() {
     for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
         assert_eq!(image("color", k).to_rgb8().as_raw(), color);
         for (found, depth) in image("depth", k).as_luma16().unwrap().iter().zip(depth) {
-            let metres = f32::from(*found) / 1000.0;
+            let meters = f32::from(*found) / 1000.0;
             // Half a millimeter of rounding, and the rounding of f32 at some meters.
-            let same = if depth.is_finite() { (metres - depth).abs() < 0.000_501 } else { *found == 0 };
+            let same = if depth.is_finite() { (meters - depth).abs() < 0.000_501 } else { *found == 0 };
             assert!(same, "{found} mm for {depth} m");
             seen += u32::from(depth.is_finite());
         }

@@ -81,7 +81,7 @@ try:
 except ImportError:
     read = 0
 else:
-    dataset = LeRobotDataset("nobody/recorded", root=root)
+    dataset = LeRobotDataset("kinetoscope/recorded", root=root)
     assert (dataset.num_episodes, len(dataset), dataset.fps) == (len(episodes), len(rows), info["fps"])
     for item, row in zip((dataset[k] for k in range(len(dataset))), rows):
         assert item["task"] == episodes[0]["tasks"][0]

@@ -355,8 +355,8 @@ mod tests {
         let straight = air.sample([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
         assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
         // Except for its color.
-        let coloured = Bsdf::new(&Material { refractive_index: 1.0, ..glass }, 0.0, [0.3; 3], true);
-        assert_eq!(coloured.sample([0.6, 0.0, 0.8], 0.5, [0.5; 2]).unwrap().weight, [0.3; 3]);
+        let colored = Bsdf::new(&Material { refractive_index: 1.0, ..glass }, 0.0, [0.3; 3], true);
+        assert_eq!(colored.sample([0.6, 0.0, 0.8], 0.5, [0.5; 2]).unwrap().weight, [0.3; 3]);
     }
 
     #[test]

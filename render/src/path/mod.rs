@@ -279,7 +279,7 @@ impl PathTracer<'_> {
             return ([0.0; 3], first);
         };
         let (mut light, mut throughput) = ([0.0; 3], [1.0; 3]);
-        let (mut bounce, mut passes, mut travelled) = (0, 0, near);
+        let (mut bounce, mut passes, mut traveled) = (0, 0, near);
         // True as long as only mirrors and glass were hit.
         let mut clear = true;
         // Origin and pdf of a sampled direction; `None` for the camera ray, mirrors and glass.
@@ -298,7 +298,7 @@ impl PathTracer<'_> {
                 break;
             };
             let dims = 1 + bounce * DIMENSIONS;
-            travelled += distance;
+            traveled += distance;
             width += spread * distance;
             limit -= distance;
             if point.alpha < 1.0 {
@@ -319,9 +319,9 @@ impl PathTracer<'_> {
                     point.bsdf.gloss(OrthonormalBasis::from_normal(point.shading_normal).to_local(o)),
                 );
                 let albedo = point.bsdf.albedo.map(|x| matt * x + (1.0 - matt));
-                first = FirstHit { albedo, gloss, normal: point.shading_normal, distance: travelled };
+                first = FirstHit { albedo, gloss, normal: point.shading_normal, distance: traveled };
                 if let Some((color, start, end)) = self.lights.haze {
-                    let k = ((travelled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);
+                    let k = ((traveled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);
                     let k = k * k * (3.0 - 2.0 * k);
                     let flat = [ray.direction[0], ray.direction[1], ray.direction[2].max(0.0)];
                     light = add_scaled(light, k, color.unwrap_or_else(|| self.lights.sky(flat)));

@@ -26,7 +26,7 @@ pub(crate) struct ShadingContext<'a> {
     pub(crate) shade: ShadeContext<'a>,
     /// Mirroring surfaces, if the scene has any.
     pub(crate) mirrors: Option<Mirrors<'a>>,
-    /// True if channels of [`Stage::Surface`](crate::frame::Stage::Detail) are rendered.
+    /// True if channels of [`Stage::Surface`](crate::frame::Stage::Surface) are rendered.
     pub(crate) surface: bool,
     /// True if channels of [`Stage::Albedo`](crate::frame::Stage::Albedo) are rendered.
     pub(crate) albedo: bool,

@@ -213,8 +213,8 @@ impl Mirrors<'_> {
                     let mirrored = add_scaled(d, -2.0 * dot(d, n), n);
                     let direction = scale(mirrored, 1.0 / dot(mirrored, mirrored).sqrt());
                     let ray = Ray { origin: points.offset_origin(k), direction };
-                    let travelled = f64::from(depths[k]) * f64::from(lengths[k]);
-                    rays[k] = Some(ReflectedRay { ray, distance: travelled, throughput: 1.0 });
+                    let traveled = f64::from(depths[k]) * f64::from(lengths[k]);
+                    rays[k] = Some(ReflectedRay { ray, distance: traveled, throughput: 1.0 });
                 }
                 let r = reflectance(source.instance);
                 let tint = if display { r } else { 1.0 };

@@ -229,7 +229,7 @@ fn reflected_eye() {
         if k % 4 == 1 {
             instance.material = Material { rgba: [1.0, 0.8, 0.6, 1.0], ..checker.clone() };
         }
-        // Objects below the mirror are invisible from both eyes.
+        // Objects below the mirror are invisible from both viewpoints.
         poses[k].translation[2] = poses[k].translation[2].abs() + 0.6;
     }
     instances[9].material.rgba[3] = 0.5;

@@ -78,7 +78,7 @@ fn cancel() {
     let before = frame.clone();
     let shot = RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
     let progress = rasterizer.progress().clone();
-    let canceller = std::thread::spawn({
+    let canceler = std::thread::spawn({
         let progress = progress.clone();
         move || {
             let start = Instant::now();
@@ -91,7 +91,7 @@ fn cancel() {
         }
     });
     let (index, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
-    let left = canceller.join().unwrap();
+    let left = canceler.join().unwrap();
     let RenderError::Canceled { samples, total } = error else { panic!("{error}") };
     assert_eq!((index, total), (0, 64 * 64 * u64::from(Renderer::MAX_SAMPLES)));
     // A few pixels of each thread.

@@ -72,11 +72,11 @@ impl Iterate {
         let way = problem.target.translation.vector - pose.translation.vector;
         let turn = (problem.target.rotation * pose.rotation.inverse()).scaled_axis();
         (self.position_error, self.rotation_error) = (way.norm(), turn.norm());
-        let (metre, radian) = match problem.task {
+        let (meter, radian) = match problem.task {
             IkTask::Pose => (problem.scale, 1.0),
             IkTask::Position => (problem.scale, 0.0),
         };
-        let weights = Vector6::new(metre, metre, metre, radian, radian, radian);
+        let weights = Vector6::new(meter, meter, meter, radian, radian, radian);
         for column in &mut self.columns {
             column.component_mul_assign(&weights);
         }

@@ -134,15 +134,15 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
     materials.check(&mut reader);
 
     let name = reader.text(root, "name")?.unwrap_or_default();
-    let mut normalised = String::with_capacity(pass.xml.len() + materials.xml.len() + 64);
-    normalised.push_str("<robot");
-    write_attribute(&mut normalised, "name", name);
-    normalised.push('>');
-    normalised.push_str(&pass.xml);
-    normalised.push_str(&materials.xml);
-    normalised.push_str("</robot>");
+    let mut normalized = String::with_capacity(pass.xml.len() + materials.xml.len() + 64);
+    normalized.push_str("<robot");
+    write_attribute(&mut normalized, "name", name);
+    normalized.push('>');
+    normalized.push_str(&pass.xml);
+    normalized.push_str(&materials.xml);
+    normalized.push_str("</robot>");
     let refused = |source| UrdfError::Model { path: path.to_path_buf(), source };
-    let robot = urdf_rs::read_from_string(&normalised).map_err(|e| refused(e.into()))?;
+    let robot = urdf_rs::read_from_string(&normalized).map_err(|e| refused(e.into()))?;
     if !pass.matches_model(&robot) {
         return Err(refused("the links or joints of the parsed model differ from those of the file".into()));
     }

@@ -169,7 +169,7 @@ fn thicken(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3]>
 struct Face {
     corners: [usize; 3],
     /// Neighbor across the edge from corner `i` to corner `i + 1`.
-    neighbours: [usize; 3],
+    neighbors: [usize; 3],
     /// Exact normal, not of unit length.
     exact: [i128; 3],
     /// Unit normal.
@@ -296,7 +296,7 @@ impl Quickhull {
         (0..3).map(|i| face.exact[i] * from_face[i]).sum::<i128>() > 0
     }
 
-    fn add(&mut self, corners: [usize; 3], neighbours: [usize; 3]) {
+    fn add(&mut self, corners: [usize; 3], neighbors: [usize; 3]) {
         let [a, b, c] = corners.map(|i| self.points[i]);
         let [u, v] = [sub(b, a), sub(c, a)].map(|e| e.map(|x| x as i128));
         let exact = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
@@ -307,7 +307,7 @@ impl Quickhull {
             self.degree[corner] += 1;
         }
         let normal = normal.map(|x| x / length);
-        self.faces.push(Face { corners, neighbours, exact, normal, alive: true, outside: Vec::new() });
+        self.faces.push(Face { corners, neighbors, exact, normal, alive: true, outside: Vec::new() });
     }
 
     fn remove(&mut self, face: usize) -> Vec<usize> {
@@ -360,7 +360,7 @@ impl Quickhull {
             // edge.
             self.add([a, b, apex], [beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
             if let Some(edge) = (0..3).find(|&e| self.faces[beyond].corners[e] == b) {
-                self.faces[beyond].neighbours[edge] = first + i;
+                self.faces[beyond].neighbors[edge] = first + i;
             }
         }
         let mut points = Vec::new();
@@ -381,8 +381,8 @@ impl Quickhull {
         let mut next = 0;
         while let Some(&face) = seen.get(next) {
             next += 1;
-            let Face { corners, neighbours, .. } = &self.faces[face];
-            for (i, &beyond) in neighbours.iter().enumerate() {
+            let Face { corners, neighbors, .. } = &self.faces[face];
+            for (i, &beyond) in neighbors.iter().enumerate() {
                 if is_seen.contains(&beyond) {
                     continue;
                 }

@@ -275,7 +275,7 @@ impl<'a> MjcfPartMut<'a> {
         let places = self.simulation.mjcf_models[self.index].qpos.clone();
         let rows = self.checked_rows("write_qpos", positions.into(), &places, env_ids)?;
         let quaternions = self.quaternions();
-        let normalised: Vec<(usize, Vec<f64>)> = rows
+        let normalized: Vec<(usize, Vec<f64>)> = rows
             .iter()
             .map(|(env, row)| {
                 let mut row = row.to_vec();
@@ -283,7 +283,7 @@ impl<'a> MjcfPartMut<'a> {
                 Ok((env, row))
             })
             .collect::<Result<_>>()?;
-        for (env, row) in normalised {
+        for (env, row) in normalized {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| {
                     let qpos = data.qpos_mut();

@@ -1,4 +1,4 @@
-//! Conversion of MuJoCo's geoms to the scene that cameras render: `mj::Model -> Visible -> (RenderScene, poses per
+//! Conversion of MuJoCo's geoms to the scene that cameras render: `Model -> VisualScene -> (RenderScene, poses per
 //! environment)`.
 //!
 //! Every geom of the model is an instance, whatever file the model came from, and so are tendons, skins and flexes.

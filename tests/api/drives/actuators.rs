@@ -24,7 +24,7 @@ use std::sync::Arc;
 const M: f64 = 0.2;
 
 fn with(model: impl Into<ActuatorModel>, kp: f64, kd: f64) -> DriveCfg {
-    modelled(".*", model, kp, kd)
+    modeled(".*", model, kp, kd)
 }
 
 fn motor(saturation_effort: f64) -> DriveCfg {
@@ -343,7 +343,7 @@ fn second_order() {
 fn models_beside_rows() {
     let (kp, kd) = (60.0, 4.0);
     let joints = [Joint::wheel("a", M), Joint::wheel("b", M), Joint::wheel("c", M).rough(0.5)];
-    let mut world = world(&joints, modelled("[bc]", IdealPd {}, kp, kd), weightless());
+    let mut world = world(&joints, modeled("[bc]", IdealPd {}, kp, kd), weightless());
     let first = |world: &mut World| {
         world.sim.reset(None).unwrap();
         world.set_position_targets(&[0.4; 3]);
@@ -395,7 +395,7 @@ fn largest_stable_step() {
 #[test]
 fn refused_models() {
     let plain = || DriveCfg { max_velocity: None, ..with(DcMotor { saturation_effort: 5.0 }, 1.0, 0.1) };
-    let mut twice = modelled("j", IdealPd {}, 1.0, 0.1);
+    let mut twice = modeled("j", IdealPd {}, 1.0, 0.1);
     twice.actuators.push((".*".into(), DelayedPd::default().into()));
     let rows: [(DriveCfg, &[&str]); 8] = [
         (plain(), &["dc_motor of joint \"j\"", "max_velocity is inf", "velocity limit"]),
@@ -404,7 +404,7 @@ fn refused_models() {
         (motor(f64::NAN), &["saturation_effort is NaN"]),
         (with(DelayedPd { delay: 10_001, max_delay: 0 }, 1.0, 0.1), &["delayed_pd", "10001", "10000"]),
         (with(DelayedPd { delay: 0, max_delay: u32::MAX }, 1.0, 0.1), &["delayed_pd", "10000"]),
-        (modelled("J", IdealPd {}, 1.0, 0.1), &["actuators", "\"J\"", "\"j\""]),
+        (modeled("J", IdealPd {}, 1.0, 0.1), &["actuators", "\"J\"", "\"j\""]),
         (twice, &["actuators", "matched by both"]),
     ];
     for (drive, parts) in rows {
@@ -422,7 +422,7 @@ fn refused_models() {
 /// Refused delays, which change nothing.
 #[test]
 fn refused_delays() {
-    let drive = modelled("a", DelayedPd { delay: 2, max_delay: 5 }, 1.0, 0.1);
+    let drive = modeled("a", DelayedPd { delay: 2, max_delay: 5 }, 1.0, 0.1);
     let mut world = world(&[Joint::wheel("a", M), Joint::wheel("b", M)], drive, weightless_envs(2));
     let first = Some(&[JointIndex(0)][..]);
     type Row<'a> = (Array2<u32>, Option<&'a [JointIndex]>, Option<&'a [EnvId]>, &'a [&'a str]);
@@ -503,7 +503,7 @@ fn change(world: &mut World, settings: &mut Settings, n: i32) {
 fn three_wheels(model: ActuatorModel) -> World {
     let joints: Vec<Joint> =
         ["a", "b", "c"].into_iter().zip(MOMENTS).map(|(name, m)| Joint::wheel(name, m).effort(LIMIT)).collect();
-    let drive = DriveCfg { max_velocity: Some(1e6.into()), ..modelled("[ab]", model, 3.0, 0.4) };
+    let drive = DriveCfg { max_velocity: Some(1e6.into()), ..modeled("[ab]", model, 3.0, 0.4) };
     world(&joints, drive, weightless_envs(ENVS))
 }
 

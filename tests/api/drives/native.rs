@@ -70,8 +70,8 @@ fn integrators_that_change_the_solution() {
         of(&["j"], native(10.0, 1.0), integrator).unwrap();
         of(&["j"], no_drive(), integrator).unwrap();
         // A robot has rows only for joints without an actuator model (`actuators.rs` has the laws).
-        of(&["a", "b"], modelled("[ab]", IdealPd {}, 10.0, 1.0), integrator).unwrap();
-        let error = of(&["a", "b"], modelled("a", IdealPd {}, 10.0, 1.0), integrator).unwrap_err();
+        of(&["a", "b"], modeled("[ab]", IdealPd {}, 10.0, 1.0), integrator).unwrap();
+        let error = of(&["a", "b"], modeled("a", IdealPd {}, 10.0, 1.0), integrator).unwrap_err();
         assert!(matches!(*error, Error::Integrator { .. }), "joint b is a row");
     }
     let fast = of(&["j"], gains(10.0, 1.0), Integrator::ImplicitFast);

@@ -167,7 +167,7 @@ pub(crate) fn native(kp: f64, kd: f64) -> DriveCfg {
 }
 
 /// Gains with an explicit model for the joints of a pattern, with a velocity limit of 7.5 rad/s.
-pub(crate) fn modelled(joints: &str, model: impl Into<ActuatorModel>, kp: f64, kd: f64) -> DriveCfg {
+pub(crate) fn modeled(joints: &str, model: impl Into<ActuatorModel>, kp: f64, kd: f64) -> DriveCfg {
     let actuators = vec![(joints.into(), model.into())];
     DriveCfg { actuators, max_velocity: Some(7.5.into()), ..gains(kp, kd) }
 }

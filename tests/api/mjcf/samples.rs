@@ -110,9 +110,9 @@ fn every_sample() {
         let (qpos, qvel) = (sim.mjcf_part(part).qpos(), sim.mjcf_part(part).qvel());
         let far = relative_difference(data.qpos(), qpos.as_slice().unwrap())
             .max(relative_difference(data.qvel(), qvel.as_slice().unwrap()));
-        let travelled = relative_difference(plain.qpos0(), data.qpos());
+        let distance = relative_difference(plain.qpos0(), data.qpos());
         assert!(far <= 1e-9, "{name} is {far} from the file alone after {steps} steps");
-        assert!(travelled > 1e-6 || plain.nv() == 0, "{name} does not move: {travelled}");
+        assert!(distance > 1e-6 || plain.nv() == 0, "{name} does not move: {distance}");
         assert!((0..plain.nsensor()).all(|s| mjcf_keywords::sensor(plain.sensor_type()[s]).is_some()), "{name}");
         parts.push(name);
     }

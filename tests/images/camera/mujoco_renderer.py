@@ -1,6 +1,6 @@
 """Pictures by MuJoCo's own renderer on OSMesa, for mujoco_renderer.rs.
 
-MODEL.xml CAMERA WIDTH HEIGHT OUT: writes OUT/depth (32-bit floats, metres along the optical axis), OUT/element (32-bit
+MODEL.xml CAMERA WIDTH HEIGHT OUT: writes OUT/depth (32-bit floats, meters along the optical axis), OUT/element (32-bit
 integers: the number of a geom, of a tendon, skin or flex that and a multiple of a million, -1 where nothing is) and OUT/color (bytes, red, green, blue), top row first. Geom groups 0 to 2 are drawn, with
 fine tessellation and one sample per pixel; shadows, reflections, fog and skybox are off.
 """

@@ -181,7 +181,7 @@ fn height_fields_and_meshes() {
 
 /// Control: the test detects a scene that is a centimeter lower.
 #[test]
-fn one_centimetre() {
+fn one_centimeter() {
     let [data, moved] = [0.0, -0.01].map(|z: f64| {
         data_of(&format!(
             "<geom type='plane' size='5 5 .1' pos='0 0 {z}'/><geom type='box' size='.2 .3 .4' pos='0 0 {}'/>",

@@ -11,7 +11,7 @@ const MASS: f64 = 0.5;
 const FORCE: f64 = 300.0;
 
 /// Velocities across the rod at the struck end and at two thirds of it; both points are frames of fixed links.
-fn velocities(off_centre: bool) -> [f64; 2] {
+fn velocities(off_center: bool) -> [f64; 2] {
     let moment = MASS * LENGTH * LENGTH / 12.0;
     let mut lab = Lab::new(weightless());
     let frame = |name| Link::new(name, 0.0, [0.0; 3]);
@@ -19,7 +19,7 @@ fn velocities(off_centre: bool) -> [f64; 2] {
     let at = |name, child, x| Joint::fixed(name, ["rod", child]).at([x, 0.0, 0.0]).turned([0.0, 0.0, 0.3]);
     let joints = [at("a", "end", -LENGTH / 2.0), at("b", "percussion", LENGTH / 6.0)];
     let robot = lab.free(&urdf(&links, &joints), [1.0, 2.0, 3.0]);
-    let torque = if off_centre { -FORCE * LENGTH / 2.0 } else { 0.0 };
+    let torque = if off_center { -FORCE * LENGTH / 2.0 } else { 0.0 };
     lab.set_link_wrench(robot, "rod", Vector3::new(0.0, FORCE, 0.0), Vector3::new(0.0, 0.0, torque));
     lab.run(1e-3);
     // The rod has rotated by 2.5e-3 rad: world velocities of its points are transformed to its axes.
@@ -40,9 +40,9 @@ fn holds() {
         let spin = impulse * (LENGTH / 2.0) / (MASS * LENGTH * LENGTH / 12.0);
         let cosine = (spin * 1e-3).cos();
         let rounding = (1e-12, "rounding of one step");
-        let (of_centre, of_turn) = (impulse / MASS * cosine, spin);
-        m.row("velocity of the struck end", "m/s", of_centre + of_turn * LENGTH / 2.0, end, rounding);
-        m.row("velocity at 2 L/3", "m/s", of_centre - of_turn * LENGTH / 6.0, percussion, rounding);
+        let (of_center, of_turn) = (impulse / MASS * cosine, spin);
+        m.row("velocity of the struck end", "m/s", of_center + of_turn * LENGTH / 2.0, end, rounding);
+        m.row("velocity at 2 L/3", "m/s", of_center - of_turn * LENGTH / 6.0, percussion, rounding);
         m.control("velocity of the struck end", "struck in the middle", central[0]);
         m.control("velocity at 2 L/3", "struck in the middle", central[1]);
     });

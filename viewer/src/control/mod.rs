@@ -177,14 +177,14 @@ impl ViewerExt for SimulationManager {
     }
 }
 
-/// Calls `act` with the conductor of the simulation, which is added if missing.
+/// Calls `act` with the view controller of the simulation, which is added if missing.
 fn with_view_controller<T>(
     sim: &mut SimulationManager,
     act: impl FnOnce(&mut ViewController, &mut SimulationManager) -> T,
 ) -> Option<T> {
     let known = sim.observers().ids::<ViewController>().first().copied();
     let id = known.unwrap_or_else(|| sim.observers_mut().add(ViewController::new()));
-    // The conductor is removed and added again, because `act` needs the whole simulation. No other code removes it.
+    // The controller is removed and added again, because `act` needs the whole simulation. No other code removes it.
     let mut conductor = sim.observers_mut().remove(id).ok()?;
     let done = act(&mut conductor, sim);
     sim.observers_mut().add(conductor);

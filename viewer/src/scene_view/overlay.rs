@@ -210,7 +210,7 @@ mod tests {
 
     /// A point two meters ahead is at the image center; its disc has `pi r^2` pixels, half of them bright.
     #[test]
-    fn centre_of_mass() {
+    fn center_of_mass() {
         let view = OrbitCamera::look_at([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
         let disc = |at: [f64; 3]| {
             let mut canvas = Canvas::new(201, 201);

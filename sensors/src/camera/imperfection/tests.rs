@@ -215,14 +215,14 @@ fn lens_reach_with_effects(imperfections: &Imperfections, reaches: &[f32], image
     let reaches: Vec<f32> = reaches.iter().enumerate().map(seen).collect();
     let [depths, distances] = depths_and_distances(&reaches, image);
     let view = image.view;
-    let spoilt = |depth: bool, distance: bool| {
+    let noisy = |depth: bool, distance: bool| {
         let mut frame = Frame::new(view.width, view.height, Channels { depth, distance, ..Channels::default() });
         (frame.depth, frame.distance) = (depth.then(|| depths.clone()), distance.then(|| distances.clone()));
         imperfections.apply(&mut frame.as_mut(), ToneCurve::Soft, image);
         [frame.depth.take(), frame.distance.take()]
     };
-    let [found_depths, found_distances] = spoilt(true, true).map(Option::unwrap);
-    let alone = [spoilt(true, false)[0].clone().unwrap(), spoilt(false, true)[1].clone().unwrap()];
+    let [found_depths, found_distances] = noisy(true, true).map(Option::unwrap);
+    let alone = [noisy(true, false)[0].clone().unwrap(), noisy(false, true)[1].clone().unwrap()];
     let found = if image.clips_by_distance() { &found_distances } else { &found_depths };
     let expected = depths_and_distances(found, image);
     for (k, all) in [found_depths.clone(), found_distances.clone()].into_iter().enumerate() {

@@ -84,9 +84,9 @@ fn real_file() {
     assert!((own.camera_matrix - info.camera_matrix).amax() < 1e-14);
     // A centered camera of 640 x 480 pixels.
     let pixels = PixelIntrinsics { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 };
-    let centred = CameraInfo::from_intrinsics("", [640, 480], &pixels, &Lens::default()).unwrap();
-    assert_eq!([centred.camera_matrix[(0, 2)], centred.camera_matrix[(1, 2)]], [319.5, 239.5]);
-    assert_eq!([centred.projection_matrix[(0, 2)], centred.projection_matrix[(1, 2)]], [319.5, 239.5]);
+    let centered = CameraInfo::from_intrinsics("", [640, 480], &pixels, &Lens::default()).unwrap();
+    assert_eq!([centered.camera_matrix[(0, 2)], centered.camera_matrix[(1, 2)]], [319.5, 239.5]);
+    assert_eq!([centered.projection_matrix[(0, 2)], centered.projection_matrix[(1, 2)]], [319.5, 239.5]);
 }
 
 /// A camera of each model with reference numbers of OpenCV, up to the accuracy of OpenCV's iterations.

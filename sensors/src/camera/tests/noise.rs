@@ -163,13 +163,13 @@ fn resolution() {
 fn saturated_hits() {
     let context = context(1);
     let depth_noise = Some(DepthNoise { constant: 0.1, quadratic: 0.0, offset: 0.0 });
-    let spoilt = Imperfections { depth_noise, ..Imperfections::default() };
+    let noisy = Imperfections { depth_noise, ..Imperfections::default() };
     let equidistant = Lens::from_name("equidistant").unwrap();
     for (lens, noise, imperfections) in [
         (Lens::default(), vec![("depth", NoiseCfg::white(0.1))], Imperfections::default()),
-        (Lens::default(), vec![], spoilt.clone()),
+        (Lens::default(), vec![], noisy.clone()),
         (equidistant, vec![("distance", NoiseCfg::white(0.1))], Imperfections::default()),
-        (equidistant, vec![], spoilt),
+        (equidistant, vec![], noisy),
     ] {
         let renderer = Renderer::FastRayTraced;
         let far = if lens.is_pinhole() { 2.01 } else { 2.2 };

@@ -52,7 +52,7 @@ impl Play for SimulationManager {
     fn play(&mut self, film: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
         let mut head = Playhead::new(film.times())?;
         let known = self.observers().ids::<ViewController>().first().copied();
-        // The conductor is removed meanwhile, so that writes of the recording do not notify it.
+        // The view controller is removed meanwhile, so that writes of the recording do not notify it.
         let taken = known.and_then(|id| self.observers_mut().remove(id).ok());
         let mut conductor = taken.unwrap_or_else(ViewController::new);
         let result = conductor.play(self, film, &mut head, go_on);
@@ -296,7 +296,7 @@ mod tests {
             sim.play(&mut film, &mut || !over.load(Ordering::Acquire)).unwrap();
         });
         assert_eq!(sim.observers().steps(), steps, "nothing was stepped");
-        // The conductor is back: the simulation steps as before.
+        // The view controller is back: the simulation steps as before.
         drop(viewer);
         sim.update(1);
         assert_eq!(sim.observers().steps(), steps + 1);

@@ -93,11 +93,11 @@ impl Columns {
         size: [usize; 2],
     ) -> Option<Self> {
         let [low, high] = bounds.map(|p| axes.map(|axis| p[axis]));
-        let per_metre = [0, 1].map(|axis| size[axis] as f64 / (high[axis] - low[axis]));
+        let per_meter = [0, 1].map(|axis| size[axis] as f64 / (high[axis] - low[axis]));
         let mut columns = Self {
             axes,
             low: [low[0], low[1]],
-            columns_per_meter: per_metre,
+            columns_per_meter: per_meter,
             size,
             starts: vec![0; size[0] * size[1] + 2],
             lists: Vec::new(),
@@ -110,7 +110,7 @@ impl Columns {
         let most = MAX_MEAN_COLUMNS * triangles.len();
         let rectangles = triangles.iter().map(|t| columns.rectangle(t));
         let in_all: usize = rectangles.map(|[from, to]| (to[0] - from[0] + 1) * (to[1] - from[1] + 1)).sum();
-        if in_all > most || !per_metre.iter().all(|x| x.is_finite()) {
+        if in_all > most || !per_meter.iter().all(|x| x.is_finite()) {
             return None;
         }
         let side = |t: &Triangle, axis: usize| extent(t, axes[axis]).map(|x| x as f32);
