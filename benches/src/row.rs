@@ -16,8 +16,10 @@ pub(crate) struct Row {
     /// Kinetoscope's number.
     pub(crate) ours: f64,
     /// The baseline's number; `None` if the baseline is not on the machine.
+    #[serde(rename = "rival")]
     pub(crate) baseline: Option<f64>,
     /// Name of the baseline.
+    #[serde(rename = "rival_name")]
     pub(crate) baseline_name: String,
     /// Speed ratio; above 1 our side is better.
     pub(crate) ratio: Option<f64>,
@@ -112,7 +114,7 @@ mod tests {
         let row = Row::new("step", "arm, 64 envs", "env-steps/s", 2, 90.0).against("bare loop", 100.0, 0.9);
         let json = serde_json::to_value(&row).unwrap_or_default();
         let keys: Vec<&String> = json.as_object().map(|o| o.keys().collect()).unwrap_or_default();
-        assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "baseline", "baseline_name", "threads", "unit"]);
+        assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "rival", "rival_name", "threads", "unit"]);
         assert!(table(&[row.clone().with_target_ratio(0.97)]).contains("MISSES"));
         assert!(!table(&[row.with_target_ratio(0.8)]).contains("MISSES"));
     }

@@ -155,8 +155,8 @@ fn tables(rows: &[Value]) -> XtaskResult<String> {
                 row["threads"],
                 row["mujoco"].as_str().map_or_else(|| row["mujoco"].to_string(), str::to_string),
                 number(&row["ours"]),
-                number(&row["baseline"]),
-                row["baseline_name"].as_str().unwrap_or("-"),
+                number(&row["rival"]),
+                row["rival_name"].as_str().unwrap_or("-"),
                 row["ratio"].as_f64().map_or_else(|| "-".to_string(), |ratio| format!("**{ratio:.2}**")),
             );
         }
@@ -210,8 +210,8 @@ mod tests {
     use serde_json::json;
 
     fn row(bench: &str, mujoco: &str, baseline: Value, ratio: Value) -> Value {
-        json!({"bench": bench, "case": "arm, 64 envs", "unit": "env-steps/s", "ours": 251_000.4, "baseline": baseline,
-               "baseline_name": "mj_step", "ratio": ratio, "threads": 2, "mujoco": mujoco})
+        json!({"bench": bench, "case": "arm, 64 envs", "unit": "env-steps/s", "ours": 251_000.4, "rival": baseline,
+               "rival_name": "mj_step", "ratio": ratio, "threads": 2, "mujoco": mujoco})
     }
 
     #[test]
