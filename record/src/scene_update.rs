@@ -165,10 +165,10 @@ impl SceneTracker {
             _ => Vec::new(),
         };
         let frames = streams.iter().flat_map(of).collect();
-        let told = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
+        let last_scenes = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
         Self {
             frames,
-            last_scenes: told,
+            last_scenes,
             bytes_left: MAX_BYTES,
             without_pose: BTreeSet::new(),
             deforming: BTreeSet::new(),
@@ -192,7 +192,7 @@ impl SceneTracker {
                 continue;
             }
             *told = Some(Arc::clone(&scene));
-            let drawn = match known.iter().find(|(other, _)| Arc::ptr_eq(other, &scene)) {
+            let visuals = match known.iter().find(|(other, _)| Arc::ptr_eq(other, &scene)) {
                 Some((_, drawn)) => Arc::clone(drawn),
                 None => {
                     let is_drawn =
@@ -203,9 +203,9 @@ impl SceneTracker {
                     drawn
                 }
             };
-            let entities = self.entities(sim, env, &scene, &drawn)?;
+            let entities = self.entities(sim, env, &scene, &visuals)?;
             let of = |entity: &Entity| {
-                drawn[entity.instance].as_ref().map_or(0, |drawn| ENTITY_OVERHEAD + drawn.shape.bytes())
+                visuals[entity.instance].as_ref().map_or(0, |drawn| ENTITY_OVERHEAD + drawn.shape.bytes())
             };
             let bytes: u64 = entities.iter().map(of).sum();
             if bytes > self.bytes_left {
@@ -213,7 +213,7 @@ impl SceneTracker {
                 continue;
             }
             self.bytes_left -= bytes;
-            updates.push(SceneUpdate { env, at, entities, visuals: drawn });
+            updates.push(SceneUpdate { env, at, entities, visuals });
         }
         Ok(updates)
     }

@@ -125,8 +125,8 @@ impl<W: Write + Seek> ZipWriter<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let start = self.at;
         let mut out = Vec::new();
-        for Entry { name, offset, size, uncompressed_size: unpacked, crc } in &self.entries {
-            let (version, method) = (u64::from(VERSION), if unpacked.is_some() { DEFLATED } else { STORED });
+        for Entry { name, offset, size, uncompressed_size, crc } in &self.entries {
+            let (version, method) = (u64::from(VERSION), if uncompressed_size.is_some() { DEFLATED } else { STORED });
             let head =
                 [(CENTRAL.into(), 4), (version, 2), (version, 2), (0, 2), (method.into(), 2), (0, 2), (DATE.into(), 2)];
             put(&mut out, &head);
@@ -143,7 +143,7 @@ impl<W: Write + Seek> ZipWriter<W> {
             // No comment, disk 0, no attributes.
             put(&mut out, &[(0, 2), (0, 2), (0, 2), (0, 4), (ZIP64_MARKER.into(), 4)]);
             out.extend_from_slice(name.as_bytes());
-            let before = unpacked.unwrap_or(*size);
+            let before = uncompressed_size.unwrap_or(*size);
             put(&mut out, &[(ZIP64_EXTRA_ID.into(), 2), (24, 2), (before, 8), (*size, 8), (*offset, 8)]);
         }
         let (length, count) = (out.len() as u64, self.entries.len() as u64);
@@ -316,17 +316,17 @@ fn parse_directory(directory: &[u8], count: u64, length: u64) -> Option<Vec<Dire
         let name = std::str::from_utf8(directory.get(at + 46..at + 46 + name_length)?).ok()?;
         let extension = at + 46 + name_length + 4;
         let [unpacked, size, offset] = [0, 8, 16].map(|k| number(directory, extension + k, 8));
-        let (unpacked, size, offset) = (unpacked?, size?, offset?);
+        let (uncompressed_size, size, offset) = (unpacked?, size?, offset?);
         let inside = offset.checked_add(LOCAL_HEADER_LEN as u64 + size).is_some_and(|end| end <= length);
         // The sum of sizes is limited by that of the archive, so that entries cannot share bytes to be read many times.
         sum = sum.checked_add(size).filter(|sum| inside && *sum <= length)?;
         let method = u16::try_from(number(directory, at + 10, 2)?).ok()?;
         // The sizes of a stored file are equal, so that no more memory is allocated than there are bytes.
-        if method == STORED && unpacked != size {
+        if method == STORED && uncompressed_size != size {
             return None;
         }
         let crc = number(directory, at + 16, 4)?;
-        files.push(DirectoryEntry { name: name.into(), method, offset, size, uncompressed_size: unpacked, crc });
+        files.push(DirectoryEntry { name: name.into(), method, offset, size, uncompressed_size, crc });
         at = extension + 24;
     }
     Some(files)
@@ -378,12 +378,12 @@ mod tests {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         archive.add("a", b"", &mut &[7; 1000][..]).unwrap();
         let again = archive.entries.remove(0);
-        let Entry { offset, size, uncompressed_size: unpacked, crc, .. } = again;
+        let Entry { offset, size, uncompressed_size, crc, .. } = again;
         archive.entries.extend(["a", "b"].map(|name| Entry {
             name: name.into(),
             offset,
             size,
-            uncompressed_size: unpacked,
+            uncompressed_size,
             crc,
         }));
         let shared = archive.finish().unwrap().into_inner();

@@ -55,11 +55,11 @@ pub(crate) enum RobotKind {
 impl RobotKind {
     /// Label of the robot in errors.
     fn label(&self, uid: &str) -> EntityLabel {
-        let what = match self {
+        let kind = match self {
             Self::Robot => "robot",
             Self::Articulation(_) => "articulation",
         };
-        EntityLabel { kind: what, uid: uid.into() }
+        EntityLabel { kind, uid: uid.into() }
     }
 }
 

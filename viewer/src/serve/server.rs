@@ -69,15 +69,15 @@ impl Server {
     /// Starts to accept connections.
     pub(super) fn start(
         listener: TcpListener,
-        door: AccessPolicy,
-        show: Arc<dyn ViewBackend>,
+        policy: AccessPolicy,
+        backend: Arc<dyn ViewBackend>,
         max_viewers: usize,
     ) -> Result<Self, ServeError> {
         let failed = |what: &'static str| move |error: std::io::Error| ServeError::System(format!("{what}: {error}"));
         listener.set_nonblocking(true).map_err(failed("cannot make the socket non-blocking"))?;
         let house = Arc::new(ServerContext {
-            policy: door,
-            backend: show,
+            policy,
+            backend,
             max_viewers,
             viewers: AtomicUsize::new(0),
             stop: AtomicBool::new(false),

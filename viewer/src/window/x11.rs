@@ -133,7 +133,7 @@ impl XWindow {
         let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
         let size = [usize::from(width), usize::from(height)];
         let format = server_scaling::render_format(&connection, visual)?;
-        let (pixels, enlarged, released) = (Vec::new(), None, None);
+        let (pixels, scaled_image, released) = (Vec::new(), None, None);
         Ok(Self {
             watch,
             connection,
@@ -148,7 +148,7 @@ impl XWindow {
             released,
             pixels,
             format,
-            scaled_image: enlarged,
+            scaled_image,
         })
     }
 
@@ -371,11 +371,11 @@ struct KeyboardMap {
 
 impl KeyboardMap {
     fn of(connection: &RustConnection) -> Result<Self, DisplayError> {
-        let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
-        let count = last.saturating_sub(first).saturating_add(1);
-        let mapping = connection.get_keyboard_mapping(first, count)?.reply()?;
+        let (first_keycode, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
+        let count = last.saturating_sub(first_keycode).saturating_add(1);
+        let mapping = connection.get_keyboard_mapping(first_keycode, count)?.reply()?;
         Ok(Self {
-            first_keycode: first,
+            first_keycode,
             keysyms_per_keycode: usize::from(mapping.keysyms_per_keycode),
             keysyms: mapping.keysyms,
         })
