@@ -254,8 +254,9 @@ impl Camera {
         self.render_count.load(Ordering::Relaxed)
     }
 
-    /// Progress of path tracing, and a way to cancel it from another thread. A cancelled read returns
-    /// [`CameraError::Render`] with [`RenderError::Canceled`]; the next read renders again.
+    /// Progress of path tracing, and a way to cancel it from another thread. After [`RenderProgress::cancel`], a read
+    /// that renders returns [`CameraError::Render`] with [`RenderError::Canceled`]. The first read after
+    /// [`RenderProgress::resume`] renders the canceled images.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }

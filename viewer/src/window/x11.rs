@@ -333,12 +333,12 @@ impl Drop for XWindow {
     }
 }
 
-/// Returns the number of window pixels per image pixel, along each side, for an image of at most about [`MAX_PIXELS`]
-/// pixels with sides that the renderer supports.
+/// Returns the number of window pixels per image pixel, along each side, for an image of at most [`MAX_PIXELS`] pixels
+/// with sides that the renderer supports.
 fn coarseness(size: [usize; 2]) -> usize {
     let fits = |k: &usize| {
         let [width, height] = size.map(|n| n.div_ceil(*k));
-        (size[0] / k).max(1) * (size[1] / k).max(1) <= MAX_PIXELS && width.max(height) <= View::MAX_SIDE
+        width * height <= MAX_PIXELS && width.max(height) <= View::MAX_SIDE
     };
     (1..).find(fits).unwrap_or(1)
 }
@@ -459,15 +459,25 @@ mod tests {
     }
 
     /// A window may be up to 65 535 pixels wide, but an image at most 8192: without a coarser image, its last column
-    /// was repeated.
+    /// was repeated. Root cause of images with too many pixels: the limit applied to sides rounded down, but images
+    /// have sides rounded up, 1921 x 1201 for a window of 3841 x 2401.
     #[test]
     fn coarse_images() {
-        for (size, k) in [([1, 1], 1), ([960, 540], 1), ([1920, 1200], 1), ([3840, 2160], 2), ([8192, 50], 1)] {
+        for (size, k) in [
+            ([1, 1], 1),
+            ([960, 540], 1),
+            ([1920, 1200], 1),
+            ([3840, 2160], 2),
+            ([3840, 2400], 2),
+            ([3841, 2401], 3),
+            ([8192, 50], 1),
+        ] {
             assert_eq!(coarseness(size), k, "{size:?}");
         }
-        for size in [[8193, 1], [30_000, 50], [65_535, 65_535], [1, 65_535]] {
+        for size in [[8193, 1], [30_000, 50], [65_535, 65_535], [1, 65_535], [3841, 2401]] {
             let k = coarseness(size);
             let image = size.map(|n| n.div_ceil(k));
+            assert!(image[0] * image[1] <= MAX_PIXELS, "{size:?}: {image:?}");
             assert!(image.iter().all(|n| *n <= View::MAX_SIDE) && image[0] * k >= size[0], "{size:?}: {k}");
         }
     }
