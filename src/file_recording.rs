@@ -52,11 +52,15 @@ impl FileRecording {
         Self { cfg, current: None, started: 0, finished: Vec::new(), failed: None, status: String::new() }
     }
 
-    /// Starts a recording to exactly the file of the configuration, for programs that record without a button.
+    /// Starts a recording to exactly the file of the configuration, for programs that record without a button. Does
+    /// nothing while a recording is running, like the button.
     ///
     /// # Errors
     /// As [`Record::record`].
     pub fn start(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
+        if self.recorder(sim).is_some() {
+            return Ok(());
+        }
         self.start_at(sim, self.cfg.path.clone())
     }
 

@@ -117,16 +117,16 @@ impl Args {
     /// # Errors
     /// No display is available, or the server cannot listen at the address.
     fn open_view(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
-        let (speed, recording) = (Some(Speed::Factor(self.speed)), Some(button));
+        let (speed, record_button) = (Some(Speed::Factor(self.speed)), Some(button));
         let names = self.model.file_names();
         if let Some(address) = &self.serve {
-            let served = sim.serve_with(address, ServeCfg { speed, record_button: recording, ..ServeCfg::default() });
+            let served = sim.serve_with(address, ServeCfg { speed, record_button, ..ServeCfg::default() });
             let served = served.map_err(|error| format!("--serve: {error}"))?;
             println!("Open {} in a browser to see {names}; Ctrl+C here ends it.", served.url());
             return Ok(None);
         }
         let title = format!("{names} - Kinetoscope");
-        let cfg = WindowCfg { title, speed, record_button: recording, ..WindowCfg::default() };
+        let cfg = WindowCfg { title, speed, record_button, ..WindowCfg::default() };
         let window = sim.open_window_with(cfg).map_err(|error| no_window(&error, &names))?;
         println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
         Ok(Some(window))

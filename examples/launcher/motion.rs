@@ -34,8 +34,8 @@ impl<'a> MotionPlayer<'a> {
         tip: TipFrame<'a>,
         progress: &'a MainLoop,
     ) -> Result<Self> {
-        let (arm, planned) = (sim.robot(robot).joint_ids(arm)?, vec![true; sim.num_envs()]);
-        Ok(Self { sim, robot, tip, arm, progress, step: 0, reachable: planned })
+        let (arm, reachable) = (sim.robot(robot).joint_ids(arm)?, vec![true; sim.num_envs()]);
+        Ok(Self { sim, robot, tip, arm, progress, step: 0, reachable })
     }
 
     /// Steps so far.

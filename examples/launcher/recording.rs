@@ -22,13 +22,9 @@ mod recorded {
             self.files.get_or_init(|| {
                 let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
                 let path = self.record.clone().unwrap_or_else(folder);
-                let (every, rates) = (self.record_every, self.record_rate.clone());
-                let cfg = RecorderCfg {
-                    overwrite: self.overwrite,
-                    period_steps: every,
-                    stream_periods: rates,
-                    ..RecorderCfg::new(path)
-                };
+                let (period_steps, stream_periods) = (self.record_every, self.record_rate.clone());
+                let cfg =
+                    RecorderCfg { overwrite: self.overwrite, period_steps, stream_periods, ..RecorderCfg::new(path) };
                 let cfg = self.record_view.as_ref().map_or_else(|| cfg.clone(), |view| with_view(cfg.clone(), view));
                 Arc::new(Mutex::new(FileRecording::new(cfg)))
             })

@@ -141,8 +141,8 @@ impl Data {
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
         let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
         // SAFETY: just made; no other reference to it exists yet.
-        let places = PrefetchAddresses::new(unsafe { raw.as_ref() });
-        Ok(Self { raw, model: model.clone(), prefetch_addresses: places })
+        let prefetch_addresses = PrefetchAddresses::new(unsafe { raw.as_ref() });
+        Ok(Self { raw, model: model.clone(), prefetch_addresses })
     }
 
     /// The model of this data.

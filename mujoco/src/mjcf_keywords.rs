@@ -206,11 +206,11 @@ pub fn sensor(code: i32) -> Option<SensorKeyword> {
         #[cfg(mj4)]
         (mj::mjSENS_E_KINETIC, "e_kinetic", Nothing, "J"),
     ];
-    list.into_iter().find(|(known, ..)| *known as i32 == code).map(|(_, word, objects, unit)| SensorKeyword {
-        keyword: word,
-        object_syntax: objects,
+    list.into_iter().find(|(known, ..)| *known as i32 == code).map(|(_, keyword, object_syntax, unit)| SensorKeyword {
+        keyword,
+        object_syntax,
         unit: (!unit.is_empty()).then_some(unit),
-        quaternion: word.ends_with("quat"),
+        quaternion: keyword.ends_with("quat"),
     })
 }
 

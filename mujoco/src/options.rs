@@ -131,7 +131,7 @@ impl Model {
         let pairs = self.options().into_iter().zip(other.options());
         pairs
             .filter(|((_, here), (_, there))| here != there)
-            .map(|((name, here), (_, there))| OptionDifference { name, first: here, second: there })
+            .map(|((name, first), (_, second))| OptionDifference { name, first, second })
             .collect()
     }
 }

@@ -36,6 +36,9 @@ impl Model {
     /// One of the equalities is not a weld of this model.
     #[must_use]
     pub fn with_welds(&self, welds: &[Weld]) -> Self {
+        for weld in welds {
+            assert!(self.is_weld(weld.equality), "equality {} is not a weld", weld.equality);
+        }
         let own_of = |field: &ModelArray| matches!(field.name, "eq_data" | "eq_active");
         let mut own: Vec<OwnArray> =
             self.own_array_list().iter().filter(|array| !own_of(&array.field)).cloned().collect();
@@ -53,7 +56,6 @@ impl Model {
             let values = unsafe { std::slice::from_raw_parts(array_pointer(compiled, &field), field.bytes) };
             let mut values = values.to_vec();
             for weld in welds {
-                assert!(self.is_weld(weld.equality), "equality {} is not a weld", weld.equality);
                 if field.name == "eq_active" {
                     values[weld.equality] = 1;
                     continue;
@@ -131,6 +133,22 @@ mod tests {
         assert_eq!(moved.eq_data()[3..10], [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
         assert!(moved.with_welds(&[]).unshared_arrays(&off).is_empty());
         assert!(off.is_weld(0) && !off.is_weld(1));
+    }
+
+    /// Root cause: equalities were checked for each array that has values, so a model without equalities ignored welds.
+    #[test]
+    #[should_panic(expected = "equality 0 is not a weld")]
+    fn no_equalities() {
+        let plain = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+        let weld = Weld { equality: 0, pose: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] };
+        let _ = mj::compile(plain, &[]).expect("compiles").into_model().with_welds(&[weld]);
+    }
+
+    #[test]
+    #[should_panic(expected = "equality 1 is not a weld")]
+    fn other_equalities() {
+        let welds = [0, 1].map(|equality| Weld { equality, pose: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] });
+        let _ = model("false").with_welds(&welds);
     }
 
     /// Other own arrays of an environment are kept.

@@ -17,7 +17,7 @@ const TICK_SPACING: f64 = 80.0;
 impl Axis {
     /// Creates an axis that shows all `values` with a margin, from pixel `pixel_range[0]` to pixel `pixel_range[1]`. The values of a
     /// logarithmic axis must be above 0.
-    pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, ends: [f64; 2]) -> Self {
+    pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, pixel_range: [f64; 2]) -> Self {
         let values = values.map(|x| if log { x.log10() } else { x });
         let (mut low, mut high) = values.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
         if low > high {
@@ -31,12 +31,7 @@ impl Axis {
         }
         // Halved values, so that the difference of the largest floats does not overflow.
         let margin = 0.04 * (high / 2.0 - low / 2.0);
-        Self {
-            log,
-            low: (low - margin).max(f64::MIN / 4.0),
-            high: (high + margin).min(f64::MAX / 4.0),
-            pixel_range: ends,
-        }
+        Self { log, low: (low - margin).max(f64::MIN / 4.0), high: (high + margin).min(f64::MAX / 4.0), pixel_range }
     }
 
     /// Pixel coordinate of a value.

@@ -132,9 +132,9 @@ impl PlotLayout {
             let pieces = series.points.split(|p| !shown(&p)).filter(|piece| !piece.is_empty());
             let places =
                 |piece: &[[f64; 2]]| piece.iter().map(|p| [x_axis.pixel_of(p[0]), y_axis.pixel_of(p[1])]).collect();
-            let pieces: Vec<Vec<[f64; 2]>> = pieces.map(|piece| decimate_m4(places(piece))).collect();
-            let marks = if plot.markers { pieces.concat() } else { Vec::new() };
-            drawing.curves.push(Curve { color, polylines: pieces, markers: marks });
+            let polylines: Vec<Vec<[f64; 2]>> = pieces.map(|piece| decimate_m4(places(piece))).collect();
+            let markers = if plot.markers { polylines.concat() } else { Vec::new() };
+            drawing.curves.push(Curve { color, polylines, markers });
             let [from, y] = [right + GAP, top + (CHAR_SIZE[1] + 3.0) * (k as f64 + 0.5)];
             let more = plot.series.len() - k;
             if k + 1 < max_entries || more == 1 && k < max_entries {

@@ -89,8 +89,8 @@ pub struct SizeError {
 
 impl fmt::Display for SizeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { width, height, min_size: least, max_size: most } = self;
-        write!(f, "a plot of {width} x {height} pixels: both must be from {least} to {most}")
+        let Self { width, height, min_size, max_size } = self;
+        write!(f, "a plot of {width} x {height} pixels: both must be from {min_size} to {max_size}")
     }
 }
 
@@ -125,9 +125,9 @@ impl Plot {
     /// # Errors
     /// The width or the height is below 200 or above 16384 pixels.
     pub fn layout(&self) -> Result<PlotLayout, SizeError> {
-        let ([width, height], [least, most]) = (self.size, SIZE_RANGE);
-        if ![width, height].iter().all(|side| (least..=most).contains(side)) {
-            return Err(SizeError { width, height, min_size: least, max_size: most });
+        let ([width, height], [min_size, max_size]) = (self.size, SIZE_RANGE);
+        if ![width, height].iter().all(|side| (min_size..=max_size).contains(side)) {
+            return Err(SizeError { width, height, min_size, max_size });
         }
         Ok(PlotLayout::of(self))
     }

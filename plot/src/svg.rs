@@ -5,14 +5,8 @@ use std::fmt::Write as _;
 
 /// Formats a drawing as an SVG document.
 pub(super) fn document(drawing: &PlotLayout) -> String {
-    let PlotLayout {
-        size: [width, height],
-        frame: [left, top, right, bottom],
-        grid,
-        labels,
-        curves,
-        legend_lines: keys,
-    } = drawing;
+    let PlotLayout { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, legend_lines } =
+        drawing;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"monospace\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
@@ -26,9 +20,9 @@ pub(super) fn document(drawing: &PlotLayout) -> String {
         out,
         "<rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"none\" stroke=\"black\"/>"
     );
-    for Curve { color, polylines: pieces, markers: marks } in curves {
+    for Curve { color, polylines, markers } in curves {
         let color = hex(*color);
-        for piece in pieces {
+        for piece in polylines {
             match &piece[..] {
                 [[x, y]] => {
                     let _ = writeln!(out, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"2\" fill=\"{color}\"/>");
@@ -43,11 +37,11 @@ pub(super) fn document(drawing: &PlotLayout) -> String {
                 }
             }
         }
-        for [x, y] in marks {
+        for [x, y] in markers {
             let _ = writeln!(out, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"3\" fill=\"{color}\"/>");
         }
     }
-    for ([from, to], color) in keys {
+    for ([from, to], color) in legend_lines {
         let (from, to, color) = (point(from), point(to), hex(*color));
         let _ = writeln!(out, "<path d=\"M{from} L{to}\" stroke=\"{color}\" stroke-width=\"3\"/>");
     }

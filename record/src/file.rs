@@ -42,7 +42,7 @@ impl StorageFactory {
     }
 }
 
-/// A file that is called `NAME.part` until it is complete. Dropping it before deletes it, unless its content is
+/// A file that is called `NAME.partial_file` until it is complete. Dropping it before deletes it, unless its content is
 /// readable.
 #[derive(Debug)]
 pub(crate) struct PartialFile {
@@ -58,18 +58,18 @@ impl PartialFile {
     /// A file of that name or a partial file of an earlier recording exists and may not be replaced, another recorder
     /// writes it, or the folder is not writable.
     pub(crate) fn create(path: &Path, overwrite: bool, recoverable: bool) -> Result<(Self, File)> {
-        let part = partial_path_of(path);
-        if let Some(left) = lock_partial_file(&part)? {
+        let partial_file = partial_path_of(path);
+        if let Some(left) = lock_partial_file(&partial_file)? {
             // An empty file has nothing to lose. Archives and animations are empty until they are finished.
             if !overwrite && left.metadata().is_ok_and(|left| left.len() > 0) {
-                return Err(RecordError::Unfinished { partial_file: part, recoverable });
+                return Err(RecordError::Unfinished { partial_file, recoverable });
             }
-            remove_file_if_exists(&part)?;
+            remove_file_if_exists(&partial_file)?;
         }
-        Self::create_as(path, part, overwrite)
+        Self::create_as(path, partial_file, overwrite)
     }
 
-    /// Creates the file as [`create`](Self::create) does, with the temporary name `part`, which must not exist.
+    /// Creates the file as [`create`](Self::create) does, with the temporary name `partial_file`, which must not exist.
     pub(crate) fn create_as(path: &Path, part: PathBuf, overwrite: bool) -> Result<(Self, File)> {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordError::Exists { path: path.into() });

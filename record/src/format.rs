@@ -84,9 +84,9 @@ impl Format {
     /// # Errors
     /// No format has this extension; the error lists the known ones.
     pub fn of_path(path: &Path) -> Result<Self> {
-        let end = path.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let found = ALL.iter().find(|known| known.extension == end);
-        found.map(|known| known.format).ok_or_else(|| RecordError::Format { path: path.into(), extension: end })
+        let extension = path.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let found = ALL.iter().find(|known| known.extension == extension);
+        found.map(|known| known.format).ok_or_else(|| RecordError::Format { path: path.into(), extension })
     }
 
     fn info(self) -> &'static FormatInfo {

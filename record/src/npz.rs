@@ -83,11 +83,11 @@ impl NpzWriter {
         scene: Option<&[u8]>,
     ) -> io::Result<Self> {
         let folder = parent_dir(part.path());
-        let spools = streams.iter().map(|_| BufferFile::create(folder)).collect::<io::Result<_>>()?;
+        let buffers = streams.iter().map(|_| BufferFile::create(folder)).collect::<io::Result<_>>()?;
         let (start, events) = (snapshot_bytes(start, folder)?, BufferFile::create(folder)?);
         let scene = scene.map(<[u8]>::to_vec);
-        let (about, notes) = (metadata(streams, masks, dt), BufWriter::new(tempfile::tempfile_in(folder)?));
-        Ok(Self { part, storage: Some(storage), metadata: about, start, scene, buffers: spools, events, notes })
+        let (metadata, notes) = (metadata(streams, masks, dt), BufWriter::new(tempfile::tempfile_in(folder)?));
+        Ok(Self { part, storage: Some(storage), metadata, start, scene, buffers, events, notes })
     }
 }
 

@@ -129,15 +129,15 @@ impl StreamRows {
             ElementType::F32 => ValueBuffer::F32(Vec::with_capacity(numbers)),
             ElementType::F64 => ValueBuffer::F64(Vec::with_capacity(numbers)),
         };
-        let (times, stamps) = (Vec::with_capacity(envs), Vec::with_capacity(envs));
+        let (times, recorded_times) = (Vec::with_capacity(envs), Vec::with_capacity(envs));
         let forces = if stream.has_two_stamps() { envs } else { 0 };
-        let (force_times, force_stamps) = (Vec::with_capacity(forces), Vec::with_capacity(forces));
+        let (force_times, recorded_force_times) = (Vec::with_capacity(forces), Vec::with_capacity(forces));
         Self {
             has_content: false,
             times,
-            recorded_times: stamps,
+            recorded_times,
             force_times,
-            recorded_force_times: force_stamps,
+            recorded_force_times,
             is_new: Vec::with_capacity(envs),
             values,
         }

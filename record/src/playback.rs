@@ -81,8 +81,8 @@ impl Playback {
         let by_hand = mocap_body_names(&view);
         let start =
             |body: &String| view.body_pose(body).map(|poses| MocapBody { body: body.clone(), poses, has_data: false });
-        let mut hands: Vec<MocapBody> = by_hand.iter().map(start).collect::<kinetoscope_sim::Result<_>>()?;
-        let (mut wanted, mut places, mut unmoved) = (Vec::new(), Vec::new(), Vec::new());
+        let mut mocap_bodies: Vec<MocapBody> = by_hand.iter().map(start).collect::<kinetoscope_sim::Result<_>>()?;
+        let (mut wanted, mut places, mut joints_without_data) = (Vec::new(), Vec::new(), Vec::new());
         let mut want = |topic: String, field: String, env: usize, column: TrackTarget| {
             let known = recording.topics().iter().find(|known| known.name == topic);
             let there = known.is_some_and(|topic| topic.fields.contains(&field));
@@ -93,7 +93,7 @@ impl Playback {
             there
         };
         for &env in &envs {
-            for (k, hand) in hands.iter_mut().enumerate() {
+            for (k, hand) in mocap_bodies.iter_mut().enumerate() {
                 for (number, (topic, field)) in pose_fields(recording, env, &hand.body).into_iter().enumerate() {
                     hand.has_data |= want(topic, field, env, TrackTarget::MocapPose(k, number));
                 }
@@ -103,8 +103,8 @@ impl Playback {
                 for (topic, field, column) in joint.qpos_fields(recording, env, &view) {
                     there |= want(topic, field, env, TrackTarget::Joint(column));
                 }
-                if !there && !unmoved.contains(&joint.name) {
-                    unmoved.push(joint.name);
+                if !there && !joints_without_data.contains(&joint.name) {
+                    joints_without_data.push(joint.name);
                 }
             }
         }
@@ -115,9 +115,9 @@ impl Playback {
         times.sort_by(f64::total_cmp);
         // One of the formats rounds times to nanoseconds.
         times.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-        let track = |(samples, (env, column))| Track { env, target: column, samples };
+        let track = |(samples, (env, target))| Track { env, target, samples };
         let tracks = samples.into_iter().zip(places).map(track).collect();
-        Ok(Self { part, times, tracks, qpos, mocap_bodies: hands, joints_without_data: unmoved })
+        Ok(Self { part, times, tracks, qpos, mocap_bodies, joints_without_data })
     }
 
     /// Times with recorded values \[s\], in ascending order, on the clock of the recording.
@@ -142,14 +142,14 @@ impl Playback {
     /// A recorded quaternion has length zero.
     pub fn seek(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<()> {
         let Some(&time) = self.times.get(frame.min(self.times.len().saturating_sub(1))) else { return Ok(()) };
-        for Track { env, target: column, samples } in &self.tracks {
+        for Track { env, target, samples } in &self.tracks {
             // Before its first time, a number has its first value.
             let last = samples.times.partition_point(|sample| *sample <= time + 1e-9).saturating_sub(1);
             // A diverged number keeps its last finite value, also after a jump to a later time.
             let until = samples.values.get(..=last);
             let value = until.and_then(|until| until.iter().rev().find(|value| value.is_finite()));
             let Some(&value) = value else { continue };
-            match *column {
+            match *target {
                 TrackTarget::Joint(column) => self.qpos[(*env, column)] = value,
                 TrackTarget::MocapPose(hand, number) => self.mocap_bodies[hand].poses[(*env, number)] = value,
             }

@@ -54,10 +54,10 @@ impl RecordedArrays {
         if !matches!(Format::of_path(path), Ok(Format::Mcap)) {
             return Self::open_npz(path);
         }
-        let McapArrays { metadata: about, start, arrays } = read_arrays(path)?;
+        let McapArrays { metadata, start, arrays } = read_arrays(path)?;
         let array = |(name, (shape, numbers))| (name, Array { shape, numbers: OnceLock::from(numbers) });
         let arrays = arrays.into_iter().map(array).collect();
-        Ok(Self { path: path.into(), metadata: about, content: Content::Mcap(start), arrays })
+        Ok(Self { path: path.into(), metadata, content: Content::Mcap(start), arrays })
     }
 
     pub(crate) fn open_npz(path: &Path) -> Result<Self> {
@@ -72,7 +72,8 @@ impl RecordedArrays {
         let mut file = ZipReader::open(from).map_err(|error| read_error(path, none, error))?;
         let about = file.read(METADATA).map_err(|error| read_error(path, none, error))?;
         let about = about.and_then(|about| serde_json::from_slice(&about).ok());
-        let about: Value = about.ok_or_else(|| malformed("it has no description of its content (recording.json)"))?;
+        let metadata: Value =
+            about.ok_or_else(|| malformed("it has no description of its content (recording.json)"))?;
         if !file.names().any(|name| name == INITIAL_STATE) {
             return Err(malformed("it has no initial state (start.snapshot)"));
         }
@@ -88,7 +89,7 @@ impl RecordedArrays {
                 arrays.insert(name, Array { shape, numbers: OnceLock::new() });
             }
         }
-        Ok(Self { path: path.into(), metadata: about, content: Content::Npz(Mutex::new(file)), arrays })
+        Ok(Self { path: path.into(), metadata, content: Content::Npz(Mutex::new(file)), arrays })
     }
 
     /// Reads a member of the archive; `None` if there is no such member.

@@ -161,9 +161,9 @@ impl Recorder {
         if let Some(feature) = format.missing_feature() {
             return Err(RecordError::NotBuilt { path: cfg.path, format, feature });
         }
-        for (field, value, least) in [("every", cfg.period_steps, 1), ("packets", cfg.packets as u64, 2)] {
-            if value < least {
-                return Err(RecordError::OutOfRange { field, value, min: least });
+        for (field, value, min) in [("every", cfg.period_steps, 1), ("packets", cfg.packets as u64, 2)] {
+            if value < min {
+                return Err(RecordError::OutOfRange { field, value, min });
             }
         }
         let (sources, left_out) = resolve(sim, &cfg, format)?;
@@ -205,7 +205,7 @@ impl Recorder {
         let thread = std::thread::Builder::new().name("recording".into()).spawn(work);
         let thread = thread.map_err(|error| RecordError::file(&cfg.path, error))?;
         let clock = RecordingClock::new(sim.cfg().physics_dt, sim.observers().steps(), &sim.time());
-        let recorded = RecordingSummary { path: cfg.path.clone(), left_out, ..RecordingSummary::default() };
+        let summary = RecordingSummary { path: cfg.path.clone(), left_out, ..RecordingSummary::default() };
         let mut recorder = Self {
             cfg,
             sources,
@@ -217,7 +217,7 @@ impl Recorder {
             failed,
             reason: why,
             failure: None,
-            summary: recorded,
+            summary,
             format,
             diverged: Vec::new(),
             scenes,
@@ -291,22 +291,22 @@ impl Recorder {
             let part = partial_path_of(&path);
             Err(WriterFailure { error: None, partial_path: part.exists().then_some(part) })
         });
-        let (failure, WriterFailure { error, partial_path: kept }) = match (self.failure.take(), written) {
+        let (failure, WriterFailure { error, partial_path }) = match (self.failure.take(), written) {
             (None, Ok(bytes)) => {
                 self.summary.bytes = bytes;
                 return Ok(self.summary.clone());
             }
             (Some(failure), Ok(_)) => (failure, WriterFailure { error: None, partial_path: None }),
             (Some(failure), Err(written)) => (failure, written),
-            (None, Err(WriterFailure { error, partial_path: kept })) => match error {
+            (None, Err(WriterFailure { error, partial_path })) => match error {
                 None => {
                     let error = Arc::new(std::io::Error::other("the recording was aborted"));
-                    return Err(RecordError::File { path, error, partial_file: kept });
+                    return Err(RecordError::File { path, error, partial_file: partial_path });
                 }
                 Some(WriteError::Io(error)) => {
-                    return Err(RecordError::File { path, error: Arc::new(error), partial_file: kept });
+                    return Err(RecordError::File { path, error: Arc::new(error), partial_file: partial_path });
                 }
-                Some(fault) => (fault.into_record_error(&path), WriterFailure { error: None, partial_path: kept }),
+                Some(fault) => (fault.into_record_error(&path), WriterFailure { error: None, partial_path }),
             },
         };
         let failure = match failure {
@@ -316,7 +316,7 @@ impl Recorder {
         Err(RecordError::Aborted {
             error: Box::new(failure),
             write_error: error.map(|error| error.to_string()),
-            partial_file: kept,
+            partial_file: partial_path,
         })
     }
 
@@ -421,15 +421,10 @@ impl Recorder {
             return;
         }
         let times = of.iter().map(|env| times[*env]).collect();
-        let (step, at) = (self.clock.step(steps), self.clock.time(steps));
+        let (step, recorded_time) = (self.clock.step(steps), self.clock.time(steps));
         let text = String::new();
         self.dirty_scenes.extend_from_slice(&of);
-        self.record_due(
-            sim,
-            Some(Event { kind, env_ids: of.clone(), times, step, recorded_time: at, text }),
-            &of,
-            None,
-        );
+        self.record_due(sim, Some(Event { kind, env_ids: of.clone(), times, step, recorded_time, text }), &of, None);
     }
 
     fn is_recorded(&self, env: usize) -> bool {
@@ -478,9 +473,9 @@ impl Recorder {
         }
         let Some(mut packet) = self.acquire_packet() else { return };
         let times = env_ids.iter().map(|env| times[*env]).collect();
-        let (step, at) = (self.clock.step(steps), self.clock.time(steps));
+        let (step, recorded_time) = (self.clock.step(steps), self.clock.time(steps));
         packet.step = step;
-        packet.event = Some(Event { kind, env_ids, times, step, recorded_time: at, text });
+        packet.event = Some(Event { kind, env_ids, times, step, recorded_time, text });
         self.summary.packets += 1;
         if let Some(full) = &self.filled {
             let _ = full.send(packet);

@@ -62,10 +62,10 @@ impl fmt::Display for ReplayResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.difference {
             None => write!(f, "identical in {} steps: {} values, bit for bit", self.steps, self.values),
-            Some(Difference { step, env, array, column, recorded, replayed: found, state_written: written }) => {
+            Some(Difference { step, env, array, column, recorded, replayed, state_written }) => {
                 write!(f, "first different at step {step} in environment {env}: {array}, column {column}, ")?;
-                write!(f, "was {recorded:e}, now {found:e}")?;
-                if *written {
+                write!(f, "was {recorded:e}, now {replayed:e}")?;
+                if *state_written {
                     f.write_str("; the state was written there, which is not an action")?;
                 }
                 Ok(())
@@ -265,19 +265,11 @@ fn difference(
         let recorded = archive.rows(&array, row)?;
         for (k, &env) in stream.env_ids.iter().enumerate() {
             for column in 0..part.width() {
-                let found = block.values.as_f64s().get(k * width + first + column).copied().unwrap_or(f64::NAN);
+                let replayed = block.values.as_f64s().get(k * width + first + column).copied().unwrap_or(f64::NAN);
                 let recorded = recorded[(k, column)];
-                if recorded.to_bits() != found.to_bits() {
-                    let written = written.contains(&EnvId(env));
-                    return Ok(Some(Difference {
-                        step: 0,
-                        env,
-                        array,
-                        column,
-                        recorded,
-                        replayed: found,
-                        state_written: written,
-                    }));
+                if recorded.to_bits() != replayed.to_bits() {
+                    let state_written = written.contains(&EnvId(env));
+                    return Ok(Some(Difference { step: 0, env, array, column, recorded, replayed, state_written }));
                 }
             }
         }

@@ -129,12 +129,14 @@ fn mean_color(texture: &Texture) -> [f64; 3] {
     [0, 1, 2].map(|k| pixels.iter().map(|pixel| f64::from(pixel[k])).sum::<f64>() / (255.0 * count))
 }
 
-/// Color of a texture at texture coordinates, with the origin at the lower left and repetition.
+/// Color of a texture at texture coordinates, with the origin at the lower left and repetition. The edges 0 and 1 have
+/// the colors of the first and the last column, and of the bottom and the top row.
 fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
     let Some(level) = texture.mip_levels().first() else { return [1.0; 3] };
     let place = |x: f32, count: u32| {
-        let part = f64::from(x).rem_euclid(1.0);
-        ((if part.is_finite() { part } else { 0.0 } * f64::from(count)) as usize).min(count as usize - 1)
+        let part = if (0.0..=1.0).contains(&x) { f64::from(x) } else { f64::from(x).rem_euclid(1.0) };
+        // The conversion of NaN gives 0.
+        ((part * f64::from(count)) as usize).min(count as usize - 1)
     };
     let (column, row) = (place(u, level.width()), place(1.0 - v, level.height()));
     let at = 4 * (row * (level.width() as usize + 1) + column);
@@ -165,10 +167,10 @@ impl SceneTracker {
             _ => Vec::new(),
         };
         let frames = streams.iter().flat_map(of).collect();
-        let told = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
+        let last_scenes = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
         Self {
             frames,
-            last_scenes: told,
+            last_scenes,
             bytes_left: MAX_BYTES,
             without_pose: BTreeSet::new(),
             deforming: BTreeSet::new(),
@@ -192,7 +194,7 @@ impl SceneTracker {
                 continue;
             }
             *told = Some(Arc::clone(&scene));
-            let drawn = match known.iter().find(|(other, _)| Arc::ptr_eq(other, &scene)) {
+            let visuals = match known.iter().find(|(other, _)| Arc::ptr_eq(other, &scene)) {
                 Some((_, drawn)) => Arc::clone(drawn),
                 None => {
                     let is_drawn =
@@ -203,9 +205,9 @@ impl SceneTracker {
                     drawn
                 }
             };
-            let entities = self.entities(sim, env, &scene, &drawn)?;
+            let entities = self.entities(sim, env, &scene, &visuals)?;
             let of = |entity: &Entity| {
-                drawn[entity.instance].as_ref().map_or(0, |drawn| ENTITY_OVERHEAD + drawn.shape.bytes())
+                visuals[entity.instance].as_ref().map_or(0, |drawn| ENTITY_OVERHEAD + drawn.shape.bytes())
             };
             let bytes: u64 = entities.iter().map(of).sum();
             if bytes > self.bytes_left {
@@ -213,7 +215,7 @@ impl SceneTracker {
                 continue;
             }
             self.bytes_left -= bytes;
-            updates.push(SceneUpdate { env, at, entities, visuals: drawn });
+            updates.push(SceneUpdate { env, at, entities, visuals });
         }
         Ok(updates)
     }
@@ -267,5 +269,40 @@ impl SceneTracker {
             format!("the appearance of environments {envs}, for viewers (more than {} MiB in all)", MAX_BYTES >> 20)
         });
         lost.into_iter().chain(deforming).chain(omitted).collect()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use kinetoscope_scene::TextureKind;
+
+    /// Root cause: 1 - v was wrapped to 0..1, so that the lower edge of a texture, v = 0, had the color of its top row.
+    /// The right edge, u = 1, likewise had the color of the first column.
+    #[test]
+    fn texture_edges() {
+        // From the top left: red, green; blue, white.
+        let pixels = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
+        let texture = Texture::new(TextureKind::TwoD, 2, 2, 3, pixels.as_flattened()).unwrap();
+        let [red, green, blue, white] = pixels.map(|pixel| pixel.map(|byte: u8| f64::from(byte) / 255.0));
+        for (u, v, expected) in [
+            (0.25, 0.75, red),
+            (0.75, 0.75, green),
+            (0.25, 0.25, blue),
+            (0.75, 0.25, white),
+            // The edges, and a point so close to the lower edge that 1 - v is rounded to 1.
+            (0.0, 1.0, red),
+            (1.0, 1.0, green),
+            (0.0, 0.0, blue),
+            (1.0, 0.0, white),
+            (0.25, 1e-9, blue),
+            // Repetitions.
+            (1.25, -0.25, red),
+            (-0.25, 1.25, white),
+            (f32::NAN, f32::INFINITY, red),
+        ] {
+            assert_eq!(color_at(&texture, [u, v]), expected, "{u} {v}");
+        }
     }
 }

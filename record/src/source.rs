@@ -56,12 +56,12 @@ impl StreamSource {
     fn new(
         name: String,
         kind: StreamKind,
-        element: ElementType,
-        parts: Vec<StreamField>,
+        element_type: ElementType,
+        fields: Vec<StreamField>,
         envs: &[usize],
         what: SourceKind,
     ) -> Self {
-        let stream = StreamSchema { name, kind, element_type: element, fields: parts, env_ids: envs.to_vec() };
+        let stream = StreamSchema { name, kind, element_type, fields, env_ids: envs.to_vec() };
         let (rows, n) = (envs.to_vec(), envs.len());
         Self {
             stream,
@@ -111,9 +111,9 @@ impl StreamSource {
     pub(crate) fn task_results(envs: &[usize]) -> Self {
         let parts = ["reward", "terminated", "truncated"].map(|part| StreamField::new(part, [])).to_vec();
         // Results of task steps are never due by a number of steps.
-        let due_at = u64::MAX;
+        let next_step = u64::MAX;
         Self {
-            next_step: due_at,
+            next_step,
             ..Self::new("task".into(), StreamKind::TaskResult, ElementType::F64, parts, envs, SourceKind::TaskResults)
         }
     }
@@ -124,10 +124,10 @@ impl StreamSource {
         let [width, height] = cfg.size;
         let kind = StreamKind::Image { camera: "stage".into(), channel: "color".into(), height, width };
         let (parts, what) = (vec![StreamField::new("", [height, width, 4])], SourceKind::Overview(cfg.clone()));
-        let every = Some(cfg.period_steps(sim.cfg().physics_dt));
+        let period_steps = Some(cfg.period_steps(sim.cfg().physics_dt));
         let first = envs.get(..1).unwrap_or_default();
         let source = Self::new("stage/color".into(), kind, ElementType::U8, parts, first, what);
-        Ok(Self { period_steps: every, overview_renderer: Some(painter), ..source })
+        Ok(Self { period_steps, overview_renderer: Some(painter), ..source })
     }
 
     pub(crate) fn joint_states(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {

@@ -58,8 +58,8 @@ impl StreamField {
 
     /// A field for the channel of a sensor.
     pub(crate) fn of_channel(channel: &SampleChannel) -> Self {
-        let (of_forces, unit) = (channel.stamp == Stamp::Force, channel.unit.to_string());
-        Self { at_force_time: of_forces, unit, ..Self::new(channel.name, [channel.width]) }
+        let (at_force_time, unit) = (channel.stamp == Stamp::Force, channel.unit.to_string());
+        Self { at_force_time, unit, ..Self::new(channel.name, [channel.width]) }
     }
 
     /// Number of values in one environment.

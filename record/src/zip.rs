@@ -16,6 +16,8 @@ const END: u32 = 0x0605_4b50;
 const VERSION: u16 = 45;
 /// January 1, 1980, the earliest date. A constant date gives the same bytes in every run.
 const DATE: u16 = 0x21;
+/// General-purpose flags, section 4.4.4: bit 11, names are UTF-8. Without it, readers decode them as code page 437.
+const UTF8_NAMES: u16 = 1 << 11;
 /// Marks a size that is in the 64-bit extension.
 const ZIP64_MARKER: u32 = u32::MAX;
 const ZIP64_EXTRA_ID: u16 = 1;
@@ -59,7 +61,8 @@ impl<W: Write + Seek> ZipWriter<W> {
     pub(crate) fn add(&mut self, name: &str, head: &[u8], data: &mut dyn Read) -> io::Result<()> {
         let offset = self.at;
         let mut header = Vec::new();
-        let fields = [(u64::from(LOCAL), 4), (u64::from(VERSION), 2), (0, 2), (0, 2), (0, 2), (u64::from(DATE), 2)];
+        let (version, flags) = (u64::from(VERSION), u64::from(UTF8_NAMES));
+        let fields = [(LOCAL.into(), 4), (version, 2), (flags, 2), (STORED.into(), 2), (0, 2), (DATE.into(), 2)];
         put(&mut header, &fields);
         // Checksum and sizes are written when they are known.
         let known_later = header.len() as u64;
@@ -125,11 +128,10 @@ impl<W: Write + Seek> ZipWriter<W> {
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let start = self.at;
         let mut out = Vec::new();
-        for Entry { name, offset, size, uncompressed_size: unpacked, crc } in &self.entries {
-            let (version, method) = (u64::from(VERSION), if unpacked.is_some() { DEFLATED } else { STORED });
-            let head =
-                [(CENTRAL.into(), 4), (version, 2), (version, 2), (0, 2), (method.into(), 2), (0, 2), (DATE.into(), 2)];
-            put(&mut out, &head);
+        for Entry { name, offset, size, uncompressed_size, crc } in &self.entries {
+            let (version, method) = (u64::from(VERSION), if uncompressed_size.is_some() { DEFLATED } else { STORED });
+            put(&mut out, &[(CENTRAL.into(), 4), (version, 2), (version, 2)]);
+            put(&mut out, &[(UTF8_NAMES.into(), 2), (method.into(), 2), (0, 2), (DATE.into(), 2)]);
             put(
                 &mut out,
                 &[
@@ -143,7 +145,7 @@ impl<W: Write + Seek> ZipWriter<W> {
             // No comment, disk 0, no attributes.
             put(&mut out, &[(0, 2), (0, 2), (0, 2), (0, 4), (ZIP64_MARKER.into(), 4)]);
             out.extend_from_slice(name.as_bytes());
-            let before = unpacked.unwrap_or(*size);
+            let before = uncompressed_size.unwrap_or(*size);
             put(&mut out, &[(ZIP64_EXTRA_ID.into(), 2), (24, 2), (before, 8), (*size, 8), (*offset, 8)]);
         }
         let (length, count) = (out.len() as u64, self.entries.len() as u64);
@@ -316,17 +318,17 @@ fn parse_directory(directory: &[u8], count: u64, length: u64) -> Option<Vec<Dire
         let name = std::str::from_utf8(directory.get(at + 46..at + 46 + name_length)?).ok()?;
         let extension = at + 46 + name_length + 4;
         let [unpacked, size, offset] = [0, 8, 16].map(|k| number(directory, extension + k, 8));
-        let (unpacked, size, offset) = (unpacked?, size?, offset?);
+        let (uncompressed_size, size, offset) = (unpacked?, size?, offset?);
         let inside = offset.checked_add(LOCAL_HEADER_LEN as u64 + size).is_some_and(|end| end <= length);
         // The sum of sizes is limited by that of the archive, so that entries cannot share bytes to be read many times.
         sum = sum.checked_add(size).filter(|sum| inside && *sum <= length)?;
         let method = u16::try_from(number(directory, at + 10, 2)?).ok()?;
         // The sizes of a stored file are equal, so that no more memory is allocated than there are bytes.
-        if method == STORED && unpacked != size {
+        if method == STORED && uncompressed_size != size {
             return None;
         }
         let crc = number(directory, at + 16, 4)?;
-        files.push(DirectoryEntry { name: name.into(), method, offset, size, uncompressed_size: unpacked, crc });
+        files.push(DirectoryEntry { name: name.into(), method, offset, size, uncompressed_size, crc });
         at = extension + 24;
     }
     Some(files)
@@ -345,6 +347,30 @@ pub(crate) fn read_stored(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
 mod tests {
     use super::*;
     use std::io::Cursor;
+
+    /// Root cause: the flag of UTF-8 names was not set, so that other programs decoded names as code page 437.
+    #[test]
+    fn utf8_names() {
+        let names = ["é.npy", "ü.obj"];
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        archive.add(names[0], b"", &mut &b"x"[..]).unwrap();
+        archive.add_deflated(names[1], b"v 0 0 0\n").unwrap();
+        let mut bytes = archive.finish().unwrap().into_inner();
+        // Flags are at offset 6 of a local header and at offset 8 of a directory entry.
+        let flags_at = |at: usize| match number(&bytes, at, 4)? {
+            signature if signature == u64::from(LOCAL) => Some(at + 6),
+            signature if signature == u64::from(CENTRAL) => Some(at + 8),
+            _ => None,
+        };
+        let places: Vec<usize> = (0..bytes.len()).filter_map(flags_at).collect();
+        let flags: Vec<Option<u64>> = places.iter().map(|&at| number(&bytes, at, 2)).collect();
+        assert_eq!(flags, [Some(1 << 11); 4]);
+        let names_in = |bytes: &[u8]| read_all(bytes).unwrap().into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+        assert_eq!(names_in(&bytes), names);
+        // Archives of earlier versions have no flags.
+        places.iter().for_each(|&at| bytes[at..at + 2].fill(0));
+        assert_eq!(names_in(&bytes), names);
+    }
 
     #[test]
     fn round_trip_and_damage() {
@@ -378,12 +404,12 @@ mod tests {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         archive.add("a", b"", &mut &[7; 1000][..]).unwrap();
         let again = archive.entries.remove(0);
-        let Entry { offset, size, uncompressed_size: unpacked, crc, .. } = again;
+        let Entry { offset, size, uncompressed_size, crc, .. } = again;
         archive.entries.extend(["a", "b"].map(|name| Entry {
             name: name.into(),
             offset,
             size,
-            uncompressed_size: unpacked,
+            uncompressed_size,
             crc,
         }));
         let shared = archive.finish().unwrap().into_inner();

@@ -57,26 +57,26 @@ impl Clone for ImageRenderer {
             renderer,
             aperture,
             shutter,
-            exposure_compensation: stops,
+            exposure_compensation,
             progress: _,
             assets,
-            prepared: plan,
-            scratch: brush,
-            accumulator: film,
-            rolling_shutter: roll,
+            prepared,
+            scratch,
+            accumulator,
+            rolling_shutter,
         } = self;
         Self {
             cfg: *cfg,
             renderer: *renderer,
             aperture: *aperture,
             shutter: *shutter,
-            exposure_compensation: *stops,
+            exposure_compensation: *exposure_compensation,
             progress: RenderProgress::default(),
             assets: assets.clone(),
-            prepared: plan.clone(),
-            scratch: brush.clone(),
-            accumulator: film.clone(),
-            rolling_shutter: roll.clone(),
+            prepared: prepared.clone(),
+            scratch: scratch.clone(),
+            accumulator: accumulator.clone(),
+            rolling_shutter: rolling_shutter.clone(),
         }
     }
 }
@@ -112,13 +112,13 @@ impl ImageRenderer {
 
     /// Current settings of all frames.
     pub(super) fn settings(&self) -> RenderSettings<'_> {
-        let Self { cfg, renderer, aperture, shutter, exposure_compensation: stops, assets, .. } = self;
+        let Self { cfg, renderer, aperture, shutter, exposure_compensation, assets, .. } = self;
         RenderSettings {
             cfg: *cfg,
             renderer: *renderer,
             aperture: aperture.as_ref(),
             shutter: *shutter,
-            exposure_compensation: *stops,
+            exposure_compensation: *exposure_compensation,
             assets,
         }
     }
@@ -176,27 +176,24 @@ impl ImageRenderer {
             }
             return result;
         }
-        let Self {
-            cfg,
-            renderer,
-            aperture,
-            shutter,
-            exposure_compensation: stops,
-            assets,
-            prepared: plan,
-            scratch: brush,
-            ..
-        } = self;
+        let Self { cfg, renderer, aperture, shutter, exposure_compensation, assets, prepared, scratch, .. } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
-        plan.prepare(
-            RenderSettings { cfg: *cfg, renderer: *renderer, aperture, shutter, exposure_compensation: *stops, assets },
+        prepared.prepare(
+            RenderSettings {
+                cfg: *cfg,
+                renderer: *renderer,
+                aperture,
+                shutter,
+                exposure_compensation: *exposure_compensation,
+                assets,
+            },
             shot,
             frame,
         )?;
-        for band in plan.shadow_bands() {
-            brush.render_shadow_band(shot.scene, band);
+        for band in prepared.shadow_bands() {
+            scratch.render_shadow_band(shot.scene, band);
         }
-        brush.render_band(plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
+        scratch.render_band(prepared, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
         Ok(())
     }
 
@@ -208,20 +205,17 @@ impl ImageRenderer {
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let Self {
-            cfg,
-            renderer,
+        let Self { cfg, renderer, aperture, shutter, exposure_compensation, assets, scratch, rolling_shutter, .. } =
+            self;
+        let (aperture, shutter) = (aperture.as_ref(), *shutter);
+        let style = RenderSettings {
+            cfg: *cfg,
+            renderer: *renderer,
             aperture,
             shutter,
-            exposure_compensation: stops,
+            exposure_compensation: *exposure_compensation,
             assets,
-            scratch: brush,
-            rolling_shutter: roll,
-            ..
-        } = self;
-        let (aperture, shutter) = (aperture.as_ref(), *shutter);
-        let style =
-            RenderSettings { cfg: *cfg, renderer: *renderer, aperture, shutter, exposure_compensation: *stops, assets };
-        roll.render_row(brush, style, shot, interval, y, row)
+        };
+        rolling_shutter.render_row(scratch, style, shot, interval, y, row)
     }
 }

@@ -58,9 +58,9 @@ impl ParallelRenderer {
     /// Creates a rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The other threads
     /// start and end with each batch, unless [`with_pool`](Self::with_pool) sets a thread pool.
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
-        let (working, rasterizers) = (threads.max(1), vec![ImageRenderer::new(cfg); threads.max(1)]);
+        let (active, renderers) = (threads.max(1), vec![ImageRenderer::new(cfg); threads.max(1)]);
         let (pool, progress) = (ThreadPool::new(), RenderProgress::default());
-        let mut all = Self { renderers: rasterizers, active: working, prepared: Vec::new(), pool, progress };
+        let mut all = Self { renderers, active, prepared: Vec::new(), pool, progress };
         all.share_progress();
         all
     }
@@ -160,10 +160,10 @@ impl ParallelRenderer {
         jobs: &mut [RenderJob<'_>],
         takes: &[FrameSample<'_>],
     ) -> Result<(), (usize, RenderError)> {
-        let Self { renderers: rasterizers, active: working, prepared: plans, pool, progress } = self;
-        let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
-        let threads = worthwhile_threads(cfg, renderer, jobs).min(*working);
-        let rasterizers = &mut rasterizers[..threads];
+        let Self { renderers, active, prepared, pool, progress } = self;
+        let Some((cfg, renderer)) = renderers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
+        let threads = worthwhile_threads(cfg, renderer, jobs).min(*active);
+        let rasterizers = &mut renderers[..threads];
         let failure = FirstError::default();
         progress.begin(jobs.iter().fold(0, |sum, (shot, frame)| sum.saturating_add(renderer.path_count(shot, frame))));
         if renderer.is_path_tracing() {
@@ -192,8 +192,8 @@ impl ParallelRenderer {
             failure.record(index, rasterizer.render_request(shot, frame));
         });
         if !together.is_empty() {
-            plans.resize_with(plans.len().max(together.len()), PreparedFrame::default);
-            render_jointly(pool, rasterizers, &mut plans[..together.len()], together, |index, result| {
+            prepared.resize_with(prepared.len().max(together.len()), PreparedFrame::default);
+            render_jointly(pool, rasterizers, &mut prepared[..together.len()], together, |index, result| {
                 failure.record(first + index, result);
             });
         }

@@ -35,18 +35,19 @@ struct PathTraceJob<'a> {
 pub(super) fn path_trace(
     pool: &ThreadPool,
     rasterizers: &mut [ImageRenderer],
-    shot: &RenderRequest<'_>,
+    request: &RenderRequest<'_>,
     take: &FrameSample<'_>,
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
     let Some(first) = rasterizers.first_mut() else { return Ok(()) };
     let (mut plan, mut film) = (std::mem::take(&mut first.prepared), std::mem::take(&mut first.accumulator));
-    let ready = plan.prepare(first.settings(), shot, frame).and_then(|()| first.shutter.exposure_interval(shot, take));
+    let ready =
+        plan.prepare(first.settings(), request, frame).and_then(|()| first.shutter.exposure_interval(request, take));
     let result = ready.and_then(|interval| {
         if let Some(interval) = interval.filter(|_| frame.color.is_some()) {
-            plan.tracer.place(shot.scene, shot.poses, Some(interval.opened.poses));
+            plan.tracer.place(request.scene, request.poses, Some(interval.opened.poses));
         }
-        let exposure = PathTraceJob { request: shot, prepared: &plan, interval, noise: take.noise };
+        let exposure = PathTraceJob { request, prepared: &plan, interval, noise: take.noise };
         trace_colors(pool, rasterizers, &exposure, &mut film, frame)?;
         render_other_channels(pool, rasterizers, &exposure, frame)?;
         encode_colors(pool, rasterizers, &plan, &film, frame);
@@ -66,34 +67,34 @@ fn trace_colors(
     film: &mut Accumulator,
     frame: &FrameMut<'_>,
 ) -> Result<(), RenderError> {
-    let &PathTraceJob { request: shot, prepared: plan, interval, noise } = exposure;
-    let (Some(projection), Some(first)) = (&plan.projection, rasterizers.first()) else { return Ok(()) };
-    let Renderer::RayTraced { samples, max_bounces, denoise, seed } = plan.renderer else { return Ok(()) };
+    let &PathTraceJob { request, prepared, interval, noise } = exposure;
+    let (Some(projection), Some(first)) = (&prepared.projection, rasterizers.first()) else { return Ok(()) };
+    let Renderer::RayTraced { samples, max_bounces, denoise, seed } = prepared.renderer else { return Ok(()) };
     if frame.color.is_none() {
         return Ok(());
     }
     let (cfg, progress) = (first.cfg, first.progress.clone());
     let (width, height) = (projection.width, projection.height);
     film.resize([width, height], denoise);
-    let (tracer, lens) = (&plan.tracer, shot.lens);
+    let (tracer, lens) = (&prepared.tracer, request.lens);
     let forward = lens.is_none_or(LensRays::is_forward);
-    let lights = shot.lights.unwrap_or(&shot.scene.lights);
-    film.lights.prepare(shot.scene, tracer, lights, cfg.shadows, projection, forward);
+    let lights = request.lights.unwrap_or(&request.scene.lights);
+    film.lights.prepare(request.scene, tracer, lights, cfg.shadows, projection, forward);
     let moving = interval.map(|ShutterInterval { opened, clock }| ExposureMotion {
         clock,
-        camera: Motion::between(&opened.world_from_camera, &shot.view.world_from_camera),
+        camera: Motion::between(&opened.world_from_camera, &request.view.world_from_camera),
     });
-    let eye =
+    let camera_rays =
         CameraRayGenerator { projection, lens, thin_lens: first.aperture.as_ref().and_then(ThinLens::from_aperture) };
     let (lamps, rows) = film.rows(ROWS);
     // A noise number of 0 leaves the seed as it is.
     let seed = seed ^ noise;
-    let (scene, moving) = (shot.scene, moving.as_ref());
+    let (scene, motion) = (request.scene, moving.as_ref());
     let paths = PathTracer {
         scene,
         tracer,
-        camera_rays: eye,
-        motion: moving,
+        camera_rays,
+        motion,
         samples,
         max_bounces,
         seed,
@@ -124,7 +125,7 @@ fn trace_colors(
         let Accumulator { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
         pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
-            denoise::filter_pass([width, k * ROWS], pass, plan.exposure, pixels, guides, to);
+            denoise::filter_pass([width, k * ROWS], pass, prepared.exposure, pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
     }
@@ -138,8 +139,8 @@ fn render_other_channels(
     exposure: &PathTraceJob<'_>,
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
-    let &PathTraceJob { request: shot, prepared: plan, interval, .. } = exposure;
-    let Some(projection) = &plan.projection else { return Ok(()) };
+    let &PathTraceJob { request, prepared, interval, .. } = exposure;
+    let Some(projection) = &prepared.projection else { return Ok(()) };
     let (width, height) = (projection.width, projection.height);
     let color = frame.color.take();
     let mut failure = Ok(());
@@ -149,7 +150,7 @@ fn render_other_channels(
             let first = Mutex::new(&mut failure);
             let rows = (0..height).map(move |y| (y, rest.split_off_first(width)));
             pool.for_each(rasterizers, rows, |rasterizer, (y, mut row)| {
-                if let Err(error) = rasterizer.render_row(shot, &interval, y, &mut row) {
+                if let Err(error) = rasterizer.render_row(request, &interval, y, &mut row) {
                     **first.lock().unwrap_or_else(PoisonError::into_inner) = Err(error);
                 }
             });
@@ -159,7 +160,7 @@ fn render_other_channels(
                 (row / BLOCK, rest.split_off_first(width * rows))
             });
             pool.for_each(rasterizers, bands, |rasterizer, (block, mut frame)| {
-                rasterizer.scratch.render_band(plan, shot, &mut frame, block..block + 1);
+                rasterizer.scratch.render_band(prepared, request, &mut frame, block..block + 1);
             });
         }
     }

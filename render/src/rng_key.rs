@@ -149,8 +149,8 @@ mod tests {
     fn covariance() {
         let times = [1, 2, 3, 5, 8, 100, 777];
         let n = 20_000;
-        let places = |age: u32| -> Vec<f64> {
-            let ticket = RngKey { due_images: age, epoch: 5, ..RngKey::new(1, 2, "eye") };
+        let places = |due_images: u32| -> Vec<f64> {
+            let ticket = RngKey { due_images, epoch: 5, ..RngKey::new(1, 2, "eye") };
             (0..n / 4).flat_map(|block| ticket.random_walks(RngStream::random_walk(1), block)).collect()
         };
         let walks: Vec<Vec<f64>> = times.iter().map(|&time| places(time)).collect();
@@ -175,9 +175,8 @@ mod tests {
         let step = |age: u32| -> Vec<f64> {
             (0..10_000)
                 .flat_map(|block| {
-                    let at = |age| {
-                        RngKey { due_images: age, ..RngKey::new(9, 0, "eye") }
-                            .random_walks(RngStream::random_walk(2), block)
+                    let at = |due_images| {
+                        RngKey { due_images, ..RngKey::new(9, 0, "eye") }.random_walks(RngStream::random_walk(2), block)
                     };
                     let (before, after) = (at(age - 1), at(age));
                     [0, 1, 2, 3].map(|k| after[k] - before[k])

@@ -39,7 +39,7 @@ impl RollingShutter {
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let Self { prepared: plan, poses, frame, size } = self;
+        let Self { prepared, poses, frame, size } = self;
         let ShutterInterval { opened, clock } = interval;
         let wanted = (shot.view.width, row.channels());
         if *size != wanted {
@@ -51,9 +51,9 @@ impl RollingShutter {
         poses.extend(opened.poses.iter().zip(shot.poses).map(|(from, to)| at(from, to)));
         let world_from_camera = at(&opened.world_from_camera, &shot.view.world_from_camera);
         let shot = RenderRequest { poses, view: &View { world_from_camera, ..*shot.view }, ..*shot };
-        plan.prepare_row(style, &shot, &frame.as_mut(), y)?;
+        prepared.prepare_row(style, &shot, &frame.as_mut(), y)?;
         let block = y / BLOCK;
-        brush.render_band(plan, &shot, &mut frame.as_mut(), block..block + 1);
+        brush.render_band(prepared, &shot, &mut frame.as_mut(), block..block + 1);
         row.take_row(frame, y % BLOCK, wanted.0);
         Ok(())
     }

@@ -105,7 +105,7 @@ impl Shutter {
         take: &FrameSample<'a>,
     ) -> Result<Option<ShutterInterval<'a>>, RenderError> {
         let Some(opened) = take.shutter_open.filter(|_| !self.is_instant()) else { return Ok(None) };
-        let ShutterOpenState { poses, world_from_camera, age: before } = opened;
+        let ShutterOpenState { poses, world_from_camera, age } = opened;
         let expected = shot.scene.instances().len();
         if poses.len() != expected {
             return Err(RenderError::PoseCount { expected, found: poses.len() });
@@ -118,11 +118,11 @@ impl Shutter {
         }
         let span = self.span(shot.view.height);
         // Tolerance of half a nanosecond: times are sums.
-        if !(before + 5e-10 >= span && before > 0.0 && before.is_finite()) {
-            return Err(RenderError::ShutterPoses { age: before, span });
+        if !(age + 5e-10 >= span && age > 0.0 && age.is_finite()) {
+            return Err(RenderError::ShutterPoses { age, span });
         }
         let last_row = shot.view.height.saturating_sub(1);
-        let clock = RowClock { last_row, row: self.row_time / before, exposure: self.exposure_time / before };
+        let clock = RowClock { last_row, row: self.row_time / age, exposure: self.exposure_time / age };
         Ok(Some(ShutterInterval { opened, clock }))
     }
 }

@@ -43,9 +43,9 @@ impl AtomicFile {
     ///
     /// # Errors
     /// The temporary file cannot be created, or exists already.
-    pub fn create_as(path: &Path, part: PathBuf) -> io::Result<Self> {
-        let file = File::create_new(&part)?;
-        Ok(Self { path: path.into(), temp_path: part, file, keep: false })
+    pub fn create_as(path: &Path, temp_path: PathBuf) -> io::Result<Self> {
+        let file = File::create_new(&temp_path)?;
+        Ok(Self { path: path.into(), temp_path, file, keep: false })
     }
 
     /// Writes a complete file and replaces a previous file at `path`.

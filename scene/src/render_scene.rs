@@ -206,19 +206,9 @@ impl RenderScene {
     ///
     /// As [`new`](Self::new).
     pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
-        let Self { headlight, ambient, lighting_space: light_sum, sky, haze, horizon, .. } = *self;
+        let Self { headlight, ambient, lighting_space, sky, haze, horizon, .. } = *self;
         let (lights, skybox) = (self.lights.clone(), self.skybox.clone());
-        Ok(Self {
-            lights,
-            headlight,
-            ambient,
-            lighting_space: light_sum,
-            sky,
-            skybox,
-            haze,
-            horizon,
-            ..Self::new(instances)?
-        })
+        Ok(Self { lights, headlight, ambient, lighting_space, sky, skybox, haze, horizon, ..Self::new(instances)? })
     }
 
     /// Creates a scene without instances, with the default lights and sky.

@@ -188,8 +188,8 @@ pub enum SensorError {
 
 impl SensorError {
     /// Wraps an error of one camera of a stereo camera.
-    pub(crate) fn of_stereo_camera(eye: &'static str) -> impl FnOnce(Self) -> Self {
-        move |error| Self::StereoCamera { side: eye, error: Box::new(error) }
+    pub(crate) fn of_stereo_camera(side: &'static str) -> impl FnOnce(Self) -> Self {
+        move |error| Self::StereoCamera { side, error: Box::new(error) }
     }
 }
 

@@ -88,8 +88,8 @@ impl SensorCfg for JointWrenchCfg {
         let links = select(&self.links, &context.bodies, "link")?;
         for &link in &links {
             if let Some(&carrier) = context.moving_bodies.get(link).filter(|&&carrier| carrier != link) {
-                let (link, carrier) = (context.bodies[link].clone(), context.bodies[carrier].clone());
-                return Err(SensorError::FusedLink { link, moving_link: carrier });
+                let (link, moving_link) = (context.bodies[link].clone(), context.bodies[carrier].clone());
+                return Err(SensorError::FusedLink { link, moving_link });
             }
         }
         let frames = select(&self.frames, &context.bodies, "link")?;

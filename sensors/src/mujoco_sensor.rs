@@ -221,13 +221,13 @@ mod tests {
     use std::collections::BTreeMap;
 
     fn context() -> SensorContext {
-        let sensor = |name: &str, kind: &str, first, width, solved| EngineSensor {
+        let sensor = |name: &str, kind: &str, first, width, force_stage| EngineSensor {
             name: name.into(),
             kind: kind.into(),
             unit: Some("m".into()),
             first,
             width,
-            force_stage: solved,
+            force_stage,
             is_quaternion: kind == "framequat",
         };
         let engine_sensors = [

@@ -339,7 +339,7 @@ impl Batch {
 impl LockedChunk<'_> {
     /// Calls `act` for every environment of the chunk, with its index and the read buffer of the chunk.
     fn for_each_env(&mut self, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
-        let Chunk { envs, read_values: read } = &mut *self.chunk;
+        let Chunk { envs, read_values } = &mut *self.chunk;
         for i in 0..envs.len() {
             // Prefetch the next environment while this one steps.
             if let Some(next) = envs.get(i + 1) {
@@ -348,7 +348,7 @@ impl LockedChunk<'_> {
                 next.envs.iter().take(1).for_each(|env| env.prefetch(self.exceeds_cache));
             }
             envs[i].forward_if_dirty();
-            act(self.first + i, &mut envs[i], read);
+            act(self.first + i, &mut envs[i], read_values);
         }
     }
 }

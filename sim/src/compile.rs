@@ -60,7 +60,7 @@ pub(crate) fn document(
     let mut diagnostics = Vec::new();
     let mut layouts = Vec::new();
     for (index, data) in contents.robots.iter().enumerate() {
-        let purpose = match purpose {
+        let dialect = match purpose {
             MjcfDialect::Simulation { .. } => {
                 MjcfDialect::Simulation { friction_tendons: data.cfg().drive.model == DriveModel::Implicit }
             }
@@ -74,7 +74,7 @@ pub(crate) fn document(
             plans: data.plans(),
             hulls: data.hulls(),
             reserve_friction_tendons: data.cfg().drive.friction.is_some(),
-            dialect: purpose,
+            dialect,
         };
         let layout = match data.file() {
             None => robot::add(data.description(), &robot_cfg, &mut mjcf, &mut diagnostics)?,
@@ -215,8 +215,8 @@ fn index_objects(compiled: &mj::Compiled, contents: &EntitySet) -> Result<Vec<Bo
     let find = |object: &RigidObjectData| {
         let body =
             compiled.id(ObjectKind::Body, object.uid()).ok_or_else(|| missing_name_error("body", object.uid()))?;
-        let joint = compiled.joint_address(&format!("{}/free", object.uid()));
-        Ok(BodyIndexing { body, free_joint: joint, mocap: None })
+        let free_joint = compiled.joint_address(&format!("{}/free", object.uid()));
+        Ok(BodyIndexing { body, free_joint, mocap: None })
     };
     contents.objects.iter().map(|object| find(object)).collect()
 }
@@ -262,7 +262,8 @@ fn index_mjcf(model: &mj::Model, part: &MjcfData) -> Result<MjcfIndexing> {
     let frames = part.frames().iter();
     let frames =
         frames.map(|frame| BodyFrame { body: bodies[frame.body], body_from_frame: frame.body_from_frame }).collect();
-    let mocaps = (0..file.nbody()).filter(|&body| file.body_mocapid()[body] >= 0).map(|body| bodies[body]).collect();
+    let mocap_bodies =
+        (0..file.nbody()).filter(|&body| file.body_mocapid()[body] >= 0).map(|body| bodies[body]).collect();
     Ok(MjcfIndexing {
         geoms: all(ObjectKind::Geom, "geom", &names.geoms)?,
         qpos,
@@ -271,7 +272,7 @@ fn index_mjcf(model: &mj::Model, part: &MjcfData) -> Result<MjcfIndexing> {
         controls: actuators.iter().map(|&actuator| model.actuator_control(actuator)).collect(),
         activations: actuators.iter().flat_map(|&actuator| model.actuator_activation(actuator)).collect(),
         actuators,
-        mocap_bodies: mocaps,
+        mocap_bodies,
         frames,
         bodies,
     })
@@ -427,10 +428,10 @@ impl CompiledScene {
         self,
         cfg: &SimulationManagerCfg,
         pool: &ThreadPool,
-        excluded: Vec<(String, String)>,
+        overlap_exclusions: Vec<(String, String)>,
     ) -> Result<Simulation> {
         let mut diagnostics = self.diagnostics;
-        for (a, b) in &excluded {
+        for (a, b) in &overlap_exclusions {
             diagnostics.push(Diagnostic::new(
                 DiagnosticKind::InitialOverlap,
                 None,
@@ -457,7 +458,7 @@ impl CompiledScene {
             property_overrides: vec![None; cfg.num_envs],
             env_scenes: Vec::new(),
             visual_proxies: self.proxies,
-            overlap_exclusions: excluded,
+            overlap_exclusions,
         };
         simulation.reset(&vec![true; cfg.num_envs]);
         Ok(simulation)

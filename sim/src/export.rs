@@ -135,7 +135,8 @@ fn prepare_for_plain_mujoco(
     simulation: &Simulation,
 ) -> Option<Diagnostic> {
     let followers = robots.iter().flat_map(|r| r.plans()).any(|plan| plan.mimic.is_some());
-    let step = mjcf.option.timestep.min(ARMATURE_STEP);
+    let simulated = mjcf.option.timestep;
+    let step = simulated.min(ARMATURE_STEP);
     let (plans, heavier) = add_armatures(mjcf, robots, step);
     let bound = |scheme| {
         let each = robots.iter().zip(&plans);
@@ -186,8 +187,7 @@ fn prepare_for_plain_mujoco(
     let holds_up_to = if followers { explicit } else { implicit };
     if mjcf.option.timestep > 0.9 * holds_up_to {
         mjcf.comments.push(format!(
-            "The time step is smaller than the simulation's {} s, so that the robot holds its start pose.",
-            mjcf.option.timestep
+            "The time step is smaller than the simulation's {simulated} s, so that the robot holds its start pose."
         ));
         mjcf.option.timestep = two_digits(0.9 * holds_up_to);
     }

@@ -69,17 +69,17 @@ impl SimulationManager {
             let version = mj::version_string();
             return Err(Error::UnsupportedIntegrator { integrator: cfg.integrator.name(), version });
         }
-        let contents = EntitySet::default();
+        let entities = EntitySet::default();
         let pool = ThreadPool::new();
-        let simulation = compile(&cfg, &contents, &pool)?;
+        let simulation = compile(&cfg, &entities, &pool)?;
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(serial, cfg.substeps);
         let visuals = VisualCache::default();
-        let draws = vec![0; cfg.num_envs];
+        let randomization_count = vec![0; cfg.num_envs];
         Ok(Self {
             serial,
             cfg,
-            entities: contents,
+            entities,
             visuals,
             ray_assets: RayAssetCache::default(),
             pool,
@@ -87,7 +87,7 @@ impl SimulationManager {
             simulation,
             sensors,
             observers: ObserverList::default(),
-            randomization_count: draws,
+            randomization_count,
             viewpoint: None,
         })
     }

@@ -54,7 +54,7 @@ fn columns(simulation: &Simulation) -> Vec<ColumnEffect> {
     let mut columns: Vec<ColumnEffect> =
         joints.map(|joint| joint.drive.map_or(ColumnEffect::Ignored, target)).collect();
     for part in &simulation.mjcf_models {
-        columns.extend(part.controls.iter().map(|&place| ColumnEffect::Control { ctrl_index: place }));
+        columns.extend(part.controls.iter().map(|&ctrl_index| ColumnEffect::Control { ctrl_index }));
     }
     columns
 }
@@ -68,7 +68,7 @@ fn apply_controls(env: &mut SimEnv, columns: &[ColumnEffect], values: impl Itera
                 env.drives.position[drive] = value.clamp(low, high);
             }
             ColumnEffect::Ignored => {}
-            ColumnEffect::Control { ctrl_index: place } => controls.push((place, value)),
+            ColumnEffect::Control { ctrl_index } => controls.push((ctrl_index, value)),
         }
     }
     if !controls.is_empty() {
@@ -169,8 +169,8 @@ impl SimulationManager {
         })?;
         let (mut entries, mut diverged) = (Vec::with_capacity(envs.len()), Vec::new());
         for (k, (entry, reason)) in results.into_iter().flatten().enumerate() {
-            let own = self.simulation.own_properties(entry.env, self.randomization_count[entry.env]);
-            entries.push(EnvEntry { overrides: own, ..entry });
+            let overrides = self.simulation.own_properties(entry.env, self.randomization_count[entry.env]);
+            entries.push(EnvEntry { overrides, ..entry });
             diverged.extend(reason.map(|reason| (k, reason)));
         }
         Ok(Rollout { states, final_states: Snapshot::new(&self.simulation, entries), diverged })
@@ -185,8 +185,8 @@ impl SimulationManager {
         match controls.indexed_iter().find(|(_, value)| !value.is_finite()) {
             None => Ok(()),
             Some(((row, step, column), &value)) => {
-                let of = format!("control {:?} of step {step}", self.entities().control_names()[column]);
-                Err(Error::NotFinite { argument: "rollout", row, column, item: of, value })
+                let item = format!("control {:?} of step {step}", self.entities().control_names()[column]);
+                Err(Error::NotFinite { argument: "rollout", row, column, item, value })
             }
         }
     }

@@ -230,8 +230,8 @@ impl<'a> SceneViewMut<'a> {
         let mujoco_body = body_frame(self.sim, body)?.body;
         for (of, numbers) in forces.iter().flat_map(|(point, force)| [("the point", point), ("the force", force)]) {
             if let Some(column) = numbers.iter().position(|x| !x.is_finite()) {
-                let (of, value) = (of.to_string(), numbers[column]);
-                return Err(Error::NotFinite { argument: "pull", row: env.0, column, item: of, value });
+                let (item, value) = (of.to_string(), numbers[column]);
+                return Err(Error::NotFinite { argument: "pull", row: env.0, column, item, value });
             }
         }
         self.sim.simulation.batch.write(env.0, |env| {
@@ -263,8 +263,8 @@ impl<'a> SceneViewMut<'a> {
                 expected: "eye and target must be finite and different, in meters",
             });
         }
-        let changes = self.sim.viewpoint.map_or(0, |view| view.revision) + 1;
-        self.sim.viewpoint = Some(Viewpoint { eye, target, revision: changes });
+        let revision = self.sim.viewpoint.map_or(0, |view| view.revision) + 1;
+        self.sim.viewpoint = Some(Viewpoint { eye, target, revision });
         Ok(())
     }
 
@@ -292,7 +292,7 @@ fn joint_axes(data: &Data) -> impl Iterator<Item = JointAxis> {
     let anchors = data.xanchor().as_chunks::<3>().0.iter().zip(data.xaxis().as_chunks::<3>().0);
     anchors.zip(data.model().jnt_type()).filter_map(|((anchor, axis), kind)| {
         let kind = *kind as u32;
-        let slides = kind == mj::mjJNT_SLIDE;
-        (slides || kind == mj::mjJNT_HINGE).then_some(JointAxis { anchor: *anchor, axis: *axis, is_slide: slides })
+        let is_slide = kind == mj::mjJNT_SLIDE;
+        (is_slide || kind == mj::mjJNT_HINGE).then_some(JointAxis { anchor: *anchor, axis: *axis, is_slide })
     })
 }

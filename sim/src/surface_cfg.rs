@@ -62,11 +62,11 @@ impl SurfaceCfg {
         patterns: &[(String, Self)],
         names: &[impl AsRef<str>],
         what: &'static str,
-        of: EntityLabel,
+        entity: EntityLabel,
     ) -> Result<Vec<(usize, Self)>> {
         patterns.iter().try_for_each(|(_, surface)| surface.validate())?;
         let surfaces = pattern::assign(patterns, &BTreeMap::new(), names, what)
-            .map_err(|error| Error::Surfaces { entity: of, error: Box::new(error) })?;
+            .map_err(|error| Error::Surfaces { entity, error: Box::new(error) })?;
         Ok(surfaces.into_iter().enumerate().filter_map(|(index, surface)| Some((index, surface?))).collect())
     }
 

@@ -96,9 +96,9 @@ impl Wrenches {
     /// Flat array: the number of wrenches, 14 numbers per wrench, then the weightless bodies.
     pub(crate) fn to_flat(&self) -> Vec<f64> {
         let mut numbers = vec![self.list.len() as f64];
-        for Wrench { owner: of, body, axes, force, torque } in &self.list {
+        for Wrench { owner, body, axes, force, torque } in &self.list {
             let q = axes.map_or([0.0; 4], |axes| [axes.w, axes.i, axes.j, axes.k]);
-            numbers.extend([of.0 as f64, of.1 as f64, *body as f64, f64::from(axes.is_some())]);
+            numbers.extend([owner.0 as f64, owner.1 as f64, *body as f64, f64::from(axes.is_some())]);
             numbers.extend(q.iter().chain(force).chain(torque));
         }
         numbers.extend(self.gravity_compensated.iter().map(|&body| body as f64));

@@ -266,13 +266,13 @@ struct StepOutput {
 fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Vec<Finding>) -> Option<Rollout> {
     let n = env.num_envs();
     let (seen, acted) = (env.observation_space().clone(), env.action_space().clone());
-    let begin =
+    let initial_observations =
         env.reset(None, Some(plan.seed)).map_err(|error| report_error("a reset with a seed", &error, found)).ok()?;
-    if !has_shape("the observation array of a reset", begin.shape(), &[n, seen.len()], found) {
+    if !has_shape("the observation array of a reset", initial_observations.shape(), &[n, seen.len()], found) {
         return None;
     }
-    check_bounds(&begin, &seen, "after the reset", found);
-    let mut run = Rollout { initial_observations: begin, steps: Vec::new() };
+    check_bounds(&initial_observations, &seen, "after the reset", found);
+    let mut run = Rollout { initial_observations, steps: Vec::new() };
     let mut watch = vec![AutoResetMonitor::default(); n];
     for step in 0..STEPS {
         let when = format!("step {step}");

@@ -150,14 +150,14 @@ impl Env {
         let actions = Array2::zeros((n, action_space.len()));
         let commands = terms.commands.iter();
         let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
-        let previous = actions.clone();
+        let previous_actions = actions.clone();
         let watch = ResetMonitor::new(n);
         let mut env = Self {
             reset_monitor: (watch.clone(), sim.observers_mut().add(watch)),
             episodes: (0..n).map(row).collect(),
             reward_sums: Array2::zeros((n, terms.rewards.len())),
             observations: Array2::zeros((n, observation_space.len())),
-            state: TaskState { sim, actions, previous_actions: previous, episode_steps: vec![0; n], commands },
+            state: TaskState { sim, actions, previous_actions, episode_steps: vec![0; n], commands },
             cfg,
             terms,
             observation_space,

@@ -39,10 +39,10 @@ impl EventTerm {
     /// Creates an event. `apply` gets one random number generator for each environment in which the event happens.
     pub fn new(
         name: impl Into<String>,
-        when: EventMode,
+        mode: EventMode,
         act: impl Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send + 'static,
     ) -> Self {
-        Self { name: name.into(), mode: when, apply: Box::new(act) }
+        Self { name: name.into(), mode, apply: Box::new(act) }
     }
 
     /// Creates an event that happens when an episode begins.

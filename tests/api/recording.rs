@@ -1,7 +1,7 @@
 //! The record button of viewers writes the same files as the recorder.
 
 use kinetoscope::FileRecording;
-use kinetoscope::record::{FieldSelector, RecordError, RecorderCfg, Recording, RecordingSummary};
+use kinetoscope::record::{FieldSelector, RecordError, Recorder, RecorderCfg, Recording, RecordingSummary};
 use kinetoscope::viewer::{Command, RecordButton, RecordControl as _, SnapshotRequest, Viewer, ViewerExt};
 use kinetoscope_testkit::worlds::{RecordedWorld, sr5};
 use std::collections::BTreeMap;
@@ -160,6 +160,34 @@ fn taken_names() {
     watched.viewer.send(Command::Record(true));
     watched.step_until("it is refused", |own| own.refused().is_some());
     assert!(watched.refused().unwrap().contains("missing") && !watched.recording_state().0);
+}
+
+/// Root cause: a start by the program replaced the handle of the running recording, which was then never finished.
+#[test]
+fn start_while_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = RecordedWorld::new(1, 1);
+    let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(folder.path().join("run.mcap")) };
+    let mut files = FileRecording::new(cfg);
+    files.start(&mut world.sim).unwrap();
+    world.step(0);
+    files.set(&mut world.sim, false).unwrap();
+    // The button records to the next file, and a start would record to the first one again.
+    files.set(&mut world.sim, true).unwrap();
+    world.step(1);
+    files.start(&mut world.sim).unwrap();
+    assert_eq!(world.sim.observers().ids::<Recorder>().len(), 1);
+    assert!(files.state(&world.sim).text.starts_with("run-2.mcap: "), "{:?}", files.state(&world.sim));
+    world.step(2);
+    let recorded = files.finish(&mut world.sim).unwrap();
+    let paths: Vec<_> = recorded.iter().map(|recorded| recorded.path.file_name().unwrap()).collect();
+    assert_eq!(paths, ["run.mcap", "run-2.mcap"]);
+    assert!(recorded.iter().all(|recorded| recorded.path.is_file()), "{recorded:?}");
+    // Control: without a running recording, the first file is written again.
+    files.start(&mut world.sim).unwrap();
+    assert!(files.state(&world.sim).text.starts_with("run.mcap: "), "{:?}", files.state(&world.sim));
+    world.step(3);
+    assert_eq!(files.finish(&mut world.sim).unwrap().len(), 1);
 }
 
 /// Regression: the error of a recording that was ended by the button was reported to the viewer only. The program's

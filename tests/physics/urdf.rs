@@ -87,8 +87,8 @@ pub(crate) struct Joint {
 impl Joint {
     fn new(kind: &'static str, name: &str, [parent, child]: [&str; 2], axis: [f64; 3]) -> Self {
         let [name, parent, child] = [name, parent, child].map(str::to_string);
-        let (limit, more) = (String::new(), String::new());
-        Self { name, kind, parent, child, xyz: [0.0; 3], rpy: [0.0; 3], axis, limit, extra_elements: more }
+        let (limit, extra_elements) = (String::new(), String::new());
+        Self { name, kind, parent, child, xyz: [0.0; 3], rpy: [0.0; 3], axis, limit, extra_elements }
     }
 
     /// A hinge without limits.

@@ -26,6 +26,8 @@ const FRAMES: usize = 14;
 const DEPTH: [f32; 2] = [0.4, 2.2];
 /// Largest difference of a color value that counts as no change.
 const TOLERANCE: u8 = 3;
+/// A transparent color far from all others, so that the quantization keeps it apart from them.
+const UNCHANGED: Rgba<u8> = Rgba([255, 0, 255, 0]);
 
 fn main() {
     let path = std::env::args_os().nth(1).expect("a file for the animation");
@@ -76,7 +78,7 @@ fn main() {
                 encoder
             });
             let mut changed = changes(&image, &mut shown);
-            let mut frame = Frame::from_rgba_speed(image.width() as u16, image.height() as u16, &mut changed, 10);
+            let mut frame = Frame::from_rgba_speed(image.width() as u16, image.height() as u16, &mut changed, 1);
             (frame.delay, frame.dispose) = (STEPS as u16, DisposalMethod::Keep);
             encoder.write_frame(&frame).unwrap();
         }
@@ -112,7 +114,7 @@ fn changes(image: &RgbaImage, shown: &mut Option<RgbaImage>) -> RgbaImage {
     let mut out = image.clone();
     for (pixel, before) in out.pixels_mut().zip(shown.pixels_mut()) {
         if pixel.0.iter().zip(before.0).all(|(a, b)| a.abs_diff(b) <= TOLERANCE) {
-            *pixel = Rgba([0; 4]);
+            *pixel = UNCHANGED;
         } else {
             *before = *pixel;
         }

@@ -222,8 +222,8 @@ mod tests {
     #[test]
     fn choices() {
         let mut sim = sample(3).sim;
-        let (size, shown) = ([64, 48], EnvSelection::One(1));
-        let cfg = ScreenshotCfg { size, camera: None, envs: shown, threads: Some(1), ..ScreenshotCfg::default() };
+        let (size, envs) = ([64, 48], EnvSelection::One(1));
+        let cfg = ScreenshotCfg { size, camera: None, envs, threads: Some(1), ..ScreenshotCfg::default() };
         let mut draw = |cfg: ScreenshotCfg| sim.render_image(&cfg);
         let canvas = draw(cfg).unwrap();
         assert_eq!(canvas.dimensions(), size);

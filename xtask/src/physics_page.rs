@@ -109,18 +109,11 @@ fn add(to: &mut PhysicsRun, law: &Value) -> Option<()> {
             let points = curve["points"].as_array()?.iter().map(|p| [number(&p[0]), number(&p[1])]).collect();
             series.push(Series { name: text(&curve["name"])?, points });
         }
-        let axes = [text(&plot["x"])?, text(&plot["y"])?];
-        let log = plot["log"].as_bool()?;
+        let axis_labels = [text(&plot["x"])?, text(&plot["y"])?];
+        let log_axes = plot["log"].as_bool()?;
         // A series with few points holds measurements, not samples of a curve.
-        let marks = series.iter().all(|series: &Series| series.points.len() <= 12);
-        let plot = Plot {
-            title: text(&plot["title"])?,
-            axis_labels: axes,
-            log_axes: log,
-            markers: marks,
-            series,
-            ..Plot::default()
-        };
+        let markers = series.iter().all(|series: &Series| series.points.len() <= 12);
+        let plot = Plot { title: text(&plot["title"])?, axis_labels, log_axes, markers, series, ..Plot::default() };
         to.plots.push((name.clone(), plot, mujoco.clone()));
     }
     Some(())

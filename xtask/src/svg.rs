@@ -45,8 +45,8 @@ mod tests {
     use super::*;
     use kinetoscope_plot::{Plot, Series};
 
-    fn svg(log: bool, points: &[[f64; 2]]) -> String {
-        let plot = Plot { title: "t".into(), axis_labels: ["x".into(), "y".into()], log_axes: log, ..Plot::default() };
+    fn svg(log_axes: bool, points: &[[f64; 2]]) -> String {
+        let plot = Plot { title: "t".into(), axis_labels: ["x".into(), "y".into()], log_axes, ..Plot::default() };
         plot.with(Series::new("a < b", points.iter().copied())).to_svg().expect("a size that can be drawn")
     }
 

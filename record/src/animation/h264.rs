@@ -85,14 +85,14 @@ impl H264Encoder {
     pub(super) fn encode(&mut self, rgba: &[u8]) -> CodedFrame<'_> {
         std::mem::swap(&mut self.current, &mut self.reference);
         self.current.fill(rgba, self.size);
-        let alone = self.frames_since_idr == 0;
-        self.slice(alone);
+        let is_idr = self.frames_since_idr == 0;
+        self.slice(is_idr);
         self.frames_since_idr = (self.frames_since_idr + 1) % IDR_INTERVAL;
-        CodedFrame { unit: &self.unit, is_idr: alone }
+        CodedFrame { unit: &self.unit, is_idr }
     }
 
     fn slice(&mut self, alone: bool) {
-        let Self { current: now, reference: before, bits, above, .. } = self;
+        let Self { current, reference, bits, above, .. } = self;
         bits.clear();
         bits.ue(0); // first_mb_in_slice
         bits.ue(if alone { 7 } else { 5 }); // slice_type: all I, all P
@@ -112,13 +112,13 @@ impl H264Encoder {
         // In P slices, intra macroblock types follow five others (table 7-13).
         let first_type = if alone { 0 } else { 5 };
         let mut skipped = 0;
-        let [columns, rows] = now.macroblocks;
+        let [columns, rows] = current.macroblocks;
         above.fill(false);
         for row in 0..rows {
             let mut left = false;
             for column in 0..columns {
                 let place = [column, row];
-                if !alone && now.equals(before, place) {
+                if !alone && current.equals(reference, place) {
                     skipped += 1;
                     (above[column], left) = (false, false);
                     continue;
@@ -129,7 +129,7 @@ impl H264Encoder {
                 }
                 let goes_on = [IntraPrediction::Vertical, IntraPrediction::Horizontal]
                     .into_iter()
-                    .find(|way| now.is_predicted(*way, place));
+                    .find(|way| current.is_predicted(*way, place));
                 if let Some(way) = goes_on {
                     // Intra_16x16 without coefficients (table 7-11): luma mode, then chroma mode (table 7-16).
                     let (luma, chroma) = match way {
@@ -155,7 +155,7 @@ impl H264Encoder {
                 } else {
                     bits.ue(first_type + 25); // I_PCM
                     bits.align();
-                    now.put(place, bits);
+                    current.put(place, bits);
                 }
                 (above[column], left) = (goes_on.is_none(), goes_on.is_none());
             }
@@ -181,9 +181,9 @@ enum IntraPrediction {
 }
 
 impl YuvFrame {
-    fn new(squares: [usize; 2]) -> Self {
-        let luma = squares[0] * squares[1] * MB_SIZE * MB_SIZE;
-        Self { macroblocks: squares, planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
+    fn new(macroblocks: [usize; 2]) -> Self {
+        let luma = macroblocks[0] * macroblocks[1] * MB_SIZE * MB_SIZE;
+        Self { macroblocks, planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
     }
 
     /// Side of a macroblock in a plane, and length of the plane's rows \[samples\].

@@ -19,8 +19,8 @@ pub(super) struct H264Level {
     min_cr: u64,
 }
 
-const fn level(code: u8, per_second: u64, squares: usize, rate: u64, waiting: u64, fewer: u64) -> H264Level {
-    H264Level { code, max_mbps: per_second, max_fs: squares, max_br: rate, max_cpb: waiting, min_cr: fewer }
+const fn level(code: u8, max_mbps: u64, max_fs: usize, max_br: u64, max_cpb: u64, min_cr: u64) -> H264Level {
+    H264Level { code, max_mbps, max_fs, max_br, max_cpb, min_cr }
 }
 
 const LEVELS: [H264Level; 19] = [

@@ -67,12 +67,12 @@ fn create_encoder(path: &Path, format: Format, size: [usize; 2]) -> Result<Box<d
     // Callers use animation formats only.
     let begin = encoder(format).ok_or_else(|| RecordError::NothingToRecord { path: path.into(), format })?;
     let [width, height] = size;
-    begin(size).map_err(|fits| RecordError::UnsupportedSize {
+    begin(size).map_err(|supported| RecordError::UnsupportedSize {
         path: path.into(),
         format,
         width,
         height,
-        supported: fits,
+        supported,
     })
 }
 

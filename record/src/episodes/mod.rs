@@ -102,7 +102,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
     pub(crate) fn new(
         dataset: D,
         features: Arc<Features>,
-        every: u64,
+        period_steps: u64,
         envs: &[usize],
         streams: &[StreamSchema],
     ) -> Self {
@@ -115,7 +115,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
             pending_step: 0,
             awaiting_result: None,
         };
-        Self { dataset, features, period_steps: every, envs: envs.iter().map(none).collect() }
+        Self { dataset, features, period_steps, envs: envs.iter().map(none).collect() }
     }
 
     /// True if the row of a step is a frame, regardless of events.
@@ -164,8 +164,8 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
 
     /// Adds the frame that waits for results, because no further ones follow.
     fn add_complete_frame(&mut self, k: usize) -> WriteResult {
-        let EnvFrames { pending, awaiting_result: complete, .. } = &mut self.envs[k];
-        match (complete.take(), pending) {
+        let EnvFrames { pending, awaiting_result, .. } = &mut self.envs[k];
+        match (awaiting_result.take(), pending) {
             (Some(frame), Some(next)) => self.dataset.add(k, &frame, next),
             _ => Ok(()),
         }
@@ -174,9 +174,9 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
     /// Adds the result of a task step.
     fn add_result(&mut self, k: usize, values: &[f64], step: u64) {
         let [reward, terminated, truncated] = *values else { return };
-        let EnvFrames { pending, pending_step: pending_at, awaiting_result: complete, .. } = &mut self.envs[k];
+        let EnvFrames { pending, pending_step, awaiting_result, .. } = &mut self.envs[k];
         // A result at the step of the pending row belongs to the action of the frame before it, if there is one.
-        let frame = if step == *pending_at { complete } else { pending };
+        let frame = if step == *pending_step { awaiting_result } else { pending };
         if let Some(frame) = frame {
             frame.reward += reward;
             frame.done |= terminated > 0.0 || truncated > 0.0;
@@ -186,8 +186,8 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
     /// Ends the episode of an environment.
     fn end_episode(&mut self, k: usize) -> WriteResult {
         // Results after the last frame are added to it, because the row after it is no frame.
-        let EnvFrames { pending, awaiting_result: complete, .. } = &mut self.envs[k];
-        if let (Some(last), Some(rest)) = (complete, pending) {
+        let EnvFrames { pending, awaiting_result, .. } = &mut self.envs[k];
+        if let (Some(last), Some(rest)) = (awaiting_result, pending) {
             last.reward += rest.reward;
             last.done |= rest.done;
         }

@@ -101,10 +101,10 @@ fn frames_per_second(path: &Path, dt: f64, every: u64) -> Result<u64> {
         let rate = 1.0 / (dt * *every as f64);
         rate >= 1.0 && (rate - rate.round()).abs() < 1e-8 * rate
     };
-    let mut near: Vec<u64> = (1..=1000).filter(fits).collect();
-    near.sort_by_key(|other| other.abs_diff(every));
-    near.truncate(3);
-    Err(RecordError::UnsupportedRate { path: path.into(), every, found, candidates: near })
+    let mut candidates: Vec<u64> = (1..=1000).filter(fits).collect();
+    candidates.sort_by_key(|other| other.abs_diff(every));
+    candidates.truncate(3);
+    Err(RecordError::UnsupportedRate { path: path.into(), every, found, candidates })
 }
 
 /// Name of a role in a dataset. Feature names must not contain slashes.
@@ -131,8 +131,8 @@ pub(crate) fn create(
     dt: f64,
     disk: &StorageFactory,
 ) -> Result<Box<dyn FormatWriter>> {
-    let RecorderCfg { path, period_steps: every, overwrite, task, .. } = cfg;
-    let fps = frames_per_second(path, dt, *every)?;
+    let RecorderCfg { path, period_steps, overwrite, task, .. } = cfg;
+    let fps = frames_per_second(path, dt, *period_steps)?;
     let features = Arc::new(Features::of(path, Format::LeRobot, streams, name_of)?);
     let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
     let statistics = statistics.chain(features.images.iter().map(|_| Statistics::new(3)));
@@ -153,7 +153,7 @@ pub(crate) fn create(
         statistics,
         png: PngWriter::default(),
     };
-    Ok(Box::new(EpisodeSplitter::new(dataset, features, *every, &envs, streams)))
+    Ok(Box::new(EpisodeSplitter::new(dataset, features, *period_steps, &envs, streams)))
 }
 
 /// Columns of a frame.

@@ -55,8 +55,8 @@ impl ImageStatistics {
             if let (Some(least), Some(largest)) = (values().min(), values().max()) {
                 let mean = sum as f64 / count;
                 let about = (squares as f64 - mean * sum as f64).max(0.0) / (255.0 * 255.0);
-                let ends = [least, largest].map(|end| end as f64 / 255.0);
-                *moments = Moments { count, mean: mean / 255.0, squared_deviations: about, range: ends };
+                let range = [least, largest].map(|end| end as f64 / 255.0);
+                *moments = Moments { count, mean: mean / 255.0, squared_deviations: about, range };
             }
         }
         Self(all)

@@ -61,12 +61,9 @@ pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Re
                         schemas.insert(header.id, (header.name, reads));
                     }
                     Record::Channel(channel) => {
-                        let (kind, reads) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                        let reads = reads.filter(|_| channel.message_encoding == "cdr");
-                        channels.insert(
-                            channel.id,
-                            McapChannel { topic: channel.topic, type_name: kind, message_type: reads },
-                        );
+                        let (type_name, reads) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                        let message_type = reads.filter(|_| channel.message_encoding == "cdr");
+                        channels.insert(channel.id, McapChannel { topic: channel.topic, type_name, message_type });
                     }
                     Record::Message { header, data } => {
                         let Some(channel) = channels.get(&header.channel_id) else {

@@ -59,20 +59,10 @@ impl StreamAssembler {
         };
         let parts: Vec<_> = stream["arrays"].as_array()?.iter().map(part).collect::<Option<_>>()?;
         // Rows have the width of their messages, so that a declared width cannot request memory.
-        let (now, rows) = (vec![Vec::new(); parts.len() * envs.len()], vec![Vec::new(); parts.len()]);
-        let told = vec![false; parts.len() * envs.len()];
+        let (present_row, rows) = (vec![Vec::new(); parts.len() * envs.len()], vec![Vec::new(); parts.len()]);
+        let has_message = vec![false; parts.len() * envs.len()];
         let (name, frames) = (stream["name"].as_str()?.to_string(), texts(&stream["columns"]));
-        Some(Self {
-            name,
-            envs,
-            parts,
-            frames,
-            steps: Vec::new(),
-            rows,
-            present_row: now,
-            has_message: told,
-            step: 0.0,
-        })
+        Some(Self { name, envs, parts, frames, steps: Vec::new(), rows, present_row, has_message, step: 0.0 })
     }
 
     /// Adds the values of an array in an environment at a step; `None` if they do not have the declared width.
@@ -237,7 +227,7 @@ pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
     })?;
     let missing =
         |name: &str| malformed(format!("it has no {name}: it was not written by this recorder, or by an older one"));
-    let (about, start) = (about.ok_or_else(|| missing(METADATA))?, start.ok_or_else(|| missing(INITIAL_STATE))?);
+    let (metadata, start) = (about.ok_or_else(|| missing(METADATA))?, start.ok_or_else(|| missing(INITIAL_STATE))?);
     let mut arrays = Arrays::new();
     for mut stream in streams {
         stream.end_row().ok_or_else(|| malformed(format!("{} lacks an environment", stream.name)))?;
@@ -253,5 +243,5 @@ pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
     for (name, numbers) in ["step", "env", "kind", "time"].into_iter().zip(events) {
         arrays.insert(format!("events/{name}"), (vec![numbers.len()], numbers));
     }
-    Ok(McapArrays { metadata: about, start, arrays })
+    Ok(McapArrays { metadata, start, arrays })
 }

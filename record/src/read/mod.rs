@@ -55,7 +55,7 @@ pub struct RecordedTopic {
 /// Selection of a number in every message of a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FieldSelector {
-    /// Full name of the topic.
+    /// Name of the topic, or the end of its name, as for [`Recording::topic`].
     pub topic: String,
     /// Name of the number.
     pub field: String,
@@ -171,20 +171,18 @@ impl Recording {
     /// # Errors
     /// A topic or a field is unknown (the error lists the nearest ones), or the file has changed since it was opened.
     pub fn time_series(&self, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
-        for FieldSelector { topic, field } in wanted {
-            let topic = match self.topics.iter().find(|known| known.name == *topic) {
-                Some(topic) => topic,
-                None => self.topic(topic, None)?,
-            };
-            if !topic.fields.iter().any(|known| known == field) {
-                let what = "field";
-                let candidates = nearest(field, &topic.fields);
-                return Err(RecordError::UnknownName { what, name: format!("{field} in {}", topic.name), candidates });
+        let with_full_name = |FieldSelector { topic, field }: &FieldSelector| {
+            let topic = self.topic(topic, None)?;
+            if topic.fields.contains(field) {
+                return Ok(FieldSelector::new(&topic.name, field));
             }
-        }
+            let (what, candidates) = ("field", nearest(field, &topic.fields));
+            Err(RecordError::UnknownName { what, name: format!("{field} in {}", topic.name), candidates })
+        };
+        let wanted = wanted.iter().map(with_full_name).collect::<Result<Vec<_>>>()?;
         match &self.content {
-            Content::Mcap => mcap::samples(&self.path, wanted),
-            Content::Npz(archive) => npz::samples(archive, wanted),
+            Content::Mcap => mcap::samples(&self.path, &wanted),
+            Content::Npz(archive) => npz::samples(archive, &wanted),
         }
     }
 

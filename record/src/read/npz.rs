@@ -37,8 +37,8 @@ fn streams(archive: &RecordedArrays) -> Vec<RecordedStream<'_>> {
             // Uses the shape of the array, not the declared one.
             let shape = archive.shape(array)?.get(2..)?;
             let own = array.strip_prefix(name).unwrap_or(array).trim_start_matches('/');
-            let of_forces = part["of_forces"].as_bool().unwrap_or(false);
-            Some(ArrayField { array, fields: fields(own, &columns, shape), at_force_time: of_forces })
+            let at_force_time = part["of_forces"].as_bool().unwrap_or(false);
+            Some(ArrayField { array, fields: fields(own, &columns, shape), at_force_time })
         });
         let env_ids = envs.filter_map(|env| usize::try_from(env).ok()).collect();
         Some(RecordedStream { name, env_ids, parts: parts.collect() })

@@ -105,8 +105,8 @@ fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) 
 fn assert_too_small(sim: &mut SimulationManager, path: &Path, left: usize, part: Option<&Path>) {
     let error = record_to_a_full_disk(sim, path, left).unwrap_err();
     assert!(error.to_string().contains("no space left"), "{left}: {error}");
-    let RecordError::File { partial_file: kept, .. } = error else { panic!("{left}: {error:?}") };
-    assert_eq!((kept.as_deref(), path.exists()), (part, false), "{left}");
+    let RecordError::File { partial_file, .. } = error else { panic!("{left}: {error:?}") };
+    assert_eq!((partial_file.as_deref(), path.exists()), (part, false), "{left}");
 }
 
 /// On a full disk, the partial folder of images contains complete images only.

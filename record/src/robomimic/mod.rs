@@ -114,11 +114,11 @@ fn name_of(role: &Role) -> String {
 
 /// Datasets of an episode, and size of the record of a frame \[bytes\].
 fn columns(features: &Features) -> (Vec<DatasetColumn>, usize) {
-    let (mut columns, mut at) = (Vec::new(), 0);
+    let (mut columns, mut offset) = (Vec::new(), 0);
     let mut add = |path: String, kind: ColumnKind| {
         let bytes = kind.bytes();
-        columns.push(DatasetColumn { path, offset: at, kind });
-        at += bytes;
+        columns.push(DatasetColumn { path, offset, kind });
+        offset += bytes;
     };
     for of in ["obs", "next_obs"] {
         for feature in &features.numbers {
@@ -137,12 +137,12 @@ fn columns(features: &Features) -> (Vec<DatasetColumn>, usize) {
         add("rewards".into(), ColumnKind::Scalar);
         add("dones".into(), ColumnKind::Integer);
     }
-    (columns, at)
+    (columns, offset)
 }
 
 /// Creates a dataset; `dt` is the physics time step \[s\].
 pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Result<Box<dyn FormatWriter>> {
-    let RecorderCfg { path, period_steps: every, overwrite, task, .. } = cfg;
+    let RecorderCfg { path, period_steps, overwrite, task, .. } = cfg;
     let features = Arc::new(Features::of(path, Format::Hdf5, streams, name_of)?);
     if !features.numbers.iter().any(|feature| feature.role == Role::Action) {
         let topic = "a recording without actions; record joint targets, or states with controls".into();
@@ -151,24 +151,24 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Re
     // Each image is one chunk of the file.
     let too_large = |[width, height]: [usize; 2]| 3 * width as u128 * height as u128 > u128::from(u32::MAX);
     if let Some([width, height]) = features.images.iter().map(|image| image.size).find(|size| too_large(*size)) {
-        let fits = "three bytes per pixel must be less than 4 GiB".into();
+        let supported = "three bytes per pixel must be less than 4 GiB".into();
         return Err(RecordError::UnsupportedSize {
             path: path.clone(),
             format: Format::Hdf5,
             width,
             height,
-            supported: fits,
+            supported,
         });
     }
     let envs = episodes::environments(path, streams)?;
     let (columns, _) = columns(&features);
     let names = features.numbers.iter().map(|feature| (feature.name.clone(), json!(feature.names)));
     let names: Map<String, Value> = names.collect();
-    let about = json!({
+    let env_args = json!({
         "env_name": "kinetoscope",
         "env_type": GYM,
         "type": GYM,
-        "env_kwargs": { "task": task, "physics_dt": dt, "every": every, "columns": names },
+        "env_kwargs": { "task": task, "physics_dt": dt, "every": period_steps, "columns": names },
     });
     let (part, _) = PartialFile::create(path, *overwrite, false)?;
     let heap = || BlockFile::create(parent_dir(path)).map_err(|error| RecordError::file(path, error));
@@ -176,7 +176,7 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Re
         part,
         features: Arc::clone(&features),
         columns,
-        env_args: about,
+        env_args,
         envs: envs.clone(),
         open_episodes: envs.iter().map(|_| None).collect(),
         episodes: Vec::new(),
@@ -184,7 +184,7 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[StreamSchema], dt: f64) -> Re
         image_file: heap()?,
         rgb: Vec::new(),
     };
-    Ok(Box::new(EpisodeSplitter::new(dataset, features, *every, &envs, streams)))
+    Ok(Box::new(EpisodeSplitter::new(dataset, features, *period_steps, &envs, streams)))
 }
 
 impl DatasetWriter for RobomimicWriter {

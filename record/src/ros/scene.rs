@@ -26,7 +26,7 @@ fn write_entity(
     to: &mut CdrWriter,
     at: RosHeader<'_>,
     entity: &Entity,
-    InstanceVisual { shape: form, rgba }: &InstanceVisual,
+    InstanceVisual { shape, rgba }: &InstanceVisual,
 ) {
     time(to, at.nanos);
     match &entity.frame {
@@ -46,7 +46,7 @@ fn write_entity(
     }
     // Arrows, cubes, spheres, cylinders, lines, triangles, texts, models.
     for kind in 0..8 {
-        match (kind, form) {
+        match (kind, shape) {
             (1, VisualShape::Box(size)) | (2, VisualShape::Ellipsoid(size)) => {
                 to.length(1);
                 pose(to, &entity.pose);
@@ -63,7 +63,7 @@ fn write_entity(
             }
             (5, VisualShape::Mesh(..) | VisualShape::Triangles(_)) => {
                 to.length(1);
-                triangles(to, entity, form, *rgba);
+                triangles(to, entity, shape, *rgba);
             }
             _ => to.length(0),
         }

@@ -119,13 +119,13 @@ fn no_side_effect() {
 #[test]
 fn reset() {
     let at_each: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10];
-    for (every, undisturbed, reset) in [(1, &(0..=10).collect::<Vec<_>>()[..], at_each), (10, &[0, 10], &[0, 6, 10])] {
+    for (period_steps, undisturbed, reset) in
+        [(1, &(0..=10).collect::<Vec<_>>()[..], at_each), (10, &[0, 10], &[0, 6, 10])]
+    {
         let (_folder, path) = scratch("run.mcap");
         let mut world = World::new(2, 2);
-        let cfg = RecorderCfg {
-            period_steps: every,
-            ..RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())])
-        };
+        let cfg =
+            RecorderCfg { period_steps, ..RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]) };
         let recorder = world.sim.record(cfg).unwrap();
         (0..6).for_each(|step| world.step(step));
         world.sim.reset(Some(&[EnvId(1)])).unwrap();

@@ -148,10 +148,10 @@ fn changed_scene() {
         assert!(observer.has_failed());
         observer.wait_until_written();
         let error = world.sim.finish_recording(recorder).unwrap_err();
-        let RecordError::Aborted { error, write_error: also, partial_file: kept } = error else { panic!("{error}") };
+        let RecordError::Aborted { error, write_error, partial_file } = error else { panic!("{error}") };
         assert!(matches!(&*error, RecordError::StreamChanged { stream, .. } if stream == "joints"), "{error}");
-        assert!(also.is_none() && !path.exists(), "{name}");
-        assert_eq!(kept, keeps.then(|| path.with_extension("mcap.part")));
+        assert!(write_error.is_none() && !path.exists(), "{name}");
+        assert_eq!(partial_file, keeps.then(|| path.with_extension("mcap.part")));
         if keeps {
             recover(&path).unwrap();
             let steps = steps_of(&messages(&path), "/env_0/arm/joint_states");

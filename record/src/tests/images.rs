@@ -200,8 +200,8 @@ const STAGE: [usize; 2] = [96, 64];
 fn stage_animations() {
     for (_, end) in animations() {
         let (_folder, path) = scratch(&format!("run.{end}"));
-        let stage = OverviewCfg { size: STAGE, fps: 20.0, ..OverviewCfg::default() };
-        let cfg = RecorderCfg { overview: stage, topics: vec![Topic::Overview], ..RecorderCfg::new(&path) };
+        let overview = OverviewCfg { size: STAGE, fps: 20.0, ..OverviewCfg::default() };
+        let cfg = RecorderCfg { overview, topics: vec![Topic::Overview], ..RecorderCfg::new(&path) };
         record_steps(&mut World::new(2, 2), cfg, 30);
         if end == "mp4" {
             // The script checks the rate of smaller images.
@@ -236,9 +236,9 @@ fn stage_by_camera() {
         ..CameraCfg::default()
     };
     world.sim.add_sensor("judge", camera).unwrap();
-    let stage = OverviewCfg { size: STAGE, fps: 20.0, eye: Some(eye), target: Some(target) };
+    let overview = OverviewCfg { size: STAGE, fps: 20.0, eye: Some(eye), target: Some(target) };
     let topics = vec![Topic::Overview, Topic::channel("judge", "color")];
-    record_steps(&mut world, RecorderCfg { overview: stage, topics, ..RecorderCfg::new(&path) }, 20);
+    record_steps(&mut world, RecorderCfg { overview, topics, ..RecorderCfg::new(&path) }, 20);
     let image = |of: &str, k: usize| std::fs::read(path.join(format!("{of}/color/env_0/{k:06}.png"))).unwrap();
     for k in 0..4 {
         // The overview also has an image at the beginning.
@@ -258,12 +258,12 @@ fn stage_alone() {
         assert!(recorded.packets > 1, "{name}");
     }
     assert!(folder.path().join("images/stage/color/env_0/000000.png").is_file());
-    for (stage, wrong) in [
+    for (overview, wrong) in [
         (OverviewCfg { fps: 0.0, ..OverviewCfg::default() }, "rate"),
         (OverviewCfg { size: [0, 10], ..OverviewCfg::default() }, "pixels"),
         (OverviewCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..OverviewCfg::default() }, "from"),
     ] {
-        let cfg = RecorderCfg { overview: stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
+        let cfg = RecorderCfg { overview, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
         kinetoscope_testkit::error_tables::assert_error(sim.record(cfg), "Overview", &[wrong]);
     }
 }

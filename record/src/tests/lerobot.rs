@@ -50,9 +50,9 @@ fn unfinished() {
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     // Without a measurement, there is no frame.
     let error = world.sim.finish_recording(recorder).unwrap_err();
-    let RecordError::Aborted { error, partial_file: kept, .. } = error else { panic!("{error}") };
+    let RecordError::Aborted { error, partial_file, .. } = error else { panic!("{error}") };
     assert!(matches!(&*error, RecordError::NoFrame { path: of, .. } if *of == path), "{error}");
-    assert_eq!(kept.as_deref(), Some(&*part));
+    assert_eq!(partial_file.as_deref(), Some(&*part));
     assert!(!path.exists() && part.exists());
     // The partial dataset is neither accepted as complete nor deleted.
     let error = world.sim.record(RecorderCfg::new(&path)).unwrap_err();

@@ -92,8 +92,8 @@ impl<S: Simd> ShearedPacket<S> {
         let [i, j] = [(last + 1) % 3, (last + 2) % 3];
         let origin = packet.origins(s);
         let inverse = D::splat(s, 1.0) / d[last];
-        let by = [d[i] * inverse, d[j] * inverse, inverse];
-        Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], shear: by })
+        let shear = [d[i] * inverse, d[j] * inverse, inverse];
+        Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], shear })
     }
 
     /// Permutation of the axes; the dominant axis of the rays comes last.

@@ -112,8 +112,8 @@ impl RayTargets {
         let mut out = Self { targets: vec![], fixed: vec![], moving: vec![], instances: is_wanted.len() };
         assets.with(|assets| {
             for (index, instance) in scene.instances().iter().enumerate().filter(|(index, _)| is_wanted[*index]) {
-                let solid = RayGeometry::from_shape(&instance.shape, assets);
-                let sphere = solid.bounds().map(|[lo, hi]| {
+                let geometry = RayGeometry::from_shape(&instance.shape, assets);
+                let sphere = geometry.bounds().map(|[lo, hi]| {
                     let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
                     ([0, 1, 2].map(|k| 0.5 * (hi[k] + lo[k])), dot(half, half).sqrt() * BOUNDS_SCALE)
                 });
@@ -123,7 +123,7 @@ impl RayTargets {
                     instance: index as u32,
                     mask_id: instance.mask_id,
                     visible: instance.visible,
-                    geometry: solid,
+                    geometry,
                     sphere,
                 });
             }
@@ -171,8 +171,8 @@ impl RayTargets {
         if !pose.is_finite() || !target.visible {
             return None;
         }
-        let (middle, radius) = target.sphere.map_or(([0.0; 3], f64::INFINITY), |(m, r)| (pose.apply(m), r));
-        Some(PlacedTarget { target: index, world_from_target: pose, center: middle, radius })
+        let (center, radius) = target.sphere.map_or(([0.0; 3], f64::INFINITY), |(m, r)| (pose.apply(m), r));
+        Some(PlacedTarget { target: index, world_from_target: pose, center, radius })
     }
 }
 
@@ -186,15 +186,15 @@ impl FixedTargets {
     pub fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
         let placed: Vec<PlacedTarget> =
             targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();
-        let (mut in_tree, mut one_by_one): (Vec<u32>, Vec<u32>) =
+        let (mut in_tree, mut unindexed): (Vec<u32>, Vec<u32>) =
             (0..placed.len() as u32).partition(|&k| placed[k as usize].radius < f64::from(f32::MAX));
         if in_tree.len() <= MAX_LINEAR_TARGETS {
-            one_by_one.append(&mut in_tree);
-            return Self { placed, bvh: None, unindexed: one_by_one };
+            unindexed.append(&mut in_tree);
+            return Self { placed, bvh: None, unindexed };
         }
         let (bvh, order) = Bvh::build(in_tree.iter().map(|&k| targets.world_box(&placed[k as usize])));
         let order = order.into_iter().map(|i| in_tree[i as usize]).collect();
-        Self { placed, bvh: Some((bvh, order)), unindexed: one_by_one }
+        Self { placed, bvh: Some((bvh, order)), unindexed }
     }
 
     /// True if the fixed targets are still at the poses that this was built for.

@@ -281,13 +281,8 @@ fn check_not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError
         return Ok(());
     }
     let reach = ((u - f.cx) / f.fx).hypot((v - f.cy) / f.fy);
-    let wanted = format!("pixel ({u:.1}, {v:.1}) is at radius {reach:.4}");
-    Err(OpticsError::LensFolds {
-        lens: optics.lens().name(),
-        angle: domain.angle,
-        radius: domain.radius,
-        requirement: wanted,
-    })
+    let requirement = format!("pixel ({u:.1}, {v:.1}) is at radius {reach:.4}");
+    Err(OpticsError::LensFolds { lens: optics.lens().name(), angle: domain.angle, radius: domain.radius, requirement })
 }
 
 /// All other fields follow from these.

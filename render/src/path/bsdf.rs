@@ -138,16 +138,16 @@ impl Bsdf {
         }
         let rest = self.scattered_fraction();
         let (into, out) = (self.fresnel(o[2]), self.fresnel(i[2]));
-        let below = [0, 1, 2].map(|k| rest * self.diffuse_albedo[k] * (1.0 - into[k]) * (1.0 - out[k]) * i[2] / PI);
+        let diffuse = [0, 1, 2].map(|k| rest * self.diffuse_albedo[k] * (1.0 - into[k]) * (1.0 - out[k]) * i[2] / PI);
         if self.is_matt() {
-            return BsdfValue { diffuse: below, specular: [0.0; 3] };
+            return BsdfValue { diffuse, specular: [0.0; 3] };
         }
         let half = [0, 1, 2].map(|k| o[k] + i[k]);
         let length = dot(half, half).sqrt();
         let (tilt, angle) = (half[2] / length, dot(half, o) / length);
         let root = |cos: f64| (self.alpha2 + (1.0 - self.alpha2) * cos * cos).sqrt();
         let seen_twice = 1.0 / (2.0 * (o[2] * root(i[2]) + i[2] * root(o[2])));
-        BsdfValue { diffuse: below, specular: scale(self.fresnel(angle), rest * self.ndf(tilt) * seen_twice * i[2]) }
+        BsdfValue { diffuse, specular: scale(self.fresnel(angle), rest * self.ndf(tilt) * seen_twice * i[2]) }
     }
 
     /// Probability of sampling the layer.
@@ -192,10 +192,10 @@ impl Bsdf {
         if direction[2] <= 0.0 {
             return None;
         }
-        let likely = self.pdf(o, direction);
-        let BsdfValue { diffuse: below, specular: layer } = self.evaluate(o, direction);
-        let weight = [0, 1, 2].map(|k| (below[k] + layer[k]) / likely);
-        Some(BsdfSample { direction, weight, is_specular: false, pdf: likely })
+        let pdf = self.pdf(o, direction);
+        let BsdfValue { diffuse, specular } = self.evaluate(o, direction);
+        let weight = [0, 1, 2].map(|k| (diffuse[k] + specular[k]) / pdf);
+        Some(BsdfSample { direction, weight, is_specular: false, pdf })
     }
 
     /// Probability density \[1/sr\] with which [`sample`](Self::sample) returns the direction `i` for the outgoing
@@ -277,8 +277,8 @@ mod tests {
                 let mut all = 0.0;
                 for [c, s] in &turns {
                     for [z, r] in &heights {
-                        let BsdfValue { diffuse: below, specular: layer } = lobe.evaluate(o, [r * c, r * s, *z]);
-                        all += (below[0] + layer[0]) * 2.0 * PI / f64::from(n * n);
+                        let BsdfValue { diffuse, specular: layer } = lobe.evaluate(o, [r * c, r * s, *z]);
+                        all += (diffuse[0] + layer[0]) * 2.0 * PI / f64::from(n * n);
                     }
                 }
                 let chosen = mean(&lobe, o, ([1, 2], 3), 14, |next| next.weight[0]);

@@ -36,7 +36,7 @@ impl SurfaceInteraction {
         let position = ray.at(hit.distance);
         let front = dot(hit.normal, ray.direction) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
-        let flat = scale(hit.normal, side);
+        let geometric_normal = scale(hit.normal, side);
         let rotation = pose.rotation;
         let from = sub(position, pose.translation);
         let local = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * from[i]).sum::<f64>());
@@ -44,9 +44,9 @@ impl SurfaceInteraction {
         let normal = corner.and_then(|c| {
             let turned = rotation.map(|row| side * dot(row, c.normal));
             // A smooth normal may face away although the flat surface is visible.
-            normalize(turned).filter(|n| dot(*n, ray.direction) < -1e-3 && dot(*n, flat) > 0.0)
+            normalize(turned).filter(|n| dot(*n, ray.direction) < -1e-3 && dot(*n, geometric_normal) > 0.0)
         });
-        let slant = (-dot(flat, ray.direction)).max(0.02).sqrt();
+        let slant = (-dot(geometric_normal, ray.direction)).max(0.02).sqrt();
         let uv = corner.and_then(|c| c.uv);
         let texel = texture(scene, index, instance, local, uv, footprint / slant);
         let albedo = [0, 1, 2].map(|k| f64::from(scene.linear_colors()[index][k]) * texel[k]);
@@ -55,19 +55,10 @@ impl SurfaceInteraction {
         let emission = scale(albedo, f64::from(material.emission.max(0.0)));
         let alpha = f64::from(material.rgba[3].clamp(0.0, 1.0));
         let lift = corner.map_or([0.0; 3], |c| rotation.map(|row| dot(row, c.lift)));
-        let lifted = add_scaled(position, 1.0, lift);
-        let normal = normal.unwrap_or(flat);
-        let lobe = Bsdf::new(material, reflectance, albedo, front);
-        Some(Self {
-            position,
-            smooth_position: lifted,
-            geometric_normal: flat,
-            shading_normal: normal,
-            front,
-            bsdf: lobe,
-            emission,
-            alpha,
-        })
+        let smooth_position = add_scaled(position, 1.0, lift);
+        let shading_normal = normal.unwrap_or(geometric_normal);
+        let bsdf = Bsdf::new(material, reflectance, albedo, front);
+        Some(Self { position, smooth_position, geometric_normal, shading_normal, front, bsdf, emission, alpha })
     }
 }
 

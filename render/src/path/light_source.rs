@@ -85,8 +85,8 @@ impl LightSource {
             ..Light::default()
         };
         let (position, forward) = (view.world_from_camera.translation, view.world_from_camera.rotation.map(|r| r[2]));
-        let sight = Some((along_axis.then(|| to_f64(forward)), f64::from(view.near)));
-        Self { position: to_f64(position), camera_near: sight, ..Self::new(&light) }
+        let camera_near = Some((along_axis.then(|| to_f64(forward)), f64::from(view.near)));
+        Self { position: to_f64(position), camera_near, ..Self::new(&light) }
     }
 
     /// Light at `point` from a sampled point of the light's disc, by two random numbers in 0..1; `None` if no light

@@ -146,10 +146,10 @@ impl SceneLights {
         forward: bool,
     ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
-        let Self { lights: lamps, emitters, environment: dome, sky, skybox, haze } = self;
+        let Self { lights: lamps, emitters, environment, sky, skybox, haze } = self;
         skybox.clone_from(&scene.skybox);
         emitters.prepare(scene, tracer);
-        *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
+        *environment = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
         *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
         lamps.clear();

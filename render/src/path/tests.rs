@@ -63,11 +63,11 @@ impl<'a> TestScene<'a> {
 
     fn paths(&self, samples: u32, max_bounces: u32, seed: u32) -> PathTracer<'_> {
         let Self { scene, tracer, lights, projection } = self;
-        let eye = CameraRayGenerator { projection, lens: None, thin_lens: None };
+        let camera_rays = CameraRayGenerator { projection, lens: None, thin_lens: None };
         PathTracer {
             scene,
             tracer,
-            camera_rays: eye,
+            camera_rays,
             motion: None,
             samples,
             max_bounces,

@@ -107,15 +107,14 @@ impl RasterScratch {
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
-        let Self { tile, layer, blended_tile: veiled, rasterizer: painter, stack, shade_stack, colors, edges, .. } =
-            self;
+        let Self { tile, layer, blended_tile, rasterizer, stack, shade_stack, colors, edges, .. } = self;
         let list = &plan.list;
         let view = CameraView { projection, lens: shot.lens, placed: &list.placed, first_ids: shot.scene.first_ids() };
         let mut draw = |tile: &mut Tile, item: &DrawItem| {
             if plan.traces_visibility {
                 plan.tracer.draw(s, stack, tile, &view, item);
             } else {
-                painter.draw(s, tile, projection, shot.scene, &list.placed, item);
+                rasterizer.draw(s, tile, projection, shot.scene, &list.placed, item);
             }
         };
         for item in &list.opaque {
@@ -129,9 +128,9 @@ impl RasterScratch {
         let context = plan.context(shot, projection, &shade_stack, wanted);
         let veils = !list.blended.is_empty();
         if veils {
-            veiled.copy(tile);
+            blended_tile.copy(tile);
             for (_, item) in &list.blended {
-                draw(veiled, item);
+                draw(blended_tile, item);
             }
         }
         let size = [projection.width, projection.height];
@@ -143,7 +142,7 @@ impl RasterScratch {
             let (ids, points) = (as_lanes(&tile.id[at..]), SamplePositions::Pixels([x, y]));
             let color = if wants_color { Some(&mut colors[block * 4 + row]) } else { None };
             if veils && wants_geometry {
-                resolve(s, &context, as_lanes(&veiled.id[at..]), points, Some(&mut pixels), None);
+                resolve(s, &context, as_lanes(&blended_tile.id[at..]), points, Some(&mut pixels), None);
                 resolve(s, &context, ids, points, None, color);
             } else {
                 resolve(s, &context, ids, points, wants_geometry.then_some(&mut pixels), color);

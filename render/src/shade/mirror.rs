@@ -153,10 +153,10 @@ impl SurfaceLanes {
     }
 
     #[inline(always)]
-    fn surface<S: Simd>(&self, s: S, along: F<S>) -> Surface<S> {
+    fn surface<S: Simd>(&self, s: S, t: F<S>) -> Surface<S> {
         let v3 = |v: &[[f32; LANES]; 3]| V3 { x: load(s, &v[0]), y: load(s, &v[1]), z: load(s, &v[2]) };
         Surface {
-            t: along,
+            t,
             normal: v3(&self.normals),
             shading_normal: v3(&self.shading),
             position: v3(&self.positions),

@@ -85,12 +85,12 @@ impl MotionVectors {
         here: M<S>,
     ) -> [F<S>; 2] {
         let unknown = splat(s, f32::INFINITY);
-        let (Some(InstanceMotion { is_static: still, camera_from_instance }), Some(eye)) =
+        let (Some(InstanceMotion { is_static, camera_from_instance }), Some(eye)) =
             (self.list.get(instance), self.previous)
         else {
             return [unknown; 2];
         };
-        if *still {
+        if *is_static {
             return [splat(s, 0.0); 2];
         }
         let there = local.rotate(&camera_from_instance.rotation).add(V3::splat(s, camera_from_instance.translation));

@@ -117,15 +117,15 @@ impl PreparedFrame {
         shot: &RenderRequest<'_>,
         frame: &FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let RenderSettings { cfg, renderer, aperture, shutter, exposure_compensation: stops, assets } = style;
+        let RenderSettings { cfg, renderer, aperture, shutter, exposure_compensation, assets } = style;
         (self.map_count, self.only_row) = (0, None);
         let RenderRequest { scene, poses, view, .. } = *shot;
         view.validate()?;
         if !matches!(cfg.samples, 1 | 4) {
             return Err(RenderError::Samples { samples: cfg.samples });
         }
-        if !(-MAX_STOPS..=MAX_STOPS).contains(&stops) {
-            return Err(RenderError::ExposureCompensation { stops: stops as f32 });
+        if !(-MAX_STOPS..=MAX_STOPS).contains(&exposure_compensation) {
+            return Err(RenderError::ExposureCompensation { stops: exposure_compensation as f32 });
         }
         renderer.validate()?;
         check_occlusion(cfg, renderer)?;
@@ -151,7 +151,7 @@ impl PreparedFrame {
         let hybrid = wants_color && renderer == Renderer::Hybrid;
         self.shadow_rays = hybrid && cfg.shadows;
         self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
-        (self.tone, self.exposure) = (cfg.tone, stops.exp2() as f32);
+        (self.tone, self.exposure) = (cfg.tone, exposure_compensation.exp2() as f32);
         if shaded && scene.lighting_space == LightingSpace::Display && cfg.tone == ToneCurve::Soft {
             self.tone = ToneCurve::Clip;
         }
@@ -253,7 +253,7 @@ impl PreparedFrame {
         shot: &RenderRequest<'a>,
         projection: &'a Projection,
         stack: &'a RefCell<&'a mut TraversalStack>,
-        [detail, albedo, flow]: [bool; 3],
+        [surface, albedo, flow]: [bool; 3],
     ) -> ShadingContext<'a> {
         let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
         let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
@@ -261,11 +261,11 @@ impl PreparedFrame {
         let mirrors = self.first_mirror.map(|first| {
             let tracer = &self.tracer;
             let others = shot.scene.instances()[first + 1..].iter().any(|instance| mirror::reflectance(instance) > 0.0);
-            let reach = (only_first || !others)
+            let bounds = (only_first || !others)
                 .then(|| tracer.bounds_without(first as u32))
                 .flatten()
                 .map(ReflectionBounds::new);
-            Mirrors { tracer, stack, first, only_first, bounds: reach }
+            Mirrors { tracer, stack, first, only_first, bounds }
         });
         ShadingContext {
             projection,
@@ -280,7 +280,7 @@ impl PreparedFrame {
                 pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel_spacing() as f32),
             },
             mirrors,
-            surface: detail,
+            surface,
             albedo,
             motion_vectors: flow.then_some(&self.motion_vectors),
         }

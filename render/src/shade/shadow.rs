@@ -162,7 +162,7 @@ impl ShadowMap {
     pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         let Self { projection, list, nearness, range, side, .. } = self;
         let (projection, list) = (&*projection, &*list);
-        let most = max_band_texels(*side);
+        let max_texels = max_band_texels(*side);
         let rows = rows_of_bands([projection.width, projection.height]);
         let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
         let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));
@@ -170,7 +170,7 @@ impl ShadowMap {
             projection,
             list,
             first: k * rows,
-            max_texels: most,
+            max_texels,
             nearness,
             range,
         })
@@ -266,10 +266,10 @@ impl ShadowBand<'_> {
         tile: &mut Tile,
         painter: &mut VisibilityRasterizer,
     ) {
-        let Self { projection, list, first, max_texels: most, nearness, range } = self;
+        let Self { projection, list, first, max_texels, nearness, range } = self;
         let wide = projection.width / BLOCK;
         let rows = range.len() / wide;
-        tile.reserve(most);
+        tile.reserve(max_texels);
         tile.clear([0, first * BLOCK], [wide, rows], 1, projection.farthest());
         at_level!(level, s => {
             for item in &list.opaque {

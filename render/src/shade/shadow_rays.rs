@@ -184,7 +184,8 @@ mod tests {
     const NOISE: f64 = 5.0 * 0.0014;
 
     /// Beside an infinitely long wall of height h, at the distance d: (1 - d / sqrt(d² + h²)) / 2, which is a half in
-    /// its corner. Source: Howell, A catalog of radiation heat transfer configuration factors, B-1 (infinitely long).
+    /// its corner. Source: Howell, A catalog of radiation heat transfer configuration factors: from an element to an
+    /// infinitely long strip in a plane perpendicular to that of the element.
     #[test]
     fn wall() {
         let wall = |height: f32| {

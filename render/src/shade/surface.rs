@@ -89,25 +89,25 @@ pub(crate) fn surface<S: Simd>(
     lanes: M<S>,
     rays: CameraRays<S>,
 ) -> Surface<S> {
-    let CameraRays { uv: [u, v], lens_rays: bent, direction } = rays;
+    let CameraRays { uv: [u, v], lens_rays, direction } = rays;
     let camera = &source.placed.local.instance_from_camera;
-    let (o, d) = match bent {
+    let (o, d) = match lens_rays {
         None => projection.rays(s, &source.placed.local, u, v),
         Some(ray) => (V3::splat(s, camera.translation), ray.direction.rotate(&camera.rotation)),
     };
     let zero = splat(s, 0.0);
-    let (along, normal, shading, uv, uv_density);
+    let (t, normal, shading, uv, uv_density);
     if let Some(mesh) = source.placed.mesh(source.instance) {
         let [x, y, z] = &camera.rotation;
-        let axis = match bent {
+        let axis = match lens_rays {
             Some(LensRayLanes { forward: false, .. }) => d.scale(1.0 / d.dot(d)),
             _ => V3::splat(s, [x[2], y[2], z[2]]),
         };
         let hit = intersect_triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
-        (along, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
+        (t, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
     } else {
         let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
-        along = hit.t;
+        t = hit.t;
         // Other shapes have a unit normal already.
         normal = match source.instance.shape {
             Shape::Plane(_) | Shape::Box(_) => hit.normal,
@@ -120,15 +120,15 @@ pub(crate) fn surface<S: Simd>(
     let back = normal.dot(d).simd_gt(zero);
     let flip = select(back, splat(s, -1.0), splat(s, 1.0));
     let world = source.world_from_instance;
-    let local = o.add(d.scale(along));
+    let local_position = o.add(d.scale(t));
     // From the camera outward, as for the depth: both agree to the last digits.
-    let position = direction.scale(along).add(V3::splat(s, projection.world_from_camera.translation));
+    let position = direction.scale(t).add(V3::splat(s, projection.world_from_camera.translation));
     Surface {
-        t: along,
+        t,
         normal: normal.scale(flip).rotate(&world.rotation),
         shading_normal: shading.scale(flip).rotate(&world.rotation),
         position,
-        local_position: local,
+        local_position,
         uv,
         uv_density,
     }

@@ -72,11 +72,11 @@ fn lens_images() {
     for (lens, rays) in lenses::distorting() {
         for renderer in &RENDERERS[1..] {
             let still = |_| {
-                let before = Some((humanoid().1, old));
+                let previous = Some((humanoid().1, old));
                 TestFrame {
                     renderer: *renderer,
                     lens: Some(rays.clone()),
-                    previous: before,
+                    previous,
                     ..TestFrame::new(humanoid(), view)
                 }
             };
@@ -93,15 +93,9 @@ fn rolling_shutter() {
     let aperture = Some(Aperture { focal_length: 0.05, f_number: 1.4, focus_distance: 1.5 });
     let renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: true, seed: 0 };
     let moved = PoseF32 { translation: [0.01, 0.0, 0.02], ..view.world_from_camera };
-    let (before, opened) = (Some((bar_at(-0.3), view)), Some((bar_at(-0.3), moved, 0.2)));
-    let still = TestFrame {
-        shutter,
-        aperture,
-        renderer,
-        previous: before,
-        shutter_open: opened,
-        ..TestFrame::new((scene, bar_at(0.3)), view)
-    };
+    let (previous, shutter_open) = (Some((bar_at(-0.3), view)), Some((bar_at(-0.3), moved, 0.2)));
+    let still =
+        TestFrame { shutter, aperture, renderer, previous, shutter_open, ..TestFrame::new((scene, bar_at(0.3)), view) };
     assert_same_bits("rows", (1, &|_| still.clone()), &[1, 2, 3], &[1]);
 }
 

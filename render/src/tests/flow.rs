@@ -157,8 +157,8 @@ fn homography() {
     let now = View { world_from_camera: PoseF32::from(&(to_f64_pose(&view.world_from_camera) * turn)), ..view };
     let still = TestFrame { channels: WANTED, ..TestFrame::new(random_scene(&mut TestRng(3), 1.0), view) };
     let still = TestFrame { cfg: RasterCfg { lod: false, ..RasterCfg::default() }, ..still };
-    let before = Some((still.poses.clone(), view));
-    let image = TestFrame { previous: before.clone(), view: now, ..still.clone() }.draw();
+    let previous = Some((still.poses.clone(), view));
+    let image = TestFrame { previous: previous.clone(), view: now, ..still.clone() }.draw();
     let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
     let k = Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
     let homography = k * turn.rotation.to_rotation_matrix().matrix() * k.try_inverse().unwrap();
@@ -174,7 +174,7 @@ fn homography() {
         turned += usize::from(expected.norm() > 2.0);
     }
     assert!(hits > 3000 && 2 * turned > hits, "{hits} pixels, of which {turned} moved by more than two");
-    let unmoved = TestFrame { previous: before, ..still.clone() }.draw();
+    let unmoved = TestFrame { previous, ..still.clone() }.draw();
     for (flow, id) in unmoved.flow().iter().zip(unmoved.mask()) {
         assert_eq!(*flow, if *id == 0 { [f32::INFINITY; 2] } else { [0.0; 2] });
     }

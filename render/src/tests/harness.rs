@@ -66,16 +66,16 @@ impl TestFrame {
     }
 
     pub(super) fn request(&self) -> RenderRequest<'_> {
-        let before = self.previous.as_ref().map(|(poses, view)| PreviousState { poses, view });
+        let previous = self.previous.as_ref().map(|(poses, view)| PreviousState { poses, view });
         let Self { scene, poses, view, .. } = self;
-        RenderRequest { scene, poses, view, lights: None, lens: self.lens.as_ref(), previous: before }
+        RenderRequest { scene, poses, view, lights: None, lens: self.lens.as_ref(), previous }
     }
 
     pub(super) fn sample(&self) -> FrameSample<'_> {
         let opened = self.shutter_open.as_ref();
-        let opened =
+        let shutter_open =
             opened.map(|(poses, camera, before)| ShutterOpenState { poses, world_from_camera: *camera, age: *before });
-        FrameSample { noise: 0, shutter_open: opened }
+        FrameSample { noise: 0, shutter_open }
     }
 
     pub(super) fn frame(&self) -> Frame {

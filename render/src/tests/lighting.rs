@@ -113,7 +113,8 @@ fn attenuation() {
 }
 
 /// Ambient occlusion at the foot of a long wall of height h: at the distance d, the wall occludes `(1 - d / sqrt(d² +
-/// h²)) / 2` of uniform light. Source: Howell, A catalog of radiation heat transfer configuration factors, B-71.
+/// h²)) / 2` of uniform light. Source: Howell, A catalog of radiation heat transfer configuration factors: from an
+/// element to an infinitely long strip in a plane perpendicular to that of the element.
 #[test]
 fn ambient_occlusion() {
     // From x = 0 on, 1 m high.

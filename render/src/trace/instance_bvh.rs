@@ -109,22 +109,22 @@ impl InstanceBvh {
                 next = (near <= limit).then_some(node);
                 continue;
             };
-            let Node { second_child: second, instance: thing, .. } = self.nodes[node as usize];
+            let Node { second_child, instance, .. } = self.nodes[node as usize];
             next = None;
-            if second == 0 {
-                limit = act(thing, limit);
+            if second_child == 0 {
+                limit = act(instance, limit);
                 continue;
             }
             let first = node + 1;
-            next = match (enter(first, limit), enter(second, limit)) {
+            next = match (enter(first, limit), enter(second_child, limit)) {
                 (Some(a), Some(b)) => {
-                    let (near, far) = if b < a { (second, (a, first)) } else { (first, (b, second)) };
+                    let (near, far) = if b < a { (second_child, (a, first)) } else { (first, (b, second_child)) };
                     waiting[count] = far;
                     count += 1;
                     Some(near)
                 }
                 (Some(_), None) => Some(first),
-                (None, Some(_)) => Some(second),
+                (None, Some(_)) => Some(second_child),
                 (None, None) => None,
             };
         }
@@ -174,9 +174,9 @@ fn best_split(boxes: &mut [InstanceItem]) -> usize {
 
 /// Adds the node of some boxes, and all nodes below.
 fn split(boxes: &mut [InstanceItem], nodes: &mut Vec<Node>, depth: usize) {
-    let around = boxes.iter().fold(EMPTY, |all, (b, ..)| union(all, b));
+    let bounds = boxes.iter().fold(EMPTY, |all, (b, ..)| union(all, b));
     let index = nodes.len();
-    nodes.push(Node { bounds: around, second_child: 0, instance: boxes[0].2 });
+    nodes.push(Node { bounds, second_child: 0, instance: boxes[0].2 });
     if boxes.len() == 1 {
         return;
     }

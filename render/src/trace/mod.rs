@@ -158,11 +158,11 @@ impl RayTracer {
     /// Places all instances, for rays in any direction at any time. `before` holds the poses at time 0; without it, all
     /// instances are static. [`prepare_geometry`](Self::prepare_geometry) must be called before.
     pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32], before: Option<&[PoseF32]>) {
-        let Self { geometries: bodies, instances: things, unbounded: endless, bvh: tree } = self;
+        let Self { geometries, instances: things, unbounded, bvh } = self;
         things.clear();
-        endless.clear();
-        tree.clear();
-        for (k, body) in bodies.iter().enumerate() {
+        unbounded.clear();
+        bvh.clear();
+        for (k, body) in geometries.iter().enumerate() {
             let Some(body) = body else { continue };
             let world_from_instance = orthonormalized(&poses[k]);
             let thing = things.len() as u32;
@@ -171,12 +171,12 @@ impl RayTracer {
             let casts_shadow = scene.instances()[k].group != Marker::GROUP;
             things.push(TracedInstance { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
             match (body.bounds(), motion) {
-                (Some(bounds), None) => tree.add(thing, &world_from_instance, bounds),
-                (Some(bounds), Some(motion)) => tree.add_moving(thing, &motion, bounds),
-                (None, _) => endless.push(thing),
+                (Some(bounds), None) => bvh.add(thing, &world_from_instance, bounds),
+                (Some(bounds), Some(motion)) => bvh.add_moving(thing, &motion, bounds),
+                (None, _) => unbounded.push(thing),
             }
         }
-        tree.build();
+        bvh.build();
     }
 
     /// Bounding box of all instances but the unbounded `instance`; `None` if another instance is unbounded.
@@ -300,18 +300,18 @@ impl RayTracer {
     #[inline(always)]
     fn intersect(
         &self,
-        thing: u32,
+        instance_index: u32,
         ray: &Ray,
         limit: f64,
         time: f64,
         stack: &mut TraversalStack,
     ) -> Option<HitCandidate> {
-        let placed @ TracedInstance { instance, .. } = &self.instances[thing as usize];
+        let placed @ TracedInstance { instance, .. } = &self.instances[instance_index as usize];
         let local = ray.inverse_transformed_by(&placed.at(time));
         match self.geometries[*instance as usize].as_ref()? {
             InstanceGeometry::Mesh(_, tree) => {
                 let (distance, index) = tree.closest_hit(&local, limit, None, stack)?;
-                Some(HitCandidate { instance_index: thing, distance, index, normal: [0.0; 3] })
+                Some(HitCandidate { instance_index, distance, index, normal: [0.0; 3] })
             }
             InstanceGeometry::Closed(shape) => {
                 let at = shape.intersect(&local, limit)?;
@@ -319,7 +319,7 @@ impl RayTracer {
                 // direction. Points of a plane have no height, so planes are excluded.
                 let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
                 let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
-                Some(HitCandidate { instance_index: thing, distance: at.t, index: 0, normal })
+                Some(HitCandidate { instance_index, distance: at.t, index: 0, normal })
             }
         }
     }

@@ -101,31 +101,24 @@ impl Chain {
             base = joint.parent;
         }
         let follows = mimic_relations(description);
-        let (mut joints, mut before) = (Vec::new(), Pose::identity());
+        let (mut joints, mut parent_from_joint) = (Vec::new(), Pose::identity());
         for &id in path.iter().rev() {
             let joint = description.joint(id);
-            before *= joint.parent_from_joint;
+            parent_from_joint *= joint.parent_from_joint;
             if !joint.kind.is_drivable() {
                 continue;
             }
-            let (slides, axis) = (joint.kind == JointKind::Prismatic, joint.axis);
+            let (is_prismatic, axis) = (joint.kind == JointKind::Prismatic, joint.axis);
             let MimicRelation { column, ratio, offset } = follows[id.0];
             match column {
                 Some(variable) => {
-                    joints.push(ChainJoint {
-                        parent_from_joint: before,
-                        axis,
-                        is_prismatic: slides,
-                        variable,
-                        ratio,
-                        offset,
-                    });
-                    before = Pose::identity();
+                    joints.push(ChainJoint { parent_from_joint, axis, is_prismatic, variable, ratio, offset });
+                    parent_from_joint = Pose::identity();
                 }
-                None => before *= joint_transform(slides, &axis, offset),
+                None => parent_from_joint *= joint_transform(is_prismatic, &axis, offset),
             }
         }
-        Ok(Self { base, joints, last_from_frame: before * link_from_frame })
+        Ok(Self { base, joints, last_from_frame: parent_from_joint * link_from_frame })
     }
 
     /// Base link, in whose frame the poses of the chain are given.
@@ -180,17 +173,17 @@ impl Chain {
     pub fn reduce_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
         held.base = self.base;
         held.joints.clear();
-        let mut before = Pose::identity();
+        let mut parent_from_joint = Pose::identity();
         for joint in &self.joints {
-            before *= joint.parent_from_joint;
+            parent_from_joint *= joint.parent_from_joint;
             match variable_of[joint.variable] {
                 Some(variable) => {
-                    held.joints.push(ChainJoint { parent_from_joint: before, variable, ..*joint });
-                    before = Pose::identity();
+                    held.joints.push(ChainJoint { parent_from_joint, variable, ..*joint });
+                    parent_from_joint = Pose::identity();
                 }
-                None => before *= joint.transform(positions),
+                None => parent_from_joint *= joint.transform(positions),
             }
         }
-        held.last_from_frame = before * self.last_from_frame;
+        held.last_from_frame = parent_from_joint * self.last_from_frame;
     }
 }

@@ -119,7 +119,7 @@ impl IkSolver {
     }
 
     fn search(&mut self, target: &Pose, initial: &[f64]) -> IkSolution<'_> {
-        let Self { chain, limits, cfg, random, least_squares: descent, best } = self;
+        let Self { chain, limits, cfg, random, least_squares, best } = self;
         let reach = Some(chain.reach()).filter(|&reach| reach > 0.0).unwrap_or(1.0);
         let problem = Problem { chain, limits, target: *target, task: cfg.task, scale: 2.0 / reach };
         let (position, rotation) = (cfg.position_tolerance, cfg.rotation_tolerance);
@@ -128,38 +128,38 @@ impl IkSolver {
         let (mut seed, mut iterations, mut reached) = (0, 0, false);
         for start in 0..cfg.num_seeds {
             let random = (start as usize).checked_sub(1).map(|row| &random[row * limits.len()..]);
-            set_start(&problem, initial, random, reach, &mut descent.current.positions);
-            descent.current.evaluate(&problem);
-            iterations += descent.descend(&problem, &near, cfg.damping);
-            reached = descent.current.is_within(&near, cfg.task);
-            if reached || start == 0 || descent.current.cost < best.cost {
-                best.copy_from(&descent.current);
+            set_start(&problem, initial, random, reach, &mut least_squares.current.positions);
+            least_squares.current.evaluate(&problem);
+            iterations += least_squares.descend(&problem, &near, cfg.damping);
+            reached = least_squares.current.is_within(&near, cfg.task);
+            if reached || start == 0 || least_squares.current.cost < best.cost {
+                best.copy_from(&least_squares.current);
                 seed = start;
             }
             if reached {
                 break;
             }
         }
-        descent.current.copy_from(best);
+        least_squares.current.copy_from(best);
         if reached {
             // Convergence is fast near the target: a few more steps remove most of the remaining error.
             let finish = StopCriteria { position: 0.01 * position, rotation: 0.01 * rotation, iterations: 4, ..near };
-            iterations += descent.descend(&problem, &finish, cfg.damping);
-            if !descent.current.is_within(&near, cfg.task) {
-                descent.current.copy_from(best);
+            iterations += least_squares.descend(&problem, &finish, cfg.damping);
+            if !least_squares.current.is_within(&near, cfg.task) {
+                least_squares.current.copy_from(best);
             }
         } else {
             let finish =
                 StopCriteria { iterations: cfg.max_iterations.saturating_mul(8), stop_on_slow_progress: false, ..near };
-            iterations += descent.descend(&problem, &finish, cfg.damping);
+            iterations += least_squares.descend(&problem, &finish, cfg.damping);
         }
         let posture = cfg.posture.as_ref();
-        remove_full_turns(&problem, posture.map_or(initial, |p| &p.rest), &mut descent.current.positions);
-        descent.current.evaluate(&problem);
-        if let Some(posture) = posture.filter(|_| descent.current.is_within(&near, cfg.task)) {
-            iterations += descent.approach_posture(&problem, &near, &posture.rest, posture.gain);
+        remove_full_turns(&problem, posture.map_or(initial, |p| &p.rest), &mut least_squares.current.positions);
+        least_squares.current.evaluate(&problem);
+        if let Some(posture) = posture.filter(|_| least_squares.current.is_within(&near, cfg.task)) {
+            iterations += least_squares.approach_posture(&problem, &near, &posture.rest, posture.gain);
         }
-        let at = &descent.current;
+        let at = &least_squares.current;
         IkSolution {
             positions: &at.positions,
             success: at.is_within(&near, cfg.task),

@@ -152,8 +152,8 @@ impl<'c> Resolver<'c> {
                 match rest.strip_prefix('/').filter(|_| self.strictness == Strictness::Lenient) {
                     Some(_) if Path::new(&rest).is_file() => Resolved::Found(PathBuf::from(rest)),
                     Some(package) => match self.package(package) {
-                        Resolved::Missing { most_likely: guess, tried, hint } => {
-                            Resolved::Missing { most_likely: guess, tried: [vec![rest], tried].concat(), hint }
+                        Resolved::Missing { most_likely, tried, hint } => {
+                            Resolved::Missing { most_likely, tried: [vec![rest], tried].concat(), hint }
                         }
                         Resolved::PackageUnknown { package, guess, tried } => {
                             Resolved::PackageUnknown { package, guess, tried: [vec![rest], tried].concat() }
@@ -218,8 +218,8 @@ impl<'c> Resolver<'c> {
                 tried.push(place);
             }
         }
-        let guess = candidates.into_iter().next().unwrap_or_default();
-        Resolved::Missing { hint: missing_file_hint(&guess), most_likely: guess, tried }
+        let most_likely = candidates.into_iter().next().unwrap_or_default();
+        Resolved::Missing { hint: missing_file_hint(&most_likely), most_likely, tried }
     }
 
     fn in_meshdir(&self, path: &str) -> Option<PathBuf> {

@@ -151,9 +151,9 @@ impl<'f> ShapeConverter<'f> {
 fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
     match resolved {
         Resolved::Found(path) => (path, "exists".to_owned()),
-        Resolved::Missing { most_likely: guess, tried, hint } => {
+        Resolved::Missing { most_likely, tried, hint } => {
             let hint = hint.map(|h| format!(" ({h})")).unwrap_or_default();
-            (guess, format!("does not exist{hint}; searched {}", format_first(&tried)))
+            (most_likely, format!("does not exist{hint}; searched {}", format_first(&tried)))
         }
         Resolved::PackageUnknown { package, guess, tried } => {
             (guess, format!("is in package \"{package}\", which was not found; searched {}", format_first(&tried)))

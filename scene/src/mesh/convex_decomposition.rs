@@ -192,7 +192,7 @@ fn distinct_points(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
 }
 
 impl Piece {
-    fn of(HulledSurface { surface, cell, hull }: HulledSurface, idle: u32) -> Self {
+    fn of(HulledSurface { surface, cell, hull }: HulledSurface, stalled_cuts: u32) -> Self {
         let faces: Vec<(V3, f64)> = hull
             .triangles
             .iter()
@@ -206,7 +206,7 @@ impl Piece {
             let faces = faces.iter().map(|&(n, d)| (dot(n, normal), d - dot(n, p)));
             faces.filter(|(slope, _)| *slope > 1e-6).map(|(slope, gap)| gap / slope).fold(f64::INFINITY, f64::min)
         };
-        let mut piece = Self { depth: 0.0, at: [0.0; 3], normal: [0.0; 3], surface, hull, cell, stalled_cuts: idle };
+        let mut piece = Self { depth: 0.0, at: [0.0; 3], normal: [0.0; 3], surface, hull, cell, stalled_cuts };
         for p in piece.surface.iter().flatten().copied().chain(piece.cell.corners_inside()) {
             for &(normal, distance) in &faces {
                 let outside = dot(normal, p) - distance;

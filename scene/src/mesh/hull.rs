@@ -356,12 +356,12 @@ impl Quickhull {
         let (seen, rim) = self.horizon(apex, from);
         let first = self.faces.len();
         let count = rim.len();
-        for (i, &Edge { from: a, to: b, face_beyond: beyond }) in rim.iter().enumerate() {
+        for (i, &Edge { from: a, to: b, face_beyond }) in rim.iter().enumerate() {
             // No face is degenerate: the apex is strictly in front of a face with this edge, so not in line with the
             // edge.
-            self.add([a, b, apex], [beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
-            if let Some(edge) = (0..3).find(|&e| self.faces[beyond].corners[e] == b) {
-                self.faces[beyond].neighbors[edge] = first + i;
+            self.add([a, b, apex], [face_beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
+            if let Some(edge) = (0..3).find(|&e| self.faces[face_beyond].corners[e] == b) {
+                self.faces[face_beyond].neighbors[edge] = first + i;
             }
         }
         let mut points = Vec::new();
@@ -383,15 +383,15 @@ impl Quickhull {
         while let Some(&face) = seen.get(next) {
             next += 1;
             let Face { corners, neighbors, .. } = &self.faces[face];
-            for (i, &beyond) in neighbors.iter().enumerate() {
-                if is_seen.contains(&beyond) {
+            for (i, &face_beyond) in neighbors.iter().enumerate() {
+                if is_seen.contains(&face_beyond) {
                     continue;
                 }
-                if self.is_in_front(apex, beyond) {
-                    is_seen.insert(beyond);
-                    seen.push(beyond);
+                if self.is_in_front(apex, face_beyond) {
+                    is_seen.insert(face_beyond);
+                    seen.push(face_beyond);
                 } else {
-                    edges.insert(corners[i], Edge { from: corners[i], to: corners[(i + 1) % 3], face_beyond: beyond });
+                    edges.insert(corners[i], Edge { from: corners[i], to: corners[(i + 1) % 3], face_beyond });
                 }
             }
         }

@@ -69,8 +69,8 @@ pub enum InvalidMesh {
 impl TriMesh {
     /// Creates a mesh of one submesh, without normals, texture coordinates and material.
     pub fn from_triangles(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
-        let parts = vec![Submesh { triangles: 0..triangles.len(), material: None }];
-        Self { positions, triangles, submeshes: parts, ..Self::default() }
+        let submeshes = vec![Submesh { triangles: 0..triangles.len(), material: None }];
+        Self { positions, triangles, submeshes, ..Self::default() }
     }
 
     /// Bounding box: smallest and largest coordinates \[m\]; `None` without vertices.

@@ -14,10 +14,10 @@ pub(super) struct Deformation {
 
 impl Deformation {
     pub(super) fn new(sources: Vec<u32>, mesh: &RenderMesh) -> Self {
-        let mut vertex_of_lane = vec![0; mesh.cluster_positions()[0].len()];
+        let mut source_vertices = vec![0; mesh.cluster_positions()[0].len()];
         for cluster in mesh.clusters() {
             let triangles = cluster.first as usize..(cluster.first + cluster.count) as usize;
-            let lanes = &mut vertex_of_lane[cluster.first_vertex as usize..][..cluster.vertex_count as usize];
+            let lanes = &mut source_vertices[cluster.first_vertex as usize..][..cluster.vertex_count as usize];
             let mut count = 0;
             for (corners, triangle) in mesh.corners()[triangles.clone()].iter().zip(&mesh.triangles()[triangles]) {
                 for (&corner, &vertex) in corners.iter().zip(triangle) {
@@ -29,7 +29,7 @@ impl Deformation {
             let last = count.checked_sub(1).map_or(0, |last| lanes[last]);
             lanes[count..].fill(last);
         }
-        Self { sources, source_vertices: vertex_of_lane }
+        Self { sources, source_vertices }
     }
 }
 

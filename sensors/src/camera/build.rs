@@ -203,10 +203,10 @@ impl CameraCfg {
                 limit: MAX_BYTES,
             });
         }
-        let (images, captures) = (self.history_length, FrameBuffer::max_pending(self, schedule));
-        let all = images.saturating_add(captures).saturating_add(1);
+        let (images, pending_frames) = (self.history_length, FrameBuffer::max_pending(self, schedule));
+        let all = images.saturating_add(pending_frames).saturating_add(1);
         if !fits(images.saturating_add(1), all) {
-            return Err(CameraError::HistoryMemory { images, pending_frames: captures, views, limit: MAX_BYTES });
+            return Err(CameraError::HistoryMemory { images, pending_frames, views, limit: MAX_BYTES });
         }
         Ok(())
     }

@@ -219,7 +219,7 @@ fn first_ids(ids: &[usize]) -> String {
 }
 
 impl CameraError {
-    /// Returns true if rendering was cancelled; the next read renders again.
+    /// Returns true if rendering was canceled. The first read after `RenderProgress::resume` renders the image.
     pub(super) fn is_cancelled(&self) -> bool {
         matches!(self, Self::Render { error: RenderError::Canceled { .. }, .. })
     }

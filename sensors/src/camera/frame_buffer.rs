@@ -53,7 +53,7 @@ pub(super) struct CapturedFrame {
 
 impl CapturedFrame {
     /// Allocates a frame of a scene; `slow_shutter` also allocates the poses at shutter opening.
-    fn new(scene: &RenderScene, ticket: RngKey, slow_shutter: bool) -> Self {
+    fn new(scene: &RenderScene, rng_key: RngKey, slow_shutter: bool) -> Self {
         let instances = scene.instances().len();
         Self {
             poses: vec![PoseF32::IDENTITY; instances],
@@ -61,7 +61,7 @@ impl CapturedFrame {
             scene: EnvScene::default(),
             world_from_parent: None,
             stamp: 0.0,
-            rng_key: ticket,
+            rng_key,
             markers: Vec::new(),
             shutter_open: slow_shutter.then(|| ShutterOpenPoses::new(instances)),
         }

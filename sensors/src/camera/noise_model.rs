@@ -40,10 +40,10 @@ impl SensorNoiseModel {
     pub(super) fn apply(&mut self, jobs: &mut [RenderJob<'_>], tickets: &[RngKey]) {
         let Self { imperfections, tone, noise, workers, pool } = self;
         let noise = noise.as_ref();
-        pool.for_each(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
-            imperfections.apply(frame, *tone, ImageContext { view: shot.view, rays: shot.lens, rng_key: ticket });
+        pool.for_each(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), rng_key)| {
+            imperfections.apply(frame, *tone, ImageContext { view: shot.view, rays: shot.lens, rng_key });
             if let Some(noise) = noise {
-                noise.apply(frame, ticket);
+                noise.apply(frame, rng_key);
             }
         });
     }

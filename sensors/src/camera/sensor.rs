@@ -254,8 +254,9 @@ impl Camera {
         self.render_count.load(Ordering::Relaxed)
     }
 
-    /// Progress of path tracing, and a way to cancel it from another thread. A cancelled read returns
-    /// [`CameraError::Render`] with [`RenderError::Canceled`]; the next read renders again.
+    /// Progress of path tracing, and a way to cancel it from another thread. After [`RenderProgress::cancel`], a read
+    /// that renders returns [`CameraError::Render`] with [`RenderError::Canceled`]. The first read after
+    /// [`RenderProgress::resume`] renders the canceled images.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
@@ -428,10 +429,10 @@ impl Camera {
 
     /// Captures a frame of a row that is due; returns true if it is shown at once.
     fn capture(&mut self, row: usize, seen: &Observation<'_>) -> bool {
-        let Self { frames, motion, viewpoints, rng_keys: tickets, .. } = self;
-        tickets[row].advance_scheduled();
+        let Self { frames, motion, viewpoints, rng_keys, .. } = self;
+        rng_keys[row].advance_scheduled();
         motion.advance(row, frames.shown(row));
-        let shown = frames.capture(row, seen, tickets[row], motion.shutter_open_poses(row), viewpoints);
+        let shown = frames.capture(row, seen, rng_keys[row], motion.shutter_open_poses(row), viewpoints);
         motion.close_shutter(row);
         if shown {
             self.motion.record_shown_view(row, self.view_of(row));

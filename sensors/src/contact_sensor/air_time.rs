@@ -39,8 +39,8 @@ impl ContactTimers {
     ];
 
     pub(super) fn new(num_envs: usize, bodies: usize, dt: f64, threshold: f64) -> Self {
-        let (seen, phases) = (vec![0; num_envs], vec![ContactPhase::default(); num_envs * bodies]);
-        Self { bodies, dt, threshold, last_step: seen, phases, net: vec![0.0; 3 * bodies] }
+        let (last_step, phases) = (vec![0; num_envs], vec![ContactPhase::default(); num_envs * bodies]);
+        Self { bodies, dt, threshold, last_step, phases, net: vec![0.0; 3 * bodies] }
     }
 
     /// Updates environment `env` at `step`; `net_forces` adds the net forces on its bodies \[N\].

@@ -44,9 +44,9 @@ impl Pairs {
     /// Creates the lookup tables. `groups` holds indices of the body axis, whose length is `axis`; `axis` stands for
     /// the world.
     pub(super) fn new(layout: MeasurementLayout, bodies: Vec<usize>, groups: &[Vec<usize>], axis: usize) -> Self {
-        let slots = (0..=axis).map(|body| bodies.iter().position(|&b| b == body)).collect();
+        let watched_index = (0..=axis).map(|body| bodies.iter().position(|&b| b == body)).collect();
         let of = |body| (0..groups.len()).filter(|&g| groups[g].contains(&body)).collect();
-        Self { layout, bodies, watched_index: slots, groups: (0..=axis).map(of).collect() }
+        Self { layout, bodies, watched_index, groups: (0..=axis).map(of).collect() }
     }
 
     /// Watched bodies as indices of the body axis.

@@ -179,24 +179,13 @@ impl<R: Rays> Scan<R> {
             }
         }
         let (per_view, moving) = (self.jobs_per_view(), self.targets.moving_count());
-        let Self {
-            pool,
-            rays,
-            order,
-            env_targets: looks,
-            fixed,
-            max_distance,
-            input: task,
-            scratch: desks,
-            job_hits: parts,
-            ..
-        } = self;
-        let threads = (task.views.len() * rays.count() / MIN_RAYS_PER_THREAD).clamp(1, desks.len());
-        let desks = &mut desks[..threads];
+        let Self { pool, rays, order, env_targets, fixed, max_distance, input, scratch, job_hits, .. } = self;
+        let threads = (input.views.len() * rays.count() / MIN_RAYS_PER_THREAD).clamp(1, scratch.len());
+        let desks = &mut scratch[..threads];
         desks.iter_mut().for_each(|desk| desk.placed_view = NO_SLOT);
-        let parts = parts[..per_view * task.views.len()].iter_mut().enumerate();
-        let (rays, order, looks, fixed) = (&*rays, order.as_deref(), &*looks, &*fixed);
-        let (task, max_distance) = (&*task, *max_distance);
+        let parts = job_hits[..per_view * input.views.len()].iter_mut().enumerate();
+        let (rays, order, looks, fixed) = (&*rays, order.as_deref(), &*env_targets, &*fixed);
+        let (task, max_distance) = (&*input, *max_distance);
         pool.for_each(desks, parts, |desk, (part, hits)| {
             let (at, first) = (part / per_view, part % per_view * RAYS_PER_JOB);
             let (env, view) = &task.views[at];

@@ -64,17 +64,17 @@ impl BodyAxis {
             .chain(objects.iter().map(|object| BodyFrame::of_body(object.body)))
             .chain(parts.iter().flat_map(|part| part.frames.iter().copied()))
             .collect();
-        let mut owners = vec![None; model.ngeom()];
+        let mut geom_owners = vec![None; model.ngeom()];
         let mut first = 0;
         for robot in robots {
             for geom in &robot.geoms {
-                owners[geom.geom] = Some((first + geom.link) as u32);
+                geom_owners[geom.geom] = Some((first + geom.link) as u32);
             }
             first += robot.links.len();
         }
         for (geom, &body) in model.geom_bodyid().iter().enumerate() {
             if let Some(k) = objects.iter().position(|object| object.body == body as usize) {
-                owners[geom] = Some((first + k) as u32);
+                geom_owners[geom] = Some((first + k) as u32);
             }
         }
         first += objects.len();
@@ -83,12 +83,12 @@ impl BodyAxis {
                 let body = model.geom_bodyid()[geom] as usize;
                 // The first body is the file's world, which belongs to the world; frame k is body k + 1.
                 let frame = part.bodies[1..].iter().position(|other| *other == body);
-                owners[geom] = frame.map(|frame| (first + frame) as u32);
+                geom_owners[geom] = frame.map(|frame| (first + frame) as u32);
             }
             first += part.frames.len();
         }
-        let carries = carriers.iter().enumerate().map(|(body, &carrier)| body == carrier).collect();
-        Self { geom_owners: owners, bodies, is_moving_body: carries }
+        let is_moving_body = carriers.iter().enumerate().map(|(body, &carrier)| body == carrier).collect();
+        Self { geom_owners, bodies, is_moving_body }
     }
 
     /// Frame of each body on the body axis.

@@ -119,12 +119,12 @@ impl DriveState {
     fn set_override(&mut self, drive: usize, kind: GainKind, value: f64) {
         let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
         let before = self.gain_override(drive, kind);
-        let instead_of = before.map_or(kind.user_value(&gains, &setting), |drawn| drawn.overridden);
+        let overridden = before.map_or(kind.user_value(&gains, &setting), |drawn| drawn.overridden);
         kind.write_torque_value(value, &mut gains, &mut setting);
         self.gains.set_if_changed(drive, gains);
         self.settings.set_if_changed(drive, setting);
         let mut drawn = self.overrides[drive];
-        drawn[kind as usize] = Some(GainOverride { value, overridden: instead_of });
+        drawn[kind as usize] = Some(GainOverride { value, overridden });
         self.overrides.set_if_changed(drive, drawn);
     }
 
@@ -193,9 +193,9 @@ impl DriveState {
     pub(super) fn set_base_gains(&mut self, drive: usize, mut gains: Gains, mut setting: DriveSetting) {
         let drawn = GainKind::ALL.map(|kind| {
             let GainOverride { value, .. } = self.gain_override(drive, kind)?;
-            let instead_of = kind.user_value(&gains, &setting);
+            let overridden = kind.user_value(&gains, &setting);
             kind.write_torque_value(value, &mut gains, &mut setting);
-            Some(GainOverride { value, overridden: instead_of })
+            Some(GainOverride { value, overridden })
         });
         self.gains.set_if_changed(drive, gains);
         self.settings.set_if_changed(drive, setting);

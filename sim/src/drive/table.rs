@@ -179,27 +179,22 @@ impl DriveState {
     pub fn new(table: &Arc<DriveTable>, model: &mj::Model) -> Self {
         let n = table.drives.len();
         let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
-        let no_targets = CowArray(vec![0.0; n].into());
-        let no_forces = CowArray(vec![0.0; model.nv()].into());
+        let zero_targets = CowArray(vec![0.0; n].into());
+        let zero_forces = CowArray(vec![0.0; model.nv()].into());
         let mut state = Self {
             gains: CowArray(table.drives.iter().map(|d| d.initial).collect()),
             settings: CowArray(table.drives.iter().map(|d| d.setting).collect()),
             overrides: CowArray(vec![GainOverrides::default(); n].into()),
             ranges: CowArray(table.drives.iter().map(|d| d.range).collect()),
             position: position.clone(),
-            velocity: no_targets.clone(),
-            feedforward: no_targets.clone(),
+            velocity: zero_targets.clone(),
+            feedforward: zero_targets.clone(),
             effort: vec![0.0; n].into(),
-            applied: no_forces.clone(),
+            applied: zero_forces.clone(),
             memory: table.models.iter().flat_map(|drive| drive.model.law().initial_memory()).collect(),
             rows: CowArray(table.rows(model).into()),
             damping: CowArray(table.damped.iter().map(|(_, damping)| *damping).collect()),
-            initial: Arc::new(InitialDrives {
-                table: Arc::clone(table),
-                position,
-                zero_targets: no_targets,
-                zero_forces: no_forces,
-            }),
+            initial: Arc::new(InitialDrives { table: Arc::clone(table), position, zero_targets, zero_forces }),
         };
         state.reset_memory();
         state

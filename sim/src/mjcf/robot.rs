@@ -142,7 +142,7 @@ pub(crate) fn add(
     emitter.bodies()?;
     emitter.inertias();
     emitter.couplings_and_actuators();
-    let base_pairs = emitter.base_pairs();
+    let base_contact_exclusions = emitter.base_pairs();
     let links = emitter
         .link_frames
         .iter()
@@ -153,7 +153,7 @@ pub(crate) fn add(
         })
         .collect();
     let RobotWriter { free_joint, geoms, damped, .. } = emitter;
-    Ok(RobotLayout { links, free_joint, base_contact_exclusions: base_pairs, geoms, damped })
+    Ok(RobotLayout { links, free_joint, base_contact_exclusions, geoms, damped })
 }
 
 struct RobotWriter<'a, 'm> {

@@ -445,10 +445,10 @@ impl MjcfWriter {
         element = element.pose(&geom.pose);
         element = match geom.role {
             // MuJoCo's viewers show groups 0 to 2.
-            GeomRole::Collision { contype, conaffinity, visible: seen } => element
+            GeomRole::Collision { contype, conaffinity, visible } => element
                 .attr("contype", contype)
                 .attr("conaffinity", conaffinity)
-                .attr("group", if seen { 0 } else { 3 }),
+                .attr("group", if visible { 0 } else { 3 }),
             GeomRole::Visual => element.attr("contype", 0).attr("conaffinity", 0).attr("group", 2),
         };
         if let Some(friction) = &geom.friction {
@@ -458,9 +458,9 @@ impl MjcfWriter {
             if surface.margin != 0.0 {
                 element = element.attr("margin", number(surface.margin));
             }
-            if let Some(ContactSolver { solref: reference, solimp: impedance, solmix: weight }) = &surface.solver {
-                let element_with = element.numbers("solref", reference).numbers("solimp", impedance);
-                element = element_with.attr("solmix", number(*weight));
+            if let Some(ContactSolver { solref, solimp, solmix }) = &surface.solver {
+                let element_with = element.numbers("solref", solref).numbers("solimp", solimp);
+                element = element_with.attr("solmix", number(*solmix));
             }
         }
         element = element.opt("material", geom.material.as_ref());

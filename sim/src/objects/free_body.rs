@@ -220,8 +220,8 @@ impl FreeBodyMut<'_> {
     }
 
     fn pose_storage(&self) -> Result<PoseStorage> {
-        let BodyIndexing { free_joint: joint, mocap, .. } = self.index;
-        let joint = joint.map(|(qpos, dof)| PoseStorage::Joint(qpos, dof));
+        let BodyIndexing { free_joint, mocap, .. } = self.index;
+        let joint = free_joint.map(|(qpos, dof)| PoseStorage::Joint(qpos, dof));
         // Among fixed bodies, only objects can be moved: the base of a robot is where its description says.
         let is_static =
             self.simulation.objects.iter().any(|object| object.is_static() && object.body == self.index.body);

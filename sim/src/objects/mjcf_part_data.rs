@@ -288,12 +288,12 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
             name.push_str(".site");
         }
         let (p, q) = (&model.site_pos()[3 * site..3 * site + 3], &model.site_quat()[4 * site..4 * site + 4]);
-        let carrier = if body == 0 { frames.len() } else { carrier(body) };
+        let moving_frame = if body == 0 { frames.len() } else { carrier(body) };
         frames.push(SensorFrame {
             name: format!("{uid}/{name}"),
             body,
             body_from_frame: from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]),
-            moving_frame: carrier,
+            moving_frame,
         });
     }
     frames

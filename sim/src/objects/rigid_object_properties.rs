@@ -217,14 +217,14 @@ impl RigidObjectMut<'_> {
         self.check_dynamic(argument)?;
         let forces = self.rows("set_external_wrench (forces)", meaning, 3, forces.into(), env_ids)?;
         let torques = self.rows("set_external_wrench (torques)", meaning, 3, torques.into(), env_ids)?;
-        let of = (OBJECT_WRENCH_OWNER, self.index);
+        let owner = (OBJECT_WRENCH_OWNER, self.index);
         let body = self.simulation.objects[self.index].body;
         for ((env, force), (_, torque)) in forces.arrays::<3>().zip(torques.arrays::<3>()) {
             let (force, torque) = (Vector3::from(force), Vector3::from(torque));
             let axes = (frame == WrenchFrame::Link).then(UnitQuaternion::identity);
             self.simulation.batch.write(env, |env| {
                 env.set_wrenches(|wrenches| {
-                    wrenches.replace(Wrench { owner: of, body, axes, force, torque });
+                    wrenches.replace(Wrench { owner, body, axes, force, torque });
                 });
             });
         }

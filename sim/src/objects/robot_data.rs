@@ -55,11 +55,11 @@ pub(crate) enum RobotKind {
 impl RobotKind {
     /// Label of the robot in errors.
     fn label(&self, uid: &str) -> EntityLabel {
-        let what = match self {
+        let kind = match self {
             Self::Robot => "robot",
             Self::Articulation(_) => "articulation",
         };
-        EntityLabel { kind: what, uid: uid.into() }
+        EntityLabel { kind, uid: uid.into() }
     }
 }
 
@@ -92,7 +92,7 @@ impl RobotData {
         let (file, mut description, mut found) =
             describe_robot(&cfg, &role.label(&cfg.uid), index, Some(scene), &mut hulls)?;
         add_payloads(&mut description, &cfg)?;
-        let link_names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
+        let link_names: Vec<&str> = description.named_links().iter().map(|link| link.name.as_str()).collect();
         let surfaces = SurfaceCfg::assign(&cfg.surfaces, &link_names, "link", role.label(&cfg.uid))?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();

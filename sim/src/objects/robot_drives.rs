@@ -177,9 +177,9 @@ impl RobotMut<'_> {
             for (row, (_, steps)) in write.rows.iter().enumerate() {
                 let (value, longest) = (steps[column], model.delay_capacity());
                 if value > f64::from(longest) {
-                    let (of, expected) =
+                    let (item, expected) =
                         (format!("joint {:?}", name(joint)), format!("at most {longest}, its max_delay"));
-                    return Err(Error::OutOfRange { argument, row, column, item: of, value, expected });
+                    return Err(Error::OutOfRange { argument, row, column, item, value, expected });
                 }
             }
             memories.push((column, memory.clone()));

@@ -202,9 +202,9 @@ impl RobotMut<'_> {
                 let Some(explicit) = table.model_of(drive) else { continue };
                 let value = values[column];
                 explicit.model.law().check(&change(table.drives[drive].initial, value)).map_err(|expected| {
-                    let of = format!("joint {:?}", self.data.joint_names()[joint]);
+                    let item = format!("joint {:?}", self.data.joint_names()[joint]);
                     let expected = format!("accepted by its drive model: {expected}");
-                    Error::OutOfRange { argument, row, column, item: of, value, expected }
+                    Error::OutOfRange { argument, row, column, item, value, expected }
                 })?;
             }
         }

@@ -120,19 +120,19 @@ impl<'v> EnvRows<'v> {
         env_ids: Option<&[EnvId]>,
         num_envs: usize,
     ) -> Result<Self> {
-        let ArgumentSpec { argument, meaning, columns, column_label: of } = table;
+        let ArgumentSpec { argument, meaning, columns, column_label } = table;
         let envs = env_list(env_ids, num_envs)?;
         if values.ncols() != columns || (values.nrows() != envs.len() && values.nrows() != 1) {
             let (found, expected) = (values.shape().to_vec(), vec![envs.len(), columns]);
             return Err(Error::Shape { argument, found, expected, meaning });
         }
         if let Some(((row, column), &value)) = values.indexed_iter().find(|(_, v)| !numbers.allow(**v)) {
-            let of = of(column);
+            let item = column_label(column);
             return Err(match numbers {
                 NumberKind::Finite | NumberKind::Acceleration if !value.is_finite() => {
-                    Error::NotFinite { argument, row, column, item: of, value }
+                    Error::NotFinite { argument, row, column, item, value }
                 }
-                _ => Error::OutOfRange { argument, row, column, item: of, value, expected: numbers.expected().into() },
+                _ => Error::OutOfRange { argument, row, column, item, value, expected: numbers.expected().into() },
             });
         }
         Ok(Self { envs, values })

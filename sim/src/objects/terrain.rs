@@ -109,8 +109,8 @@ impl Terrain {
         }
         for ((row, column), &value) in cfg.heights.indexed_iter() {
             if !value.is_finite() {
-                let of = format!("terrain {:?}", cfg.uid);
-                return Err(Error::NotFinite { argument: "heights", row, column, item: of, value });
+                let item = format!("terrain {:?}", cfg.uid);
+                return Err(Error::NotFinite { argument: "heights", row, column, item, value });
             }
         }
         let range = [

@@ -126,8 +126,8 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: SceneCo
                     _ => {}
                 }
             }
-            let PropertyTable { names, unsupported: without, .. } = &mut table;
-            without.retain(|(name, _)| !names.contains(name));
+            let PropertyTable { names, unsupported, .. } = &mut table;
+            unsupported.retain(|(name, _)| !names.contains(name));
         }
         Property::Color => {
             for geom in 0..model.ngeom() {

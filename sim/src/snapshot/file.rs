@@ -139,8 +139,8 @@ fn write_entry(entry: &EnvEntry, out: &mut ByteWriter) {
         out.u64(weld.equality as u64);
         out.numbers(&weld.pose);
     }
-    let SavedProperties { values, randomizations: draws } = &*entry.overrides;
-    out.u64(*draws);
+    let SavedProperties { values, randomizations } = &*entry.overrides;
+    out.u64(*randomizations);
     out.u64(values.len() as u64);
     for NamedValue { property, name, nth, value } in values {
         out.text(property.name());
@@ -194,13 +194,13 @@ fn read_entry(reader: &mut ByteReader<'_>, drive_count: usize) -> Result<EnvEntr
     let wrenches = Wrenches::from_flat(&wrenches).ok_or(Malformed("a wrench is incomplete"))?;
     // An index, and a list of seven numbers with its length.
     let welds = (0..reader.count(8 * 9)?).map(|_| read_weld(reader)).collect::<Result<Vec<_>, _>>()?;
-    let draws = match reader.u64()? {
+    let randomizations = match reader.u64()? {
         draws if draws <= MAX_STEPS => draws,
         _ => return Err(Malformed("a randomization count is out of range")),
     };
     // Two texts and a list with their lengths, and a number.
     let own = (0..reader.count(8 + 8 + 4 + 8)?).map(|_| read_property(reader)).collect::<Result<Vec<_>, _>>()?;
-    let own = Arc::new(SavedProperties { values: own, randomizations: draws });
+    let overrides = Arc::new(SavedProperties { values: own, randomizations });
     let reason = match reader.u8()? {
         0 => None,
         1 => {
@@ -221,7 +221,7 @@ fn read_entry(reader: &mut ByteReader<'_>, drive_count: usize) -> Result<EnvEntr
     };
     let inputs = UserInputs::from_values(values, active);
     let state = EnvState { motion, inputs, drives, wrenches, welds, steps: done, diverged };
-    Ok(EnvEntry { env, state, overrides: own })
+    Ok(EnvEntry { env, state, overrides })
 }
 
 fn read_property(reader: &mut ByteReader<'_>) -> Result<NamedValue, Malformed> {
@@ -292,7 +292,7 @@ mod tests {
         let mut entries: Vec<EnvEntry> = own
             .into_iter()
             .zip([3, 0])
-            .map(|(own, at)| EnvEntry { env: at, state: env.save_state(), overrides: own })
+            .map(|(overrides, at)| EnvEntry { env: at, state: env.save_state(), overrides })
             .collect();
         entries[1].state.diverged = Some(Box::new(EnvStatus::Diverged { step: 7, reason }));
         Snapshot { layout: Arc::new(layout), entries: entries.into() }

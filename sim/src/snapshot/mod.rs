@@ -83,7 +83,7 @@ impl Snapshot {
 
     /// Index of the state for each of `requested` environments, after a check that the snapshot is of this scene; a single
     /// state applies to all.
-    pub(crate) fn states_for(&self, wanted: usize, simulation: &Simulation) -> Result<Vec<usize>> {
+    pub(crate) fn states_for(&self, requested: usize, simulation: &Simulation) -> Result<Vec<usize>> {
         if let Some(difference) = self.layout.difference(&simulation.layout) {
             return Err(SnapshotError::OtherScene { difference }.into());
         }
@@ -93,9 +93,9 @@ impl Snapshot {
             return Err(SnapshotError::OtherScene { difference }.into());
         }
         match self.entries.len() {
-            held if held == wanted => Ok((0..held).collect()),
-            1 => Ok(vec![0; wanted]),
-            held => Err(SnapshotError::EnvCount { saved: held, requested: wanted }.into()),
+            held if held == requested => Ok((0..held).collect()),
+            1 => Ok(vec![0; requested]),
+            saved => Err(SnapshotError::EnvCount { saved, requested }.into()),
         }
     }
 

@@ -46,11 +46,11 @@ impl SavedProperties {
 
 impl Simulation {
     /// Properties of an environment as a snapshot stores them.
-    pub(crate) fn own_properties(&self, env: usize, draws: u64) -> Arc<SavedProperties> {
+    pub(crate) fn own_properties(&self, env: usize, randomizations: u64) -> Arc<SavedProperties> {
         // Created before an environment is locked: the creation reads an environment.
         self.tables();
         let values = self.batch.read(env, |here| self.named_properties(env, here));
-        Arc::new(SavedProperties { values, randomizations: draws })
+        Arc::new(SavedProperties { values, randomizations })
     }
 }
 

@@ -31,13 +31,13 @@ impl<'a> Lighting<'a> {
     /// default lights, has MuJoCo's lighting without those lights. Every other simulation has the lighting of
     /// simulations, such as a recorded scene without lights of its own.
     pub(crate) fn of(cfg: &SimulationManagerCfg, contents: &'a EntitySet) -> Self {
-        let EntitySet { robots, objects, terrains, mjcf_models: parts, .. } = contents;
+        let EntitySet { robots, objects, terrains, mjcf_models, .. } = contents;
         let by_default = cfg.lights == SimulationManagerCfg::default().lights;
-        match &parts[..] {
+        match &mjcf_models[..] {
             [part] if robots.is_empty() && objects.is_empty() && terrains.is_empty() && by_default => {
                 Self::Mujoco { file: part.model() }
             }
-            _ => Self::Default { files: parts.iter().map(|part| part.model()).collect() },
+            _ => Self::Default { files: mjcf_models.iter().map(|part| part.model()).collect() },
         }
     }
 

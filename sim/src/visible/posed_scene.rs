@@ -72,8 +72,8 @@ impl OffscreenScene {
                 return Err(Error::Shape { argument: "qpos", found, expected, meaning: "positions of the model" });
             }
             if let Some(column) = qpos.iter().position(|q| !q.is_finite()) {
-                let (of, value) = (format!("position {column}"), qpos[column]);
-                return Err(Error::NotFinite { argument: "qpos", row: 0, column, item: of, value });
+                let (item, value) = (format!("position {column}"), qpos[column]);
+                return Err(Error::NotFinite { argument: "qpos", row: 0, column, item, value });
             }
             data.qpos_mut().copy_from_slice(qpos);
         }

@@ -82,6 +82,28 @@ fn with_followers() {
     assert!(export.run(1e4 * bound, 400, 0.5).is_none(), "the control: a step far above it diverges");
 }
 
+/// Root cause: the comment on a second reduction of the time step, for the light wheel of another robot, was written
+/// from the step that was already reduced for followers, not from that of the simulation.
+#[test]
+fn two_reductions() {
+    let (files, out, cfg) = (TempFiles::default(), TempFiles::default(), worlds::cfg(1, 1));
+    let hand = worlds::urdf_robot("hand", assets::path("revo1_left/revo1_left.urdf").unwrap());
+    let wheel = worlds::text_robot(&files, "wheel", &urdf(&[Joint::wheel("j", 1e-5)]));
+    let mut sim = worlds::sim(cfg.clone());
+    sim.add_robot(RobotCfg { drive: gains(100.0, 10.0), ..hand }).unwrap();
+    sim.add_robot(RobotCfg { drive: gains(1e4, 0.1), ..wheel }).unwrap();
+    sim.dump(out.folder()).unwrap();
+    for name in ["robot.mjcf2.xml", "robot.mjcf4.xml"] {
+        let xml = std::fs::read_to_string(out.folder().join(name)).unwrap();
+        // Armatures are added for a step of 2 ms. The explicit drive of the wheel is stable up to 54 µs.
+        let added: f64 = between(&xml, "mimic joints at a time step of ", " s").parse().unwrap();
+        let step: f64 = between(&xml, "timestep=\"", "\"").parse().unwrap();
+        assert!(step < added && added < cfg.physics_dt, "{name}: {step} {added}");
+        let named: f64 = between(&xml, "smaller than the simulation's ", " s").parse().unwrap();
+        assert_eq!(named, cfg.physics_dt, "{name}");
+    }
+}
+
 /// Followers of an export stay at the positions given by their moving drivers.
 #[test]
 fn followers_track() {

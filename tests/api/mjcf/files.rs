@@ -140,7 +140,7 @@ fn newer_elements() {
         ("damping=\"1 -2 0\"", "", ["joint \"j\"", "nonlinear (polynomial) damping"]),
         ("", delayed, ["actuator \"a\"", "delay"]),
     ] {
-        assert_error(part(inside, after), "MjcfPart", &parts);
+        assert_error(part(inside, after), "MjcfAttach", &parts);
     }
     for (sensor, what) in [
         ("<contact name=\"x\" geom1=\"g\"/>", "the type contact"),

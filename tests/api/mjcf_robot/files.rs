@@ -4,7 +4,7 @@ use super::*;
 use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
-use kinetoscope::sim::Error;
+use kinetoscope::sim::{Error, SurfaceCfg};
 use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{gains, pose_error, pose_of_row, urdf_robot};
@@ -49,6 +49,20 @@ fn control_parts() {
     assert_eq!(named[..6], ["base", "shoulder", "fore", "carriage", "plate", "hand"]);
     assert!(named.contains(&"tip") && named.contains(&"shoulder_site"), "{named:?}");
     assert_eq!(of.description().links.len() - named.len(), 2 + 2 + 1);
+}
+
+/// Root cause: patterns of surfaces were matched with all links, including the unnamed frames between joints.
+#[test]
+fn surfaces() {
+    let with_surfaces = |patterns: &[&str]| {
+        let surfaces = patterns.iter().map(|pattern| (pattern.to_string(), SurfaceCfg::metal(0.5))).collect();
+        empty(1).add_robot(RobotCfg { surfaces, ..robot("odd", ODD) })
+    };
+    assert_error(with_surfaces(&["pan.frame"]), "", &["surfaces", "\"pan.frame\" matches no link"]);
+    // The links plate and hand; both patterns match pan.frame.
+    with_surfaces(&["p.*", "[hp]an.*"]).unwrap();
+    // Control: both patterns match the hand.
+    assert_error(with_surfaces(&["h.*", "[hp]an.*"]), "", &["surfaces", "matched by both"]);
 }
 
 /// A dump loads in plain MuJoCo and describes the same robot, including drives. As a URDF it has the same tree, joints

@@ -93,8 +93,8 @@ fn writes() {
     let twice = Some(&[EnvId(2), EnvId(0), EnvId(2)][..]);
     let rows = |columns| Array2::from_elem((3, columns), 1.0);
     let repeated = |result: Result<()>, called: &str| match result {
-        Err(Error::RepeatedItem { argument, item: of, first: 0, second: 2 }) => {
-            assert_eq!((argument, of.as_str()), (called, "environment 2"));
+        Err(Error::RepeatedItem { argument, item, first: 0, second: 2 }) => {
+            assert_eq!((argument, item.as_str()), (called, "environment 2"));
         }
         other => panic!("{called}: {other:?}"),
     };

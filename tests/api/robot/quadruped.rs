@@ -92,7 +92,7 @@ fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> StandingResult {
     sim.update(steps(30.0));
     let foot: Vec<bool> = sim.sensor(all).unwrap().body_names().iter().map(|name| name.ends_with("_FOOT")).collect();
     assert_eq!(foot.iter().filter(|foot| **foot).count(), 4);
-    let (mut low, mut high, mut elsewhere, mut carried) = (f64::MAX, f64::MIN, 0.0f64, 0.0);
+    let (mut low, mut high, mut max_other_force, mut carried) = (f64::MAX, f64::MIN, 0.0f64, 0.0);
     let mut least = vec![f64::MAX; foot.len()];
     for step in 0..steps(30.0) {
         sim.update(1);
@@ -102,28 +102,28 @@ fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> StandingResult {
         for (body, foot) in foot.iter().enumerate() {
             let force = nalgebra::Vector3::from_fn(|k, _| forces[(0, body, k)]);
             if !foot {
-                elsewhere = elsewhere.max(force.norm());
+                max_other_force = max_other_force.max(force.norm());
             } else if step >= steps(29.0) {
                 carried += force.z / f64::from(steps(1.0));
                 least[body] = least[body].min(force.z);
             }
         }
     }
-    let feet = (0..foot.len()).filter(|&b| foot[b] && least[b] > 1.0).count();
+    let loaded_feet = (0..foot.len()).filter(|&b| foot[b] && least[b] > 1.0).count();
     StandingResult {
         drift: high - low,
         weight_ratio: carried / (9.81 * sim.robot(robot).total_mass()),
-        loaded_feet: feet,
-        max_other_force: elsewhere,
+        loaded_feet,
+        max_other_force,
     }
 }
 
 fn check(name: &str, robot: RobotCfg) {
-    let StandingResult { drift, weight_ratio: carried, loaded_feet: feet, max_other_force: elsewhere } =
+    let StandingResult { drift, weight_ratio, loaded_feet, max_other_force } =
         stand(robot, SimulationManagerCfg::legged());
     assert!(drift < 5e-3, "{name}: the base drifts by {drift} m");
-    assert!((carried - 1.0).abs() < 0.01, "{name}: the feet carry {carried} of the weight");
-    assert!(feet == 4 && elsewhere == 0.0, "{name}: {feet} feet, {elsewhere} N elsewhere");
+    assert!((weight_ratio - 1.0).abs() < 0.01, "{name}: the feet carry {weight_ratio} of the weight");
+    assert!(loaded_feet == 4 && max_other_force == 0.0, "{name}: {loaded_feet} feet, {max_other_force} N elsewhere");
 }
 
 #[test]

@@ -85,8 +85,8 @@ fn our_images(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, MaskIds
     };
     // In MuJoCo's order; the model renders all of them.
     let of_class = |class: &str| visible.mask_ids().iter().filter(|id| id.class == class).map(|id| id.id).collect();
-    let others = ["tendon", "skin", "flex"].map(of_class);
-    (images, MaskIds { geoms: (0..model.ngeom()).map(mask_of).collect(), deformables: others })
+    let deformables = ["tendon", "skin", "flex"].map(of_class);
+    (images, MaskIds { geoms: (0..model.ngeom()).map(mask_of).collect(), deformables })
 }
 
 /// The MJCF with a camera named "judge" in its world body.
@@ -131,12 +131,12 @@ const MIN_BRIGHTNESS: f64 = 16.0;
 
 fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
     let [width, height] = SIZE;
-    let (mut seen, mut compared, mut same) = (0, 0, 0);
+    let (mut covered, mut compared, mut same) = (0, 0, 0);
     let mut pairs: Vec<ColorPair> = Vec::new();
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let k = y * width + x;
-            seen += usize::from(theirs.ids[k] >= 0);
+            covered += usize::from(theirs.ids[k] >= 0);
             let around: Vec<usize> =
                 [0, 1, 2].iter().flat_map(|r| [0, 1, 2].map(|c| k + r * width + c - width - 1)).collect();
             if !around.iter().all(|&n| theirs.ids[n] == theirs.ids[k]) {
@@ -175,13 +175,7 @@ fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
     let hues: Vec<f64> = hues.collect();
     assert!(4 * hues.len() > pairs.len(), "a quarter of the pixels is not black: {} of {}", hues.len(), pairs.len());
     let hue = hues.iter().sum::<f64>() / hues.len() as f64;
-    Agreement {
-        covered: seen,
-        compared,
-        same: same as f64 / compared as f64,
-        brightness: covariance / (va * vb).sqrt(),
-        hue,
-    }
+    Agreement { covered, compared, same: same as f64 / compared as f64, brightness: covariance / (va * vb).sqrt(), hue }
 }
 
 /// Checks one scene; `files` holds the assets of the model.

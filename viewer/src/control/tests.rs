@@ -236,8 +236,8 @@ fn floating_cube() -> (SimulationManager, RigidObjectId) {
     (sim, id.unwrap())
 }
 
-fn drag(hold: [f64; 3], target: [f64; 3]) -> Command {
-    Command::Drag { env: EnvId(0), body: 0, anchor: hold, target }
+fn drag(anchor: [f64; 3], target: [f64; 3]) -> Command {
+    Command::Drag { env: EnvId(0), body: 0, anchor, target }
 }
 
 /// A free body pulled at its center of mass is a critically damped oscillator: x(t) = 1 - (1 + w t) e^-wt.

@@ -237,8 +237,8 @@ impl ViewController {
                 let set = sim.robot_mut(robot).set_qpos_target(&arr2(&[[value]]), Some(&[joint]), envs);
                 set.map_err(|error| error.to_string())?;
             }
-            Command::Drag { env, body, anchor: hold, target } => {
-                let spring = Spring { env, body, anchor: hold, target };
+            Command::Drag { env, body, anchor, target } => {
+                let spring = Spring { env, body, anchor, target };
                 if self.springs.get(&viewer).is_some_and(|old| old.body_ref() != spring.body_ref()) {
                     self.release(sim, viewer);
                 }
@@ -261,7 +261,7 @@ impl ViewController {
 
     /// Applies the spring forces to the next step. Springs of several viewers on one body are added.
     fn apply_springs(&mut self, sim: &mut SimulationManager) {
-        let Self { springs, refusals, pulled_bodies: pulled, .. } = self;
+        let Self { springs, refusals, pulled_bodies, .. } = self;
         let mut forces: Vec<(BodyRef, Vec<_>)> = Vec::new();
         springs.retain(|_, spring| match spring.current_force(sim) {
             Ok(force) => {
@@ -276,12 +276,12 @@ impl ViewController {
                 false
             }
         });
-        for let_go in pulled.drain(..).filter(|held| !forces.iter().any(|(now, _)| now == held)) {
+        for let_go in pulled_bodies.drain(..).filter(|held| !forces.iter().any(|(now, _)| now == held)) {
             spring::release(sim, let_go);
         }
         for (held, forces) in forces {
             match sim.scene_mut().set_point_forces(held.env, held.body, &forces) {
-                Ok(()) => pulled.push(held),
+                Ok(()) => pulled_bodies.push(held),
                 Err(error) => {
                     refusals.record_refusal(CommandKind::Spring, Some(error.to_string()));
                     springs.retain(|_, spring| spring.body_ref() != held);

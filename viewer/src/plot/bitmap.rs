@@ -15,14 +15,8 @@ const CURVE_HALF_WIDTH: f64 = 0.75;
 
 /// Rasterizes a plot.
 pub(super) fn rasterize(drawing: &PlotLayout) -> Canvas {
-    let PlotLayout {
-        size: [width, height],
-        frame: [left, top, right, bottom],
-        grid,
-        labels,
-        curves,
-        legend_lines: keys,
-    } = drawing;
+    let PlotLayout { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, legend_lines } =
+        drawing;
     let mut canvas = Canvas::new(*width, *height);
     canvas.bytes_mut().fill(255);
     let mut pen = LineRasterizer { coverage: vec![0; width * height], touched: Vec::new(), size: [*width, *height] };
@@ -30,8 +24,8 @@ pub(super) fn rasterize(drawing: &PlotLayout) -> Canvas {
         pen.add_line(*from, *to, 0.5);
     }
     pen.composite(&mut canvas, GRAY);
-    for Curve { color, polylines: pieces, markers: marks } in curves {
-        for piece in pieces {
+    for Curve { color, polylines, markers } in curves {
+        for piece in polylines {
             for pair in piece.windows(2) {
                 pen.add_line(pair[0], pair[1], CURVE_HALF_WIDTH);
             }
@@ -39,7 +33,7 @@ pub(super) fn rasterize(drawing: &PlotLayout) -> Canvas {
                 pen.add_line(one, one, 2.0);
             }
         }
-        for mark in marks {
+        for mark in markers {
             pen.add_line(*mark, *mark, 3.0);
         }
         pen.composite(&mut canvas, *color);
@@ -49,7 +43,7 @@ pub(super) fn rasterize(drawing: &PlotLayout) -> Canvas {
         pen.add_line(corners[k], corners[(k + 1) % 4], 0.5);
     }
     pen.composite(&mut canvas, BLACK);
-    for ([from, to], color) in keys {
+    for ([from, to], color) in legend_lines {
         pen.add_line(*from, *to, 1.5);
         pen.composite(&mut canvas, *color);
     }

@@ -90,9 +90,9 @@ impl MergedScene {
 
     /// Updates the poses of the instances.
     fn update_poses(&mut self, snapshot: &Snapshot) {
-        let Self { poses, instance_sources: parts, is_ground, .. } = self;
+        let Self { poses, instance_sources, is_ground, .. } = self;
         poses.clear();
-        poses.extend(parts.iter().zip(is_ground).map(|(&(env, i), is_ground)| {
+        poses.extend(instance_sources.iter().zip(is_ground).map(|(&(env, i), is_ground)| {
             let env = &snapshot.envs[env];
             let pose = env.snapshot.instances.get(i).copied().unwrap_or_default();
             if *is_ground { pose } else { translated(&pose, env.origin) }

@@ -55,8 +55,8 @@ impl MouseSpring {
 
     /// Returns the drag command, or `None` if the body no longer exists.
     pub(crate) fn command(&self) -> Option<Command> {
-        let Selection { env, body, point_in_body: hold, .. } = self.picked;
-        Some(Command::Drag { env: EnvId(env), body: body?, anchor: hold, target: self.target })
+        let Selection { env, body, point_in_body, .. } = self.picked;
+        Some(Command::Drag { env: EnvId(env), body: body?, anchor: point_in_body, target: self.target })
     }
 
     /// Returns the drawn spring: its environment and its two ends in the environment frame \[m\].

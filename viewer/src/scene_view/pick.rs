@@ -32,8 +32,8 @@ impl Selection {
         // The ground is shared by all environments, so the point is relative to the environment of its instance.
         let point = [0, 1, 2].map(|k| f64::from(position[k]) - stage.origin[k]);
         let pose = body.and_then(|body| stage.snapshot.bodies.get(body));
-        let hold = pose.map_or(point, |pose| pose.inverse_transform_point(&Point3::from(point)).into());
-        Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, point_in_body: hold })
+        let point_in_body = pose.map_or(point, |pose| pose.inverse_transform_point(&Point3::from(point)).into());
+        Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, point_in_body })
     }
 
     /// Returns the current pose of the body, or `None` for the world and for bodies that no longer exist.

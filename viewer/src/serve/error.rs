@@ -40,9 +40,6 @@ pub enum ServeError {
     /// The operating system provides no random numbers or no thread.
     #[error("cannot serve: {0}")]
     System(String),
-    /// The simulation returned an error.
-    #[error("cannot serve: {0}")]
-    Simulation(#[from] kinetoscope_sim::Error),
 }
 
 fn hint(candidates: &[String]) -> String {

@@ -139,9 +139,9 @@ impl Serve for SimulationManager {
         let backend = Arc::new(ViewerHub::new(host_viewer, cfg));
         let server = Server::start(listener, AccessPolicy::new(address, token), backend, max_viewers)?;
         button.into_iter().for_each(|button| self.record_button(button));
-        let house = server.context();
+        let context = server.context();
         let host = self.observers_mut().add(ServerObserver(server));
-        Ok(ServerHandle { url, address, context: house, host })
+        Ok(ServerHandle { url, address, context, host })
     }
 }
 

@@ -67,8 +67,8 @@ pub(super) fn send_page(stream: &mut TcpStream, html: &str, nonce: &str, with_bo
     send(stream, "200 OK", &more, html, with_body);
 }
 
-/// Sends a status and an explanation.
-pub(super) fn send_error(stream: &mut TcpStream, status: Status) {
+/// Sends a status and an explanation. Responses to HEAD requests have no body.
+pub(super) fn send_error(stream: &mut TcpStream, status: Status, with_body: bool) {
     let more: &[(&str, &str)] = match status {
         Status::MethodNotAllowed => &[("Allow", "GET, HEAD")],
         Status::UpgradeRequired => &[("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")],
@@ -76,7 +76,7 @@ pub(super) fn send_error(stream: &mut TcpStream, status: Status) {
         _ => &[],
     };
     let more: Vec<_> = more.iter().copied().chain([("Content-Type", "text/plain; charset=utf-8")]).collect();
-    send(stream, status.status_line(), &more, &format!("{}\n", status.explanation()), true);
+    send(stream, status.status_line(), &more, &format!("{}\n", status.explanation()), with_body);
 }
 
 fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, with_body: bool) {

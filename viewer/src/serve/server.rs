@@ -69,15 +69,15 @@ impl Server {
     /// Starts to accept connections.
     pub(super) fn start(
         listener: TcpListener,
-        door: AccessPolicy,
-        show: Arc<dyn ViewBackend>,
+        policy: AccessPolicy,
+        backend: Arc<dyn ViewBackend>,
         max_viewers: usize,
     ) -> Result<Self, ServeError> {
         let failed = |what: &'static str| move |error: std::io::Error| ServeError::System(format!("{what}: {error}"));
         listener.set_nonblocking(true).map_err(failed("cannot make the socket non-blocking"))?;
         let house = Arc::new(ServerContext {
-            policy: door,
-            backend: show,
+            policy,
+            backend,
             max_viewers,
             viewers: AtomicUsize::new(0),
             stop: AtomicBool::new(false),
@@ -208,19 +208,21 @@ fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
     let head = match RequestHead::read(stream) {
         Ok(Some(head)) => head,
         Ok(None) => return,
-        Err(status) => return response::send_error(stream, status),
+        // The method of a request that cannot be parsed is unknown.
+        Err(status) => return response::send_error(stream, status, true),
     };
+    let with_body = head.method != "HEAD";
     if let Err(status) = house.policy.check(&head) {
-        return response::send_error(stream, status);
+        return response::send_error(stream, status, with_body);
     }
     match (head.method.as_str(), head.path.as_str()) {
         ("GET" | "HEAD", "/" | "/index.html") => match super::token::random_hex() {
-            Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, head.method == "GET"),
-            Err(_) => response::send_error(stream, Status::InternalError),
+            Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, with_body),
+            Err(_) => response::send_error(stream, Status::InternalError, with_body),
         },
         ("GET", WEBSOCKET_PATH) => upgrade(stream, house, head),
-        ("GET" | "HEAD", _) => response::send_error(stream, Status::NotFound),
-        _ => response::send_error(stream, Status::MethodNotAllowed),
+        ("GET" | "HEAD", _) => response::send_error(stream, Status::NotFound, with_body),
+        _ => response::send_error(stream, Status::MethodNotAllowed, with_body),
     }
 }
 
@@ -231,10 +233,10 @@ fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
     // Sixteen bytes in base64.
     let key = head.header("sec-websocket-key").ok().flatten().filter(|key| key.len() == 24);
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
-        return response::send_error(stream, Status::UpgradeRequired);
+        return response::send_error(stream, Status::UpgradeRequired, true);
     };
     let Some(seat) = ViewerSlot::acquire(house) else {
-        return response::send_error(stream, Status::ServiceUnavailable);
+        return response::send_error(stream, Status::ServiceUnavailable, true);
     };
     let switch = format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {}\r\n\r\n",

@@ -46,16 +46,16 @@ struct SessionShared {
 }
 
 impl ViewerHub {
-    pub(super) fn new(usher: Viewer, cfg: ServeCfg) -> Self {
+    pub(super) fn new(host_viewer: Viewer, cfg: ServeCfg) -> Self {
         if let Some(speed) = cfg.speed {
-            usher.send(control::Command::SetSpeed(speed));
+            host_viewer.send(control::Command::SetSpeed(speed));
         }
-        let hands = Mutex::new(usher.add_viewer(SnapshotRequest::EMPTY));
+        let control_viewer = Mutex::new(host_viewer.add_viewer(SnapshotRequest::EMPTY));
         Self {
-            host_viewer: usher,
+            host_viewer,
             shared: Arc::new(SessionShared {
                 cfg,
-                control_viewer: hands,
+                control_viewer,
                 render_lock: Mutex::new(()),
                 session_count: AtomicUsize::new(0),
             }),
@@ -319,14 +319,14 @@ impl ViewerSession {
         self.orbit_camera = Some(eye);
         let view = eye.view(self.size[0], self.size[1]);
         let spring = self.mouse_spring.as_ref().map(|pull| pull.ends(snapshot));
-        let (overlays, picked, trails) = (self.overlays, self.selection.as_ref(), Some(&self.trails));
-        let look = ViewOptions { envs: self.env_selection, overlays, selection: picked, trails, spring };
+        let (overlays, selection, trails) = (self.overlays, self.selection.as_ref(), Some(&self.trails));
+        let look = ViewOptions { envs: self.env_selection, overlays, selection, trails, spring };
         let shared = Arc::clone(&self.shared);
         let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
         self.painter.draw(snapshot, &view, &look, &mut self.canvas).ok()?;
         let file = self.encode_jpeg()?;
-        let about = json!({"shows": "stage", "type": "image/jpeg", "snapshot": snapshot.number});
-        Some(EncodedImage { description: about, file })
+        let description = json!({"shows": "stage", "type": "image/jpeg", "snapshot": snapshot.number});
+        Some(EncodedImage { description, file })
     }
 
     fn render_panel(&mut self, snapshot: &Snapshot) -> Option<EncodedImage> {
@@ -342,8 +342,8 @@ impl ViewerSession {
         let shared = Arc::clone(&self.shared);
         let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
         let drawn = self.panel.draw(snapshot, camera, env, PANEL_WIDTH, &mut self.canvas);
-        let about = json!({"shows": "camera", "type": "image/jpeg", "camera": name, "environment": env});
-        Some(EncodedImage { description: about, file: drawn.then(|| self.encode_jpeg()).flatten()? })
+        let description = json!({"shows": "camera", "type": "image/jpeg", "camera": name, "environment": env});
+        Some(EncodedImage { description, file: drawn.then(|| self.encode_jpeg()).flatten()? })
     }
 
     /// Encodes the canvas as a JPEG file.

@@ -50,7 +50,12 @@ struct WebSocketSession<'a, S> {
 struct SessionEnded;
 
 /// Runs a session until the browser or the server ends it.
-pub(super) fn run_session(stream: &mut TcpStream, rest: Vec<u8>, house: &ServerContext, eyes: Box<dyn ViewSession>) {
+pub(super) fn run_session(
+    stream: &mut TcpStream,
+    rest: Vec<u8>,
+    context: &ServerContext,
+    session: Box<dyn ViewSession>,
+) {
     let config = WebSocketConfig::default()
         .read_buffer_size(8 << 10)
         .write_buffer_size(0)
@@ -60,8 +65,8 @@ pub(super) fn run_session(stream: &mut TcpStream, rest: Vec<u8>, house: &ServerC
     let Some(past) = now.checked_sub(STATE_INTERVAL + IMAGE_CHECK_INTERVAL) else { return };
     let mut viewer = WebSocketSession {
         socket: WebSocket::from_partially_read(&*stream, rest, Role::Server, Some(config)),
-        context: house,
-        session: eyes,
+        context,
+        session,
         unseen_images: 0,
         unseen_states: 0,
         last_received: now,

@@ -534,8 +534,8 @@ impl App {
             Some(Drag { grip: DragMode::Spring(pull), .. }) => Some(pull.ends(&snapshot)),
             _ => None,
         };
-        let (shown, overlays, picked) = (self.visible_envs(), self.overlays, self.selection.as_ref());
-        let look = ViewOptions { envs: shown, overlays, selection: picked, trails: Some(&self.trails), spring };
+        let (envs, overlays, selection) = (self.visible_envs(), self.overlays, self.selection.as_ref());
+        let look = ViewOptions { envs, overlays, selection, trails: Some(&self.trails), spring };
         self.painter.set_max_threads(self.thread_budget.threads(&snapshot.run, now));
         // The snapshot number of a paused simulation changes only if a user changed something.
         let shows = (snapshot.number, view);
@@ -552,7 +552,7 @@ impl App {
         }
         let name = self.caption(&snapshot);
         let refused = if self.send_failed { Some(NOT_STEPPING) } else { snapshot.run.last_refusal.as_deref() };
-        hud::draw_status(canvas, &snapshot, shown, &name, self.frame_times.len() as f64, refused);
+        hud::draw_status(canvas, &snapshot, envs, &name, self.frame_times.len() as f64, refused);
         if let Some(picked) = &self.selection {
             let mut lines = selection_text(picked, &snapshot);
             lines.extend(self.followed_point.map(|_| "followed".into()));

@@ -20,13 +20,13 @@ fn x_range(width: usize) -> [f64; 2] {
 
 /// Draws the timeline if the snapshot belongs to a recording.
 pub(super) fn draw(canvas: &mut Canvas, snapshot: &Snapshot) {
-    let Some(Timeline { time: now, start, end }) = snapshot.run.timeline else { return };
+    let Some(Timeline { time, start, end }) = snapshot.run.timeline else { return };
     let [width, height] = canvas.dimensions();
     let [left, right] = x_range(width).map(|x| x as i32);
     let top = i32::try_from(height).unwrap_or(i32::MAX) - HEIGHT as i32;
     canvas.fill([0, top], [i32::try_from(width).unwrap_or(i32::MAX), HEIGHT as i32], DARK, 200);
     canvas.fill([left, top + 6], [right - left, 4], GRAY, 110);
-    let share = if end > start { (now - start) / (end - start) } else { 0.0 };
+    let share = if end > start { (time - start) / (end - start) } else { 0.0 };
     let at = left + (share.clamp(0.0, 1.0) * f64::from(right - left)) as i32;
     canvas.fill([left, top + 6], [at - left, 4], YELLOW, 160);
     canvas.fill([at - 1, top + 2], [3, 12], YELLOW, 255);
@@ -57,8 +57,8 @@ mod tests {
     use crate::window::{App, Input, Modifiers};
     use std::sync::Arc;
 
-    fn at(now: f64) -> Snapshot {
-        let timeline = Some(Timeline { time: now, start: 2.0, end: 6.0 });
+    fn at(time: f64) -> Snapshot {
+        let timeline = Some(Timeline { time, start: 2.0, end: 6.0 });
         Snapshot { run: RunState { timeline, ..RunState::default() }, ..Snapshot::default() }
     }
 

@@ -133,7 +133,7 @@ impl XWindow {
         let most_significant_first = connection.setup().image_byte_order == ImageOrder::MSB_FIRST;
         let size = [usize::from(width), usize::from(height)];
         let format = server_scaling::render_format(&connection, visual)?;
-        let (pixels, enlarged, released) = (Vec::new(), None, None);
+        let (pixels, scaled_image, released) = (Vec::new(), None, None);
         Ok(Self {
             watch,
             connection,
@@ -148,7 +148,7 @@ impl XWindow {
             released,
             pixels,
             format,
-            scaled_image: enlarged,
+            scaled_image,
         })
     }
 
@@ -333,12 +333,12 @@ impl Drop for XWindow {
     }
 }
 
-/// Returns the number of window pixels per image pixel, along each side, for an image of at most about [`MAX_PIXELS`]
-/// pixels with sides that the renderer supports.
+/// Returns the number of window pixels per image pixel, along each side, for an image of at most [`MAX_PIXELS`] pixels
+/// with sides that the renderer supports.
 fn coarseness(size: [usize; 2]) -> usize {
     let fits = |k: &usize| {
         let [width, height] = size.map(|n| n.div_ceil(*k));
-        (size[0] / k).max(1) * (size[1] / k).max(1) <= MAX_PIXELS && width.max(height) <= View::MAX_SIDE
+        width * height <= MAX_PIXELS && width.max(height) <= View::MAX_SIDE
     };
     (1..).find(fits).unwrap_or(1)
 }
@@ -371,11 +371,11 @@ struct KeyboardMap {
 
 impl KeyboardMap {
     fn of(connection: &RustConnection) -> Result<Self, DisplayError> {
-        let (first, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
-        let count = last.saturating_sub(first).saturating_add(1);
-        let mapping = connection.get_keyboard_mapping(first, count)?.reply()?;
+        let (first_keycode, last) = (connection.setup().min_keycode, connection.setup().max_keycode);
+        let count = last.saturating_sub(first_keycode).saturating_add(1);
+        let mapping = connection.get_keyboard_mapping(first_keycode, count)?.reply()?;
         Ok(Self {
-            first_keycode: first,
+            first_keycode,
             keysyms_per_keycode: usize::from(mapping.keysyms_per_keycode),
             keysyms: mapping.keysyms,
         })
@@ -459,15 +459,25 @@ mod tests {
     }
 
     /// A window may be up to 65 535 pixels wide, but an image at most 8192: without a coarser image, its last column
-    /// was repeated.
+    /// was repeated. Root cause of images with too many pixels: the limit applied to sides rounded down, but images
+    /// have sides rounded up, 1921 x 1201 for a window of 3841 x 2401.
     #[test]
     fn coarse_images() {
-        for (size, k) in [([1, 1], 1), ([960, 540], 1), ([1920, 1200], 1), ([3840, 2160], 2), ([8192, 50], 1)] {
+        for (size, k) in [
+            ([1, 1], 1),
+            ([960, 540], 1),
+            ([1920, 1200], 1),
+            ([3840, 2160], 2),
+            ([3840, 2400], 2),
+            ([3841, 2401], 3),
+            ([8192, 50], 1),
+        ] {
             assert_eq!(coarseness(size), k, "{size:?}");
         }
-        for size in [[8193, 1], [30_000, 50], [65_535, 65_535], [1, 65_535]] {
+        for size in [[8193, 1], [30_000, 50], [65_535, 65_535], [1, 65_535], [3841, 2401]] {
             let k = coarseness(size);
             let image = size.map(|n| n.div_ceil(k));
+            assert!(image[0] * image[1] <= MAX_PIXELS, "{size:?}: {image:?}");
             assert!(image.iter().all(|n| *n <= View::MAX_SIDE) && image[0] * k >= size[0], "{size:?}: {k}");
         }
     }

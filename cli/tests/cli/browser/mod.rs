@@ -296,9 +296,8 @@ fn record_button() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.npz");
     let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
-    let recording = Some(RecordButton::shared(files));
-    let running =
-        ServedSimulation::start_at(1, "127.0.0.1:0", ServeCfg { record_button: recording, ..ServeCfg::default() });
+    let record_button = Some(RecordButton::shared(files));
+    let running = ServedSimulation::start_at(1, "127.0.0.1:0", ServeCfg { record_button, ..ServeCfg::default() });
     let mut tab = page(&browser, &running.url);
     tab.wait_until("a button", "!$('record').hidden && $('record').textContent === 'Record'");
     tab.click("$('record')");

@@ -58,7 +58,7 @@ impl ServedSimulation {
     pub(crate) fn start_at(num_envs: usize, address: &str, cfg: ServeCfg) -> Self {
         let mut sim = scene(num_envs);
         let served = sim.serve_with(address, cfg).unwrap();
-        let key =
+        let viewer =
             sim.viewer(SnapshotRequest { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false });
         let (now, stop) = (Arc::<Mutex<SimState>>::default(), Arc::new(AtomicBool::new(false)));
         let robot = sim.entities().robot_id("arm").unwrap();
@@ -78,15 +78,7 @@ impl ServedSimulation {
                 std::thread::sleep(Duration::from_millis(1));
             }
         });
-        Self {
-            url: served.url().into(),
-            address: served.address(),
-            served,
-            now,
-            stop,
-            viewer: key,
-            thread: Some(thread),
-        }
+        Self { url: served.url().into(), address: served.address(), served, now, stop, viewer, thread: Some(thread) }
     }
 
     pub(crate) fn now(&self) -> SimState {

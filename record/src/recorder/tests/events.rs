@@ -95,8 +95,8 @@ fn rates() {
         let every = SamplingCfg::every(2.0 * sim.cfg().physics_dt);
         sim.add_sensor("imu", ImuCfg { sampling: every, ..ImuCfg::on("ball/ball") }).unwrap();
         sim.add_sensor("second", ImuCfg::on("ball/ball")).unwrap();
-        let rates = rates.iter().map(|(name, steps)| ((*name).to_string(), *steps)).collect();
-        let cfg = RecorderCfg { period_steps: 3, stream_periods: rates, overwrite: true, ..RecorderCfg::new(path) };
+        let stream_periods = rates.iter().map(|(name, steps)| ((*name).to_string(), *steps)).collect();
+        let cfg = RecorderCfg { period_steps: 3, stream_periods, overwrite: true, ..RecorderCfg::new(path) };
         let recorder = sim.record(cfg)?;
         sim.update(20);
         sim.finish_recording(recorder)

@@ -250,8 +250,8 @@ impl BvhBuilder {
             self.scratch.clone_from(&self.groups);
             self.build_wide_node([GroupRange { bounds, start: 0, end: count as u32, depth: 0 }; 2], 1)
         };
-        let bounds = [lo.map(|x| x - pad), hi.map(|x| x + pad)];
-        (Bvh { nodes: std::mem::take(&mut self.nodes), root, bounds: around, padded_bounds: bounds }, order)
+        let padded_bounds = [lo.map(|x| x - pad), hi.map(|x| x + pad)];
+        (Bvh { nodes: std::mem::take(&mut self.nodes), root, bounds: around, padded_bounds }, order)
     }
 
     /// Adds all groups of primitives, which are in this order.

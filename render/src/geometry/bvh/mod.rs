@@ -140,7 +140,7 @@ impl Bvh {
             return None;
         }
         let [lo, hi] = self.padded_bounds;
-        let (mut shift, mut leave) = (0.0f64, limit);
+        let (mut entry_distance, mut leave) = (0.0f64, limit);
         for k in 0..3 {
             let (o, d) = (ray.origin[k], ray.direction[k]);
             if d == 0.0 {
@@ -151,19 +151,19 @@ impl Bvh {
             }
             let inverse = 1.0 / d;
             let (a, b) = ((lo[k] - o) * inverse, (hi[k] - o) * inverse);
-            (shift, leave) = (shift.max(a.min(b)), leave.min(a.max(b)));
+            (entry_distance, leave) = (entry_distance.max(a.min(b)), leave.min(a.max(b)));
         }
-        if shift > leave {
+        if entry_distance > leave {
             return None;
         }
-        let origin = add_scaled(ray.origin, shift, ray.direction).map(|x| x as f32);
+        let origin = add_scaled(ray.origin, entry_distance, ray.direction).map(|x| x as f32);
         // A component close to 0 would have an infinite inverse; it keeps the sign of the ray.
         let inverse = ray.direction.map(|d| {
             let d = d as f32;
             1.0 / if d.abs() < 1e-18 { 1e-18f32.copysign(d) } else { d }
         });
         let backward = inverse.map(|x| x < 0.0);
-        Some(EntryRay { entry_distance: shift, origin, inverse, backward })
+        Some(EntryRay { entry_distance, origin, inverse, backward })
     }
 }
 

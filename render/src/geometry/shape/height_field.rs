@@ -88,10 +88,10 @@ impl HeightGrid {
         };
         let mut size = cells;
         while size[0] > 1 || size[1] > 1 {
-            let (below, wide) = (size, size[0].div_ceil(2));
+            let (below, width) = (size, size[0].div_ceil(2));
             size = size.map(|n| n.div_ceil(2));
             let blocks = (0..size[0] * size[1]).map(|k| {
-                let (i, j) = (k % wide, k / wide);
+                let (i, j) = (k % width, k / width);
                 let parts = [0, 1, 2, 3].map(|p| [2 * i + p % 2, 2 * j + p / 2]);
                 let inside = parts.into_iter().filter(|p| p[0] < below[0] && p[1] < below[1]);
                 inside
@@ -99,7 +99,7 @@ impl HeightGrid {
                     .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], [a, b]| [lo.min(a), hi.max(b)])
             });
             let blocks = blocks.collect();
-            field.pyramid.push(PyramidLevel { width: wide, blocks });
+            field.pyramid.push(PyramidLevel { width, blocks });
         }
         field
     }

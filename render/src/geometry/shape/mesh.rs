@@ -81,9 +81,9 @@ impl MeshBuilder {
         let around = |[a, b, c]: &Triangle| {
             [[0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])), [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k]))]
         };
-        let (bvh, numbers) = self.builder.build(self.triangles.iter().map(around));
-        let triangles = numbers.iter().map(|&number| self.triangles[number as usize]).collect();
-        MeshBvh { bvh, triangles, mesh_indices: numbers, columns: Default::default() }
+        let (bvh, mesh_indices) = self.builder.build(self.triangles.iter().map(around));
+        let triangles = mesh_indices.iter().map(|&number| self.triangles[number as usize]).collect();
+        MeshBvh { bvh, triangles, mesh_indices, columns: Default::default() }
     }
 }
 

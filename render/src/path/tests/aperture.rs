@@ -108,10 +108,10 @@ fn fisheye() {
     let rays = LensRays::new(&optics, [SIZE; 2], 1).unwrap();
     let (scene, poses) = emitter_at(1.0, 0.1);
     let studio = TestScene::new(&scene, &poses, &ahead());
-    let pupil = ThinLens::from_aperture(&Aperture { focal_length: 0.1, f_number: 1.0, focus_distance: 2.0 });
+    let thin_lens = ThinLens::from_aperture(&Aperture { focal_length: 0.1, f_number: 1.0, focus_distance: 2.0 });
     let pose = pose_to_f64(&PoseF32::IDENTITY);
     for at in [[14.3, 13.8], [26.0, 14.0], [5.0, 22.5]] {
-        let eye = CameraRayGenerator { lens: Some(&rays), thin_lens: pupil, ..studio.paths(1, 0, 0).camera_rays };
+        let eye = CameraRayGenerator { lens: Some(&rays), thin_lens, ..studio.paths(1, 0, 0).camera_rays };
         let to = scale(optics.unproject(at).unwrap(), 2.0);
         for choice in [[0.0, 0.0], [0.9, 0.2], [1.0, 0.7]] {
             let ray = eye.camera_ray(at, &pose, || choice).unwrap().ray;

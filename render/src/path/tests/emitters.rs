@@ -31,7 +31,7 @@ fn brick(half: [f32; 3]) -> Shape {
 fn by_strategies(scene: &RenderScene, poses: &[PoseF32], view: &View, bounces: u32, count: u32) -> [(f64, f64); 3] {
     let studio = TestScene::new(scene, poses, view);
     [MisStrategy::Both, MisStrategy::Light, MisStrategy::Bsdf]
-        .map(|ways| studio.mean_light(&PathTracer { strategy: ways, ..studio.paths(16, bounces, 0) }, count))
+        .map(|strategy| studio.mean_light(&PathTracer { strategy, ..studio.paths(16, bounces, 0) }, count))
 }
 
 /// True if the means differ by less than five standard deviations of the difference, and single precision.
@@ -199,13 +199,13 @@ fn far_from_own_frame() {
         let view = one_ray_view(there([0.9, 0.2, 0.05]), [0.0; 3]);
         scene.lights.clear();
         let studio = TestScene::new(&scene, &poses, &view);
-        for ways in [MisStrategy::Both, MisStrategy::Light] {
-            let light = studio.mean_light(&PathTracer { strategy: ways, ..studio.paths(256, 0, 0) }, 128);
+        for strategy in [MisStrategy::Both, MisStrategy::Light] {
+            let light = studio.mean_light(&PathTracer { strategy, ..studio.paths(256, 0, 0) }, 128);
             let far = Tolerance::absolute(
                 5.0 * light.1 + 4e-5 * expected,
                 "five deviations; translations of 40 m are rounded to 4e-6 m: 4e-5 of the height and of the form factor",
             );
-            assert_number(&format!("{angles:?} {ways:?}"), light.0, expected, far);
+            assert_number(&format!("{angles:?} {strategy:?}"), light.0, expected, far);
             assert!(light.1 < 0.01 * expected, "the control: a difference of a twentieth is detected: {light:?}");
         }
         // A light without a size lights the floor, whatever the floor's frame; the panel is not between.

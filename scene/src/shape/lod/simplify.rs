@@ -36,8 +36,8 @@ impl<'a> Surface<'a> {
         let triangles: Vec<[u32; 3]> = mesh.triangles().iter().filter(|t| !flat(t)).copied().collect();
         let count = mesh.positions().len();
         let error = vec![0.0; triangles.len()];
-        let (start, around, least) = (vec![0; count + 1], Vec::new(), vec![0.0; count]);
-        Self { mesh, vertex, triangles, error, start, around, min_error: least }
+        let (start, around, min_error) = (vec![0; count + 1], Vec::new(), vec![0.0; count]);
+        Self { mesh, vertex, triangles, error, start, around, min_error }
     }
 
     pub(super) fn triangles(&self) -> &[[u32; 3]] {

@@ -257,21 +257,21 @@ impl Star {
     /// above or below it.
     fn overlay(&self, fan: &mut Fan) {
         let m = self.count;
-        let Fan { to, flat, height, planes, max_gap: apart, overlapped: over, .. } = fan;
+        let Fan { to, flat, height, planes, max_gap, overlapped, .. } = fan;
         let (start, rise) = (flat[0], height[0]);
-        apart[1..m - 1].fill(0.0);
-        over[1..m - 1].fill(0);
+        max_gap[1..m - 1].fill(0.0);
+        overlapped[1..m - 1].fill(0);
         for i in 0..m {
             // Old triangle `i` and a new one share an edge of the polygon.
-            over[i.clamp(1, m - 2)] |= 1 << i;
+            overlapped[i.clamp(1, m - 2)] |= 1 << i;
         }
         for j in 1..m - 1 {
             // The vertex itself is at the origin.
             let sides = [area(start, flat[j]), area(flat[j], flat[j + 1]), area(flat[j + 1], start)];
             if sides.iter().all(|&side| side >= 0.0) {
                 let gap = dot(planes[j], to[0]) / dot(planes[j], self.normal);
-                apart[j] = apart[j].max(gap.abs());
-                over[j] = u32::MAX >> (32 - m);
+                max_gap[j] = max_gap[j].max(gap.abs());
+                overlapped[j] = u32::MAX >> (32 - m);
             }
         }
         for j in 2..m - 1 {
@@ -297,8 +297,8 @@ impl Star {
                 let inverse = 1.0 / turn.abs();
                 let gap = (s * inverse * height[i] - (rise + t * inverse * edge_rise)).abs();
                 for side in [j - 1, j] {
-                    apart[side] = apart[side].max(gap);
-                    over[side] |= 1 << (i - 1) | 1 << i;
+                    max_gap[side] = max_gap[side].max(gap);
+                    overlapped[side] |= 1 << (i - 1) | 1 << i;
                 }
             }
         }

@@ -141,12 +141,11 @@ impl<'a> BoxAccumulator<'a> {
             let (min, max) = ([u[0], v[0]], [u[1], v[1]]);
             (min[0] < max[0] && min[1] < max[1]).then_some(PixelBox { min, max })
         };
-        let boxes =
-            self.list.into_iter().map(|SegmentExtent { id, pixels, visible_extent: seen, full_extent: whole }| {
-                let [min, max] = seen.map(|corner| corner.map(|x| x as f64));
-                let tight = (pixels > 0).then_some(PixelBox { min, max });
-                Box2d { id, tight, loose: whole.and_then(loose), visible_pixels: pixels }
-            });
+        let boxes = self.list.into_iter().map(|SegmentExtent { id, pixels, visible_extent, full_extent }| {
+            let [min, max] = visible_extent.map(|corner| corner.map(|x| x as f64));
+            let tight = (pixels > 0).then_some(PixelBox { min, max });
+            Box2d { id, tight, loose: full_extent.and_then(loose), visible_pixels: pixels }
+        });
         boxes.filter(|b| b.tight.is_some() || b.loose.is_some()).collect()
     }
 }

@@ -45,10 +45,10 @@ impl Segmentation {
         let mut alone = IsolatedRenderer::new(camera, row, env);
         let mut found = Vec::new();
         for segment in self.segments(level) {
-            let alone_pixels = alone.pixels(segment)?.count();
-            if alone_pixels > 0 {
+            let unoccluded_pixels = alone.pixels(segment)?.count();
+            if unoccluded_pixels > 0 {
                 let visible_pixels = mask.iter().filter(|id| segment.mask_ids.contains(id)).count();
-                found.push(Occlusion { id: segment.id, visible_pixels, unoccluded_pixels: alone_pixels });
+                found.push(Occlusion { id: segment.id, visible_pixels, unoccluded_pixels });
             }
         }
         Ok(found)

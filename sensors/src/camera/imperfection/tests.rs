@@ -19,8 +19,8 @@ fn view(size: [usize; 2], f: f32) -> View {
     View { width: size[0], height: size[1], fx: f, fy: f, cx, cy, near: 0.01, far: 100.0, world_from_camera }
 }
 
-fn pinhole<'a>(view: &'a View, ticket: &'a RngKey) -> ImageContext<'a> {
-    ImageContext { view, rays: None, rng_key: ticket }
+fn pinhole<'a>(view: &'a View, rng_key: &'a RngKey) -> ImageContext<'a> {
+    ImageContext { view, rays: None, rng_key }
 }
 
 fn tone() -> &'static ToneLut {

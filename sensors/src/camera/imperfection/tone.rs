@@ -27,10 +27,11 @@ impl ToneLut {
     }
 
     fn new(curve: ToneCurve) -> Self {
-        let least = std::array::from_fn(|k| min_radiance_of(curve, k as f32 + 1.0));
+        let min_radiance = std::array::from_fn(|k| min_radiance_of(curve, k as f32 + 1.0));
         // The curve adds half a byte for rounding.
-        let light = |byte: usize| if byte == 255 { least[254] } else { min_radiance_of(curve, byte as f32 + 0.5) };
-        Self { radiance: std::array::from_fn(|byte| f64::from(light(byte))), min_radiance: least }
+        let light =
+            |byte: usize| if byte == 255 { min_radiance[254] } else { min_radiance_of(curve, byte as f32 + 0.5) };
+        Self { radiance: std::array::from_fn(|byte| f64::from(light(byte))), min_radiance }
     }
 
     pub(super) fn decode(&self, byte: u8) -> f64 {

@@ -29,8 +29,8 @@ pub(in crate::camera) struct RenderedImages {
 impl RenderedImages {
     /// Allocates `count` images, all of them outdated.
     pub(in crate::camera) fn new(cfg: &CameraCfg, count: usize) -> Self {
-        let pictures = Images::new(cfg.channels, count, cfg.width, cfg.height);
-        Self { images: pictures, stale: vec![true; count], error: None }
+        let images = Images::new(cfg.channels, count, cfg.width, cfg.height);
+        Self { images, stale: vec![true; count], error: None }
     }
 
     /// Returns the images, or the error of rendering them.
@@ -80,9 +80,9 @@ pub(in crate::camera) struct FrameRenderer {
 }
 
 impl FrameRenderer {
-    pub(in crate::camera) fn new(rasterizer: ParallelRenderer, faults: Option<SensorNoiseModel>) -> Self {
-        let (views, jobs, takes, tickets) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { rasterizer, views, jobs, frame_samples: takes, rng_keys: tickets, noise_model: faults }
+    pub(in crate::camera) fn new(rasterizer: ParallelRenderer, noise_model: Option<SensorNoiseModel>) -> Self {
+        let (views, jobs, frame_samples, rng_keys) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { rasterizer, views, jobs, frame_samples, rng_keys, noise_model }
     }
 }
 
@@ -123,23 +123,17 @@ impl Camera {
         frames: impl Iterator<Item = FrameMut<'a>>,
     ) -> Result<(), (usize, RenderError)> {
         let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
-        let FrameRenderer {
-            rasterizer,
-            views,
-            jobs: kept,
-            frame_samples: kept_takes,
-            rng_keys: tickets,
-            noise_model: faults,
-        } = &mut *renderer;
+        let FrameRenderer { rasterizer, views, jobs: kept, frame_samples: kept_takes, rng_keys, noise_model } =
+            &mut *renderer;
         views.clear();
         views.extend(sources.clone().map(|source| self.view_from(&source)));
-        tickets.clear();
+        rng_keys.clear();
         let mut jobs: Vec<RenderJob<'_>> = recycle(std::mem::take(kept));
         let mut takes: Vec<FrameSample<'_>> = recycle(std::mem::take(kept_takes));
         let mut marked: Vec<&[Marker]> = Vec::new();
         for ((source, frame), view) in sources.zip(frames).zip(&*views) {
             jobs.push((self.render_request(&source, view, self.motion.previous_frame(source.row)), frame));
-            tickets.push(source.frame.rng_key);
+            rng_keys.push(source.frame.rng_key);
             if self.cfg.draw_markers {
                 marked.push(&source.frame.markers);
             }
@@ -150,8 +144,8 @@ impl Camera {
             false => rasterizer.render_samples(&mut jobs, &takes),
         };
         *kept_takes = recycle(takes);
-        if let Some(faults) = faults {
-            faults.apply(&mut jobs, tickets);
+        if let Some(faults) = noise_model {
+            faults.apply(&mut jobs, rng_keys);
         }
         let miss = match self.cfg.depth_miss {
             DepthMiss::Inf => None,
@@ -173,7 +167,7 @@ impl Camera {
         &'a self,
         source: &FrameSource<'a>,
         view: &'a View,
-        before: Option<PreviousState<'a>>,
+        previous: Option<PreviousState<'a>>,
     ) -> RenderRequest<'a> {
         let FrameSource { frame, rays, .. } = *source;
         let scene = frame.scene.0.as_deref().unwrap_or(&self.scene);
@@ -183,18 +177,18 @@ impl Camera {
             view,
             lights: Some(&frame.lights),
             lens: rays.map(|rays| &**rays),
-            previous: before,
+            previous,
         }
     }
 
     /// Returns the shutter poses and the path tracing seed of a frame.
     fn frame_sample<'a>(&self, source: &FrameSource<'a>) -> FrameSample<'a> {
-        let opened = source.frame.shutter_open_poses().and_then(|(poses, parent)| {
+        let shutter_open = source.frame.shutter_open_poses().and_then(|(poses, parent)| {
             let camera = self.viewpoints.world_from(source.viewpoint, Some(parent))?;
-            let before = self.motion.shutter_seconds()?;
-            Some(ShutterOpenState { poses, world_from_camera: PoseF32::from(&camera), age: before })
+            let age = self.motion.shutter_seconds()?;
+            Some(ShutterOpenState { poses, world_from_camera: PoseF32::from(&camera), age })
         });
-        FrameSample { noise: source.frame.rng_key.bits(RngStream::PATHS), shutter_open: opened }
+        FrameSample { noise: source.frame.rng_key.bits(RngStream::PATHS), shutter_open }
     }
 
     /// Returns true if the shutter has a nonzero span: image rows may show several instants.
@@ -242,12 +236,14 @@ fn render_with_markers(
     let (mut all_takes, mut of) = (takes.to_vec(), (0..shots.len()).collect::<Vec<_>>());
     for (index, stage) in &stages {
         let frame = FrameMut { color: all[*index].1.color.take(), ..FrameMut::default() };
-        let Some(MarkedScene { scene, poses, shutter_open_poses: opened }) = stage else { continue };
+        let Some(MarkedScene { scene, poses, shutter_open_poses }) = stage else { continue };
         let take = takes[*index];
         all.push((RenderRequest { scene, poses, previous: None, ..shots[*index] }, frame));
-        let opened =
-            take.shutter_open.zip(opened.as_deref()).map(|(opened, poses)| ShutterOpenState { poses, ..opened });
-        all_takes.push(FrameSample { shutter_open: opened, ..take });
+        let shutter_open = take
+            .shutter_open
+            .zip(shutter_open_poses.as_deref())
+            .map(|(opened, poses)| ShutterOpenState { poses, ..opened });
+        all_takes.push(FrameSample { shutter_open, ..take });
         of.push(*index);
     }
     let drawn = rasterizer.render_samples(&mut all, &all_takes).map_err(|(place, error)| (of[place], error));

@@ -137,12 +137,12 @@ pub(super) fn frame_of(
     (renderer, shutter): (Renderer, Shutter),
     channels: Channels,
     (scene, poses, view): (&RenderScene, &[PoseF32], &View),
-    opened: Option<ShutterOpenState<'_>>,
+    shutter_open: Option<ShutterOpenState<'_>>,
 ) -> Frame {
     let mut rasterizer = ImageRenderer::new(cfg);
     (rasterizer.renderer, rasterizer.shutter) = (renderer, shutter);
     let mut frame = Frame::new(view.width, view.height, channels);
     let shot = RenderRequest { scene, poses, view, lights: None, lens: None, previous: None };
-    rasterizer.render_sample(&shot, &FrameSample { noise: 0, shutter_open: opened }, &mut frame.as_mut()).unwrap();
+    rasterizer.render_sample(&shot, &FrameSample { noise: 0, shutter_open }, &mut frame.as_mut()).unwrap();
     frame
 }

@@ -101,14 +101,10 @@ impl SensorCfg for RayCasterCameraCfg {
     fn build(&self, context: &SensorContext) -> Result<RayCasterCamera, SensorError> {
         let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
         if !(self.max_distance > 0.0 && self.max_distance < f64::from(f32::MAX)) {
-            let (what, of, value) = ("max_distance", "ray caster camera", self.max_distance);
-            return Err(RayError::Number {
-                what,
-                owner: of,
-                value,
-                allowed: "positive, and a number in single precision",
-            }
-            .into());
+            let (what, owner, value) = ("max_distance", "ray caster camera", self.max_distance);
+            return Err(
+                RayError::Number { what, owner, value, allowed: "positive, and a number in single precision" }.into()
+            );
         }
         let pixels = self.width.checked_mul(self.height).filter(|n| (1..=RayPattern::MAX_RAYS).contains(n));
         let Some(pixels) = pixels else {

@@ -59,10 +59,10 @@ impl RayImages {
         pixels: &Pixels,
         miss: f32,
     ) {
-        let lens =
+        let intrinsics =
             PixelIntrinsics { fx: lenses[(env, 0)], fy: lenses[(env, 1)], cx: lenses[(env, 2)], cy: lenses[(env, 3)] };
         let world_from_camera = from_row(&std::array::from_fn(|k| poses[(env, k)]));
-        self.viewpoints[env] = ImageViewpoint { world_from_camera, intrinsics: lens };
+        self.viewpoints[env] = ImageViewpoint { world_from_camera, intrinsics };
         for k in 0..pixels.width * pixels.height {
             let at = (env, k / pixels.width, k % pixels.width);
             let id = ids[(env, k)] as i32;
@@ -70,7 +70,7 @@ impl RayImages {
                 (miss, miss)
             } else {
                 let distance = distances[(env, k)];
-                ((distance * pixels.direction(&lens, k)[2]) as f32, distance as f32)
+                ((distance * pixels.direction(&intrinsics, k)[2]) as f32, distance as f32)
             };
             (self.depth[at], self.distance[at], self.mask[at]) = (depth, distance, id);
             for axis in 0..3 {

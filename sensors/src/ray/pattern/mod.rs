@@ -96,16 +96,16 @@ impl RayPattern {
 }
 
 /// Checks that a number is positive and finite.
-fn check_positive(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
+fn check_positive(owner: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
     }
-    Err(RayError::Number { what, owner: of, value, allowed: "positive and finite" })
+    Err(RayError::Number { what, owner, value, allowed: "positive and finite" })
 }
 
 /// Checks that a number is finite.
-fn check_finite(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
-    if value.is_finite() { Ok(value) } else { Err(RayError::Number { what, owner: of, value, allowed: "finite" }) }
+fn check_finite(owner: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
+    if value.is_finite() { Ok(value) } else { Err(RayError::Number { what, owner, value, allowed: "finite" }) }
 }
 
 #[cfg(test)]

@@ -91,8 +91,8 @@ fn mistakes() {
     assert!(error(Lidar { channels: 0, ..Lidar::default() }.into()).contains("0e0 rays"));
     assert!(error(Lidar { horizontal_fov_deg: [0.0, 400.0], ..Lidar::default() }.into()).contains("400"));
     assert!(error(Lidar { vertical_fov_deg: [0.0, 91.0], ..Lidar::default() }.into()).contains("91"));
-    let lens = Intrinsics::Fovy { radians: 4.0 };
-    assert!(error(Pinhole { intrinsics: lens, ..Pinhole::default() }.into()).contains("angle"));
+    let intrinsics = Intrinsics::Fovy { radians: 4.0 };
+    assert!(error(Pinhole { intrinsics, ..Pinhole::default() }.into()).contains("angle"));
     assert!(error(Custom { starts: vec![[0.0; 3]; 2], directions: vec![[1.0; 3]] }.into()).contains("2 starts and 1"));
     let text = error(Custom { starts: vec![[f64::NAN, 0.0, 0.0]], directions: vec![[1.0; 3]] }.into());
     assert!(text.contains("ray 0"), "{text}");

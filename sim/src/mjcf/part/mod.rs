@@ -122,19 +122,19 @@ struct PartWriter<'a> {
 }
 
 impl PartDocument {
-    /// Converts a file to a part, without the sensors in `sensors_left_out`.
+    /// Converts a file to a part, without the sensors in `omitted_sensors`.
     ///
     /// # Errors
     /// The model has an element that a part cannot represent.
     pub fn new(
         of: &PartSource<'_>,
-        sensors_left_out: Vec<(usize, OmittedElement)>,
+        omitted_sensors: Vec<(usize, OmittedElement)>,
         source: &SourceLocation,
     ) -> Result<Self, PartError> {
         of.check()?;
-        let lines = |target| of.writer(target, &sensors_left_out).lines(source);
+        let lines = |target| of.writer(target, &omitted_sensors).lines(source);
         let (v2, v4) = (lines(SupportedVersion::V2)?, lines(SupportedVersion::V4)?);
-        Ok(Self { uid: of.uid.into(), v2, v4, omitted_sensors: sensors_left_out })
+        Ok(Self { uid: of.uid.into(), v2, v4, omitted_sensors })
     }
 
     /// Name of the part.
@@ -187,7 +187,7 @@ impl<'a> PartSource<'a> {
 
 impl PartWriter<'_> {
     fn lines(self, source: &SourceLocation) -> Result<PartLines, PartError> {
-        let [actuators, actuators_with_state] = self.actuators()?;
+        let [actuators, stateful_actuators] = self.actuators()?;
         let lines = PartLines {
             source: source.clone(),
             assets: self.assets(),
@@ -196,19 +196,19 @@ impl PartWriter<'_> {
             equalities: self.equalities()?,
             tendons: self.tendons()?,
             actuators,
-            stateful_actuators: actuators_with_state,
+            stateful_actuators,
             sensors: self.sensors()?,
             omitted: Vec::new(),
         };
         Ok(PartLines { omitted: self.left_out.into_inner(), ..lines })
     }
 
-    /// True if the target is MuJoCo 4.x. Otherwise records that `what` of an element is left out, since only models of
+    /// True if the target is MuJoCo 4.x. Otherwise records that `property` of an element is left out, since only models of
     /// 4.x have it.
     fn supports_v4(&self, element: &'static str, index: usize, what: &str) -> bool {
         if self.target == SupportedVersion::V2 {
-            let (name, what) = (self.names.of(element, index), what.into());
-            self.left_out.borrow_mut().push(OmittedElement { element, name, property: what });
+            let (name, property) = (self.names.of(element, index), what.into());
+            self.left_out.borrow_mut().push(OmittedElement { element, name, property });
         }
         self.target == SupportedVersion::V4
     }

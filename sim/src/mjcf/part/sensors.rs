@@ -14,8 +14,8 @@ const V4_SENSORS: [&str; 4] = ["jointactuatorfrc", "tendonactuatorfrc", "e_poten
 /// Finds the sensors of a file that a part cannot have, with their indices.
 pub(crate) fn unsupported_sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedElement)> {
     let reason = |s: usize| {
-        let what = unsupported_reason(model, s)?;
-        Some((s, OmittedElement { element: "sensor", name: names.of("sensor", s), property: what }))
+        let property = unsupported_reason(model, s)?;
+        Some((s, OmittedElement { element: "sensor", name: names.of("sensor", s), property }))
     };
     (0..model.nsensor()).filter_map(reason).collect()
 }

@@ -41,15 +41,15 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
     let follows_velocity = affine && stiffness == 0.0 && damping > 0.0 && gain == damping;
     let is_motor = gain_type == "fixed" && bias_type == "none";
     let (stiffness, damping) = if follows_position || follows_velocity { (stiffness, damping) } else { (0.0, 0.0) };
-    let mut unsaid = Vec::new();
+    let mut unsupported = Vec::new();
     if !(follows_position || follows_velocity || is_motor) {
         let law = format!("gaintype {gain_type}, biastype {bias_type}, biasprm {:?}", &bias[..3]);
-        unsaid.push(format!(
+        unsupported.push(format!(
             "its force law is neither a position or velocity servo nor a motor ({law}); its gains are not used"
         ));
     }
     if dynamics != "none" {
-        unsaid.push(format!(
+        unsupported.push(format!(
             "its activation dynamics ({dynamics}) are not used: the drive follows its targets without delay"
         ));
     }
@@ -57,7 +57,7 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
     let mut limit = |what: &str, low: f64, high: f64| {
         let end = low.abs().max(high.abs());
         if low != -high {
-            unsaid.push(format!("its {what} {low} .. {high} became {} .. {end}", -end));
+            unsupported.push(format!("its {what} {low} .. {high} became {} .. {end}", -end));
         }
         force = Some(force.map_or(end, |old: f64| old.min(end)));
     };
@@ -77,10 +77,10 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
             let [low, high] = of_gain(1.0);
             limit("force at the ends of its ctrlrange", low, high);
         } else if !follows_position || !is_within(lengths(model, gear, path), of_gain(stiffness)) {
-            unsaid.push(said);
+            unsupported.push(said);
         }
     }
-    ActuatorLaw { stiffness, damping, force, unsupported: unsaid }
+    ActuatorLaw { stiffness, damping, force, unsupported }
 }
 
 /// Range of lengths of an actuator within the limits of the joints.

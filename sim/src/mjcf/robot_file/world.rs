@@ -79,11 +79,9 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedEl
         // Drives are friction rows or forces of this crate, which MuJoCo's sum over actuators does not include.
         let word = mjcf_keywords::sensor(model.sensor_type()[sensor]).map_or("", |word| word.keyword);
         if matches!(word, "jointactuatorfrc" | "tendonactuatorfrc") {
-            let what = format!("the type {word}: it measures actuator forces, and drives replace the actuators");
-            left_out.push((
-                sensor,
-                OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property: what },
-            ));
+            let property = format!("the type {word}: it measures actuator forces, and drives replace the actuators");
+            left_out
+                .push((sensor, OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property }));
             continue;
         }
         let observed = [
@@ -101,11 +99,9 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedEl
             };
             is_gone.then(|| format!("{word} {name:?}, which a robot does not import"))
         });
-        if let Some(what) = omitted {
-            left_out.push((
-                sensor,
-                OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property: what },
-            ));
+        if let Some(property) = omitted {
+            left_out
+                .push((sensor, OmittedElement { element: "sensor", name: names.sensors[sensor].clone(), property }));
         }
     }
     left_out.sort_by_key(|(sensor, _)| *sensor);

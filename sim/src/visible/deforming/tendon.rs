@@ -45,7 +45,7 @@ impl Tendon {
     /// Segments of the path in `data`, in order.
     pub(super) fn segments(&self, data: &Data, each: &mut dyn FnMut(Segment)) {
         let model = data.model();
-        let width = model.tendon_width()[self.tendon];
+        let radius = model.tendon_width()[self.tendon];
         let first = data.ten_wrapadr()[self.tendon];
         let count = data.ten_wrapnum()[self.tendon];
         let (Ok(first), Ok(count)) = (usize::try_from(first), usize::try_from(count)) else { return };
@@ -55,9 +55,7 @@ impl Tendon {
             && let Some(length) = catenary::hanging_length(data, self.tendon)
             && let [from, to] = *points
         {
-            return catenary::segments([from, to], model.gravity(), length, &mut |ends| {
-                each(Segment { ends, radius: width })
-            });
+            return catenary::segments([from, to], model.gravity(), length, &mut |ends| each(Segment { ends, radius }));
         }
         for (ends, objects) in points.array_windows::<2>().zip(objects.array_windows::<2>()) {
             if objects.contains(&PULLEY) {
@@ -65,7 +63,7 @@ impl Tendon {
             }
             // Thinner inside the geom that the tendon wraps around.
             let inside = objects.iter().all(|object| *object >= 0);
-            each(Segment { ends: *ends, radius: if inside { 0.5 * width } else { width } });
+            each(Segment { ends: *ends, radius: if inside { 0.5 * radius } else { radius } });
         }
     }
 }

@@ -24,9 +24,9 @@ pub(super) struct Costs {
 
 impl Default for Costs {
     fn default() -> Self {
-        let mut least = [[f32::INFINITY; BVH_WIDTH]; MAX_LEAF + MAX_GROUP];
-        least[MAX_LEAF - 1][0] = 0.0;
-        Self { costs: [[0.0; MAX_LEAF]; MAX_GROUP], min_costs: least }
+        let mut min_costs = [[f32::INFINITY; BVH_WIDTH]; MAX_LEAF + MAX_GROUP];
+        min_costs[MAX_LEAF - 1][0] = 0.0;
+        Self { costs: [[0.0; MAX_LEAF]; MAX_GROUP], min_costs }
     }
 }
 
@@ -35,13 +35,13 @@ impl Default for Costs {
 pub(super) fn leaf_ends<S: Simd>(
     s: S,
     things: &[BuildItem],
-    Costs { costs, min_costs: least }: &mut Costs,
+    Costs { costs, min_costs }: &mut Costs,
 ) -> ([u8; BVH_WIDTH], usize) {
     let things = &things[..things.len().min(MAX_GROUP)];
     // The last rows, the newest first: avoids reading memory that has just been written.
     let none = F8::splat(s, f32::INFINITY);
     let mut recent = [none; MAX_LEAF];
-    recent[0] = F8::load(s, &least[MAX_LEAF - 1]);
+    recent[0] = F8::load(s, &min_costs[MAX_LEAF - 1]);
     // Least cost of all primitives as k + 1 leaves.
     let mut best = none;
     // The boxes around the last primitive, the last two, and so on.
@@ -65,7 +65,7 @@ pub(super) fn leaf_ends<S: Simd>(
             best = best.min(*row + F8::splat(s, cost));
         }
         recent = [best.shift_in(f32::INFINITY), recent[0], recent[1], recent[2]];
-        least[MAX_LEAF + j] = recent[0].array();
+        min_costs[MAX_LEAF + j] = recent[0].array();
     }
     let (mut leaves, mut cost) = (0, f32::INFINITY);
     for (k, other) in best.array().into_iter().enumerate() {
@@ -82,10 +82,10 @@ pub(super) fn leaf_ends<S: Simd>(
         ends[k] = j as u8;
         // Leaf lengths that gave the least cost. All are tested: the first one is unpredictable for a branch.
         let gave = (0..MAX_LEAF).fold(1 << MAX_LEAF, |bits: u32, before| {
-            bits | u32::from(least[MAX_LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
+            bits | u32::from(min_costs[MAX_LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
         });
         j -= gave.trailing_zeros() as usize + 1;
-        cost = least[MAX_LEAF + j - 1][k];
+        cost = min_costs[MAX_LEAF + j - 1][k];
     }
     (ends, leaves + 1)
 }
