@@ -273,9 +273,9 @@ struct Rollout<'r, E> {
 }
 
 impl<E: VectorEnv> Rollout<'_, E> {
-    /// Runs one episode in all environments, starting from the observations `observations`. Returns the returns, and the
-    /// distances of the tip from the target at the end \[m\]. Afterwards the next episode has begun. `None` if the user
-    /// has stopped the run.
+    /// Runs one episode in all environments, starting from the observations `observations`. Returns the returns, and
+    /// the distances of the tip from the target at the end \[m\]. Afterwards the next episode has begun. `None` if the
+    /// user has stopped the run.
     fn episode<'p>(
         &mut self,
         seen: &mut Array2<f64>,
@@ -312,7 +312,7 @@ impl<E: VectorEnv> Rollout<'_, E> {
     }
 }
 
-/// Computes the actions of each environment's policy from the observations `observations`.
+/// Computes the actions of each environment's policy from the observations `seen`.
 fn act<'p>(seen: &Array2<f64>, policy: impl Fn(usize) -> ArrayView2<'p, f64>, actions: &mut Array2<f64>) {
     for ((env, mut action), row) in actions.rows_mut().into_iter().enumerate().zip(seen.rows()) {
         let weights = policy(env);

@@ -16,7 +16,7 @@ use kinetoscope_sim::{DriveCfg, RobotCfg};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-/// Error: an asset was not found.
+/// Error of [`path`]: an asset does not exist.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetNotFound {
     /// Requested path.

@@ -74,8 +74,8 @@ impl Workers {
         assert!(!panicked, "work panicked on another thread of the pool");
     }
 
-    /// Posts a job. Returns `false` if no worker can help. After `true`, the caller must call `finish` before `worker_loop`
-    /// ends.
+    /// Posts a job. Returns `false` if no worker can help. After `true`, the caller must call `finish` before the
+    /// borrow `work` ends.
     fn post(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) -> bool {
         // If the operating system refuses a thread, the job runs on the existing ones.
         let _ = self.start(slots - 1);
@@ -84,7 +84,7 @@ impl Workers {
         if num_workers == 0 || job.in_flight {
             return false;
         }
-        // SAFETY: the reference is not used after the borrow ends. It stays in `job.worker_loop` until `finish` removes it,
+        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it,
         // and a worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches
         // `finish` on every path: its own share of the work cannot unwind past it, and nothing in between can panic.
         let lent = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), BorrowedWork>(work) };

@@ -349,7 +349,8 @@ mod tests {
         compile(&base_text())
     }
 
-    /// Names of all arrays in which two models of the same sizes differ by more than rounding.
+    /// Names of the arrays in which two models of the same sizes differ, and `stat` if their statistics differ. Arrays
+    /// of f64 and statistics may differ by rounding; other arrays must be equal.
     fn differences(a: &Model, b: &Model) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |field: ModelArray| {

@@ -10,8 +10,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 
-// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `ModelEditor`, which
-// is its only owner then.
+// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `ModelEditor`,
+// which is its only owner then.
 unsafe impl Send for Storage {}
 // SAFETY: once shared in a `Model`, nothing writes to it.
 unsafe impl Sync for Storage {}
@@ -101,7 +101,8 @@ impl std::fmt::Debug for ShallowModel {
     }
 }
 
-// SAFETY: the pointers in `header` lead into `storage` and `own_array_list`, which are Send + Sync; nothing writes through them.
+// SAFETY: the pointers in `header` lead into `storage` and `own_array_list`, which are Send + Sync; nothing writes
+// through them.
 unsafe impl Send for ShallowModel {}
 // SAFETY: as above.
 unsafe impl Sync for ShallowModel {}
@@ -179,7 +180,7 @@ impl Model {
     /// Returns the same model with a changed struct and its own arrays.
     ///
     /// # Safety
-    /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own_array_list`, where
+    /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own`, where
     /// it has the size of its field.
     pub(super) unsafe fn with_arrays(&self, header: mj::mjModel, own: Arc<[OwnArray]>) -> Self {
         Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own }))

@@ -10,7 +10,7 @@ use mujoco_sys as mj;
 use mujoco_sys::fields::model::{ModelArray, each};
 use std::sync::Arc;
 
-/// An active weld.
+/// Weld to activate with [`Model::with_welds`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weld {
     /// Index of the equality.
@@ -72,7 +72,7 @@ impl Model {
             set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
         }
         // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, except
-        // those that were just set to `own_array_list`, each to memory of the size of its field: moving a box does not move its
+        // those that were just set to `own`, each to memory of the size of its field: moving a box does not move its
         // content.
         unsafe { self.with_arrays(header, Arc::from(own)) }
     }

@@ -48,7 +48,7 @@ pub enum Anchor {
 pub struct Curve {
     /// Color as red, green, blue.
     pub color: [u8; 3],
-    /// Points of each polyline.
+    /// Points of each polyline \[pixels\].
     pub polylines: Vec<Vec<[f64; 2]>>,
     /// Positions of the markers.
     pub markers: Vec<[f64; 2]>,
@@ -156,7 +156,7 @@ impl PlotLayout {
     }
 }
 
-/// Shortens a name to `max_chars` characters. Keeps its end, because long names usually differ there.
+/// Shortens a name to `room` characters. Keeps its end, because long names usually differ there.
 fn truncate_start(name: &str, room: usize) -> String {
     let count = name.chars().count();
     if count <= room {

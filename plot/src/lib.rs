@@ -77,9 +77,9 @@ impl Default for Plot {
 /// Error of a plot whose width or height is outside the supported range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SizeError {
-    /// Width \[pixels\].
+    /// Requested width \[pixels\].
     pub width: usize,
-    /// Height \[pixels\].
+    /// Requested height \[pixels\].
     pub height: usize,
     /// Smallest supported width and height \[pixels\].
     pub min_size: usize,

@@ -18,7 +18,7 @@ const TIMES: &str = "times.csv";
 /// Writer of a folder of PNG files, such as `camera/color/env_0/000000.png`, with `times.csv`.
 ///
 /// `times.csv` has for each image the physics step since the recording began, and the simulation time and recorded time
-/// of capture \[s\]. The folder is called `NAME.partial_path` until it is complete. In a remaining partial folder, every `.png`
+/// of capture \[s\]. The folder is called `NAME.part` until it is complete. In a remaining partial folder, every `.png`
 /// file is complete, and the last rows of `times.csv` may be missing.
 pub(crate) struct ImageFolderWriter {
     folder: PartialFolder,

@@ -327,7 +327,7 @@ fn small_mask_ids(values: &ValueBuffer, range: std::ops::Range<usize>) -> Option
     ids.get(range)?.iter().map(|id| u16::try_from(*id).ok()).collect()
 }
 
-/// Channel metadata of field number `field` of a stream: names, separated by commas, and the unit.
+/// Channel metadata of field number `part` of a stream: names, separated by commas, and the unit.
 fn channel_metadata(stream: &StreamSchema, part: usize) -> BTreeMap<String, String> {
     let StreamKind::SensorValues { rows, filters } = &stream.kind else { return BTreeMap::new() };
     let unit = stream.fields.get(part).map(|part| part.unit.clone()).unwrap_or_default();

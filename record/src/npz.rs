@@ -19,7 +19,7 @@
 //! A reset or a write adds a row of the states of all environments. With `every` above 1, the states of the other
 //! environments in such a row lie between two of their regular rows. They have the time at which they were read.
 //!
-//! Until the end, rows are in unnamed files in the same folder. A killed process leaves nothing.
+//! Until the end, rows are in unnamed files in the same folder. A killed process leaves only an empty `NAME.part`.
 
 use crate::file::{PartialFile, Storage, parent_dir};
 use crate::npy;

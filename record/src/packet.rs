@@ -44,7 +44,7 @@ impl EventKind {
         }
     }
 
-    /// Number in NumPy archives.
+    /// Number in the array `events/kind` of NumPy archives.
     pub fn number(self) -> u8 {
         match self {
             Self::Reset => 0,

@@ -6,10 +6,11 @@ use crate::scene_file::{self, SCENE_ARCHIVE};
 use kinetoscope_sim::{MjcfId, MjcfPart, SimulationManager};
 use ndarray::Array2;
 
-/// Recorded motion in its scene. [`seek`](Self::seek) sets the simulation to a recorded time.
+/// Recorded motion in its scene. [`seek`](Self::seek) sets the simulation to one of the recorded
+/// [`times`](Self::times), by its index.
 ///
-/// It includes everything that moves by itself: joints of robots, articulations and MJCF files, free bases and objects,
-/// and kinematic objects. Properties that were changed per environment (sizes, colors) appear as in the scene.
+/// The motion includes joints of robots, articulations and MJCF files, floating bases, free objects and kinematic
+/// objects. Sizes and colors that were changed per environment are not replayed.
 #[derive(Debug)]
 pub struct Playback {
     part: MjcfId,
@@ -52,8 +53,8 @@ const QPOS_WIDTHS: [usize; 4] = [7, 4, 1, 1];
 const FREE: i32 = 0;
 
 impl Playback {
-    /// Opens the playback of a recording, in the scene that the file contains or in `scene`, a simulation that is built
-    /// as the recorded one was. Returns the playback and the simulation that displays it.
+    /// Opens a recording for playback in the scene that the file contains, or in the scene of `scene`, a simulation
+    /// built like the recorded one. Returns the playback and the simulation that displays the motion.
     ///
     /// # Errors
     /// The recording contains no scene and none is given, the scene cannot be compiled, or no motion was recorded.

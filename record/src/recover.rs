@@ -23,7 +23,7 @@ pub struct Recovered {
     pub damage: Option<String>,
 }
 
-/// Makes a complete file of the partial file of a killed recording. `path` is the intended name of the recording.
+/// Makes a complete file from the partial file of a killed recording. `path` is the intended name of the recording.
 ///
 /// The file contains the scene and the messages of all complete chunks from the beginning. The partial file is deleted,
 /// unless it is damaged. The file is read by chunks, so that the memory does not depend on its size.
@@ -35,10 +35,11 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
     recover_to(&path, &path)
 }
 
-/// Recovers as [`recover`] does, into a file called `to`.
+/// Recovers the partial file of the recording `path` into the file `to`, as [`recover`] does.
 ///
 /// # Errors
-/// The same as [`recover`]; a file called `to` exists.
+/// There is no partial file, a recorder is writing it, the file `to` exists, or no message can be read. The partial
+/// file is kept then.
 pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovered> {
     let (path, to) = (path.as_ref(), to.as_ref());
     let left = partial_path_of(path);

@@ -22,8 +22,8 @@ pub struct JointId(pub usize);
 pub struct RobotDescription {
     /// Name of the robot.
     pub name: String,
-    /// All links. `links[root.0]` is the only link without a parent joint. Links that are
-    /// [`is_auxiliary_frame`](Link::is_auxiliary_frame) come last.
+    /// All links. `links[root.0]` is the only link without a parent joint. [Auxiliary frames](Link::is_auxiliary_frame)
+    /// come last.
     pub links: Vec<Link>,
     /// All joints, fixed ones included, in the order of the merged files.
     pub joints: Vec<Joint>,
@@ -60,7 +60,7 @@ pub struct Link {
 /// Mass properties of a link as the file gives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
-    /// Location of the declaration.
+    /// Location of the `<inertial>` element.
     pub source: SourceLocation,
     /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Pose,
@@ -73,7 +73,7 @@ pub struct Inertial {
 /// Partly specified mass properties of a link. `None` marks a missing value; a complete set is an [`Inertial`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartialInertial {
-    /// Location of the declaration.
+    /// Location of the `<inertial>` element.
     pub source: SourceLocation,
     /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Option<Pose>,

@@ -119,15 +119,15 @@ impl RigidInertia {
         }
     }
 
-    /// Principal moments \[kg m²\], largest first (as MuJoCo sorts them), and the rotation `frame_from_principal`:
-    /// `inertia = R diag Rᵀ`, R right-handed, also where moments are equal. A tensor that is already diagonal and
-    /// sorted gives the identity.
+    /// Principal moments C >= B >= A \[kg m²\], largest first (as MuJoCo sorts them), and the rotation R
+    /// `frame_from_principal`: `inertia = R diag(C, B, A) Rᵀ`. R is right-handed, also for equal moments. A tensor that
+    /// is already diagonal and sorted gives the identity.
     ///
-    /// MuJoCo compares A + B >= C exactly. Where only the rounding of the eigenvalues violates it (by less than 1e-12
-    /// C, as for a thin plate), the middle moment is raised until it holds. Write these numbers to the MJCF
-    /// (`diaginertia`, `quat`) rather than the tensor, which MuJoCo would round again.
+    /// MuJoCo requires A + B >= C without a tolerance. For a thin plate, rounding of the eigenvalues may violate this
+    /// inequality by up to 1e-12 C. The middle moment B is then raised until the inequality holds. Write these numbers
+    /// to the MJCF (`diaginertia`, `quat`) rather than the tensor, which MuJoCo would round again.
     ///
-    /// Only the symmetric part of the tensor is used. Input that is not finite gives output that is not finite.
+    /// Only the symmetric part of the tensor is used. All elements must be finite; otherwise the result is meaningless.
     pub fn principal(&self) -> (Vector3<f64>, UnitQuaternion<f64>) {
         let (mut moments, axes) = sorted_eigen(&symmetric_part(&self.inertia));
         let missing = moments[0] - (moments[1] + moments[2]);

@@ -94,8 +94,8 @@ impl Headlight {
     /// Returns the headlight as a directional light along the camera's viewing direction `forward`, as in MuJoCo's
     /// renderer.
     ///
-    /// Returns `None` if the headlight is off, for [`LightingSpace::Linear`], and for omnidirectional cameras (`forward` is
-    /// `None`). In the last two cases, the headlight shines from the camera's position.
+    /// Returns `None` if the headlight is off, for [`LightingSpace::Linear`], and for omnidirectional cameras
+    /// (`forward` is `None`). In the last two cases, the headlight shines from the camera's position.
     pub fn as_directional(&self, sum: LightingSpace, forward: Option<[f32; 3]>) -> Option<Light> {
         let direction = forward.filter(|_| self.active && sum == LightingSpace::Display)?;
         Some(Light {
@@ -169,8 +169,9 @@ pub struct Haze {
 
 /// Haze at the end of an infinite ground, as in MuJoCo's renderer.
 ///
-/// The ground fades into a color, and this color into the background, up to the height of the camera. The haze acts on
-/// the first infinite plane, for cameras above it, and on the color channel only.
+/// The ground fades into the haze color. The haze color fades into the background up to the height of the camera. The
+/// haze applies to the first visible infinite plane, if the camera is above this plane, and changes the color channel
+/// only. Path-traced frames omit it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HorizonHaze {
     /// Color (sRGB, 0..=1).

@@ -25,7 +25,7 @@ pub struct Material {
     pub reflectance: f32,
     /// Metallic share in 0..=1. A metal has no diffuse reflection, and its specular reflection has its color.
     pub metallic: f32,
-    /// Roughness in 0..=1, instead of `shininess`: alpha of the GGX distribution is its square.
+    /// Roughness in 0..=1; the alpha of the GGX distribution is its square. `None` uses `shininess`.
     pub roughness: Option<f32>,
     /// Share of transmitted light in 0..=1, refracted as by glass. Only the path tracer transmits light, through closed
     /// shapes; other renderers draw the surface. The opacity of `rgba` is transparency without refraction.

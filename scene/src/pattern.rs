@@ -130,8 +130,7 @@ fn explain(pattern: &str, error: regex::Error) -> PatternError {
     }
 }
 
-/// Returns the indices of the names that the patterns match: pattern by pattern, in the order of names within a
-/// pattern.
+/// Returns the indices of the matched names, ordered by pattern, then by their order in `names`.
 ///
 /// `what` is the kind of the names, such as `joint`.
 ///

@@ -5,7 +5,8 @@ use ndarray::{Array, Axis, RemoveAxis};
 
 /// Values of a quantity in all environments.
 pub(crate) trait PerEnvArray: Clone {
-    /// Creates default values of `shape` in each environment; empty lists for quantities without a fixed size.
+    /// Creates an array of default values, shape (num_envs, `shape`...). A quantity of variable length gets one empty
+    /// list per environment.
     fn zeroed(num_envs: usize, shape: &[usize]) -> Self;
 
     /// True if `other` has the same sizes, in `num_envs` environments.
@@ -53,8 +54,8 @@ impl<T: Clone> PerEnvArray for Vec<Vec<T>> {
 
 /// Takes a list of flags of `Requires`, each with its name in messages and its fields of `SceneState`.
 ///
-/// A field has a type that implements [`PerEnvArray`], and its shape in an environment: an axis of `Lengths`, and the width
-/// of a second axis.
+/// A field has a type that implements [`PerEnvArray`], and its shape in an environment: an axis of `Lengths`, and the
+/// width of a second axis.
 macro_rules! quantities {
     ($(
         $(#[$about:meta])*

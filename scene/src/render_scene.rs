@@ -19,8 +19,8 @@ pub struct Instance {
     pub group: u8,
     /// True if the instance is drawn.
     pub visible: bool,
-    /// Name of the instance's owner: `uid/link`, the uid of an object, or the name of a geom of the world (`ground`). Ray casters
-    /// select their targets by name; several instances may share a name.
+    /// Name of the instance's owner: `uid/link`, the uid of an object, or the name of a geom of the world (`ground`).
+    /// Ray casters select their targets by name; several instances may share a name.
     pub name: Arc<str>,
     /// Index of the instance's body, on the body axis of [`SceneState`](crate::SceneState); `None` for the world.
     pub body: Option<u32>,
@@ -267,7 +267,7 @@ impl RenderScene {
         true
     }
 
-    /// Instances, in the order of poses.
+    /// Instances. Every list of instance poses has one pose per instance, in this order.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
     }

@@ -23,7 +23,8 @@ quantities! {
 
     /// Flag of [`SceneState::body_velocities`].
     VELOCITIES = "velocities" {
-        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], world axes, shape \[num_envs, bodies, 6\].
+        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], world axes, shape \[num_envs, bodies,
+        /// 6\].
         body_velocities: Array3<f64> [bodies, 6],
     }
 
@@ -103,8 +104,8 @@ quantities! {
         actuator_controls: Array2<f64> [actuators],
         /// Forces of actuators, shape \[num_envs, actuators\].
         ///
-        /// For drives, the values of [`joint_efforts`](Self::joint_efforts) \[N m or N\]; for actuators of MJCF files, the
-        /// force in the unit of the file, before the gear.
+        /// For drives, the values of [`joint_efforts`](Self::joint_efforts) \[N m or N\]; for actuators of MJCF files,
+        /// the force in the unit of the file, before the gear.
         actuator_forces: Array2<f64> [actuators],
         /// Activations of actuators, shape \[num_envs, actuators\]; 0 for actuators without activation. For actuators
         /// with several activations (MuJoCo 4.x: `actdim`), the last one, which determines their force.
@@ -167,8 +168,8 @@ pub struct VisibleState {
     pub instance_poses: Array2<PoseF32>,
     /// Lights of the scene at their current poses, shape \[num_envs, lights\].
     pub lights: Array2<Light>,
-    /// Scenes with their current shapes, including own sizes and colors of environments, shape \[num_envs\]; empty for
-    /// a scene whose shapes do not [change](crate::Instance::is_deformable).
+    /// Render scene of each environment with its current shapes, sizes and colors, shape \[num_envs\]. The list is
+    /// empty if no instance is [deformable](crate::Instance::is_deformable).
     pub scenes: Vec<EnvScene>,
 }
 

@@ -38,7 +38,8 @@ pub struct JointWrenchCfg {
 /// Both are in the axes of the link and about its origin: the joint frame on the child side, as URDF defines it. For
 /// [`JointWrenchCfg::frames`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
 /// force and `T` the torque about the origin of the link; the frame is at `p` with the rotation `R` in the link. The
-/// force is then `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, wherever the frame is.
+/// force is then `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The wrench is always that of the whole joint, independent of
+/// the position of the frame.
 ///
 /// The sign is that of the wrench **on the link**: a load that hangs from its joint reads an upward force of its
 /// weight. Gravity and contacts of the link are not part of the wrench, but the reaction to them is. The effort of the
@@ -81,7 +82,7 @@ impl SensorCfg for JointWrenchCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing, an empty selection of `links` and `body_state`, a link that is fused to another one
+    /// A pattern that matches nothing, an empty selection of `links` and `frames`, a link that is fused to another one
     /// (the error names it), or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;
@@ -130,7 +131,7 @@ fn read(measured: &[MeasuredWrench], state: &SceneState, env: usize, row: &mut [
     }
 }
 
-/// Expresses a force, and a torque about the origin of a link, in a frame of the link.
+/// Transforms a wrench from the origin and axes of a link to the origin and axes of a frame on the link.
 fn wrench_in_frame(link_from_frame: &Pose, force: Vector3<f64>, torque: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let Pose { translation, rotation } = link_from_frame;
     let torque = torque - translation.vector.cross(&force);

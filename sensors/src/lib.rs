@@ -14,7 +14,7 @@
 //! | `sensor`, `slot` | the traits of all sensors; owner of a lazy or eager sensor |
 //! | `sampling`, `schedule`, `history`, `delay`, `noise` | the sampler and its parts |
 //!
-//! A new sensor is one new file; `joint_state` is the shortest example:
+//! A new sensor is one new file; `actuator_state` is the shortest example. The parts of a sensor, for the joint state:
 //!
 //! ```
 //! use kinetoscope_scene::SceneState;

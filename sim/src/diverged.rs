@@ -9,7 +9,7 @@ use std::fmt;
 pub struct DivergedEnv {
     /// The environment.
     pub env: EnvId,
-    /// Number of steps before the failed one, since the last reset.
+    /// Number of completed steps since the last reset.
     pub step: u64,
     /// Description of the failure.
     pub reason: String,

@@ -28,7 +28,7 @@ pub enum EnvStatus {
     Running,
     /// A step failed. The environment stays in its last valid state until it is reset.
     Diverged {
-        /// Number of steps before the failed one, since the last reset.
+        /// Number of completed steps since the last reset.
         step: u64,
         /// Reason of the failure.
         reason: Divergence,
@@ -103,7 +103,8 @@ impl SimEnv {
         Self::with_drives(model, DriveState::new(drives, model))
     }
 
-    /// As [`new`](Self::new), with drives whose unmodified arrays are shared with other environments.
+    /// Creates an environment as [`new`](Self::new) does, with a given drive state. Clones of one drive state share
+    /// their unmodified arrays.
     pub(crate) fn with_drives(model: &Model, drives: DriveState) -> Result<Self, EngineError> {
         let mut env = Self {
             data: Data::new(model)?,
@@ -138,8 +139,8 @@ impl SimEnv {
         self.forward(&good);
     }
 
-    /// Replaces the model by one of the same sizes. The forward pass is deferred: [`forward_if_dirty`](Self::forward_if_dirty) must
-    /// follow before any other use except another replacement.
+    /// Replaces the model by one of the same sizes. The forward pass is deferred:
+    /// [`forward_if_dirty`](Self::forward_if_dirty) must follow before any other use except another replacement.
     pub(crate) fn set_model(&mut self, model: Model) {
         if !self.dirty {
             self.raw_quats.restore(&mut self.data);
@@ -469,7 +470,7 @@ impl SimEnv {
         contacts.extend(solved.contacts.iter().filter(|_| done));
     }
 
-    /// Solves the current state, passes the solution to `capture`, and restores the state. Returns true if the solve
+    /// Solves the current state, passes the solution to `take`, and restores the state. Returns true if the solve
     /// succeeded.
     fn with_solved_state(
         &mut self,

@@ -96,10 +96,10 @@ fn write_file(path: &Path, text: &str) -> Result<()> {
 /// Time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
 const ARMATURE_STEP: f64 = 0.002;
 
-/// Adds `step` times its damping to the armature of each drive of robots with mimic joints, if plain MuJoCo is unstable
-/// otherwise. Explicit drives are then as stable as drives with implicit damping, `(M + h kd) a = -kp (q - q*) - kd v`,
-/// and couplings are solved with the same inertia. Returns the plans with these armatures, and the uids of the changed
-/// robots.
+/// Adds `h kd` to the armature of the drives of a robot with mimic joints, if plain MuJoCo is otherwise unstable at the
+/// time step h (`step`) \[s\]. Joints of MJCF files stay unchanged. An explicit drive is then as stable as a drive with
+/// implicit damping, `(M + h kd) a = -kp (q - q*) - kd v`, and MuJoCo solves the couplings with the same inertia.
+/// Returns the plans with the new armatures, and the uids of the changed robots.
 fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<Vec<JointPlan>>, Vec<String>) {
     let mut heavier = Vec::new();
     let mut of_robot = |robot: &Arc<RobotData>| {

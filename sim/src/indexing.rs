@@ -12,7 +12,7 @@ pub(crate) struct RobotIndexing {
     pub links: Vec<BodyFrame>,
     /// The body of the root link.
     pub root: BodyIndexing,
-    /// All geoms of the robot.
+    /// All geoms of the robot, for collision and for visuals.
     pub geoms: Vec<GeomIndexing>,
 }
 
@@ -70,7 +70,7 @@ pub(crate) struct MjcfIndexing {
     pub joints: Vec<JointIndexing>,
     /// Indices in `ctrl` of the file's actuators.
     pub controls: Vec<usize>,
-    /// Indices in `act` of the file's actuators.
+    /// Indices in `act` of the file's actuators that have an activation.
     pub activations: Vec<usize>,
     /// Mocap bodies of the file.
     pub mocap_bodies: Vec<usize>,

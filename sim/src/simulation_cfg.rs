@@ -58,7 +58,8 @@ pub struct GroundCfg {
     pub color: [f64; 3],
     /// True if cameras see a checker pattern with squares of 0.5 m, slightly lighter and darker than the color.
     pub checker: bool,
-    /// Further surface properties.
+    /// Surface properties for rendering besides the color, such as reflectance and roughness. They do not affect
+    /// friction.
     pub surface: SurfaceCfg,
 }
 

@@ -30,7 +30,7 @@ pub enum Finding {
     },
     /// An array has the wrong shape.
     Shape {
-        /// The array, and the step.
+        /// The array, and the time: `step 12`, or `after the reset`.
         what: String,
         /// Its shape.
         found: Vec<usize>,
@@ -39,7 +39,7 @@ pub enum Finding {
     },
     /// An observation is not finite, or outside the observation space.
     OutOfSpace {
-        /// The array, and the step.
+        /// Time: `step 12`, or `after the reset`.
         when: String,
         /// The environment.
         env: usize,
@@ -52,7 +52,7 @@ pub enum Finding {
     },
     /// A reward is not finite.
     Reward {
-        /// The step.
+        /// Time: `step 12`.
         when: String,
         /// The environment.
         env: usize,
@@ -61,7 +61,7 @@ pub enum Finding {
     },
     /// The final observation of an episode that goes on differs from the observation.
     FinalObservation {
-        /// The step.
+        /// Time: `step 12`.
         when: String,
         /// The environment.
         env: usize,
@@ -69,7 +69,7 @@ pub enum Finding {
     /// An episode that ended was not followed by another one: it ends again in every step, with an unchanged
     /// observation.
     NoAutoReset {
-        /// The step of the third consecutive end.
+        /// Time of the third consecutive end: `step 12`.
         when: String,
         /// The environment.
         env: usize,
@@ -87,7 +87,7 @@ pub enum Finding {
 /// The first difference between two runs that should be equal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunDifference {
-    /// The step.
+    /// Time of the difference: `step 12`, or `after the reset`.
     pub when: String,
     /// The environment.
     pub env: usize,

@@ -72,9 +72,9 @@ impl Env {
 
     /// The simulation, to serve, record or change it between steps.
     ///
-    /// The next step sees a state that is written here. If the simulation is reset here or by a viewer, the episode
-    /// ends with the next step ([`EndReason::Reset`]) and another one begins. [`reset`](Self::reset) begins an episode
-    /// at once.
+    /// The next step starts from a state that is written here. If the simulation is reset here or by a viewer, the next
+    /// step ends the episode ([`EndReason::Reset`]) and begins a new one. To begin a new episode at once, call
+    /// [`reset`](Self::reset).
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.state.sim
     }
@@ -410,7 +410,7 @@ impl Env {
         Ok(())
     }
 
-    /// Runs the events that are `due` in `envs`, each with random numbers keyed by `named(event)`.
+    /// Runs the events that are `due` in `envs`, each with random numbers keyed by `name(event)`.
     fn run_events(
         &mut self,
         envs: &[usize],
@@ -448,7 +448,7 @@ impl Env {
     }
 }
 
-/// Number of steps from step `context` until an interval event is due again, uniform in `low..=high`.
+/// Number of steps from step `now` until an interval event is due again, uniform in `low..=high`.
 fn draw_interval(key: EpisodeKey, env: usize, event: &str, now: u64, [low, high]: [u64; 2]) -> u64 {
     let share = key.episode_rng(env, &format!("interval/{event}/{now}")).uniform();
     // Rounding may make the product of a share below 1 the whole width.

@@ -19,8 +19,8 @@ pub struct TerminationTerm {
 }
 
 impl TerminationTerm {
-    /// Creates a term that terminates the episodes where `ends` returns true, shape (N,). A terminated episode reached
-    /// a goal or failed, so that no further reward is possible.
+    /// Creates a term that terminates the episodes of all environments for which `ends` returns true, shape (N,). A
+    /// terminated episode reached a goal or failed, so no further reward is possible.
     pub fn new(
         name: impl Into<String>,
         ends: impl Fn(&TermContext<'_>) -> TermResult<Array1<bool>> + Send + 'static,
@@ -28,8 +28,8 @@ impl TerminationTerm {
         Self { name: name.into(), truncates: false, condition: Box::new(ends) }
     }
 
-    /// Truncates episodes instead of terminating them: the task could continue, but its episode is cut off. Learning
-    /// algorithms bootstrap the value of the final observation then.
+    /// Makes the term truncate episodes instead of terminating them: the task could continue, but the episode is cut
+    /// off. Learning algorithms then bootstrap the value of the final observation.
     #[must_use]
     pub fn truncating(self) -> Self {
         Self { truncates: true, ..self }

@@ -15,14 +15,15 @@ const FORBID_UNSAFE: [&str; 7] = [
     "record/src/lib.rs",
     "viewer/src/lib.rs",
 ];
+/// Largest number of lines of a file.
 const MAX_LINES: usize = 800;
-/// First folders of absolute paths that exist on one machine only.
 /// Largest number of public methods of `SimulationManager`; further ones belong to its views and handles.
 const MAX_MANAGER_METHODS: usize = 45;
 
 /// Largest number of names in the prelude.
 const MAX_PRELUDE_NAMES: usize = 45;
 
+/// First folders of absolute paths that exist on one machine only.
 const FOREIGN_FOLDERS: [&str; 3] = ["home", "root", "work"];
 /// Larger files are data.
 const MAX_TEXT_BYTES: u64 = 1 << 20;

@@ -259,7 +259,7 @@ fn luma([red, green, blue]: [i32; 3]) -> u8 {
     ((11_966 * red + 40_254 * green + 4_064 * blue + (16 << 16) + (1 << 15)) >> 16) as u8
 }
 
-/// Chroma (Cb, Cr) of BT.709 from 16 to 240, from sums of four pixels.
+/// Chroma (Cb, Cr) of BT.709 from 16 to 240, from the RGB sums of four pixels, in fixed point with 16 bits.
 fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {
     let middle = (128 << 18) + (1 << 17);
     let cb = -6_596 * red - 22_189 * green + 28_785 * blue + middle;

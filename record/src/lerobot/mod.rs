@@ -251,7 +251,7 @@ impl DatasetWriter for LeRobotWriter {
         Ok(())
     }
 
-    /// Completes the file of the episode.
+    /// Completes the Parquet file of the open episode of `env`, if any.
     fn end(&mut self, env: usize) -> WriteResult {
         let Some(mut running) = self.open_episodes[env].take() else { return Ok(()) };
         running.write(&self.disk)?;

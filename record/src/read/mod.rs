@@ -22,7 +22,8 @@ use crate::recorded_arrays::RecordedArrays;
 use kinetoscope_scene::pattern::closest_names;
 use std::path::{Path, PathBuf};
 
-/// An open recording: an MCAP file of ROS 2 messages from any program, or a NumPy archive of a recorder.
+/// A recording opened for reading: an MCAP file of ROS 2 messages from any program, or a NumPy archive (`.npz`) written
+/// by a [`Recorder`](crate::Recorder).
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,

@@ -3,11 +3,11 @@
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
-/// Mask id of the visible link or object, by whichever alias the channel was selected.
+/// Mask id of the visible link or object, under every alias of the channel.
 ///
-/// Isaac's names `semantic_segmentation` and `instance_segmentation` select this channel; its numbers are ids of links
-/// in either case. `SceneView::segmentation` returns a `Segmentation`, which turns them into images of instances or
-/// semantic classes.
+/// Isaac's names `semantic_segmentation` and `instance_segmentation` select this channel too; its numbers are always
+/// ids of links. `SceneView::segmentation` returns a `Segmentation`, which converts mask images to images of instances
+/// or semantic classes.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask;
 

@@ -69,8 +69,10 @@ macro_rules! channels {
             /// Names of all channels.
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
 
-            /// Channels of these names or aliases (`rgb`, `distance_to_image_plane`, `normals`...). All of Isaac's
-            /// segmentation names select the mask, ids of links; see [`Mask`] for instances and classes.
+            /// Creates the set of channels with these names or aliases (`rgb`, `distance_to_image_plane`,
+            /// `normals`...). Isaac's names `semantic_segmentation`, `instance_segmentation`,
+            /// `instance_segmentation_fast` and `instance_id_segmentation_fast` select the mask, which contains ids of
+            /// links. [`Mask`] describes images of instances and classes.
             ///
             /// # Errors
             ///
@@ -134,8 +136,8 @@ macro_rules! channels {
                 C::view_in(self)
             }
 
-            /// Moves the images of `views`, a range of `all` views, up by `by` places; the last images of the range are
-            /// dropped.
+            /// Moves the images of `views`, a range of the `all` views, by `by` places toward higher indices. The last
+            /// `by` images of the range are dropped.
             pub fn shift_views(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -144,7 +146,7 @@ macro_rules! channels {
                 })*
             }
 
-            /// Fills the images of `views`, a range of `all` views, with zeros.
+            /// Fills the images of `views`, a range of the `all` views, with zeros.
             pub fn clear_views(&mut self, all: usize, views: Range<usize>) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -152,8 +154,12 @@ macro_rules! channels {
                 })*
             }
 
-            /// Copies view `from` of `others`, which holds `other_count` views, to view `to` of the `count` views here.
-            /// Channels and size are the same.
+            /// Copies view `from` of `others`, which has `other_count` views, to view `to` of these images, which have
+            /// `count` views. Channels that either side lacks are skipped.
+            ///
+            /// # Panics
+            ///
+            /// If an index is out of range, or the sizes of the images differ.
             pub fn copy_view(&mut self, count: usize, to: usize, others: &Self, other_count: usize, from: usize) {
                 $(if let (Some(numbers), Some(others)) = (
                     self.$field.as_mut().and_then(|array| array.as_slice_mut()),

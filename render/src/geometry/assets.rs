@@ -24,7 +24,7 @@ impl RayAssetCache {
 /// The mesh that a structure was built from, and the structure.
 type CacheEntry<T> = (Weak<RenderMesh>, Weak<T>);
 
-/// Acceleration structures, found by the identity of their mesh.
+/// Cache of acceleration structures, keyed by the address of their mesh.
 #[derive(Debug, Default)]
 pub struct AssetCache {
     meshes: Vec<CacheEntry<MeshBvh>>,

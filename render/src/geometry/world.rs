@@ -177,7 +177,12 @@ impl RayTargets {
 }
 
 impl FixedTargets {
-    /// Places the fixed targets at their poses (world from target), one pose per instance of the scene.
+    /// Places the fixed targets. `poses` (world from instance) has one pose for every instance of the scene, moving
+    /// ones included. Invisible targets and targets with a pose that is not finite are skipped.
+    ///
+    /// # Panics
+    ///
+    /// If `poses` has fewer elements than the scene has instances.
     pub fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
         let placed: Vec<PlacedTarget> =
             targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();

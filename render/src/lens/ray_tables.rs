@@ -8,19 +8,19 @@ use std::sync::Arc;
 /// Largest memory of the rays of a camera \[bytes\].
 const MAX_BYTES: usize = 16 << 30;
 
-/// Lens and rays of all views (rows) of a camera. A pinhole has no rays.
+/// Lens of a camera, and the rays of each of its views (rows). A lens without distortion has no rays.
 #[derive(Clone, Debug)]
 pub struct LensRayTables {
     lens: Lens,
     size: [usize; 2],
     samples: u8,
-    /// Rays of the configured intrinsics, and of those that were set later.
+    /// Rays for the configured intrinsics, and for intrinsics that were set later.
     tables: Vec<Arc<LensRays>>,
     rows: Vec<Option<Arc<LensRays>>>,
 }
 
 impl LensRayTables {
-    /// Computes the rays of a lens with the same intrinsics in every row.
+    /// Computes the rays of a lens, with the same intrinsics for every view.
     pub fn new(
         lens: Lens,
         pixels: &PixelIntrinsics,
@@ -35,12 +35,12 @@ impl LensRayTables {
         Ok(all)
     }
 
-    /// Lens of all rows.
+    /// Lens of all views.
     pub fn lens(&self) -> Lens {
         self.lens
     }
 
-    /// Rays of a row; `None` for a pinhole.
+    /// Rays of view `row`; `None` for a lens without distortion.
     ///
     /// # Panics
     ///
@@ -50,13 +50,17 @@ impl LensRayTables {
         self.rows[row].as_deref()
     }
 
-    /// Shared rays of a row; `None` for a pinhole.
+    /// Shared rays of view `row`; `None` for a lens without distortion.
+    ///
+    /// # Panics
+    ///
+    /// If `row` is out of range.
     #[track_caller]
     pub fn shared(&self, row: usize) -> Option<&Arc<LensRays>> {
         self.rows[row].as_ref()
     }
 
-    /// Computes the rays of several intrinsics, once for equal ones; empty for a pinhole.
+    /// Computes the rays of several intrinsics, once for equal ones. The list is empty for a lens without distortion.
     pub fn compute(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
         if self.lens.is_pinhole() {
             self.lens.domain()?;

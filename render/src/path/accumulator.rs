@@ -72,7 +72,7 @@ impl Accumulator {
 }
 
 impl AccumulatorRows<'_> {
-    /// Traces the paths of all pixels; returns false if rendering was canceled. With `denoise`, radiance is divided by
+    /// Traces the paths of all pixels; returns false if rendering was canceled. With `smooth`, radiance is divided by
     /// albedo.
     pub(crate) fn path_trace(
         &mut self,

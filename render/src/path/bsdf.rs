@@ -161,9 +161,9 @@ impl Bsdf {
         (layer / (layer + below).max(1e-12)).clamp(0.1, 1.0)
     }
 
-    /// Samples the direction of light that is scattered to `o` (unit, in the local frame of the point), by three random
-    /// numbers in 0..1. The mean of the weight times the light from there is the light towards `o`. `None` stands for
-    /// no light, also for directions along the surface.
+    /// Samples the incoming direction of the light that is scattered to `o` (unit, in the local frame of the point),
+    /// with three random numbers in 0..1. The mean of the weight times the light from the sampled direction is the
+    /// light toward `o`. `None` stands for no light, also for directions along the surface.
     pub(super) fn sample(&self, o: V3, lobe: f64, at: [f64; 2]) -> Option<BsdfSample> {
         if o[2] <= 0.0 {
             return None;
@@ -198,7 +198,8 @@ impl Bsdf {
         Some(BsdfSample { direction, weight, is_specular: false, pdf })
     }
 
-    /// Pdf of a direction above the surface in [`sample`](Self::sample), for light that is scattered to `o` \[1/sr\].
+    /// Probability density \[1/sr\] with which [`sample`](Self::sample) returns the direction `i` for the outgoing
+    /// direction `o`; both are above the surface.
     pub(super) fn pdf(&self, o: V3, i: V3) -> f64 {
         let share = self.layer_probability(o);
         // The sum of both strategies' pdfs.

@@ -30,7 +30,7 @@ fn combine(seed: u32, x: u32) -> u32 {
     mix(seed ^ mix(x.wrapping_add(0x9e37_79b9)))
 }
 
-/// Owen scrambling: flips each bit depending on the bits above it.
+/// Hash-based Owen scrambling: flips each bit depending on `seed` and on the bits above it.
 fn scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x = x.wrapping_add(seed);

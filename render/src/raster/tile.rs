@@ -49,7 +49,7 @@ impl Tile {
         self.cleared.reserve_exact(blocks.saturating_sub(self.cleared.len()));
     }
 
-    /// Moves the tile and empties it. It must be [settled](Self::finish) before it is read.
+    /// Moves the tile and empties it. Call [`finish`](Self::finish) before reading it.
     pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
         [self.x0, self.y0] = origin;
         [self.blocks_x, self.blocks_y] = blocks;
@@ -114,7 +114,7 @@ impl Tile {
         (self.empty, self.only_row) = (other.empty, other.only_row);
     }
 
-    /// Memory held \[bytes\].
+    /// Allocated heap memory \[bytes\].
     pub(crate) fn bytes(&self) -> usize {
         4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())
             + self.dirty.capacity()

@@ -49,7 +49,7 @@ pub(super) fn bar_at(right: f64) -> Vec<PoseF32> {
 const SPEED: f64 = 3.0;
 
 /// The bar `right` meters to the right, path traced with one center sample for all other channels; the shutter opened
-/// `age` seconds ago.
+/// `before` seconds ago.
 fn tracer(samples: u32, shutter: Shutter, right: f64, before: f64) -> TestFrame {
     let (scene, view) = bar();
     TestFrame {

@@ -17,9 +17,9 @@ pub struct View {
     pub fx: f32,
     /// Focal length along y \[pixels\].
     pub fy: f32,
-    /// Principal point, x \[pixels\].
+    /// Principal point along x \[pixels\]; the center of the first pixel is 0.5.
     pub cx: f32,
-    /// Principal point, y \[pixels\].
+    /// Principal point along y \[pixels\]; the center of the first pixel is 0.5.
     pub cy: f32,
     /// Smallest visible depth along the optical axis \[m\].
     pub near: f32,

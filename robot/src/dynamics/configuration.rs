@@ -27,8 +27,9 @@ pub struct Configuration {
     pub joint_positions: Vec<f64>,
     /// Interpretation of the positions of mimic joints.
     pub mimic: MimicPositions,
-    /// Pose `joint_from_child` of each floating and planar joint, in the order of the description; identity at zero. A
-    /// planar joint allows a translation normal to the axis and a rotation about it (not checked).
+    /// Pose `joint_from_child` of each floating and planar joint, in the order of the description; the identity at the
+    /// zero position. A planar joint allows a translation perpendicular to its axis and a rotation about its axis.
+    /// Other poses are not rejected.
     pub free_joint_poses: Vec<Pose>,
 }
 

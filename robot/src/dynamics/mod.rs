@@ -363,7 +363,7 @@ impl<'a> Dynamics<'a> {
     }
 
     /// Inverse dynamics `tau = M a + c + g`: the generalized force that produces `acceleration`, the rate of change of
-    /// `velocity`, under `gravity` \[m/s²\].
+    /// `velocity`, under `gravity` in world axes \[m/s²\] (z = -9.81 on earth).
     ///
     /// Source: recursive Newton-Euler algorithm, Featherstone 2008, table 5.1, in world axes (section 5.3's transforms
     /// become identities). An axis S that is fixed in a body of velocity v changes at the rate v × S.

@@ -57,7 +57,7 @@ impl<'n> TipFrame<'n> {
         Self { link: Some(link), ..self }
     }
 
-    /// Sets the frame on the link: `link_from_frame`, the "tool center point".
+    /// Sets the tool center point: its pose in the frame of the link \[m\].
     #[must_use]
     pub fn with_tcp(self, link_from_frame: Pose) -> Self {
         Self { tcp: link_from_frame, ..self }

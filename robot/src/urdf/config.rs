@@ -102,7 +102,7 @@ impl UrdfCfg {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Strictness {
-    /// Each deviation is a warning that describes the reading.
+    /// Each deviation is a warning that describes how the element was read.
     #[default]
     Lenient,
     /// Each deviation is an error.
@@ -173,8 +173,7 @@ pub struct ComponentCfg {
     pub name: String,
     /// Path of the URDF file.
     pub urdf: PathBuf,
-    /// Pose of the root link in the frame of the link it is attached to; in the frame of the robot for a component
-    /// without a parent.
+    /// Pose of the component's root link in the frame of the parent link; in the frame of the robot without a parent.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub transform: Pose,
     /// Parent component; by default the usual parent, if present.

@@ -269,8 +269,8 @@ fn meshdir(reader: &Reader<'_>, node: Node<'_, '_>) -> Result<Option<String>, Ur
     Ok(None)
 }
 
-/// Warns about transmissions of unknown joints. Transmissions have no meaning for the simulation, but an unknown joint
-/// indicates a broken file.
+/// Warns about transmissions that name an unknown joint. Transmissions have no meaning for the simulation, but an
+/// unknown joint indicates a broken file.
 fn check_transmissions(reader: &mut Reader<'_>, root: Node<'_, '_>, edges: &[JointEdge]) -> Result<(), UrdfError> {
     let joints: HashSet<&str> = edges.iter().map(|e| e.joint.name.as_str()).collect();
     for transmission in reader.named(root, "transmission") {

@@ -365,7 +365,7 @@ mod tests {
         along_y(&outline, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]], 0.5)
     }
 
-    /// True if a point is in a convex mesh, or at most `near` outside of it.
+    /// True if a point is at most `near` \[m\] in front of every face plane of a convex mesh.
     fn within(hull: &TriMesh, p: V3, near: f64) -> bool {
         hull.triangles.iter().all(|t| {
             let corners = t.map(|i| hull.positions[i as usize].map(f64::from));

@@ -319,7 +319,8 @@ impl Quickhull {
         std::mem::take(&mut self.faces[face].outside)
     }
 
-    /// Assigns each point to the face of `among` that it is farthest in front of, and drops points behind all faces.
+    /// Assigns each point to the face of `among` that it is farthest in front of, and adds the farthest point of each
+    /// face to the candidates. Hull vertices, and points at most `tolerance` in front of every face, are dropped.
     fn assign_outside_points(&mut self, points: Vec<usize>, among: &[usize]) {
         for point in points {
             if self.degree[point] > 0 {

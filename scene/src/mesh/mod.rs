@@ -46,10 +46,12 @@ pub use trimesh::InvalidMesh;
 pub use volume_integrals::VolumeIntegrals;
 pub use write::{write_binary_stl, write_obj};
 
-/// Triangles with optional normals and texture coordinates, in one vertex array.
+/// A triangle mesh with optional vertex normals and texture coordinates. One index selects position, normal and texture
+/// coordinates of a vertex.
 ///
-/// Every index is smaller than `positions.len()`; every position is finite; `normals` and `uvs` are either absent or as
-/// long as `positions`. [`load`] guarantees these invariants.
+/// Every vertex index is smaller than `positions.len()`, and every number is finite. `normals` and `uvs` are either
+/// absent or as long as `positions`. The submeshes cover all triangles consecutively, and their materials exist.
+/// [`load`] guarantees these invariants, and [`validate`](Self::validate) checks them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions \[m\].
@@ -76,7 +78,7 @@ pub struct Submesh {
     pub material: Option<usize>,
 }
 
-/// Material of a part, as given in the mesh file.
+/// Material of a submesh, as given in the mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMaterial {
     /// Name in the file.

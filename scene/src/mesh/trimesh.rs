@@ -37,27 +37,27 @@ pub enum InvalidMesh {
         /// Number of positions.
         positions: usize,
     },
-    /// The parts do not cover the triangles consecutively.
+    /// The submeshes do not cover the triangles consecutively.
     #[error(
         "submesh {part} covers triangles {found_start}..{found_end}; submeshes must be contiguous: this one must begin \
          at {expected_start}, and the last one must end at {triangles}"
     )]
     Submeshes {
-        /// Index of the part (one past the last if triangles are left over).
+        /// Index of the submesh (one past the last if triangles are left over).
         part: usize,
-        /// First triangle of the part.
+        /// First triangle of the submesh.
         found_start: usize,
-        /// End of the part's triangles, exclusive.
+        /// End of the submesh's triangles, exclusive.
         found_end: usize,
-        /// Expected first triangle of the part.
+        /// Expected first triangle of the submesh.
         expected_start: usize,
         /// Number of triangles.
         triangles: usize,
     },
-    /// A part refers to a missing material.
+    /// A submesh refers to a missing material.
     #[error("submesh {part} uses material {material}, but the mesh has {materials} materials")]
     Material {
-        /// Index of the part.
+        /// Index of the submesh.
         part: usize,
         /// Index of the material.
         material: usize,
@@ -67,7 +67,7 @@ pub enum InvalidMesh {
 }
 
 impl TriMesh {
-    /// Creates a mesh of one part, without normals, texture coordinates and material.
+    /// Creates a mesh of one submesh, without normals, texture coordinates and material.
     pub fn from_triangles(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
         let submeshes = vec![Submesh { triangles: 0..triangles.len(), material: None }];
         Self { positions, triangles, submeshes, ..Self::default() }
@@ -135,10 +135,12 @@ impl TriMesh {
         out
     }
 
-    /// Checks all invariants of the type. Meshes from [`super::load`] satisfy them.
+    /// Checks that the lengths of the arrays agree, that every index is in range, that all numbers are finite, and that
+    /// the submeshes cover all triangles consecutively. The lengths of normals are not checked. Meshes from
+    /// [`super::load`] pass this check.
     ///
     /// # Errors
-    /// The first violated invariant.
+    /// The first violation.
     pub fn validate(&self) -> Result<(), InvalidMesh> {
         let positions = self.positions.len();
         let lengths = [

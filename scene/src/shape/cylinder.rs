@@ -10,7 +10,7 @@ use crate::sampling::{sample_disk, cos_sin_turns};
 use crate::vector::{V3, add_scaled, normalize};
 use std::f64::consts::PI;
 
-/// A cylinder along z with flat ends.
+/// A solid cylinder with flat ends, centered at the origin, with its axis along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
     /// Radius \[m\].

@@ -215,7 +215,7 @@ impl Shape {
         }
     }
 
-    /// First size that is not positive and finite, if any.
+    /// First size \[m\] that is not positive and finite; `None` if all sizes are valid.
     pub fn invalid_size(&self) -> Option<f32> {
         let sizes = match self.geometry() {
             ShapeKind::ClosedForm(shape) => shape.sizes(),

@@ -10,8 +10,8 @@ use std::sync::{Arc, OnceLock};
 
 /// A mesh prepared for rendering, once per asset and shared by all environments.
 ///
-/// Triangles are sorted along a space-filling curve and split into [`Cluster`]s of at most [`RenderMesh::MAX_CLUSTER_TRIANGLES`]
-/// triangles, which the rasterizer culls and transforms.
+/// Triangles are sorted along a space-filling curve and split into [`Cluster`]s of at most
+/// [`RenderMesh::MAX_CLUSTER_TRIANGLES`] triangles, which the rasterizer culls and transforms.
 #[derive(Clone, Debug, Default)]
 pub struct RenderMesh {
     positions: Vec<[f32; 3]>,
@@ -298,7 +298,7 @@ impl RenderMesh {
         &self.positions
     }
 
-    /// Unit vertex normals.
+    /// Unit normals, one per vertex, in the frame of the mesh; 0 for vertices of triangles without an area.
     pub fn normals(&self) -> &[[f32; 3]] {
         &self.normals
     }

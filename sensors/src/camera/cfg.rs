@@ -79,7 +79,7 @@ pub struct CameraCfg {
     pub round_period: bool,
     /// Measured channels.
     pub channels: Channels,
-    /// Value of depth and distance where nothing is hit.
+    /// Value of depth and distance at pixels without a hit.
     pub depth_miss: DepthMiss,
     /// Renderer of the images.
     pub renderer: Renderer,

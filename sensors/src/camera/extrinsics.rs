@@ -75,7 +75,8 @@ pub enum Placement {
     LookAt {
         /// Position of the camera \[m\].
         eye: [f64; 3],
-        /// Point in the middle of the image, if the principal point is \[m\].
+        /// Point that the optical axis passes through \[m\]. It is in the middle of the image if the principal point
+        /// is.
         target: [f64; 3],
         /// Upward direction of the image.
         #[serde(default = "z_axis")]

@@ -32,7 +32,7 @@ impl ShutterOpenPoses {
         Some((&self.poses, self.parent?))
     }
 
-    /// Copies `other`; clears the poses if they cannot be rendered.
+    /// Copies `other`. Clears the poses if `other` is `None` or has a pose that is not rigid.
     pub(super) fn assign_valid(&mut self, other: Option<&Self>) {
         self.parent = None;
         if let Some(other) = other.filter(|other| other.poses.iter().all(PoseF32::is_rigid)) {

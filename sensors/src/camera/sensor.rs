@@ -219,7 +219,7 @@ impl Camera {
         self.cfg.channels
     }
 
-    /// Schedule of the frames.
+    /// Update period of the camera in physics steps.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
     }
@@ -335,11 +335,12 @@ impl Camera {
         )
     }
 
-    /// The view of environment `env` at the captured instant, as the renderer uses it.
+    /// View of environment `env` (pose, intrinsics, near and far) at the captured instant, as the renderer uses it.
     ///
     /// # Errors
     ///
-    /// An environment that the camera does not see, [`CameraError::NothingCaptured`].
+    /// The camera does not see the environment, or it is attached to a body and has captured nothing yet
+    /// ([`CameraError::NothingCaptured`]).
     pub fn view(&self, env: usize) -> Result<View, SensorError> {
         let row = self.row(env)?;
         let pose = self.world_from_camera(row).ok_or(CameraError::NothingCaptured { env })?;

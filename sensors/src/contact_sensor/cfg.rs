@@ -45,7 +45,7 @@ pub struct ContactSensorCfg {
 }
 
 impl Default for ContactSensorCfg {
-    /// No bodies yet; a contact threshold of 1 N.
+    /// No bodies, a contact threshold of 1 N, and no optional quantities.
     fn default() -> Self {
         Self {
             bodies: Vec::new(),

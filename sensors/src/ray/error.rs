@@ -2,7 +2,7 @@
 
 use kinetoscope_render::OpticsError;
 
-/// Errors of building a ray caster.
+/// Error returned when a ray caster is built from an invalid configuration, pattern or scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RayError {

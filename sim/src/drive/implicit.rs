@@ -54,7 +54,8 @@ pub(super) fn apply(drive: &Drive, row: usize, gains: &Gains, target: &Target, d
     data.efc_frictionloss_mut()[efc] = limit;
 }
 
-/// Effort of the row in the last `mj_step2` \[N m or N\].
+/// Effort of the drive in the last `mj_step2` \[N m or N\]: the force of its row, or the clamped feed-forward effort of
+/// a drive without gains.
 pub(super) fn effort(row: usize, gains: &Gains, feedforward: f64, data: &mj::Data) -> f64 {
     if has_gains(gains) {
         data.efc_force()[data.ne() + row]

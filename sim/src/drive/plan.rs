@@ -25,7 +25,8 @@ pub struct JointPlan {
     pub setting: DriveSetting,
     /// Effort limit \[N m or N\]; infinite without a limit.
     pub max_effort: f64,
-    /// Velocity limit \[rad/s or m/s\], infinite without a limit; reported, not enforced.
+    /// Velocity limit \[rad/s or m/s\]; infinite without a limit. It is the no-load speed of a
+    /// [`DcMotor`](crate::DcMotor); other drives do not enforce it.
     pub max_velocity: f64,
     /// Dry friction \[N m or N\].
     pub friction: f64,
@@ -287,8 +288,8 @@ pub(crate) fn coupling_curve(joint: &Joint) -> Option<CouplingPolynomial> {
     }
 }
 
-/// Position of a joint that may follow others by mimics and curves, both of which are acyclic. `free_position` gives the
-/// positions of joints that follow no other.
+/// Position of a joint that may follow others by mimics and curves, both of which are acyclic. `free_position` gives
+/// the positions of joints that follow no other.
 pub(crate) fn followed_position(
     description: &RobotDescription,
     free_position: &dyn Fn(JointId) -> f64,

@@ -237,7 +237,8 @@ impl DriveState {
         self.applied.clone_from(&initial.zero_forces);
     }
 
-    /// Changes the user values of a drive and computes its gains from them; limits stay.
+    /// Changes the user values of a drive. A gain is recomputed if its user value, the drive type or the inertia
+    /// changed. Other gains, such as randomized ones, and limits stay.
     pub fn update_setting(&mut self, drive: usize, change: impl FnOnce(&mut DriveSetting)) {
         let (old, mut setting) = (self.settings[drive], self.settings[drive]);
         change(&mut setting);
@@ -297,9 +298,9 @@ impl DriveState {
         rows.iter().enumerate().for_each(|(index, row)| self.rows.set_if_changed(index, *row));
     }
 
-    /// Flat array of the state, for [`set_from_flat`](Self::set_from_flat). It has ten numbers per drive (gains and limits,
-    /// their user values, target range; without overrides), then targets (position, velocity, feed-forward), efforts,
-    /// applied forces, and the memory of explicit models.
+    /// Flat array of the state, for [`set_from_flat`](Self::set_from_flat). It has ten numbers per drive (gains and
+    /// limits, their user values, target range; without overrides), then targets (position, velocity, feed-forward),
+    /// efforts, applied forces, and the memory of explicit models.
     pub(crate) fn to_flat(&self) -> Vec<f64> {
         let settings = self.ranges.iter().enumerate().flat_map(|(drive, range)| {
             let (gains, setting) = self.base_gains(drive);

@@ -92,7 +92,7 @@ pub struct JointReport {
 pub struct MimicReport {
     /// The driving joint, as in the file.
     pub joint: String,
-    /// Ratio.
+    /// Factor of the driving joint's position.
     pub multiplier: f64,
     /// Offset \[rad or m\].
     pub offset: f64,

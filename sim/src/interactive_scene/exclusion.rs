@@ -8,7 +8,7 @@ use kinetoscope_scene::source_location::SourceLocation;
 /// Pair of bodies or robots that never collide.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExclusionCfg {
-    /// Names, as in [`SimulationManager::exclude_collision`]; a prefix `{ENV}/` is ignored.
+    /// Names, as in [`SimulationManager::exclude_collision`]; a prefix `{ENV}/` or `{ENV_REGEX_NS}/` is ignored.
     pub pair: [String; 2],
     /// File and line of the declaration, for error messages; `None` for a scene from Rust.
     pub at: Option<SourceLocation>,

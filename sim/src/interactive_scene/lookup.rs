@@ -28,7 +28,7 @@ impl InteractiveScene {
         })
     }
 
-    /// Handle of a robot.
+    /// Returns the handle of a robot by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a robot.
@@ -56,7 +56,7 @@ impl InteractiveScene {
         Ok(self.sim.robot_mut(id))
     }
 
-    /// Handle of a passive articulation.
+    /// Returns the handle of a passive articulation by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a passive articulation.
@@ -84,7 +84,7 @@ impl InteractiveScene {
         Ok(self.sim.articulation_mut(id))
     }
 
-    /// Handle of a rigid object.
+    /// Returns the handle of a rigid object by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a rigid object.
@@ -112,7 +112,7 @@ impl InteractiveScene {
         Ok(self.sim.rigid_object_mut(id))
     }
 
-    /// Handle of a group of rigid objects.
+    /// Returns the handle of a group of rigid objects by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a group.
@@ -140,7 +140,7 @@ impl InteractiveScene {
         Ok(self.sim.rigid_object_group_mut(id))
     }
 
-    /// Handle of a terrain.
+    /// Returns the handle of a terrain by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a terrain.
@@ -159,7 +159,7 @@ impl InteractiveScene {
         Ok(self.sim.entities().terrain(self.terrain_id(name)?))
     }
 
-    /// Handle of an attached MJCF file.
+    /// Returns the handle of an attached MJCF file by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not an attached MJCF file.
@@ -187,7 +187,7 @@ impl InteractiveScene {
         Ok(self.sim.mjcf_part_mut(id))
     }
 
-    /// Handle of a weld.
+    /// Returns the handle of a weld by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a weld.
@@ -215,7 +215,7 @@ impl InteractiveScene {
         Ok(self.sim.weld_mut(id))
     }
 
-    /// Handle of a sensor of type `S`, such as `Camera`.
+    /// Returns the handle of a sensor of type `S`, such as `Camera`, by the name of its entity.
     ///
     /// # Errors
     /// The entity does not exist, or is not a sensor of this type.

@@ -84,8 +84,8 @@ impl SceneCfg {
         self
     }
 
-    /// Disables collisions between two bodies or robots. Names are as in [`SimulationManager::exclude_collision`]; a
-    /// prefix `{ENV}/` is ignored.
+    /// Adds a pair of bodies or robots that never collide. Names are as in [`SimulationManager::exclude_collision`]; a
+    /// prefix `{ENV}/` or `{ENV_REGEX_NS}/` is ignored. [`InteractiveScene::new`] checks the names.
     #[must_use]
     pub fn exclude_collision(mut self, one: impl Into<String>, other: impl Into<String>) -> Self {
         self.exclusions.push(ExclusionCfg { pair: [one.into(), other.into()], at: None });

@@ -160,7 +160,7 @@ pub struct MaterialAsset {
     pub name: String,
     /// RGBA color.
     pub rgba: [f64; 4],
-    /// Name of the texture.
+    /// Name of its [`TextureAsset`]; `None` for a plain color.
     pub texture: Option<String>,
 }
 
@@ -370,7 +370,7 @@ pub struct JointEquality {
     pub follower: String,
     /// Name of the followed joint.
     pub driver: String,
-    /// Ratio.
+    /// Factor of the driver's position.
     pub multiplier: f64,
     /// Offset \[rad or m\].
     pub offset: f64,

@@ -34,8 +34,8 @@ pub struct ArticulationCfg {
     /// Pose of the root link in the environment; for an MJCF file, pose of the file's world.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Initial positions by joint pattern \[rad or m\]. Joints without a match start at 0, or at the `ref` of an MJCF
-    /// file.
+    /// Initial positions by joint pattern \[rad or m\]. Other joints start at 0, or at the `ref` of an MJCF file. All
+    /// initial positions are clamped to the joint limits; a mimic joint starts at the position that its driver implies.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Drives, such as the spring of a door closer (a stiffness, and a target at 0); `None` for passive joints.

@@ -11,8 +11,8 @@ use std::sync::Arc;
 
 /// Collision geometry of an object from a mesh file.
 ///
-/// MuJoCo's contacts are those of convex shapes: a mesh that is not convex collides as one, as several, or as very many
-/// of them. Mass and moments are those of the mesh in any case.
+/// MuJoCo computes contacts between convex shapes only: a mesh that is not convex collides as one, several, or very
+/// many convex shapes. Mass and moments are always those of the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -21,16 +21,16 @@ pub enum MeshCollision {
     #[default]
     Hull,
     /// Convex pieces that together rise above the surface by at most a tolerance. Each piece is a hull, computed as for
-    /// [`ObjectShape::Mesh`], and cached on disk with the hulls. A diagnostic reports when the pieces are too few for
-    /// the tolerance. Each piece costs time while another body is near the object. Together they contain everything
-    /// that a closed mesh encloses; for an open mesh, which a diagnostic names, they contain the surface.
+    /// [`ObjectShape::Mesh`], and cached on disk with the hulls. A diagnostic reports that the pieces are too few for
+    /// the tolerance. Each piece costs time while another body is near the object. The pieces of a closed mesh contain
+    /// everything that the mesh encloses. The pieces of an open mesh, which a diagnostic names, contain its surface.
     Pieces(ConvexDecompositionCfg),
     /// Every triangle exactly as in the file, as the front of a prism. This is for static and kinematic objects of up
-    /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it. A body that
-    /// penetrates the front by more than that falls through. Bodies at rest lie where they should. Bodies that slide
-    /// over edges between triangles are braked, since MuJoCo does not treat the triangles as one surface: a ball of 5
-    /// cm radius that slides along a smooth valley at 0.5 m/s, over an edge every 5 cm on both sides, still has more
-    /// than 0.3 m/s after 0.6 m. Triangles too thin for MuJoCo are left out, with a diagnostic.
+    /// to 2000 triangles. If the mesh is thinner than `thickness`, prisms protrude behind it. A body that penetrates
+    /// the front by more than `thickness` falls through. Bodies rest at the correct position. Bodies that slide over
+    /// edges between triangles are braked, because MuJoCo does not treat the triangles as one surface: a ball of 5 cm
+    /// radius that slides along a smooth valley at 0.5 m/s, over an edge every 5 cm on both sides, still has more than
+    /// 0.3 m/s after 0.6 m. Triangles too thin for MuJoCo are omitted, with a diagnostic.
     Triangles {
         /// Thickness of the prisms \[m\].
         thickness: f64,
@@ -38,7 +38,8 @@ pub enum MeshCollision {
 }
 
 impl MeshCollision {
-    /// Maximum number of exact triangles: each is a geom of MuJoCo.
+    /// Maximum number of triangles for [`Triangles`](Self::Triangles), not counting those that are too thin. Each
+    /// triangle is a MuJoCo geom.
     pub const MAX_TRIANGLES: usize = 2000;
 
     /// Checks the numbers, and that the object supports this collision geometry.

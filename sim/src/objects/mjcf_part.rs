@@ -82,8 +82,8 @@ impl<'a> MjcfPart<'a> {
         Ok(found.into_iter().map(ActuatorIndex).collect())
     }
 
-    /// Columns of [`qpos`](Self::qpos) for the joints that match patterns: 7 for a free joint (position, then w x y z),
-    /// 4 for a ball, 1 for others.
+    /// Returns the range of columns of [`qpos`](Self::qpos) for each joint that matches a pattern, in the order of the
+    /// patterns. A free joint has 7 columns (x, y, z, qw, qx, qy, qz), a ball joint 4, any other joint 1.
     ///
     /// # Errors
     /// A pattern matches nothing (with the nearest names), or a joint is matched twice.
@@ -91,8 +91,9 @@ impl<'a> MjcfPart<'a> {
         self.columns(patterns, self.model().jnt_qposadr(), [7, 4, 1])
     }
 
-    /// Columns of [`qvel`](Self::qvel) for the joints that match patterns: 6 for a free joint (velocity in the
-    /// environment, then angular velocity in the body), 3 for a ball, 1 for others.
+    /// Returns the range of columns of [`qvel`](Self::qvel) for each joint that matches a pattern, in the order of the
+    /// patterns. A free joint has 6 columns (velocity in the axes of the environment, then angular velocity in the axes
+    /// of the body), a ball joint 3, any other joint 1.
     ///
     /// # Errors
     /// As [`qpos_columns`](Self::qpos_columns).

@@ -89,9 +89,9 @@ impl<'a> RigidObjectMut<'a> {
     /// world axes, are preserved. A forward pass follows, so that later reads belong to the new state.
     ///
     /// A kinematic object stays there until the next write or reset. A static object stays there over resets, until the
-    /// next write or [`reset_properties`](crate::EnvPropertiesMut::reset). Its pose is
-    /// [`crate::Property`](crate::Property) and `Rotation`, and an environment with another pose gets a model of its
-    /// own. A body that touches the object at its new pose is pushed out as in any contact.
+    /// next write or [`EnvPropertiesMut::reset`](crate::EnvPropertiesMut::reset). Its pose is the properties `Position`
+    /// and `Rotation` ([`Property`](crate::Property)), and an environment with another pose gets a model of its own. A
+    /// body that touches the object at its new pose is pushed out as in any contact.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;

@@ -198,10 +198,10 @@ impl RigidObjectMut<'_> {
         Ok(())
     }
 
-    /// Applies a force \[N\] at the center of mass and a torque \[N m\] from the next step on, until they are set again
-    /// or the environment is reset; zeros end them. Both have rows of 3 for `env_ids` (`None` for all environments; a
-    /// single row applies to all of them). With [`WrenchFrame::Link`] both are in the axes of the object and turn with
-    /// it, from step to step.
+    /// Applies a force \[N\] at the center of mass and a torque \[N m\] in every step until the next call or a reset of
+    /// the environment. Zeros remove them. Both have the shape (environments, 3): rows for `env_ids` (`None` for all
+    /// environments; a single row applies to all of them). With [`WrenchFrame::World`] both are in world axes and keep
+    /// their direction. With [`WrenchFrame::Link`] both are in the axes of the object and turn with it.
     ///
     /// # Errors
     /// The object is not dynamic; wrong shape, an unknown or repeated environment, or a value that is not finite. Then

@@ -51,8 +51,8 @@ pub struct RobotCfg {
     /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
     ///   `solimpfriction` apply to the other joints.
     /// - Named sites are links on fixed joints. The end of a control part
-    ///   ([`TipFrame::of_part`](kinetoscope_robot::kinematics::TipFrame::of_part)) follows such a joint if there is exactly one.
-    ///   So a site that is added to the last body, for a touch sensor say, moves that end. Name the link
+    ///   ([`TipFrame::of_part`](kinetoscope_robot::kinematics::TipFrame::of_part)) follows such a joint if there is
+    ///   exactly one. So a site that is added to the last body, for a touch sensor say, moves that end. Name the link
     ///   ([`TipFrame::at`](kinetoscope_robot::kinematics::TipFrame::at)) where this matters.
     /// - Elements of the file's world (a floor, lights), global settings and keyframes are not part of the robot.
     ///   [`diagnostics`](crate::SimulationManager::diagnostics) names everything that is left out.
@@ -89,8 +89,9 @@ pub struct RobotCfg {
     /// Initial height of the lowest collision point of the robot above the ground at z = 0 \[m\], instead of the z of
     /// [`init_pose`](Self::init_pose). `None` leaves the robot at `init_pose`.
     pub ground_clearance: Option<f64>,
-    /// Initial positions by joint pattern or control part \[rad or m\]. Joints without a match start at 0, or at the
-    /// `ref` of an MJCF file.
+    /// Initial positions by joint pattern or control part \[rad or m\]. Other joints start at 0, or at the `ref` of an
+    /// MJCF file. All initial positions are clamped to the joint limits; a mimic joint starts at the position that its
+    /// driver implies.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Payloads by link pattern \[kg\]: a point mass at the link's center of mass, or a ball with the density of water

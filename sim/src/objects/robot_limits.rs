@@ -141,9 +141,9 @@ impl RobotMut<'_> {
     /// Sets the speed limits of drives \[rad/s or m/s\], infinite for no limit. Rows and columns as in
     /// [`set_stiffness`](Self::set_stiffness).
     ///
-    /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive
-    /// law limits the speed of a joint. The actuator model [`DcMotor`](crate::DcMotor) uses them as its no-load speed;
-    /// nothing warns if its torque-speed line becomes too steep for the time step.
+    /// The limits are for planners and rewards, which read them with [`qvel_limits`](Robot::qvel_limits). Neither
+    /// MuJoCo nor the drive law enforces them. The actuator model [`DcMotor`](crate::DcMotor) uses the limit as its
+    /// no-load speed. A torque-speed line that is too steep for the time step causes no warning here.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, a value that is negative or NaN, or that the actuator

@@ -48,8 +48,8 @@ impl RobotMut<'_> {
     ///
     /// Dry friction is a property of the environment and survives resets. Unlike
     /// [`set_stiffness`](Self::set_stiffness), it also stays when a [snapshot](crate::Snapshot) is restored without its
-    /// properties. [`reset_properties`](crate::EnvPropertiesMut::reset) restores the values that the robot was added
-    /// with.
+    /// properties. [`EnvPropertiesMut::reset`](crate::EnvPropertiesMut::reset) restores the values that the robot was
+    /// added with.
     ///
     /// All joints without an implicit drive may have dry friction, those of passive articulations too. An implicit
     /// drive uses MuJoCo's friction constraint of the joint. Such a joint has dry friction only if the model has a

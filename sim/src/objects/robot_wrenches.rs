@@ -30,7 +30,8 @@ impl Robot<'_> {
         wrenches
     }
 
-    /// True for links with gravity compensation, shape (N, links).
+    /// True for links with gravity compensation by [`set_gravity_compensation`](RobotMut::set_gravity_compensation),
+    /// shape (N, links). `gravcomp` of an MJCF file is not included.
     #[doc(alias = "get_gravity_compensation")]
     pub fn gravity_compensation(&self) -> Array2<bool> {
         let links = &self.indexing().links;
@@ -45,14 +46,15 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Applies forces \[N\] and torques \[N m\] to links from the next step on, until they are set again or the
-    /// environment is reset; zeros end them. Both have the shape (environments, links, 3): rows for `env_ids` (`None`
-    /// for all environments; a single row applies to all of them), links as `link_ids` (`None` for all links). Other
-    /// links keep their wrenches.
+    /// Applies forces \[N\] and torques \[N m\] to links in every step until the next call or a reset of the
+    /// environment. Zeros remove them. Both have the shape (environments, links, 3): rows for `env_ids` (`None` for all
+    /// environments; a single row applies to all of them), links as `link_ids` (`None` for all links). Other links keep
+    /// their wrenches.
     ///
     /// A force acts at the center of mass of the link's body: of the link and of all links fixed to it. Wrenches on
     /// links that are fused into one body add up. To push at a point at the offset `r` from there, add `r x F` to the
-    /// torque. With [`WrenchFrame::Link`] both are in the axes of the link and turn with it, from step to step.
+    /// torque. With [`WrenchFrame::World`] both are in world axes and keep their direction. With [`WrenchFrame::Link`]
+    /// both are in the axes of the link and turn with it.
     ///
     /// ```
     /// use ndarray::array;

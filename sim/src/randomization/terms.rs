@@ -29,7 +29,7 @@ impl RandomizationOp {
     }
 }
 
-/// Randomization of one property for all names that a pattern matches.
+/// One random operation on one property, for all names that a pattern matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RandomizationTerm {
@@ -37,7 +37,7 @@ pub struct RandomizationTerm {
     pub property: Property,
     /// Regular expression that matches whole names (see [`Properties`]).
     pub pattern: String,
-    /// Random operation. All elements of one name share one sample.
+    /// Random operation. Elements with the same name get the same random numbers.
     pub draw: RandomizationOp,
 }
 

@@ -118,14 +118,14 @@ fn slider_cranks(model: &Model) -> impl Iterator<Item = String> + '_ {
 }
 
 impl VisualScene {
-    /// Creates the scene of the geoms of `model` with the lighting of MuJoCo's renderer. Each body has one mask id,
-    /// each geom of the world its own.
+    /// Creates the scene of the geoms, tendons, skins and flexes of `model`, with the lighting of MuJoCo's renderer.
+    /// All geoms of a body share one mask id. Each geom of the world, tendon, skin and flex has its own mask id.
     pub fn of_model(model: &Model) -> Self {
         Self::with_mujoco_lighting(model, &identity::by_body(model, false))
     }
 
-    /// Creates the scene of the geoms and sites of `model`, as in MuJoCo's viewers. Mask ids are those of
-    /// [`of_model`](Self::of_model); bodies with sites only, and sites of the world, have further ones.
+    /// Creates the scene of [`of_model`](Self::of_model) with the sites of `model`, as in MuJoCo's viewers. Bodies that
+    /// have only sites, and sites of the world, get additional mask ids.
     pub fn with_sites(model: &Model) -> Self {
         Self::with_mujoco_lighting(model, &identity::by_body(model, true))
     }
@@ -142,7 +142,7 @@ impl VisualScene {
     }
 
     /// Extracts the render scene of `model`. The geoms in `replacements` are rendered as these parts. `frames` are the
-    /// frames on the body axis of sensors, `surface_overrides` has additional surface properties, and `look` is the lighting.
+    /// frames on the body axis of sensors, `painted` has additional surface properties, and `look` is the lighting.
     pub(crate) fn extract(
         model: &Model,
         identities: &MaskIdMap,
@@ -280,8 +280,8 @@ impl VisualScene {
         !self.deforming.is_empty()
     }
 
-    /// Puts the scene of environment `env`, whose own scene is `env_scene`, into `out` with the shapes of `data`; `env_scene`
-    /// itself if no shape changes. The memory of scenes without other holders is reused.
+    /// Writes the scene of environment `env`, whose own scene is `own`, to `out` with the shapes of `data`; without
+    /// deforming shapes, `out` becomes `own`. The memory of scenes without other owners is reused.
     pub(crate) fn update_shapes(&self, data: &Data, env: usize, own: &EnvScene, out: &mut EnvScene) {
         if self.deforms() {
             let scene = own.0.as_ref().unwrap_or(&self.scene);

@@ -1,4 +1,4 @@
-//! Model at one moment, which can be rendered without a simulation.
+//! A model at one instant, which can be rendered without a simulation.
 
 use super::{MaskId, VisualScene, overview};
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Posed scene: a model at one moment, with its render scene, poses, lights and cameras.
+/// Offscreen scene: a model at one instant, with its render scene, poses, lights and cameras.
 #[derive(Clone, Debug)]
 pub struct OffscreenScene {
     visual_scene: Arc<VisualScene>,
@@ -55,7 +55,7 @@ pub struct FreeCamera {
 const DEFAULT_VIEW_DIRECTION: [f64; 3] = [-0.664, 0.608, -0.435];
 
 impl OffscreenScene {
-    /// Creates the posed scene of an MJCF file, at the positions `qpos` (`None` for those of the file).
+    /// Creates the offscreen scene of an MJCF file, at the positions `qpos` (`None` for those of the file).
     ///
     /// # Errors
     /// MuJoCo rejects the file, or `qpos` does not have one finite number for each position of the model.
@@ -84,7 +84,7 @@ impl OffscreenScene {
         Ok(Self { view_direction: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
     }
 
-    /// Creates the posed scene of one environment of a simulation in its current state.
+    /// Creates the offscreen scene of one environment of a simulation in its current state.
     ///
     /// # Errors
     /// The environment does not exist.
@@ -94,10 +94,10 @@ impl OffscreenScene {
         Ok(sim.simulation.batch.read(env.0, |env| Self::of_data(&visible, env.data())))
     }
 
-    /// Creates the posed scene of several environments side by side (`None` for all environments), placed by
-    /// [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins), with markers in them. The
-    /// ground is rendered once; lights and cameras are those of environment 0. Everything else is rendered in every
-    /// environment: a terrain that is larger than the space between environments overlaps.
+    /// Creates the offscreen scene of several environments side by side (`None` for all environments), at
+    /// [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins). Each marker is shown in its
+    /// environment. The ground is rendered once; lights and cameras are those of environment 0. Everything else is
+    /// rendered in every environment, so a terrain that is larger than the space between environments overlaps.
     ///
     /// # Errors
     /// An environment does not exist, or there are more triangles than can be rendered.

@@ -60,7 +60,7 @@ impl VisualCache {
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
     }
 
-    /// Warns about a robot from URDF files without visual shapes.
+    /// Warns if a robot from URDF files has no visual shape.
     pub(crate) fn check_robot(&mut self, robot: &RobotData) {
         let description = robot.description();
         if robot.file().is_some() || description.links.iter().any(|link| !link.visuals.is_empty()) {

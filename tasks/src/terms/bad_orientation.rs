@@ -3,7 +3,8 @@
 use crate::termination::TerminationTerm;
 use kinetoscope_sim::RobotId;
 
-/// Terminates where the z axis of the root link deviates from the world's z axis by more than `angle` \[rad\].
+/// Creates a term called `name` that terminates environments in which the z axis of the root link deviates from the
+/// world's z axis by more than `angle` \[rad\].
 pub fn bad_orientation(name: &str, robot: RobotId, angle: f64) -> TerminationTerm {
     TerminationTerm::new(name, move |now| {
         let poses = now.sim().robot(robot).root_pose();

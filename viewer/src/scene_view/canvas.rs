@@ -127,7 +127,8 @@ impl Canvas {
     }
 }
 
-/// Clips a line to the image plus a margin of one pixel; `None` if the line is outside (Liang and Barsky 1984).
+/// Clips a line to the image plus a margin of one pixel; `None` if the line is outside or a coordinate is not finite.
+/// Source: Liang and Barsky 1984.
 fn clip_line(from: [f32; 2], to: [f32; 2], size: [f32; 2]) -> Option<[[f32; 2]; 2]> {
     if from.iter().chain(&to).any(|x| !x.is_finite()) {
         return None;

@@ -109,22 +109,23 @@ impl OrbitCamera {
         self.target = (Vector3::from(self.target) + by).into();
     }
 
-    /// Orbits about the target, for a mouse drag by pixels of an image of `height` rows.
+    /// Orbits about the target, for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows.
     pub fn orbit(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let scale = std::f64::consts::PI / height.max(1) as f64;
         self.azimuth = (self.azimuth - dx * scale).rem_euclid(std::f64::consts::TAU);
         self.elevation = (self.elevation - dy * scale).clamp(-MAX_ELEVATION, MAX_ELEVATION);
     }
 
-    /// Turns the camera in place, for a mouse drag by pixels of an image of `height` rows. The target moves.
+    /// Turns the camera in place, for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows. The
+    /// target moves.
     pub fn look_around(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let eye = Vector3::from(self.position());
         self.orbit([-dx, -dy], height);
         self.target = (eye + self.distance * Vector3::from(self.direction())).into();
     }
 
-    /// Pans such that points at the target's distance follow the mouse, for a drag by pixels of an image of `height`
-    /// rows.
+    /// Pans for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows. Points at the depth of
+    /// the target follow the mouse.
     pub fn pan(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let [right, up] = self.axes();
         let scale = 2.0 * self.distance * (0.5 * self.fovy).tan() / height.max(1) as f64;
@@ -136,7 +137,7 @@ impl OrbitCamera {
         self.distance = (self.distance * 0.85f64.powf(steps)).clamp(DISTANCE_RANGE[0], DISTANCE_RANGE[1]);
     }
 
-    /// Moves by distances ahead, to the right, and up along +z \[m\].
+    /// Moves the camera ahead, to the right, and up along +z \[m\].
     pub fn translate(&mut self, [ahead, right, up]: [f64; 3]) {
         let [to_right, _] = self.axes();
         self.shift(Vector3::from(self.direction()) * ahead + to_right * right + Vector3::z() * up);

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-/// Returns the range of a joint's slider \[rad or m\]: its limits. A missing limit is replaced by half a turn, or by 1
-/// m for a prismatic joint. If the other limit lies beyond that, the range extends by the same amount from it. An empty
-/// range counts as unlimited.
+/// Returns the range of a joint's slider \[rad or m\]: its limits. A missing upper limit is replaced by half a turn
+/// (1 m if the joint `slides`), counted from 0 or from a positive lower limit. A missing lower limit is replaced in the
+/// same way, with opposite signs. An empty range counts as unlimited.
 pub(crate) fn slider_range([low, high]: [f64; 2], slides: bool) -> [f64; 2] {
     let reach = if slides { 1.0 } else { PI };
     match (low.is_finite(), high.is_finite()) {

@@ -33,8 +33,8 @@ impl EnvSelection {
     }
 }
 
-/// The state of all environments at one time. Snapshots are immutable. Quantities are in the frame of their
-/// environment.
+/// The state of all environments at one time. Snapshots are immutable. Quantities of an environment are in its frame;
+/// [`viewpoint`](Self::viewpoint) is in the frame of the overview.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
     /// Sequence number, from 1, increasing.
@@ -47,7 +47,8 @@ pub struct Snapshot {
     pub mask_ids: Arc<[MaskId]>,
     /// Names of bodies, joints and cameras.
     pub names: Arc<Names>,
-    /// Camera set by the program, if any.
+    /// Point of view of the last [`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view), in the frame of
+    /// the overview; `None` before the first call.
     pub viewpoint: Option<Viewpoint>,
     /// State of each environment.
     pub envs: Vec<SnapshotEnv>,

@@ -65,7 +65,7 @@ mod tests {
     const LATE: Duration = Duration::from_millis(50);
     const QUICK: Duration = Duration::from_millis(20);
 
-    /// Returns the samples per pixel of each image of a moving scene, 50 ms apart. `last_fine_frame` has the durations of images
+    /// Returns the samples per pixel of each image of a moving scene, 50 ms apart. `fine` has the durations of images
     /// with all samples.
     fn samples(fineness: &mut AdaptiveQuality, start: Instant, fine: &[Duration]) -> Vec<u8> {
         let one = |(k, &took): (u32, &Duration)| {

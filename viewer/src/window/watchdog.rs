@@ -31,7 +31,7 @@ struct Shared {
 }
 
 impl Watchdog {
-    /// Starts to watch a connection with this socket.
+    /// Starts a thread that watches the connection of `socket`.
     ///
     /// # Errors
     /// The operating system cannot start a thread.

@@ -107,7 +107,7 @@ impl<S: Simd> Beam<S> {
         ((self.depth + limits * self.speed).reduce_max() as f32).next_up()
     }
 
-    /// Depths at which the boxes begin, and a bit for each box that is met before the depth `max_depth`.
+    /// Depths at which the boxes begin, and a bit for each box that is met before the depth `deepest`.
     #[inline(always)]
     fn intersect_children(&self, node: &Node, deepest: f32) -> ([f32; BVH_WIDTH], u32) {
         let [i, j, k] = self.axes;

@@ -145,7 +145,7 @@ impl Segmentation {
         Ok(Self { levels: [instances, links, classes] })
     }
 
-    /// Returns all segments of a level.
+    /// Returns all segments of a level, ordered by the smallest mask id of each.
     pub fn segments(&self, level: SegmentLevel) -> &[Segment] {
         &self.level(level).segments
     }

@@ -189,7 +189,8 @@ impl RayCasterCamera {
         self.sample_counts()
     }
 
-    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the images \[pixels\], shape (N, 3, 3).
+    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the current images \[pixels\], shape (N, 3, 3).
+    /// Intrinsics that were set since then apply from the next image on.
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         self.model.images.intrinsic_matrices()
     }

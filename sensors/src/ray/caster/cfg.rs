@@ -58,7 +58,8 @@ pub struct RayCasterCfg {
     pub pattern: RayPattern,
     /// Largest distance of a hit \[m\]; may be infinite.
     pub max_distance: f64,
-    /// Smallest and largest position error of the sensor, sampled for each axis at every reset \[m\].
+    /// Range of the position drift \[m\]: an offset along each axis of the environment frame, sampled uniformly at
+    /// every reset.
     pub drift: [f64; 2],
     /// Targets of the rays.
     pub targets: HitTargets,

@@ -101,7 +101,8 @@ impl PartWriter<'_> {
         })
     }
 
-    /// Creates the files that the assets refer to.
+    /// Returns the files that the assets refer to, as names and bytes: PNG textures, and height fields in MuJoCo's
+    /// format.
     pub(super) fn files(&self) -> Result<Vec<Asset>, PartError> {
         let m = self.model;
         let mut files = Vec::new();

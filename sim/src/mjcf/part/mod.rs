@@ -40,11 +40,11 @@ pub struct PartDocument {
 pub struct PartLines {
     /// Location of the MJCF file.
     pub source: SourceLocation,
-    /// Meshes, height fields, textures, materials.
+    /// Textures, materials, meshes and height fields.
     pub assets: Vec<String>,
     /// Bodies of the world.
     pub bodies: Vec<String>,
-    /// Pairs of geoms with contact parameters, and pairs of bodies that never collide.
+    /// Geom pairs with contact parameters, and body pairs that never collide.
     pub contacts: Vec<String>,
     /// Equality constraints.
     pub equalities: Vec<String>,
@@ -101,9 +101,9 @@ pub struct PartSource<'a> {
     pub uid: &'a str,
     /// Pose of the file's world in the scene's world.
     pub pose: &'a Pose,
-    /// Prefix of the names of its asset files.
+    /// Prefix of the names of the part's asset files.
     pub stem: &'a str,
-    /// Differences from the file, for a part that is a robot.
+    /// Changes to the file, for a part that is a robot.
     pub rig: Option<&'a RobotOverrides>,
 }
 
@@ -122,7 +122,7 @@ struct PartWriter<'a> {
 }
 
 impl PartDocument {
-    /// Converts a file to a part, without the sensors `omitted_sensors`.
+    /// Converts a file to a part, without the sensors in `omitted_sensors`.
     ///
     /// # Errors
     /// The model has an element that a part cannot represent.
@@ -171,7 +171,7 @@ impl<'a> PartSource<'a> {
         }
     }
 
-    /// Creates the files that the lines of the part refer to.
+    /// Returns the asset files of the part as names and bytes: PNG textures, and height fields in MuJoCo's format.
     ///
     /// # Errors
     /// A texture cannot be written.

@@ -1,12 +1,12 @@
-//! Differences between the MJCF file of a robot and the part written from it.
+//! Changes to the MJCF file of a robot in the part that is written from it.
 
 use super::super::document::Inertial;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Differences from the file in a part that is a robot.
+/// Changes to an MJCF file in a part that is a robot.
 ///
-/// Elements that are not written at all: geoms and sites of the file's world, actuators, actuator force limits of
-/// joints, excluded pairs with the world, and the geom pairs in `pairs`.
+/// These elements of the file are omitted: geoms, sites, cameras and lights of the file's world, actuators, actuator
+/// force limits of joints, contact exclusions with the world, and the geom pairs in `pairs`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotOverrides {
     /// Passive properties of each joint of the file.
@@ -15,7 +15,7 @@ pub struct RobotOverrides {
     pub base: RootAttachment,
     /// MuJoCo's `contype` and `conaffinity` for every geom that collides in the file.
     pub contact: [i32; 2],
-    /// Indices of the geom pairs that are left out.
+    /// Indices of the geom pairs that are omitted.
     pub pairs: BTreeSet<usize>,
     /// Indices of geoms that collide although the bits in the file disable their collisions.
     pub colliding: BTreeSet<usize>,

@@ -16,8 +16,8 @@ pub(super) struct SourceLocations {
 }
 
 impl SourceLocations {
-    /// Searches `text`, the content of `file`. Elements that this search misses are located at the first line of the
-    /// file.
+    /// Collects the locations of the named elements in `text`, the content of `file`, and in the files that it
+    /// includes, which are read from disk. All other elements get the first line of `file`.
     pub(super) fn of(text: &str, file: &Path) -> Self {
         let mut places = Self { file: SourceLocation::new(file, 1), named: HashMap::new() };
         places.add(text, file, file.parent().unwrap_or(Path::new("")), &mut 0);
@@ -39,7 +39,7 @@ impl SourceLocations {
             }
             let Some(name) = node.attribute("name") else { continue };
             let section = node.parent().map_or("", |parent| parent.tag_name().name());
-            // In these sections the kind is that of the section, in bodies that of the element.
+            // In these sections the kind is the name of the section, elsewhere the name of the element.
             let kind = match section {
                 "actuator" | "equality" | "tendon" => section,
                 _ if tag == "freejoint" => "joint",
@@ -51,7 +51,7 @@ impl SourceLocations {
         }
     }
 
-    /// Location of the `kind` called `name`; the first line of the file if the search missed it.
+    /// Location of the element `name` of the kind `kind`; the first line of the file if no such element was found.
     pub(super) fn get(&self, kind: &str, name: &str) -> SourceLocation {
         self.named.get(&(kind.to_string(), name.to_string())).unwrap_or(&self.file).clone()
     }

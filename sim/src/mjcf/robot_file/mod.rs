@@ -221,7 +221,9 @@ impl MjcfRobotFile {
         if body == 0 { cfg.uid.into() } else { self.scoped_name(cfg, &self.names.bodies[body]) }
     }
 
-    /// Passive properties of all joints, and the joints whose damping is integrated with the drives.
+    /// Passive properties of all joints as written to the document, and the joints whose damping B is part of the
+    /// solve. If drives are constraint rows (`rows`), the document has no joint damping, and the armature of joints
+    /// with damping is raised by `h B`, with the time step h.
     fn passive(
         &self,
         cfg: &RobotMjcfCfg<'_>,
@@ -245,7 +247,7 @@ impl MjcfRobotFile {
             passive
         };
         let mut joints: Vec<PassiveJointProperties> = (0..m.njnt()).map(of_joint).collect();
-        // As for robots from URDF files; `mjcf::robot` gives the reason.
+        // As for robots from URDF files (`mjcf::robot` gives the reason), but only for joints with damping in the file.
         if rows && mjcf.option.integrator != Integrator::Rk4 {
             for (joint, passive) in joints.iter_mut().enumerate() {
                 let is_written = !(cfg.fix_base && self.root.free_joint == Some(joint));
@@ -297,8 +299,8 @@ impl MjcfRobotFile {
         (0..m.nbody()).map(|body| body == 0 || fix_base && m.body_weldid()[body] as usize == root).collect()
     }
 
-    /// Pairs of a body that never moves and a moving child body: MuJoCo does not exclude their contacts. Pairs that the
-    /// file excludes itself are omitted.
+    /// Pairs of a body that never moves and a moving child body, whose contacts MuJoCo does not exclude. Pairs that the
+    /// file itself excludes are omitted.
     fn base_pairs(&self, cfg: &RobotMjcfCfg<'_>) -> Vec<(String, String)> {
         let still = self.static_bodies(cfg.fix_base);
         let parent = |body: usize| self.model.body_parentid()[body] as usize;
