@@ -35,17 +35,23 @@ fn world(threads: usize) -> SimulationManager {
     sim
 }
 
-/// Number of allocations of ten steps, after thirty steps of warm-up.
-fn allocations_of_steps(sim: &mut SimulationManager) -> u64 {
+/// Asserts that ten steps allocate nothing after thirty steps of warm-up. Returns the number of steps.
+///
+/// With several threads, up to ten blocks of ten steps may be needed: the assignment of work to threads is random, and the
+/// memory of the calling thread grows to the need of its largest share.
+#[track_caller]
+fn assert_no_allocation(sim: &mut SimulationManager, what: &str) -> u64 {
     sim.update(30);
-    allocations(|| (0..10).for_each(|_| sim.update(1)))
+    let blocks = if sim.threads() == 1 { 1 } else { 10 };
+    let settled = (1..=blocks).find(|_| allocations(|| (0..10).for_each(|_| sim.update(1))) == 0);
+    30 + 10 * settled.unwrap_or_else(|| panic!("{} threads, {what}: every block allocates", sim.threads()))
 }
 
 #[test]
 fn steps() {
     for threads in [1, 3] {
         let mut sim = world(threads);
-        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, no sensors");
+        assert_no_allocation(&mut sim, "no sensors");
         let contact = ContactSensorCfg {
             filters: vec!["ground".into()],
             track_air_time: true,
@@ -54,7 +60,7 @@ fn steps() {
         sim.add_sensor("contact", contact).unwrap();
         let sampling = SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("ball") }).unwrap();
-        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, sensors of numbers");
+        assert_no_allocation(&mut sim, "sensors of numbers");
         // 10201 rays per environment, and a camera with 3072: enough work for all threads.
         let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
         let offset = kinetoscope_scene::Pose::translation(0.0, 0.0, 2.0);
@@ -62,7 +68,7 @@ fn steps() {
         assert!(scanner.requires().contains(StateFields::INSTANCES));
         sim.add_sensor("scanner", scanner).unwrap();
         sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
-        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, rays");
+        assert_no_allocation(&mut sim, "rays");
         // MuJoCo's own sensors and joint wrenches, of an attached MJCF file; a camera that captures the visible state.
         sim.add_mjcf(MjcfPartCfg::text("m", PENDULUM)).unwrap();
         let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
@@ -84,11 +90,11 @@ fn steps() {
         let delayed = CameraCfg { latency_steps: 2, history_length: 3, dropout: 0.1, ..camera.clone() };
         sim.add_sensor("late", delayed).unwrap();
         let camera = sim.add_sensor("camera", camera).unwrap();
-        assert_eq!(allocations_of_steps(&mut sim), 0, "{threads} threads, every kind of sensor");
+        let steps = assert_no_allocation(&mut sim, "every kind of sensor");
         let captured = sim.sensor(camera).unwrap();
         assert_eq!(
             (captured.frame_counts()[0], captured.render_count()),
-            (40, 0),
+            (steps, 0),
             "every frame is captured and no frame is rendered yet"
         );
     }
@@ -153,5 +159,5 @@ fn actuator_models() {
         ..Default::default()
     })
     .unwrap();
-    assert_eq!(allocations_of_steps(&mut sim), 0);
+    assert_no_allocation(&mut sim, "a scene that changes its shape");
 }
