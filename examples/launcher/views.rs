@@ -172,12 +172,12 @@ impl SensorWindow {
 
 /// Does nothing: without the feature `viewer`, a simulation cannot be paused.
 #[cfg(not(feature = "viewer"))]
-pub(crate) fn let_go() {}
+pub(crate) fn release_pause() {}
 
 /// Placeholder for builds without the feature `viewer`.
 #[cfg(not(feature = "viewer"))]
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Shown;
+pub(crate) struct SharedWindow;
 
 #[cfg(not(feature = "viewer"))]
 impl SharedWindow {
