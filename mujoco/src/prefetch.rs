@@ -81,7 +81,8 @@ impl PrefetchAddresses {
 }
 
 impl Data {
-    /// Prefetches the counters and pointers that every step of this data reads first, without waiting for them.
+    /// Prefetches the counters and pointers that every step of this data reads first, without waiting for them. Has no
+    /// effect on processors other than x86-64.
     pub fn prefetch(&self) {
         let header = self.prefetch_addresses().header;
         prefetch_bytes(header, 2 * CACHE_LINE_BYTES, CacheLevel::First);

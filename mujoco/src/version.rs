@@ -32,9 +32,12 @@ pub struct VersionError {
     pub library: String,
 }
 
-/// Compares the versions of headers and library, silences MuJoCo's console output and log file, and loads its plugins.
+/// Compares the versions of the headers and the loaded library.
 ///
-/// Every other entry point calls this function first.
+/// If they are equal, the first call also replaces MuJoCo's error and warning handlers, so that MuJoCo writes nothing
+/// to the console or a log file, and loads MuJoCo's plugins (4.x).
+///
+/// [`compile`](crate::compile()) and [`compile_file`](crate::compile_file) call this function first.
 ///
 /// # Errors
 /// The library has another version than the headers.

@@ -42,8 +42,8 @@ impl StorageFactory {
     }
 }
 
-/// A file that is called `NAME.partial_file` until it is complete. Dropping it before deletes it, unless its content is
-/// readable.
+/// A file that is called `NAME.part` until it is complete. If it is dropped earlier, the partial file is deleted,
+/// unless its content is readable.
 #[derive(Debug)]
 pub(crate) struct PartialFile {
     /// Locked while it is written, so that other recorders do not take it for a remainder.

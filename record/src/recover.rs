@@ -18,19 +18,20 @@ const LARGEST_CHUNK: usize = 1 << 30;
 pub struct Recovered {
     /// Number of messages in the recovered file.
     pub messages: u64,
-    /// Damage beyond a last chunk that was not written completely. The partial file is kept in this case, for other
-    /// tools.
+    /// Damage other than an incomplete last chunk; `None` if there is no such damage. After such damage, the partial
+    /// file is kept for other tools.
     pub damage: Option<String>,
 }
 
 /// Makes a complete file from the partial file of a killed recording. `path` is the intended name of the recording.
 ///
-/// The file contains the scene and the messages of all complete chunks from the beginning. The partial file is deleted,
-/// unless it is damaged. The file is read by chunks, so that the memory does not depend on its size.
+/// The new file contains the scene and the messages of all chunks before the first incomplete or damaged one. The
+/// partial file is then deleted. It is kept if it has damage other than an incomplete last chunk
+/// ([`Recovered::damage`]). It is read chunk by chunk, so the memory does not depend on its size.
 ///
 /// # Errors
-/// There is no partial file, a recorder is writing it, a file called `path` exists, or no message can be read. The
-/// partial file is kept then.
+/// There is no partial file, it is not an MCAP file, a recorder is writing it, the file `path` exists, no message can
+/// be read, or a file cannot be read or written. On an error, the partial file is kept.
 pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
     recover_to(&path, &path)
 }
@@ -38,8 +39,8 @@ pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
 /// Recovers the partial file of the recording `path` into the file `to`, as [`recover`] does.
 ///
 /// # Errors
-/// There is no partial file, a recorder is writing it, the file `to` exists, or no message can be read. The partial
-/// file is kept then.
+/// There is no partial file, it is not an MCAP file, a recorder is writing it, the file `to` exists, no message can be
+/// read, or a file cannot be read or written. On an error, the partial file is kept.
 pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovered> {
     let (path, to) = (path.as_ref(), to.as_ref());
     let left = partial_path_of(path);

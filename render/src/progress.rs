@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Progress of path tracing, and a way to cancel it; clones are handles of the same progress, for other threads.
+/// Progress of path tracing, and a way to cancel it. Clones share the same counters, also between threads.
 ///
 /// Counts belong to the current batch of images, or to the last one. They are 0 for images without paths. Cancellation
 /// leaves all pixels of the current image unchanged, and is an error:
@@ -90,7 +90,7 @@ impl RenderProgress {
         self.0.total.store(total, Ordering::Relaxed);
     }
 
-    /// Subtracts the paths of an image that cannot be rendered.
+    /// Reduces the total by the untraced paths of an image that failed.
     pub(crate) fn subtract(&self, samples: u64) {
         let less = |total: u64| Some(total.saturating_sub(samples));
         let _ = self.0.total.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);

@@ -57,7 +57,7 @@ pub struct HullSet<'c> {
 }
 
 impl<'c> HullSet<'c> {
-    /// Creates an empty set of hulls.
+    /// Creates an empty set. `cfg` configures the hulls that are computed later.
     pub fn new(cfg: &'c HullCfg) -> Self {
         Self { cache: HullCache::default_location(), cfg, by_mesh: BTreeMap::new() }
     }

@@ -228,8 +228,8 @@ pub fn closest_names<'c>(name: &str, candidates: impl IntoIterator<Item = &'c st
     ranked.into_iter().map(|(_, c)| c).collect()
 }
 
-/// Twice the edit distance (insertions, deletions, replacements) of the lower-case names, plus one if the names differ.
-/// Only the first 64 characters count, which bounds the cost of malicious names.
+/// Twice the edit distance (insertions, deletions, replacements) of the first 64 characters in lower case, plus one if
+/// the whole names differ in any way, case included. The limit bounds the cost of malicious names.
 fn edit_distance(a: &str, b: &str) -> usize {
     let lower = |s: &str| s.chars().take(64).flat_map(char::to_lowercase).collect::<Vec<char>>();
     let (left, right) = (lower(a), lower(b));

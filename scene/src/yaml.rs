@@ -224,7 +224,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Places a complete value, and stores it for aliases.
+    /// Adds a complete value to the open list or table. A value with an anchor (`anchor` above 0) is stored for
+    /// aliases, if the dialect has aliases. `begin` is the document size before the value.
     fn close(&mut self, node: Node, anchor: usize, begin: usize) -> Result<(), String> {
         if anchor > 0 && self.dialect.aliases {
             self.anchors.insert(anchor, (node.value.clone(), self.size - begin));

@@ -85,6 +85,8 @@ impl SensorCfg for ImuCfg {
         self.sampling.lazy_schedule(dt)
     }
 
+    /// Builds the IMU.
+    ///
     /// # Errors
     ///
     /// An unknown body, an offset that is not a pose, a bias that is not finite, or an invalid sampling configuration.

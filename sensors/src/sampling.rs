@@ -275,7 +275,8 @@ impl Sampler {
         self.phases.due_count(env, step) > 0
     }
 
-    /// Resets the environments `env_ids` to `state`: see [`Sensor::reset`](crate::Sensor::reset). Samples new biases.
+    /// Resets the environments `env_ids` to `state` and samples new biases; see
+    /// [`Sensor::reset`](crate::Sensor::reset). `read` is as for [`update`](Self::update).
     ///
     /// # Errors
     ///

@@ -26,7 +26,8 @@ impl SimulationManager {
         SceneView::new(self)
     }
 
-    /// Access for viewers and renderers that change the simulation.
+    /// Access for viewers and renderers that needs `&mut`: builds the visual scene, reads visual state and contacts,
+    /// applies forces, switches markers.
     pub fn scene_mut(&mut self) -> SceneViewMut<'_> {
         SceneViewMut::new(self)
     }
@@ -151,7 +152,7 @@ impl<'a> SceneViewMut<'a> {
         self.sim.visual_scene()
     }
 
-    /// Copies the visual state of an environment to `read_visual_state`, whose memory is reused.
+    /// Copies the visual state of an environment into `look`, whose memory is reused.
     ///
     /// # Errors
     /// The environment does not exist.

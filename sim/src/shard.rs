@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Rank of this process among several that simulate together, each with
+/// Rank of this process and number of processes that simulate together. Each process has
 /// [`num_envs`](crate::SimulationManagerCfg::num_envs) environments.
 ///
 /// Environments are numbered over all processes: environment `i` of process `rank` has the global index

@@ -39,7 +39,7 @@ pub struct SimulationManagerCfg {
     pub threads: Option<usize>,
     /// Distance between environments in the overview \[m\].
     pub arena_space: f64,
-    /// Rank of this process when several processes simulate together.
+    /// Rank of this process and number of processes, if several processes simulate together.
     pub shard: Shard,
     /// Ground plane at z = 0; `None` for a scene without ground.
     #[serde(with = "kinetoscope_scene::file_format::or_false")]

@@ -26,7 +26,8 @@ impl<'a> Warnings<'a> {
         Self { sim }
     }
 
-    /// Counts of all warnings by name: diagnostics, MuJoCo's warnings over all environments, diverged environments.
+    /// Counts of all warnings that occurred, by name: diagnostics, MuJoCo's warnings over all environments, and the
+    /// number of diverged environments (`environment-diverged`).
     pub fn counts(&self) -> BTreeMap<String, u64> {
         let mut counts: BTreeMap<String, u64> =
             count_by_name(self.sim.diagnostics()).into_iter().map(|(name, n)| (name.to_string(), n as u64)).collect();
@@ -47,7 +48,7 @@ impl<'a> Warnings<'a> {
         counts
     }
 
-    /// Counts of MuJoCo's warnings in one environment, by name.
+    /// Counts of MuJoCo's warnings in one environment, by name. Warnings that did not occur are omitted.
     ///
     /// # Errors
     /// The environment does not exist.

@@ -354,7 +354,7 @@ fn write(
 }
 
 impl DatasetColumn {
-    /// End offset in the record \[bytes\].
+    /// Offset of the first byte after this column in the record \[bytes\].
     fn end(&self) -> usize {
         self.offset + self.kind.bytes()
     }

@@ -44,7 +44,7 @@ impl CdrWriter {
         self.0.extend_from_slice(&number.to_le_bytes());
     }
 
-    /// Writes an array of fixed length.
+    /// Writes an array of fixed length: numbers without a length.
     pub(crate) fn f64s(&mut self, numbers: &[f64]) {
         numbers.iter().for_each(|number| self.f64(*number));
     }

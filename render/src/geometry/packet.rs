@@ -5,7 +5,7 @@ use kinetoscope_scene::PoseF64;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::vector::V3;
 
-/// Rays of a packet.
+/// Number of rays in a packet.
 pub const WIDTH: usize = DOUBLES;
 /// All lanes, a bit for each.
 pub(crate) const ALL: u64 = (1 << WIDTH) - 1;

@@ -50,7 +50,8 @@ impl LensRayTables {
         self.rows[row].as_deref()
     }
 
-    /// Shared rays of view `row`; `None` for a lens without distortion.
+    /// Rays of view `row`, as the `Arc` that views with the same intrinsics share; `None` for a lens without
+    /// distortion.
     ///
     /// # Panics
     ///

@@ -64,8 +64,8 @@ impl SobolSequence {
 }
 
 impl SobolSample {
-    /// Two random numbers in 0..1. Of the first 2^k samples, each of 2^k equal boxes of the square, of any proportions,
-    /// has one. Pairs of different dimensions are independent.
+    /// Two random numbers in 0..1. Stratification: if the square is divided into 2^a columns and 2^(k-a) rows, each box
+    /// contains exactly one of the first 2^k samples. Samples with different `dimension` are independent.
     pub(crate) fn sample_2d(self, dimension: u32) -> [f64; 2] {
         let seed = combine(self.seed, dimension);
         let first = scramble(self.index, seed).reverse_bits();

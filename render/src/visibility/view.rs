@@ -30,7 +30,8 @@ pub struct View {
 }
 
 impl View {
-    /// Largest side of an image \[pixels\]: edge functions stay exact up to here (see `raster::triangle`).
+    /// Largest width or height of an image \[pixels\]. It is below the guard band of the rasterizer (16000 pixels),
+    /// inside which edge functions are exact.
     pub const MAX_SIDE: usize = 8192;
 
     /// A camera at `eye` that looks at `target` \[m\], with the vertical field of view `fovy` \[rad\], square pixels

@@ -119,7 +119,8 @@ pub struct IkCfg {
     /// Initial damping of each start, in multiples of half the squared error; above 0. Small values give large first
     /// steps.
     pub damping: f64,
-    /// Number of starts, at least 1. The first starts at the initial positions, all others at random positions.
+    /// Maximum number of starts, 1 to 100000. The first starts at the initial positions, all others at random
+    /// positions. The search ends at the first start that reaches the target.
     pub num_seeds: u32,
     /// Seed of the random starts. The same target and initial positions give bit-identical results in any batch.
     pub seed: u64,

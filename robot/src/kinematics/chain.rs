@@ -59,8 +59,8 @@ pub(super) struct MimicRelation {
     pub(super) offset: f64,
 }
 
-/// Finds for every joint the column that determines its position: its own column, or that of its driver. Columns are
-/// those of [`RobotDescription::drivable_joints`].
+/// Expresses the position of every joint as a function of one column: its own, or that of its mimic driver. The column
+/// is `None` if that joint cannot move. Columns are those of [`RobotDescription::drivable_joints`].
 pub(super) fn mimic_relations(description: &RobotDescription) -> Vec<MimicRelation> {
     let mut column = vec![None; description.joints.len()];
     for (k, (id, _)) in description.drivable_joints().enumerate() {

@@ -30,7 +30,8 @@ const IGNORED_ELEMENTS: [&str; 8] =
 /// Reads a URDF file with the default [`Strictness`].
 ///
 /// # Errors
-/// Any [`UrdfError`] up to the tree checks; mesh files are not checked.
+/// The file cannot be read, is not well-formed URDF, or its links and joints do not form a tree. Mesh files are not
+/// checked.
 pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
     parse_file_with(path, Strictness::default())
 }

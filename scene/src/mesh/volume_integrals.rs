@@ -24,7 +24,8 @@ pub struct VolumeIntegrals {
 impl TriMesh {
     /// True if the surface has no boundary: every edge is traversed equally often in both directions.
     ///
-    /// Vertices at the same position count as one, and degenerate triangles are ignored.
+    /// Vertices at the same position count as one. Edges between two corners at the same position are ignored. A mesh
+    /// without edges is not closed.
     pub fn is_closed(&self) -> bool {
         // -0 and 0 are the same position.
         let place = |vertex: u32| self.positions[vertex as usize].map(|x| (x + 0.0).to_bits());

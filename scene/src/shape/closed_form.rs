@@ -52,7 +52,7 @@ pub trait ClosedForm {
     /// A ray that begins inside of a solid intersects it at its exit.
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection>;
 
-    /// Number of the smooth face at an intersection, less than
+    /// Index of the smooth face at an intersection, from 0; less than
     /// [`IDS_OF_PRIMITIVE`](crate::RenderScene::IDS_OF_PRIMITIVE).
     fn face(&self, _intersection: &Intersection, _ray: &Ray) -> usize {
         0

@@ -64,7 +64,7 @@ impl ClosedForm for Cylinder {
         Some(Intersection { t, normal })
     }
 
-    /// Number of the face: the side, the lower end, the upper end.
+    /// Index of the face: 0 side, 1 lower end, 2 upper end.
     fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
         match intersection.normal {
             [0.0, 0.0, _] => 1 + usize::from(ray.at(intersection.t)[2] >= 0.0),

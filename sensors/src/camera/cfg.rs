@@ -58,7 +58,8 @@ pub struct CameraCfg {
     pub height: usize,
     /// Focal lengths and principal point.
     pub intrinsics: Intrinsics,
-    /// Lens: directions of the rays of pixels. Lenses other than a pinhole need a renderer that traces rays.
+    /// Lens: mapping between pixels and ray directions. A lens other than the pinhole needs a renderer other than
+    /// [`Renderer::Raster`].
     pub lens: lens::Lens,
     /// Aperture of the lens, for depth of field; `None` is a point. Needs [`Renderer::RayTraced`].
     pub aperture: Option<Aperture>,

@@ -204,7 +204,7 @@ impl Camera {
         StateFields::VISIBLE | part(attached, StateFields::POSES) | part(draws_markers, StateFields::MARKERS)
     }
 
-    /// Environments of the camera: the first axis of all its arrays.
+    /// Index of the environment of each row (first axis) of the camera's arrays.
     pub fn env_ids(&self) -> &[usize] {
         self.viewpoints.envs.env_ids()
     }

@@ -44,7 +44,7 @@ pub struct RobotReport {
     pub warnings: Vec<ReportWarning>,
 }
 
-/// Report on a link.
+/// Mass properties and pose of a link.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinkReport {
     /// Name.
@@ -61,7 +61,7 @@ pub struct LinkReport {
     pub pose: [f64; 7],
 }
 
-/// Report on a joint.
+/// Type, links, axis, limits and mimic relation of a joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointReport {
     /// Name.

@@ -366,9 +366,9 @@ pub struct Light {
 pub struct JointEquality {
     /// Unique name.
     pub name: String,
-    /// Name of the following joint.
+    /// Name of the constrained joint, `joint1` in MJCF.
     pub follower: String,
-    /// Name of the followed joint.
+    /// Name of the driving joint, `joint2` in MJCF.
     pub driver: String,
     /// Factor of the driver's position.
     pub multiplier: f64,

@@ -404,9 +404,9 @@ impl RobotWriter<'_, '_> {
         }
     }
 
-    /// Moves viscous damping out of the document where drives are friction rows. Damping B then acts inside the solve
-    /// as well: `h B` as armature (in the document, so that every constant that MuJoCo derives from the inertia
-    /// includes it) and `-B v` applied in each step.
+    /// Removes viscous damping B from the document and integrates it implicitly, if drives are friction rows and the
+    /// integrator is not RK4. `h B` is added to the armature, and each step applies `-B v`. The armature is in the
+    /// document, so that constants that MuJoCo derives from the inertia include it.
     fn move_damping_to_armature(&mut self, joints: &mut [Joint]) {
         // RK4 evaluates forces inside its step, where no code of this crate runs, and row drives do not support RK4.
         if !self.friction_is_tendon() || self.mjcf.option.integrator == Integrator::Rk4 {

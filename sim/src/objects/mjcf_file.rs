@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MjcfFile {
-    /// Path of the file; with `text`, only its name in error messages.
+    /// Path of the file. If `text` is set, no file is read and the path only appears in error messages.
     pub path: PathBuf,
-    /// MJCF text, which must not refer to files; `None` for the content of the file.
+    /// MJCF source text, without references to other files. `None` reads the file at `path`.
     pub text: Option<String>,
 }
 
 impl MjcfFile {
-    /// Creates the configuration of a file.
+    /// Creates a configuration that reads the MJCF file at `path`.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), text: None }
     }

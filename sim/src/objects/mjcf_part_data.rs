@@ -48,8 +48,9 @@ pub struct MjcfPartCfg {
     /// Pose of the file's world in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Surface properties of bodies besides those of the file, by pattern of body names; `world` selects the geoms of
-    /// the file's world. A body may match only one pattern.
+    /// Surface properties for rendering, by pattern of body names. They replace those of the file; a property that is
+    /// `None` keeps the value of the file. `world` selects the geoms of the file's world. A body may match only one
+    /// pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Semantic class in the table of mask ids; `None` for `mjcf`.
@@ -198,7 +199,7 @@ impl MjcfData {
         &self.document
     }
 
-    /// Asset files that the lines of the part refer to.
+    /// Generated asset files that the part's MJCF elements refer to.
     pub(crate) fn files(&self) -> &[mj::Asset] {
         &self.files
     }

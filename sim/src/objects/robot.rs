@@ -222,8 +222,8 @@ impl<'a> Robot<'a> {
     }
 }
 
-/// Write access to a robot: commands and state. Positions and velocities are its state. Accelerations follow from the
-/// state and the forces, so [writing](Self::write_qacc) them moves nothing.
+/// Write access to a robot: commands and state. The state consists of positions and velocities. MuJoCo computes
+/// accelerations from state and forces in every step, so [`write_qacc`](Self::write_qacc) does not move the robot.
 #[derive(Debug)]
 pub struct RobotMut<'a> {
     pub(super) data: &'a Arc<RobotData>,
@@ -248,8 +248,8 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Sets position targets \[rad or m\]: rows for `env_ids` (`None` for all environments; a single row applies to all
-    /// of them), columns for `joint_ids` (`None` for all joints). Targets are clamped to the limits; columns of mimic
-    /// joints are accepted and ignored.
+    /// of them), columns for `joint_ids` (`None` for all joints). Targets are clamped to the joint limits. Columns of
+    /// joints without a drive (passive and mimic joints) are accepted and ignored.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.
@@ -416,7 +416,8 @@ impl<'a> RobotMut<'a> {
         self.sensors.refresh(write.rows.envs(), self.simulation);
     }
 
-    /// Checks an argument of finite numbers before anything is written.
+    /// Checks the joints, the environments and the shape of an argument, and that its numbers are finite. Nothing is
+    /// written.
     pub(super) fn checked_rows<'v>(
         &self,
         argument: &'static str,

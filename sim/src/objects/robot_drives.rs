@@ -149,12 +149,12 @@ impl RobotMut<'_> {
     /// Sets the delay of joints with a [`DelayedPd`] drive \[MuJoCo steps\]; it survives resets. Rows and columns as in
     /// [`set_stiffness`](Self::set_stiffness).
     ///
-    /// Step n uses the targets of step n - delay, whatever the delay was before. If the delay grows by k, the last k
-    /// targets that were used are used once more, in their order. If it falls by k, the next k targets are skipped.
+    /// Step n uses the targets of step n - delay, with the delay at step n. If the delay grows by k, the last k targets
+    /// that were used are used once more, in their order. If it falls by k, the next k targets are skipped.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, a joint with another model, or a delay above the
-    /// model's `max_delay`. Then nothing is set.
+    /// larger of the model's `delay` and `max_delay`. Then nothing is set.
     pub fn set_delay<'t>(
         &mut self,
         steps: impl AsArray<'t, u32, Ix2>,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Element that a number in the mask channel identifies, the same in every environment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MaskId {
-    /// Number in the mask channel, never 0.
+    /// Value in the mask channel. Never 0, which is the background.
     pub id: i32,
     /// Robot, rigid object or geom of the world; in a model without a simulation, the first body of the tree.
     pub object: String,

@@ -40,7 +40,7 @@ use kinetoscope_scene::{
 };
 use std::sync::Arc;
 
-/// Render scene of a model, whose instances move with elements of the model.
+/// Render scene of a MuJoCo model. Each instance moves with one element of the model.
 #[derive(Clone, Debug)]
 pub struct VisualScene {
     scene: Arc<RenderScene>,
@@ -296,8 +296,9 @@ impl VisualScene {
         &self.ids
     }
 
-    /// Messages about elements that are not rendered: textures or meshes that cannot be read, and what cameras do not
-    /// support: signed distance fields and the rods of slider-cranks.
+    /// One message for each element that is not rendered: unreadable textures, skyboxes and meshes, invalid geoms and
+    /// sites, signed distance fields, and rods of slider-cranks. If the scene has too many triangles, one message says
+    /// that the scene is not rendered.
     pub fn omitted(&self) -> &[String] {
         &self.left_out
     }

@@ -27,8 +27,8 @@ pub enum Command {
     Resume,
     /// Pauses a running simulation and resumes a paused one.
     TogglePause,
-    /// Runs this many steps and pauses again. The program has to request these steps: `update(n)` still does n steps in
-    /// total.
+    /// Runs this many steps and pauses again. The steps run inside the program's calls of `update`; `update(n)` does n
+    /// steps in total.
     Step(u32),
     /// Sets the speed of simulated time. The latest setting counts; when its viewer is dropped, the previous setting of
     /// another viewer applies again.
@@ -112,7 +112,7 @@ impl Speed {
 /// Optional snapshot contents that a viewer requests, in addition to poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SnapshotRequest {
-    /// Maximum number of snapshots per second of wall-clock time.
+    /// Maximum number of snapshots per second of wall-clock time, clamped to 0.1 to 1000.
     pub rate: f64,
     /// Environments whose contacts and contact forces are included. Computing them costs as much as a simulation step.
     pub contacts: Option<EnvSelection>,

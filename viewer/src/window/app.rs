@@ -195,7 +195,8 @@ impl App {
         self.queue_spring();
     }
 
-    /// Records the result of sending the last command. The image shows a message after a failure.
+    /// Records if the last command was queued: `heard` is false if the simulation has ended or its command queue is
+    /// full. The image then shows a message.
     pub fn set_send_result(&mut self, heard: bool) {
         self.send_failed = !heard;
     }

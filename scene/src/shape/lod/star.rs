@@ -214,8 +214,8 @@ impl Star {
 
     /// Computes the triangles after the collapse onto `ring[onto]`, and returns the largest of their bounds.
     ///
-    /// Returns `Impossible` if triangles would overlap, deviate from the normals of their corners, or share an edge with more
-    /// than one other triangle.
+    /// Returns `None` if triangles would overlap, deviate too much from the normals of their corners, or share an edge
+    /// with more than one other triangle.
     pub(super) fn collapse(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<f64> {
         let m = self.count;
         for (j, i) in (onto..m).chain(0..onto).enumerate() {
@@ -304,8 +304,9 @@ impl Star {
         }
     }
 
-    /// Selects a normal of the neighbor for each new triangle: of the two along the collapsed edge, the one nearer to
-    /// the corner's previous normal. Returns `Impossible` if a triangle would deviate from the normals of its corners.
+    /// Selects the vertex normal of each new triangle at the neighbor. The candidates are the two normals along the
+    /// collapsed edge; the one nearer to the corner's previous normal is used. Returns `None` if a triangle would
+    /// deviate too much from the normals of its corners.
     fn corners(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<()> {
         let m = self.count;
         let corner = |(triangle, corner): (u32, u8), step: u8| surface.corner(triangle, corner + step);

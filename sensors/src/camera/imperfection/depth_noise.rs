@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub struct DepthNoise {
     /// Standard deviation at depth `offset` \[m\], 0 to 1000.
     pub constant: f64,
-    /// Growth with the square of the depth \[1/m\], 0 to 1000.
+    /// Coefficient of (z - `offset`)² in the standard deviation \[1/m\], 0 to 1000.
     pub quadratic: f64,
     /// Depth of the minimum of the parabola \[m\], -1000 to 1000.
     pub offset: f64,

@@ -56,7 +56,7 @@ pub struct RayCasterCfg {
     pub alignment: RayAlignment,
     /// Pattern of the rays, x forward, y left, z up.
     pub pattern: RayPattern,
-    /// Largest distance of a hit \[m\]; may be infinite.
+    /// Maximum distance of a hit from the start of its ray \[m\], above 0; may be infinite.
     pub max_distance: f64,
     /// Range of the position drift \[m\]: an offset along each axis of the environment frame, sampled uniformly at
     /// every reset.

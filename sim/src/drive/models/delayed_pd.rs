@@ -21,7 +21,8 @@ use serde::{Deserialize, Serialize};
 pub struct DelayedPd {
     /// Initial delay \[steps\].
     pub delay: u32,
-    /// Largest delay that may be set later \[steps\]; at least `delay`.
+    /// Largest delay that [`RobotMut::set_delay`](crate::RobotMut::set_delay) accepts \[steps\]. A value below `delay`
+    /// counts as `delay`.
     pub max_delay: u32,
 }
 
@@ -39,7 +40,7 @@ impl DelayedPd {
         self.delay.max(self.max_delay)
     }
 
-    /// Delay of a drive with this memory \[steps\].
+    /// Current delay, read from the memory of a drive \[steps\].
     pub(crate) fn delay_of(memory: &[f64]) -> u32 {
         memory[DELAY] as u32
     }

@@ -55,7 +55,7 @@ pub trait ActuatorLaw: std::fmt::Debug {
         gains.kd
     }
 
-    /// Effort in a step \[N m or N\].
+    /// Effort that acts during the step, after the limits of the model \[N m or N\].
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64;
 
     /// Updates the memory after a step with the target `target`.

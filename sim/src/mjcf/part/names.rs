@@ -6,35 +6,35 @@ use std::collections::BTreeSet;
 /// Names of a file's elements in MuJoCo's order, without the part's uid; unique within each kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartNames {
-    /// Bodies; the first is the world.
+    /// Names of the bodies; the first body is the world.
     pub bodies: Vec<String>,
-    /// Joints.
+    /// Names of the joints.
     pub joints: Vec<String>,
-    /// Geoms.
+    /// Names of the geoms.
     pub geoms: Vec<String>,
-    /// Sites.
+    /// Names of the sites.
     pub sites: Vec<String>,
     /// True for each site that has a name in the file.
     pub named_sites: Vec<bool>,
-    /// Cameras.
+    /// Names of the cameras.
     pub cameras: Vec<String>,
-    /// Lights.
+    /// Names of the lights.
     pub lights: Vec<String>,
-    /// Meshes.
+    /// Names of the meshes.
     pub meshes: Vec<String>,
-    /// Height fields.
+    /// Names of the height fields.
     pub height_fields: Vec<String>,
-    /// Textures.
+    /// Names of the textures.
     pub textures: Vec<String>,
-    /// Materials.
+    /// Names of the materials.
     pub materials: Vec<String>,
-    /// Equalities.
+    /// Names of the equalities.
     pub equalities: Vec<String>,
-    /// Tendons.
+    /// Names of the tendons.
     pub tendons: Vec<String>,
-    /// Actuators.
+    /// Names of the actuators.
     pub actuators: Vec<String>,
-    /// MuJoCo's own sensors.
+    /// Names of MuJoCo's own sensors.
     pub sensors: Vec<String>,
 }
 

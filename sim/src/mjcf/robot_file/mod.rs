@@ -132,13 +132,13 @@ impl MjcfRobotFile {
         &self.model
     }
 
-    /// Asset files that the lines of the robot refer to.
+    /// Generated asset files (PNG textures, height fields) that the robot's MJCF elements refer to.
     pub(crate) fn files(&self) -> &[Asset] {
         &self.files
     }
 
-    /// MuJoCo's own sensors of the robot in the scene. The first value of each is counted among the values of the
-    /// robot.
+    /// MuJoCo's own sensors of the robot in the scene. [`EngineSensor::first`] is relative to the first value of the
+    /// robot, not to `sensordata`.
     pub(crate) fn sensors(&self) -> &[EngineSensor] {
         &self.sensors
     }
