@@ -18,7 +18,7 @@ pub enum DiagnosticKind {
     /// The effort limit is 0 or absent: the joint's effort is not limited.
     EffortUnlimited,
     /// The range that a mimic joint implies exceeds its own limits. The driver's usable range is the intersection.
-    /// Where that is less than 1 % of the driver's range, the limits of the mimic joint are ignored.
+    /// If the intersection is less than 1 % of the range of the driver, the limits of the mimic joint are ignored.
     MimicRangeClipped,
     /// A file named by a visual does not exist: the visual is left out.
     VisualMeshMissing,
