@@ -66,7 +66,7 @@ fn commands() {
     }
     elsewhere.sort();
     assert_eq!((elsewhere, run >= 4), (ELSEWHERE.map(String::from).to_vec(), true), "{run} lines were run");
-    for made in ["joints.svg", "tracking.png", "pictures/replay_0.000s.png", "pictures/replay_1.500s.png"] {
+    for made in ["joints.svg", "tracking.png", "images/replay_0.000s.png", "images/replay_1.500s.png"] {
         assert!(folder.path().join(made).is_file(), "{made}");
     }
 }
