@@ -49,13 +49,18 @@ impl<'a> Lighting<'a> {
 /// Distance of a skybox in MuJoCo's renderer relative to that of the far clipping plane, measured in its images.
 const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
 
-/// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns a message about a
-/// skybox that cannot be rendered.
-pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Option<String> {
+/// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns messages about
+/// image-based lights and skyboxes, which are not rendered.
+pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Vec<String> {
+    let mut left_out = Vec::new();
     let linear = |color: [f32; 3]| if look.is_mujoco() { color } else { to_linear(color) };
     scene.lights = (0..model.nlight())
         .map(|index| {
             let light = model.light(index);
+            if light.kind == LightType::Image && light.active {
+                let name = model.name(ObjectKind::Light, index).unwrap_or_else(|| index.to_string());
+                left_out.push(format!("the image-based light {name} is not rendered"));
+            }
             let spot = LightKind::Spot { cutoff_deg: light.cutoff_deg.min(90.0), exponent: light.exponent };
             let kind = match light.kind {
                 LightType::Directional => LightKind::Directional,
@@ -111,12 +116,13 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
         file.texture(*texture).is_some_and(|texture| texture.kind == TextureType::Skybox)
     };
     let textures = files.iter().flat_map(|file| (0..file.ntex()).map(|texture| (*file, texture)));
-    let (file, texture) = textures.into_iter().find(is_sky)?;
+    let Some((file, texture)) = textures.into_iter().find(is_sky) else { return left_out };
     match surface::skybox(file, texture) {
         Ok(image) => scene.skybox = Some(image),
         Err(reason) => {
             let name = file.name(ObjectKind::Texture, texture).unwrap_or_else(|| texture.to_string());
-            return Some(format!("the skybox {name} is not rendered: {reason}"));
+            left_out.push(format!("the skybox {name} is not rendered: {reason}"));
+            return left_out;
         }
     }
     if look.is_mujoco() {
@@ -125,7 +131,7 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
         let radius = (SKYBOX_RADIUS * file.clip_distances()[1]) as f32;
         scene.horizon = Some(HorizonHaze { color, radius, width });
     }
-    None
+    left_out
 }
 
 /// Converts a light color to linear color space. MuJoCo multiplies colors in display space, the renderer here
@@ -196,6 +202,30 @@ mod tests {
         let plain = mj::compile("<mujoco><worldbody><geom type='plane' size='0 0 1'/></worldbody></mujoco>", &[]);
         let plain = VisualScene::of_model(&plain.expect("compiles").into_model());
         assert!(plain.scene().horizon.is_none() && plain.scene().skybox.is_none());
+    }
+
+    /// A light with an image is named as not rendered; switched off, it is not. Only MuJoCo 4 has such lights.
+    ///
+    /// Regression: the light was dropped without a message.
+    #[test]
+    fn image_based_light() {
+        let file = |active: bool| {
+            format!(
+                r#"<mujoco><asset><texture name="sky" type="cube" builtin="flat" width="8" height="8"/></asset>
+                <worldbody><light name="dome" type="image" texture="sky" active="{active}"/>
+                    <geom size="0.1"/></worldbody></mujoco>"#
+            )
+        };
+        if mj::BUILD_VERSION == mj::SupportedVersion::V2 {
+            assert!(mj::compile(&file(true), &[]).is_err(), "2.2.2 has no type of lights");
+            return;
+        }
+        let omitted = |active| {
+            let model = mj::compile(&file(active), &[]).expect("compiles").into_model();
+            VisualScene::of_model(&model).omitted().to_vec()
+        };
+        assert_eq!(omitted(true), ["the image-based light dome is not rendered"]);
+        assert_eq!(omitted(false), [""; 0]);
     }
 
     /// A simulation that shows one MJCF file has the lighting of that file alone: its lights, headlight, skybox and
