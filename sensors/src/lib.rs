@@ -14,7 +14,8 @@
 //! | `sensor`, `slot` | the traits of all sensors; owner of a lazy or eager sensor |
 //! | `sampling`, `schedule`, `history`, `delay`, `noise` | the sampler and its parts |
 //!
-//! A new sensor is one new file; `actuator_state` is the shortest example. The parts of a sensor, for the joint state:
+//! A new sensor is one new file and one line in the list of numeric sensors below; `actuator_state` is the shortest
+//! example. The parts of a sensor, for the joint state:
 //!
 //! ```
 //! use kinetoscope_scene::SceneState;
@@ -40,19 +41,12 @@
 //! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
 
-mod actuator_state;
 mod body_state;
 mod cached;
 pub mod camera;
-mod contact_sensor;
 mod delay;
 mod error;
-mod frame_transformer;
 mod history;
-mod imu;
-mod joint_state;
-mod joint_wrench;
-mod mujoco_sensor;
 mod noise;
 pub mod ray;
 mod sampling;
@@ -63,18 +57,52 @@ mod slot;
 mod state_requirements;
 mod summary;
 
-pub use actuator_state::{ActuatorState, ActuatorStateCfg};
-pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use error::SensorError;
-pub use frame_transformer::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};
 pub use history::History;
-pub use imu::{Imu, ImuCfg};
-pub use joint_state::{JointState, JointStateCfg};
-pub use joint_wrench::{JointWrench, JointWrenchCfg};
-pub use mujoco_sensor::{MujocoSensor, MujocoSensorCfg};
 pub use noise::NoiseCfg;
 pub use sampling::{SampleChannel, Sampled, Sampler, SamplingCfg, Stamp};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 pub use slot::SensorSlot;
 pub use state_requirements::StateRequirements;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+
+/// Declares the numeric sensors: their modules, their public types and their names in scene files.
+macro_rules! numeric_sensors {
+    ($($name:literal => $module:ident :: { $Cfg:ident, $($item:ident),+ },)*) => {
+        $(
+            mod $module;
+            pub use $module::{$Cfg, $($item),+};
+        )*
+
+        /// Visits the configurations of all built-in sensors, with their names in scene files.
+        pub fn visit_sensor_types(visitor: &mut impl SensorTypeVisitor) {
+            visitor.visit::<camera::CameraCfg>("camera");
+            visitor.visit::<camera::StereoCameraCfg>("stereo_camera");
+            visitor.visit::<ray::RayCasterCfg>("ray_caster");
+            visitor.visit::<ray::RayCasterCameraCfg>("ray_caster_camera");
+            $(visitor.visit::<$Cfg>($name);)*
+        }
+    };
+}
+
+numeric_sensors! {
+    "contact_sensor" => contact_sensor::{ContactSensorCfg, ContactSensor},
+    "imu" => imu::{ImuCfg, Imu},
+    "frame_transformer" => frame_transformer::{FrameTransformerCfg, FrameTransformer, TargetFrameCfg},
+    "joint_state" => joint_state::{JointStateCfg, JointState},
+    "actuator_state" => actuator_state::{ActuatorStateCfg, ActuatorState},
+    "joint_wrench" => joint_wrench::{JointWrenchCfg, JointWrench},
+    "mujoco_sensor" => mujoco_sensor::{MujocoSensorCfg, MujocoSensor},
+}
+
+/// Receiver of the sensor types that [`visit_sensor_types`] lists.
+pub trait SensorTypeVisitor {
+    /// Receives one configuration type, with its name in scene files.
+    fn visit<C>(&mut self, name: &'static str)
+    where
+        C: SensorCfg + Clone + Debug + Send + Sync + Serialize + DeserializeOwned + 'static;
+}

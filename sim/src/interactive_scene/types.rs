@@ -1,4 +1,4 @@
-//! Entity types of scene files, one line each.
+//! Entity types of scene files, one line each; the list of built-in sensors is that of `kinetoscope-sensors`.
 
 use super::entity::{AnySensorCfg, EntityCfg};
 use super::value::{Value, ValueError};
@@ -9,14 +9,11 @@ use crate::objects::rigid_object_data::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
 use crate::objects::weld_data::WeldCfg;
-use kinetoscope_sensors::camera::{CameraCfg, StereoCameraCfg};
-use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
-use kinetoscope_sensors::{
-    ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
-};
+use kinetoscope_sensors::{SensorCfg, SensorTypeVisitor};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
 use std::any::Any;
+use std::fmt::Debug;
 
 /// Entity types that a scene file can select by `type`: the built-in ones and those of other crates.
 ///
@@ -46,25 +43,17 @@ impl Default for EntityTypes {
     /// Robots, articulations, rigid objects and groups of them, terrains, attached MJCF files, welds and the built-in
     /// sensors.
     fn default() -> Self {
-        Self { entries: Vec::new() }
+        let types = Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
             .with::<ArticulationCfg>("articulation")
             .with::<RigidObjectCfg>("rigid_object")
             .with::<RigidObjectGroupCfg>("rigid_object_group")
             .with::<TerrainCfg>("terrain")
             .with::<MjcfPartCfg>("mjcf")
-            .with::<WeldCfg>("weld")
-            .with_sensor::<CameraCfg>("camera")
-            .with_sensor::<StereoCameraCfg>("stereo_camera")
-            .with_sensor::<RayCasterCfg>("ray_caster")
-            .with_sensor::<RayCasterCameraCfg>("ray_caster_camera")
-            .with_sensor::<ContactSensorCfg>("contact_sensor")
-            .with_sensor::<ImuCfg>("imu")
-            .with_sensor::<FrameTransformerCfg>("frame_transformer")
-            .with_sensor::<JointStateCfg>("joint_state")
-            .with_sensor::<ActuatorStateCfg>("actuator_state")
-            .with_sensor::<JointWrenchCfg>("joint_wrench")
-            .with_sensor::<MujocoSensorCfg>("mujoco_sensor")
+            .with::<WeldCfg>("weld");
+        let mut with_sensors = WithBuiltInSensors(types);
+        kinetoscope_sensors::visit_sensor_types(&mut with_sensors);
+        with_sensors.0
     }
 }
 
@@ -85,14 +74,18 @@ impl EntityTypes {
     }
 
     fn with<K: EntityKind>(mut self, name: impl Into<String>) -> Self {
+        self.insert::<K>(name.into());
+        self
+    }
+
+    fn insert<K: EntityKind>(&mut self, name: String) {
         let entry = EntityType {
-            name: name.into(),
+            name,
             read: |value| K::Cfg::deserialize(value).map(Into::into),
             write: |entity| K::from_entity(entity).map(toml::Table::try_from),
         };
         self.entries.retain(|other| other.name != entry.name);
         self.entries.push(entry);
-        self
     }
 
     pub(super) fn get(&self, name: &str) -> Option<&EntityType> {
@@ -102,6 +95,18 @@ impl EntityTypes {
     /// Type name and table of an entity; `None` for an unknown type.
     pub(super) fn write(&self, entity: &EntityCfg) -> Option<(&str, Result<toml::Table, toml::ser::Error>)> {
         self.entries.iter().find_map(|entry| Some((entry.name.as_str(), (entry.write)(entity)?)))
+    }
+}
+
+/// Adds the built-in sensors.
+struct WithBuiltInSensors(EntityTypes);
+
+impl SensorTypeVisitor for WithBuiltInSensors {
+    fn visit<C>(&mut self, name: &'static str)
+    where
+        C: SensorCfg + Clone + Debug + Send + Sync + Serialize + DeserializeOwned + 'static,
+    {
+        self.0.insert::<SensorKind<C>>(name.into());
     }
 }
 
