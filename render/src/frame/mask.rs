@@ -15,7 +15,13 @@ impl Channel for Mask {
     type Element = i32;
     type Layout = Ix3;
     const NAME: &'static str = "mask";
-    const ALIASES: &'static [&'static str] = &["segmentation", "semantic_segmentation", "instance_segmentation", "instance_segmentation_fast", "instance_id_segmentation_fast"];
+    const ALIASES: &'static [&'static str] = &[
+        "segmentation",
+        "semantic_segmentation",
+        "instance_segmentation",
+        "instance_segmentation_fast",
+        "instance_id_segmentation_fast",
+    ];
     const COMPONENTS: usize = 1;
     const STAGE: Stage = Stage::Geometry;
 

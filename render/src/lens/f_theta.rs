@@ -1,7 +1,7 @@
 //! NVIDIA's f-theta lens.
 
 use super::polynomial::{derivative, first_sign_change, solve, value};
-use super::{OpticsError, Domain, LensModel, check_max_angle, check_finite, radial};
+use super::{Domain, LensModel, OpticsError, check_finite, check_max_angle, radial};
 use crate::intrinsics::Intrinsics;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;

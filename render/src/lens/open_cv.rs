@@ -2,7 +2,7 @@
 
 use super::poles::{Fraction, Poles};
 use super::polynomial::bisect;
-use super::{OpticsError, Domain, LensModel, check_max_angle, check_finite};
+use super::{Domain, LensModel, OpticsError, check_finite, check_max_angle};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -233,7 +233,8 @@ impl LensModel for OpenCv {
         const NAMES: [&str; 12] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
         let all = self.coefficients();
         check_finite(&std::array::from_fn::<_, 12, _>(|k| (NAMES[k], all[k])))?;
-        self.max_angle.map_or(Ok(()), |angle| check_max_angle(angle, MAX_ANGLE, "above 0, at most 1.569 (89.9 degrees)"))
+        self.max_angle
+            .map_or(Ok(()), |angle| check_max_angle(angle, MAX_ANGLE, "above 0, at most 1.569 (89.9 degrees)"))
     }
 
     fn domain(&self) -> Domain {

@@ -1,7 +1,7 @@
 //! OpenCV's fisheye lens.
 
 use super::polynomial::{first_sign_change, solve, value};
-use super::{OpticsError, Domain, LensModel, check_max_angle, check_finite, radial};
+use super::{Domain, LensModel, OpticsError, check_finite, check_max_angle, radial};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -41,7 +41,8 @@ impl OpenCvFisheye {
 
 impl LensModel for OpenCvFisheye {
     const NAME: &'static str = "opencv_fisheye";
-    const ALIASES: &'static [&'static str] = &["kannala_brandt", "kannala_brandt4", "fisheyeKannalaBrandtK3", "fisheye"];
+    const ALIASES: &'static [&'static str] =
+        &["kannala_brandt", "kannala_brandt4", "fisheyeKannalaBrandtK3", "fisheye"];
 
     fn max_angle(&self) -> Option<f64> {
         self.max_angle

@@ -1,6 +1,6 @@
 //! The equirectangular panorama.
 
-use super::{OpticsError, Domain, LensModel};
+use super::{Domain, LensModel, OpticsError};
 use crate::intrinsics::Intrinsics;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

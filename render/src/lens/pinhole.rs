@@ -1,6 +1,6 @@
 //! The pinhole: straight lines stay straight.
 
-use super::{OpticsError, Domain, LensModel};
+use super::{Domain, LensModel, OpticsError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 

@@ -2,8 +2,8 @@
 
 use super::area_sampling::AreaSampling;
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
+use super::interval::{Interval, cylinder_interval, slab_interval, sphere_interval};
 use super::revolution::{arc, revolve};
-use super::interval::{Interval, sphere_interval, slab_interval, cylinder_interval};
 use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, add_scaled, normalize};

@@ -2,11 +2,11 @@
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection};
+use super::interval::{cylinder_interval, slab_interval};
 use super::revolution::revolve;
-use super::interval::{slab_interval, cylinder_interval};
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::sampling::{sample_disk, cos_sin_turns};
+use crate::sampling::{cos_sin_turns, sample_disk};
 use crate::vector::{V3, add_scaled, normalize};
 use std::f64::consts::PI;
 

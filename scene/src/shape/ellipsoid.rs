@@ -6,7 +6,7 @@ use super::interval::sphere_interval;
 use super::sphere::Sphere;
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::vector::{V3, add_scaled, to_f64, normalize};
+use crate::vector::{V3, add_scaled, normalize, to_f64};
 
 /// An ellipsoid with its axes along x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,13 +2,13 @@
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
-use super::revolution::{arc, revolve};
 use super::interval::sphere_interval;
+use super::revolution::{arc, revolve};
 use crate::Ray;
 use crate::basis::OrthonormalBasis;
 use crate::mesh::TriMesh;
 use crate::sampling::cos_sin_turns;
-use crate::vector::{V3, add_scaled, dot, scale, normalize};
+use crate::vector::{V3, add_scaled, dot, normalize, scale};
 use std::f64::consts::PI;
 
 /// A sphere.

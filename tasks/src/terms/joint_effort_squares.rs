@@ -1,10 +1,10 @@
 //! Reward of joint efforts.
 
-use super::{select_joints, find_joints};
+use super::{find_joints, select_joints};
 use crate::error::Result;
 use crate::reward::RewardTerm;
-use ndarray::Axis;
 use kinetoscope_sim::{RobotId, SimulationManager};
+use ndarray::Axis;
 
 /// Sum of the squared drive efforts in the last physics step \[N² m² or N²\], over the joints that match one of
 /// `patterns` (whole names).

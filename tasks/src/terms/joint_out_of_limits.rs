@@ -3,8 +3,8 @@
 use super::find_joints;
 use crate::error::Result;
 use crate::termination::TerminationTerm;
-use ndarray::{Array1, Axis};
 use kinetoscope_sim::{RobotId, SimulationManager};
+use ndarray::{Array1, Axis};
 
 /// Terminates where a joint that matches one of `patterns` (whole names) is beyond its limits
 /// ([`soft_qpos_limits`](kinetoscope_sim::Robot::soft_qpos_limits)). Joints without limits never terminate an episode.

@@ -3,8 +3,8 @@
 use super::find_joints;
 use crate::error::Result;
 use crate::event::EventTerm;
-use ndarray::Array2;
 use kinetoscope_sim::{RobotId, SimulationManager};
+use ndarray::Array2;
 
 /// Randomizes the initial state of the joints that match one of `patterns` (whole names) when an episode begins. An
 /// offset from `positions` \[rad or m\] is added to the default position, within the joint limits. The velocity is from
@@ -28,7 +28,8 @@ pub fn reset_joints_by_offset(
         let starts = sim.robot(robot).default_qpos();
         for die in dice {
             let env = die.env();
-            let mut drawn = |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.uniform_range(low, high));
+            let mut drawn =
+                |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.uniform_range(low, high));
             let (mut at, moving) = (drawn(positions), drawn(velocities));
             at.indexed_iter_mut().for_each(|((_, k), x)| *x += starts[(env.0, joints[k].0)]);
             // Written positions are clamped to the limits.

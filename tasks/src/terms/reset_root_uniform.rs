@@ -2,9 +2,9 @@
 
 use crate::episode_rng::EpisodeRng;
 use crate::event::EventTerm;
-use ndarray::Array2;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_sim::RobotId;
+use ndarray::Array2;
 
 /// Ranges \[low, high\] of uniformly distributed offsets from the default root pose, and of root velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

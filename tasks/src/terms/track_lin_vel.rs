@@ -16,7 +16,8 @@ pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into
             return Err(format!("the command {command:?} has {found} columns; it needs at least two, x and y").into());
         }
         let pairs = moves.rows().into_iter().zip(wanted.rows());
-        let square = |k: usize, is: &ndarray::ArrayView1<'_, f64>, to: &ndarray::ArrayView1<'_, f64>| (is[k] - to[k]).powi(2);
+        let square =
+            |k: usize, is: &ndarray::ArrayView1<'_, f64>, to: &ndarray::ArrayView1<'_, f64>| (is[k] - to[k]).powi(2);
         Ok(pairs.map(|(is, to)| (-(square(0, &is, &to) + square(1, &is, &to)) / (std * std)).exp()).collect())
     })
 }

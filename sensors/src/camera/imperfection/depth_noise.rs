@@ -1,8 +1,8 @@
 //! Depth noise that grows with the square of the depth.
 
 use super::{DepthEffect, ImageContext, within};
-use kinetoscope_render::RngStream;
 use crate::error::SensorError;
+use kinetoscope_render::RngStream;
 use serde::{Deserialize, Serialize};
 
 /// Depth noise of triangulation. Disparity errors have the same size everywhere, so errors of a depth z grow with its

@@ -1,6 +1,6 @@
 //! Exposure compensation.
 
-use super::{RadianceEffect, PixelContext, within};
+use super::{PixelContext, RadianceEffect, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 

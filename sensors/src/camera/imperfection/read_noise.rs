@@ -1,8 +1,8 @@
 //! Read noise of the electronics.
 
-use super::{RadianceEffect, PixelContext, within};
-use kinetoscope_render::RngStream;
+use super::{PixelContext, RadianceEffect, within};
 use crate::error::SensorError;
+use kinetoscope_render::RngStream;
 use serde::{Deserialize, Serialize};
 
 /// Normally distributed noise of the electronics, the same at every brightness and independent for red, green and blue.

@@ -1,8 +1,8 @@
 //! Photon noise.
 
-use super::{RadianceEffect, PixelContext, within};
-use kinetoscope_render::RngStream;
+use super::{PixelContext, RadianceEffect, within};
 use crate::error::SensorError;
+use kinetoscope_render::RngStream;
 use serde::{Deserialize, Serialize};
 
 /// Photon noise: the number of electrons in a pixel is Poisson distributed, so the variance of radiance x is
@@ -37,8 +37,12 @@ impl RadianceEffect for ShotNoise {
         let (ticket, block) = (place.image.rng_key, place.pixel as u32);
         let mean = light.map(|light| light * self.electrons);
         // Random numbers are only computed if a channel needs them.
-        let normals = mean.iter().any(|mean| *mean >= NORMAL_APPROXIMATION_MIN).then(|| ticket.normals(RngStream::SHOT, block));
-        let uniforms = mean.iter().any(|mean| *mean < NORMAL_APPROXIMATION_MIN).then(|| ticket.uniforms(RngStream::SHOT_LOW_LIGHT, block));
+        let normals =
+            mean.iter().any(|mean| *mean >= NORMAL_APPROXIMATION_MIN).then(|| ticket.normals(RngStream::SHOT, block));
+        let uniforms = mean
+            .iter()
+            .any(|mean| *mean < NORMAL_APPROXIMATION_MIN)
+            .then(|| ticket.uniforms(RngStream::SHOT_LOW_LIGHT, block));
         for (k, light) in light.iter_mut().enumerate() {
             let counted = match (normals, uniforms) {
                 (Some(normals), _) if mean[k] >= NORMAL_APPROXIMATION_MIN => mean[k] + mean[k].sqrt() * normals[k],

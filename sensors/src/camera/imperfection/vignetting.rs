@@ -1,6 +1,6 @@
 //! Light falloff away from the optical axis.
 
-use super::{RadianceEffect, PixelContext, within};
+use super::{PixelContext, RadianceEffect, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 

@@ -1,14 +1,14 @@
 //! The hemispherical lidar RS-Bpearl.
 
-use super::{UnnormalizedRay, PatternImpl, check_finite, check_positive};
+use super::{PatternImpl, UnnormalizedRay, check_finite, check_positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
 /// Elevations of the beams \[deg\]. Source: Isaac Lab's `BpearlPatternCfg`.
 const VERTICAL_DEG: [f64; 32] = [
-    89.5, 86.6875, 83.875, 81.0625, 78.25, 75.4375, 72.625, 69.8125, 67.0, 64.1875, 61.375, 58.5625, 55.75, 52.9375, 50.125,
-    47.3125, 44.5, 41.6875, 38.875, 36.0625, 33.25, 30.4375, 27.625, 24.8125, 22.0, 19.1875, 16.375, 13.5625, 10.75, 7.9375,
-    5.125, 2.3125,
+    89.5, 86.6875, 83.875, 81.0625, 78.25, 75.4375, 72.625, 69.8125, 67.0, 64.1875, 61.375, 58.5625, 55.75, 52.9375,
+    50.125, 47.3125, 44.5, 41.6875, 38.875, 36.0625, 33.25, 30.4375, 27.625, 24.8125, 22.0, 19.1875, 16.375, 13.5625,
+    10.75, 7.9375, 5.125, 2.3125,
 ];
 
 /// The hemispherical lidar RS-Bpearl, with its dome along z (on robots it is mounted upside down or tilted: rotate the

@@ -1,6 +1,6 @@
 //! User-defined rays.
 
-use super::{UnnormalizedRay, PatternImpl};
+use super::{PatternImpl, UnnormalizedRay};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! Parallel rays over a rectangle.
 
-use super::{UnnormalizedRay, PatternImpl, check_finite, check_positive};
+use super::{PatternImpl, UnnormalizedRay, check_finite, check_positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
@@ -37,13 +37,7 @@ pub struct Grid {
 impl Default for Grid {
     /// The height scanner of Isaac's locomotion tasks: 17 by 11 rays, 0.1 m apart, straight down.
     fn default() -> Self {
-        Self {
-            resolution: 0.1,
-            size: [1.6, 1.0],
-            direction: [0.0, 0.0, -1.0],
-            order: GridOrder::Xy,
-            centered: false,
-        }
+        Self { resolution: 0.1, size: [1.6, 1.0], direction: [0.0, 0.0, -1.0], order: GridOrder::Xy, centered: false }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Spinning lidar.
 
-use super::{UnnormalizedRay, PatternImpl, check_finite, check_positive};
+use super::{PatternImpl, UnnormalizedRay, check_finite, check_positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! One ray through every pixel of a pinhole camera.
 
-use super::{UnnormalizedRay, PatternImpl};
-use kinetoscope_render::Intrinsics;
+use super::{PatternImpl, UnnormalizedRay};
 use crate::ray::RayError;
+use kinetoscope_render::Intrinsics;
 use serde::{Deserialize, Serialize};
 
 /// One ray through the center of every pixel of a pinhole camera that looks along x with z up, row by row from the top
