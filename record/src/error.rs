@@ -110,17 +110,17 @@ pub enum RecordError {
     },
     /// The format requires a whole number of rows per second.
     #[error(
-        "{path}: with `every` {every} there are {found:.3} rows per second, but the format needs a whole number; {}",
+        "{path}: with `period_steps` {period_steps} there are {found:.3} rows per second, but the format needs a whole number; {}",
         rate_advice(.candidates)
     )]
     UnsupportedRate {
         /// The file.
         path: PathBuf,
         /// [`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps).
-        every: u64,
+        period_steps: u64,
         /// Rows per second \[Hz\].
         found: f64,
-        /// Values of `every` that give a whole rate, the nearest first.
+        /// Values of `period_steps` that give a whole rate, the nearest first.
         candidates: Vec<u64>,
     },
     /// A stream is missing in an environment of a dataset, whose rows must be complete.
@@ -305,6 +305,6 @@ fn rate_advice(near: &[u64]) -> String {
     let near: Vec<String> = near.iter().map(u64::to_string).collect();
     match near.is_empty() {
         true => "choose another physics_dt".into(),
-        false => format!("valid values of `every`: {}", near.join(", ")),
+        false => format!("valid values of `period_steps`: {}", near.join(", ")),
     }
 }

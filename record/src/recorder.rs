@@ -161,7 +161,7 @@ impl Recorder {
         if let Some(feature) = format.missing_feature() {
             return Err(RecordError::NotBuilt { path: cfg.path, format, feature });
         }
-        for (field, value, min) in [("every", cfg.period_steps, 1), ("packets", cfg.packets as u64, 2)] {
+        for (field, value, min) in [("period_steps", cfg.period_steps, 1), ("packets", cfg.packets as u64, 2)] {
             if value < min {
                 return Err(RecordError::OutOfRange { field, value, min });
             }

@@ -131,7 +131,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Rep
     }
     // A NaN fails this check, too.
     if !steps.windows(2).all(|pair| [0.0, 1.0].contains(&(pair[1] - pair[0]))) {
-        return Err(archive.malformed("it does not contain every step: record with `every: 1`".into()));
+        return Err(archive.malformed("it does not contain every step: record with `period_steps: 1`".into()));
     }
     for source in states.iter().chain(&targets) {
         if archive.steps(&source.stream.name)? != steps {

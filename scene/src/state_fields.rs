@@ -79,7 +79,7 @@ impl fmt::Display for StateFields {
 
 impl fmt::Debug for StateFields {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Requires({self})")
+        write!(f, "StateFields({self})")
     }
 }
 
@@ -95,7 +95,7 @@ mod tests {
         assert!(need.contains(StateFields::POSES) && !need.contains(StateFields::POSES | StateFields::SENSORDATA));
         need |= StateFields::SENSORDATA;
         assert_eq!(need.without(StateFields::POSES).names().collect::<Vec<_>>(), ["contacts", "sensordata"]);
-        assert_eq!(format!("{:?}", StateFields::default()), "Requires(nothing)");
+        assert_eq!(format!("{:?}", StateFields::default()), "StateFields(nothing)");
         assert_eq!(StateFields::present_in(&SceneState::new(2)), StateFields::NONE);
         let all = StateFields::NAMES.iter().fold(StateFields::NONE, |sum, (field, _)| sum | *field);
         assert_eq!(all.names().count(), StateFields::NAMES.len(), "every field has its own bit");

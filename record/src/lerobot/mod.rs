@@ -90,21 +90,21 @@ struct Episode {
 ///
 /// # Errors
 /// The rate of the recording is not a whole number.
-fn frames_per_second(path: &Path, dt: f64, every: u64) -> Result<u64> {
-    let found = 1.0 / (dt * every as f64);
+fn frames_per_second(path: &Path, dt: f64, period_steps: u64) -> Result<u64> {
+    let found = 1.0 / (dt * period_steps as f64);
     let whole = found.round();
     // The tolerance is a thousandth of a frame per hour.
     if whole >= 1.0 && (found - whole).abs() < 1e-8 * whole {
         return Ok(whole as u64);
     }
-    let fits = |every: &u64| {
-        let rate = 1.0 / (dt * *every as f64);
+    let fits = |period: &u64| {
+        let rate = 1.0 / (dt * *period as f64);
         rate >= 1.0 && (rate - rate.round()).abs() < 1e-8 * rate
     };
     let mut candidates: Vec<u64> = (1..=1000).filter(fits).collect();
-    candidates.sort_by_key(|other| other.abs_diff(every));
+    candidates.sort_by_key(|other| other.abs_diff(period_steps));
     candidates.truncate(3);
-    Err(RecordError::UnsupportedRate { path: path.into(), every, found, candidates })
+    Err(RecordError::UnsupportedRate { path: path.into(), period_steps, found, candidates })
 }
 
 /// Name of a role in a dataset. Feature names must not contain slashes.

@@ -124,10 +124,10 @@ fn set_periods(sources: &mut [StreamSource], cfg: &RecorderCfg, format: Format) 
     }
     for (name, every) in &cfg.stream_periods {
         if *every == 0 {
-            return Err(RecordError::OutOfRange { field: "a number of steps in rates", value: 0, min: 1 });
+            return Err(RecordError::OutOfRange { field: "a number of steps in stream_periods", value: 0, min: 1 });
         }
         if matches!(format, Format::LeRobot | Format::Hdf5) {
-            let topic = format!("a separate rate for {name:?}; all frames have the rate of `every`");
+            let topic = format!("a separate period for {name:?}; all frames have the period of `period_steps`");
             return Err(RecordError::UnsupportedTopic { path: cfg.path.clone(), format, topic });
         }
         let is_of = |source: &&mut StreamSource| {

@@ -84,11 +84,11 @@ fn configurations() {
         (with(Topic::channel("camera", "dept")), &["camera/dept", "camera/depth"]),
         (with(Topic::channel("camera", "normal")), &["camera/normal", "camera/depth"]),
         (with(Topic::channel("imu", "depth")), &["imu/depth"]),
-        (RecorderCfg { period_steps: 0, ..run() }, &["every", "at least 1"]),
+        (RecorderCfg { period_steps: 0, ..run() }, &["period_steps", "at least 1"]),
         (RecorderCfg { packets: 1, ..run() }, &["packets", "at least 2"]),
         (
             RecorderCfg { period_steps: 3, ..new("run.lerobot") },
-            &["run.lerobot", "33.333", "valid values of `every`: 2, 4, 1"],
+            &["run.lerobot", "33.333", "valid values of `period_steps`: 2, 4, 1"],
         ),
         (
             new("run.lerobot").with_topics([Topic::Sensor("imu".into())]),
