@@ -233,7 +233,7 @@ fn write_images(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(im
     image_file::write_png(&out.join(&files[1]), &image_file::depth_image(size, &distance, range))?;
     if let Ok(info) = camera.camera_info(name, 0) {
         files.push(format!("{name}.yaml"));
-        info.write(&out.join(format!("{name}.yaml")))?;
+        info.write(out.join(format!("{name}.yaml")))?;
     }
     let optics = camera.optics(0)?;
     let (f, domain) = (optics.pixels(), optics.domain());

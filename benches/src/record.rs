@@ -83,7 +83,7 @@ impl Contender for Arms {
             }
         }
         if let Some(recorder) = self.recorder {
-            self.sim.observers_mut().get(recorder)?.wait_until_written();
+            self.sim.observers_mut().get_mut(recorder)?.wait_until_written();
         }
         Ok(start.elapsed())
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::ptr::NonNull;
 
 /// A file that the MJCF refers to, held in memory.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Asset {
     /// Base name, lower case and unique, because 2.2.2 strips folders and lower-cases names.
     pub name: String,
@@ -118,7 +118,8 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
 ///
 /// # Errors
 /// MuJoCo's version does not match, or MuJoCo rejects the file.
-pub fn compile_file(path: &Path) -> Result<Compiled, LoadError> {
+pub fn compile_file(path: impl AsRef<Path>) -> Result<Compiled, LoadError> {
+    let path = path.as_ref();
     check_version()?;
     let name = CString::new(path.to_string_lossy().as_bytes())
         .map_err(|_| CompileError::new(&format!("{path:?} contains a NUL character")))?;

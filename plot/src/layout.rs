@@ -33,7 +33,7 @@ pub struct Label {
 }
 
 /// Horizontal alignment of a text at its position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Anchor {
     /// The text starts at the position.
     Start,

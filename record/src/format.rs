@@ -7,6 +7,7 @@ use std::path::Path;
 
 /// File format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Format {
     /// MCAP file of ROS 2 messages, for Foxglove and Rerun. After the process is killed, [`recover`](crate::recover)
     /// restores what the writer thread had received half a second before. Rows that waited for that thread are lost.
@@ -83,7 +84,8 @@ impl Format {
     ///
     /// # Errors
     /// No format has this extension; the error lists the known ones.
-    pub fn of_path(path: &Path) -> Result<Self> {
+    pub fn of_path(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
         let extension = path.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
         let found = ALL.iter().find(|known| known.extension == extension);
         found.map(|known| known.format).ok_or_else(|| RecordError::Format { path: path.into(), extension })
@@ -146,7 +148,7 @@ mod tests {
                 Mcap | Npz | Images | LeRobot | Hdf5 | Apng | Gif | Webp | Mp4 => {}
             }
             assert_eq!(format.info().extension, end);
-            assert_eq!(Format::of_path(&Path::new("a.b/run").with_extension(end)).ok(), Some(format));
+            assert_eq!(Format::of_path(Path::new("a.b/run").with_extension(end)).ok(), Some(format));
         }
     }
 }

@@ -71,7 +71,7 @@ impl Record for SimulationManager {
             return Err(RecordError::Env { env, count: self.num_envs() });
         }
         let (steps, times) = (self.observers().steps(), self.time());
-        self.observers_mut().get(recorder)?.note(steps, &times, env, text)
+        self.observers_mut().get_mut(recorder)?.note(steps, &times, env, text)
     }
 
     #[track_caller]

@@ -64,7 +64,7 @@ impl Default for Light {
 }
 
 /// Rule by which light is added up and multiplied by the color of a surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum LightingSpace {
     /// Physical rule: light is linear, and surface colors are converted from sRGB to linear.
     #[default]
@@ -96,7 +96,7 @@ impl Headlight {
     ///
     /// Returns `None` if the headlight is off, for [`LightingSpace::Linear`], and for omnidirectional cameras
     /// (`forward` is `None`). In the last two cases, the headlight shines from the camera's position.
-    pub fn as_directional(&self, sum: LightingSpace, forward: Option<[f32; 3]>) -> Option<Light> {
+    pub fn to_directional(&self, sum: LightingSpace, forward: Option<[f32; 3]>) -> Option<Light> {
         let direction = forward.filter(|_| self.active && sum == LightingSpace::Display)?;
         Some(Light {
             kind: LightKind::Directional,

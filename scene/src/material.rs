@@ -72,7 +72,7 @@ impl Material {
 }
 
 /// Mapping of a texture onto a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureKind {
     /// Mapped by texture coordinates, or by x and y of the shape.
     TwoD,

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// A name that is not in a list of known names.
-#[derive(Clone, Debug, PartialEq, Error)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("unknown {what} {name:?}; {}", format_known(.candidates))]
 pub struct UnknownName {
     /// Kind of the name, such as `joint`.

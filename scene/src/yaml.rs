@@ -2,7 +2,7 @@
 
 use saphyr_parser::{Event, Parser, ScalarStyle, Tag};
 use std::collections::{HashMap, HashSet};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Largest depth of nested lists and tables.
 const MAX_DEPTH: usize = 48;
@@ -35,9 +35,9 @@ pub enum Value {
     /// A value that is neither a list nor a table.
     Scalar(Scalar),
     /// A list.
-    List(Rc<[Node]>),
+    List(Arc<[Node]>),
     /// Keys and values, in the order of the file. Keys are unique.
-    Table(Rc<[(String, Node)]>),
+    Table(Arc<[(String, Node)]>),
 }
 
 /// A word, a number, or a text.
@@ -63,7 +63,8 @@ pub enum ScalarKind {
 }
 
 /// Error in a file, with its position.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}, column {column}: {message}")]
 pub struct YamlError {
     /// Line, counted from 1.
     pub line: usize,

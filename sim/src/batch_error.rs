@@ -2,7 +2,8 @@
 
 use kinetoscope_mujoco::EngineError;
 
-/// An error of [`Batch::new`](crate::batch::Batch::new).
+/// An error of the number of environments or threads, from
+/// [`SimulationManager::new`](crate::SimulationManager::new).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BatchError {

@@ -5,6 +5,7 @@ use crate::ids::EnvId;
 use crate::manager::SimulationManager;
 use std::any::{Any, TypeId};
 use std::fmt;
+use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
 
 /// Observes a simulation between its steps and may change it: a viewer, a recorder, a pause control.
@@ -69,6 +70,20 @@ impl<O> Clone for ObserverId<O> {
 }
 
 impl<O> Copy for ObserverId<O> {}
+
+impl<O> PartialEq for ObserverId<O> {
+    fn eq(&self, other: &Self) -> bool {
+        (self.manager, self.number) == (other.manager, other.number)
+    }
+}
+
+impl<O> Eq for ObserverId<O> {}
+
+impl<O> Hash for ObserverId<O> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.manager, self.number).hash(state);
+    }
+}
 
 impl<O> fmt::Debug for ObserverId<O> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -215,7 +230,7 @@ impl<'a> ObserversMut<'a> {
     /// # Panics
     /// The handle belongs to another manager.
     #[track_caller]
-    pub fn get<O: Observer>(self, id: ObserverId<O>) -> Result<&'a mut O> {
+    pub fn get_mut<O: Observer>(self, id: ObserverId<O>) -> Result<&'a mut O> {
         let index = self.sim.slot_index(id)?;
         let seat = &mut self.sim.observers.slots[index];
         let any: Option<&mut dyn Any> = seat.observer.as_deref_mut().map(|observer| observer as &mut dyn Any);

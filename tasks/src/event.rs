@@ -8,7 +8,7 @@ use std::fmt;
 type ApplyEvent = Box<dyn Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send>;
 
 /// Time at which an event happens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum EventMode {
     /// Once, when the task is built, in all environments.

@@ -59,7 +59,7 @@ impl EndedEpisode {
 ///
 /// If there are several, a divergence comes first, then a reset, then the terms in the order in which they were added,
 /// then the time limit.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum EndReason {
     /// The simulation diverged: the environment stayed in its last good state until its reset.

@@ -26,7 +26,7 @@ impl WorldWithViewer {
     fn new(path: &Path) -> Self {
         let mut world = RecordedWorld::new(1, 1);
         let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(path))));
-        world.sim.record_button(RecordButton::shared(Arc::clone(&files)));
+        world.sim.set_record_button(RecordButton::shared(Arc::clone(&files)));
         let viewer = world.sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
         Self { world, files, viewer, step: 0, positions: BTreeMap::new() }
     }

@@ -66,5 +66,5 @@ pub(crate) fn exported(dir: &Path) -> Result<Model, String> {
         SupportedVersion::V2 => "robot.mjcf2.xml",
         SupportedVersion::V4 => "robot.mjcf4.xml",
     };
-    compile_file(&dir.join(file)).map(|compiled| compiled.into_model()).map_err(|e| format!("the export: {e}"))
+    compile_file(dir.join(file)).map(|compiled| compiled.into_model()).map_err(|e| format!("the export: {e}"))
 }

@@ -42,13 +42,15 @@ mod screenshot;
 mod serve;
 pub mod window;
 
+pub use embedded_graphics;
+
 pub use control::{
     Command, Play, PlayError, PlaybackSource, RecordButton, RecordControl, RecordingState, SnapshotRequest, Speed,
     ViewController, Viewer, ViewerExt,
 };
 pub use scene_view::{
-    CameraView, Canvas, EnvSelection, JointEntry, Names, OrbitCamera, Overlays, RunState, SceneRenderer, Snapshot,
-    SnapshotEnv, Timeline, ViewOptions,
+    CameraView, Canvas, EnvSelection, JointEntry, Names, OrbitCamera, Overlays, RunState, Snapshot, SnapshotEnv,
+    Timeline,
 };
 pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
 pub use serve::{Serve, ServeCfg, ServeError, ServerHandle};

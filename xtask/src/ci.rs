@@ -8,7 +8,7 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, source_check, spelling, wheel,
+    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, site, source_check, spelling, wheel,
 };
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -255,7 +255,7 @@ fn unit_tests(context: &Context<'_>) -> XtaskResult {
 
 fn rustdoc(context: &Context<'_>) -> XtaskResult {
     let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
-    cargo.args(["doc", "--workspace", "--no-deps"]).args(test::features(&["--workspace"])).run()
+    cargo.args(["doc", "--no-deps"]).args(site::PUBLISHED).args(test::features(&["--workspace"])).run()
 }
 
 fn demo(context: &Context<'_>) -> XtaskResult {

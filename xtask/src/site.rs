@@ -23,6 +23,11 @@ const BOOK: &str = "docs";
 /// Folders of the site.
 const API: &str = "api";
 const SOURCE: &str = "source";
+/// Front page of the API, which contains the README.
+const API_FRONT_PAGE: &str = "api/kinetoscope/index.html";
+/// Arguments of cargo for the packages with public documentation. The others switch on features with internals.
+pub(crate) const PUBLISHED: [&str; 7] =
+    ["--workspace", "--exclude", "kinetoscope-benches", "--exclude", "kinetoscope-testkit", "--exclude", "xtask"];
 /// Pages outside of [`BOOK`], and the chapters that include them.
 const INCLUDED_PAGES: [(&str, &str); 5] = [
     ("README.md", "introduction.html"),
@@ -73,9 +78,13 @@ fn mdbook(repo: &Repo) -> XtaskResult<PathBuf> {
 /// Builds the API documentation and copies it to `to`.
 fn api(repo: &Repo, to: &Path) -> XtaskResult {
     let ready = setup::prepare(repo, Requirements::default())?;
-    let cargo = ready.cargo().args(["doc", "--workspace", "--no-deps"]);
-    cargo.args(test::features(&["--workspace"])).run()?;
-    copy_folder(&repo.target.join("doc"), to)?;
+    // Pages of an earlier run may be of items that no longer exist.
+    let doc = repo.target.join("doc");
+    if doc.exists() {
+        fs::remove_dir_all(&doc).map_err(|e| Failure::new(format!("{}: {e}", doc.display())))?;
+    }
+    ready.cargo().args(["doc", "--no-deps"]).args(PUBLISHED).args(test::features(&["--workspace"])).run()?;
+    copy_folder(&doc, to)?;
     write(
         &to.join("index.html"),
         "<!DOCTYPE html><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"0; url=kinetoscope/index.html\">\n\
@@ -90,7 +99,9 @@ fn link(repo: &Repo, site: &Path) -> XtaskResult {
     let mut copied = BTreeSet::new();
     let mut findings = Vec::new();
     // 404.html is served at any address, so mdbook writes its links in another form.
-    let is_page = |file: &String| file.ends_with(".html") && file != "404.html" && !file.starts_with(API);
+    let is_page = |file: &String| {
+        file == API_FRONT_PAGE || file.ends_with(".html") && file != "404.html" && !file.starts_with(API)
+    };
     let pages: Vec<String> = files_below(site).into_iter().filter(is_page).collect();
     let read = |page: &str| {
         let path = site.join(page);

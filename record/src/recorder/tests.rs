@@ -259,7 +259,7 @@ fn panic_of_the_thread() {
         assert!(packets < 3, "a test of panics");
     });
     sim.update(20);
-    sim.observers_mut().get(recorder).unwrap().wait_until_written();
+    sim.observers_mut().get_mut(recorder).unwrap().wait_until_written();
     kinetoscope_testkit::error_tables::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
 }
 

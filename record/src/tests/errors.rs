@@ -144,7 +144,7 @@ fn changed_scene() {
         // A second robot adds joints, which the sensor of all joints now measures.
         world.sim.add_robot(kinetoscope_testkit::worlds::sr5("other")).unwrap();
         world.step(2);
-        let observer = world.sim.observers_mut().get(recorder).unwrap();
+        let observer = world.sim.observers_mut().get_mut(recorder).unwrap();
         assert!(observer.has_failed());
         observer.wait_until_written();
         let error = world.sim.finish_recording(recorder).unwrap_err();

@@ -76,7 +76,7 @@ fn overwritten_folder() {
     let recorder = world.sim.record(overwriting(cfg.clone())).unwrap();
     assert!(matches!(world.sim.record(overwriting(cfg)), Err(RecordError::Busy { .. })));
     (0..IMAGE_EVERY).for_each(|step| world.step(step));
-    world.sim.observers_mut().get(recorder).unwrap().wait_until_written();
+    world.sim.observers_mut().get_mut(recorder).unwrap().wait_until_written();
     assert!(path.join("camera/color/env_0/000003.png").exists() && part.join("camera/color/env_0/000000.png").exists());
     let time = world.sim.time()[1];
     let recorded = world.sim.finish_recording(recorder).unwrap();

@@ -24,6 +24,7 @@ pub type ImageView<'a, C> = ArrayView<'a, <C as Channel>::Element, <C as Channel
 
 /// Calls a macro with the list of channels: documentation, module and type of each.
 #[macro_export]
+#[doc(hidden)]
 macro_rules! with_channels {
     ($then:ident) => {
         $then! {

@@ -6,12 +6,12 @@
 //! precision.
 
 mod model;
-pub mod optics;
+pub(crate) mod optics;
 mod poles;
 mod polynomial;
 mod radial;
 mod ray_tables;
-pub mod rays;
+pub(crate) mod rays;
 
 use super::optics_error::OpticsError;
 use kinetoscope_scene::pattern::{UnknownName, closest_names};
@@ -49,6 +49,15 @@ macro_rules! lenses {
                 Self::$Name(lens)
             }
         })*
+
+        impl std::str::FromStr for Lens {
+            type Err = UnknownName;
+
+            /// The lens of a name or alias, as [`Lens::from_name`].
+            fn from_str(name: &str) -> Result<Self, UnknownName> {
+                Self::from_name(name)
+            }
+        }
 
         impl Lens {
             /// Names of all lenses.

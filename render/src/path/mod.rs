@@ -157,7 +157,7 @@ impl SceneLights {
         // After the other lights, and not counted in their limit: it is a point, and needs no random numbers.
         if scene.headlight.active {
             let axis = forward.then(|| view.world_from_camera.rotation.map(|row| row[2]));
-            lamps.push(match scene.headlight.as_directional(scene.lighting_space, axis) {
+            lamps.push(match scene.headlight.to_directional(scene.lighting_space, axis) {
                 Some(light) => LightSource::new(&light),
                 None => LightSource::headlight(&scene.headlight, view, forward),
             });

@@ -142,7 +142,7 @@ impl Lighting {
                 shadow: shadow(k),
             });
         }
-        let headlight = scene.headlight.as_directional(scene.lighting_space, forward);
+        let headlight = scene.headlight.to_directional(scene.lighting_space, forward);
         self.headlight_is_light = headlight.is_some();
         self.lights.extend(headlight.map(|light| PreparedLight {
             light,

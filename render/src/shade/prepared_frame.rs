@@ -185,13 +185,14 @@ impl PreparedFrame {
     fn prepare_lights(&mut self, cfg: RasterCfg, shot: &RenderRequest<'_>) {
         let RenderRequest { scene, poses, view, lights, lens, .. } = *shot;
         let lights = lights.unwrap_or(&scene.lights);
-        let mut maps = [None; 256];
+        // Indices of lights with shadow maps, and those of their maps.
+        let mut maps: [Option<(usize, usize)>; MAX_SHADOWS] = [None; MAX_SHADOWS];
         if cfg.shadows {
             let side = shadow_side(cfg, view);
             let lamps = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
             let mut views = [None; MAX_LIGHTS];
             let mut casting = [0; MAX_LIGHTS];
-            let lamps = lamps.filter(|(k, l)| l.cast_shadow && *k < maps.len());
+            let lamps = lamps.filter(|(_, l)| l.cast_shadow);
             let lamps = lamps.filter_map(|(k, light)| Some((k, LightView::from_light(light)?)));
             for ((k, lamp), (view, of)) in lamps.zip(views.iter_mut().zip(&mut casting)) {
                 (*view, *of) = (Some(lamp), k);
@@ -211,13 +212,15 @@ impl PreparedFrame {
                     self.shadows.push(ShadowMap::empty());
                 }
                 if self.shadows[self.map_count].prepare(lamp, receivers, scene, poses, cfg, side) {
-                    maps[k] = Some(self.map_count);
+                    maps[self.map_count] = Some((k, self.map_count));
                     self.map_count += 1;
                 }
             }
         }
         let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
-        self.lighting.prepare(scene, lights, forward, |k| maps.get(k).copied().flatten());
+        self.lighting.prepare(scene, lights, forward, |k| {
+            maps.iter().flatten().find(|(light, _)| *light == k).map(|(_, map)| *map)
+        });
         let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden;
         self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
     }

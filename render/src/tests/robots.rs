@@ -26,7 +26,7 @@ static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
     let folder = kinetoscope_testkit::test_resources::robot("rokae_description/urdf/SR5.urdf")
         .with_file_name("../meshes/xMateSR5/visual");
     SR5.map(|(name, ..)| {
-        let mesh = load(&folder.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
+        let mesh = load(folder.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
         Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)) }
     })
 });
@@ -76,7 +76,7 @@ fn textures_of_anymal() {
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
     let [base, top, bottom, face] =
-        ["base", "top_shell", "bottom_shell", "face"].map(|file| load(&meshes.join(format!("{file}.dae"))).unwrap());
+        ["base", "top_shell", "bottom_shell", "face"].map(|file| load(meshes.join(format!("{file}.dae"))).unwrap());
     let back = (&face, -0.4145, std::f64::consts::PI);
     let parts = [(&base, 0., 0.), (&top, 0., 0.), (&bottom, 0., 0.), (&face, 0.4145, 0.), back];
     for (k, (mesh, x, yaw)) in parts.into_iter().enumerate() {

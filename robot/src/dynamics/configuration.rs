@@ -6,7 +6,7 @@ use kinetoscope_scene::Pose;
 use nalgebra::{DVector, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Interpretation of the positions of mimic joints.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum MimicPositions {
     /// Derived from the followed joint; the numbers given for mimic joints are ignored.
     #[default]

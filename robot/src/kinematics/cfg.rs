@@ -71,7 +71,7 @@ impl<'n> From<&'n str> for TipFrame<'n> {
 }
 
 /// Part of a target pose to reach.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IkTask {
     /// Position and rotation.

@@ -99,7 +99,7 @@ impl UrdfCfg {
 /// | `<axis/>` without `xyz` on a fixed or floating joint | it is ignored |
 /// | one number in the `scale` of a mesh | it applies to all three axes |
 /// | `package:///path` | an absolute path, else a package with one slash too many |
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Strictness {
     /// Each deviation is a warning that describes how the element was read.
@@ -141,7 +141,7 @@ pub struct NameCaseCfg {
 }
 
 /// Conversion of the letter case of a name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum NameCase {
     /// As in the file.

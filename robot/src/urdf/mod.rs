@@ -28,4 +28,5 @@ pub use file::{JointMetadata, LimitMetadata, LinkMetadata, UrdfFile, VisualMetad
 pub use merge::{MergedRobot, assemble};
 pub use parse::{parse_file, parse_file_with, parse_str, parse_str_with};
 pub use tree::Tree;
+pub use urdf_rs;
 pub use write::{write_urdf, write_urdf_with};

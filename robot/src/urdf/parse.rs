@@ -32,7 +32,7 @@ const IGNORED_ELEMENTS: [&str; 8] =
 /// # Errors
 /// The file cannot be read, is not well-formed URDF, or its links and joints do not form a tree. Mesh files are not
 /// checked.
-pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
+pub fn parse_file(path: impl AsRef<Path>) -> Result<UrdfFile, UrdfError> {
     parse_file_with(path, Strictness::default())
 }
 
@@ -40,7 +40,8 @@ pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
 ///
 /// # Errors
 /// As [`parse_file`]; strict reading also rejects deviations from URDF whose meaning is clear.
-pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
+pub fn parse_file_with(path: impl AsRef<Path>, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
+    let path = path.as_ref();
     let owned = || path.to_path_buf();
     if path.is_dir() {
         return Err(UrdfError::FileIsFolder { path: owned(), urdfs: urdfs_in(path) });
@@ -84,7 +85,7 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
 ///
 /// # Errors
 /// As [`parse_file`].
-pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
+pub fn parse_str(text: &str, path: impl AsRef<Path>) -> Result<UrdfFile, UrdfError> {
     parse_str_with(text, path, Strictness::default())
 }
 
@@ -92,7 +93,8 @@ pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
 ///
 /// # Errors
 /// As [`parse_file_with`].
-pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
+pub fn parse_str_with(text: &str, path: impl AsRef<Path>, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
+    let path = path.as_ref();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if text.trim().is_empty() {
         return Err(UrdfError::FileEmpty { path: path.to_path_buf() });

@@ -39,7 +39,7 @@ fn extensions() -> String {
 ///
 /// # Errors
 /// The file cannot be read, or its content is invalid, unsupported or without triangles.
-pub fn load(path: &Path) -> Result<TriMesh, MeshError> {
+pub fn load(path: impl AsRef<Path>) -> Result<TriMesh, MeshError> {
     load_with(path, &MeshOptions::default())
 }
 
@@ -47,7 +47,8 @@ pub fn load(path: &Path) -> Result<TriMesh, MeshError> {
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_with(path: &Path, options: &MeshOptions) -> Result<TriMesh, MeshError> {
+pub fn load_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<TriMesh, MeshError> {
+    let path = path.as_ref();
     load_bytes(path, &read(path)?, options)
 }
 
@@ -56,7 +57,8 @@ pub fn load_with(path: &Path, options: &MeshOptions) -> Result<TriMesh, MeshErro
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_bytes(path: &Path, bytes: &[u8], options: &MeshOptions) -> Result<TriMesh, MeshError> {
+pub fn load_bytes(path: impl AsRef<Path>, bytes: &[u8], options: &MeshOptions) -> Result<TriMesh, MeshError> {
+    let path = path.as_ref();
     let ctx = ReadContext { path, options };
     let format = format_of(path, bytes)
         .ok_or_else(|| MeshError::UnknownFormat { path: path.to_owned(), expected: extensions() })?;

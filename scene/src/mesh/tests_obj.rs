@@ -34,7 +34,7 @@ fn libraries() {
     let lib = "newmtl unused\nKd 1 1 0\nnewmtl blue\nKd 0 0 1\nmap_Kd tex/blue.png\nnewmtl red\nKd 1 0 0\n";
     files.write("my colors.mtl", lib);
     let text = format!("mtllib missing.mtl\nmtllib my colors.mtl\n{SQUARE}usemtl red\nf 2 3 4\n");
-    let mesh = load(&files.write("part.obj", text)).unwrap();
+    let mesh = load(files.write("part.obj", text)).unwrap();
     assert_eq!(mesh.submeshes.len(), 2);
     assert_eq!((mesh.submeshes[0].triangles.clone(), mesh.submeshes[1].triangles.clone()), (0..3, 3..4));
     assert_eq!(mesh.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(), ["red", "blue"]);

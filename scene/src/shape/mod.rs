@@ -9,7 +9,7 @@ mod crease;
 mod deformation;
 mod interval;
 mod lod;
-pub mod render_mesh;
+pub(crate) mod render_mesh;
 mod revolution;
 mod triangulated;
 

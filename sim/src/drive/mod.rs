@@ -30,6 +30,7 @@ pub use cfg::{DriveCfg, DriveCfgError, JointGains, PerJoint, resolve};
 pub use mode::{DriveMode, JointInfo, PdGains};
 pub use models::{ActuatorModel, DcMotor, DelayedPd, IdealPd};
 
+use kinetoscope_scene::pattern::{UnknownName, closest_names};
 use serde::{Deserialize, Serialize};
 
 /// List of drive modes: `Variant => the mode`.
@@ -38,6 +39,7 @@ macro_rules! drive_modes {
         /// The meaning of stiffness and damping.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
+        #[non_exhaustive]
         pub enum DriveType {
             $($(#[$doc])* $variant,)*
         }
@@ -67,12 +69,13 @@ drive_modes! {
 }
 
 impl std::str::FromStr for DriveType {
-    type Err = String;
+    type Err = UnknownName;
 
-    fn from_str(name: &str) -> Result<Self, String> {
-        Self::ALL.iter().copied().find(|t| t.mode().name() == name).ok_or_else(|| {
-            let known: Vec<_> = Self::ALL.iter().map(|t| t.mode().name()).collect();
-            format!("unknown drive type {name:?}; known types: {}", known.join(", "))
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        Self::ALL.iter().copied().find(|known| known.mode().name() == name).ok_or_else(|| {
+            let known = Self::ALL.iter().map(|known| known.mode().name());
+            let candidates = closest_names(name, known).into_iter().map(String::from).collect();
+            UnknownName { what: "drive type", name: name.into(), candidates }
         })
     }
 }
@@ -85,7 +88,8 @@ pub enum DriveModel {
     /// exact at the effort limit. Integrators: Euler, and implicitfast on MuJoCo 4.x.
     #[default]
     Implicit,
-    /// MuJoCo's own actuator: explicit, with every integrator, stable up to [`actuator::stable_timestep`].
+    /// MuJoCo's own actuator: explicit, with every integrator.
+    /// [`add_robot`](crate::SimulationManager::add_robot) warns if the time step is too long for stability.
     Actuator,
 }
 
@@ -98,6 +102,6 @@ mod tests {
         for mode in DriveType::ALL {
             assert_eq!(mode.mode().name().parse(), Ok(*mode));
         }
-        assert!("froce".parse::<DriveType>().unwrap_err().contains("force"));
+        assert!("froce".parse::<DriveType>().unwrap_err().candidates.contains(&"force".into()));
     }
 }

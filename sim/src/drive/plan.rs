@@ -46,7 +46,7 @@ pub struct JointPlan {
     pub initial: f64,
 }
 
-/// An error of [`plan`].
+/// An error of the drive settings of a robot, from [`add_robot`](crate::SimulationManager::add_robot).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {

@@ -16,6 +16,7 @@ use crate::sensor_list::SensorId;
 use kinetoscope_sensors::{Sensor, SensorCfg};
 use std::any::Any;
 use std::fmt::Debug;
+use std::sync::Arc;
 
 /// Configuration of one entity of a scene.
 #[derive(Clone, Debug)]
@@ -142,16 +143,16 @@ impl Clone for Box<dyn AnySensorCfg> {
 }
 
 /// Type-erased [`SensorId`].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct AnySensorId {
-    id: Box<dyn Any + Send + Sync>,
+    id: Arc<dyn Any + Send + Sync>,
     index: usize,
     type_name: &'static str,
 }
 
 impl AnySensorId {
     fn new<S: Sensor>(id: SensorId<S>) -> Self {
-        Self { id: Box::new(id), index: id.index(), type_name: short_type_name::<S>() }
+        Self { id: Arc::new(id), index: id.index(), type_name: short_type_name::<S>() }
     }
 
     /// The handle, if the sensor has type `S`.

@@ -58,8 +58,7 @@ impl RobotMut<'_> {
     ///
     /// Drives of [`DriveModel::Implicit`](crate::DriveModel::Implicit) are stable with any gains. Explicit actuator
     /// models are not, and only [`add_robot`](crate::SimulationManager::add_robot) warns about them: gains that are set
-    /// here are not checked against the time step. [`stable_timestep`](crate::drive::actuator::stable_timestep)
-    /// computes the limit.
+    /// here are not checked against the time step.
     ///
     /// ```
     /// use ndarray::array;

@@ -111,7 +111,7 @@ fn followers_track() {
         drive: gains(100.0, 10.0),
         ..worlds::urdf_robot("robot", assets::path("revo1_left/revo1_left.urdf").unwrap())
     });
-    let model = mj::compile_file(&export.files.write("tracked.xml", &export.xml))
+    let model = mj::compile_file(export.files.write("tracked.xml", &export.xml))
         .unwrap_or_else(|e| panic!("{e}"))
         .into_model();
     let mut data = mj::Data::new(&model).unwrap();

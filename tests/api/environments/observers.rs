@@ -151,7 +151,7 @@ fn acts_of_others() {
     all.push((3, SimEvent::Stepped));
     assert_eq!(read_log(&hearers), all);
     assert_eq!(sim.observers().get(hearer).unwrap().every, 1);
-    sim.observers_mut().get(hearer).unwrap().every = 2;
+    sim.observers_mut().get_mut(hearer).unwrap().every = 2;
     assert_eq!(sim.observers_mut().remove(hearer).unwrap().every, 2);
     assert!(matches!(sim.observers().get(hearer), Err(Error::ObserverUnavailable)));
     assert!(matches!(sim.observers_mut().remove(hearer), Err(Error::ObserverUnavailable)));

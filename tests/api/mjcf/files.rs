@@ -225,7 +225,7 @@ fn exported() {
     for file in
         [if BUILD_VERSION == SupportedVersion::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" }, "run.mjcf.xml"]
     {
-        let model = compile_file(&files.folder().join(file)).unwrap().into_model();
+        let model = compile_file(files.folder().join(file)).unwrap().into_model();
         assert_eq!((model.nq(), model.nu(), model.nsensor()), (ours.nq(), ours.nu(), ours.nsensor()), "{file}");
         assert_eq!(model.body_mass(), ours.body_mass(), "{file}");
         assert_eq!((model.ntex(), model.nhfield()), (1, 1), "{file}");
@@ -286,6 +286,6 @@ fn exported_for_2_2_2() {
     for word in ["dyntype=\"filter\"", "name=\"new/follow\"", "<jointpos name=\"new/angle\"", "name=\"new/pull\""] {
         assert!(old.contains(word), "{word}");
     }
-    let model = compile_file(&files.folder().join("robot.mjcf4.xml")).unwrap().into_model();
+    let model = compile_file(files.folder().join("robot.mjcf4.xml")).unwrap().into_model();
     assert_eq!((model.neq(), model.nsensor()), (2, 5));
 }

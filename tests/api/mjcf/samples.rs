@@ -29,7 +29,7 @@ fn compiled_alone(file: &Path) -> Model {
     let dir = tempfile::tempdir().unwrap();
     copy(file.parent().unwrap(), dir.path());
     std::fs::write(dir.path().join("plainly.xml"), text).unwrap();
-    mj::compile_file(&dir.path().join("plainly.xml")).unwrap().into_model()
+    mj::compile_file(dir.path().join("plainly.xml")).unwrap().into_model()
 }
 
 fn copy(from: &Path, to: &Path) {

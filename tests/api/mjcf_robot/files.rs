@@ -73,7 +73,7 @@ fn dumps() {
     let files = TempFiles::default();
     sim.dump(files.folder()).unwrap();
     let file = if BUILD_VERSION == SupportedVersion::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
-    let model = compile_file(&files.folder().join(file)).unwrap().into_model();
+    let model = compile_file(files.folder().join(file)).unwrap().into_model();
     assert_eq!((model.nv(), model.nu()), (7, 7));
     assert!((model.body_mass().iter().sum::<f64>() - 7.2).abs() < 1e-12);
     assert_eq!((model.dof_damping()[2], model.dof_armature()[1]), (0.2, 0.01));

@@ -169,7 +169,7 @@ fn export() {
     assert_eq!(sim.dump(dir.path()).unwrap(), []);
     let exported = if BUILD_VERSION == SupportedVersion::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };
     for file in [exported, "run.mjcf.xml"] {
-        let model = compile_file(&dir.path().join(file)).unwrap().into_model();
+        let model = compile_file(dir.path().join(file)).unwrap().into_model();
         let (found, ours) = (model.height_field(0), sim.batch().model().height_field(0));
         assert_eq!((model.nhfield(), found.rows, found.columns), (1, 21, 31));
         assert_eq!((found.size, found.elevation), (ours.size, ours.elevation), "{file}");

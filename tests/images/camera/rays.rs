@@ -154,7 +154,7 @@ fn random_scenes() {
 fn sample_models() {
     for name in ["humanoid/humanoid.xml", "slider_crank/slider_crank.xml", "tendon_arm/arm26.xml", "mug/mug.xml"] {
         // The samples are of 2.2.2; later versions have dropped some elements.
-        let Ok(compiled) = mj::compile_file(&kinetoscope_testkit::test_resources::sample_model(name)) else {
+        let Ok(compiled) = mj::compile_file(kinetoscope_testkit::test_resources::sample_model(name)) else {
             assert!(mj::BUILD_VERSION == mj::SupportedVersion::V4, "{name}");
             continue;
         };

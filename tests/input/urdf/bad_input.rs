@@ -179,7 +179,7 @@ fn unreadable_files() {
         ("empty.urdf", Some(b""), "FileEmpty", &[]),
     ];
     let read = |name: &str, content: Option<&[u8]>| {
-        parse_file(&content.map_or_else(|| files.folder().join(name), |content| files.write(name, content)))
+        parse_file(content.map_or_else(|| files.folder().join(name), |content| files.write(name, content)))
     };
     assert_errors(rows.map(|(name, content, kind, needles)| (name, read(name, content), kind, needles)));
     let bom = files.write("bom.urdf", b"\xef\xbb\xbf<robot name=\"r\"><link name=\"a\"/></robot>");

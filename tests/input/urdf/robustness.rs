@@ -30,7 +30,7 @@ fn parse_bytes(bytes: &[u8], files: &TempFiles) -> bool {
     match std::str::from_utf8(bytes) {
         Ok(text) => parse_str(text, Path::new("robot.urdf")).is_ok(),
         Err(_) => {
-            let error = parse_file(&files.write("robot.urdf", bytes)).unwrap_err();
+            let error = parse_file(files.write("robot.urdf", bytes)).unwrap_err();
             assert!(matches!(error, UrdfError::Encoding { .. }), "{error}");
             false
         }

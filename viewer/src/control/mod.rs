@@ -159,7 +159,7 @@ pub trait ViewerExt {
     fn viewer(&mut self, wants: SnapshotRequest) -> Viewer;
 
     /// Sets the record button that all viewers show. A recording that the previous button was running is stopped.
-    fn record_button(&mut self, button: RecordButton);
+    fn set_record_button(&mut self, button: RecordButton);
 }
 
 impl ViewerExt for SimulationManager {
@@ -172,7 +172,7 @@ impl ViewerExt for SimulationManager {
         viewer.unwrap_or_else(Viewer::ended)
     }
 
-    fn record_button(&mut self, button: RecordButton) {
+    fn set_record_button(&mut self, button: RecordButton) {
         with_view_controller(self, |conductor, sim| conductor.set_button(sim, button));
     }
 }

@@ -29,7 +29,7 @@ pub struct RecordingState {
 }
 
 /// A record button for [`WindowCfg`](crate::WindowCfg), [`ServeCfg`](crate::ServeCfg) or
-/// [`ViewerExt::record_button`](super::ViewerExt::record_button). Clones refer to the same button.
+/// [`ViewerExt::set_record_button`](super::ViewerExt::set_record_button). Clones refer to the same button.
 ///
 /// A simulation has one button, which all its windows and browser views show. A button that is set later replaces it. A
 /// recording started by a viewer stops when that viewer is dropped; a recording started by the program continues.

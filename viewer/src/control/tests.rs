@@ -389,7 +389,7 @@ fn record_button() {
     let viewer = sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
     assert_eq!(run(&viewer).recording, None);
     let (counter, button, counted) = counter();
-    sim.record_button(button);
+    sim.set_record_button(button);
     assert!(run(&viewer).recording.is_some_and(|recording| !recording.on));
     viewer.send(Command::Record(true));
     step_until(&mut sim, |_| counted() == (true, 1, 0));
@@ -426,7 +426,7 @@ fn recording_ends_with_viewer() {
     let mut sim = sample(1).sim;
     let (first, second) = (sim.viewer(SnapshotRequest::default()), sim.viewer(SnapshotRequest::default()));
     let (counter, button, counted) = counter();
-    sim.record_button(button.clone());
+    sim.set_record_button(button.clone());
     first.send(Command::Record(true));
     step_until(&mut sim, |_| counted() == (true, 1, 0));
     // Pressed again by the second viewer, it still belongs to the first.
@@ -446,8 +446,8 @@ fn recording_ends_with_viewer() {
     sim.update(200);
     assert_eq!(counted(), (true, 2, 1));
     // Setting the same button again changes nothing; another button stops the recording of the first.
-    sim.record_button(button);
+    sim.set_record_button(button);
     assert_eq!(counted(), (true, 2, 1));
-    sim.record_button(RecordButton::new(Counter::default()));
+    sim.set_record_button(RecordButton::new(Counter::default()));
     assert_eq!(counted(), (false, 2, 2));
 }

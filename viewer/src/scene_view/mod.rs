@@ -27,7 +27,7 @@ pub use orbit_camera::OrbitCamera;
 pub use overlay::Overlays;
 pub(crate) use pick::required_contacts;
 pub(crate) use pick::{Selection, selection_text};
-pub use scene_renderer::{SceneRenderer, ViewOptions};
+pub(crate) use scene_renderer::{SceneRenderer, ViewOptions};
 pub(crate) use slider::slider_range;
 pub use snapshot::{EnvSelection, JointEntry, Names, RunState, Snapshot, SnapshotEnv, Timeline};
 pub(crate) use snapshot_pool::SnapshotPool;

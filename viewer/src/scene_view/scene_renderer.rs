@@ -17,7 +17,7 @@ const SELECTION_RADIUS: f32 = 4.0;
 
 /// Renders images of snapshots. It reuses its buffers, so one instance should serve all images of a window.
 #[derive(Debug)]
-pub struct SceneRenderer {
+pub(crate) struct SceneRenderer {
     rasterizer: ParallelRenderer,
     cfg: RasterCfg,
     assembly: MergedScene,
@@ -25,28 +25,28 @@ pub struct SceneRenderer {
 
 /// Contents of an image besides the scene.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ViewOptions<'a> {
+pub(crate) struct ViewOptions<'a> {
     /// Environments in the image.
-    pub envs: EnvSelection,
+    pub(crate) envs: EnvSelection,
     /// Overlays.
-    pub overlays: Overlays,
+    pub(crate) overlays: Overlays,
     /// Selected point.
-    pub selection: Option<&'a Selection>,
+    pub(crate) selection: Option<&'a Selection>,
     /// Trails of bodies.
-    pub trails: Option<&'a Trails>,
+    pub(crate) trails: Option<&'a Trails>,
     /// Mouse spring: its environment and its two ends in the environment frame \[m\].
-    pub spring: Option<(usize, [[f64; 3]; 2])>,
+    pub(crate) spring: Option<(usize, [[f64; 3]; 2])>,
 }
 
 impl SceneRenderer {
     /// Creates a renderer with `threads` threads and four samples per pixel.
-    pub fn new(threads: usize) -> Self {
+    pub(crate) fn new(threads: usize) -> Self {
         let cfg = RasterCfg::default();
         Self { rasterizer: ParallelRenderer::new(cfg, threads), cfg, assembly: MergedScene::default() }
     }
 
     /// Limits the number of threads for the next images.
-    pub fn set_max_threads(&mut self, most: usize) {
+    pub(crate) fn set_max_threads(&mut self, most: usize) {
         self.rasterizer.use_threads(most);
     }
 
@@ -56,7 +56,7 @@ impl SceneRenderer {
     }
 
     /// Sets the number of samples per pixel, 1 or 4.
-    pub fn set_samples(&mut self, samples: u8) {
+    pub(crate) fn set_samples(&mut self, samples: u8) {
         self.cfg.samples = samples;
     }
 
@@ -65,7 +65,7 @@ impl SceneRenderer {
     ///
     /// # Errors
     /// The view is invalid, or the renderer failed.
-    pub fn draw(
+    pub(crate) fn draw(
         &mut self,
         snapshot: &Snapshot,
         view: &View,
@@ -105,7 +105,7 @@ impl SceneRenderer {
     }
 
     /// Returns the object at a pixel, or `None` for the sky. Markers are ignored.
-    pub fn pick(
+    pub(crate) fn pick(
         &mut self,
         snapshot: &Snapshot,
         view: &View,

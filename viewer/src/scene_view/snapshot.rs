@@ -9,7 +9,7 @@ use kinetoscope_sim::{EnvId, EnvVisualState, JointIndex, MaskId, RobotId, Simula
 use std::sync::Arc;
 
 /// Selection of environments.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum EnvSelection {
     /// All environments, in their grid.
     #[default]

@@ -19,7 +19,7 @@ const MIN_DISTANCE: f64 = 0.01;
 /// Trails of the bodies of the shown environments, environment by environment, for at most 1024 bodies. The image notes
 /// if there are more bodies.
 #[derive(Debug, Default)]
-pub struct Trails {
+pub(crate) struct Trails {
     /// Positions of each body, from the bodies of environment `first_env` on, in the environment frame \[m\].
     positions: Vec<VecDeque<[f64; 3]>>,
     first_env: usize,
@@ -30,7 +30,7 @@ pub struct Trails {
 impl Trails {
     /// Appends the current positions. Trails restart when the bodies change, when an environment is reset, and for
     /// environments that had no trails.
-    pub fn add(&mut self, snapshot: &Snapshot, shown: EnvSelection) {
+    pub(crate) fn add(&mut self, snapshot: &Snapshot, shown: EnvSelection) {
         let bodies = snapshot.names.bodies.len();
         let (first_env, wanted) = match shown {
             EnvSelection::All => (0, bodies * snapshot.envs.len()),
@@ -64,11 +64,6 @@ impl Trails {
     /// True if every body of this environment has a trail.
     fn has_trails_of(&self, env: usize) -> bool {
         env >= self.first_env && (env - self.first_env + 1) * self.bodies <= self.positions.len()
-    }
-
-    /// Removes all trails.
-    pub fn clear(&mut self) {
-        self.positions.clear();
     }
 
     /// Draws the trails of the shown environments; older positions are darker.

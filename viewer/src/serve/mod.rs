@@ -138,7 +138,7 @@ impl Serve for SimulationManager {
         let host_viewer = self.viewer(SnapshotRequest { rate: 2.0, ..SnapshotRequest::default() });
         let backend = Arc::new(ViewerHub::new(host_viewer, cfg));
         let server = Server::start(listener, AccessPolicy::new(address, token), backend, max_viewers)?;
-        button.into_iter().for_each(|button| self.record_button(button));
+        button.into_iter().for_each(|button| self.set_record_button(button));
         let context = server.context();
         let host = self.observers_mut().add(ServerObserver(server));
         Ok(ServerHandle { url, address, context, host })

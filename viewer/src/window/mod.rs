@@ -208,7 +208,7 @@ impl OpenWindow for SimulationManager {
         let run =
             move |screen: XWindow, viewer: Viewer, shared: &WindowState| run_window_loop(screen, &viewer, &cfg, shared);
         let window = spawn_window(title, size, display, viewer, begin, run)?;
-        button.into_iter().for_each(|button| self.record_button(button));
+        button.into_iter().for_each(|button| self.set_record_button(button));
         Ok(window)
     }
 }

@@ -521,7 +521,7 @@ fn record_button() {
     assert!(shows.click(on_button).is_empty() && !red(&bare));
     assert_eq!(shows.type_in("r"), [Command::Record(true)]);
     for on in [false, true] {
-        shows.sample.sim.record_button(RecordButton::new(Switch(on)));
+        shows.sample.sim.set_record_button(RecordButton::new(Switch(on)));
         shows.app.set_snapshot(shows.viewer.newest().unwrap());
         assert_eq!(shows.type_in("r"), [Command::Record(!on)]);
         assert_eq!(shows.click(on_button), [Command::Record(!on)]);

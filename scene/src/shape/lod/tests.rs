@@ -134,7 +134,7 @@ fn sphere(segments: usize) -> RenderMesh {
 /// A link of the vendor's SR5 robot.
 fn vendor(link: &str) -> RenderMesh {
     let file = format!("rokae_description/meshes/xMateSR5/visual/xMateSR5_{link}.stl");
-    render(&load(&kinetoscope_testkit::test_resources::robot(&file)).unwrap().scaled([0.001; 3]))
+    render(&load(kinetoscope_testkit::test_resources::robot(&file)).unwrap().scaled([0.001; 3]))
 }
 
 /// Number of occurrences of each directed edge.

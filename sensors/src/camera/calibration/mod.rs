@@ -146,7 +146,8 @@ impl CameraInfo {
     /// # Errors
     ///
     /// The first problem, with file and line, or field.
-    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, CalibrationError> {
+        let path = path.as_ref();
         let text = std::fs::read_to_string(path)
             .map_err(|error| CalibrationError::File { path: path.into(), error: error.to_string() })?;
         Self::parse(&text, &path.display().to_string())

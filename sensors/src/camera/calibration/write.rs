@@ -30,7 +30,8 @@ impl CameraInfo {
     /// # Errors
     ///
     /// [`CalibrationError::File`].
-    pub fn write(&self, path: &Path) -> Result<(), CalibrationError> {
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), CalibrationError> {
+        let path = path.as_ref();
         std::fs::write(path, self.to_yaml())
             .map_err(|error| CalibrationError::File { path: path.into(), error: error.to_string() })
     }

@@ -68,6 +68,7 @@ macro_rules! actuator_models {
         /// An explicit actuator model with its parameters.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
+        #[non_exhaustive]
         pub enum ActuatorModel {
             $($(#[$doc])* $variant($model),)*
         }
