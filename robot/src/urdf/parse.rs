@@ -27,7 +27,7 @@ const MAX_FILE_SIZE: u64 = 256 << 20;
 const IGNORED_ELEMENTS: [&str; 8] =
     ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
 
-/// Reads a URDF file with the default [`Strictness`].
+/// Reads a URDF file with the default [`Strictness`], lenient.
 ///
 /// # Errors
 /// The file cannot be read, is not well-formed URDF, or its links and joints do not form a tree. Mesh files are not
@@ -39,7 +39,7 @@ pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
 /// Reads a URDF file.
 ///
 /// # Errors
-/// As [`parse_file`]; strict reading also rejects deviations from URDF whose meaning is clear.
+/// Those of [`parse_file`]; strict reading also rejects the deviations that [`Strictness`] lists.
 pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let owned = || path.to_path_buf();
     if path.is_dir() {
@@ -83,7 +83,7 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
 /// start at its folder.
 ///
 /// # Errors
-/// As [`parse_file`].
+/// Those of [`parse_file`].
 pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
     parse_str_with(text, path, Strictness::default())
 }
@@ -91,7 +91,7 @@ pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
 /// Reads a URDF from memory. `path` names the file in messages, and relative mesh paths start at its folder.
 ///
 /// # Errors
-/// As [`parse_file_with`].
+/// Those of [`parse_file_with`].
 pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if text.trim().is_empty() {
