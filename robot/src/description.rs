@@ -225,8 +225,8 @@ pub enum FileActuation {
     Coupled(Option<CouplingPolynomial>),
 }
 
-/// Polynomial coupling of a joint to another joint: `position = follower_start + Σ coefficients[k] (position(joint) -
-/// driver_start)ᵏ`.
+/// Polynomial coupling of a joint to another joint with the position x:
+/// `position = follower_start + Σ coefficients[k] (x - driver_start)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingPolynomial {
     /// Followed joint; `None` for the constant position `follower_start + coefficients[0]`.
@@ -379,8 +379,9 @@ impl RobotDescription {
         self.links.iter().filter_map(|l| l.inertial.as_ref()).map(|i| i.mass).sum()
     }
 
-    /// Resolves a chain of mimic joints. Returns driver, multiplier and offset: `position(id) = multiplier *
-    /// position(driver) + offset`. For a joint without a mimic, these are the joint itself, 1 and 0.
+    /// Resolves a chain of mimic joints to its end. Returns driver, multiplier and offset:
+    /// `position(id) = multiplier * position(driver) + offset`. For a joint without a mimic, these are the joint
+    /// itself, 1 and 0.
     ///
     /// Mimic chains are free of cycles: `urdf::merge` rejects cycles, and `mjcf::robot_file` creates none.
     ///

@@ -14,7 +14,7 @@ pub enum DiagnosticKind {
     /// A moving body without mass, which also got no mass from shapes, has minimal mass properties in the MJCF, because
     /// MuJoCo requires a mass. They are not part of `total_mass`.
     MasslessLink,
-    /// The lower position limit exceeds the upper one: both are ignored.
+    /// The lower position limit exceeds the upper one, where an absent one counts as 0: both are ignored.
     LimitIgnored,
     /// The effort limit of a URDF joint is 0 or absent: the joint's effort is not limited.
     EffortUnlimited,

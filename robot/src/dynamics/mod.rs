@@ -244,7 +244,11 @@ impl<'a> Dynamics<'a> {
         self.dofs.len()
     }
 
-    /// Range of generalized velocities of a joint; empty for a fixed joint. Panics if there is no such joint.
+    /// Range of generalized velocities of a joint; empty for a fixed joint.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such joint.
     pub fn dof_range(&self, joint: JointId) -> Range<usize> {
         self.joint_dofs[joint.0].clone()
     }

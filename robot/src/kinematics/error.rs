@@ -26,7 +26,7 @@ pub enum KinematicsError {
         /// Last links of its branches.
         links: Vec<String>,
     },
-    /// No joint of the control part or robot moves the link, so inverse kinematics cannot.
+    /// No joint of the control part (or of the robot) moves the link.
     #[error("no joint of {of} moves link {link:?}; {}", movers_sentence(.moving_joints))]
     NoMovingJoint {
         /// Owner of the joints: `control part "arm"`, `the robot`.

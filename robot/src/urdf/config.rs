@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UrdfCfg {
-    /// URDF files of the robot; a parent may follow its children. A component without a parent whose name has no
-    /// default parent must be the first.
+    /// URDF files of the robot; a parent may follow its children. A component with a custom
+    /// [`name`](ComponentCfg::name) and without `parent` must be the first.
     pub components: Vec<ComponentCfg>,
     /// Letter case of the names of the merged robot.
     pub name_case: NameCaseCfg,
@@ -192,8 +192,8 @@ pub struct ComponentCfg {
     /// Link of this component to attach, as named in its file. It must be the root, which is the default.
     pub child_link: Option<String>,
     /// Prefix of the names of this component; names that already start with it, in any case, stay unchanged. The
-    /// default is `left_` or `right_` for a component whose name starts so in a robot of several components, else no
-    /// prefix.
+    /// default is `left_` or `right_` for a component whose name starts with it in a robot of several components, else
+    /// no prefix.
     pub prefix: Option<String>,
 }
 

@@ -387,7 +387,7 @@ pub enum UrdfError {
         /// Most similar existing components, the closest match first; at most 12.
         candidates: Vec<String>,
     },
-    /// A component whose name has no default parent sets no parent, and is not the first component.
+    /// A component with a custom name sets no parent, and is not the first component.
     #[error(
         "component \"{component}\" has no default parent; set its parent to another component. {}",
         format_candidates(.candidates, .candidates.len())

@@ -74,9 +74,9 @@ pub struct JointMetadata {
 pub struct LimitMetadata {
     /// Location of the limit element.
     pub source: SourceLocation,
-    /// True if `lower` is given and not above `upper`.
+    /// True if `lower` is given and not above `upper` (0 if `upper` is absent).
     pub lower: bool,
-    /// True if `upper` is given and not below `lower`.
+    /// True if `upper` is given and not below `lower` (0 if `lower` is absent).
     pub upper: bool,
     /// True if `effort` is given.
     pub effort: bool,

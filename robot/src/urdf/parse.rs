@@ -39,7 +39,7 @@ pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
 /// Reads a URDF file.
 ///
 /// # Errors
-/// Those of [`parse_file`]; strict reading also rejects the deviations that [`Strictness`] lists.
+/// Same errors as [`parse_file`]; strict reading also rejects the deviations that [`Strictness`] lists.
 pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let owned = || path.to_path_buf();
     if path.is_dir() {
@@ -83,7 +83,7 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
 /// start at its folder.
 ///
 /// # Errors
-/// Those of [`parse_file`].
+/// Same errors as [`parse_file`].
 pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
     parse_str_with(text, path, Strictness::default())
 }
@@ -91,7 +91,7 @@ pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
 /// Reads a URDF from memory. `path` names the file in messages, and relative mesh paths start at its folder.
 ///
 /// # Errors
-/// Those of [`parse_file_with`].
+/// Same errors as [`parse_file_with`].
 pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if text.trim().is_empty() {
