@@ -216,7 +216,7 @@ fn write_fields(installation: &Installation, path: &Path) {
     fs::write(path, out).expect("OUT_DIR is writable");
 }
 
-/// Rust spelling of a C element type. MuJoCo's own types keep their names, which bindgen declares.
+/// Returns the Rust name of a C element type. Types of MuJoCo keep their names, because bindgen declares them.
 fn rust_type(c: &str) -> &str {
     match c {
         "int" => "::std::os::raw::c_int",

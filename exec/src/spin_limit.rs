@@ -8,9 +8,9 @@
 pub(crate) struct SpinLimit(u32);
 
 impl SpinLimit {
-    /// Longest patience: about 1 ms on processors whose pause instruction takes 140 cycles, less on others.
+    /// Largest limit: about 1 ms on processors whose pause instruction takes 140 cycles, less on others.
     pub(crate) const MAX: Self = Self(20_000);
-    /// Shortest patience: covers the gap between the jobs of one simulation step.
+    /// Smallest limit: covers the gap between the jobs of one simulation step.
     const MIN: Self = Self(500);
 
     /// Number of polls.
@@ -18,7 +18,7 @@ impl SpinLimit {
         self.0
     }
 
-    /// Returns the patience for the next wait. `job_came` is true if the last wait ended with a job.
+    /// Returns the limit for the next wait. `job_came` is true if the last wait ended with a job.
     pub(crate) fn next(self, job_came: bool) -> Self {
         let next = if job_came { self.0 + self.0 / 64 + 1 } else { self.0 / 2 };
         Self(next.clamp(Self::MIN.0, Self::MAX.0))

@@ -9,7 +9,8 @@ type Hook = dyn Fn(usize, usize, &(dyn Fn(usize) + Sync)) + Send + Sync;
 
 /// Thread pool that runs one job at a time. Clones share the same threads.
 ///
-/// While a job runs, other callers do their work on their own thread. The threads end when the last clone is dropped.
+/// While a job runs, jobs of other callers, and jobs started inside the job, run on the calling thread alone. The
+/// threads end when the last clone is dropped.
 #[derive(Clone)]
 pub struct ThreadPool {
     workers: Option<Arc<Workers>>,
@@ -27,7 +28,8 @@ impl ThreadPool {
         Self { workers: None, hook: None }
     }
 
-    /// Returns a pool on the same threads that runs the work of each slot inside `hook(slot, slots, work)`.
+    /// Returns a pool on the same threads that runs the work of each slot inside `hook(slot, slots, work)`, slot 0
+    /// included. Replaces an earlier hook.
     ///
     /// The hook must call `work(slot)` once. It is meant for measurements per thread, such as allocation counts.
     pub fn with_hook(mut self, hook: impl Fn(usize, usize, &(dyn Fn(usize) + Sync)) + Send + Sync + 'static) -> Self {
@@ -35,7 +37,8 @@ impl ThreadPool {
         self
     }
 
-    /// Starts the threads for jobs with `slots` slots now, instead of with the first job.
+    /// Starts the `slots - 1` threads for jobs with `slots` slots now, instead of with the first job. Does nothing for
+    /// threads that exist, or in a [serial](Self::serial) pool.
     ///
     /// # Errors
     /// The operating system cannot start a thread.
@@ -49,8 +52,8 @@ impl ThreadPool {
     /// Calls `work(0)` on the calling thread and, concurrently, `work(slot)` for other slots below `slots` on worker
     /// threads.
     ///
-    /// Each slot runs at most once. Returns when all calls have returned. Busy or missing workers are not waited for,
-    /// so `work` must complete the job even if only slot 0 runs.
+    /// Each slot runs at most once, slot 0 always. Returns when all calls have returned. Busy or missing workers are
+    /// not waited for, so `work` must complete the job even if only slot 0 runs.
     ///
     /// # Panics
     /// If `work` panics on any thread.
@@ -70,7 +73,8 @@ impl ThreadPool {
 
     /// Calls `act(scratch, item)` once for each item, on at most `scratch.len()` threads, including the calling thread.
     ///
-    /// Each thread takes the next item when it has finished one. Without scratch values, no item is processed.
+    /// Each thread takes the next item when it has finished one, so the assignment of items to threads varies. Without
+    /// scratch values, no item is processed.
     ///
     /// # Panics
     /// If `act` or the iterator panics on any thread.

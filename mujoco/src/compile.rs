@@ -12,7 +12,8 @@ use std::ptr::NonNull;
 /// A file that the MJCF refers to, held in memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Asset {
-    /// Base name, lower case and unique, because 2.2.2 strips folders and lower-cases names.
+    /// Name without folders, lower case and unique: 2.2.2 strips folders from the names in the MJCF and converts them
+    /// to lower case.
     pub name: String,
     /// Content.
     pub bytes: Vec<u8>,
@@ -87,10 +88,11 @@ impl Drop for Vfs {
     }
 }
 
-/// Compiles MJCF text. Files that it names are looked up in `assets` first.
+/// Compiles MJCF text. Files that it names are looked up in `assets` first, then on disk.
 ///
 /// # Errors
-/// MuJoCo's version does not match, or MuJoCo rejects the model (its message, and the line that it names).
+/// MuJoCo's version does not match, MuJoCo rejects the model, or an asset is empty or has an invalid or repeated name
+/// (`model.xml` is reserved).
 pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     check_version()?;
     let mut vfs = Vfs::new();
@@ -114,7 +116,7 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     load(c"model.xml", vfs.0.as_ptr())
 }
 
-/// Compiles an MJCF file. Files that it names are looked up on disk.
+/// Compiles an MJCF file. Files that it names are looked up on disk, by MuJoCo's rules.
 ///
 /// # Errors
 /// MuJoCo's version does not match, or MuJoCo rejects the file.

@@ -32,9 +32,9 @@ impl Drop for Data {
 pub enum Warning {
     /// The inertia matrix is close to singular.
     Inertia,
-    /// The contact buffer is full: contacts were dropped.
+    /// The contact buffer (4.x: the arena) is full: contacts were dropped.
     ContactFull,
-    /// The constraint buffer is full: constraints were dropped.
+    /// The constraint buffer (4.x: the arena) is full: constraints were dropped.
     ConstraintFull,
     /// A position is not finite or too large.
     BadPosition,
@@ -42,7 +42,7 @@ pub enum Warning {
     BadVelocity,
     /// An acceleration is not finite or too large.
     BadAcceleration,
-    /// A control is not finite or too large; MuJoCo replaces it by zero.
+    /// A control is not finite or too large; MuJoCo then uses zero for all controls.
     BadControl,
 }
 
@@ -101,14 +101,16 @@ impl WarningCounts {
         }
     }
 
-    /// Returns the warning that indicates divergence: a bad acceleration, position or velocity, if any.
+    /// Returns a warning that indicates divergence: a bad acceleration, position or velocity, the first one in this
+    /// order.
     ///
-    /// The first one in the order of a step is the cause.
+    /// [`step2`](Data::step2) and then [`step1`](Data::step1) check them in this order, so the first one is the cause.
     pub fn diverged(&self) -> Option<Warning> {
         [Warning::BadAcceleration, Warning::BadPosition, Warning::BadVelocity].into_iter().find(|&w| self.get(w) > 0)
     }
 
-    /// Returns the buffer that overflowed, if any.
+    /// Returns the buffer that overflowed, if any: contacts before constraints. An overflow of the stack is an
+    /// [`EngineError`] instead.
     pub fn overflow(&self) -> Option<Overflow> {
         if self.get(Warning::ContactFull) > 0 {
             Some(Overflow::Contacts)
@@ -132,7 +134,8 @@ pub enum Overflow {
 }
 
 impl Data {
-    /// Creates data in the model's initial state, with the model's buffer sizes.
+    /// Creates data in the model's initial state, with the model's buffer sizes. Poses and other derived quantities are
+    /// not computed yet.
     ///
     /// # Errors
     /// MuJoCo cannot allocate the data.
@@ -154,7 +157,8 @@ impl Data {
         &self.prefetch_addresses
     }
 
-    /// Replaces the model by another one of the same sizes: one [edited](super::ModelEditor) from the same compiled model.
+    /// Replaces the model by another one of the same sizes: one [edited](super::ModelEditor) from the same compiled
+    /// model. The state stays unchanged.
     ///
     /// The next forward pass updates everything that depends on the model.
     ///
@@ -186,7 +190,8 @@ impl Data {
         unsafe { self.raw.as_mut() }
     }
 
-    /// Resets the state to the model's initial state. Also clears the effects of an engine error.
+    /// Resets state, inputs and warning counters to the model's initial state. Also clears the effects of an engine
+    /// error. Derived quantities are not computed.
     pub fn reset(&mut self) {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together.
@@ -206,7 +211,8 @@ impl Data {
         guarded(|| unsafe { mj::mj_step1(m, d) })
     }
 
-    /// Computes actuation, accelerations and constraint forces, and integrates one time step (`mj_step2`).
+    /// Computes actuation, accelerations and constraint forces, and integrates one time step (`mj_step2`). Call
+    /// [`step1`](Self::step1) first. A model with the integrator RK4 is integrated with Euler's method here.
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -263,7 +269,8 @@ impl Data {
         done
     }
 
-    /// Returns the dense joint-space inertia matrix of the last forward pass, row-major, shape (nv, nv).
+    /// Returns the dense joint-space inertia matrix of the last forward pass, armature included, in row-major order
+    /// with the shape (nv, nv).
     ///
     /// # Errors
     /// MuJoCo stopped.
@@ -284,7 +291,8 @@ impl Data {
         Ok(dense)
     }
 
-    /// Force of contact `index` in the contact frame: normal, two tangents, three torques \[N, N m\].
+    /// Force of contact `index` from the last solve, in the contact frame: normal, two tangents, three torques \[N and
+    /// N m\]. A positive normal force pushes the geoms apart.
     ///
     /// # Panics
     /// `index` is not smaller than the number of contacts.
@@ -307,12 +315,13 @@ impl Data {
         self.header_mut().time = time;
     }
 
-    /// Number of equality rows. They come first among the constraint rows.
+    /// Number of equality rows of the last forward pass. They come first among the constraint rows.
     pub fn ne(&self) -> usize {
         self.header().ne.max(0) as usize
     }
 
-    /// Number of friction rows. They follow the equality rows: degrees of freedom in order, then tendons.
+    /// Number of dry-friction rows of the last forward pass (contacts excluded). They follow the equality rows: degrees
+    /// of freedom in order, then tendons.
     pub fn nf(&self) -> usize {
         self.header().nf.max(0) as usize
     }
@@ -327,7 +336,7 @@ impl Data {
         size_of::<mj::mjData>() + d.nbuffer as usize + extra
     }
 
-    /// Returns the warning counts since the last call, and clears them.
+    /// Returns the number of warnings of each type since the last call or reset, and sets MuJoCo's counters to zero.
     pub fn take_warnings(&mut self) -> WarningCounts {
         let mut counts = WarningCounts::default();
         let warnings = &mut self.header_mut().warning;

@@ -92,7 +92,8 @@ edited_arrays! {
 }
 
 impl ModelEditor {
-    /// Creates an editor that starts with the compiled model of `model`.
+    /// Creates an editor that starts with the arrays that the compiler made. Edits that `model` contains are not
+    /// loaded; see [`load`](Self::load).
     ///
     /// # Errors
     /// MuJoCo cannot allocate a copy.
@@ -114,7 +115,7 @@ impl ModelEditor {
         Ok(Self { base: model.clone(), copy, scratch, fields })
     }
 
-    /// Loads the arrays of `model` as the new starting point.
+    /// Replaces all edits by the arrays and the gravity of `model`.
     ///
     /// # Panics
     /// `model` comes from another compilation than the model of this editor.
@@ -143,7 +144,8 @@ impl ModelEditor {
     /// body.
     ///
     /// # Errors
-    /// The inertia matrix of the body is diagonal, and MuJoCo 4.x has no memory for its other elements.
+    /// On 4.x: MuJoCo stores only a diagonal mass matrix for this body (`body_simple`), with no memory for other
+    /// elements.
     ///
     /// # Panics
     /// There is no such body.
@@ -197,7 +199,7 @@ impl ModelEditor {
         self.geom_rbound_mut()[geom] = radius;
     }
 
-    /// Sets gravity \[m/s²\].
+    /// Sets gravity \[m/s²\]; [`set_constants`](Self::set_constants) is not needed.
     pub fn set_gravity(&mut self, gravity: [f64; 3]) {
         self.copy.header_mut().opt.gravity = gravity;
     }
@@ -273,7 +275,8 @@ impl ModelEditor {
     }
 }
 
-/// Error of [`ModelEditor::set_center_of_mass`]: the center of mass of a body with a diagonal inertia cannot be moved.
+/// Error of [`ModelEditor::set_center_of_mass`] on 4.x: the center of mass of a body with a diagonal mass matrix cannot
+/// be moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagonalInertia;
 

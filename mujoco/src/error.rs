@@ -13,21 +13,21 @@ pub struct EngineError {
 }
 
 impl EngineError {
-    /// True if more memory would help.
+    /// True if MuJoCo's message mentions the stack, the arena or memory, so that larger buffers may help.
     pub fn is_out_of_memory(&self) -> bool {
         let text = self.message.to_ascii_lowercase();
         ["stack", "arena", "memory"].iter().any(|word| text.contains(word))
     }
 }
 
-/// MuJoCo rejected a model.
+/// MuJoCo rejected a model, or an asset has an invalid name or content.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct CompileError {
-    /// MuJoCo's message.
+    /// MuJoCo's message on one line. On 2.2.2, a hint about newer versions follows for an unknown keyword.
     pub message: String,
-    /// Line of the MJCF that MuJoCo names, counted from 1.
+    /// Line of the MJCF that MuJoCo's message names, from 1; `None` if the message names no line.
     pub line: Option<u32>,
-    /// Origin of that line: the element of the user's file.
+    /// Location of the rejected element in the user's file, if known.
     pub source_location: Option<SourceLocation>,
 }
 

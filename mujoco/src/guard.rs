@@ -33,7 +33,7 @@ unsafe extern "C-unwind" fn on_error(message: *const c_char) {
 /// Warnings are counted in `mjData.warning`; the handler keeps MuJoCo from writing to the console and to a log file.
 unsafe extern "C-unwind" fn on_warning(_message: *const c_char) {}
 
-/// Replaces MuJoCo's process-wide handlers. Called once, from `check_version`.
+/// Replaces MuJoCo's process-wide error and warning handlers. Called once, from `check_version`.
 pub(super) fn install_handlers() {
     // SAFETY: the handler is a plain pointer, written once before any other MuJoCo call of this process.
     unsafe { mj::mju_user_error = Some(on_error) };

@@ -6,7 +6,8 @@ use super::guard::guarded;
 use mujoco_sys as mj;
 
 impl Data {
-    /// Computes poses and centers of mass of bodies at the current positions (`mj_kinematics`, `mj_comPos`).
+    /// Computes poses of bodies, geoms and sites, and centers of mass, at the current positions (`mj_kinematics`,
+    /// `mj_comPos`).
     ///
     /// This is the part of a forward pass that [`jacobian`](Self::jacobian) needs.
     ///

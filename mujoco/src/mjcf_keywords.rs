@@ -14,7 +14,7 @@ pub fn joint(code: i32) -> Option<&'static str> {
     keyword(&list, code)
 }
 
-/// Keyword of a geom or site type, and its number of sizes.
+/// Keyword of a geom or site type, and the number of values in its `size` attribute.
 pub fn geom(code: i32) -> Option<(&'static str, usize)> {
     let list = [
         (mj::mjGEOM_PLANE, "plane", 3),
@@ -65,7 +65,7 @@ pub enum WrapType {
     Geom,
 }
 
-/// Kind of a point of a tendon's path.
+/// Kind of a point of a tendon's path, from its code (`wrap_type`).
 pub fn wrap_type(code: i32) -> Option<WrapType> {
     let list = [
         (mj::mjWRAP_JOINT, WrapType::Joint),
@@ -77,7 +77,7 @@ pub fn wrap_type(code: i32) -> Option<WrapType> {
     list.into_iter().find(|(known, _)| *known as i32 == code).map(|(_, point)| point)
 }
 
-/// Attribute that names the target of an actuator's transmission.
+/// Attribute that names the target of an actuator's transmission, such as `joint`.
 pub fn transmission(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjTRN_JOINT, "joint"),
@@ -151,13 +151,13 @@ pub struct SensorKeyword {
     pub keyword: &'static str,
     /// Form in which MJCF names the object.
     pub object_syntax: SensorObjectSyntax,
-    /// Unit; `None` if it depends on the object.
+    /// Unit of the values, `1` without a dimension; `None` if it depends on the object.
     pub unit: Option<&'static str>,
     /// True if the values are a quaternion.
     pub quaternion: bool,
 }
 
-/// Type of one of MuJoCo's own sensors; `None` if it is not supported.
+/// Keyword, unit and syntax of a type of MuJoCo's own sensors; `None` if it is not supported.
 pub fn sensor(code: i32) -> Option<SensorKeyword> {
     use SensorObjectSyntax::{Frame, Named, None as Nothing};
     let list = [
@@ -238,7 +238,8 @@ pub fn unsupported_sensor(code: i32) -> Option<&'static str> {
     keyword(&list, code)
 }
 
-/// True if a sensor measures results of the constraint solver (`mjSTAGE_ACC`), not only positions and velocities.
+/// True if the stage of a sensor ([`Model::sensor_needstage`](crate::Model::sensor_needstage)) is `mjSTAGE_ACC`: it
+/// measures accelerations or forces, not only positions and velocities.
 pub fn needs_acceleration_stage(stage: i32) -> bool {
     stage == mj::mjSTAGE_ACC as i32
 }

@@ -115,7 +115,7 @@ pub(super) fn array_pointer(model: &mj::mjModel, field: &ModelArray) -> *const u
     unsafe { pointer.cast::<*const u8>().read() }
 }
 
-/// An immutable model, cheap to clone, shared by all environments and threads.
+/// An immutable model, cheap to clone and to share between environments and threads.
 #[derive(Clone, Debug)]
 pub struct Model(Arc<ShallowModel>);
 
@@ -125,17 +125,18 @@ pub struct Model(Arc<ShallowModel>);
 /// contacts and constraints share one arena.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Buffers {
-    /// Largest number of contacts (2.2.2).
+    /// Largest number of contacts (2.2.2; unused on 4.x).
     pub contacts: usize,
-    /// Largest number of constraint rows (2.2.2).
+    /// Largest number of constraint rows, which also determines the stack size (2.2.2; unused on 4.x).
     pub constraints: usize,
-    /// Size of the arena \[bytes\] (4.x).
+    /// Size of the arena, stack included \[bytes\] (4.x; unused on 2.2.2).
     pub arena_bytes: usize,
 }
 
 impl Buffers {
-    /// Returns sizes with twice the capacity of the buffer that overflowed. Other buffers do not grow, because unused
-    /// rows are expensive on 2.2.2.
+    /// Returns sizes with twice the capacity of the buffer that overflowed. On 2.2.2, the stack grows with
+    /// `constraints`, and the other buffer keeps its size, because unused rows are expensive. On 4.x, the arena
+    /// doubles.
     #[must_use]
     pub fn enlarged(self, what: Overflow) -> Self {
         let twice = |n: usize| n.max(1).saturating_mul(2);
@@ -157,12 +158,13 @@ impl Model {
         &self.0.header
     }
 
-    /// True if both are the same model, including its buffer sizes.
+    /// True if one is a clone of the other. Results of [`with_buffers`](Self::with_buffers) and of other methods are
+    /// different models, even with equal content.
     pub fn ptr_eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
-    /// Returns the same model with other buffer sizes, at least 1 each. Only the struct is copied; the arrays are
+    /// Returns the same model with other buffer sizes; a size of 0 becomes 1. Only the struct is copied; the arrays are
     /// shared.
     #[must_use]
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
@@ -222,12 +224,13 @@ impl Model {
         size_of::<ShallowModel>() + self.0.own.iter().map(array).sum::<usize>()
     }
 
-    /// Memory of the arrays that models share \[bytes\].
+    /// Memory of all arrays of the compiled model, which its models share \[bytes\]. Includes arrays of which this
+    /// model has its own copy.
     pub fn shared_bytes(&self) -> usize {
         self.header().nbuffer as usize
     }
 
-    /// Names of the arrays that are stored in different memory in the two models.
+    /// Names of the arrays that are stored in different memory in the two models, which come from one compiled model.
     pub fn unshared_arrays(&self, other: &Self) -> Vec<&'static str> {
         let (mine, theirs) = (self.array_pointers(), other.array_pointers());
         mine.iter().zip(&theirs).filter(|(mine, theirs)| mine.1 != theirs.1).map(|(mine, _)| mine.0).collect()
@@ -240,7 +243,7 @@ impl Model {
         pointers
     }
 
-    /// Buffer sizes of a new [`Data`](super::Data) of this model.
+    /// Buffer sizes of a new [`Data`](super::Data) of this model. `arena_bytes` is 0 on 2.2.2.
     pub fn buffers(&self) -> Buffers {
         let m = self.header();
         #[cfg(mj4)]
@@ -250,8 +253,8 @@ impl Model {
         Buffers { contacts: m.nconmax.max(0) as usize, constraints: m.njmax.max(0) as usize, arena_bytes }
     }
 
-    /// Small initial buffer sizes: room for all permanent constraints (equalities, drives, friction, limits) and for a
-    /// few contacts.
+    /// Small initial buffer sizes: room for all permanent constraints (equalities, drives, friction, limits) and 16
+    /// contacts.
     pub fn small_buffers(&self) -> Buffers {
         const CONTACTS: usize = 16;
         /// Rows of a contact with a pyramidal cone of dimension 3.
@@ -269,12 +272,12 @@ impl Model {
         }
     }
 
-    /// Number of generalized positions.
+    /// Number of generalized positions: 7 for a free joint, 4 for a ball joint, 1 for a hinge or slide.
     pub fn nq(&self) -> usize {
         self.header().nq as usize
     }
 
-    /// Number of degrees of freedom.
+    /// Number of degrees of freedom: 6 for a free joint, 3 for a ball joint, 1 for a hinge or slide.
     pub fn nv(&self) -> usize {
         self.header().nv as usize
     }
@@ -289,7 +292,7 @@ impl Model {
         self.header().nbody as usize
     }
 
-    /// Number of joints.
+    /// Number of joints, free and ball joints included.
     pub fn njnt(&self) -> usize {
         self.header().njnt as usize
     }
@@ -362,12 +365,12 @@ impl Model {
         self.header().nskin as usize
     }
 
-    /// Physics step \[s\].
+    /// MuJoCo's time step \[s\] (`opt.timestep`).
     pub fn timestep(&self) -> f64 {
         self.header().opt.timestep
     }
 
-    /// Gravity \[m/s²\].
+    /// Gravity \[m/s²\] (`opt.gravity`), also if it is disabled.
     pub fn gravity(&self) -> [f64; 3] {
         self.header().opt.gravity
     }
@@ -414,8 +417,8 @@ pub(super) fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
 }
 
 impl Compiled {
-    /// Disables MuJoCo's automatic reset of diverged environments and, if `has_drive_rows`, its constraint islands
-    /// (4.x).
+    /// On 4.x, disables MuJoCo's automatic reset of diverged environments and, if `has_drive_rows`, its constraint
+    /// islands. Has no effect on 2.2.2.
     ///
     /// Drive rows are rewritten in the one system of all constraints. With islands, 4.x would solve a copy made before
     /// that.
@@ -433,13 +436,14 @@ impl Compiled {
         let _ = has_drive_rows;
     }
 
-    /// Physics step \[s\].
+    /// MuJoCo's time step \[s\] (`opt.timestep`).
     pub fn timestep(&self) -> f64 {
         // SAFETY: the model is alive and `Compiled` its only owner.
         unsafe { self.0.0.as_ref() }.opt.timestep
     }
 
-    /// Sets gain and bias of `actuators` to zero and removes their control limits, so that they only hold targets.
+    /// Sets gain and bias parameters of `actuators` to zero and removes their control limits. They then exert no force,
+    /// and their controls only store targets.
     pub fn clear_actuator_gains(&mut self, actuators: &[usize]) {
         let gains = mj::mjNGAIN as usize;
         let biases = mj::mjNBIAS as usize;
@@ -450,7 +454,8 @@ impl Compiled {
         self.unlimit_controls(actuators);
     }
 
-    /// Turns `actuators` into plain effort sources: the control is the force, without limits.
+    /// Turns `actuators` into plain effort sources: the control is the actuator force, without limits of control and
+    /// force. Gears stay.
     pub fn make_effort_sources(&mut self, actuators: &[usize]) {
         self.clear_actuator_gains(actuators);
         for &i in actuators {
@@ -459,8 +464,8 @@ impl Compiled {
         }
     }
 
-    /// Removes the control limits of `actuators`. The drive limits its targets itself, and a control may also carry a
-    /// feed-forward effort.
+    /// Removes the control limits of `actuators`, given as indices. The drive limits its targets itself, and a control
+    /// may also carry a feed-forward effort.
     pub fn unlimit_controls(&mut self, actuators: &[usize]) {
         for &i in actuators {
             self.actuator_ctrllimited_mut()[i] = Default::default();

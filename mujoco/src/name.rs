@@ -69,7 +69,8 @@ impl Compiled {
         unsafe { id(self.raw(), kind, name) }
     }
 
-    /// Indices of the first position and the first degree of freedom of the joint called `name`.
+    /// Indices of the first position and the first degree of freedom of the joint called `name`; `None` if there is no
+    /// such joint.
     pub fn joint_address(&self, name: &str) -> Option<(usize, usize)> {
         let joint = self.id(ObjectKind::Joint, name)?;
         // SAFETY: the model is alive and nothing writes to it while `self` is borrowed.

@@ -1,4 +1,4 @@
-//! Comparison of the `<option>` settings of two models.
+//! Settings of `<option>` of a model, and their comparison for two models.
 
 use super::model::Model;
 use mujoco_sys as mj;
@@ -6,7 +6,7 @@ use mujoco_sys as mj;
 /// A global setting that differs between two models.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OptionDifference {
-    /// MJCF name of the setting: an attribute of `<option>`, or one of its `<flag>`.
+    /// MJCF name of the setting: an attribute of `<option>`, or `flag NAME` for an attribute of its `<flag>`.
     pub name: &'static str,
     /// Value in the first model.
     pub first: String,
@@ -72,7 +72,8 @@ const ENABLED: &[(u32, &str)] = &[
 ];
 
 impl Model {
-    /// Names of all `<option>` settings and their values as text.
+    /// Names and values (as text) of the `<option>` settings that affect a step. Not included are the flags `autoreset`
+    /// and `island` and, on 4.x, `sdf_iterations`, `sdf_initpoints` and `sleep_tolerance`.
     pub fn options(&self) -> Vec<(&'static str, String)> {
         let opt = &self.header().opt;
         let integrators = [
@@ -126,7 +127,7 @@ impl Model {
         options
     }
 
-    /// Settings of `<option>` that differ from those of `other`.
+    /// Settings of [`options`](Self::options) that differ from those of `other`; `first` is the value in this model.
     pub fn option_differences(&self, other: &Self) -> Vec<OptionDifference> {
         let pairs = self.options().into_iter().zip(other.options());
         pairs

@@ -47,7 +47,8 @@ fn prefetch_bytes(start: *const u8, bytes: usize, level: CacheLevel) {
     let _ = (start, bytes, level);
 }
 
-/// Prefetches the memory of `values`, which should be a short slice.
+/// Prefetches the memory of `values`, which should be a short slice, without waiting for it. Has no effect on
+/// processors other than x86-64.
 pub fn prefetch<T>(values: &[T]) {
     prefetch_bytes(values.as_ptr().cast(), size_of_val(values), CacheLevel::First);
 }
@@ -93,7 +94,8 @@ impl Data {
         );
     }
 
-    /// Prefetches the same memory as [`prefetch`](Self::prefetch), and the state and working memory.
+    /// Prefetches the same memory as [`prefetch`](Self::prefetch), the first 32 KiB of the arrays and the first 8 KiB
+    /// of the arena (2.2.2: stack).
     pub fn prefetch_arrays(&self) {
         self.prefetch();
         let places = self.prefetch_addresses();

@@ -8,8 +8,7 @@ use mujoco_sys as mj;
 impl Data {
     /// Calls `call` with the raw model and data, for the C functions that are declared in [`sys`](crate::sys).
     ///
-    /// An error inside MuJoCo (`mju_error`) ends `call` and becomes an `Err`. The data are then incomplete until the
-    /// next forward pass or reset.
+    /// An error inside MuJoCo (`mju_error`) ends `call` and becomes an `Err`. The data must then be reset or dropped.
     ///
     /// # Errors
     /// MuJoCo's engine stopped.

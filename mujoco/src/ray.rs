@@ -8,18 +8,18 @@ use mujoco_sys as mj;
 /// Intersection of a ray with a geom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// Distance along the ray, in multiples of its direction.
+    /// Distance along the ray, in multiples of the length of its direction.
     pub distance: f64,
     /// Index of the geom.
     pub geom: usize,
 }
 
 impl Data {
-    /// Returns the nearest intersection of a ray with a geom (`mj_ray`).
+    /// Returns the nearest intersection of a ray with a geom (`mj_ray`); `None` if the ray hits nothing.
     ///
-    /// Bit k of `groups` includes the geoms of group k. Planes are hit from the front only, triangles from both sides,
-    /// and fully transparent geoms never. Origin and direction are in the world frame \[m\]. Poses are those of the
-    /// last forward pass.
+    /// Bit k of `groups` includes the geoms of group k (0 to 5), also those that are fixed to the world. Planes are hit
+    /// from the front only, triangles from both sides, and fully transparent geoms never. Origin and direction are in
+    /// the world frame \[m\]. Poses are those of the last forward pass.
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
@@ -42,11 +42,11 @@ impl Data {
 
     /// Computes the nearest intersections of rays from one point (`mj_multiRay`), by the rules of [`ray`](Self::ray).
     ///
-    /// `distances` receives distances in multiples of the rays' directions, -1 for a ray without a hit. MuJoCo culls
-    /// geoms for all rays at once.
+    /// `distances` receives distances in multiples of the lengths of the directions, -1 for a ray without a hit. MuJoCo
+    /// culls geoms for all rays at once.
     ///
     /// # Errors
-    /// MuJoCo's engine stopped, or is of a version without `mj_multiRay`.
+    /// MuJoCo's engine stopped. On 2.2.2, which has no `mj_multiRay`, always.
     ///
     /// # Panics
     /// `directions` and `distances` have different lengths.

@@ -7,7 +7,7 @@ use mujoco_sys::fields::model as fields;
 /// A skin: a mesh whose vertices follow bodies.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinArrays<'a> {
-    /// Material, -1 for none.
+    /// Index of the material; -1 without a material.
     pub material: i32,
     /// Group; viewers show 0 to 2.
     pub group: i32,
@@ -19,7 +19,7 @@ pub struct SkinArrays<'a> {
     pub positions: &'a [[f32; 3]],
     /// Texture coordinates of vertices, with v downward; empty for a skin without texture coordinates.
     pub texcoords: &'a [[f32; 2]],
-    /// Vertex indices of each triangle.
+    /// Vertices of each triangle, as indices in [`positions`](Self::positions).
     pub faces: &'a [[i32; 3]],
     bones: [usize; 2],
     first_vertices: &'a [i32],
@@ -34,13 +34,13 @@ pub struct SkinArrays<'a> {
 /// A body that moves vertices of a skin.
 #[derive(Clone, Copy, Debug)]
 pub struct Bone<'a> {
-    /// The body.
+    /// Index of the body.
     pub body: usize,
-    /// Position of the body in the bind pose \[m\].
+    /// Position of the body in the bind pose, in the world frame \[m\].
     pub position: [f32; 3],
-    /// Orientation of the body in the bind pose, wxyz.
+    /// Orientation of the body in the bind pose, in the world frame, wxyz.
     pub orientation: [f32; 4],
-    /// Indices of the vertices that the body moves.
+    /// Vertices that the body moves, as indices within the skin.
     pub vertices: &'a [i32],
     /// The weight of the body for each of these vertices.
     pub weights: &'a [f32],
@@ -68,7 +68,7 @@ impl<'a> SkinArrays<'a> {
 pub struct FlexArrays<'a> {
     /// Number of dimensions: 1 for cables, 2 for cloth, 3 for solids.
     pub dimensions: usize,
-    /// Material, -1 for none.
+    /// Index of the material; -1 without a material.
     pub material: i32,
     /// Group; viewers show 0 to 2.
     pub group: i32,
@@ -82,15 +82,16 @@ pub struct FlexArrays<'a> {
     pub first_vertex: usize,
     /// Number of vertices.
     pub vertices: usize,
-    /// Vertex indices of the elements, `dimensions` + 1 for each.
+    /// Vertices of the elements, `dimensions` + 1 for each, as indices within the flex.
     pub elements: &'a [i32],
-    /// Vertex indices of the boundary elements, `dimensions` for each.
+    /// Vertices of the boundary elements, `dimensions` for each, as indices within the flex.
     pub shell: &'a [i32],
     /// Texture coordinates, with v downward; empty for a flex without texture coordinates.
     pub texcoords: &'a [[f32; 2]],
-    /// Indices of the texture coordinates of the elements' vertices, in the layout of [`elements`](Self::elements).
+    /// Texture coordinates of the elements' vertices, as indices in [`texcoords`](Self::texcoords), in the layout of
+    /// [`elements`](Self::elements).
     pub element_texcoords: &'a [i32],
-    /// Vertex indices of each edge.
+    /// Vertices of each edge, as indices within the flex.
     pub edges: &'a [[i32; 2]],
 }
 
@@ -132,7 +133,7 @@ impl Model {
         }
     }
 
-    /// True if the stiffness or the damping of a tendon has terms of higher order (4.x).
+    /// True if the stiffness or the damping of a tendon has terms of higher order (4.x); false on 2.2.2.
     ///
     /// # Panics
     /// There is no such tendon.
@@ -143,13 +144,13 @@ impl Model {
         of(array!(self, tendon_stiffnesspoly)) || of(array!(self, tendon_dampingpoly))
     }
 
-    /// True if the stiffness or the damping of a tendon has terms of higher order (4.x).
+    /// True if the stiffness or the damping of a tendon has terms of higher order (4.x); false on 2.2.2.
     #[cfg(not(mj4))]
     pub fn tendon_has_nonlinear_terms(&self, _tendon: usize) -> bool {
         false
     }
 
-    /// True if gravity is nonzero and enabled.
+    /// True if gravity is nonzero and not disabled by the flag `gravity`.
     pub fn has_gravity(&self) -> bool {
         let disabled = self.header().opt.disableflags as u32 & mujoco_sys::mjDSBL_GRAVITY;
         disabled == 0 && self.gravity().iter().map(|g| g * g).sum::<f64>().sqrt() > 1e-15

@@ -28,7 +28,8 @@ struct UnnormalizedQuat {
     value: [f64; 4],
 }
 
-/// Inputs that a user sets and a step only reads: controls, applied forces, mocap poses, user data.
+/// Inputs that a user sets and a step only reads: controls, applied forces, mocap poses, user data, and active flags of
+/// equalities (4.x).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UserInputs {
     values: Vec<f64>,
@@ -85,7 +86,7 @@ impl IntegrationState {
         self.save_arrays(data);
     }
 
-    /// Resets the quaternions to their values before the forward pass of the saved data.
+    /// Sets the quaternions of this state to the values in `raw`, those before the forward pass of the saved data.
     pub fn undo_normalization(&mut self, raw: &UnnormalizedQuats) {
         for quat in raw.iter() {
             let first = 1 + quat.address;
@@ -113,7 +114,8 @@ impl IntegrationState {
         Self { values }
     }
 
-    /// Copies the state into `data`, which must have the same model. Its buffers may be larger.
+    /// Copies the state into `data`, whose model must have the same sizes; other sizes panic. Its buffers may be
+    /// larger. Derived quantities are not updated.
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
             data.set_time(time);
@@ -123,7 +125,7 @@ impl IntegrationState {
 }
 
 impl UnnormalizedQuats {
-    /// Allocates storage for the quaternions that a forward pass over `model` normalizes.
+    /// Allocates storage for the quaternions that a forward pass over `model` normalizes; nothing to store on 4.x.
     pub fn new(model: &Model) -> Self {
         if cfg!(mj4) {
             return Self::default();
@@ -161,7 +163,7 @@ impl UnnormalizedQuats {
 }
 
 impl UserInputs {
-    /// All numbers, and the active flags of equalities (4.x; empty on 2.2.2).
+    /// All numbers, and the active flags of equalities (empty on 2.2.2).
     pub fn values(&self) -> (&[f64], &[bool]) {
         #[cfg(mj4)]
         let active = &self.active[..];
@@ -194,7 +196,8 @@ impl UserInputs {
         }
     }
 
-    /// Copies the inputs into `data`, which must have the same model. Its buffers may be larger.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Its buffers may be larger. Inputs of other
+    /// sizes, or inputs that were never saved, panic.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]

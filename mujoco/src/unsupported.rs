@@ -7,7 +7,7 @@ use super::model::Model;
 pub struct UnsupportedFeature {
     /// MJCF name of the element.
     pub element: &'static str,
-    /// Index of the element among those of its kind.
+    /// Index of the element among those of its kind; 0 for `flex` and `plugin`.
     pub index: usize,
     /// Name or description of the feature, for error messages.
     pub feature: &'static str,
@@ -91,7 +91,8 @@ impl Model {
         None
     }
 
-    /// Returns a feature of a sensor that 2.2.2 lacks and that cannot be written back as MJCF, if any.
+    /// Returns the name of a feature of a sensor that 2.2.2 lacks and that cannot be written back as MJCF, if any;
+    /// `None` on 2.2.2.
     ///
     /// # Panics
     /// There is no such sensor.
@@ -129,7 +130,7 @@ impl Model {
         }
     }
 
-    /// Gravity compensation of a body (4.x): 1 cancels gravity; 0 on 2.2.2.
+    /// Gravity compensation of a body (4.x), as a fraction of its weight: 1 cancels gravity; 0 on 2.2.2.
     ///
     /// # Panics
     /// There is no such body.
@@ -147,7 +148,7 @@ impl Model {
         }
     }
 
-    /// Range of the total actuator force on a joint \[N m or N\], if limited (4.x).
+    /// Range of the total actuator force on a joint \[N m or N\]; `None` without a limit and on 2.2.2.
     ///
     /// # Panics
     /// There is no such joint.
@@ -167,7 +168,7 @@ impl Model {
         }
     }
 
-    /// Range of the total actuator force on a tendon \[N\], if limited (4.x).
+    /// Range of the total actuator force on a tendon \[N\]; `None` without a limit and on 2.2.2.
     ///
     /// # Panics
     /// There is no such tendon.

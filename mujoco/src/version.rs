@@ -28,7 +28,7 @@ pub const BUILD_VERSION: SupportedVersion = SupportedVersion::V4;
 pub struct VersionError {
     /// Version of the headers.
     pub headers: String,
-    /// Version the library reports.
+    /// Version that the loaded library reports.
     pub library: String,
 }
 

@@ -56,7 +56,7 @@ impl Model {
         }
     }
 
-    /// Pairs of bodies that are excluded from collisions.
+    /// Pairs of bodies whose collisions the MJCF excludes (`<exclude>`), as body indices; 0 is the world.
     pub fn excluded_bodies(&self) -> impl Iterator<Item = [usize; 2]> {
         // The upper half of a signature is the first body, the lower half the second. 2.2.2 counts bodies from 1.
         let first = u32::from(cfg!(not(mj4)));
@@ -65,7 +65,7 @@ impl Model {
         self.exclude_signature().iter().map(halves).map(move |(one, other)| [body(one), body(other)])
     }
 
-    /// True if an equality constraint is active in the initial state.
+    /// True if an equality constraint is active in the initial state of this model.
     ///
     /// # Panics
     /// There is no such equality.
@@ -79,7 +79,7 @@ impl Model {
         super::arrays::is_set(active[equality])
     }
 
-    /// True if an equality of bodies couples sites (4.x); false on 2.2.2.
+    /// True if a connect or weld equality couples sites instead of bodies (4.x); false on 2.2.2.
     ///
     /// # Panics
     /// There is no such equality.

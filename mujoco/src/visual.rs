@@ -9,17 +9,18 @@ use mujoco_sys::fields::model as fields;
 /// A compiled mesh. Triangle corners have separate indices of positions, normals and texture coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshArrays<'a> {
-    /// Vertices in the geom's frame \[m\].
+    /// Vertices in the frame of a geom with this mesh \[m\]; MuJoCo's compiler aligns this frame with the center of
+    /// mass and the principal axes of the mesh.
     pub positions: &'a [[f32; 3]],
     /// Unit normals: those of the file, or computed by MuJoCo.
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates, with v downward, if the mesh has any.
     pub texcoords: Option<&'a [[f32; 2]]>,
-    /// Vertex indices of each triangle.
+    /// Indices in [`positions`](Self::positions) of each triangle's corners.
     pub faces: &'a [[i32; 3]],
-    /// Normal indices of each triangle's corners.
+    /// Indices in [`normals`](Self::normals) of each triangle's corners.
     pub face_normals: &'a [[i32; 3]],
-    /// Texture-coordinate indices of each triangle's corners.
+    /// Indices in [`texcoords`](Self::texcoords) of each triangle's corners.
     pub face_texcoords: &'a [[i32; 3]],
 }
 
@@ -32,16 +33,16 @@ pub struct HeightFieldArrays<'a> {
     pub rows: usize,
     /// Number of columns, along x.
     pub columns: usize,
-    /// Elevation in 0..=1, row by row.
+    /// Elevation in 0..=1, row by row: the first row is at the lowest y, each row begins at the lowest x.
     pub elevation: &'a [f32],
 }
 
-/// Mapping of a texture.
+/// Type of a texture: its mapping onto surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureType {
     /// Mapped by texture coordinates.
     TwoD,
-    /// Mapped onto a cube around the shape: six square images, one below the other.
+    /// Mapped onto a cube around the shape: six square images, one below the other, or one square image for all sides.
     Cube,
     /// Mapped onto the sky, with the layout of a cube.
     Skybox,
@@ -50,7 +51,7 @@ pub enum TextureType {
 /// A texture image.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureArrays<'a> {
-    /// Mapping of the texture.
+    /// Type of the texture: 2D, cube or skybox.
     pub kind: TextureType,
     /// Width \[pixels\].
     pub width: usize,
@@ -67,7 +68,7 @@ pub struct TextureArrays<'a> {
 pub struct MaterialValues {
     /// Color and opacity, 0..=1.
     pub rgba: [f32; 4],
-    /// Index of the color texture.
+    /// Index of the color texture; `None` without one.
     pub texture: Option<usize>,
     /// Number of repetitions of the texture along its two axes.
     pub tex_repeat: [f32; 2],
@@ -113,7 +114,7 @@ pub struct LightValues {
     pub attenuation: [f32; 3],
     /// Half angle of a spot's cone \[deg\].
     pub cutoff_deg: f32,
-    /// Exponent of a spotlight's falloff from its axis.
+    /// Exponent of a spotlight's falloff from its axis: 0 gives uniform light in the cone.
     pub exponent: f32,
     /// Ambient color.
     pub ambient: [f32; 3],
@@ -188,12 +189,13 @@ impl Model {
         self.header().ncam as usize
     }
 
-    /// Extent of the model \[m\]. Distances of the default camera and its clipping planes are multiples of it.
+    /// Extent of the model \[m\] (`stat.extent`). Distances of the default camera and its clipping planes are multiples
+    /// of it.
     pub fn extent(&self) -> f64 {
         self.header().stat.extent
     }
 
-    /// Center of the model \[m\].
+    /// Center of the model in the world frame \[m\] (`stat.center`).
     pub fn center(&self) -> [f64; 3] {
         self.header().stat.center
     }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Weld to activate with [`Model::with_welds`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weld {
-    /// Index of the equality.
+    /// Index of the equality constraint in the model (MuJoCo's eq id).
     pub equality: usize,
     /// Pose of the second body in the frame of the first: x, y, z \[m\], unit quaternion w, x, y, z.
     pub pose: [f64; 7],
@@ -28,7 +28,8 @@ impl Model {
         self.eq_type().get(index).is_some_and(|&kind| kind as u32 == mj::mjEQ_WELD)
     }
 
-    /// Returns the model with these welds active, besides those that are active from the start.
+    /// Returns the model with these welds active, besides those that are active from the start. Welds of an earlier
+    /// call end. If a weld is listed twice, the last pose counts.
     ///
     /// On 4.x, the active flags are in the data: call [`Data::set_equality_active`] too.
     ///

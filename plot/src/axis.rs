@@ -15,8 +15,8 @@ pub(super) struct Axis {
 const TICK_SPACING: f64 = 80.0;
 
 impl Axis {
-    /// Creates an axis that shows all `values` with a margin, from pixel `pixel_range[0]` to pixel `pixel_range[1]`. The values of a
-    /// logarithmic axis must be above 0.
+    /// Creates an axis that shows all `values` with a margin, from pixel `pixel_range[0]` to pixel `pixel_range[1]`.
+    /// Values of a logarithmic axis must be above 0. Without values, the range is about 0 to 1.
     pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, pixel_range: [f64; 2]) -> Self {
         let values = values.map(|x| if log { x.log10() } else { x });
         let (mut low, mut high) = values.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));

@@ -1,7 +1,7 @@
 //! Reduction of curves with far more points than pixels.
 
-/// Keeps the first, lowest, highest and last of the consecutive points in each column of pixels. The line covers the
-/// same pixels. Source: Jugel et al., "M4: A Visualization-Oriented Time Series Data Aggregation", VLDB 2014.
+/// Keeps the first, lowest, highest and last of consecutive points \[pixels\] in each column of pixels. The line covers
+/// the same pixels. Source: Jugel et al., "M4: A Visualization-Oriented Time Series Data Aggregation", VLDB 2014.
 pub(super) fn decimate_m4(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut out: Vec<[f64; 2]> = Vec::new();
     for run in points.chunk_by(|a, b| a[0].floor() == b[0].floor()) {

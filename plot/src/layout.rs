@@ -11,13 +11,13 @@ pub struct PlotLayout {
     pub size: [usize; 2],
     /// Left, top, right and bottom of the frame.
     pub frame: [f64; 4],
-    /// Lines of the grid.
+    /// Lines of the grid, each from one end to the other.
     pub grid: Vec<[[f64; 2]; 2]>,
     /// All texts: tick labels, title, axis labels and legend.
     pub labels: Vec<Label>,
-    /// The curves.
+    /// The curves, one for each series, in the same order.
     pub curves: Vec<Curve>,
-    /// Line samples of the legend, with their colors.
+    /// Line samples of the legend, with their colors; fewer than the curves if the legend has no room.
     pub legend_lines: Vec<([[f64; 2]; 2], [u8; 3])>,
 }
 
@@ -26,7 +26,7 @@ pub struct PlotLayout {
 pub struct Label {
     /// The text.
     pub text: String,
-    /// A point on the baseline of the text.
+    /// A point on the baseline of the text \[pixels\].
     pub at: [f64; 2],
     /// Horizontal alignment of the text at that point.
     pub anchor: Anchor,
@@ -48,9 +48,10 @@ pub enum Anchor {
 pub struct Curve {
     /// Color as red, green, blue.
     pub color: [u8; 3],
-    /// Points of each polyline \[pixels\].
+    /// Points of each polyline \[pixels\], reduced to those that differ in the image. A polyline of one point is drawn
+    /// as a dot.
     pub polylines: Vec<Vec<[f64; 2]>>,
-    /// Positions of the markers.
+    /// Positions of the markers \[pixels\]; empty without [`Plot::markers`].
     pub markers: Vec<[f64; 2]>,
 }
 

@@ -51,9 +51,10 @@ pub struct Plot {
     pub title: String,
     /// Labels of the horizontal and the vertical axis, with units.
     pub axis_labels: [String; 2],
-    /// True for two logarithmic axes.
+    /// True if both axes are logarithmic.
     pub log_axes: bool,
-    /// True for a marker at each point.
+    /// True for markers at the points. Of consecutive points in one column of pixels, only the first, lowest, highest
+    /// and last have markers.
     pub markers: bool,
     /// The curves.
     pub series: Vec<Series>,
@@ -112,7 +113,7 @@ impl Plot {
         self
     }
 
-    /// Returns the plot as SVG text.
+    /// Returns the plot as an SVG document.
     ///
     /// # Errors
     /// The width or the height is below 200 or above 16384 pixels.

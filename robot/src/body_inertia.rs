@@ -17,13 +17,15 @@ const MASSLESS_MOMENT: f64 = 1e-9;
 /// Links joined by fixed joints, which move as one rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidBody {
-    /// Links of the body and their poses in the frame of the first link.
+    /// Links of the body and their poses in the frame of the first link, which is the root link or the child of a
+    /// moving joint.
     pub links: Vec<(LinkId, Pose)>,
-    /// False only for the body of the root link of a robot with a fixed base.
+    /// False only for the body of the root link if the base is fixed.
     pub moves: bool,
 }
 
-/// Groups the links of a robot into rigid bodies. The body of the root link comes first.
+/// Groups the links of a robot into rigid bodies. `floating_base` is true if the root link moves. The body of the root
+/// link comes first.
 pub fn rigid_bodies(description: &RobotDescription, floating_base: bool) -> Vec<RigidBody> {
     let mut bodies = vec![RigidBody { links: vec![(description.root, Pose::identity())], moves: floating_base }];
     let mut next = 0;
@@ -45,10 +47,10 @@ pub fn rigid_bodies(description: &RobotDescription, floating_base: bool) -> Vec<
     bodies
 }
 
-/// Mass properties of a body as written to the MJCF.
+/// Mass properties of a rigid body as written to the MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyInertia {
-    /// Mass properties in the body frame, repaired where they are physically impossible.
+    /// Mass properties in the frame of the first link of the body, repaired where they are physically impossible.
     pub inertia: RigidInertia,
     /// Location of the first `<inertial>` of the body; `None` where no link has one.
     pub source: Option<SourceLocation>,
@@ -56,8 +58,8 @@ pub struct BodyInertia {
 
 /// Combines the mass properties of the links of a body.
 ///
-/// Adds a warning for each link whose own inertia is physically impossible, and for a moving body without mass. Returns
-/// `None` for a massless body that does not move.
+/// Adds a warning for each link whose own inertia is physically impossible, and for a moving body without mass, which
+/// gets 1e-6 kg and 1e-9 kg m². Returns `None` for a massless body that does not move.
 pub fn fuse(
     description: &RobotDescription,
     body: &RigidBody,

@@ -1,4 +1,5 @@
-//! Robot description: the merged links and joints as the files define them, before any repair for MuJoCo.
+//! Robot description: the merged links and joints as the files define them.
+//! [`complete`](crate::shape_inertia::complete) adds missing mass properties; all other repairs for MuJoCo come later.
 //!
 //! The URDF and MJCF readers build it (`urdf::merge`, and `mjcf::robot_file` of the simulation crate). Dynamics,
 //! kinematics, the MJCF writer and the drives read it. Names are unique, elements keep the order of the files, and each
@@ -22,10 +23,11 @@ pub struct JointId(pub usize);
 pub struct RobotDescription {
     /// Name of the robot.
     pub name: String,
-    /// All links. `links[root.0]` is the only link without a parent joint. [Auxiliary frames](Link::is_auxiliary_frame)
-    /// come last.
+    /// All links; [`root`](Self::root) is the only one without a parent joint. [Auxiliary
+    /// frames](Link::is_auxiliary_frame) come last.
     pub links: Vec<Link>,
-    /// All joints, fixed ones included, in the order of the merged files.
+    /// All joints, fixed ones included. Joints of URDF files have the order of the files; a joint that connects two
+    /// components precedes the joints of the attached component.
     pub joints: Vec<Joint>,
     /// Root link of the tree.
     pub root: LinkId,
@@ -36,13 +38,16 @@ pub struct RobotDescription {
 pub struct Link {
     /// Unique name.
     pub name: String,
-    /// Location of the link in its file.
+    /// Location of the link element (URDF), or of the body, site or joint that the link stands for (MJCF).
     pub source: SourceLocation,
-    /// Component of the robot that the link comes from (`arm`, `hand`, ...).
+    /// Component of the robot that the link comes from (`arm`, `hand`, ...). It is empty for an added base link, and
+    /// the name of the robot in a robot from MJCF.
     pub component: String,
-    /// Mass properties; `None` where the file has no `<inertial>`.
+    /// Mass properties; `None` for a link without any. For a URDF they are those of `<inertial>`, completed or replaced
+    /// by [`complete`](crate::shape_inertia::complete); for an MJCF file, those of the compiled body.
     pub inertial: Option<Inertial>,
-    /// Mass properties of an incomplete `<inertial>`. `inertial` stays `None` until the shapes supply the rest.
+    /// Mass properties of an incomplete `<inertial>`; `inertial` is `None` then.
+    /// [`complete`](crate::shape_inertia::complete) takes this value and sets `inertial`.
     pub partial_inertial: Option<PartialInertial>,
     /// Visual shapes.
     pub visuals: Vec<Visual>,
@@ -52,15 +57,16 @@ pub struct Link {
     pub parent_joint: Option<JointId>,
     /// Joints whose parent this link is, in file order.
     pub child_joints: Vec<JointId>,
-    /// True for an auxiliary frame between two joints of one body, as MJCF has them. Such a link has no mass, no shape
-    /// and no body of its own in MuJoCo, and lists of links for users omit it.
+    /// True for an auxiliary frame of an MJCF body that has several joints, or a joint whose anchor is not at the
+    /// origin of the body. An auxiliary frame has no mass, no shape and no body in MuJoCo. Lists of links for users
+    /// omit it.
     pub is_auxiliary_frame: bool,
 }
 
-/// Mass properties of a link as the file gives them.
+/// Mass properties of a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
-    /// Location of the `<inertial>` element.
+    /// Location of the `<inertial>` element; that of the link (URDF) or body (MJCF) if the values are computed.
     pub source: SourceLocation,
     /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Pose,
@@ -94,7 +100,7 @@ pub struct Visual {
     pub link_from_shape: Pose,
     /// Shape and size.
     pub geometry: Geometry,
-    /// Material; `None` where the file gives no material.
+    /// Material; `None` if the `<visual>` has no `<material>`.
     pub material: Option<Material>,
 }
 
@@ -147,14 +153,14 @@ pub enum Geometry {
     },
 }
 
-/// Material of a visual.
+/// Material of a visual. Values that the `<visual>` does not give are those of the named material of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the file, if any.
     pub name: Option<String>,
-    /// Linear RGBA in 0..=1; `None` where the file gives no color.
+    /// RGBA in 0..=1, a display color (sRGB); `None` where the file gives no color.
     pub rgba: Option<[f64; 4]>,
-    /// Resolved path of the texture file.
+    /// Resolved path of the texture file; `None` without a texture or if the file does not exist.
     pub texture: Option<PathBuf>,
 }
 
@@ -173,67 +179,68 @@ pub struct Joint {
     pub child: LinkId,
     /// Pose of the joint frame (= child link frame at zero) in the parent link frame.
     pub parent_from_joint: Pose,
-    /// Unit axis in the joint frame; x where the file has no `<axis>`.
+    /// Unit axis in the joint frame. It is x for fixed and floating joints, and where a URDF has no `<axis>`.
     pub axis: Unit<Vector3<f64>>,
-    /// Limits; `None` where the file has no `<limit>`.
+    /// Limits; `None` where a URDF has no `<limit>`, and for an MJCF joint without a range and a force limit.
     pub limit: Option<JointLimit>,
     /// Passive viscous damping \[N m s/rad or N s/m\]; `None` where the file gives no value.
     pub damping: Option<f64>,
     /// Dry friction \[N m or N\]; `None` where the file gives no value.
     pub friction: Option<f64>,
-    /// Mimic coupling to another joint.
+    /// Linear coupling to another joint. `None` for other couplings of MJCF files; see [`FileActuation::Coupled`].
     pub mimic: Option<Mimic>,
-    /// Joint properties that only MJCF has; `None` for joints of a URDF file.
+    /// Joint properties that only MJCF has; `None` for joints of a URDF file and for fixed joints.
     pub defaults: Option<JointDefaults>,
 }
 
-/// Joint properties that MJCF has and URDF lacks. They apply where the robot configuration sets nothing else.
+/// Joint properties that MJCF has and URDF lacks: defaults for values that the robot configuration does not set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointDefaults {
     /// Rotor inertia \[kg m² or kg\].
     pub armature: f64,
-    /// Initial position \[rad or m\].
+    /// Initial position \[rad or m\] (`ref`, MuJoCo's `qpos0`).
     pub position: f64,
-    /// Actuation of the joint in the file.
+    /// Actuation of the joint in the file. A drive replaces it.
     pub drive: FileActuation,
 }
 
-/// Actuation of a joint as a file defines it.
+/// Actuation of a joint as an MJCF file defines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FileActuation {
     /// The file has no actuators at all.
     Unspecified,
     /// The file has actuators, but no actuator acts on this joint.
     Passive,
-    /// Actuated by an effort. The file gives no gains.
+    /// Actuated without stiffness and damping: the control is an effort.
     Effort,
-    /// Actuated by position or velocity actuators.
+    /// Actuated by position or velocity actuators. Gains of several actuators on the joint are added.
     Servo {
         /// Stiffness \[N m/rad or N/m\].
         stiffness: f64,
         /// Damping \[N m s/rad or N s/m\].
         damping: f64,
     },
-    /// Positioned by a coupling that is not a mimic, so the joint must not be driven. The curve is `None` where several
-    /// couplings act on the joint, or where the couplings form a cycle.
+    /// Positioned by a joint equality that is not a [`Mimic`], so the joint must not be driven. The polynomial is
+    /// `None` if several equalities act on the joint, or if the couplings form a cycle.
     Coupled(Option<CouplingPolynomial>),
 }
 
-/// Polynomial coupling of a joint to another joint: `position = start + Σ coefficients[k] (position(joint) - at)ᵏ`.
+/// Polynomial coupling of a joint to another joint with the position x:
+/// `position = follower_start + Σ coefficients[k] (x - driver_start)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingPolynomial {
-    /// Followed joint; `None` for the constant position `start + coefficients[0]`.
+    /// Followed joint; `None` for the constant position `follower_start + coefficients[0]`.
     pub joint: Option<JointId>,
-    /// Initial position of the followed joint \[rad or m\].
+    /// Position of the followed joint \[rad or m\] in MuJoCo's `qpos0`; 0 without a followed joint.
     pub driver_start: f64,
-    /// Initial position of the following joint \[rad or m\].
+    /// Position of the following joint \[rad or m\] in MuJoCo's `qpos0`.
     pub follower_start: f64,
     /// Coefficients in ascending order, the constant first.
     pub coefficients: [f64; 5],
 }
 
 impl CouplingPolynomial {
-    /// Position of the following joint where the followed joint is at `driver` \[rad or m\].
+    /// Position of the following joint \[rad or m\] for the position `driver` of the followed joint.
     pub fn position(&self, driver: f64) -> f64 {
         let by = driver - self.driver_start;
         self.follower_start + self.coefficients.iter().rev().fold(0.0, |sum, c| sum * by + c)
@@ -245,11 +252,11 @@ impl CouplingPolynomial {
 pub enum JointKind {
     /// No motion.
     Fixed,
-    /// Rotation about the axis, limited.
+    /// Rotation about the axis with limits; the limits may be missing or invalid ([`Joint::limit`]).
     Revolute,
-    /// Rotation about the axis, unlimited.
+    /// Rotation about the axis without limits; position limits of the file are ignored.
     Continuous,
-    /// Translation along the axis, limited.
+    /// Translation along the axis; without limits for an MJCF slide without a range.
     Prismatic,
     /// Six degrees of freedom.
     Floating,
@@ -276,18 +283,20 @@ impl JointKind {
     }
 }
 
-/// Limits of a joint as the file gives them; `None` where the file has no value.
+/// Limits of a joint as the file gives them; `None` where the file has no value. Both position limits are `None` if the
+/// lower one exceeds the upper one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimit {
     /// Location of the declaration.
     pub source: SourceLocation,
-    /// Lower position \[rad or m\].
+    /// Lower position \[rad or m\]. If only the upper one is given, drives use 0, the default of URDF.
     pub lower: Option<f64>,
-    /// Upper position \[rad or m\].
+    /// Upper position \[rad or m\]. If only the lower one is given, drives use 0, the default of URDF.
     pub upper: Option<f64>,
-    /// Largest effort \[N m or N\].
+    /// Largest effort \[N m or N\]. Drives treat 0 as unlimited.
     pub effort: Option<f64>,
-    /// Largest speed \[rad/s or m/s\]; reported, not enforced.
+    /// Largest speed \[rad/s or m/s\]. It does not limit the motion; actuator models may use it, such as `DcMotor` as
+    /// the no-load speed.
     pub velocity: Option<f64>,
 }
 
@@ -296,9 +305,10 @@ pub struct JointLimit {
 pub struct Mimic {
     /// Location of the declaration.
     pub source: SourceLocation,
-    /// Followed joint as the file names it. It may itself follow another joint.
+    /// Followed joint. It may follow another joint itself; [`mimic_driver`](RobotDescription::mimic_driver) resolves
+    /// such chains.
     pub joint: JointId,
-    /// Ratio.
+    /// Factor of the position of the followed joint; negative for opposite directions.
     pub multiplier: f64,
     /// Offset \[rad or m\].
     pub offset: f64,
@@ -323,7 +333,8 @@ impl Link {
 }
 
 impl RobotDescription {
-    /// Links shown to users, indexed by [`LinkId`]: all links except the auxiliary frames between joints.
+    /// All links except [auxiliary frames](Link::is_auxiliary_frame), indexed by [`LinkId`]. Users see only these
+    /// links.
     pub fn named_links(&self) -> &[Link] {
         let named = self.links.iter().position(|link| link.is_auxiliary_frame).unwrap_or(self.links.len());
         &self.links[..named]
@@ -357,18 +368,20 @@ impl RobotDescription {
         &self.joints[id.0]
     }
 
-    /// Revolute, continuous and prismatic joints in file order, mimic ones included: the columns of `qpos`.
+    /// Revolute, continuous and prismatic joints in the order of [`joints`](Self::joints), mimic joints included: the
+    /// columns of `qpos` of the robot.
     pub fn drivable_joints(&self) -> impl Iterator<Item = (JointId, &Joint)> {
         self.joints.iter().enumerate().filter(|(_, j)| j.kind.is_drivable()).map(|(i, j)| (JointId(i), j))
     }
 
-    /// Sum of the link masses \[kg\].
+    /// Sum of the link masses \[kg\]. Links without mass properties count as 0.
     pub fn total_mass(&self) -> f64 {
         self.links.iter().filter_map(|l| l.inertial.as_ref()).map(|i| i.mass).sum()
     }
 
-    /// Resolves a chain of mimic joints to its driver, with the composed ratio and offset:
-    /// `position(id) = multiplier * position(driver) + offset`. A joint without a mimic returns itself, 1 and 0.
+    /// Resolves a chain of mimic joints to its end. Returns driver, multiplier and offset:
+    /// `position(id) = multiplier * position(driver) + offset`. For a joint without a mimic, these are the joint
+    /// itself, 1 and 0.
     ///
     /// Mimic chains are free of cycles: `urdf::merge` rejects cycles, and `mjcf::robot_file` creates none.
     ///

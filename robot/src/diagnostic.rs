@@ -8,17 +8,19 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum DiagnosticKind {
-    /// A physically impossible inertia tensor was repaired in the MJCF. The description keeps the values of the file.
+    /// The mass properties of a link are physically impossible. In the MJCF, its body has repaired values, or valid
+    /// ones after merging with links attached by fixed joints. The description keeps the values of the file.
     InertiaRepaired,
-    /// A moving body without mass and shapes got minimal mass properties, which MuJoCo requires. They are not part of
-    /// `total_mass`.
+    /// A moving body without mass, which also got no mass from shapes, has minimal mass properties in the MJCF, because
+    /// MuJoCo requires a mass. They are not part of `total_mass`.
     MasslessLink,
-    /// The lower limit exceeds the upper limit: the limit is ignored.
+    /// The lower position limit exceeds the upper one, where an absent one counts as 0: both are ignored.
     LimitIgnored,
-    /// The effort limit is 0 or absent: the joint's effort is not limited.
+    /// The effort limit of a URDF joint is 0 or absent: the joint's effort is not limited.
     EffortUnlimited,
-    /// The range that a mimic joint implies exceeds its own limits. The driver's usable range is the intersection.
-    /// If the intersection is less than 1 % of the range of the driver, the limits of the mimic joint are ignored.
+    /// Within the limits of its driver, a mimic joint can exceed its own limits. The target range of the driver is
+    /// narrowed so that it cannot. If less than 1 % of the driver's range would remain, the limits of the mimic joint
+    /// are ignored instead.
     MimicRangeClipped,
     /// A file named by a visual does not exist: the visual is left out.
     VisualMeshMissing,
@@ -26,27 +28,29 @@ pub enum DiagnosticKind {
     VisualMeshInvalid,
     /// The sizes and colors of an environment cannot be rendered: it is rendered with the nominal ones.
     LookInvalid,
-    /// A name was used by two components and got a prefix or suffix.
+    /// A name was already in use, in another component or by a body of the same MJCF file, and got a prefix or suffix.
     NameClash,
     /// A material is referenced but defined nowhere.
     MaterialUndefined,
     /// A texture file does not exist or cannot be read; the color is used.
     TextureMissing,
-    /// An element of the file has no meaning for the simulation and was skipped.
+    /// An element of a file is skipped, or a drive replaces it, or only a part of it is reproduced.
     ElementIgnored,
-    /// A transmission, mimic or plugin names something that does not exist.
+    /// A `<transmission>` names a joint that does not exist: it is ignored.
     ReferenceUnknown,
-    /// The native actuator drive is outside the range where it is stable.
+    /// Explicit drives (`DriveModel::Actuator` or actuator models) are unstable at the time step.
     ActuatorUnstable,
-    /// Two geoms overlap in the initial pose and were excluded from self-collision.
+    /// Two bodies of one robot overlap in the initial pose: collisions between them are disabled.
     InitialOverlap,
-    /// A clearance above the ground was requested for a robot without collision shapes.
+    /// A ground clearance was requested for a robot without collision shapes: it is ignored.
     ClearanceIgnored,
     /// The initial position was outside the limits of the joint and was moved to the nearest limit.
     InitialPositionClamped,
-    /// A coupled joint starts beyond its own limits, where the joints that it follows put it.
+    /// A mimic or coupled joint starts beyond its own limits: the start position of the joint that it follows implies
+    /// this.
     FollowerStartsBeyondLimits,
-    /// A position was given for a mimic joint whose driver puts it elsewhere.
+    /// The position given for a mimic or coupled joint differs from the one that the followed joint implies: it is
+    /// ignored.
     MimicPositionIgnored,
     /// An element that may occur once occurs again: the first one is used.
     ElementRepeated,
@@ -54,27 +58,30 @@ pub enum DiagnosticKind {
     ShapeEmpty,
     /// An XML prefix has no namespace: its elements and attributes are ignored.
     NamespaceUnbound,
-    /// A xacro element was left in a URDF: it is ignored.
+    /// A xacro element below the top level was left in a URDF: it is ignored.
     XacroLeftover,
     /// An XML declaration is not at the beginning of its file: it is ignored.
     DeclarationMisplaced,
     /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
     InertialIncomplete,
-    /// Mass properties that were missing, or impossible for the shapes, were computed from the shapes.
+    /// Mass properties that were missing, or impossible for the shapes, were computed from the shapes. Without shapes,
+    /// an incomplete `<inertial>` got the inertia of a sphere or, without a mass, was ignored.
     InertiaFromShapes,
     /// The inertia of a jointed link is that of a rigid body far larger than its shapes: it is kept.
     InertiaImplausible,
     /// A mesh scale is a single number: it applies to all three axes.
     ScaleUniform,
-    /// The URI of a mesh or texture is invalid, but its meaning is clear.
+    /// The URI of a mesh or texture has no package name (`package:///path`) but was resolved. Only the first one of a
+    /// file is reported.
     AddressRepaired,
-    /// A robot has no visual shape: images do not show it.
+    /// A robot from URDF files has no visual shape: images do not show it.
     NothingToDraw,
-    /// An axis was not of unit length and was normalized.
+    /// The length of a joint axis differed from 1 by more than 0.001: the axis was normalized.
     AxisNormalized,
     /// A color was outside 0..1 and was clamped.
     ColorClamped,
-    /// A global setting of an MJCF file differs from the scene's setting: the scene's setting applies.
+    /// A global setting of an MJCF file differs from the scene's setting: the scene's setting applies. Also reported
+    /// for friction solver parameters of joints, which implicit drives do not use.
     SettingIgnored,
     /// The mesh of an object is open, encloses no volume, or is partly inside out: its mass properties are those of its
     /// convex hull. Also reported for an open mesh that collides as convex pieces or triangles, which do not enclose
@@ -146,7 +153,7 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// Creates a warning at `source_location`.
+    /// Creates a warning; `source` is its location, or `None`.
     pub fn new(kind: DiagnosticKind, source: impl Into<Option<SourceLocation>>, message: impl Into<String>) -> Self {
         Self { kind, source: source.into(), message: message.into() }
     }
@@ -161,7 +168,7 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Number of diagnostics of each kind, by name.
+/// Number of diagnostics of each kind that occurs, by [name](DiagnosticKind::name).
 pub fn count_by_name(diagnostics: &[Diagnostic]) -> BTreeMap<&'static str, usize> {
     let mut counts = BTreeMap::new();
     for d in diagnostics {

@@ -42,7 +42,7 @@ pub struct RigidInertia {
     pub inertia: Matrix3<f64>,
 }
 
-/// Reason why MuJoCo rejects mass properties.
+/// Reason why MuJoCo rejects the mass properties of a moving body.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InertiaFault {
@@ -55,7 +55,7 @@ pub enum InertiaFault {
         /// The mass \[kg\].
         mass: f64,
     },
-    /// The tensor differs from its transpose.
+    /// The tensor differs from its transpose by more than rounding.
     #[error("the inertia tensor is not symmetric")]
     NotSymmetric,
     /// A principal moment is negative, zero, or too small for MuJoCo.

@@ -48,7 +48,8 @@ pub enum ShapeInertiaError {
     },
 }
 
-/// Convex hulls of mesh files, each computed once.
+/// Convex hulls of mesh files, each computed once. Hulls are also stored in the hull cache on disk
+/// ([`HullCache::default_location`]).
 #[derive(Debug)]
 pub struct HullSet<'c> {
     cache: HullCache,
@@ -62,7 +63,8 @@ impl<'c> HullSet<'c> {
         Self { cache: HullCache::default_location(), cfg, by_mesh: BTreeMap::new() }
     }
 
-    /// Computes the convex hull of every collision mesh of a robot.
+    /// Returns the convex hulls of all collision meshes of a robot, by file and scale. Hulls that are already in the
+    /// set are not computed again.
     ///
     /// # Errors
     /// A mesh cannot be read or has no hull.
@@ -91,7 +93,8 @@ impl<'c> HullSet<'c> {
         Ok(hulls)
     }
 
-    /// Convex hull of a mesh; `None` where the file cannot be read. Other users of the file report that error.
+    /// Convex hull of a mesh; `None` for other shapes and where the file cannot be read. Other users of the file report
+    /// that error.
     fn of_mesh(&mut self, geometry: &Geometry) -> Option<&TriMesh> {
         let Geometry::Mesh { path, scale, .. } = geometry else { return None };
         let key = MeshKey::new(path, scale);
@@ -103,7 +106,11 @@ impl<'c> HullSet<'c> {
     }
 }
 
-/// Completes the mass properties of a robot from URDF files. Adds a warning for each link that changes.
+/// Computes mass properties from shapes for a robot from URDF files: those of incomplete `<inertial>`s, and those of
+/// links of moving bodies where no link has any (see [`MissingInertia`]). Also replaces inertias of moving bodies that
+/// are impossible, or too large for the shapes of a free body. Adds a warning for each change.
+///
+/// `floating_base` is true if the root link moves.
 ///
 /// # Errors
 /// The density of the configuration is not positive and finite.
@@ -137,7 +144,7 @@ pub fn complete(
     Ok(())
 }
 
-/// Computes the mass properties of a link without `<inertial>`.
+/// Sets the mass properties of a link without `<inertial>`. A link without shapes that have a volume stays without.
 fn inertial_from_shapes(link: &mut Link, density: f64, hulls: &mut HullSet<'_>, diagnostics: &mut Vec<Diagnostic>) {
     let Some(shapes) = ShapeSolid::of(link, hulls) else { return };
     let mass = shapes.unit.mass * density;
@@ -151,7 +158,7 @@ fn inertial_from_shapes(link: &mut Link, density: f64, hulls: &mut HullSet<'_>, 
     diagnostics.push(Diagnostic::new(DiagnosticKind::InertiaFromShapes, link.source.clone(), message));
 }
 
-/// Completes an `<inertial>` that lacks its mass or its inertia.
+/// Completes an `<inertial>` that lacks its mass or its inertia, or drops it if no mass can be computed.
 fn complete_partial(
     link: &mut Link,
     missing: MissingInertia,
@@ -198,9 +205,10 @@ fn complete_partial(
 
 /// Replaces implausible inertias by those of the shapes.
 ///
-/// A physically impossible inertia is replaced where the smallest repair would leave a body that cannot be simulated
-/// (see [`MAX_GYRATION_RATIO`]). On a body that moves freely, an inertia that no body of these shapes has is replaced too. On a body
-/// behind a joint such an inertia is kept, with a warning: it may include the rotor of a gear.
+/// If the whole body is invalid, an inertia that is not positive definite is replaced. An inertia that violates the
+/// triangle inequality, or that belongs to a body that moves freely, is replaced if its radius of gyration is too large
+/// for the shapes (see [`MAX_GYRATION_RATIO`]). On a body behind a joint such a large inertia is kept, with a warning:
+/// it may include the rotor of a gear.
 fn replace_implausible_inertias(
     description: &mut RobotDescription,
     body: &RigidBody,
@@ -281,7 +289,8 @@ fn replace_implausible_inertias(
     }
 }
 
-/// Mass properties of a solid ball about the origin of a link.
+/// Mass properties of a solid ball at the origin of a link, with a mass \[kg\] and a density \[kg/m³\] that gives its
+/// radius.
 pub fn solid_ball_inertial(link: &Link, mass: f64, density: f64) -> Inertial {
     let radius = (mass / density * 0.75 / PI).cbrt();
     let inertia = Matrix3::from_diagonal_element(0.4 * mass * radius * radius);

@@ -8,10 +8,11 @@ use nalgebra::{DVector, Translation3, Unit, UnitQuaternion, Vector3};
 /// Interpretation of the positions of mimic joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum MimicPositions {
-    /// Derived from the followed joint; the numbers given for mimic joints are ignored.
+    /// Derived from the driver by [`Mimic`](crate::description::Mimic); the numbers given for mimic joints are ignored.
+    /// Other couplings of MJCF files are not included.
     #[default]
     FollowDriver,
-    /// As given, even where they disagree with the driver. MuJoCo's equality constraints may be slightly violated.
+    /// As given, even where they disagree with the driver: MuJoCo's equality constraints may be slightly violated.
     AsGiven,
 }
 
@@ -20,7 +21,7 @@ pub enum MimicPositions {
 pub struct Configuration {
     /// Pose of the root link in the world, `world_from_root`.
     pub root_pose: Pose,
-    /// True if the root moves freely. Its six degrees of freedom then precede all others.
+    /// True if the root link moves freely. Its six degrees of freedom then precede all others.
     pub floating_base: bool,
     /// Position \[rad or m\] of each joint of [`RobotDescription::drivable_joints`], in that order, mimic joints
     /// included.
@@ -75,8 +76,8 @@ impl Configuration {
         Ok(drivable.iter().enumerate().map(follow).collect())
     }
 
-    /// Returns the configuration after motion at the constant generalized velocity `velocity` for `duration` \[s\]. The
-    /// layout of the velocity is that of [`Dynamics`](super::Dynamics).
+    /// Returns the configuration after motion at the constant generalized velocity `velocity` for `duration` \[s\].
+    /// Joint limits are ignored. The layout of the velocity is that of [`Dynamics`](super::Dynamics).
     ///
     /// # Panics
     ///
@@ -117,8 +118,8 @@ impl Configuration {
     }
 }
 
-/// The two directions of travel of a planar joint: x and y turned by the shortest rotation that takes z to the axis
-/// (a half turn about x where the axis is -z).
+/// The two directions of travel of a planar joint, in the joint frame: x and y turned by the shortest rotation that
+/// takes z to `axis` (a half turn about x if the axis is -z).
 ///
 /// URDF does not define them. A model of the joint as two slides and a hinge must use these directions.
 pub fn planar_axes(axis: &Unit<Vector3<f64>>) -> [Unit<Vector3<f64>>; 2] {

@@ -1,7 +1,8 @@
-//! Rigid-body dynamics of a [`RobotDescription`], computed from the files alone and without MuJoCo.
+//! Rigid-body dynamics of a [`RobotDescription`], computed without MuJoCo.
 //!
-//! It is the reference for everything downstream: MuJoCo's results for the MJCF must agree with the URDF. Nothing is
-//! repaired here: a link without `<inertial>` has no mass, whatever its shapes.
+//! It is the reference for everything downstream: MuJoCo's results for the MJCF must agree with the description.
+//! Nothing is repaired here: a link whose [`inertial`](crate::description::Link::inertial) is `None` has no mass,
+//! whatever its shapes. Rotor inertia (armature), springs and joint couplings are not included.
 //!
 //! **Generalized velocities** (and forces), in this order:
 //!
@@ -10,7 +11,7 @@
 //! 2. one per joint of [`RobotDescription::drivable_joints`], in that order. Mimic joints are coordinates of their own,
 //!    as in MuJoCo, where the coupling is a constraint and not a reduction;
 //! 3. per floating joint six, per planar joint three, in the order of the description. Floating: velocity of the child
-//!    origin in the axes of the joint frame, angular velocity in the axes of the child. Planar: along both
+//!    origin in the axes of the joint frame, then angular velocity in the axes of the child. Planar: along both
 //!    [`planar_axes`], then about the axis.
 //!
 //! **Equation of motion**: `M(q) a + c(q, v) + g(q) = tau`. `tau` is the effort of the joints without their damping and
@@ -79,7 +80,8 @@ pub struct Momentum {
     pub angular: Vector3<f64>,
 }
 
-/// Kinematics and dynamics of a robot in one configuration.
+/// Link poses and rigid-body dynamics of a robot at one [`Configuration`]: mass matrix, bias force, inverse dynamics,
+/// momentum, energy. Methods take the generalized velocity and acceleration, in the order of the module documentation.
 #[derive(Clone, Debug)]
 pub struct Dynamics<'a> {
     description: &'a RobotDescription,
@@ -112,7 +114,7 @@ struct Dof {
 }
 
 impl<'a> Dynamics<'a> {
-    /// Computes the kinematics of the robot in `configuration`.
+    /// Computes link poses and joint axes of the robot at `configuration`, which stays fixed for this value.
     ///
     /// # Errors
     ///
@@ -237,12 +239,16 @@ impl<'a> Dynamics<'a> {
         }
     }
 
-    /// Number of generalized velocities.
+    /// Number of generalized velocities, the six of a floating base included.
     pub fn dof_count(&self) -> usize {
         self.dofs.len()
     }
 
     /// Range of generalized velocities of a joint; empty for a fixed joint.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such joint.
     pub fn dof_range(&self, joint: JointId) -> Range<usize> {
         self.joint_dofs[joint.0].clone()
     }
@@ -257,7 +263,7 @@ impl<'a> Dynamics<'a> {
         self.world_from_link[link.0]
     }
 
-    /// Sum of the link masses \[kg\].
+    /// Sum of the link masses \[kg\]. Links without mass properties count as 0.
     pub fn total_mass(&self) -> f64 {
         self.description.total_mass()
     }
@@ -274,7 +280,7 @@ impl<'a> Dynamics<'a> {
         -gravity.dot(&(whole.first_moment + self.origin * whole.mass))
     }
 
-    /// Kinetic energy \[J\] at the generalized velocity `velocity`.
+    /// Kinetic energy \[J\] of the links at the generalized velocity `velocity`.
     ///
     /// # Panics
     ///
@@ -315,8 +321,8 @@ impl<'a> Dynamics<'a> {
         Momentum { linear: sum.force, angular: sum.moment - com.cross(&sum.force) }
     }
 
-    /// Mass matrix M, shape \[dof_count, dof_count\], symmetric. The module documentation gives the order of rows and
-    /// columns.
+    /// Mass matrix M, shape \[dof_count, dof_count\], symmetric, without rotor inertia (armature). The module
+    /// documentation gives the order of rows and columns.
     ///
     /// Source: composite-rigid-body algorithm, Featherstone 2008, table 6.2.
     pub fn mass_matrix(&self) -> DMatrix<f64> {

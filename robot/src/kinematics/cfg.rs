@@ -4,7 +4,7 @@ use super::KinematicsError;
 use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Frame of a robot, such as a tool center point, and the joints that may move it.
+/// Frame of a robot, such as a tool center point, and the joints that inverse kinematics may move.
 ///
 /// A name converts to a tip: `"arm"` is the control part of that name or, if there is no such part, the link.
 ///
@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipFrame<'n> {
-    /// Control part or link that the frame belongs to.
+    /// Control part or link that selects the joints and, unless [`link`](Self::link) is set, the link.
     pub name: TipSelector<'n>,
-    /// Link to use instead of the last link of the part.
+    /// Link that the frame is fixed to, instead of the link that [`name`](Self::name) selects.
     pub link: Option<&'n str>,
     /// Pose of the tool center point in the frame of the link \[m\].
     pub tcp: Pose,
@@ -29,16 +29,17 @@ pub struct TipFrame<'n> {
 /// Name that selects the link and the joints of a [`TipFrame`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TipSelector<'n> {
-    /// Control part: selects its last link.
+    /// Control part: selects its joints and its last link.
     Part(&'n str),
-    /// Link.
+    /// Link: selects this link and all joints of the robot.
     Link(&'n str),
     /// Control part or, if no part has this name, link.
     PartOrLink(&'n str),
 }
 
 impl<'n> TipFrame<'n> {
-    /// Selects the end of a control part, moved by the joints of the part.
+    /// Selects the last link of a control part, moved by the joints of the part. A part that ends in several links is
+    /// an error when the frame is used.
     ///
     /// The link is the child of the last joint of the part. Fixed joints below that child are followed while there is
     /// exactly one of them, within one component of the URDF.
@@ -85,10 +86,11 @@ pub enum IkTask {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NullSpacePosture {
-    /// Preferred positions \[rad or m\], one for each column of the joints in question. Entries of mimic joints are
-    /// ignored.
+    /// Preferred positions \[rad or m\]: one for each joint of the tip's control part, in the order of the part, or for
+    /// each joint of the robot if the tip is a link. For an [`IkSolver`](super::IkSolver), one for each variable of its
+    /// chain. Entries of mimic joints are ignored.
     pub rest: Vec<f64>,
-    /// Fraction of the remaining way to go in one step, above 0 and at most 1.
+    /// Fraction of the remaining distance to the posture that one step covers, above 0 and at most 1.
     #[serde(default = "default_gain")]
     pub gain: f64,
 }
@@ -112,9 +114,9 @@ pub struct IkCfg {
     pub task: IkTask,
     /// Tolerated distance from the target \[m\].
     pub position_tolerance: f64,
-    /// Tolerated angle to the target \[rad\].
+    /// Tolerated angle to the target \[rad\]; unused with [`IkTask::Position`].
     pub rotation_tolerance: f64,
-    /// Maximum number of steps from each start, at least 1.
+    /// Maximum number of steps from each start, at least 1. The refinement of the result takes further steps.
     pub max_iterations: u32,
     /// Initial damping of each start, in multiples of half the squared error; above 0. Small values give large first
     /// steps.
@@ -124,7 +126,7 @@ pub struct IkCfg {
     pub num_seeds: u32,
     /// Seed of the random starts. The same target and initial positions give bit-identical results in any batch.
     pub seed: u64,
-    /// Preferred posture of joints that the target leaves free.
+    /// Preferred posture of joints that the target leaves free, approached after the target is reached.
     pub posture: Option<NullSpacePosture>,
 }
 
@@ -147,10 +149,10 @@ impl Default for IkCfg {
 const MAX_SEEDS: u32 = 100_000;
 
 impl IkCfg {
-    /// Checks every number. `joints` is the number of columns.
+    /// Checks every number. `joints` is the expected length of [`NullSpacePosture::rest`].
     ///
     /// # Errors
-    /// A number is out of its range.
+    /// A number is out of its range, or the posture has another length or a value that is not finite.
     pub fn validate(&self, joints: usize) -> Result<(), KinematicsError> {
         let check = |right: bool, field, value: &dyn std::fmt::Debug, expected| {
             if right {

@@ -78,7 +78,8 @@ impl Chain {
     /// Builds the chain to a frame at `link_from_frame` on `link`.
     ///
     /// The variables of the chain are the columns of [`RobotDescription::drivable_joints`]. Positions have as many
-    /// entries; entries of joints outside the chain are ignored.
+    /// entries; entries of mimic joints and of joints outside the chain are ignored. A joint with a polynomial coupling
+    /// of an MJCF file counts as a free joint.
     ///
     /// # Errors
     /// The link does not exist, or it is not connected to the root.
@@ -126,17 +127,19 @@ impl Chain {
         self.base
     }
 
-    /// Largest variable index plus one: the minimum number of positions for [`pose`](Self::pose).
+    /// Largest index of a variable that the chain uses, plus one: the minimum number of positions for
+    /// [`pose`](Self::pose).
     pub fn variables(&self) -> usize {
         self.joints.iter().map(|joint| joint.variable + 1).max().unwrap_or(0)
     }
 
-    /// True if a variable moves the frame.
+    /// True if a variable moves the frame, directly or by a mimic joint. False for an index out of range.
     pub fn is_moved_by(&self, variable: usize) -> bool {
         self.joints.iter().any(|joint| joint.variable == variable && joint.ratio != 0.0)
     }
 
-    /// Sum of the distances between its joints \[m\]: with slides at zero, the frame is never farther from the base.
+    /// Sum of the distances from the base over all joints to the frame \[m\]. With prismatic joints at zero, the frame
+    /// is never farther from the base.
     pub fn reach(&self) -> f64 {
         let between = |pose: &Pose| pose.translation.vector.norm();
         self.joints.iter().map(|joint| between(&joint.parent_from_joint)).sum::<f64>() + between(&self.last_from_frame)
@@ -148,8 +151,8 @@ impl Chain {
         self.joints.iter().filter(|joint| joint.variable == variable).all(|j| !j.is_prismatic && j.ratio.fract() == 0.0)
     }
 
-    /// Returns the chain with the variables `free` only, in that order. All other variables are fixed at `positions`
-    /// \[rad or m\].
+    /// Returns the chain with the variables `free` only, renumbered in that order. All other variables are fixed at
+    /// `positions` \[rad or m\], one for each variable of this chain.
     ///
     /// # Panics
     /// If `positions` has fewer numbers than the chain has [`variables`](Self::variables).
@@ -167,8 +170,9 @@ impl Chain {
         held
     }
 
-    /// Writes the chain that [`reduced`](Self::reduced) returns into an existing chain, without allocating. `variable_of`
-    /// gives the new index of each variable that stays free.
+    /// Writes the chain that [`reduced`](Self::reduced) returns into an existing chain, without allocating.
+    /// `variable_of` gives the new index of each variable that stays free, and `None` for each variable that is fixed
+    /// at its value in `positions`.
     #[track_caller]
     pub fn reduce_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
         held.base = self.base;

@@ -18,7 +18,7 @@ pub enum KinematicsError {
         /// Name of the link.
         link: String,
     },
-    /// A control part ends in several links.
+    /// A control part ends in several links, so its last link is ambiguous.
     #[error("control part {part:?} has several end links: {}; select one with Tip::at", quoted(.links))]
     AmbiguousTip {
         /// Name of the part.
@@ -26,7 +26,7 @@ pub enum KinematicsError {
         /// Last links of its branches.
         links: Vec<String>,
     },
-    /// The joints that may move do not move the link.
+    /// No joint of the control part (or of the robot) moves the link.
     #[error("no joint of {of} moves link {link:?}; {}", movers_sentence(.moving_joints))]
     NoMovingJoint {
         /// Owner of the joints: `control part "arm"`, `the robot`.

@@ -5,7 +5,8 @@ use crate::description::{JointKind, LinkId, RobotDescription};
 use kinetoscope_scene::Pose;
 
 impl Chain {
-    /// Pose of the frame in the base link at `positions` \[rad or m\], one for each variable.
+    /// Pose of the chain's frame in the frame of the base link. `positions` \[rad or m\] has one value for each
+    /// variable: for each drivable joint of the robot, unless the chain is [reduced](Self::reduced).
     ///
     /// Source: a product of transforms, one per joint (Siciliano et al., "Robotics", Springer 2009, section 2.8).
     ///
@@ -24,10 +25,11 @@ impl Chain {
     }
 }
 
-/// Poses of all links, indexed by [`LinkId`], at `positions` \[rad or m\] of the drivable joints; mimic joints follow.
+/// Poses of all links, indexed by [`LinkId`], at `positions` \[rad or m\], one for each drivable joint. Values of mimic
+/// joints are ignored; they follow their drivers.
 ///
-/// `standing` returns the pose of the root link and of the children of floating and planar joints. All poses are in the
-/// frame of those poses.
+/// `standing` returns the pose of the root link and of each child of a floating or planar joint. The result has the
+/// same reference frame as these poses.
 pub fn link_poses(description: &RobotDescription, positions: &[f64], standing: impl Fn(LinkId) -> Pose) -> Vec<Pose> {
     let follows = mimic_relations(description);
     let mut poses = vec![Pose::identity(); description.links.len()];

@@ -12,8 +12,9 @@ use std::f64::consts::{PI, TAU};
 /// A solve descends by damped least squares within the limits. It starts from the initial positions, then from random
 /// positions, until one start reaches the target. Random starts are uniform within the limits; for joints that rotate,
 /// at most half a turn from the middle. Without limits they are uniform about the initial position. The error is
-/// weighted as if the chain's [`reach`](Chain::reach) were two radians. Among positions that differ by full turns, the
-/// result is the one nearest to the posture, or to the initial positions if there is no posture.
+/// weighted as if the chain's [`reach`](Chain::reach) were two radians. Among positions that differ by full turns and
+/// are within the limits, the result is the one nearest to the posture, or to the initial positions if there is no
+/// posture.
 ///
 /// A solve takes at most `num_seeds * max_iterations` steps, and some more to refine the result. A target that is not
 /// reached uses all starts.
@@ -31,7 +32,8 @@ pub struct IkSolver {
 /// Result of [`IkSolver::solve`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IkSolution<'s> {
-    /// Positions of the variables \[rad or m\], within the limits; the best found if `success` is false.
+    /// Positions of the variables \[rad or m\], within the limits; those with the smallest weighted error if `success`
+    /// is false.
     pub positions: &'s [f64],
     /// True if the errors are within the tolerances; for [`IkTask::Position`](super::IkTask::Position), only the
     /// position error counts.
@@ -40,18 +42,19 @@ pub struct IkSolution<'s> {
     pub position_error: f64,
     /// Angle between the frame and the target \[rad\]; also given where only the position had to be reached.
     pub rotation_error: f64,
-    /// Number of steps of all starts together.
+    /// Number of steps of all starts and of the refinement together.
     pub iterations: u32,
     /// Index of the start that led to the result; 0 is the start from the initial positions.
     pub seed: u32,
 }
 
 impl IkSolver {
-    /// Creates a solver for `chain`. It solves for all variables of the chain, each within its `limits` \[rad or m\],
-    /// which may be infinite.
+    /// Creates a solver for `chain`. The solver moves all variables of the chain, each within its `limits` (lower,
+    /// upper) \[rad or m\]. Limits may be infinite. [`Chain::reduced`] fixes variables that must not move.
     ///
     /// # Errors
-    /// A variable does not move the frame, or limits or numbers of the configuration are invalid.
+    /// A variable of the chain does not move its frame, the length of `limits` differs from the number of variables, a
+    /// lower limit exceeds the upper one, or `cfg` is invalid.
     pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
         let joints = limits.len();
         if chain.variables() > joints {
@@ -88,13 +91,14 @@ impl IkSolver {
         &self.chain
     }
 
-    /// Mutable access to the chain. A new chain must have the same variables.
+    /// Mutable access to the chain, to change its fixed part ([`Chain::reduce_into`]). A new chain must have the same
+    /// number of variables, and each must move the frame.
     pub fn chain_mut(&mut self) -> &mut Chain {
         &mut self.chain
     }
 
-    /// Finds positions that bring the frame to `target`, a pose in the base link of the chain. `initial` \[rad or m\]
-    /// has one number for each variable and is clamped to the limits.
+    /// Finds positions that bring the frame to `target`, a pose in the frame of the base link of the chain. `initial`
+    /// \[rad or m\] has one number for each variable and is clamped to the limits.
     ///
     /// # Errors
     /// `initial` has the wrong length, a number is not finite, or the rotation of the target is not of length 1. A

@@ -7,12 +7,12 @@ use nalgebra::{Vector3, Vector6};
 impl Chain {
     /// Computes the geometric Jacobian at `positions` \[rad or m\] and returns the pose of the frame.
     ///
-    /// The column of a variable is the velocity of the origin of the frame, then its angular velocity, both in the axes
-    /// of the base link, per unit of the variable \[m/rad, rad/rad, m/m\].
+    /// `columns` receives one column for each variable: the velocity of the origin of the frame, then its angular
+    /// velocity, both in the axes of the base link, per unit of the variable \[m/rad, rad/rad, m/m\].
     ///
     /// A revolute joint with the axis a through o gives (a × (p - o), a) at the origin p of the frame, a prismatic
     /// joint (a, 0). Source: Siciliano et al., "Robotics", Springer 2009, equation 3.30. A mimic joint adds its own
-    /// velocity times its ratio to the column of its driver.
+    /// velocity times its multiplier to the column of its driver.
     ///
     /// # Panics
     /// If there are fewer positions or columns than [`variables`](Self::variables).

@@ -19,22 +19,25 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UrdfCfg {
-    /// URDF files of the robot, in any order.
+    /// URDF files of the robot; a parent may follow its children. A component with a custom
+    /// [`name`](ComponentCfg::name) and without `parent` must be the first.
     pub components: Vec<ComponentCfg>,
     /// Letter case of the names of the merged robot.
     pub name_case: NameCaseCfg,
-    /// Folders of `package://` and `model://` packages by name. They take precedence over every search.
+    /// Folders of `package://` and `model://` packages by name. A package that is listed here is searched in its folder
+    /// only, and in `meshdir` of the file.
     pub packages: BTreeMap<String, PathBuf>,
     /// Folder to search for packages, meshes and textures that are not found from the URDF, like Isaac Gym's
-    /// `asset_root`.
+    /// `asset_root`. A relative path starts at the working directory.
     pub asset_root: Option<PathBuf>,
     /// Handling of deviations from URDF whose meaning is clear.
     pub strictness: Strictness,
-    /// Mass properties of links whose file gives no mass properties.
+    /// Mass properties of moving bodies without any `<inertial>`, and density for an `<inertial>` without a mass.
     pub missing_inertia: MissingInertia,
-    /// Name of the robot; by default the robot names of the files, joined by `_`.
+    /// Name of the robot in its description; by default the robot names of the files, joined by `_`.
     pub name: Option<String>,
-    /// Name of the massless link that is added below components where they need a common base.
+    /// Name of the massless root link that is added if several components have no parent, or if the first of them has a
+    /// [`transform`](ComponentCfg::transform).
     pub base_link_name: String,
 }
 
@@ -54,12 +57,13 @@ impl Default for UrdfCfg {
 }
 
 impl UrdfCfg {
-    /// Creates the configuration of a robot from one file.
+    /// Creates the configuration of a robot from one file, as the component `robot`.
     pub fn single(urdf: impl AsRef<Path>) -> Self {
         Self { components: vec![ComponentCfg::new("robot", urdf)], ..Self::default() }
     }
 
-    /// Creates the configuration of a serial robot: each file is attached to the tip of the previous file.
+    /// Creates the configuration of a serial robot: each file is attached to the tip of the previous file, the leaf
+    /// link with the most joints above it.
     ///
     /// A single file is named `robot`, two files `arm` and `hand`, more files `part1`, `part2` and so on.
     ///
@@ -109,7 +113,8 @@ pub enum Strictness {
     Strict,
 }
 
-/// Mass properties of moving bodies whose links all lack an `<inertial>`.
+/// Mass properties of moving bodies whose links all lack an `<inertial>`. The density also gives the mass of an
+/// `<inertial>` that lacks mass and density.
 ///
 /// A body is a link with all links that fixed joints join to it. A link without `<inertial>` that is fixed to a link
 /// with mass gets no mass of its own: the mass of the other link includes it.
@@ -120,7 +125,8 @@ pub enum MissingInertia {
     /// link without collision shapes uses its visual shapes. Meshes count as their convex hulls; overlapping shapes
     /// count twice. Bodies without shapes are treated as with [`Minimal`](Self::Minimal).
     Density(f64),
-    /// The body has 1e-6 kg and 1e-9 kg m², which are not part of the total mass.
+    /// In the MJCF, the body has 1e-6 kg and moments of inertia of 1e-9 kg m², which are not part of the total mass. An
+    /// `<inertial>` without mass and density is ignored.
     Minimal,
 }
 
@@ -130,7 +136,7 @@ impl Default for MissingInertia {
     }
 }
 
-/// Letter case of the names of a merged robot.
+/// Letter case of the names of a merged robot, prefixes and added names included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NameCaseCfg {
@@ -140,7 +146,7 @@ pub struct NameCaseCfg {
     pub link: NameCase,
 }
 
-/// Conversion of the letter case of a name.
+/// Letter case that names are converted to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum NameCase {
@@ -168,28 +174,31 @@ impl NameCase {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ComponentCfg {
-    /// Name of the component: `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`, `left_hand`, `right_hand`,
-    /// `arm` and `hand` have a default parent; any other name is allowed.
+    /// Name of the component, unique in the robot. `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`,
+    /// `left_hand`, `right_hand`, `arm` and `hand` have a default place; any other name is allowed.
     pub name: String,
     /// Path of the URDF file.
     pub urdf: PathBuf,
-    /// Pose of the component's root link in the frame of the parent link; in the frame of the robot without a parent.
+    /// Pose of the component's root link in the frame of the parent link or, without a parent, of the added base link.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub transform: Pose,
-    /// Parent component; by default the usual parent, if present.
+    /// Parent component. The default is the first one present of: `chassis` for `legs`; `legs`, `chassis` for `torso`
+    /// (only with a `chassis`); `torso`, `chassis` for `head` and arms; the arm of the same side for hands. Otherwise
+    /// the component has no parent.
     pub parent: Option<String>,
-    /// Link of the parent component to attach to, as named in its file; by default the tip.
+    /// Link of the parent component to attach to, as named in its file or after merging. The default is the root of a
+    /// `chassis`, else the leaf with the most joints above it; several such leaves are an error.
     pub parent_link: Option<String>,
-    /// Link of this component to attach, as named in its file; must be its root.
+    /// Link of this component to attach, as named in its file. It must be the root, which is the default.
     pub child_link: Option<String>,
     /// Prefix of the names of this component; names that already start with it, in any case, stay unchanged. The
-    /// default is `left_` or `right_` for a component with such a name in a robot of several components, else no
-    /// prefix.
+    /// default is `left_` or `right_` for a component whose name starts with it in a robot of several components, else
+    /// no prefix.
     pub prefix: Option<String>,
 }
 
 impl ComponentCfg {
-    /// Creates a component with the default parent and the identity transform.
+    /// Creates a component with defaults: usual parent and links, identity transform, default prefix.
     pub fn new(name: impl Into<String>, urdf: impl AsRef<Path>) -> Self {
         Self {
             name: name.into(),

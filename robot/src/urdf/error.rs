@@ -5,7 +5,7 @@ use kinetoscope_scene::source_location::SourceLocation;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Error of reading or merging URDF files. Every variant names the location and the remedy.
+/// Error of reading or merging URDF files. Messages give the location and the remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum UrdfError {
@@ -20,7 +20,7 @@ pub enum UrdfError {
     FileIsFolder {
         /// Path of the folder.
         path: PathBuf,
-        /// Names of the `.urdf` files in the folder.
+        /// Names of `.urdf` files in the folder, sorted; at most three.
         urdfs: Vec<String>,
     },
     /// The file exists but cannot be read.
@@ -39,7 +39,7 @@ pub enum UrdfError {
         /// Size limit \[bytes\].
         limit: u64,
     },
-    /// The file has no content.
+    /// The file has no content or only whitespace.
     #[error("{}: is empty; a URDF starts with <robot name=\"...\">", path.display())]
     FileEmpty {
         /// Path of the file.
@@ -90,7 +90,7 @@ pub enum UrdfError {
         /// Suggested remedy.
         advice: &'static str,
     },
-    /// A number is missing, superfluous, unreadable or not finite.
+    /// An attribute has too few or too many numbers, or a number that is unreadable or not finite.
     #[error("{at}: {element}: {problem}")]
     Number {
         /// Location in the file.
@@ -112,7 +112,7 @@ pub enum UrdfError {
         /// Problem and accepted values.
         problem: String,
     },
-    /// An attribute is missing.
+    /// A required attribute is missing or empty.
     #[error("{at}: {owner}: <{element}> has no {attribute}; write {example}")]
     AttributeMissing {
         /// Location in the file.
@@ -126,7 +126,7 @@ pub enum UrdfError {
         /// Example of a valid attribute.
         example: &'static str,
     },
-    /// A child element is missing.
+    /// A required child element is missing.
     #[error("{at}: {owner}: <{element}> has no <{child}>; {fix}")]
     ElementMissing {
         /// Location in the file.
@@ -183,7 +183,7 @@ pub enum UrdfError {
     /// A joint type does not exist in URDF.
     #[error("{at}: joint \"{joint}\": unknown type \"{found}\"; {}", format_candidates(.candidates, .candidates.len()))]
     JointTypeUnknown {
-        /// Location of the joint element.
+        /// Location of the `type` attribute.
         at: SourceLocation,
         /// Name of the joint.
         joint: String,
@@ -204,7 +204,7 @@ pub enum UrdfError {
         /// Shapes of URDF, the closest match first.
         candidates: Vec<String>,
     },
-    /// Two links, joints or materials have the same name.
+    /// Two links, two joints or two top-level materials of a file have the same name. Equal materials are allowed.
     #[error("{second}: a second {what} named \"{name}\", the first is at {first}; names must be unique")]
     NameRepeated {
         /// Kind of the element: `link`, `joint` or `material`.
@@ -244,7 +244,7 @@ pub enum UrdfError {
         role: &'static str,
         /// Name of the missing link.
         link: String,
-        /// Existing links, the closest match first.
+        /// Most similar existing links, the closest match first; at most 12.
         candidates: Vec<String>,
         /// Number of existing links.
         total: usize,
@@ -280,7 +280,7 @@ pub enum UrdfError {
         joint: String,
         /// Name of the missing joint.
         mimicked_joint: String,
-        /// Existing joints, the closest match first.
+        /// Most similar existing joints, the closest match first; at most 12.
         candidates: Vec<String>,
         /// Number of existing joints.
         total: usize,
@@ -384,10 +384,10 @@ pub enum UrdfError {
         component: String,
         /// Name of the missing parent.
         parent: String,
-        /// Existing components, the closest match first.
+        /// Most similar existing components, the closest match first; at most 12.
         candidates: Vec<String>,
     },
-    /// A component without a default parent sets no parent.
+    /// A component with a custom name sets no parent, and is not the first component.
     #[error(
         "component \"{component}\" has no default parent; set its parent to another component. {}",
         format_candidates(.candidates, .candidates.len())
@@ -395,7 +395,7 @@ pub enum UrdfError {
     ComponentParentRequired {
         /// Name of the component.
         component: String,
-        /// Existing components, the closest match first.
+        /// Most similar existing components, the closest match first; at most 12.
         candidates: Vec<String>,
     },
     /// The parents of components form a cycle.
@@ -417,7 +417,7 @@ pub enum UrdfError {
         link: String,
         /// Component that was searched for the link.
         of: String,
-        /// Existing links, the closest match first.
+        /// Most similar existing links, the closest match first; at most 12.
         candidates: Vec<String>,
         /// Number of existing links.
         total: usize,
@@ -460,7 +460,7 @@ pub enum UrdfError {
         /// Number of deepest leaf links.
         total: usize,
     },
-    /// The URDF model rejected a file that passed all checks: a defect of this program.
+    /// The library `urdf-rs` rejected a file that passed all checks: a defect of this program.
     #[error("{}: the URDF library (urdf-rs) rejected the normalized file, which is a defect of this program; please report it: {source}", path.display())]
     Model {
         /// Path of the file.

@@ -13,9 +13,9 @@ use std::sync::Arc;
 /// model cannot express: locations, and which values the file gave.
 #[derive(Clone, Debug)]
 pub struct UrdfFile {
-    /// Path as the user gave it.
+    /// Path as the user gave it; relative mesh paths start at its folder.
     pub path: Arc<PathBuf>,
-    /// Typed model. Values that the file does not give have defaults.
+    /// Typed model of `urdf-rs`. Values that the file does not give have defaults. Shapes of size 0 are left out.
     pub robot: urdf_rs::Robot,
     /// Metadata of each link of `robot`.
     pub links: Vec<LinkMetadata>,
@@ -23,7 +23,7 @@ pub struct UrdfFile {
     pub joints: Vec<JointMetadata>,
     /// Tree of links.
     pub tree: Tree,
-    /// `meshdir` of `<mujoco><compiler>`, where MuJoCo users keep meshes.
+    /// `meshdir` of `<mujoco><compiler>` as written, the folder in which meshes are searched last.
     pub meshdir: Option<String>,
     /// Warnings about repaired or ignored elements.
     pub diagnostics: Vec<Diagnostic>,
@@ -38,9 +38,9 @@ pub struct LinkMetadata {
     pub inertial: Option<SourceLocation>,
     /// Values of an incomplete inertial element; `inertial` is then `None`.
     pub partial_inertial: Option<PartialInertial>,
-    /// Metadata of each visual.
+    /// Metadata of each visual, parallel to the visuals of the model.
     pub visuals: Vec<VisualMetadata>,
-    /// Location of each collision element.
+    /// Location of each collision element, parallel to the collisions of the model.
     pub collisions: Vec<SourceLocation>,
 }
 
@@ -64,7 +64,8 @@ pub struct JointMetadata {
     pub damping: bool,
     /// True if the dynamics element gives friction.
     pub friction: bool,
-    /// Location of the mimic element; `None` without a mimic, or where a mimic has no meaning (a fixed joint).
+    /// Location of the mimic element; `None` without a mimic, or if it was ignored because the joint is fixed, floating
+    /// or planar.
     pub mimic: Option<SourceLocation>,
 }
 
@@ -73,9 +74,9 @@ pub struct JointMetadata {
 pub struct LimitMetadata {
     /// Location of the limit element.
     pub source: SourceLocation,
-    /// True if `lower` is given and usable.
+    /// True if `lower` is given and not above `upper` (0 if `upper` is absent).
     pub lower: bool,
-    /// True if `upper` is given and usable.
+    /// True if `upper` is given and not below `lower` (0 if `lower` is absent).
     pub upper: bool,
     /// True if `effort` is given.
     pub effort: bool,

@@ -257,7 +257,7 @@ pub(super) fn read_pose(
     Ok(Some([xyz.unwrap_or_default(), rpy.unwrap_or_default()]))
 }
 
-/// Reads the shape of `node`. Returns `false` for a shape of size 0, which is left out.
+/// Reads the shape of `node`. Returns `false` for a shape of size 0, which the caller leaves out.
 fn read_geometry(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -341,7 +341,7 @@ fn read_mesh(
     Ok(())
 }
 
-/// Reads the scale of a mesh. A single number applies to all axes.
+/// Reads the scale of a mesh. In lenient reading, a single number applies to all axes.
 fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64; 3]>, UrdfError> {
     let error = match reader.numbers::<3>(mesh, "scale") {
         Ok(scale) => return Ok(scale),

@@ -2,8 +2,8 @@
 //!
 //! Components are merged parents first. A fixed joint, `<parent>_TO_<child>_CONNECTOR`, attaches each component to the
 //! tip of its parent: the leaf at the end of the longest chain of joints. The attachment to a chassis is its root
-//! instead, since the leaves of a chassis are wheels. Several components without a parent, or a single component with a
-//! transform, stand on an added massless link (`base_link`), from which the connectors `BASE_TO_<child>_CONNECTOR`
+//! instead, since the leaves of a chassis are wheels. If several components have no parent, or the first of them has a
+//! transform, they stand on an added massless link (`base_link`), from which the connectors `BASE_TO_<child>_CONNECTOR`
 //! start.
 
 use super::components::ComponentTree;
@@ -34,13 +34,13 @@ pub struct MergedRobot {
 /// Reads and merges the files of a robot.
 ///
 /// Mass properties are those of the files. [`MissingInertia`](super::MissingInertia) is applied when a robot is added
-/// to a simulation, whose `description` is complete.
+/// to a simulation; the description of that robot is complete.
 ///
 /// Links and joints have the order of the components (parents first, else as given) and, within a component, the order
 /// of its file.
 ///
 /// # Errors
-/// A file or the configuration is invalid, or a collision mesh does not exist.
+/// A file or the configuration is invalid, or a collision mesh does not exist. A missing visual mesh is a warning.
 pub fn assemble(cfg: &UrdfCfg) -> Result<MergedRobot, UrdfError> {
     let components = ComponentTree::new(cfg)?;
     let mut files = Vec::with_capacity(cfg.components.len());

@@ -27,7 +27,7 @@ const MAX_FILE_SIZE: u64 = 256 << 20;
 const IGNORED_ELEMENTS: [&str; 8] =
     ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
 
-/// Reads a URDF file with the default [`Strictness`].
+/// Reads a URDF file with the default [`Strictness`], lenient.
 ///
 /// # Errors
 /// The file cannot be read, is not well-formed URDF, or its links and joints do not form a tree. Mesh files are not
@@ -39,7 +39,7 @@ pub fn parse_file(path: impl AsRef<Path>) -> Result<UrdfFile, UrdfError> {
 /// Reads a URDF file.
 ///
 /// # Errors
-/// As [`parse_file`]; strict reading also rejects deviations from URDF whose meaning is clear.
+/// Same errors as [`parse_file`]; strict reading also rejects the deviations that [`Strictness`] lists.
 pub fn parse_file_with(path: impl AsRef<Path>, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let path = path.as_ref();
     let owned = || path.to_path_buf();
@@ -84,7 +84,7 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
 /// start at its folder.
 ///
 /// # Errors
-/// As [`parse_file`].
+/// Same errors as [`parse_file`].
 pub fn parse_str(text: &str, path: impl AsRef<Path>) -> Result<UrdfFile, UrdfError> {
     parse_str_with(text, path, Strictness::default())
 }
@@ -92,7 +92,7 @@ pub fn parse_str(text: &str, path: impl AsRef<Path>) -> Result<UrdfFile, UrdfErr
 /// Reads a URDF from memory. `path` names the file in messages, and relative mesh paths start at its folder.
 ///
 /// # Errors
-/// As [`parse_file_with`].
+/// Same errors as [`parse_file_with`].
 pub fn parse_str_with(text: &str, path: impl AsRef<Path>, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let path = path.as_ref();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);

@@ -266,7 +266,8 @@ impl<'c> Resolver<'c> {
 }
 
 impl PackageSearch {
-    /// Checks the folder itself, its child of that name, and its children whose `package.xml` has that name.
+    /// Checks the folder itself, if its name or its `package.xml` matches, then its child of that name, and its
+    /// children whose `package.xml` has that name.
     fn search_folder(&mut self, folder: &Path, package: &str, why: &str) {
         if folder.file_name().is_some_and(|n| n == package) || declared_name(folder).as_deref() == Some(package) {
             self.check(folder.to_path_buf(), why);

@@ -147,7 +147,8 @@ impl<'f> ShapeConverter<'f> {
     }
 }
 
-/// Most likely path of a URI, and the problem with it.
+/// Returns the most likely path of a URI, and the end of a sentence about the problem, for example
+/// `does not exist; searched a, b`.
 fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
     match resolved {
         Resolved::Found(path) => (path, "exists".to_owned()),

@@ -8,7 +8,7 @@ use kinetoscope_scene::pattern::closest_names;
 use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::HashMap;
 
-/// Tree of the links and joints of one file, as indices.
+/// Tree of the links and joints of one file, as indices of links and joints in file order.
 #[derive(Clone, Debug, Default)]
 pub struct Tree {
     /// Link without a parent.
@@ -19,9 +19,9 @@ pub struct Tree {
     pub parent_joint: Vec<Option<usize>>,
     /// Joints below each link, in file order.
     pub child_joints: Vec<Vec<usize>>,
-    /// Joint that each joint mimics.
+    /// Joint that each joint mimics; `None` for a joint without a mimic.
     pub mimics: Vec<Option<usize>>,
-    /// Number of joints between the root and each link.
+    /// Number of joints between the root and each link, fixed joints included.
     pub depth: Vec<usize>,
 }
 
@@ -195,7 +195,8 @@ impl Tree {
         UrdfError::MimicCycle { at, joint: edges[start].joint.name.clone(), joints }
     }
 
-    /// Finds the leaves at the end of the longest chain of joints.
+    /// Returns all links with the largest [`depth`](Self::depth): the leaves at the end of the longest chains of
+    /// joints, in file order.
     pub fn tips(&self) -> Vec<usize> {
         let deepest = self.depth.iter().copied().max().unwrap_or(0);
         (0..self.depth.len()).filter(|&l| self.depth[l] == deepest).collect()

@@ -1,7 +1,8 @@
 //! Writer of a [`RobotDescription`] as URDF.
 //!
-//! The text is the same for the same description, and reads back to the same robot up to rounding (1e-12). Materials
-//! are written inside the visuals, since two components may use one name for two materials.
+//! The text is the same for the same description. The description of a URDF robot reads back to the same robot up to
+//! rounding (1e-12). Data that only MJCF has ([`Joint::defaults`]) are left out. Materials are written inside the
+//! visuals, since two components may use one name for two materials.
 
 use super::reader::{format_number, format_numbers, write_attribute};
 use super::rotation::rpy_of;

@@ -8,8 +8,8 @@ use std::path::Path;
 /// Maximum number of prefixes that are declared for a file; more are not extensions of URDF.
 const MAX_PREFIXES: usize = 32;
 
-/// Removes misplaced XML declarations and binds all prefixes, without changing line numbers. `error` is the parser's
-/// first error.
+/// Removes misplaced XML declarations and binds up to [`MAX_PREFIXES`] undeclared prefixes, without changing line
+/// numbers. `error` is the parser's first error.
 ///
 /// # Errors
 /// The first remaining error of the parser.
