@@ -16,7 +16,8 @@ pub enum LightKind {
         /// to 128.
         exponent: f32,
     },
-    /// Uniform in all directions. The rasterizer draws no shadows of this type.
+    /// Uniform in all directions. The rasterizer's shadow maps have no shadows of this type; ray-traced shadows and
+    /// path-traced images have them.
     Point,
 }
 

@@ -78,7 +78,7 @@ macro_rules! quantities {
             pub force_time: Vec<f64>,
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
             /// Render scenes of environments with their own sizes or colors, shape \[num_envs\]; empty if all
-            /// environments share one scene.
+            /// environments share one scene, or if neither `visible` nor `instance_poses` is requested.
             pub own_scenes: Vec<EnvScene>,
         }
 

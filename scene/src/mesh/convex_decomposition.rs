@@ -41,7 +41,7 @@ impl Default for ConvexDecompositionCfg {
 /// Result of a decomposition into convex pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexDecomposition {
-    /// Closed convex hulls with outward-facing triangles, in the order in which they were cut.
+    /// Closed convex hulls with outward-facing triangles. Equal inputs give the same order.
     pub hulls: Vec<TriMesh>,
     /// Largest distance between the hull of a piece and its surface \[m\].
     ///
