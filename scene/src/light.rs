@@ -39,8 +39,8 @@ pub struct Light {
     /// Constant c, linear l and quadratic q attenuation: intensity is 1 / (c + l d + q d²) at a distance d \[m\].
     /// Unused for directional lights.
     pub attenuation: [f32; 3],
-    /// Radius of the light's disc, for soft shadows in ray-traced images \[m\]. For a directional light, the radius at
-    /// a distance of 1 m (the tangent of its angular radius). With 0, shadows are sharp.
+    /// Radius of the light's disc, for soft shadows in path-traced images \[m\]. For a directional light, the radius at
+    /// a distance of 1 m (the tangent of its angular radius). With 0, and in all other renderers, shadows are sharp.
     pub radius: f32,
     /// True if instances in the light cast shadows.
     pub cast_shadow: bool,
