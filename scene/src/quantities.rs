@@ -72,9 +72,9 @@ macro_rules! quantities {
             pub time: Vec<f64>,
             /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\].
             ///
-            /// It is one MuJoCo step (`physics_dt / substeps`) earlier than [`time`](Self::time). Right after a reset or
-            /// a write to the state, both are equal, because accelerations and contacts are then solved for the current
-            /// state.
+            /// It is one MuJoCo step (`physics_dt / substeps`) earlier than [`time`](Self::time). Right after a reset
+            /// or a write to the state, both are equal, because accelerations and contacts are then solved for the
+            /// current state.
             pub force_time: Vec<f64>,
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
             /// Render scenes of environments with their own sizes or colors, shape \[num_envs\]; empty if all
