@@ -22,7 +22,7 @@ pub struct AtomicFile {
 
 impl AtomicFile {
     /// Creates a temporary file beside `path` with a unique name, so that concurrent writers of one path do not
-    /// interfere.
+    /// interfere. The folder must exist.
     ///
     /// # Errors
     /// The temporary file cannot be created.
@@ -48,7 +48,7 @@ impl AtomicFile {
         Ok(Self { path: path.into(), temp_path, file, keep: false })
     }
 
-    /// Writes a complete file and replaces a previous file at `path`.
+    /// Writes a complete file and replaces a previous file at `path`. The folder must exist.
     ///
     /// # Errors
     /// The file cannot be written. A previous file at `path` stays.
@@ -93,7 +93,8 @@ impl AtomicFile {
         Ok(())
     }
 
-    /// Renames the temporary file to its final path, which must be free.
+    /// Renames the temporary file to its final path, which must be free. On a file system without hard links, a file
+    /// that appears there at the same moment may be replaced.
     ///
     /// # Errors
     /// The path is taken, or the file cannot be renamed.

@@ -10,9 +10,10 @@ pub struct PosedScene<'a> {
     pub scene: &'a RenderScene,
     /// World-from-instance poses, one for each instance of the scene.
     pub poses: &'a [PoseF32],
-    /// Offset of all positions \[m\].
+    /// Offset that is added to all positions \[m\], such as the origin of the environment.
     pub origin: [f64; 3],
-    /// Largest coordinate of movable instances \[m\]. Instances beyond it have flown away and are ignored.
+    /// Largest absolute coordinate of movable instances in `poses` \[m\], without the offset. Movable instances beyond
+    /// it have flown away and are ignored.
     pub reach: f32,
 }
 
@@ -53,8 +54,9 @@ impl CameraFit {
     /// Returns the nearest placement with the whole scene in the image.
     ///
     /// Returns `None` if nothing of a finite size is drawn, or if the viewing direction is vertical. The smallest
-    /// distance follows from four supporting planes of the instances, so it is exact. Planes are ignored, and so are
-    /// static instances that are much larger than robots and objects, such as terrain and walls of a room.
+    /// distance follows from four supporting planes of the instances, so it is exact. Planes and geom groups above 2
+    /// are ignored, and so are static instances that are much larger than robots and objects, such as terrain and walls
+    /// of a room.
     pub fn fit(&self, placed: &[PosedScene<'_>]) -> Option<FittedView> {
         let forward = unit(self.forward)?;
         let right = unit([forward[1], -forward[0], 0.0])?;

@@ -46,12 +46,13 @@ pub mod pose {
     /// Writes `[x, y, z, qw, qx, qy, qz]`.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the serializer.
     pub fn serialize<S: Serializer>(pose: &Pose, serializer: S) -> Result<S::Ok, S::Error> {
         to_row(pose).serialize(serializer)
     }
 
-    /// Reads an array or a table.
+    /// Reads an array or a table. In a table, a missing `pos` is 0 and a missing rotation is the identity. Quaternions
+    /// are normalized.
     ///
     /// # Errors
     /// The value has another form, two rotations, or an invalid rotation.
@@ -108,12 +109,12 @@ pub mod rotation {
     /// Writes `[w, x, y, z]`.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the serializer.
     pub fn serialize<S: Serializer>(rotation: &UnitQuaternion<f64>, serializer: S) -> Result<S::Ok, S::Error> {
         to_wxyz(rotation).serialize(serializer)
     }
 
-    /// Reads `[w, x, y, z]` or roll, pitch and yaw.
+    /// Reads `[w, x, y, z]`, which is normalized, or `{ rpy_deg = [r, p, y] }` \[deg\].
     ///
     /// # Errors
     /// The value has another form, or is not a rotation.
@@ -154,7 +155,7 @@ pub mod vector {
     /// Writes `[x, y, z]`.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the serializer.
     pub fn serialize<S: Serializer>(vector: &Vector3<f64>, serializer: S) -> Result<S::Ok, S::Error> {
         <[f64; 3]>::from(*vector).serialize(serializer)
     }
@@ -162,7 +163,7 @@ pub mod vector {
     /// Reads `[x, y, z]`.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the deserializer: the value is not a list of three numbers.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector3<f64>, D::Error> {
         <[f64; 3]>::deserialize(deserializer).map(Vector3::from)
     }
@@ -173,18 +174,18 @@ pub mod optional_vector {
     use super::*;
     use nalgebra::Vector3;
 
-    /// Writes `[x, y, z]`, or nothing.
+    /// Writes `[x, y, z]`; `None` is written as the format's empty value, `null` in JSON.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the serializer.
     pub fn serialize<S: Serializer>(vector: &Option<Vector3<f64>>, serializer: S) -> Result<S::Ok, S::Error> {
         vector.map(<[f64; 3]>::from).serialize(serializer)
     }
 
-    /// Reads `[x, y, z]`.
+    /// Reads `[x, y, z]`, or the format's empty value as `None`.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the deserializer: the value is not a list of three numbers.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vector3<f64>>, D::Error> {
         Ok(Option::<[f64; 3]>::deserialize(deserializer)?.map(Vector3::from))
     }
@@ -197,7 +198,7 @@ pub mod pairs {
     /// Writes a table.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the serializer.
     pub fn serialize<T: Serialize, S: Serializer>(pairs: &[(String, T)], serializer: S) -> Result<S::Ok, S::Error> {
         let mut table = serializer.serialize_map(Some(pairs.len()))?;
         for (key, value) in pairs {
@@ -206,10 +207,10 @@ pub mod pairs {
         table.end()
     }
 
-    /// Reads a table.
+    /// Reads a table in its order. Repeated keys are kept, if the format allows them.
     ///
     /// # Errors
-    /// Those of the format and of the values.
+    /// Errors of the deserializer: the value is not a table, or a value in it is invalid.
     pub fn deserialize<'de, T, D>(deserializer: D) -> Result<Vec<(String, T)>, D::Error>
     where
         T: Deserialize<'de>,
@@ -245,7 +246,7 @@ pub mod or_false {
     /// Writes the value, or `false`.
     ///
     /// # Errors
-    /// Those of the format.
+    /// Errors of the serializer.
     pub fn serialize<T: Serialize, S: Serializer>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error> {
         match value {
             Some(value) => value.serialize(serializer),
@@ -256,7 +257,7 @@ pub mod or_false {
     /// Reads a table, a number or `false`.
     ///
     /// # Errors
-    /// Those of the format and of the value. `true` is an error.
+    /// Errors of the deserializer: the value has another form (`true`, a list, a text), or is invalid.
     pub fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
     where
         T: Deserialize<'de>,

@@ -1,6 +1,7 @@
 //! Lights, sky and haze.
 //!
-//! Light colors are linear intensities. Surface colors are display colors (sRGB).
+//! Light colors are linear intensities, except in [`LightingSpace::Display`]. Colors of surfaces, skies and haze are
+//! display colors (sRGB).
 
 /// Type of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +16,8 @@ pub enum LightKind {
         /// to 128.
         exponent: f32,
     },
-    /// Uniform in all directions. The rasterizer draws no shadows of this type.
+    /// Uniform in all directions. The rasterizer's shadow maps have no shadows of this type; ray-traced shadows and
+    /// path-traced images have them.
     Point,
 }
 
@@ -24,9 +26,9 @@ pub enum LightKind {
 pub struct Light {
     /// Type of the light.
     pub kind: LightKind,
-    /// Position, world frame \[m\].
+    /// Position in the environment frame \[m\]. Unused for directional lights.
     pub position: [f32; 3],
-    /// Direction of the emitted light, world frame; need not be a unit vector.
+    /// Direction of the emitted light in the environment frame; need not be a unit vector. Unused for point lights.
     pub direction: [f32; 3],
     /// Ambient color.
     pub ambient: [f32; 3],
@@ -34,10 +36,11 @@ pub struct Light {
     pub diffuse: [f32; 3],
     /// Specular color.
     pub specular: [f32; 3],
-    /// Constant, linear and quadratic attenuation: intensity is 1 / (c + l d + q d²). Unused for directional lights.
+    /// Constant c, linear l and quadratic q attenuation: intensity is 1 / (c + l d + q d²) at a distance d \[m\].
+    /// Unused for directional lights.
     pub attenuation: [f32; 3],
-    /// Radius of the light's disc, for soft shadows in ray-traced images \[m\]. For a directional light, the radius at
-    /// a distance of 1 m (the tangent of its angular radius). With 0, shadows are sharp.
+    /// Radius of the light's disc, for soft shadows in path-traced images \[m\]. For a directional light, the radius at
+    /// a distance of 1 m (the tangent of its angular radius). With 0, and in all other renderers, shadows are sharp.
     pub radius: f32,
     /// True if instances in the light cast shadows.
     pub cast_shadow: bool,
@@ -159,7 +162,8 @@ impl Default for Sky {
 /// Haze: distant surfaces fade into a color.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Haze {
-    /// Color of the haze; `None` is the sky behind the surface.
+    /// Color of the haze (sRGB, 0..=1); `None` is the sky behind the surface, or its horizon color for views below the
+    /// horizon.
     pub color: Option<[f32; 3]>,
     /// Distance from the camera at which the haze begins \[m\].
     pub start: f32,

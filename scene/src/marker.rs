@@ -1,4 +1,5 @@
-//! Markers: visualizations of sensor measurements. Markers are drawn for users and never measured.
+//! Markers: visualizations of sensor measurements. Markers are drawn in viewers, and in the color of cameras with
+//! `draw_markers`. No other channel or sensor measures them.
 
 use crate::material::Material;
 use crate::mesh::TriMesh;
@@ -8,14 +9,14 @@ use crate::{Pose, PoseF32};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// A colored marker in an environment.
+/// A visualization marker in an environment: a sphere, an arrow or the axes of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Marker {
     /// Kind and size.
     pub kind: MarkerKind,
     /// Pose in the environment frame.
     pub pose: Pose,
-    /// Color and opacity, 0..=1; axes have their own colors.
+    /// Color (sRGB) and opacity, 0..=1. Ignored for axes, which are red, green, blue and opaque.
     pub rgba: [f32; 4],
 }
 
@@ -23,7 +24,7 @@ pub struct Marker {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MarkerKind {
-    /// A sphere around the pose.
+    /// A sphere around the position of the pose.
     Sphere {
         /// Radius \[m\].
         radius: f32,
@@ -43,21 +44,22 @@ pub enum MarkerKind {
 }
 
 impl Marker {
-    /// Value of drawn markers in the mask channel.
+    /// Mask id of the instances that draw markers. The mask channel of cameras omits markers.
     pub const MASK_ID: i32 = -1;
-    /// Geom group that separates markers from other instances: MuJoCo's groups are 0 to 5.
+    /// Geom group of markers in camera images, which separates them from other instances: MuJoCo's groups are 0 to 5.
+    /// [`instances`](Self::instances) returns group 0, and cameras change it.
     pub const GROUP: u8 = 31;
 
-    /// A sphere at `center` \[m\].
+    /// A sphere at `center` in the environment frame \[m\], with a radius \[m\].
     pub fn sphere(center: [f64; 3], radius: f32, rgba: [f32; 4]) -> Self {
         let [x, y, z] = center;
         Self { kind: MarkerKind::Sphere { radius }, pose: Pose::translation(x, y, z), rgba }
     }
 
-    /// An arrow from `tail` with the direction and length of `vector` \[m\]; the diameter of its shaft is 1/20 of its
-    /// length.
+    /// An arrow from `tail` with the direction and length of `vector`, in the environment frame \[m\]; the diameter of
+    /// its shaft is 1/20 of its length.
     ///
-    /// Returns `None` for a vector without a direction.
+    /// Returns `None` for a vector that is shorter than 1e-9 m or not finite.
     pub fn arrow(tail: [f64; 3], vector: [f64; 3], rgba: [f32; 4]) -> Option<Self> {
         let vector = Vector3::from(vector);
         let length = vector.norm();
@@ -75,7 +77,8 @@ impl Marker {
         Self { kind: MarkerKind::Axes { length }, pose, rgba: [1.0; 4] }
     }
 
-    /// Instances that draw the marker, with their poses in the environment. Invalid sizes and poses give no instances.
+    /// Instances that draw the marker, with their poses in the environment frame. Instances with invalid sizes or poses
+    /// are left out.
     pub fn instances(&self) -> Vec<(Instance, PoseF32)> {
         let drawn = match self.kind {
             MarkerKind::Sphere { radius } => vec![(shape::Shape::from(Sphere { radius }), Pose::identity(), self.rgba)],

@@ -10,7 +10,8 @@ pub struct Material {
     pub rgba: [f32; 4],
     /// Texture on the surface.
     pub texture: Option<Arc<Texture>>,
-    /// Repetitions of a 2D texture over the shape, or over 2 m with `tex_uniform`, as in MuJoCo's renderer.
+    /// Repetitions of a 2D texture over the shape, or over 2 m with `tex_uniform` and on infinite planes, as in
+    /// MuJoCo's renderer. Unused for meshes with texture coordinates; 0 and negative numbers act as 1.
     pub tex_repeat: [f32; 2],
     /// True if `tex_repeat` is per 2 m instead of per shape.
     pub tex_uniform: bool,
@@ -18,14 +19,16 @@ pub struct Material {
     pub emission: f32,
     /// Strength of highlights in 0..=1.
     pub specular: f32,
-    /// Sharpness of highlights in 0..=1: the exponent is 128 times this.
+    /// Sharpness of highlights in 0..=1: the exponent is 128 times this. Unused with `roughness`.
     pub shininess: f32,
     /// Mirror reflectance in 0..=1. Opaque planes and the +z faces of boxes reflect in all renderers, other shapes only
     /// in path-traced images.
     pub reflectance: f32,
-    /// Metallic share in 0..=1. A metal has no diffuse reflection, and its specular reflection has its color.
+    /// Metallic share in 0..=1. A metal has no diffuse reflection, and its specular reflection has its color. The
+    /// rasterizer ignores it in [`LightingSpace::Display`](crate::LightingSpace::Display).
     pub metallic: f32,
-    /// Roughness in 0..=1; the alpha of the GGX distribution is its square. `None` uses `shininess`.
+    /// Roughness in 0..=1; the alpha of the GGX distribution is its square. `None` derives alpha from
+    /// [`exponent`](Self::exponent): `alpha² = 2 / (exponent + 2)`.
     pub roughness: Option<f32>,
     /// Share of transmitted light in 0..=1, refracted as by glass. Only the path tracer transmits light, through closed
     /// shapes; other renderers draw the surface. The opacity of `rgba` is transparency without refraction.
@@ -60,8 +63,9 @@ impl Material {
         Self { rgba, ..Self::default() }
     }
 
-    /// Exponent of the highlights in Blinn's and Phong's models, 1 to 128: 128 times `shininess`, or 2 / alpha² - 2 for
-    /// a roughness. Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007, section 5.2.
+    /// Exponent of the highlights in Blinn's and Phong's models, clamped to 1..=128: 128 times `shininess`, or 2 /
+    /// alpha² - 2 for a roughness. Source: Walter et al., Microfacet models for refraction through rough surfaces,
+    /// 2007, section 5.2.
     pub fn exponent(&self) -> f32 {
         let exponent = match self.roughness {
             Some(roughness) => 2.0 / roughness.clamp(0.0, 1.0).powi(4) - 2.0,
@@ -88,7 +92,7 @@ pub struct Texture {
     levels: Vec<MipLevel>,
 }
 
-/// A mip level of a texture.
+/// Mip level of a texture: its size and its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MipLevel {
     width: u32,
@@ -151,7 +155,8 @@ impl Texture {
         Ok(Self { kind, levels })
     }
 
-    /// A checkerboard of 2 x 2 squares in two colors, as MuJoCo's builtin "checker".
+    /// A checkerboard of 2 x 2 squares in two sRGB colors, as MuJoCo's builtin "checker"; `a` is the color of the top
+    /// left square.
     ///
     /// `size` is the side of the image \[pixels\], clamped to 2..=4096 and rounded down to an even number.
     pub fn checker(size: u32, a: [u8; 3], b: [u8; 3]) -> Self {
@@ -172,7 +177,8 @@ impl Texture {
         self.kind
     }
 
-    /// Mip levels, the largest first.
+    /// Mip levels, the largest first, down to 1 x 1 pixel. The levels of a cube texture end when the side of a face is
+    /// odd.
     pub fn mip_levels(&self) -> &[MipLevel] {
         &self.levels
     }

@@ -64,7 +64,7 @@ pub enum PatternError {
         /// Number of names.
         total: usize,
     },
-    /// Two patterns match the same name.
+    /// Two patterns or keys select the same name, or one pattern is listed twice.
     #[error("{what} \"{name}\" is matched by both \"{first}\" and \"{second}\"; make the two disjoint")]
     MatchedTwice {
         /// Kind of the name, such as `joint`.
@@ -88,7 +88,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Compiles `pattern`.
+    /// Compiles `pattern`, which must later match whole names.
     ///
     /// # Errors
     /// [`PatternError::Invalid`] or [`PatternError::Unsupported`].
@@ -132,7 +132,7 @@ fn explain(pattern: &str, error: regex::Error) -> PatternError {
 
 /// Returns the indices of the matched names, ordered by pattern, then by their order in `names`.
 ///
-/// `what` is the kind of the names, such as `joint`.
+/// `what` is the kind of the names for errors, such as `joint`.
 ///
 /// # Errors
 /// A pattern does not compile or matches no name, or two patterns match the same name.
@@ -246,7 +246,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
     2 * row[right.len()] + usize::from(a != b)
 }
 
-/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if the list was cut.
+/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if `total` is larger than the list.
 pub fn format_candidates(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {

@@ -7,12 +7,12 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 /// Variable names follow the algebra: `world_from_link * link_from_camera`.
 pub type Pose = Isometry3<f64>;
 
-/// Normalized unit quaternion from `[w, x, y, z]`.
+/// Normalized unit quaternion from `[w, x, y, z]`; NaN for a zero quaternion.
 pub fn from_wxyz(q: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]))
 }
 
-/// Normalized unit quaternion from `[x, y, z, w]` (ROS, SciPy).
+/// Normalized unit quaternion from `[x, y, z, w]` (ROS, SciPy); NaN for a zero quaternion.
 pub fn from_xyzw(q: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
 }
@@ -33,7 +33,7 @@ pub fn to_row(pose: &Pose) -> [f64; 7] {
     [t.x, t.y, t.z, q.w, q.i, q.j, q.k]
 }
 
-/// Pose from a row `[x, y, z, qw, qx, qy, qz]`. The quaternion is normalized.
+/// Pose from a row `[x, y, z, qw, qx, qy, qz]`. The quaternion is normalized; a zero quaternion gives NaN.
 pub fn from_row(row: &[f64; 7]) -> Pose {
     Pose::from_parts(Translation3::new(row[0], row[1], row[2]), from_wxyz([row[3], row[4], row[5], row[6]]))
 }

@@ -86,7 +86,7 @@ impl PoseF32 {
         }
     }
 
-    /// True if every number is finite and the matrix is a rotation up to rounding.
+    /// True if every number is finite and the matrix is a rotation, within 1e-3.
     pub fn is_rigid(&self) -> bool {
         let r = &self.rotation;
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

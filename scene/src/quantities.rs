@@ -1,5 +1,5 @@
 //! The macro behind the list of quantities in [`state`](crate::state). It generates the fields of `SceneState`, the
-//! flags of `Requires`, and all code that handles each field.
+//! flags of `StateFields`, and all code that handles each field.
 
 use ndarray::{Array, Axis, RemoveAxis};
 
@@ -52,9 +52,9 @@ impl<T: Clone> PerEnvArray for Vec<Vec<T>> {
     }
 }
 
-/// Takes a list of flags of `Requires`, each with its name in messages and its fields of `SceneState`.
+/// Takes a list of flags of `StateFields`, each with its name in messages and its fields of `SceneState`.
 ///
-/// A field has a type that implements [`PerEnvArray`], and its shape in an environment: an axis of `Lengths`, and the
+/// A field has a type that implements [`PerEnvArray`], and its shape in an environment: an axis of `StateDims`, and the
 /// width of a second axis.
 macro_rules! quantities {
     ($(
@@ -66,18 +66,19 @@ macro_rules! quantities {
         /// State of all environments after a physics step (or after a reset).
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct SceneState {
-            /// Physics steps since the last reset of each environment, shape \[num_envs\].
+            /// Physics steps (of `physics_dt`) since the last reset of each environment, shape \[num_envs\].
             pub step: Vec<u64>,
             /// Time of positions and velocities \[s\] since the last reset, shape \[num_envs\].
             pub time: Vec<f64>,
             /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\].
             ///
-            /// It is one step of the physics engine earlier than [`time`](Self::time). Right after a reset or a write
-            /// to the state, both are equal, because accelerations and contacts are then solved for the current state.
+            /// It is one MuJoCo step (`physics_dt / substeps`) earlier than [`time`](Self::time). Right after a reset
+            /// or a write to the state, both are equal, because accelerations and contacts are then solved for the
+            /// current state.
             pub force_time: Vec<f64>,
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
             /// Render scenes of environments with their own sizes or colors, shape \[num_envs\]; empty if all
-            /// environments share one scene.
+            /// environments share one scene, or if neither `visible` nor `instance_poses` is requested.
             pub own_scenes: Vec<EnvScene>,
         }
 
@@ -93,7 +94,7 @@ macro_rules! quantities {
             /// All flags, with their names in messages.
             pub(crate) const NAMES: &'static [(Self, &'static str)] = &[$((Self::$FLAG, $name),)+];
 
-            /// Flags of the quantities that `state` has.
+            /// Flags whose fields are all present in `state`.
             pub fn present_in(state: &SceneState) -> Self {
                 let mut present = Self::NONE;
                 $(if [$(state.$field.is_some()),+].iter().all(|is| *is) {
@@ -102,7 +103,8 @@ macro_rules! quantities {
                 present
             }
 
-            /// Copies the part of `state` that is in the set, with its steps and times.
+            /// Copies the fields of `state` that are in the set, with steps and times. The copy has the scenes of
+            /// [`SceneState::own_scenes`] only with [`VISIBLE`](Self::VISIBLE) or [`INSTANCES`](Self::INSTANCES).
             pub fn part_of(self, state: &SceneState) -> SceneState {
                 let sees = self.contains(Self::VISIBLE) || self.contains(Self::INSTANCES);
                 SceneState {
@@ -116,7 +118,8 @@ macro_rules! quantities {
         }
 
         impl SceneState {
-            /// Creates a state at step 0 with default values of the quantities of `requires`.
+            /// Creates a state at step 0 with the fields of `requires`, filled with default values. The arrays of
+            /// `visible` are empty.
             pub fn with_room(requires: StateFields, lengths: &StateDims) -> Self {
                 let n = lengths.num_envs;
                 let wants = |flag| requires.contains(flag);
@@ -128,7 +131,7 @@ macro_rules! quantities {
             }
 
             /// Returns the first array of `requires` with a size other than in `lengths`, if any: name of the axis,
-            /// expected size, found size.
+            /// expected size, found size. Absent arrays, contacts, markers and `visible` are not checked.
             pub fn misfit(&self, requires: StateFields, lengths: &StateDims) -> Option<(&'static str, usize, usize)> {
                 $($($(if let Some([envs, count, ..]) = self.$field.as_ref().map(|array| array.shape())
                     && requires.contains(StateFields::$FLAG)

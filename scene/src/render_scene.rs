@@ -11,13 +11,13 @@ use std::sync::Arc;
 pub struct Instance {
     /// Shape.
     pub shape: Shape,
-    /// Material. An instance with alpha 0 is not drawn.
+    /// Material. An instance with alpha 0 is not drawn, but ray casters hit it if `visible` is true.
     pub material: Material,
     /// Value in the mask channel; never 0, which means no instance.
     pub mask_id: i32,
     /// Geom group; views may hide groups.
     pub group: u8,
-    /// True if the instance is drawn.
+    /// False hides the instance from cameras and ray casters.
     pub visible: bool,
     /// Name of the instance's owner: `uid/link`, the uid of an object, or the name of a geom of the world (`ground`).
     /// Ray casters select their targets by name; several instances may share a name.
@@ -57,7 +57,8 @@ impl Instance {
         Self { name: Arc::from(name), ..self }
     }
 
-    /// Returns the instance as a part of a body.
+    /// Returns the instance as a part of a body, given by its index on the body axis of
+    /// [`SceneState`](crate::SceneState).
     #[must_use]
     pub fn with_body(self, body: u32) -> Self {
         Self { body: Some(body), ..self }
@@ -102,9 +103,9 @@ impl Instance {
     }
 }
 
-/// Instances, lights and background of an environment, without poses.
+/// Instances, lights and background of an environment, without poses of instances.
 ///
-/// A scene is shared by environments and threads. Each frame supplies one pose per instance.
+/// A scene is shared by environments and threads. Each frame supplies one pose per instance, and the current lights.
 #[derive(Clone, Debug)]
 pub struct RenderScene {
     instances: Vec<Instance>,
@@ -116,16 +117,16 @@ pub struct RenderScene {
     pub lights: Vec<Light>,
     /// Headlight of every camera.
     pub headlight: Headlight,
-    /// Ambient light from all directions.
+    /// Ambient light from all directions, in addition to the `ambient` of lights.
     pub ambient: Hemisphere,
     /// Rule by which light is added up.
     pub lighting_space: LightingSpace,
     /// Background.
     pub sky: Sky,
-    /// Background image instead of `sky`: a [cube](TextureKind::Cube) around the camera in MuJoCo's axes, with faces
-    /// toward +x, -x, +z, -z, -y, +y.
+    /// Background image instead of `sky`: a [cube](TextureKind::Cube) around the camera. Its six squares face +x, -x,
+    /// +z, -z, -y, +y of the world, because the y axis of MuJoCo's skyboxes points up.
     pub skybox: Option<Arc<Texture>>,
-    /// Haze over distant surfaces.
+    /// Haze over distant surfaces; `None` for clear air.
     pub haze: Option<Haze>,
     /// Haze at the end of an infinite ground.
     pub horizon: Option<HorizonHaze>,
@@ -159,7 +160,7 @@ pub enum RenderSceneError {
         /// Index of the instance.
         instance: usize,
     },
-    /// The scene has more triangles than ids.
+    /// The triangles of all meshes, with 8 ids for each shape without triangles, exceed the number of ids.
     #[error("the scene has more than {limit} triangles")]
     TooManyTriangles {
         /// Largest number of ids.
@@ -177,7 +178,8 @@ impl RenderScene {
     ///
     /// # Errors
     ///
-    /// A size is not positive, a number is not finite, a mask id is 0, or there are too many triangles.
+    /// A size is not positive and finite, a number of a material is not finite, a refractive index is outside of
+    /// 1..=10, a mask id is 0, or there are too many triangles.
     pub fn new(instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
         let mut first_ids = vec![0u32];
         let mut next = 0u32;
@@ -272,8 +274,8 @@ impl RenderScene {
         &self.instances
     }
 
-    /// First id of each instance: instance k has the ids `first_ids()[k]..first_ids()[k + 1]`. A mesh has one per
-    /// triangle.
+    /// First id of each instance: instance k has the ids `first_ids()[k]..first_ids()[k + 1]`. A mesh or height field
+    /// has one per triangle, other shapes have [`IDS_OF_PRIMITIVE`](Self::IDS_OF_PRIMITIVE).
     pub fn first_ids(&self) -> &[u32] {
         &self.first_ids
     }
@@ -294,7 +296,7 @@ impl RenderScene {
         &self.texture_offsets
     }
 
-    /// Number of triangles of all meshes.
+    /// Number of triangles of all meshes and height fields.
     pub fn triangle_count(&self) -> usize {
         self.instances.iter().filter_map(Instance::mesh).map(|m| m.triangles().len()).sum()
     }
@@ -328,7 +330,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Triangles of the shape, if it is a mesh.
+    /// Triangles of the shape, if it is a mesh or a height field.
     pub fn mesh(&self) -> Option<&crate::shape::RenderMesh> {
         self.shape.mesh().map(Arc::as_ref)
     }

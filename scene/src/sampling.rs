@@ -3,7 +3,8 @@
 use crate::vector::V3;
 use std::f64::consts::PI;
 
-/// Cosine and sine of a fraction of a turn, 0..=1, by their series. The library's functions differ between machines.
+/// Cosine and sine of an angle of `part` turns, 0..=1, by their series. The library's functions differ between
+/// machines.
 #[inline]
 pub fn cos_sin_turns(part: f64) -> [f64; 2] {
     let quarter = (4.0 * part + 0.5) as i64;
@@ -24,14 +25,14 @@ pub fn cos_sin_turns(part: f64) -> [f64; 2] {
     }
 }
 
-/// Uniformly distributed point of a disc of radius 1.
+/// Point of the unit disc, uniformly distributed for two uniform numbers in 0..1.
 #[inline]
 pub fn sample_disk([a, b]: [f64; 2]) -> [f64; 2] {
     let (r, [cos, sin]) = (a.sqrt(), cos_sin_turns(b));
     [r * cos, r * sin]
 }
 
-/// Cosine-distributed direction of the hemisphere around +z.
+/// Unit direction of the hemisphere around +z, distributed as its cosine to +z for two uniform numbers in 0..1.
 #[inline]
 pub fn sample_cosine_hemisphere(at: [f64; 2]) -> V3 {
     let [x, y] = sample_disk(at);

@@ -1,8 +1,8 @@
 //! `SceneState`: the state of all environments that sensors measure, as plain arrays.
 //!
 //! The simulation fills the state after every physics step, and sensors read it. The first axis is the environment.
-//! Arrays are in C order, f64, in the environment-local world frame and SI units. Only requested quantities are
-//! present.
+//! Arrays are in C order, in the environment frame with world axes, and in SI units. They are f64, except for the poses
+//! of [`VisibleState`]. Only requested quantities are present.
 //!
 //! A step from t_k to t_(k+1) involves two times: contacts, efforts and accelerations are solved for t_k, positions and
 //! velocities are those of t_(k+1). The state has both times.
@@ -31,8 +31,8 @@ quantities! {
     /// Flag of [`SceneState::body_accelerations`], [`SceneState::force_poses`] and [`SceneState::force_velocities`];
     /// costs the engine an extra pass.
     ACCELERATIONS = "accelerations" {
-        /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity
-        /// (0 at rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\].
+        /// Coordinate accelerations of body origins (0 at rest, -9.81 along z in free fall), then angular accelerations
+        /// \[m/s², rad/s²\], in world axes at [`force_time`](Self::force_time), shape \[num_envs, bodies, 6\].
         ///
         /// They are the solution of the engine. If the engine then damps joints implicitly (the `damping` of joints
         /// with native actuators), velocities change slightly less.
@@ -47,7 +47,8 @@ quantities! {
 
     /// Flag of [`SceneState::contacts`].
     CONTACTS = "contacts" {
-        /// Contacts with forces.
+        /// Contacts with solved forces at [`force_time`](Self::force_time). Contacts within the margin only, without
+        /// constraints, are left out.
         contacts: Contacts,
     }
 
@@ -55,9 +56,10 @@ quantities! {
     JOINT_EFFORTS = "joint_efforts" {
         /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\].
         ///
-        /// For joints of MJCF files, MuJoCo's `qfrc_actuator`: the sum of the actuators' efforts on the joint, with
-        /// gravity compensation by actuators (`actuatorgravcomp`), clamped to the joint's `actuatorfrcrange` (MuJoCo
-        /// 2.2.2 has neither of these two). After a reset, it is computed for the current state.
+        /// For joints without a drive, of robots and MJCF files, MuJoCo's `qfrc_actuator`: the sum of the actuators'
+        /// efforts on the joint, with gravity compensation by actuators (`actuatorgravcomp`), clamped to the joint's
+        /// `actuatorfrcrange` (MuJoCo 2.2.2 has neither of these two). After a reset, it is computed for the current
+        /// state.
         joint_efforts: Array2<f64> [joints],
     }
 
@@ -71,25 +73,27 @@ quantities! {
 
     /// Flag of [`SceneState::sensordata`].
     SENSORDATA = "sensordata" {
-        /// Values of the physics engine's own sensors, shape \[num_envs, values\].
+        /// Values of the physics engine's own sensors, shape \[num_envs, values\]. After a step, values that depend on
+        /// forces or accelerations belong to [`force_time`](Self::force_time).
         sensordata: Array2<f64> [engine_values],
     }
 
-    /// Flag of [`SceneState::visible`], and of the [`RenderScene`] that sensors are built for.
+    /// Flag of [`SceneState::visible`]. A sensor that requires it also gets the [`RenderScene`] when it is built.
     VISIBLE = "visible" {
-        /// Poses of visible instances.
+        /// Poses of all instances and lights, for cameras.
         visible: VisibleState,
     }
 
     /// Flag of [`SceneState::joint_wrenches`]; costs the engine an extra pass.
     JOINT_WRENCHES = "joint_wrenches" {
         /// Forces, then torques that the joint of each link exerts on the link \[N, N m\], about the origin of the link
-        /// and in its axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to other links, because their
-        /// joint does not move.
+        /// and in its axes, at [`force_time`](Self::force_time), shape \[num_envs, bodies, 6\]. NaN for links that are
+        /// fused to other links, because their joint does not move.
         joint_wrenches: Array3<f64> [bodies, 6],
     }
 
-    /// Flag of [`SceneState::instance_poses`], and of the [`RenderScene`] that sensors are built for.
+    /// Flag of [`SceneState::instance_poses`]. A sensor that requires it also gets the [`RenderScene`] when it is
+    /// built.
     INSTANCES = "instances" {
         /// World-from-instance poses, in the order of [`RenderScene::instances`], in double precision for ray casters,
         /// shape \[num_envs, instances\].
@@ -100,7 +104,7 @@ quantities! {
     /// [`SceneState::actuator_activations`].
     ACTUATORS = "actuators" {
         /// Controls of actuators, shape \[num_envs, actuators\]: the position target of a drive \[rad or m\]; for an
-        /// actuator of an MJCF file, its control in the unit of the file.
+        /// actuator of an MJCF file, its control in the unit of the file, before clamping to `ctrlrange`.
         actuator_controls: Array2<f64> [actuators],
         /// Forces of actuators, shape \[num_envs, actuators\].
         ///
@@ -124,11 +128,12 @@ quantities! {
 pub struct StateDims {
     /// Number of environments.
     pub num_envs: usize,
-    /// Number of bodies.
+    /// Number of bodies, in this order: links of robots and articulations, rigid objects, bodies and sites of MJCF
+    /// files. The world is not included.
     pub bodies: usize,
-    /// Number of joints with one degree of freedom.
+    /// Number of joints with one degree of freedom: those of robots and articulations, then those of MJCF files.
     pub joints: usize,
-    /// Number of actuators.
+    /// Number of actuators: the drives of robots, then the actuators of MJCF files.
     pub actuators: usize,
     /// Number of values of the physics engine's own sensors.
     pub engine_values: usize,
@@ -160,7 +165,7 @@ impl PartialEq for EnvScene {
     }
 }
 
-/// Poses of the instances and lights of a [`RenderScene`] in all environments.
+/// Poses of the instances and lights of a [`RenderScene`] in all environments, hidden instances included.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VisibleState {
     /// World-from-instance poses, in the order of [`RenderScene::instances`], in single precision for the renderer,
@@ -169,7 +174,8 @@ pub struct VisibleState {
     /// Lights of the scene at their current poses, shape \[num_envs, lights\].
     pub lights: Array2<Light>,
     /// Render scene of each environment with its current shapes, sizes and colors, shape \[num_envs\]. The list is
-    /// empty if no instance is [deformable](crate::Instance::is_deformable).
+    /// empty if no instance is [deformable](crate::Instance::is_deformable); [`SceneState::own_scenes`] then has sizes
+    /// and colors.
     pub scenes: Vec<EnvScene>,
 }
 
@@ -182,13 +188,13 @@ pub struct Contacts {
     pub list: Vec<Contact>,
 }
 
-/// A contact of two bodies.
+/// A contact of two bodies, with its force at [`SceneState::force_time`]. Vectors are in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The two bodies, as indices of the body axis of [`SceneState`]; `None` is the world. Fused links keep their own
     /// index.
     pub bodies: [Option<u32>; 2],
-    /// Position \[m\].
+    /// Position in the environment frame, in the middle between both surfaces \[m\].
     pub point: [f64; 3],
     /// Unit vector from the first body to the second.
     pub normal: [f64; 3],
@@ -212,13 +218,15 @@ impl SceneState {
         self.step.len()
     }
 
-    /// Own render scene of environment `env`, if it does not use the shared scene.
+    /// Own render scene of environment `env`. The inner value is `None` if the environment uses the shared scene, or
+    /// does not exist.
     pub fn env_scene(&self, env: usize) -> &EnvScene {
         static AS_ALL: EnvScene = EnvScene(None);
         self.own_scenes.get(env).unwrap_or(&AS_ALL)
     }
 
-    /// Scene that cameras see in environment `env`, with its current shapes, if it is not the shared scene.
+    /// Scene that cameras see in environment `env`, with its current shapes. The inner value is `None` for the shared
+    /// scene.
     pub fn visible_scene(&self, env: usize) -> &EnvScene {
         let shaped = self.visible.as_ref().and_then(|visible| visible.scenes.get(env));
         shaped.unwrap_or_else(|| self.env_scene(env))
@@ -226,9 +234,10 @@ impl SceneState {
 
     /// Copies the environments where `chosen` is true from `other`: steps, times, and the fields that this state has.
     ///
-    /// Returns `false` and changes nothing if `other` is not of the same scene: it lacks a field of this state, or has
-    /// other sizes. Allocates only if the capacity of the contact list does not suffice for old and new contacts
-    /// together: the new list is built behind the old one, and the capacity is kept.
+    /// Returns `false` and changes nothing if `chosen` does not have one element per environment, or if `other` is not
+    /// of the same scene: it lacks a field of this state, or has other sizes. Allocates only if the capacity of the
+    /// contact list does not suffice for old and new contacts together: the new list is built behind the old one, and
+    /// the capacity is kept.
     #[must_use]
     pub fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) -> bool {
         if !(chosen.len() == self.num_envs() && self.same_shape(other)) {

@@ -5,7 +5,7 @@ use std::ops::{BitOr, BitOrAssign};
 
 /// Set of the fields of a [`SceneState`](crate::SceneState) that a sensor needs.
 ///
-/// The flags are generated from the list in `state.rs`.
+/// Each flag selects one group of arrays, for example [`POSES`](Self::POSES).
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct StateFields(pub(crate) u32);
 
@@ -13,12 +13,12 @@ impl StateFields {
     /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// Quantities that the engine solves for the beginning of a step.
+    /// Quantities that the engine solves for the start of a step: accelerations, contacts and joint wrenches.
     ///
     /// They are lost when the step is done, so a simulation must know before the step that a sensor needs them.
     pub const FORCE_STAGE: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
-    /// True if this set contains all of `other`.
+    /// True if this set contains all flags of `other`; always true for an empty `other`.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
@@ -43,7 +43,7 @@ impl StateFields {
         self.0 == 0
     }
 
-    /// Names of the fields in the set.
+    /// Names of the flags in the set, such as `poses`.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.iter().filter(move |(field, _)| self.contains(*field)).map(|(_, name)| *name)
     }

@@ -33,7 +33,7 @@ pub fn scale(a: V3, k: f64) -> V3 {
     a.map(|x| x * k)
 }
 
-/// Vector scaled to length 1; `None` for a zero vector and for numbers that are not finite.
+/// Vector scaled to length 1; `None` for a zero vector and for infinite numbers.
 #[inline(always)]
 pub fn normalize(a: V3) -> Option<V3> {
     // Divided by the largest component first, because squares of tiny or huge numbers leave the range.

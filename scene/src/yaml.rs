@@ -16,7 +16,8 @@ pub struct YamlFeatures {
     pub files: &'static str,
     /// True if aliases are accepted. Otherwise they are errors.
     pub aliases: bool,
-    /// True if tags are ignored. Otherwise, tags other than `!!str` are errors.
+    /// True if tags are ignored. Otherwise, tags other than `!!str` are errors. `!!str` makes a scalar a text in both
+    /// cases.
     pub tags: bool,
 }
 
@@ -43,7 +44,7 @@ pub enum Value {
 /// A word, a number, or a text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scalar {
-    /// Text as in the file, without quotes.
+    /// Text of the value, without quotes and with escapes resolved.
     pub text: String,
     /// Type by YAML 1.2's core schema.
     pub kind: ScalarKind,
@@ -56,9 +57,10 @@ pub enum ScalarKind {
     Null,
     /// `true` or `false`.
     Bool(bool),
-    /// A number in TOML's notation: without superfluous zeros and signs, with a digit on both sides of a point.
+    /// A number in TOML's notation: without superfluous zeros and signs, with a digit on both sides of a point. `1e999`
+    /// for a number that is too large for `f64`.
     Number(String),
-    /// Any other text, and everything in quotes.
+    /// Any other text, and everything in quotes or with the tag `!!str`.
     Text,
 }
 
@@ -107,11 +109,11 @@ enum Content {
     },
 }
 
-/// Parses the only document of a text; `None` for an empty text.
+/// Parses the only document of a text; `None` for a text without a value.
 ///
 /// # Errors
 /// The text is not YAML, has several documents or duplicate keys, uses aliases or tags that `dialect` rejects, or
-/// exceeds this parser's limits of depth and size.
+/// exceeds this parser's limits of depth (48) and size (64 MiB with all aliases expanded).
 pub fn parse(text: &str, dialect: &YamlFeatures) -> Result<Option<Node>, YamlError> {
     let mut builder = Builder { dialect, open: Vec::new(), root: None, anchors: HashMap::new(), size: 0 };
     let mut parser = Parser::new_from_str(text);

@@ -20,7 +20,8 @@ impl ActionTerm {
     /// Creates a term with the columns of `space`.
     ///
     /// `apply` gets the clamped actions of all environments, shape (N, columns of the term), and writes them to the
-    /// simulation as targets, efforts or wrenches. It is called once per step, before the first physics step.
+    /// simulation as targets, efforts or wrenches. Unless [`every_physics_step`](Self::every_physics_step) is set, it
+    /// is called once per step, before the first physics step.
     pub fn new(
         name: impl Into<String>,
         space: Space,
@@ -29,7 +30,7 @@ impl ActionTerm {
         Self { name: name.into(), space, every_physics_step: false, apply: Box::new(apply) }
     }
 
-    /// Calls `apply` before every physics step, for a control law that reads the state.
+    /// Calls `apply` with the same actions before every physics step of a step, for a control law that reads the state.
     #[must_use]
     pub fn every_physics_step(self) -> Self {
         Self { every_physics_step: true, ..self }

@@ -37,7 +37,7 @@ impl EnvBuilder {
         Self { sim, cfg, terms: Terms::default() }
     }
 
-    /// The simulation, for terms that need it when they are created.
+    /// Read access to the simulation, for terms that need it when they are created.
     pub fn sim(&self) -> &SimulationManager {
         &self.sim
     }
@@ -84,11 +84,13 @@ impl EnvBuilder {
         self
     }
 
-    /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup) events.
+    /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup)
+    /// events. No episode begins: call [`Env::reset`] first.
     ///
     /// # Errors
     /// - There is no action or observation column.
     /// - Two terms of one kind have the same name, or a name is empty or contains a slash.
+    /// - Two columns of a term have the same name.
     /// - A number is out of range, or an event fails.
     pub fn build(self) -> Result<Env> {
         let Self { sim, cfg, terms } = self;

@@ -18,7 +18,7 @@ pub enum Finding {
     NoEnvironments,
     /// A valid call returned an error.
     UnexpectedError {
-        /// The call.
+        /// The call: `a reset with a seed` or `step 12`.
         what: String,
         /// The error message.
         error: String,
@@ -30,7 +30,7 @@ pub enum Finding {
     },
     /// An array has the wrong shape.
     Shape {
-        /// The array, and the time: `step 12`, or `after the reset`.
+        /// The array and the time, such as `rewards of step 12`.
         what: String,
         /// Its shape.
         found: Vec<usize>,
@@ -39,15 +39,16 @@ pub enum Finding {
     },
     /// An observation is not finite, or outside the observation space.
     OutOfSpace {
-        /// Time: `step 12`, or `after the reset`.
+        /// The array and the time: `observations of step 12`, `final_observations of step 12`, or `after the reset`.
+        /// Steps count from 0.
         when: String,
         /// The environment.
         env: usize,
-        /// The column.
+        /// Name of the column.
         column: String,
         /// The value.
         value: f64,
-        /// The bounds of the column.
+        /// Lower and upper bound of the column.
         bounds: [f64; 2],
     },
     /// A reward is not finite.
@@ -59,7 +60,7 @@ pub enum Finding {
         /// The reward.
         value: f64,
     },
-    /// The final observation of an episode that goes on differs from the observation.
+    /// The final observation of an episode that goes on differs from the observation of the same step.
     FinalObservation {
         /// Time: `step 12`.
         when: String,
@@ -80,7 +81,8 @@ pub enum Finding {
     MaskedReset(RunDifference),
     /// The actions of one environment changed the results of others.
     Interference(RunDifference),
-    /// Actions beyond their bounds give other results than actions at the bounds.
+    /// Actions beyond their bounds give other results than actions at the bounds. Only columns with two finite bounds
+    /// are tested.
     ActionClamping(RunDifference),
 }
 
@@ -139,16 +141,16 @@ impl fmt::Display for Finding {
 }
 
 /// Tests a batch of environments against the [`VectorEnv`] contract, as Gymnasium's `check_env` does. Returns the first
-/// violation of each kind; the list is empty if the contract holds.
+/// violation of each kind, and every invalid call that was accepted; the list is empty if no violation was found.
 ///
-/// Each of several runs resets the batch with `seed` and does 100 steps with random actions of that seed. The test
-/// covers:
+/// Each of several runs resets the batch with `seed` and does 100 steps with random actions of that seed. Episode ends
+/// after these steps are not tested. The test covers:
 ///
 /// - shapes, observations within their space, finite rewards;
 /// - final observations, and the automatic reset in the step in which an episode ends;
-/// - the same bits for the same seed;
-/// - resets by mask that leave other environments unchanged;
-/// - environments that do not influence each other;
+/// - the same bits for the same seed; without them, the next three tests are skipped;
+/// - resets by mask that leave other environments unchanged, if there are two or more environments;
+/// - environments that do not influence each other, if there are two or more environments;
 /// - actions beyond their bounds, which must act as the bounds;
 /// - errors for masks and actions of another shape, and for actions that are NaN.
 ///

@@ -16,7 +16,8 @@ pub struct CommandTerm {
 }
 
 impl CommandTerm {
-    /// Creates a term with named columns. `sample` returns the values for one episode of one environment.
+    /// Creates a term with named columns. `sample` returns the values for one episode of one environment. A value that
+    /// is not finite is an error of the reset or step that begins the episode.
     pub fn new<const K: usize>(
         name: impl Into<String>,
         columns: [&str; K],

@@ -14,9 +14,9 @@ pub struct TermContext<'e> {
 #[derive(Debug)]
 pub(crate) struct TaskState {
     pub(crate) sim: SimulationManager,
-    /// The last actions, within their bounds, shape (N, action columns).
+    /// Actions of the step in progress or of the last step, within their bounds, shape (N, action columns).
     pub(crate) actions: Array2<f64>,
-    /// Actions of the step before the last one, shape (N, action columns).
+    /// Actions of the step before that of `actions`, shape (N, action columns).
     pub(crate) previous_actions: Array2<f64>,
     /// Number of steps of each episode so far.
     pub(crate) episode_steps: Vec<u64>,
@@ -41,24 +41,25 @@ impl<'e> TermContext<'e> {
         self.state.sim.num_envs()
     }
 
-    /// Actions of the last step, clamped to their bounds, shape (N, columns of
-    /// [`Env::action_space`](crate::Env::action_space)); 0 at the start of an episode.
+    /// Actions of the step in progress, or of the last step between steps, clamped to their bounds, shape (N, columns
+    /// of [`Env::action_space`](crate::Env::action_space)); 0 at the start of an episode.
     pub fn actions(&self) -> ArrayView2<'e, f64> {
         self.state.actions.view()
     }
 
-    /// Actions of the step before the last one, shaped as [`actions`](Self::actions); 0 if the episode had no such
+    /// Actions of the step before that of [`actions`](Self::actions), in the same shape; 0 if the episode had no such
     /// step.
     pub fn previous_actions(&self) -> ArrayView2<'e, f64> {
         self.state.previous_actions.view()
     }
 
-    /// Number of steps of each environment's episode so far, including the present one, shape (N,).
+    /// Number of steps of each environment's episode so far, including the step in progress, shape (N,); 0 at the start
+    /// of an episode.
     pub fn episode_steps(&self) -> &'e [u64] {
         &self.state.episode_steps
     }
 
-    /// Values of the command term called `name`, shape (N, columns of the term).
+    /// Values of the command term called `name`, shape (N, columns of the term); 0 before the first reset.
     ///
     /// # Errors
     /// There is no command term of this name; the error lists the existing ones, the nearest first.

@@ -79,7 +79,8 @@ impl Env {
         &mut self.state.sim
     }
 
-    /// Returns the simulation in the state after the last step.
+    /// Returns the simulation in its current state: after the last step, including the resets of episodes that ended in
+    /// it.
     pub fn into_sim(self) -> SimulationManager {
         let (mut sim, (_, id)) = (self.state.sim, self.reset_monitor);
         // The caller may have swapped the simulation through `sim_mut`. Then it lacks this observer.
@@ -89,7 +90,7 @@ impl Env {
         sim
     }
 
-    /// Returns the context that terms see at present.
+    /// Returns the context that terms would get now, between steps.
     pub fn context(&self) -> TermContext<'_> {
         self.state.context()
     }
@@ -109,12 +110,13 @@ impl Env {
         f64::from(self.cfg.decimation) * self.state.sim.cfg().physics_dt
     }
 
-    /// Columns of the observations, named `term/column`. A term with noise and without a clip is unbounded.
+    /// Columns of the observations, named `term/column`, with the bounds of the clip after scaling. Columns of a term
+    /// without a clip are unbounded.
     pub fn observation_space(&self) -> &Space {
         &self.observation_space
     }
 
-    /// Columns of the actions, named `term/column`.
+    /// Columns of the actions, named `term/column`, with the bounds to which actions are clamped.
     pub fn action_space(&self) -> &Space {
         &self.action_space
     }
@@ -124,8 +126,8 @@ impl Env {
         self.terms.rewards.iter().map(|term| term.name.as_str()).collect()
     }
 
-    /// The latest observations, shape (N, columns of [`observation_space`](Self::observation_space)); zeros before the
-    /// first reset.
+    /// The latest observations, with noise, clip and scale, shape (N, columns of
+    /// [`observation_space`](Self::observation_space)); zeros before the first reset.
     pub fn observations(&self) -> ArrayView2<'_, f64> {
         self.observations.view()
     }
@@ -213,8 +215,8 @@ impl Env {
     ///
     /// # Errors
     /// - The actions have another shape or are not finite, or an environment has no episode. Nothing was done then.
-    /// - A term fails, or returns an array of another shape or with a number that is not finite. The step is then
-    ///   incomplete and every environment has to be reset.
+    /// - A term fails, or returns an array of another shape or a number that is not finite. The step is then incomplete
+    ///   and every environment has to be reset.
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
         let actions = self.clamp_actions(actions.into())?;
         if let Some(env) = self.episodes.iter().position(|row| !row.is_active) {

@@ -122,7 +122,7 @@ pub enum EnvError {
         what: &'static str,
         /// The name given.
         name: String,
-        /// Names that exist, the nearest first.
+        /// Names that exist, the nearest first; at most 12.
         candidates: Vec<String>,
     },
     /// An array has the wrong shape.
@@ -149,7 +149,7 @@ pub enum EnvError {
         /// The value.
         value: f64,
     },
-    /// An environment without an episode was stepped: it was never reset, or not since a step failed.
+    /// An environment without an episode was stepped: it was never reset, or its last reset or the last step failed.
     #[error(
         "environment {env} has no episode: call `reset(None, ..)` before the first step, and after a step that failed"
     )]

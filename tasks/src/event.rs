@@ -11,13 +11,15 @@ type ApplyEvent = Box<dyn Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermR
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum EventMode {
-    /// Once, when the task is built, in all environments.
+    /// Once, when the task is built, in all environments. Later resets undo changes of the state, but not of properties
+    /// such as masses.
     Startup,
     /// When an episode begins, after the simulation went back to the initial state there.
     Reset,
-    /// Repeatedly during an episode, after steps. The number of steps in between is drawn anew each time.
+    /// Repeatedly during an episode, after steps in which the episode does not end. The number of steps before the
+    /// first event of an episode, and between two events, is drawn anew each time, uniformly from `steps`.
     Interval {
-        /// Minimum and maximum number of steps, at least 1.
+        /// Minimum and maximum number of steps of the task, both included, at least 1.
         steps: [u64; 2],
     },
 }
@@ -25,8 +27,8 @@ pub enum EventMode {
 /// A change of the simulation besides the actions, such as a random initial state or a push.
 ///
 /// Its random numbers come from one generator for each affected environment. They repeat with the seed that is given to
-/// [`Env::reset`](crate::Env::reset). To randomize properties with them, use
-/// [`randomize_with`](kinetoscope_sim::EnvPropertiesMut::randomize_with).
+/// [`Env::reset`](crate::Env::reset); those of [`EventMode::Startup`] events repeat with the simulation's seed. To
+/// randomize properties with them, use [`randomize_with`](kinetoscope_sim::EnvPropertiesMut::randomize_with).
 /// [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) instead continues the manager's own random numbers,
 /// which a reset does not restart.
 pub struct EventTerm {
@@ -36,7 +38,8 @@ pub struct EventTerm {
 }
 
 impl EventTerm {
-    /// Creates an event. `apply` gets one random number generator for each environment in which the event happens.
+    /// Creates an event. `act` gets one random number generator for each environment in which the event happens, and
+    /// must change these environments only.
     pub fn new(
         name: impl Into<String>,
         mode: EventMode,
@@ -45,7 +48,7 @@ impl EventTerm {
         Self { name: name.into(), mode, apply: Box::new(act) }
     }
 
-    /// Creates an event that happens when an episode begins.
+    /// Creates an event that happens when an episode begins ([`EventMode::Reset`]).
     pub fn on_reset(
         name: impl Into<String>,
         act: impl Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send + 'static,

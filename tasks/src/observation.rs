@@ -15,14 +15,14 @@ type Observe = Box<dyn Fn(&TermContext<'_>) -> TermResult<Array2<f64>> + Send>;
 pub enum Noise {
     /// Normal distribution with mean 0.
     Normal {
-        /// Standard deviation, in the unit of the columns.
+        /// Standard deviation, in the unit of the values before scaling.
         std: f64,
     },
     /// Uniform distribution.
     Uniform {
-        /// Lower bound, in the unit of the columns.
+        /// Lower bound, in the unit of the values before scaling.
         low: f64,
-        /// Upper bound, in the unit of the columns.
+        /// Upper bound, in the unit of the values before scaling.
         high: f64,
     },
 }
@@ -68,20 +68,20 @@ impl ObservationTerm {
         Self { name: name.into(), columns, noise: None, clip, scale: 1.0, observe: Box::new(observe) }
     }
 
-    /// Adds noise to the values.
+    /// Adds noise to the values, drawn anew for each observation. It replaces the noise of an earlier call.
     #[must_use]
     pub fn with_noise(self, noise: Noise) -> Self {
         Self { noise: Some(noise), ..self }
     }
 
-    /// Clips the values to \[low, high\], in the unit of the columns. An infinite value, such as the depth of a miss,
-    /// becomes a bound.
+    /// Clips the noisy values to \[low, high\], in their unit before scaling. An infinite value, such as the depth of a
+    /// miss, becomes a bound.
     #[must_use]
     pub fn clipped(self, clip: [f64; 2]) -> Self {
         Self { clip, ..self }
     }
 
-    /// Multiplies the clipped values by `scale`.
+    /// Multiplies the clipped values by `scale`, which must be finite and not 0.
     #[must_use]
     pub fn scaled(self, scale: f64) -> Self {
         Self { scale, ..self }

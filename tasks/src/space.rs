@@ -76,7 +76,8 @@ impl Space {
         place.ok_or_else(|| EnvError::unknown("column", name, self.names.iter().map(String::as_str)))
     }
 
-    /// True if a row has as many numbers as there are columns, and each is within its bounds.
+    /// True if a row has as many numbers as there are columns, and each is within its bounds. NaN is outside of all
+    /// bounds.
     pub fn contains(&self, row: ArrayView1<'_, f64>) -> bool {
         let mut bounds = self.low.iter().zip(&self.high);
         row.len() == self.len() && row.iter().all(|x| bounds.next().is_some_and(|(low, high)| low <= x && x <= high))

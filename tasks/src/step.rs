@@ -8,18 +8,18 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step<I = StepInfo> {
     /// Present observations, shape (N, columns of [`observation_space`](crate::VectorEnv::observation_space)). In an
-    /// environment whose episode ended, the first observation of the next episode.
+    /// environment whose episode ended in this step, the first observation of the next episode.
     pub observations: Array2<f64>,
     /// Observations that the actions led to, same shape. In an environment whose episode ended, its last observation;
     /// elsewhere equal to `observations`.
     pub final_observations: Array2<f64>,
-    /// Rewards, shape (N,).
+    /// Rewards of this step, shape (N,). In an environment whose episode ended, the last reward of that episode.
     pub rewards: Array1<f64>,
-    /// True if the episode reached its end, shape (N,): no further reward is possible. In an [`Env`](crate::Env), by a
-    /// termination term or a diverged simulation.
+    /// True if the episode reached its end in this step, shape (N,): no further reward is possible. In an
+    /// [`Env`](crate::Env), by a termination term or a diverged simulation.
     pub terminated: Array1<bool>,
-    /// True if the episode was cut off, shape (N,). In an [`Env`](crate::Env), by the limit of steps, a truncating
-    /// term, or a reset from outside the task.
+    /// True if the episode was cut off in this step, shape (N,). In an [`Env`](crate::Env), by the limit of steps, a
+    /// truncating term, or a reset from outside the task. `terminated` may be true as well.
     pub truncated: Array1<bool>,
     /// Additional results of the implementation.
     pub info: I,
@@ -28,10 +28,10 @@ pub struct Step<I = StepInfo> {
 /// Additional results of a step of an [`Env`](crate::Env).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepInfo {
-    /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)). Their sums are the
-    /// rewards.
+    /// Weighted rewards of each term, shape (N, reward terms), in the order of
+    /// [`Env::reward_names`](crate::Env::reward_names). The sum of a row is the reward of that environment.
     pub reward_terms: Array2<f64>,
-    /// The episodes that ended, in the order of environments.
+    /// The episodes that ended in this step, in the order of environments.
     pub ended: Vec<EndedEpisode>,
 }
 
@@ -44,7 +44,8 @@ pub struct EndedEpisode {
     pub reason: EndReason,
     /// Number of steps of the episode.
     pub steps: u64,
-    /// Sum of the weighted rewards of each term, in the order of [`Env::reward_names`](crate::Env::reward_names).
+    /// Sum of the weighted rewards of each term over the episode, in the order of
+    /// [`Env::reward_names`](crate::Env::reward_names).
     pub reward_sums: Vec<f64>,
 }
 
@@ -62,7 +63,8 @@ impl EndedEpisode {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum EndReason {
-    /// The simulation diverged: the environment stayed in its last good state until its reset.
+    /// The simulation diverged, with a description such as `step 12: bad acceleration`. The environment stayed in its
+    /// last good state until its reset.
     Diverged(String),
     /// The environment was reset from outside the task: by a viewer, or by the program through
     /// [`Env::sim_mut`](crate::Env::sim_mut). The final observation and reward are those of the state after that reset.

@@ -9,7 +9,7 @@ type Condition = Box<dyn Fn(&TermContext<'_>) -> TermResult<Array1<bool>> + Send
 
 /// A reason for episodes to end.
 ///
-/// Two reasons need no term: a diverged simulation, and the limit of
+/// Three reasons need no term: a diverged simulation, a reset from outside the task, and the limit of
 /// [`EnvCfg::episode_steps`](crate::EnvCfg::episode_steps).
 pub struct TerminationTerm {
     pub(crate) name: String,

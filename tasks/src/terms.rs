@@ -43,10 +43,10 @@ fn select_joints(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
 }
 
 /// Joint positions relative to the initial ones \[rad or m\]; one column for each joint that matches one of `patterns`
-/// (whole names).
+/// (whole names), in the order of [`find_joints`](kinetoscope_sim::Robot::find_joints).
 ///
 /// # Errors
-/// A pattern matches no joint.
+/// A pattern is invalid or matches no joint, or two patterns match the same joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.
@@ -62,7 +62,7 @@ pub fn joint_pos_rel(
 /// Joint velocities \[rad/s or m/s\]; columns as in [`joint_pos_rel`].
 ///
 /// # Errors
-/// A pattern matches no joint.
+/// A pattern is invalid or matches no joint, or two patterns match the same joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.
@@ -70,7 +70,8 @@ pub fn joint_vel(sim: &SimulationManager, name: &str, robot: RobotId, patterns: 
     joint_observation(sim, name, robot, patterns, |robot| robot.qvel())
 }
 
-/// A term with the columns that `read` returns for the joints that match `patterns`.
+/// Creates a term with the columns of `read` for the joints that match `patterns`. `read` returns all joints, shape (N,
+/// dof).
 fn joint_observation(
     sim: &SimulationManager,
     name: &str,
@@ -82,12 +83,13 @@ fn joint_observation(
     Ok(ObservationTerm::new(name, names, move |now| Ok(select_joints(&read(&now.sim().robot(robot)), &joints))))
 }
 
-/// The last actions; `names` are the names of all columns of the action space.
+/// [`TermContext::actions`]; `names` are the names of all columns of the action space, in its order.
 pub fn last_action<N: Into<String>>(name: &str, names: impl IntoIterator<Item = N>) -> ObservationTerm {
     ObservationTerm::new(name, names, |now| Ok(now.actions().to_owned()))
 }
 
-/// Values of a command; `names` are the names of its columns.
+/// Values of the command term called `command`; `names` are the names of its columns. If there is no such term,
+/// observations fail.
 pub fn generated_commands<N: Into<String>>(
     name: &str,
     command: impl Into<String>,
@@ -97,11 +99,12 @@ pub fn generated_commands<N: Into<String>>(
     ObservationTerm::new(name, names, move |now| Ok(now.command(&command)?.to_owned()))
 }
 
-/// Joint efforts \[N m or N\], from `-bound` to `bound`, applied with
-/// [`set_qf_target`](kinetoscope_sim::RobotMut::set_qf_target).
+/// Joint efforts \[N m or N\], from `-bound` to `bound`, set with
+/// [`set_qf_target`](kinetoscope_sim::RobotMut::set_qf_target): they are added to the efforts of drives, and mimic
+/// joints ignore them. Columns are as in [`joint_pos_rel`].
 ///
 /// # Errors
-/// A pattern matches no joint, or `bound` is negative or NaN.
+/// A pattern is invalid or matches no joint, two patterns match the same joint, or `bound` is negative or NaN.
 ///
 /// # Panics
 /// The robot belongs to another manager.
@@ -118,11 +121,12 @@ pub fn joint_efforts(
     }))
 }
 
-/// Changes of joint position targets: actions are from -1 to 1, and an action of 1 adds `step` \[rad or m\] to a target
-/// in a step of the task. Targets stay within the limits of the joints.
+/// Changes of joint position targets: actions are from -1 to 1, and an action of 1 adds `step` \[rad or m\] to the
+/// current target in a step of the task. Targets stay within the limits of the joints. Columns are as in
+/// [`joint_pos_rel`]; joints without a drive ignore them.
 ///
 /// # Errors
-/// A pattern matches no joint.
+/// A pattern is invalid or matches no joint, or two patterns match the same joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.
@@ -140,12 +144,13 @@ pub fn relative_joint_positions(
     }))
 }
 
-/// A reward of 1 in every step.
+/// A reward of 1, times `weight`, in every step, including the last one of an episode.
 pub fn is_alive(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now| Ok(Array1::ones(now.num_envs())))
 }
 
-/// Sum of the squared changes of the actions since the previous step.
+/// Sum over all action columns of the squared changes since the previous step; the first step of an episode is compared
+/// with 0.
 pub fn action_rate(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now: &TermContext<'_>| -> TermResult<Array1<f64>> {
         let change = &now.actions() - &now.previous_actions();

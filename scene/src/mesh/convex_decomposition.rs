@@ -26,8 +26,8 @@ const MAX_VERTICES: usize = 4096;
 pub struct ConvexDecompositionCfg {
     /// Largest number of pieces, 1 to 1024.
     pub max_pieces: usize,
-    /// Largest distance of the hull of a piece above its surface, along the surface's normal, or below it \[m\]; above
-    /// 0.
+    /// Largest distance between the hull of a piece and its surface, above and below the surface \[m\]; above 0.
+    /// Exceeded if `max_pieces` does not suffice.
     pub tolerance: f64,
 }
 
@@ -41,7 +41,7 @@ impl Default for ConvexDecompositionCfg {
 /// Result of a decomposition into convex pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexDecomposition {
-    /// Closed convex hulls with outward-facing triangles, in the order in which they were cut.
+    /// Closed convex hulls with outward-facing triangles. Equal inputs give the same order.
     pub hulls: Vec<TriMesh>,
     /// Largest distance between the hull of a piece and its surface \[m\].
     ///
@@ -183,7 +183,7 @@ impl SourceSurface {
     }
 }
 
-/// Distinct points in single precision.
+/// Rounds points to single precision, sorts them and removes duplicates; -0 becomes 0.
 fn distinct_points(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
     let mut points: Vec<[f32; 3]> = points.map(|p| p.map(|x| x as f32 + 0.0)).collect();
     points.sort_by(|a, b| (0..3).fold(std::cmp::Ordering::Equal, |order, k| order.then(a[k].total_cmp(&b[k]))));

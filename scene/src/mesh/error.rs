@@ -95,7 +95,7 @@ pub enum MeshError {
         /// Largest accepted number.
         limit: usize,
     },
-    /// The mesh has no convex hull.
+    /// No convex hull or convex pieces can be computed, or their configuration is invalid.
     #[error("{}: no convex hull: {source}", path.display())]
     Hull {
         /// The mesh file.

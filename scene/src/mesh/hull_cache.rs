@@ -16,10 +16,10 @@ const MAGIC: &[u8; 12] = b"kshull\r\n\x00\x01\x00\x00";
 pub(super) const KEY_BYTES: usize = 32;
 const HEADER_BYTES: usize = MAGIC.len() + KEY_BYTES + 8;
 
-/// Disk cache of convex hulls, in one folder.
+/// Disk cache of convex hulls, in one folder. The [`Default`] is disabled.
 ///
 /// A problem with the folder or a file in it costs time but is never an error: the hull is computed again, and written
-/// again if possible.
+/// again if possible. Hulls of plain glTF files, whose vertices are in other files, are not cached.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct HullCache {
     dir: Option<PathBuf>,
@@ -27,7 +27,7 @@ pub struct HullCache {
 
 impl HullCache {
     /// Cache in `$KINETOSCOPE_CACHE`, else `$XDG_CACHE_HOME/kinetoscope`, else `$HOME/.cache/kinetoscope`, else
-    /// disabled.
+    /// disabled. An empty variable counts as unset.
     pub fn default_location() -> Self {
         Self::from_env(|name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from))
     }
@@ -57,7 +57,8 @@ impl HullCache {
     /// Returns the convex hull of the vertices of a mesh file, scaled along its axes (the `scale` of URDF).
     ///
     /// # Errors
-    /// A factor of the scale is 0 or not finite, the file cannot be read, or its vertices have no hull.
+    /// A factor of the scale is 0 or not finite, the configuration is out of range, the file cannot be read, or its
+    /// vertices have no hull.
     pub fn hull_of_file(&self, path: &Path, scale: [f64; 3], cfg: &HullCfg) -> Result<TriMesh, MeshError> {
         self.hull_of_file_with(path, &MeshOptions::default(), scale, cfg)
     }

@@ -56,7 +56,7 @@ pub use write::{write_binary_stl, write_obj};
 pub struct TriMesh {
     /// Vertex positions \[m\].
     pub positions: Vec<[f32; 3]>,
-    /// Unit vertex normals.
+    /// Vertex normals; of unit length in meshes from [`load`].
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA). Coordinates outside of 0..=1
     /// repeat the image.
@@ -92,8 +92,8 @@ pub struct MeshMaterial {
 /// Source of a texture's pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TextureSource {
-    /// An image file. It may not exist.
+    /// An image file, with its path resolved relative to the mesh file. It may not exist.
     File(PathBuf),
-    /// An image inside the mesh file (GLB): its bytes, PNG or JPEG.
+    /// An image inside the mesh file (GLB, or a `data:` URI of glTF): its bytes, usually PNG or JPEG.
     Embedded(Vec<u8>),
 }

@@ -102,7 +102,7 @@ impl TriMesh {
         six / 6.0
     }
 
-    /// Returns the mesh scaled along its axes, as by `scale` of a URDF mesh.
+    /// Returns the mesh scaled along the axes of its frame, about the origin, as by `scale` of a URDF mesh.
     ///
     /// A negative product of the factors mirrors the mesh. The winding is then reversed, so that the front stays
     /// outside.
@@ -135,9 +135,9 @@ impl TriMesh {
         out
     }
 
-    /// Checks that the lengths of the arrays agree, that every index is in range, that all numbers are finite, and that
-    /// the submeshes cover all triangles consecutively. The lengths of normals are not checked. Meshes from
-    /// [`super::load`] pass this check.
+    /// Checks that the lengths of the arrays agree, that every vertex and material index is in range, that all numbers
+    /// are finite, and that the submeshes cover all triangles consecutively. Normals need not have unit length. Meshes
+    /// from [`super::load`] pass this check.
     ///
     /// # Errors
     /// The first violation.

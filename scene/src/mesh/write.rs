@@ -7,7 +7,8 @@ use std::ops::Range;
 use super::TriMesh;
 use super::builder::{cross, sub};
 
-/// Writes all triangles as binary STL with face normals. Vertex normals, texture coordinates and materials are lost.
+/// Writes all triangles as binary STL with face normals. Vertex normals, texture coordinates, submeshes and materials
+/// are lost.
 ///
 /// # Errors
 /// `out` fails, or the mesh has more than 4294967295 triangles.

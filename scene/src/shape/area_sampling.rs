@@ -7,7 +7,7 @@ use crate::vector::V3;
 pub struct SurfacePoint {
     /// Position \[m\].
     pub position: V3,
-    /// Unit normal, pointing outward.
+    /// Unit normal, pointing outward; for a triangle, toward the side from which its corners are counter-clockwise.
     pub normal: V3,
     /// Index of the triangle; 0 for a shape without triangles.
     pub triangle: u32,
@@ -18,16 +18,18 @@ pub trait AreaSampling {
     /// Area of the surface \[m²\].
     fn area(&self) -> f64;
 
-    /// Returns a surface point for three uniform numbers in 0..1: `side` selects a face, `at` a point on it.
+    /// Returns a surface point for three uniform numbers in 0..1: `side` selects a face or triangle, `at` a point on
+    /// it.
     fn sample(&self, side: f64, at: [f64; 2]) -> SurfacePoint;
 
-    /// Returns a point that may be visible from `from`, and the pdf of its direction \[1/sr\] if it was not sampled by
-    /// area. Returns `None` if the numbers give no point.
+    /// Returns a point that may be visible from `from`, in the frame of the shape, and the pdf of its direction
+    /// \[1/sr\]. The pdf is `None` if the point was sampled by area as in [`sample`](Self::sample). Returns `None` if
+    /// the numbers give no point.
     fn sample_from(&self, _from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, Option<f64>)> {
         Some((self.sample(side, at), None))
     }
 
-    /// Pdf of directions from `from` \[1/sr\], if [`sample_from`](Self::sample_from) does not sample by area there.
+    /// Pdf of the directions of [`sample_from`](Self::sample_from) \[1/sr\]; `None` if it samples by area there.
     fn pdf_from(&self, _from: V3) -> Option<f64> {
         None
     }

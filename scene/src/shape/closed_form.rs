@@ -32,7 +32,7 @@ pub enum HullPart {
 ///
 /// Shapes that are not convex are [made of triangles](super::Triangulated).
 pub trait ClosedForm {
-    /// Sizes that must be positive and finite.
+    /// Sizes \[m\] that must be positive and finite.
     fn sizes(&self) -> Vec<f32>;
 
     /// Smallest and largest coordinates \[m\]; infinite for an infinite shape.
@@ -49,7 +49,7 @@ pub trait ClosedForm {
 
     /// Returns the nearest intersection at a distance from 0 to `limit` \[m\], both included.
     ///
-    /// A ray that begins inside of a solid intersects it at its exit.
+    /// A ray that begins inside of a solid intersects it at its exit. A plane is intersected from +z only.
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection>;
 
     /// Index of the smooth face at an intersection, from 0; less than

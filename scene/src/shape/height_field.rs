@@ -19,10 +19,11 @@ impl HeightField {
     /// Creates a height field with MuJoCo's parameters.
     ///
     /// `size` is the half length along x, half length along y, height of elevation 1, and depth of the floor below zero
-    /// \[m\]. `elevation` holds `rows` rows (along y) of `columns` numbers (along x) in 0..=1.
+    /// \[m\]. `elevation` holds `rows` rows (along y, from -y) of `columns` numbers (along x, from -x), usually in
+    /// 0..=1.
     ///
     /// Returns `None` for fewer than two rows or columns, another number of elevations than grid points, and an
-    /// elevation that is negative or not finite.
+    /// elevation that is negative or not finite. Sizes are not checked.
     pub fn new(size: [f64; 4], rows: usize, columns: usize, elevation: &[f32]) -> Option<Self> {
         let elevations = elevation.iter().all(|e| e.is_finite() && *e >= 0.0);
         if rows < 2 || columns < 2 || elevation.len() != rows.checked_mul(columns)? || !elevations {
@@ -83,7 +84,7 @@ impl HeightField {
         self.columns
     }
 
-    /// Elevations, row by row.
+    /// Elevations as given to [`new`](Self::new), row by row from -y.
     pub fn elevation(&self) -> &Arc<[f32]> {
         &self.elevation
     }

@@ -42,10 +42,10 @@ macro_rules! shapes {
         }
 
         impl Shape {
-            /// Module names of all kinds of shapes.
+            /// Module names of all kinds of shapes, such as `box_`.
             pub const MODULES: &'static [&'static str] = &[$(stringify!($module),)* $(stringify!($triangles_module)),*];
 
-            /// Name of the kind.
+            /// Name of the kind, such as `box`.
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$Name(_) => stringify!($module).trim_end_matches('_'),)*
@@ -113,7 +113,8 @@ enum ShapeKind<'a> {
 }
 
 impl Shape {
-    /// Triangulates the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
+    /// Triangulates the surface, counter-clockwise seen from outside, with about `segments` (clamped to 3..=1024) edges
+    /// around a circle. Meshes and height fields return their own triangles.
     ///
     /// Infinite planes become 200 m wide.
     pub fn tessellate(&self, segments: usize) -> TriMesh {
@@ -180,13 +181,14 @@ impl Shape {
     }
 
     /// Returns the nearest intersection of a ray and a shape with a closed form, at a distance from 0 to `limit` \[m\],
-    /// both included; `None` for triangles.
+    /// both included; always `None` for meshes and height fields.
     #[inline]
     pub fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         self.with_closed_form(Intersect(ray, limit)).flatten()
     }
 
-    /// Number of the smooth face at an intersection with a shape with a closed form; 0 for triangles.
+    /// Index of the smooth face at an intersection with a shape with a closed form, such as 0 to 5 for a box; 0 for
+    /// meshes and height fields.
     pub fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
         match self.geometry() {
             ShapeKind::ClosedForm(shape) => shape.face(intersection, ray),

@@ -43,9 +43,9 @@ pub struct Cluster {
     /// Radius of the bounding sphere \[m\].
     pub radius: f32,
     /// True if every triangle belongs to a closed surface with its front outside, so that no back face is visible from
-    /// outside.
+    /// outside. False for deformable meshes.
     pub closed: bool,
-    /// Axis of the cone that contains all normals.
+    /// Axis of the cone that contains the normals of all triangles.
     pub cone_axis: [f32; 3],
     /// Cosine of the half angle of that cone; -1 if there is no useful cone.
     pub cone_cos: f32,
@@ -213,7 +213,11 @@ impl RenderMesh {
         self.bounds = if self.clusters.is_empty() { [[0.0; 3]; 2] } else { all };
     }
 
-    /// Prepares the triangles of one part (one material) of a mesh.
+    /// Prepares the triangles of one part (one material) of a mesh; `crease` as in [`new`](Self::new).
+    ///
+    /// # Panics
+    ///
+    /// If `part` or `mesh` violates an invariant of [`TriMesh`].
     pub fn from_submesh(mesh: &TriMesh, part: &Submesh, crease: f32) -> Self {
         let triangles = mesh.triangles[part.triangles.clone()].to_vec();
         let mut map = HashMap::new();
@@ -293,7 +297,7 @@ impl RenderMesh {
         });
     }
 
-    /// Vertex positions \[m\].
+    /// Vertex positions \[m\]. A vertex of the input occurs once for each of its normals.
     pub fn positions(&self) -> &[[f32; 3]] {
         &self.positions
     }
@@ -303,7 +307,7 @@ impl RenderMesh {
         &self.normals
     }
 
-    /// Texture coordinates, origin at the lower left of the image.
+    /// Texture coordinates, one pair per vertex, origin at the lower left of the image; `None` if the input has none.
     pub fn uvs(&self) -> Option<&[[f32; 2]]> {
         self.uvs.as_deref()
     }
@@ -349,21 +353,22 @@ impl RenderMesh {
         if may { self.levels().iter().take_while(|level| level.error <= error).count() } else { 0 }
     }
 
-    /// Returns the level with a number of [`RenderMesh::level_within`]. 0 and numbers without a level give the mesh
-    /// itself.
+    /// Returns the level with a number of [`RenderMesh::level_within`]. The mesh itself is returned for 0, for numbers
+    /// without a level, and while the levels are not computed.
     #[inline]
     pub fn level(&self, number: usize) -> &Self {
         let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
         number.checked_sub(1).and_then(level).map_or(self, |level| &level.mesh)
     }
 
-    /// [`LodLevel::error`] of the level with a number \[m\]; 0 for the mesh itself.
+    /// [`LodLevel::error`] of level `number` \[m\], numbered as in [`level_within`](Self::level_within). 0 for the mesh
+    /// itself and for numbers without a level.
     pub fn level_error(&self, number: usize) -> f32 {
         let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
         number.checked_sub(1).and_then(level).map_or(0.0, |level| level.error)
     }
 
-    /// Converts the mesh back to a [`TriMesh`], in drawing order.
+    /// Converts the mesh back to a [`TriMesh`] of one submesh without a material, in drawing order.
     pub fn to_tri_mesh(&self) -> TriMesh {
         let mut mesh = TriMesh::from_triangles(self.positions.clone(), self.triangles.clone());
         mesh.normals = Some(self.normals.clone());

@@ -19,7 +19,7 @@ pub enum TerrainGenerator {
 }
 
 impl TerrainGenerator {
-    /// Heights \[m\], rows along y, columns along x.
+    /// Heights \[m\], rows along y, columns along x, from the negative ends.
     ///
     /// # Errors
     /// Those of the generator.

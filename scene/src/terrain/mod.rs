@@ -49,7 +49,7 @@ pub enum TerrainError {
         /// Nearest side that is a whole number of cells \[m\].
         nearest: f64,
     },
-    /// A height field has more points than can be drawn.
+    /// A height field has more than [`MAX_POINTS`] points.
     #[error(
         "{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} are supported: choose larger cells"
     )]

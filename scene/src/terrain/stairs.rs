@@ -4,7 +4,7 @@ use super::{TerrainError, finite, grid_size, positive};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Stairs from all four sides up (or down) to a square platform at the center.
+/// Stairs from all four sides up (or down) to a platform at the center, which is square if the field is.
 ///
 /// A height field has no vertical walls, so each riser is inclined over one cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct PyramidStairs {
     pub step_height: f64,
     /// Depth of a tread, including its riser \[m\].
     pub tread: f64,
-    /// Side of the platform \[m\].
+    /// Smallest side of the platform \[m\]. The platform is larger if the rest is not a whole number of treads.
     pub platform: f64,
 }
 

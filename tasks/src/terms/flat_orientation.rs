@@ -3,7 +3,8 @@
 use crate::reward::RewardTerm;
 use kinetoscope_sim::RobotId;
 
-/// Squared sine of the angle between the z axes of the root link and of the world: 0 where the robot stands upright.
+/// Squared sine of the angle between the z axis of the root link and the direction of gravity: 0 for an upright root, 1
+/// for one on its side. It is also 0 upside down and without gravity. A penalty needs a negative `weight`.
 pub fn flat_orientation(name: &str, weight: f64, robot: RobotId) -> RewardTerm {
     RewardTerm::new(name, weight, move |now| {
         let gravity = now.sim().robot(robot).projected_gravity_b();

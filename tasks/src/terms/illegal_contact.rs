@@ -5,7 +5,8 @@ use kinetoscope_sensors::ContactSensor;
 use kinetoscope_sim::SensorId;
 use ndarray::{Array1, Axis};
 
-/// Terminates where the net normal contact force on one of the sensor's bodies exceeds `force` \[N\].
+/// Terminates the episodes of environments in which the net normal contact force
+/// ([`net_forces_w`](ContactSensor::net_forces_w)) on one of the sensor's bodies exceeds `force` \[N\].
 pub fn illegal_contact(name: &str, sensor: SensorId<ContactSensor>, force: f64) -> TerminationTerm {
     TerminationTerm::new(name, move |now| {
         let sensor = now.sim().sensor(sensor)?;

@@ -6,11 +6,12 @@ use crate::reward::RewardTerm;
 use kinetoscope_sim::{RobotId, SimulationManager};
 use ndarray::Axis;
 
-/// Sum of the squared drive efforts in the last physics step \[N² m² or N²\], over the joints that match one of
-/// `patterns` (whole names).
+/// Sum of the squared drive efforts ([`qf`](kinetoscope_sim::Robot::qf)) in the last physics step \[N² m² or N²\], over
+/// the joints that match one of `patterns` (whole names). Joints without a drive add 0. A penalty needs a negative
+/// `weight`.
 ///
 /// # Errors
-/// A pattern matches no joint.
+/// A pattern is invalid or matches no joint, or two patterns match the same joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.

@@ -6,11 +6,12 @@ use crate::termination::TerminationTerm;
 use kinetoscope_sim::{RobotId, SimulationManager};
 use ndarray::{Array1, Axis};
 
-/// Terminates where a joint that matches one of `patterns` (whole names) is beyond its limits
-/// ([`soft_qpos_limits`](kinetoscope_sim::Robot::soft_qpos_limits)). Joints without limits never terminate an episode.
+/// Terminates the episodes of environments in which a joint that matches one of `patterns` (whole names) is beyond its
+/// soft limits ([`soft_qpos_limits`](kinetoscope_sim::Robot::soft_qpos_limits)). Joints without limits never terminate
+/// an episode.
 ///
 /// # Errors
-/// A pattern matches no joint.
+/// A pattern is invalid or matches no joint, or two patterns match the same joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.

@@ -6,12 +6,13 @@ use crate::event::EventTerm;
 use kinetoscope_sim::{RobotId, SimulationManager};
 use ndarray::Array2;
 
-/// Randomizes the initial state of the joints that match one of `patterns` (whole names) when an episode begins. An
-/// offset from `positions` \[rad or m\] is added to the default position, within the joint limits. The velocity is from
-/// `velocities` \[rad/s or m/s\]. Both are uniformly distributed.
+/// Creates an event that sets the joints that match one of `patterns` (whole names) to random states when an episode
+/// begins. An offset from `positions` \[rad or m\] is added to the default position, and the sum is clamped to the
+/// joint limits. The velocity is from `velocities` \[rad/s or m/s\]. Both ranges are \[low, high\], uniformly
+/// distributed, with a number for each joint. Position targets stay at their defaults.
 ///
 /// # Errors
-/// A pattern matches no joint.
+/// A pattern is invalid or matches no joint, or two patterns match the same joint.
 ///
 /// # Panics
 /// The robot belongs to another manager.

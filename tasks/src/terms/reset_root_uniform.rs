@@ -6,20 +6,22 @@ use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_sim::RobotId;
 use ndarray::Array2;
 
-/// Ranges \[low, high\] of uniformly distributed offsets from the default root pose, and of root velocities.
+/// Ranges \[low, high\] of uniformly distributed offsets from the default root pose, and of root velocities. The
+/// default is no offset and no velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RootRanges {
-    /// x, y, z in the frame of the environment \[m\].
+    /// Offsets along x, y and z of the environment frame \[m\].
     pub position: [[f64; 2]; 3],
     /// Roll, pitch, yaw about the axes of the default root pose \[rad\].
     pub rpy: [[f64; 2]; 3],
-    /// Linear velocity in world axes \[m/s\].
+    /// Linear velocity of the root link's origin in world axes \[m/s\].
     pub linear: [[f64; 2]; 3],
     /// Angular velocity in world axes \[rad/s\].
     pub angular: [[f64; 2]; 3],
 }
 
-/// Randomizes the pose and the velocity of the root link when an episode begins. The robot must not have a fixed base.
+/// Creates an event that sets the root link to a random pose and velocity when an episode begins. Poses are offsets
+/// from the default root pose. With a fixed base, the event returns an error.
 pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> EventTerm {
     let drawn = |die: &mut EpisodeRng, ranges: [[f64; 2]; 3]| ranges.map(|[low, high]| die.uniform_range(low, high));
     EventTerm::on_reset(name, move |sim, dice| {

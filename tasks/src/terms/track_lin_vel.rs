@@ -3,10 +3,11 @@
 use crate::reward::RewardTerm;
 use kinetoscope_sim::RobotId;
 
-/// Reward exp(-d² / std²) for tracking a velocity command.
+/// Reward `weight` exp(-d² / `std`²) for tracking a velocity command.
 ///
-/// d is the distance between the x and y velocity of the root link, in its own frame, and the first two columns of the
-/// command \[m/s\]. The term is `weight` where both are equal.
+/// d is the distance between the x and y velocity of the root link's origin, in the axes of the root link, and the
+/// first two columns of the command term called `command` \[m/s\]. The step fails if there is no such term, or if it
+/// has fewer than two columns.
 pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into<String>, std: f64) -> RewardTerm {
     let command = command.into();
     RewardTerm::new(name, weight, move |now| {

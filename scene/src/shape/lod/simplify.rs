@@ -150,7 +150,7 @@ impl<'a> Surface<'a> {
         triangles.retain(alive);
     }
 
-    /// Collects the triangles around each vertex.
+    /// Rebuilds `start` and `around`, the lists of triangles around each vertex.
     fn connect(&mut self) {
         let Self { vertex, triangles, start, around, .. } = self;
         start.fill(0);
