@@ -115,7 +115,7 @@ impl PathTracer<'_> {
         [0, 1, 2].map(|c| by * there.emission[c] * (scatter.diffuse[c] + scatter.specular[c]))
     }
 
-    /// MIS weight of emission that a path hit. The direction of the path was sampled at `from` with the pdf `pdf`
+    /// MIS weight of emission that a path hit. The direction of the path was sampled at `from` with the pdf `likely`
     /// \[1/sr\].
     pub(super) fn bsdf_mis_weight(&self, from: V3, likely: f64, hit: &Hit, at: V3) -> f64 {
         let Some(emitter) = self.lights.emitters.for_instance(hit.instance) else { return 1.0 };

@@ -2,8 +2,8 @@
 //!
 //! Two levels of BVHs. The lower level has one BVH per mesh, in the mesh's own frame: built once, shared by all
 //! environments, and the same that ray casters use. The upper level is a BVH over the boxes of a frame's instances,
-//! built for every frame (`bvh`). Shapes with a closed form are intersected exactly; height fields as the triangles
-//! that the rasterizer draws. Everything is in double precision.
+//! built for every frame (`instance_bvh`). Shapes with a closed form are intersected exactly; height fields as the
+//! triangles that the rasterizer draws. Everything is in double precision.
 //!
 //! The rays of an image need no upper BVH: an instance is tested only within the rectangle of the image that it covers.
 //! There its rays are cast in packets of eight, the nearest instances first. The rays fill the rasterizer's own
