@@ -14,7 +14,8 @@ use std::f64::consts::PI;
 const EMITTER_DIMENSIONS: u32 = 1 << 29;
 
 impl PathTracer<'_> {
-    /// Direct light of all lights, scattered by a point towards `o`.
+    /// Direct light of all lights, scattered by a point towards the unit vector `o`. `dims` is the first dimension of
+    /// the surface's random numbers.
     #[inline(always)]
     pub(super) fn direct_light<S: Simd>(
         &self,

@@ -185,7 +185,7 @@ impl RayTracer {
         alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
     }
 
-    /// Pose of a visible instance at a time.
+    /// Pose of an instance at a time from 0 to [`END_TIME`](motion::END_TIME); `None` for hidden instances.
     pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
         let thing = self.instances.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
         Some(self.instances[thing].at(time))
