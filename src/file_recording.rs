@@ -52,8 +52,9 @@ impl FileRecording {
         Self { cfg, current: None, started: 0, finished: Vec::new(), failed: None, status: String::new() }
     }
 
-    /// Starts a recording to exactly the file of the configuration, for programs that record without a button; existing
-    /// files are not skipped. Does nothing while a recording is running, like the button.
+    /// Starts a recording to exactly the file of the configuration, for programs that record without a button; an
+    /// existing file is an error unless the configuration allows overwriting. Does nothing while a recording is
+    /// running, like the button.
     ///
     /// # Errors
     /// As [`Record::record`].

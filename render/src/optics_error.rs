@@ -29,7 +29,7 @@ pub enum OpticsError {
         angle: f64,
         /// Distance of that angle from the principal point in the normalized image (times fx: in pixels).
         radius: f64,
-        /// Pixel or `max_angle` beyond the fold, as the end of the sentence.
+        /// Pixel or `max_angle` beyond the fold, as text for the message.
         requirement: String,
     },
     /// No pixel of the image lies in the domain of the lens.

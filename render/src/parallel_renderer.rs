@@ -58,7 +58,8 @@ impl Clone for ParallelRenderer {
 
 impl ParallelRenderer {
     /// Creates a renderer with [`Renderer::Raster`] for each of `threads` threads, the calling one included; 0 counts
-    /// as 1. The other threads start and end with each batch, unless [`with_pool`](Self::with_pool) sets a thread pool.
+    /// as 1. The other threads start with the first batch that needs them, and end when the renderer and all its clones
+    /// are dropped; see also [`with_pool`](Self::with_pool).
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
         let (active, renderers) = (threads.max(1), vec![ImageRenderer::new(cfg); threads.max(1)]);
         let (pool, progress) = (ThreadPool::new(), RenderProgress::default());
