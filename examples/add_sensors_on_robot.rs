@@ -187,7 +187,7 @@ fn max_height(scanner: &RayCaster) -> Option<f64> {
     heights.iter().copied().filter(|z| z.is_finite()).reduce(f64::max)
 }
 
-/// The largest component of all forces \[N\], defined as in the tutorial.
+/// The largest signed component of all forces, at least 0 \[N\], defined as in the tutorial.
 fn largest(forces: ArrayView3<'_, f64>) -> f64 {
     forces.iter().copied().fold(0.0, f64::max)
 }

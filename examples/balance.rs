@@ -68,8 +68,8 @@ const PUSH_FORCES: [f64; 2] = [20.0, 35.0];
 /// Upward force of the third push \[N\]: the robot weighs 94 N, and leaves the floor for about a quarter of a second.
 const LIFT: f64 = 120.0;
 
-/// Success at the end of the run: tilt at most this \[rad\], speed at most this \[m/s\], distance from the start at
-/// most this \[m\].
+/// Success at the end of the run: tilt below this \[rad\], speed below this \[m/s\], distance from the start below this
+/// \[m\], along the floor.
 const MAX_TILT: f64 = 0.05;
 const MAX_SPEED: f64 = 0.1;
 const MAX_DISTANCE: f64 = 0.5;
@@ -311,7 +311,7 @@ struct SensorReadings {
     spin: Vector3<f64>,
     /// Specific force (acceleration minus gravity) in the axes of the body \[m/s²\].
     acceleration: Vector3<f64>,
-    /// True if both wheels touch the floor.
+    /// True if both wheels touch the floor, with more than 1 N each.
     grounded: bool,
 }
 
@@ -392,7 +392,7 @@ impl PushSchedule {
 struct RunStats {
     /// The largest tilt \[rad\].
     tilt: f64,
-    /// Steps without contact of both wheels, once the robot has landed.
+    /// Steps after the first second in which at least one wheel is off the floor.
     steps_without_contact: u64,
     /// True if the body has touched the floor.
     fell: bool,

@@ -262,8 +262,8 @@ struct ImageWriter {
 }
 
 impl ImageWriter {
-    /// Renders the current camera image, shows it and writes it to files. Returns false if the user ended the example
-    /// meanwhile.
+    /// Renders the current camera images, shows them and writes them to files, once for each step. Returns false if the
+    /// user ended the example meanwhile.
     fn add(&mut self, camera: &Camera, step: u64) -> launcher::Result<bool> {
         // Two targets at step 0 share one image.
         if self.files.iter().any(|f| f["step"] == step) {

@@ -115,7 +115,7 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// Balls all around the camera, so that every direction shows objects.
+/// Adds a ring of balls on the ground around the camera, so that every heading shows objects.
 fn add_objects(sim: &mut SimulationManager) -> launcher::Result {
     for k in 0..12 {
         let (angle, radius) = (f64::from(k) * std::f64::consts::TAU / 12.0, 0.12);
@@ -182,8 +182,8 @@ fn sample_lenses() -> Vec<Lens> {
     ]
 }
 
-/// Intrinsics that fit the image circle of a lens into the image; a vertical field of view of 75 degrees for lenses
-/// without an image circle.
+/// Intrinsics that fit the image circle of a fisheye into the image, those of a full panorama, or a vertical field of
+/// view of 75 degrees for pinholes.
 fn fitted_intrinsics(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrinsics> {
     let Domain { radius, .. } = lens.domain()?;
     let (w, h) = (width as f64, height as f64);
@@ -256,7 +256,7 @@ fn write_images(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(im
     Ok((image, report))
 }
 
-/// The largest reprojection error of the point map through the lens \[pixels\].
+/// The largest reprojection error of the point map of environment 0 through the lens \[pixels\].
 fn reprojection_error(camera: &Camera) -> launcher::Result<f64> {
     let (map, optics) = (camera.point_map(0, PointFrame::Camera)?, camera.optics(0)?);
     let mut worst = 0.0f64;

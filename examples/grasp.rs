@@ -197,7 +197,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
     trial::write_results(&args.launcher, &mut sim, count)
 }
 
-/// Grip frame of a cube, on the side face that points most toward the arm.
+/// Grip frame at the center of a cube, parallel to its faces: x points away from the arm, as far as quarter turns
+/// allow.
 fn grip_pose(cube: &Pose) -> Pose {
     let away = cube.translation.y.atan2(cube.translation.x);
     let yaw = without_tilt(cube).rotation.euler_angles().2;

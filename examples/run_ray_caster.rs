@@ -62,7 +62,7 @@ struct Totals {
     stepping: [Vec<Duration>; 2],
     hits: u64,
     misses: u64,
-    /// Largest distance of a hit from the terrain's surface \[m\].
+    /// Largest vertical distance of a hit from the terrain's surface \[m\].
     worst: f64,
     lines: Vec<Value>,
 }
@@ -188,7 +188,7 @@ fn scanner_cfg(args: &Args) -> RayCasterCfg {
     }
 }
 
-/// Puts every ball at a random place above the middle, with a random horizontal velocity.
+/// Resets the simulation, then puts every ball at a random place near its start, with a random horizontal velocity.
 fn randomize_ball(sim: &mut SimulationManager, ball: RigidObjectId, noise: &mut [KeyedRng]) -> launcher::Result {
     sim.reset(None)?;
     let mut between = |env: usize, most: f64| most * (2.0 * noise[env].uniform() - 1.0);
@@ -230,7 +230,7 @@ fn median_ms(mut times: Vec<Duration>) -> f64 {
     times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64) * 1e3
 }
 
-/// Position of the ball of environment 0, and the terrain heights below it.
+/// Position of the ball of environment 0, and the range of heights that its rays hit: as text, and for the report.
 fn summary(sim: &SimulationManager, scene: &Scene) -> launcher::Result<(String, Value)> {
     let (scanner, pose) = (sim.sensor(scene.scanner)?, sim.rigid_object(scene.ball).pose());
     let of_first = scanner.hits().index_axis_move(Axis(0), 0);

@@ -273,9 +273,9 @@ struct Rollout<'r, E> {
 }
 
 impl<E: VectorEnv> Rollout<'_, E> {
-    /// Runs one episode in all environments, starting from the observations `observations`. Returns the returns, and
-    /// the distances of the tip from the target at the end \[m\]. Afterwards the next episode has begun. `None` if the
-    /// user has stopped the run.
+    /// Runs one episode in all environments, starting from the observations `seen`. Returns the return of each
+    /// environment, and the distance of its tip from the target at the end \[m\]. Afterwards the next episode has
+    /// begun, and `seen` holds its first observations. `None` if the user has stopped the run.
     fn episode<'p>(
         &mut self,
         seen: &mut Array2<f64>,

@@ -16,7 +16,7 @@ use kinetoscope_sim::{DriveCfg, RobotCfg};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-/// Error of [`path`]: an asset does not exist.
+/// Error of [`path`] and of the robots: an asset does not exist.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetNotFound {
     /// Requested path.
@@ -40,8 +40,8 @@ impl std::error::Error for AssetNotFound {}
 
 /// Returns the path of an asset such as `sr5/SR5.urdf`.
 ///
-/// An absolute path is returned unchanged. Other paths are looked up below the folder `KINETOSCOPE_ASSETS`, then below
-/// the folder that comes with this crate.
+/// An absolute path that exists is returned unchanged. Other paths are looked up below the folder `KINETOSCOPE_ASSETS`,
+/// then below the folder that comes with this crate.
 ///
 /// # Errors
 /// The asset is in none of these places; the error lists them.
@@ -49,7 +49,8 @@ pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetNotFound> {
     resolve(asset.as_ref(), std::env::var_os("KINETOSCOPE_ASSETS").map(PathBuf::from))
 }
 
-/// Quadruped, standing with bent knees at a height of 0.6 m; drives of 80 N m/rad and 5 N m s/rad. Uid `quadruped`.
+/// Quadruped with a free base, standing with bent knees, its base 0.6 m above the origin; drives of 80 N m/rad and 5 N
+/// m s/rad. Uid `quadruped`.
 ///
 /// The initial pose is that of Isaac Lab's `ANYMAL_C_CFG`.
 ///

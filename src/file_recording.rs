@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// Recording to files for a record button: each recording that the button starts gets a new file.
 ///
-/// A value belongs to one simulation. Dropping the simulation aborts the current recording, so call [`finish`](Self::finish)
-/// before.
+/// Use one `FileRecording` per simulation. Dropping the simulation aborts the current recording, so call
+/// [`finish`](Self::finish) before.
 ///
 /// ```no_run
 /// use kinetoscope::FileRecording;
@@ -52,8 +52,9 @@ impl FileRecording {
         Self { cfg, current: None, started: 0, finished: Vec::new(), failed: None, status: String::new() }
     }
 
-    /// Starts a recording to exactly the file of the configuration, for programs that record without a button. Does
-    /// nothing while a recording is running, like the button.
+    /// Starts a recording to exactly the file of the configuration, for programs that record without a button; an
+    /// existing file is an error unless the configuration allows overwriting. Does nothing while a recording is
+    /// running, like the button.
     ///
     /// # Errors
     /// As [`Record::record`].
@@ -64,7 +65,8 @@ impl FileRecording {
         self.start_at(sim, self.cfg.path.clone())
     }
 
-    /// Ends the current recording, and returns all recordings that have ended since the last call.
+    /// Ends the current recording, and returns all recordings that this value or its button has ended since the last
+    /// call.
     ///
     /// # Errors
     /// As [`Record::finish_recording`], also for a recording that the button ended. The next call returns complete

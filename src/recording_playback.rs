@@ -3,7 +3,7 @@
 use kinetoscope_record::Playback;
 use kinetoscope_sim::SimulationManager;
 
-/// A recording that viewers can play with [`Play::play`](kinetoscope_viewer::Play::play).
+/// Wrapper of a [`Playback`] that viewers can play with [`Play::play`](kinetoscope_viewer::Play::play).
 ///
 /// ```no_run
 /// use kinetoscope::RecordingPlayback;

@@ -23,8 +23,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aperture {
-    /// Focal length of the lens \[m\]. It determines the aperture diameter, together with the f-number, and nothing
-    /// else.
+    /// Focal length of the lens \[m\]. It determines the aperture diameter, together with the f-number, and is the
+    /// lower limit of the focus distance. It does not change the field of view.
     pub focal_length: f64,
     /// Focal length divided by the aperture diameter. An infinite f-number is a pinhole.
     pub f_number: f64,
@@ -39,8 +39,9 @@ impl Aperture {
         self.focal_length / self.f_number
     }
 
-    /// Diameter of the disc to which a point at `depth` \[m\] is blurred \[pixels\], for a camera of focal length `f`
-    /// \[pixels\]. Source: similar triangles, see any text on optics, such as Hecht, Optics, section 5.2.
+    /// Diameter \[pixels\] of the disc to which a point at `depth` \[m\] along the optical axis is blurred, for a
+    /// camera of focal length `f` \[pixels\]. Source: similar triangles, see any text on optics, such as Hecht, Optics,
+    /// section 5.2.
     pub fn circle_of_confusion(&self, depth: f64, f: f64) -> f64 {
         f * self.diameter() * (1.0 / self.focus_distance - 1.0 / depth).abs()
     }

@@ -18,27 +18,28 @@ use crate::visibility::{RenderError, View};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{PoseF32, RenderScene};
 
-/// Renders frames, one at a time; keeps its scratch memory. Use one per thread.
+/// Renders single frames by rasterization, ray tracing or path tracing ([`renderer`](Self::renderer)). Keeps its
+/// scratch memory; use one renderer per thread.
 ///
-/// The same request gives the same bits on every thread and with every instruction set.
+/// The same request and settings give the same bits on every thread and with every instruction set.
 ///
-/// Transparency: instances with 0 < alpha < 1 are blended into the color, back to front by the depth of their origins.
-/// Only the nearest surface of each is blended. All other channels contain the nearest surface whatever its alpha,
-/// unless that is 0, as in MuJoCo. The opacity of textures is ignored.
+/// Transparency, except in path-traced color: instances with 0 < alpha < 1 are blended into the color, back to front by
+/// the depth of their origins. Of each instance, only the nearest surface is blended. All other channels contain the
+/// nearest surface whatever its alpha, unless that is 0, as in MuJoCo. The opacity of textures is ignored.
 #[derive(Debug)]
 pub struct ImageRenderer {
-    /// Options of the rasterizer.
+    /// Options of all renderers, such as shadows, tone curve and geom groups.
     pub cfg: RasterCfg,
-    /// The renderer that is used.
+    /// Algorithm of color and visibility.
     pub renderer: Renderer,
-    /// Aperture of the lens, for depth of field; `None` is a pinhole.
+    /// Aperture of the lens, for depth of field; `None` renders everything sharp. Only path tracing accepts `Some`.
     pub aperture: Option<Aperture>,
-    /// Exposure time and readout of the rows.
+    /// Exposure time and readout of the rows. Only path tracing accepts other times than 0.
     pub shutter: Shutter,
-    /// Exposure compensation in stops, -20 to 20: light is multiplied by 2 to this power before the tone curve. Bright
-    /// areas that saturate in one image keep their detail in an image with fewer stops.
+    /// Exposure compensation in stops, -20 to 20: the light of the color channel is multiplied by 2 to this power
+    /// before the tone curve. Bright areas that saturate in one image keep their detail in an image with fewer stops.
     pub exposure_compensation: f64,
-    /// Progress of path tracing.
+    /// Progress and cancellation of path tracing.
     pub progress: RenderProgress,
     pub(super) assets: RayAssetCache,
     pub(super) prepared: PreparedFrame,
@@ -88,12 +89,13 @@ impl Default for ImageRenderer {
 }
 
 impl ImageRenderer {
-    /// Creates a rasterizer with the best SIMD level of this machine.
+    /// Creates a renderer with [`Renderer::Raster`], without depth of field, exposure time and exposure compensation.
+    /// It uses the best instruction set of this machine.
     pub fn new(cfg: RasterCfg) -> Self {
         Self::with_level(cfg, SimdLevel::best())
     }
 
-    /// Creates a rasterizer with a given SIMD level.
+    /// As [`new`](Self::new), with a given SIMD level.
     pub(crate) fn with_level(cfg: RasterCfg, level: SimdLevel) -> Self {
         Self {
             cfg,
@@ -110,7 +112,7 @@ impl ImageRenderer {
         }
     }
 
-    /// Current settings of all frames.
+    /// Settings of the next frame.
     pub(super) fn settings(&self) -> RenderSettings<'_> {
         let Self { cfg, renderer, aperture, shutter, exposure_compensation, assets, .. } = self;
         RenderSettings {
@@ -123,16 +125,17 @@ impl ImageRenderer {
         }
     }
 
-    /// Scratch memory held \[bytes\].
+    /// Scratch memory held \[bytes\], without the cache of BVHs over meshes.
     pub fn scratch_bytes(&self) -> usize {
         self.prepared.bytes() + self.scratch.bytes() + self.accumulator.bytes() + self.rolling_shutter.bytes()
     }
 
-    /// Renders the channels of `frame`.
+    /// Renders the channels of `frame`, through a pinhole, with the lights of the scene. `poses` holds the pose of each
+    /// instance: world from instance. Optical flow is +inf, because there is no previous frame.
     ///
     /// # Errors
     ///
-    /// For an invalid view, pose or buffer; the frame is unchanged then.
+    /// For invalid settings, views, poses or buffers, and for canceled path tracing; the frame is unchanged then.
     pub fn render(
         &mut self,
         scene: &RenderScene,
@@ -146,17 +149,19 @@ impl ImageRenderer {
         )
     }
 
-    /// Renders the channels of `frame` into borrowed buffers.
+    /// Renders the channels of `frame` into borrowed buffers. All channels show one instant, that of the poses,
+    /// whatever the [`shutter`](Self::shutter).
     ///
     /// # Errors
     ///
-    /// For an invalid view, pose or buffer; the frame is unchanged then.
+    /// For an invalid request or buffer, for invalid settings, and for canceled path tracing; the frame is unchanged
+    /// then.
     pub fn render_request(&mut self, shot: &RenderRequest<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
         self.render_sample(shot, &FrameSample::default(), frame)
     }
 
-    /// As [`render_request`](Self::render_request), with noise and motion for path tracing: `take` holds the noise number and
-    /// the poses at shutter opening.
+    /// As [`render_request`](Self::render_request), with the noise number and the poses at shutter opening of `take`.
+    /// Renderers other than path tracing ignore `take`.
     ///
     /// # Errors
     ///

@@ -105,7 +105,8 @@ impl Intrinsics {
         Ok(Self::Pixels { fx, fy, cx, cy })
     }
 
-    /// The same intrinsics in pixels of an image of `width` by `height`.
+    /// The same intrinsics in pixels of an image of `width` by `height`. [`Pixels`](Self::Pixels) are not scaled to the
+    /// image size.
     ///
     /// # Errors
     ///

@@ -4,8 +4,8 @@
 //! A render request (scene, poses, view) is prepared once per frame, then passes through these stages:
 //!
 //! ```text
-//! request -> shade::plan -> raster | trace -> shade::group -> frame
-//!            preparation    visibility        shading         channels
+//! request -> shade::prepared_frame -> raster | trace -> shade::group -> frame
+//!            preparation              visibility        shading         channels
 //! ```
 //!
 //! | module | content |

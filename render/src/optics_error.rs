@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpticsError {
-    /// A number of the lens is out of its range.
+    /// A number of a lens or of intrinsics is out of its range.
     #[error("{what} of the lens is {value}; it must be {allowed}")]
     Lens {
         /// Name of the number.
@@ -29,7 +29,7 @@ pub enum OpticsError {
         angle: f64,
         /// Distance of that angle from the principal point in the normalized image (times fx: in pixels).
         radius: f64,
-        /// The part of the image that needs more.
+        /// Pixel or `max_angle` beyond the fold, as text for the message.
         requirement: String,
     },
     /// No pixel of the image lies in the domain of the lens.

@@ -15,7 +15,8 @@ use crate::visibility::RenderError;
 use kinetoscope_exec::ThreadPool;
 use std::sync::{Mutex, PoisonError};
 
-/// Less work than this is done on the calling thread: waking or starting another takes up to 0.05 ms \[ns\].
+/// Work that takes less time than this \[ns\] is done on the calling thread: waking or starting another thread takes up
+/// to 0.05 ms.
 const MIN_THREAD_WORK_NS: usize = 1_000_000;
 /// Bands per thread, approximately: the last bands decide how long other threads wait.
 const BANDS_PER_THREAD: usize = 8;
@@ -26,13 +27,14 @@ pub type RenderJob<'a> = (RenderRequest<'a>, FrameMut<'a>);
 /// Renders batches of frames on several threads; keeps the scratch memory of each thread. The bits do not depend on the
 /// number of threads.
 ///
-/// With many frames, each frame is rendered by one thread. The last frames, which would leave threads without work, are
-/// rendered by all threads together: first their visibility is prepared, then their shadow maps in parts, then bands of
-/// the images.
+/// Of many frames, each is rendered by one thread. Batches of fewer than two frames per thread, and the last frames of
+/// a batch, which would leave threads without work, are rendered by all threads together: first their visibility is
+/// prepared, then their shadow maps in parts, then bands of the images. Path tracing renders one frame after the other,
+/// each by all threads.
 #[derive(Debug)]
 pub struct ParallelRenderer {
     renderers: Vec<ImageRenderer>,
-    /// Number of rasterizers in use.
+    /// Largest number of threads to use.
     active: usize,
     prepared: Vec<PreparedFrame>,
     pool: ThreadPool,
@@ -55,8 +57,9 @@ impl Clone for ParallelRenderer {
 }
 
 impl ParallelRenderer {
-    /// Creates a rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The other threads
-    /// start and end with each batch, unless [`with_pool`](Self::with_pool) sets a thread pool.
+    /// Creates a renderer with [`Renderer::Raster`] for each of `threads` threads, the calling one included; 0 counts
+    /// as 1. The other threads start with the first batch that needs them, and end when the renderer and all its clones
+    /// are dropped; see also [`with_pool`](Self::with_pool).
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
         let (active, renderers) = (threads.max(1), vec![ImageRenderer::new(cfg); threads.max(1)]);
         let (pool, progress) = (ThreadPool::new(), RenderProgress::default());
@@ -72,23 +75,26 @@ impl ParallelRenderer {
         }
     }
 
-    /// Renders on the threads of `pool`. With the pool of a simulation, no memory is allocated after the first batches.
+    /// Renders on the threads of `pool`; the number of threads stays that of [`new`](Self::new). With the pool of a
+    /// simulation, no memory is allocated after the first batches.
     pub fn with_pool(mut self, pool: ThreadPool) -> Self {
         self.pool = pool;
         self
     }
 
-    /// Number of threads, the calling one included.
+    /// Number of threads given to [`new`](Self::new), the calling one included; [`use_threads`](Self::use_threads) does
+    /// not change it.
     pub fn threads(&self) -> usize {
         self.renderers.len()
     }
 
-    /// Limits the number of threads from now on, to at least one; all keep their memory.
+    /// Limits the number of threads of the next batches to `most`, clamped to 1..=[`threads`](Self::threads). All
+    /// threads keep their memory.
     pub fn use_threads(&mut self, most: usize) {
         self.active = most.clamp(1, self.renderers.len());
     }
 
-    /// Sets the options of the rasterizer.
+    /// Sets the options of the next batches, see [`ImageRenderer::cfg`].
     pub fn set_cfg(&mut self, cfg: RasterCfg) {
         for rasterizer in &mut self.renderers {
             rasterizer.cfg = cfg;
@@ -102,7 +108,8 @@ impl ParallelRenderer {
         }
     }
 
-    /// Sets depth of field and exposure time: `None` and [`Shutter::default`] are a pinhole and an instant.
+    /// Sets depth of field and exposure time: with `None`, everything is sharp; with [`Shutter::default`], an image
+    /// shows one instant. Other values need path tracing.
     pub fn set_exposure_optics(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
         for rasterizer in &mut self.renderers {
             (rasterizer.aperture, rasterizer.shutter) = (aperture, shutter);
@@ -116,7 +123,7 @@ impl ParallelRenderer {
         }
     }
 
-    /// Progress of the path tracing of the current images.
+    /// Progress of the path tracing of the current or the last batch.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
@@ -126,7 +133,7 @@ impl ParallelRenderer {
         self.renderers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
     }
 
-    /// Shares the cache of BVHs over meshes.
+    /// Uses `assets`, which other renderers may share, as the cache of BVHs over meshes.
     pub fn share_assets(&mut self, assets: &RayAssetCache) {
         for rasterizer in &mut self.renderers {
             rasterizer.assets = assets.clone();
@@ -143,14 +150,14 @@ impl ParallelRenderer {
     ///
     /// # Errors
     ///
-    /// The error of the first frame that cannot be rendered, with its index; the other frames are rendered
-    /// nevertheless.
+    /// The error of the first frame that cannot be rendered, with its index in `jobs`. The other frames are rendered
+    /// nevertheless, except those after a cancellation.
     pub fn render(&mut self, jobs: &mut [RenderJob<'_>]) -> Result<(), (usize, RenderError)> {
         self.render_samples(jobs, &[])
     }
 
-    /// As [`render`](Self::render), with noise and motion per frame for path tracing: `takes` holds the noise number of
-    /// each frame and the poses at shutter opening. Frames without an entry show one instant, with the same noise.
+    /// As [`render`](Self::render), with the noise number and the poses at shutter opening of each frame in `takes`.
+    /// Frames without an entry show one instant, with noise number 0. Renderers other than path tracing ignore `takes`.
     ///
     /// # Errors
     ///

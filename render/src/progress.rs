@@ -34,7 +34,7 @@ struct Counters {
 }
 
 impl RenderProgress {
-    /// Number of traced paths.
+    /// Number of paths of the batch that are traced.
     pub fn samples(&self) -> u64 {
         self.0.samples.load(Ordering::Relaxed)
     }
@@ -55,24 +55,24 @@ impl RenderProgress {
         (total > 0).then(|| self.samples() as f64 / total as f64)
     }
 
-    /// Time since the start of the batch; `None` before the first batch.
+    /// Time since the start of the batch, also after its end; `None` before the first batch.
     pub fn elapsed(&self) -> Option<Duration> {
         self.0.started.lock().unwrap_or_else(PoisonError::into_inner).map(|start| start.elapsed())
     }
 
-    /// Estimated time left, at the mean speed so far; `None` before the first path.
+    /// Estimated time left for the paths, at the mean speed so far; `None` before the first path.
     pub fn remaining(&self) -> Option<Duration> {
         let (elapsed, done) = (self.elapsed()?, self.fraction().filter(|done| *done > 0.0)?);
         Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - done) / done).ok()
     }
 
-    /// Cancels the current path tracing, and any that starts before [`resume`](Self::resume). The steps after the
-    /// paths, other channels and denoising, are completed.
+    /// Cancels the current path tracing, and any that starts before [`resume`](Self::resume). An image whose paths are
+    /// all traced is completed.
     pub fn cancel(&self) {
         self.0.canceled.store(true, Ordering::Relaxed);
     }
 
-    /// Allows rendering again. Canceled images are rendered when they are read again.
+    /// Allows path tracing again. A `Camera` renders its canceled images when they are read again.
     pub fn resume(&self) {
         self.0.canceled.store(false, Ordering::Relaxed);
     }

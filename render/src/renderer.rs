@@ -39,8 +39,8 @@ pub enum Renderer {
     /// - **Lights** are as bright as in the rasterizer: a white matt surface that faces a light of color L has the
     ///   radiance L. A light with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces the lit point:
     ///   keep it at least the radius below a ceiling, or half of it is behind the ceiling. Ambient light of lights and
-    ///   of the headlight reaches every surface, as in the rasterizer. Objects in front of the near plane cast no
-    ///   shadow in the headlight. The first 16 lights count, and the headlight.
+    ///   of the headlight reaches every surface, as in the rasterizer. Objects between the camera and the near plane
+    ///   cast no shadow in the headlight. The first 16 active lights count, and the headlight.
     /// - **Environment light** is [`RenderScene::ambient`](kinetoscope_scene::RenderScene::ambient): its sky's radiance
     ///   from above the horizon, its ground's from below. An unoccluded matt surface (specular 0) receives the same
     ///   light as in the rasterizer; below a glossy layer it receives the rest. Cameras and mirrors see
@@ -54,15 +54,16 @@ pub enum Renderer {
     ///   the plain color of all other light. For a metal, F0 is its color, F90 is 1, and the layer below is black. The
     ///   fraction `reflectance` of the light is mirrored perfectly, for boxes by the +z face alone. Of the rest, the
     ///   fraction `transmission` meets smooth glass: it is mirrored by Fresnel's equations or transmitted by Snell's
-    ///   law, and takes the color where it enters. Each surface of glass is a bounce; glass casts shadows, and lights
-    ///   are invisible through it. `alpha` is the fraction of light that the front of a surface absorbs or scatters;
-    ///   the rest passes straight. Backs of transparent surfaces are invisible. Paths end, black, after 64 such
-    ///   surfaces, and where a smooth normal mirrors them below the flat surface.
+    ///   law, and takes the color where it enters. Each mirror and each surface of glass is a bounce; glass casts
+    ///   shadows, and lights are invisible through it. `alpha` is the fraction of light that the front of a surface
+    ///   absorbs or scatters; the rest passes straight. Backs of transparent surfaces are invisible. Paths end, black,
+    ///   after 64 such surfaces, and where a smooth normal mirrors them below the flat surface.
     ///
     /// The [tone curve](crate::request::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the
-    /// pixel and the seed only: the same bits for any number of threads. Each image of a `Camera` has its own noise. It
-    /// is keyed by the seed of the simulation, the environment's global index, the name of the camera and the index of
-    /// the image, besides this seed: the same in any batch.
+    /// pixel, the seed and [`FrameSample::noise`](crate::shutter::FrameSample::noise) only: the same bits for any
+    /// number of threads. Each image of a `Camera` has its own noise. It is keyed by the seed of the simulation, the
+    /// environment's global index, the name of the camera and the index of the image, besides this seed: the same in
+    /// any batch.
     RayTraced {
         /// Paths per pixel; 1 to 65536. A power of two distributes them best.
         samples: u32,
@@ -134,7 +135,8 @@ impl Renderer {
         }
     }
 
-    /// True if visibility is ray traced; `bent` is true for a lens that bends lines.
+    /// Returns true if rays, not the rasterizer, find the surface that each pixel shows. `bent` is true if the lens is
+    /// not a pinhole.
     pub fn traces_visibility(self, bent: bool) -> bool {
         match self {
             Self::Raster => false,
@@ -148,7 +150,7 @@ impl Renderer {
         matches!(self, Self::RayTraced { .. })
     }
 
-    /// Number of paths of an image.
+    /// Number of paths of an image; 0 without path tracing or without color.
     pub(crate) fn path_count(self, shot: &RenderRequest<'_>, frame: &FrameMut<'_>) -> u64 {
         match self {
             Self::RayTraced { samples, .. } if frame.color.is_some() => {

@@ -6,30 +6,38 @@ use crate::visibility::View;
 use kinetoscope_scene::{Light, PoseF32, RenderScene};
 use serde::{Deserialize, Serialize};
 
-/// Options of the rasterizer.
+/// Options of a renderer. The rasterizer uses all of them except `occlusion_rays`; each field names its exceptions for
+/// the other renderers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RasterCfg {
-    /// Samples per pixel for color: 1 or 4. All other channels sample the pixel's center.
+    /// Samples per pixel for color: 1 or 4. Path tracing ignores them. All other channels sample the pixel's center.
     pub samples: u8,
-    /// True if lights cast shadows (the first four directional lights and spots).
+    /// True if lights with [`cast_shadow`](Light::cast_shadow) cast shadows. With shadow maps
+    /// ([`Renderer::Raster`](crate::renderer::Renderer::Raster) and
+    /// [`FastRayTraced`](crate::renderer::Renderer::FastRayTraced)) these are the first four directional lights and
+    /// spots that have casters; with the other renderers, all lights.
     pub shadows: bool,
-    /// True if planar mirrors (material `reflectance` of planes and of the +z face of boxes) reflect the scene: one ray
-    /// from each sample on a mirror, shaded at its hit. Path tracing always reflects.
+    /// True if planar mirrors (material `reflectance` of opaque planes and of the +z face of opaque boxes) reflect the
+    /// scene: one ray from each sample on a mirror, shaded at its hit. In MuJoCo's light model, only the first mirror
+    /// of the scene reflects. Path tracing always reflects.
     pub reflections: bool,
-    /// Texels along the side of a shadow map; 0 selects the size by the image size.
+    /// Texels along the side of a shadow map; 0 selects 128 to 1024 by the image size. Other values are clamped to
+    /// 64..=8192 and rounded up to a multiple of 8.
     pub shadow_size: usize,
     /// Rays per color sample for ambient occlusion, in [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0
-    /// disables it. Ambient light is then the part of [`RenderScene::ambient`] that is not occluded, as in
+    /// disables it. Path tracing ignores this number; with the other renderers, a number above 0 is an error. With
+    /// ambient occlusion, ambient light is the part of [`RenderScene::ambient`] that is not occluded, as in
     /// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) without bounces. It is exact where flat surfaces
     /// are unoccluded (with smooth normals, parts of the mesh below a facet occlude it). Elsewhere it has the noise of
     /// so many rays, which depends on the point only.
     pub occlusion_rays: u16,
     /// Tone curve from light to color bytes.
     pub tone: ToneCurve,
-    /// Geom groups that are rendered: bit k is group k.
+    /// Geom groups that are rendered: bit k is group k. Instances of other groups cast no shadows either.
     pub groups: u32,
-    /// True to render dense meshes at a lower level of detail where that is hardly visible.
+    /// True to render dense meshes at a lower level of detail where that is hardly visible. Only
+    /// [`Renderer::Raster`](crate::renderer::Renderer::Raster) and shadow maps use lower levels.
     ///
     /// A continuous map joins the simplified surface to the mesh. It moves no point by more than 1 mm, nor by more than
     /// half a pixel anywhere in the image (both are proven, see [`kinetoscope_scene::shape::RenderMesh::levels`];
@@ -71,15 +79,16 @@ impl Default for RasterCfg {
 pub struct RenderRequest<'a> {
     /// The scene.
     pub scene: &'a RenderScene,
-    /// Pose of each instance: world from instance.
+    /// Pose of each instance, in the order of the scene: world from instance.
     pub poses: &'a [PoseF32],
     /// The camera.
     pub view: &'a View,
-    /// Lights that replace the scene's, for lights that move.
+    /// Lights that replace the scene's, for lights that move; `None` for the scene's.
     pub lights: Option<&'a [Light]>,
-    /// Rays of a lens, used instead of the view's focal lengths and principal point; `None` is a pinhole.
+    /// Rays of a lens, used instead of the view's focal lengths and principal point; `None` is a pinhole. They must
+    /// have been computed for the image size of the view.
     pub lens: Option<&'a LensRays>,
-    /// The previous frame, used by [`Flow`](crate::frame::Flow) only.
+    /// The previous frame, used by [`Flow`](crate::frame::Flow) only; without it, the flow is +inf.
     pub previous: Option<PreviousState<'a>>,
 }
 
@@ -88,7 +97,7 @@ pub struct RenderRequest<'a> {
 pub struct PreviousState<'a> {
     /// Pose of each instance in the previous frame: world from instance.
     pub poses: &'a [PoseF32],
-    /// Camera of the previous frame. With a lens, its focal lengths and principal point only show if the intrinsics
-    /// differ from those of [`RenderRequest::view`]; if both are equal, the lens is the same.
+    /// Camera of the previous frame. With a [lens](RenderRequest::lens), the previous frame has the same lens model,
+    /// with the focal lengths and the principal point of this view.
     pub view: &'a View,
 }

@@ -34,17 +34,17 @@ impl RngStream {
     /// Noise of path tracing.
     pub const PATHS: Self = Self(5);
 
-    /// White noise of a channel, new for each image; channels are counted from 0.
+    /// White noise of a channel, new for each image; `channel` is 0 to 15.
     pub const fn white(channel: u8) -> Self {
         Self(16 + channel)
     }
 
-    /// Biases of a channel, drawn at a reset.
+    /// Biases of a channel, drawn at a reset; `channel` is 0 to 15.
     pub const fn bias(channel: u8) -> Self {
         Self(32 + channel)
     }
 
-    /// Random-walk steps of the biases of a channel.
+    /// Random-walk steps of the biases of a channel; `channel` is 0 to 15.
     pub const fn random_walk(channel: u8) -> Self {
         Self(48 + channel)
     }
@@ -79,7 +79,7 @@ impl RngKey {
         (self.epoch, self.due_images) = (self.image_count, 0);
     }
 
-    /// Four uniform random numbers of this image, in 0 to 1; `block` selects the group of four.
+    /// Four uniform random numbers of this image, in 0 to 1, both excluded; `block` selects the group of four.
     #[inline]
     pub fn uniforms(&self, stream: RngStream, block: u32) -> [f64; 4] {
         self.philox.uniforms(counter(stream, block, self.image_count, 0))
@@ -90,7 +90,8 @@ impl RngKey {
         self.philox.bits(counter(stream, 0, self.image_count, 0))[0]
     }
 
-    /// Four normally distributed random numbers of this image, with mean 0 and variance 1.
+    /// Four normally distributed random numbers of this image, with mean 0 and variance 1; `block` selects the group of
+    /// four.
     #[inline]
     pub fn normals(&self, stream: RngStream, block: u32) -> [f64; 4] {
         self.philox.normals(counter(stream, block, self.image_count, 0))

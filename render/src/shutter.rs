@@ -29,20 +29,23 @@ pub struct Shutter {
 /// Noise and motion of one frame, for path tracing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrameSample<'a> {
-    /// Number that varies the noise: for another frame, or another environment.
+    /// Number that is combined with the seed of [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) by XOR:
+    /// different numbers for frames and environments give each its own noise.
     pub noise: u32,
-    /// Poses at shutter opening; `None` for a static scene.
+    /// Poses at or before shutter opening. With `None`, all rows show the instant of the request's poses, whatever the
+    /// shutter.
     pub shutter_open: Option<ShutterOpenState<'a>>,
 }
 
-/// Poses at shutter opening.
+/// Poses at shutter opening, or shortly before it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShutterOpenState<'a> {
-    /// Pose of each instance at shutter opening: world from instance.
+    /// Pose of each instance, in the order of the scene: world from instance.
     pub poses: &'a [PoseF32],
-    /// Pose of the camera at shutter opening.
+    /// Pose of the camera's optical frame at the same time.
     pub world_from_camera: PoseF32,
-    /// Time from shutter opening to the time stamp of the image \[s\]: at least the shutter's [`span`](Shutter::span).
+    /// Time from these poses to the time stamp of the image \[s\]: positive, and at least the shutter's
+    /// [`span`](Shutter::span).
     pub age: f64,
 }
 
@@ -75,7 +78,7 @@ impl Shutter {
         self.row_time == 0.0 && self.exposure_time == 0.0
     }
 
-    /// Time from the first light to the reading of the last row \[s\], for an image with `rows` rows.
+    /// Time from shutter opening to the reading of the last row \[s\], for an image with `rows` rows.
     pub fn span(&self, rows: usize) -> f64 {
         self.row_time * rows.saturating_sub(1) as f64 + self.exposure_time
     }
@@ -94,7 +97,7 @@ impl Shutter {
         Ok(())
     }
 
-    /// Exposure interval of a frame; `None` if it is one instant.
+    /// Exposure interval of a frame; `None` if the frame shows one instant.
     ///
     /// # Errors
     ///

@@ -5,7 +5,7 @@ use ndarray::{Dimension, Ix3, Ix4};
 /// Lanes of a [`PixelGroup`].
 const LANES: usize = 16;
 
-/// Computed values of 8 x 2 pixels, from which channels are written.
+/// Computed values of 8 x 2 pixels, from which channels are written. Lane 8 r + c is the pixel in row r and column c.
 #[derive(Clone, Debug, Default)]
 pub struct PixelGroup {
     /// Color and opacity after the tone curve (sRGB).
@@ -24,7 +24,7 @@ pub struct PixelGroup {
     pub shading_normal: [[f32; LANES]; 3],
     /// Position of the surface, frame of the environment \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
-    /// Motion since the previous frame \[pixels\]; +inf on a miss.
+    /// Motion since the previous frame (right, down) \[pixels\]; +inf on a miss or without a previous frame.
     pub flow: [[f32; LANES]; 2],
 }
 
@@ -58,11 +58,11 @@ pub trait Channel {
     /// Stage at which the channel can be written.
     const STAGE: Stage;
 
-    /// Writes the components of one pixel of a group.
+    /// Writes the components of the pixel `lane` of a group.
     fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Element]);
 
-    /// Writes up to 8 horizontally adjacent pixels of a group. Channels whose memory already has this order override it
-    /// with a copy.
+    /// Writes up to 8 horizontally adjacent pixels of a group, as many as `out` holds, from the lane `first` on.
+    /// Channels whose memory already has this order override it with a copy.
     #[inline(always)]
     fn write_row(group: &PixelGroup, first: usize, out: &mut [Self::Element]) {
         for (column, out) in out.chunks_exact_mut(Self::COMPONENTS).enumerate() {

@@ -3,7 +3,8 @@
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
-/// Depth along the optical axis \[m\]; +inf where no surface was hit.
+/// Depth along the optical axis \[m\]; +inf where no surface was hit. Negative behind the camera, which lenses of more
+/// than 180 degrees see.
 #[derive(Clone, Copy, Debug)]
 pub struct Depth;
 

@@ -11,9 +11,9 @@ use ndarray::Ix4;
 /// moved.
 ///
 /// It is +inf where no surface was hit, where the point was not in front of the camera in the previous frame (for
-/// lenses: outside of [`Optics::domain`](crate::lens::optics::Optics::domain)), and in the first frame. Across the seam
-/// of a panorama it is a whole turn, 2 pi fx, less or more. Isaac's `motion_vectors` have the opposite sign: left and
-/// up.
+/// lenses: outside of [`Optics::domain`](crate::lens::optics::Optics::domain)), and in frames without a previous frame.
+/// Across the seam of a panorama it is a whole turn, 2 pi fx, less or more. Isaac's `motion_vectors` have the opposite
+/// sign: left and up.
 #[derive(Clone, Copy, Debug)]
 pub struct Flow;
 

@@ -3,11 +3,11 @@
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
-/// Mask id of the visible link or object, under every alias of the channel.
+/// Mask id of the visible link or object; 0 where no surface was hit.
 ///
 /// Isaac's names `semantic_segmentation` and `instance_segmentation` select this channel too; its numbers are always
-/// ids of links. `SceneView::segmentation` returns a `Segmentation`, which converts mask images to images of instances
-/// or semantic classes.
+/// mask ids, one for each link or object. `SceneView::segmentation` returns a `Segmentation`, which converts mask
+/// images to images of instances or semantic classes.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask;
 

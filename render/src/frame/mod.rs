@@ -15,7 +15,7 @@ pub trait ListedChannel: Channel {
     /// True if the channel is selected.
     fn is_selected(channels: Channels) -> bool;
 
-    /// Images of the channel; `None` if it was not rendered.
+    /// Images of the channel; `None` if `images` does not store it.
     fn view_in(images: &Images) -> Option<ImageView<'_, Self>>;
 }
 
@@ -137,8 +137,8 @@ macro_rules! channels {
                 C::view_in(self)
             }
 
-            /// Moves the images of `views`, a range of the `all` views, by `by` places toward higher indices. The last
-            /// `by` images of the range are dropped.
+            /// Moves the images of `views`, a range of the `all` views, by `by` places toward higher indices. The first
+            /// `by` images of the range keep their content; the last `by` are dropped.
             pub fn shift_views(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -171,7 +171,7 @@ macro_rules! channels {
                 })*
             }
 
-            /// Mutable frames of all views, in order.
+            /// Mutable frames of all views, in order; `views` is their number.
             pub fn frames_mut(&mut self, views: usize) -> impl Iterator<Item = FrameMut<'_>> {
                 $(let mut $field = self.$field.as_mut().and_then(|array| array.as_slice_mut()).map(|numbers| {
                     let each = (numbers.len() / views.max(1)).max(1);
@@ -191,7 +191,8 @@ macro_rules! channels {
             }
         })*
 
-        /// Image of one view per channel, row by row from the top left.
+        /// Images of one view, one per channel: row by row from the top left, with the components of a pixel adjacent.
+        /// `None` for channels that are not rendered.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Frame {
             $($(#[$doc])* pub $field: Option<Vec<<$Name as Channel>::Element>>,)*
@@ -204,7 +205,7 @@ macro_rules! channels {
         }
 
         impl Frame {
-            /// Images of `width` by `height` pixels, filled with zeros.
+            /// Images of `width` by `height` pixels for the selected channels, filled with zeros.
             pub fn new(width: usize, height: usize, channels: Channels) -> Self {
                 let pixels = width * height;
                 Self { $($field: channels.$field.then(|| vec![Default::default(); pixels * $Name::COMPONENTS]),)* }

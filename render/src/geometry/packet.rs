@@ -89,8 +89,9 @@ impl Packet {
         D::load(s, &self.limit)
     }
 
-    /// The rays that may meet a sphere before their limits, in the frame that `pose` maps from; `None` if no ray does.
-    /// All rays meet a sphere of radius +inf. Each lane equals, to the bit, the transform of its ray alone.
+    /// The rays that may meet a sphere, given in their own frame, before their limits: transformed to the frame that
+    /// `pose` maps from; `None` if no ray does. All rays meet a sphere of radius +inf. Each lane equals, to the bit,
+    /// the transform of its ray alone.
     #[inline(always)]
     pub(super) fn in_local_frame<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
         let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));

@@ -78,7 +78,7 @@ struct PlacedTarget {
     radius: f64,
 }
 
-/// Fixed targets at their poses: shared by all environments with the same fixed poses.
+/// Fixed targets at their poses. All environments with the same poses of fixed targets share one instance.
 #[derive(Clone, Debug, Default)]
 pub struct FixedTargets {
     placed: Vec<PlacedTarget>,
@@ -100,8 +100,8 @@ pub struct RayWorld {
 }
 
 impl RayTargets {
-    /// Prepares the instances of `scene` with the `wanted` indices; repeated indices count once. Invisible instances
-    /// are never hit. BVHs over meshes are taken from `assets`, or built.
+    /// Prepares the instances of `scene` with the `wanted` indices; repeated indices count once, indices out of range
+    /// are ignored. Invisible instances are never hit. BVHs over meshes are taken from `assets`, or built.
     pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssetCache) -> Self {
         let mut is_wanted = vec![false; scene.instances().len()];
         for index in wanted {
@@ -131,12 +131,12 @@ impl RayTargets {
         out
     }
 
-    /// Indices of the target instances in the scene.
+    /// Indices of the target instances in the scene, in ascending order.
     pub fn instances(&self) -> impl Iterator<Item = usize> {
         self.targets.iter().map(|t| t.instance as usize)
     }
 
-    /// Number of targets.
+    /// Number of targets, invisible ones included.
     pub fn len(&self) -> usize {
         self.targets.len()
     }
@@ -226,7 +226,7 @@ impl RayTargets {
 }
 
 impl RayWorld {
-    /// Creates a ray caster without placed targets.
+    /// Creates a ray caster without placed targets: rays hit nothing before [`place`](Self::place).
     pub fn new(targets: &Arc<RayTargets>) -> Self {
         Self::with_level(targets, SimdLevel::best())
     }
@@ -264,8 +264,8 @@ impl RayWorld {
         self.place_moving(targets.moving_poses(poses));
     }
 
-    /// Places other targets, with the fixed ones already prepared and the poses of the moving ones as in
-    /// [`RayTargets::moving_poses`].
+    /// Replaces the targets, and places them. `fixed` must be built for `targets`; `moving` holds the poses of the
+    /// moving targets as in [`RayTargets::moving_poses`].
     pub fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedTargets>, moving: &[PoseF64]) {
         if !Arc::ptr_eq(&self.targets, targets) {
             self.targets = Arc::clone(targets);

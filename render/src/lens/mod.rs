@@ -82,18 +82,20 @@ macro_rules! lenses {
                 match self { $(Self::$Name(_) => $Name::NAME,)* }
             }
 
-            /// True if every ray goes forward: near, far and depth are those of a pinhole. For other lenses, near and
-            /// far are distances along the ray.
+            /// True for [`Pinhole`] and [`OpenCv`], whose rays all go forward: near and far are depths along the
+            /// optical axis. For other lenses, whatever their largest angle, near and far are distances along the ray.
             pub fn is_forward(&self) -> bool {
                 match self { $(Self::$Name(_) => $Name::FORWARD,)* }
             }
 
-            /// True for a single lens with an optical axis, off which the illumination falls off.
+            /// False for [`Panorama`] only. The illumination of all other lenses falls off with the angle to the
+            /// optical axis.
             pub fn has_axis(&self) -> bool {
                 match self { $(Self::$Name(_) => $Name::HAS_AXIS,)* }
             }
 
-            /// True if the lens has no distortion: images equal those without a lens, bit for bit, with every renderer.
+            /// True for [`Pinhole`], and for [`OpenCv`] with all coefficients 0 and no `max_angle`: images equal those
+            /// without a lens, bit for bit, with every renderer.
             pub fn is_pinhole(&self) -> bool {
                 match self { $(Self::$Name(lens) => lens.is_pinhole(),)* }
             }

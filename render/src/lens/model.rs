@@ -6,9 +6,11 @@ use crate::optics_error::OpticsError;
 /// Domain of a lens: the range of visible directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
-    /// Largest angle between a ray and the optical axis \[rad\].
+    /// Largest angle between a ray and the optical axis \[rad\]. For a distortion that folds back at different angles
+    /// in different directions, the smallest of these angles.
     pub angle: f64,
-    /// Distance of such a ray from the principal point in the normalized image (times fx: in pixels).
+    /// Distance of such a ray from the principal point in the normalized image (times fx: in pixels); +inf for a
+    /// pinhole.
     pub radius: f64,
     /// True if rays end there because the mapping folds back or has a pole, not at a requested angle.
     pub folds: bool,
@@ -29,13 +31,13 @@ pub trait LensModel: Copy + Default {
     const NAME: &'static str;
     /// Accepted aliases.
     const ALIASES: &'static [&'static str];
-    /// True if every ray goes forward, so that near, far and depth are measured along the optical axis, as for a
-    /// pinhole. For other lenses, near and far are distances along the ray.
+    /// True if every ray goes forward, so that near and far are measured along the optical axis, as for a pinhole. For
+    /// other lenses, near and far are distances along the ray.
     const FORWARD: bool = false;
     /// True if there is an aperture with an optical axis; a panorama is composed of many images.
     const HAS_AXIS: bool = true;
 
-    /// True if these numbers make a pinhole.
+    /// True if the lens with these numbers is a pinhole.
     fn is_pinhole(&self) -> bool {
         false
     }

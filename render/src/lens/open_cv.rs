@@ -43,9 +43,9 @@ pub struct OpenCv {
     pub k1: f64,
     /// Radial, numerator: coefficient of r⁴.
     pub k2: f64,
-    /// Tangential: coefficient of 2 x y along x, of r² + 2 y² along y.
+    /// Tangential: coefficient of 2 x y along x and of r² + 2 y² along y.
     pub p1: f64,
-    /// Tangential: coefficient of r² + 2 x² along x, of 2 x y along y.
+    /// Tangential: coefficient of r² + 2 x² along x and of 2 x y along y.
     pub p2: f64,
     /// Radial, numerator: coefficient of r⁶.
     pub k3: f64,

@@ -52,7 +52,7 @@ impl Optics {
         self.pixels
     }
 
-    /// Range of visible directions.
+    /// Range of visible directions: largest angle to the optical axis \[rad\], and its radius in the normalized image.
     pub fn domain(&self) -> Domain {
         self.domain
     }
@@ -72,8 +72,8 @@ impl Optics {
         Some([x * by, y * by, z * by])
     }
 
-    /// As [`unproject`](Self::unproject), but scaled to z = 1 if all rays go forward: near and far are multiples of
-    /// this vector.
+    /// As [`unproject`](Self::unproject), but scaled to z = 1 if all rays go [forward](Lens::is_forward): near and far
+    /// are multiples of this vector.
     pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])

@@ -20,7 +20,8 @@ pub struct LensRayTables {
 }
 
 impl LensRayTables {
-    /// Computes the rays of a lens, with the same intrinsics for every view.
+    /// Computes the rays of a lens for `rows` views with the same intrinsics. `size` is the image size (width, height),
+    /// `samples` the number of color samples per pixel, 1 or 4.
     pub fn new(
         lens: Lens,
         pixels: &PixelIntrinsics,
@@ -61,7 +62,8 @@ impl LensRayTables {
         self.rows[row].as_ref()
     }
 
-    /// Computes the rays of several intrinsics, once for equal ones. The list is empty for a lens without distortion.
+    /// Returns the rays of several intrinsics, once for equal ones. Rays of intrinsics that are in use are not computed
+    /// again. The list is empty for a lens without distortion.
     pub fn compute(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
         if self.lens.is_pinhole() {
             self.lens.domain()?;
@@ -87,7 +89,8 @@ impl LensRayTables {
         Ok(made)
     }
 
-    /// Assigns rays to rows by their intrinsics; `made` holds the rays that were computed for them.
+    /// Assigns rays to the views `rows`. `pixels` returns the intrinsics of a view, and `made` holds their rays from
+    /// [`compute`](Self::compute).
     pub fn set(&mut self, made: Vec<Arc<LensRays>>, rows: &[usize], pixels: impl Fn(usize) -> PixelIntrinsics) {
         if self.lens.is_pinhole() {
             return;

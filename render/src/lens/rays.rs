@@ -123,7 +123,7 @@ impl LensRays {
         self.size
     }
 
-    /// Samples per pixel: 1, or 4 with color samples besides the center.
+    /// Color samples per pixel: 4, or 1 if there are only rays through the pixel centers.
     pub fn samples(&self) -> u8 {
         if self.planes > 1 { 4 } else { 1 }
     }
@@ -167,7 +167,8 @@ impl LensRays {
         }
     }
 
-    /// Ray of a sample in the optical frame; 0 if the sample has no ray.
+    /// Ray of a sample of the pixel in column `at[0]` and row `at[1]`, in the optical frame; 0 if the sample has no
+    /// ray. Plane 0 is the pixel center, planes 1 to 4 are the color samples.
     #[inline(always)]
     pub fn direction(&self, plane: usize, at: [usize; 2]) -> [f32; 3] {
         let (group, lane) = self.group_index(plane, at);

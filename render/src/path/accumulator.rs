@@ -41,7 +41,7 @@ pub(crate) struct AccumulatorRows<'a> {
 }
 
 impl Accumulator {
-    /// Memory per pixel of an image \[bytes\], with or without denoising.
+    /// Memory per pixel of an image \[bytes\]; `smooth` is true with denoising.
     pub const fn bytes_per_pixel(smooth: bool) -> usize {
         if smooth { 2 * size_of::<Pixel>() + size_of::<DenoiseGuide>() } else { size_of::<Pixel>() }
     }

@@ -70,7 +70,7 @@ pub(crate) fn estimate_variance([width, first]: [usize; 2], from: &[Pixel], guid
     }
 }
 
-/// One filter pass over some rows, beginning at `first`; `filter_pass` counts from 0. Light will be multiplied by `exposure`.
+/// One filter pass over some rows, beginning at `first`; `pass` counts from 0. Light will be multiplied by `exposure`.
 pub(crate) fn filter_pass(
     [width, first]: [usize; 2],
     pass: u32,

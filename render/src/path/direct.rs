@@ -14,7 +14,8 @@ use std::f64::consts::PI;
 const EMITTER_DIMENSIONS: u32 = 1 << 29;
 
 impl PathTracer<'_> {
-    /// Direct light of all lights, scattered by a point towards `o`.
+    /// Direct light of all lights, scattered by a point towards the unit vector `o`. `dims` is the first dimension of
+    /// the surface's random numbers.
     #[inline(always)]
     pub(super) fn direct_light<S: Simd>(
         &self,
@@ -115,7 +116,7 @@ impl PathTracer<'_> {
         [0, 1, 2].map(|c| by * there.emission[c] * (scatter.diffuse[c] + scatter.specular[c]))
     }
 
-    /// MIS weight of emission that a path hit. The direction of the path was sampled at `from` with the pdf `pdf`
+    /// MIS weight of emission that a path hit. The direction of the path was sampled at `from` with the pdf `likely`
     /// \[1/sr\].
     pub(super) fn bsdf_mis_weight(&self, from: V3, likely: f64, hit: &Hit, at: V3) -> f64 {
         let Some(emitter) = self.lights.emitters.for_instance(hit.instance) else { return 1.0 };

@@ -30,7 +30,7 @@ pub(super) struct Emitter {
     area: f64,
     /// Cumulative power of all emitters up to this one, in any unit.
     cumulative_power: f64,
-    /// Probability of this emitter.
+    /// Probability of sampling this emitter.
     probability: f64,
 }
 
@@ -90,7 +90,7 @@ impl Emitter {
         (density > 0.0 && density.is_finite()).then_some(density)
     }
 
-    /// Probability of this emitter.
+    /// Probability of sampling this emitter.
     pub(super) fn probability(&self) -> f64 {
         self.probability
     }
@@ -139,14 +139,15 @@ impl Emitters {
         *power = sum;
     }
 
-    /// Samples an emitter in proportion to its power, by a number in 0..1; `None` without emitters.
+    /// Samples an emitter with a probability in proportion to its power, by a random number in 0..1; `None` without
+    /// emitters.
     pub(super) fn sample(&self, number: f64) -> Option<&Emitter> {
         let place = number * self.power;
         let k = self.list.partition_point(|emitter| emitter.cumulative_power <= place);
         self.list.get(k.min(self.list.len().checked_sub(1)?))
     }
 
-    /// The emitter of an instance.
+    /// The emitter of an instance; `None` if its surface is not sampled.
     pub(super) fn for_instance(&self, instance: u32) -> Option<&Emitter> {
         let k = self.list.binary_search_by_key(&instance, |emitter| emitter.instance).ok()?;
         self.list.get(k)

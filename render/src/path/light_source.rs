@@ -33,7 +33,7 @@ pub(super) struct LightSource {
 pub(super) struct LightSample {
     /// Unit vector towards the light.
     pub(super) direction: V3,
-    /// Distance within which the light may be occluded \[m\].
+    /// Distance within which the light may be occluded \[m\]; +inf for a directional light.
     pub(super) distance: f64,
     /// Factor of the light's color that arrives.
     pub(super) strength: f64,

@@ -45,7 +45,7 @@ pub(crate) struct ClusterPass<'a> {
     pub(crate) first_id: u32,
 }
 
-/// Rasterizes the triangles of a cluster.
+/// Rasterizes the triangles of a cluster, front faces only if `pass` culls.
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(
     s: S,

@@ -57,7 +57,8 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// Layer of an instance, when the geom groups of `groups` are rendered (bit k is group k).
+    /// Layer of an instance, when the geom groups of `groups` are rendered (bit k is group k; instance groups above 31
+    /// count as 31).
     pub fn for_instance(instance: &Instance, groups: u32) -> Self {
         let alpha = instance.material.rgba[3];
         if !instance.visible || alpha <= 0.0 || groups >> instance.group.min(31) & 1 == 0 {
@@ -129,8 +130,8 @@ impl DrawList {
         self.blended.reserve_exact(blended);
     }
 
-    /// Finds the items that may be visible. `keep` classifies instances. With a lens, items may be anywhere in the
-    /// image.
+    /// Finds and sorts the items that may be visible. `keep` returns the layer of an instance. With a lens, items are
+    /// culled by depth only, and their bounds are the whole image.
     pub(crate) fn build(
         &mut self,
         projection: &Projection,

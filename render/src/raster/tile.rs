@@ -82,8 +82,8 @@ impl Tile {
         self.cleared[block] = false;
     }
 
-    /// Prepares a block of which every sample will be written; returns the value of all samples if the block is still
-    /// empty.
+    /// Prepares a block of which every sample will be written; returns the nearness of all samples if the block is
+    /// still empty.
     #[inline(always)]
     pub(crate) fn take_cleared(&mut self, block: usize) -> Option<f32> {
         std::mem::take(&mut self.cleared[block]).then_some(self.empty)
@@ -96,7 +96,7 @@ impl Tile {
         }
     }
 
-    /// Copies the depths of another tile, with no ids.
+    /// Copies the nearness of another tile, and sets all ids to [`NO_ID`].
     pub(crate) fn copy_depths(&mut self, other: &Self) {
         self.copy(other);
         self.id.fill(NO_ID);

@@ -294,7 +294,8 @@ impl PreparedFrame {
 ///
 /// # Errors
 ///
-/// [`RenderError::Occlusion`] for occlusion rays of a renderer that casts none.
+/// [`RenderError::Occlusion`] for occlusion rays with [`Renderer::Raster`] or [`Renderer::FastRayTraced`]. Path tracing
+/// ignores them.
 pub fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderError> {
     match renderer {
         Renderer::Raster | Renderer::FastRayTraced if cfg.occlusion_rays > 0 => {
@@ -308,7 +309,8 @@ pub fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderE
 ///
 /// # Errors
 ///
-/// [`RenderError::NeedsPathTracing`] for a renderer without path tracing.
+/// [`RenderError::NeedsPathTracing`] for an aperture, an exposure time or a rolling shutter of a renderer without path
+/// tracing.
 pub fn check_exposure_optics(
     renderer: Renderer,
     aperture: Option<&Aperture>,

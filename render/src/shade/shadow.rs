@@ -176,9 +176,10 @@ impl ShadowMap {
         })
     }
 
-    /// Fraction of the light that reaches points, 0..=1: the mean over 3x3 texels, interpolated between them. The
-    /// points are first moved off the surface by more than a texel, so that a surface does not shadow itself. They are
-    /// moved farther if the surface has a level of detail with an error up to `error` \[m\], or the caster has one.
+    /// Fraction of the light that reaches points, 0..=1, and 1 outside of the map: the mean over 3x3 texels,
+    /// interpolated between them. The points are first moved off the surface by more than a texel, so that a surface
+    /// does not shadow itself. They are moved farther if the surface has a level of detail with an error up to `error`
+    /// \[m\], or the caster has one.
     #[inline(always)]
     pub(crate) fn visibility<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
         let p = &self.projection;

@@ -133,7 +133,8 @@ impl LightView {
         self.hull(&corners(lo, hi).map(|p| pose.apply(p)), margin)
     }
 
-    /// Projection of the map over the casters that can shade the receivers, and true if planes are among these casters.
+    /// Projection of the map over the casters that can shade the receivers, and true if planes are among these casters;
+    /// `None` without such casters.
     pub(super) fn fit(
         &self,
         scene: &RenderScene,

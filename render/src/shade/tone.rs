@@ -54,19 +54,19 @@ impl ToneCurve {
 }
 
 impl ToneCurve {
-    /// The sRGB value of linear light, 0..=255, not rounded.
+    /// The sRGB value of linear light, 0..=255, plus 0.5 and at most 255: its integer part is the sRGB byte.
     pub fn encode(self, intensity: f32) -> f32 {
         encode(Scalar, self, splat(Scalar, intensity)).array()[0]
     }
 }
 
-/// The sRGB byte of linear light, as a number in 0..=255.
+/// The sRGB value of linear light plus 0.5, at most 255: its integer part is the sRGB byte.
 #[inline(always)]
 pub(crate) fn encode<S: Simd>(s: S, curve: ToneCurve, x: F<S>) -> F<S> {
     to_srgb(s, curve.apply(s, max(x, splat(s, 0.0))))
 }
 
-/// The sRGB byte of linear light in 0..=1, without the tone curve, as a number in 0..=255.
+/// As [`encode`] for linear light in 0..=1, without the tone curve.
 #[inline(always)]
 pub(crate) fn to_srgb<S: Simd>(s: S, x: F<S>) -> F<S> {
     let r = x.sqrt();

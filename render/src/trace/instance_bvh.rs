@@ -46,7 +46,8 @@ impl InstanceBvh {
         self.nodes.clear();
     }
 
-    /// Adds an instance by its bounding box in its own frame.
+    /// Adds a static instance. `thing` is its index, `pose` is world from instance, `[lo, hi]` its bounding box in its
+    /// own frame.
     pub(super) fn add(&mut self, thing: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) {
         let at = pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
         let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
@@ -56,7 +57,7 @@ impl InstanceBvh {
         self.boxes.push((bounds, scale(at, 2.0), thing));
     }
 
-    /// Adds a moving instance.
+    /// Adds a moving instance; `bounds` is its bounding box in its own frame.
     pub(super) fn add_moving(&mut self, thing: u32, motion: &Motion, bounds: [V3; 2]) {
         let [lo, hi] = motion.bounds(bounds, BOUNDS_SCALE);
         self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));

@@ -2,8 +2,8 @@
 //!
 //! Two levels of BVHs. The lower level has one BVH per mesh, in the mesh's own frame: built once, shared by all
 //! environments, and the same that ray casters use. The upper level is a BVH over the boxes of a frame's instances,
-//! built for every frame (`bvh`). Shapes with a closed form are intersected exactly; height fields as the triangles
-//! that the rasterizer draws. Everything is in double precision.
+//! built for every frame (`instance_bvh`). Shapes with a closed form are intersected exactly; height fields as the
+//! triangles that the rasterizer draws. Everything is in double precision.
 //!
 //! The rays of an image need no upper BVH: an instance is tested only within the rectangle of the image that it covers.
 //! There its rays are cast in packets of eight, the nearest instances first. The rays fill the rasterizer's own
@@ -185,7 +185,7 @@ impl RayTracer {
         alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
     }
 
-    /// Pose of a visible instance at a time.
+    /// Pose of an instance at a time from 0 to [`END_TIME`](motion::END_TIME); `None` for hidden instances.
     pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
         let thing = self.instances.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
         Some(self.instances[thing].at(time))

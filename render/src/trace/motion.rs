@@ -65,7 +65,8 @@ impl Motion {
         PoseF64 { rotation, translation }
     }
 
-    /// A box that contains, at every time, a box given in the moving frame.
+    /// A box in the world that contains, at every time, a box given in the moving frame, enlarged by the factor
+    /// `larger`.
     pub(super) fn bounds(&self, [lo, hi]: [V3; 2], larger: f64) -> [V3; 2] {
         let [a, b] = self.origins;
         let reach = match self.rotation {

@@ -30,7 +30,8 @@ struct Interval<S: Simd> {
     leave: F<S>,
 }
 
-/// The first surface at or behind `near`. An interval that leaves before it enters is empty.
+/// The first surface at or behind `near`: lanes with a hit, parameter, and lanes whose rays enter the solid there. An
+/// interval that leaves before it enters is empty.
 #[inline(always)]
 fn first_surface<S: Simd>(s: S, i: Interval<S>, near: f32) -> (M<S>, F<S>, M<S>) {
     let near = splat(s, near);

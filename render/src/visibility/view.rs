@@ -21,11 +21,12 @@ pub struct View {
     pub cx: f32,
     /// Principal point along y \[pixels\]; the center of the first pixel is 0.5.
     pub cy: f32,
-    /// Smallest visible depth along the optical axis \[m\].
+    /// Smallest visible depth along the optical axis \[m\]; for lenses whose rays do not all go
+    /// [forward](crate::lens::Lens::is_forward), the distance along the ray.
     pub near: f32,
-    /// Largest visible depth along the optical axis \[m\].
+    /// Largest visible depth along the optical axis \[m\], or distance as for `near`.
     pub far: f32,
-    /// Pose of the camera.
+    /// Pose of the camera's optical frame.
     pub world_from_camera: PoseF32,
 }
 
@@ -36,7 +37,8 @@ impl View {
 
     /// A camera at `eye` that looks at `target` \[m\], with the vertical field of view `fovy` \[rad\], square pixels
     /// and the principal point at the center; it sees depths from 1 cm to 100 m. The image's upward direction is as
-    /// near to `up` as possible; for a view along `up`, it is +y of the world (or +x, if `up` is y).
+    /// near to `up` as possible; for a view along `up`, it is +y of the world (or +x, if `up` is about ±y). An `up` of
+    /// 0 is +z.
     ///
     /// # Errors
     ///

@@ -18,7 +18,8 @@ const _: () = assert!(MAX_GROUP <= MAX_LEAF * BVH_WIDTH, "every group can be cut
 pub(super) struct Costs {
     /// Cost of a leaf that ends with each primitive, one primitive long, two, and so on.
     costs: [[f32; MAX_LEAF]; MAX_GROUP],
-    /// Least cost of the first j primitives as k leaves, in row j + LEAF - 1. The rows in front stand for negative j.
+    /// Least cost of the first j primitives as k leaves, in row j + MAX_LEAF - 1. The rows in front stand for negative
+    /// j.
     min_costs: [[f32; BVH_WIDTH]; MAX_LEAF + MAX_GROUP],
 }
 

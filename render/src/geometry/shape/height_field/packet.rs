@@ -39,8 +39,8 @@ impl HeightGrid {
         CellLanes { corners, at: [D::load(s, &cells[0]), D::load(s, &cells[1])] }
     }
 
-    /// Packet version of [`unit`](kinetoscope_scene::vector::unit) for the surface's normal; false in lanes without a
-    /// surface.
+    /// Packet version of [`normalize`](kinetoscope_scene::vector::normalize) for the surface's normal; false in lanes
+    /// without a surface.
     #[inline(always)]
     fn normals<S: Simd>(&self, s: S, hx: D<S>, hy: D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
         let one = D::splat(s, 1.0);
@@ -55,7 +55,8 @@ impl HeightGrid {
         (normal, largest.lt(D::splat(s, f64::INFINITY)))
     }
 
-    /// Packet version of [`plumb`](Self::plumb); returns a bit for each lane it applies to.
+    /// Packet version of [`intersect_vertical`](HeightGrid::intersect_vertical); returns a bit for each lane it applies
+    /// to.
     #[inline(always)]
     pub(super) fn intersect_vertical_packet<S: Simd>(&self, s: S, packet: &Packet, touches: &mut Intersections) -> u64 {
         let (o, d) = (packet.origins(s), packet.directions(s));
@@ -77,8 +78,8 @@ impl HeightGrid {
         done.to_bitmask()
     }
 
-    /// The first steps of [`touch`](Self::touch) for the `wanted` rays of a packet that enter through the top of the
-    /// bounding box. Returns a bit for each lane that hits the surface there.
+    /// The first steps of [`intersect`](HeightGrid::intersect) for the `wanted` rays of a packet that enter through the
+    /// top of the bounding box. Returns a bit for each lane that hits the surface there.
     #[inline(always)]
     pub(super) fn intersect_steep_packet<S: Simd>(
         &self,
@@ -159,7 +160,8 @@ impl HeightGrid {
     }
 }
 
-/// Packet version of [`HeightGrid::intersect_cells`] for rays above the surface: distance, slopes at the hit, and the lanes that hit.
+/// Packet version of [`HeightGrid::intersect_cell`] for rays above the surface: distance, slopes at the hit, and the
+/// lanes that hit.
 #[inline(always)]
 fn intersect_cells<S: Simd>(
     s: S,

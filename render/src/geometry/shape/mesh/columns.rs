@@ -8,13 +8,13 @@
 //! Above is along any axis of the mesh's own frame (MuJoCo turns meshes to their principal axes). That axis is called z
 //! below.
 //!
-//! The columns contain every triangle that [`ShearedRay`](crate::geometry::triangle::Shear) can hit. Some point of that
-//! triangle, at a height z between those of its corners, is along x where the ray is at that height, up to rounding:
-//! the corners as seen from the ray are on both sides of it. With coordinates up to M, slopes b up to 1 and e = 2^-53,
-//! a corner is off by at most e M times 2 (the difference to the ray's origin along x), 2 (along z), 2 (their product
-//! with b) and 4 (the difference of both). The ray's position at the lowest and the highest corner is off by 2 (the
-//! difference along z), 2 (the product) and 3 (the sum). So the interval between these two positions, wider by 15 e M,
-//! meets the triangle's own interval; along y likewise. Rounding keeps order when coordinates become columns. So
+//! The columns contain every triangle that [`ShearedRay`](crate::geometry::triangle::ShearedRay) can hit. Some point of
+//! that triangle, at a height z between those of its corners, is along x where the ray is at that height, up to
+//! rounding: the corners as seen from the ray are on both sides of it. With coordinates up to M, slopes b up to 1 and e
+//! = 2^-53, a corner is off by at most e M times 2 (the difference to the ray's origin along x), 2 (along z), 2 (their
+//! product with b) and 4 (the difference of both). The ray's position at the lowest and the highest corner is off by 2
+//! (the difference along z), 2 (the product) and 3 (the sum). So the interval between these two positions, wider by 15
+//! e M, meets the triangle's own interval; along y likewise. Rounding keeps order when coordinates become columns. So
 //! intervals that meet have columns in common, and both have all columns of a rectangle.
 
 use super::MeshBvh;
