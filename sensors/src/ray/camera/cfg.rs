@@ -35,16 +35,16 @@ pub struct RayCasterCameraCfg {
     pub intrinsics: Intrinsics,
     /// Pose of the camera, and the body that it is attached to.
     pub extrinsics: Extrinsics,
-    /// Largest distance along the ray \[m\].
+    /// Maximum distance of a hit along the ray \[m\], above 0 and finite in single precision.
     pub max_distance: f64,
     /// Value of depth and distance where nothing is hit; [`DepthMiss::Far`] is `max_distance`.
     pub depth_miss: DepthMiss,
     /// Targets of the rays.
     pub targets: HitTargets,
-    /// Geom groups of the targets: bit k is group k.
+    /// Geom groups of the targets: bit k is group k; by default groups 0, 1 and 2.
     pub groups: u32,
-    /// Rate, history, latency and noise. Only the channel `distances` can have noise: the distance along the ray of
-    /// each pixel \[m\], from which depth and points follow. Noisy distances are clamped to the range from 0 to
+    /// Rate, history, latency, dropout and noise. Only the channel `distances` can have noise: the distance along the
+    /// ray of each pixel \[m\], from which depth and points follow. Noisy distances are clamped to the range from 0 to
     /// `max_distance`.
     ///
     /// Normals, masks and misses are exact: hits stay hits and misses stay misses. The mask distinguishes a hit at
