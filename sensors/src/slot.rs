@@ -131,7 +131,8 @@ impl SensorSlot {
         }
     }
 
-    /// Forwards [`Sensor::due_in`].
+    /// Physics steps until the next update of the slot: [`Sensor::due_in`] of an eager sensor (`u64::MAX` after a
+    /// panic), or the schedule of a lazy one.
     pub fn due_in(&self, step: &[u64]) -> u64 {
         match &self.phases {
             Some(phases) => phases.due_in(step.iter().copied()),

@@ -40,9 +40,9 @@ const BYTES_PER_RAY: usize = 40 + 80 + 32;
 /// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 ///
-/// Lists of the geometry seen along an axis of a mesh are built once for each mesh and axis. This happens when
-/// neighboring rays first run within about 7° of that axis. It allocates memory, mostly at the reset right after the
-/// sensor is built, but also in a later step if rays or meshes rotate to another axis.
+/// For rays within about 7° of an axis of a mesh, a lookup structure is built once for each mesh and axis, when such
+/// rays are first cast. It allocates memory, mostly at the reset right after the sensor is built, but also in a later
+/// step if rays or meshes rotate to another axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCfg {
