@@ -277,7 +277,8 @@ impl ContactSensor {
     }
 
     /// True where contact of a body began since the previous measurement, however short it was, shape (N, B); `None`
-    /// unless air times are tracked. A contact that exists at a reset does not count.
+    /// unless air times are tracked. A contact that exists at a reset does not count. With dropout, a lost measurement
+    /// also loses the contacts that began since the measurement before it.
     pub fn first_contact(&self) -> Option<Array2<bool>> {
         self.optional_values("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
     }
