@@ -17,10 +17,10 @@ use std::fmt;
 #[serde(default, deny_unknown_fields)]
 pub struct ActuatorStateCfg {
     /// Name patterns of the actuators to measure, in the order they are reported; `None` measures all. The drive of a
-    /// robot joint is named `uid/joint`, an actuator of an MJCF file `uid/actuator`. The part after the slash is
+    /// robot joint is named `uid/joint`, an actuator of an MJCF file `uid/actuator`. The part after the first slash is
     /// enough.
     pub actuators: Option<Vec<String>>,
-    /// Rate, history, latency and noise; the channels are `controls`, `forces` and `activations`.
+    /// Rate, history, latency, dropout and noise; the channels are `controls`, `forces` and `activations`.
     pub sampling: SamplingCfg,
 }
 
@@ -117,13 +117,14 @@ impl ActuatorState {
         &self.names
     }
 
-    /// Controls (inputs) of the actuators, shape \[num_envs, actuators\]; see [`SceneState::actuator_controls`].
+    /// Controls (inputs) of the actuators, shape \[num_envs, actuators\]: the position target of a drive \[rad or m\],
+    /// the control of an actuator of an MJCF file in the unit of the file.
     pub fn controls(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("controls")
     }
 
-    /// Forces of the actuators, shape \[num_envs, actuators\]; see [`SceneState::actuator_forces`]. Captured at
-    /// [`Sampled::force_stamps`].
+    /// Forces of the actuators, shape \[num_envs, actuators\]: the effort of a drive \[N m or N\]; for an actuator of
+    /// an MJCF file, the force in the unit of the file, before the gear. Captured at [`Sampled::force_stamps`].
     pub fn forces(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("forces")
     }

@@ -17,7 +17,7 @@ pub enum SensorError {
     /// The sensor panicked during a measurement.
     #[error("the sensor panicked during a measurement")]
     Panicked,
-    /// The update period is negative, infinite or not a number.
+    /// The update period is negative, infinite, not a number, or at least 2^53 physics steps.
     #[error("update_period is {update_period} s; it must be 0 (every step) or a positive number")]
     InvalidPeriod {
         /// The period \[s\].
@@ -73,7 +73,7 @@ pub enum SensorError {
         what: &'static str,
         /// The given name.
         name: String,
-        /// Known names, nearest first.
+        /// Known names, nearest first, at most 12.
         candidates: Vec<String>,
     },
     /// A name without its prefix matches several items.
@@ -86,7 +86,8 @@ pub enum SensorError {
         /// Full names of the matching items.
         candidates: Vec<String>,
     },
-    /// A name pattern is not a regular expression, or two patterns match the same name.
+    /// A name pattern is not a regular expression, two patterns match the same name, or the noise of a camera channel
+    /// is given by two names of the channel. The string is the message.
     #[error("{0}")]
     Pattern(String),
     /// A number of the configuration is out of range.
@@ -102,7 +103,7 @@ pub enum SensorError {
     /// A contact sensor has no bodies.
     #[error("the contact sensor has no bodies; add patterns of body names{}", if .candidates.is_empty() { String::new() } else { format!(", such as {}", quoted(.candidates)) })]
     NoBodies {
-        /// Names of existing bodies.
+        /// Names of existing bodies, at most 12.
         candidates: Vec<String>,
     },
     /// The configuration selects nothing to measure.
@@ -114,7 +115,7 @@ pub enum SensorError {
         field: &'static str,
         /// Kind of item that the field selects.
         what: &'static str,
-        /// First existing names.
+        /// First existing names, at most 12.
         candidates: Vec<String>,
     },
     /// The filter of a contact sensor matches only its single watched body.

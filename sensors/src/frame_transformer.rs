@@ -23,10 +23,10 @@ pub struct FrameTransformerCfg {
     /// Pose of the source frame in the frame of its body.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub source_offset: Pose,
-    /// The target frames, in the order they are reported.
+    /// The target frames, in the order they are reported; at least one.
     pub targets: Vec<TargetFrameCfg>,
-    /// Rate, history, latency and noise; channels that can have noise: `source_pos_w`, `target_pos_w` and
-    /// `target_pos_source`.
+    /// Rate, history, latency, dropout and noise; channels that can have noise: `source_pos_w`, `target_pos_w` and
+    /// `target_pos_source`. The noise of each channel is independent of the others.
     #[serde(default)]
     pub sampling: SamplingCfg,
     /// Shows the axes of source and targets ([`Sensor::markers`]).
@@ -38,9 +38,11 @@ pub struct FrameTransformerCfg {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetFrameCfg {
-    /// Name pattern of the bodies, for full names or link names; the source body may be a target too.
+    /// Name pattern of the bodies, for full names (`uid/link`, the uid of an object) or the part after the first slash;
+    /// the source body may be a target too.
     pub bodies: String,
-    /// Name of the frame; `None` is the full name of its body. With several bodies, frames are named `name/body`.
+    /// Name of the frame; `None` is the full name of its body. If the pattern matches several bodies, the frames are
+    /// named `name/uid/link`.
     pub name: Option<String>,
     /// Pose of the frame in the frame of its body.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
@@ -70,7 +72,8 @@ struct BodyFrame {
     body_from_frame: Pose,
 }
 
-/// Poses of target frames in the world and in the source frame, in all environments. Shapes: N environments, M targets.
+/// Poses of target frames in the environment and in the source frame, in all environments. Shapes: N environments, M
+/// targets.
 #[derive(Clone, Debug)]
 pub struct FrameTransformer {
     source_name: String,
@@ -232,12 +235,12 @@ impl FrameTransformer {
         &self.names
     }
 
-    /// Position of the source frame in the world \[m\], shape (N, 3).
+    /// Position of the source frame in the frame of the environment \[m\], shape (N, 3).
     pub fn source_pos_w(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("source_pos_w")
     }
 
-    /// Orientation of the source frame in the world, w x y z, shape (N, 4).
+    /// Orientation of the source frame in the frame of the environment, w x y z, shape (N, 4).
     pub fn source_quat_w(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("source_quat_w")
     }
@@ -246,12 +249,12 @@ impl FrameTransformer {
         self.sampler.values_as(channel, (self.sampler.num_envs(), self.targets.len(), width))
     }
 
-    /// Positions of the targets in the world \[m\], shape (N, M, 3).
+    /// Positions of the targets in the frame of the environment \[m\], shape (N, M, 3).
     pub fn target_pos_w(&self) -> ArrayView3<'_, f64> {
         self.rows("target_pos_w", 3)
     }
 
-    /// Orientations of the targets in the world, w x y z, shape (N, M, 4).
+    /// Orientations of the targets in the frame of the environment, w x y z, shape (N, M, 4).
     pub fn target_quat_w(&self) -> ArrayView3<'_, f64> {
         self.rows("target_quat_w", 4)
     }

@@ -96,7 +96,8 @@ impl<T: Clone> History<T> {
         self.rows.index_axis(Axis(0), env).split_at(Axis(0), self.filled[env]).0
     }
 
-    /// The row of environment `env` that is `age` measurements old (0 is the newest); `None` if the row is not filled.
+    /// The row of environment `env` that is `age` measurements old (0 is the newest); `None` if that row is not filled
+    /// or does not exist.
     ///
     /// # Panics
     ///

@@ -24,14 +24,15 @@ pub struct ImuCfg {
     /// Pose of the IMU in the frame of the body.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
-    /// Bias added to the measured acceleration \[m/s²\], in world axes; `None` is minus gravity, as a real IMU measures
-    /// at rest.
+    /// Bias added to the acceleration \[m/s²\], in world axes; `None` is minus the gravity of the simulation, as a real
+    /// IMU measures at rest.
     #[serde(with = "kinetoscope_scene::file_format::optional_vector")]
     pub gravity_bias: Option<Vector3<f64>>,
-    /// Rate, history, latency and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`, `lin_acc_b`,
-    /// `ang_acc_b`.
+    /// Rate, history, latency, dropout and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`,
+    /// `lin_acc_b`, `ang_acc_b`.
     pub sampling: SamplingCfg,
-    /// Shows the IMU frame, and an arrow of the measured acceleration, 1 m for 20 m/s² ([`Sensor::markers`]).
+    /// Shows the IMU frame, and an arrow of the measured acceleration with the gravity bias, 1 m for 20 m/s²
+    /// ([`Sensor::markers`]).
     pub debug_vis: bool,
 }
 
@@ -162,7 +163,8 @@ impl Sensor for Imu {
         Some(self)
     }
 
-    /// The IMU frame, and an arrow of the measured acceleration, 1 m for 20 m/s²; the arrow points upward at rest.
+    /// The IMU frame, and an arrow of the measured acceleration with the gravity bias, 1 m for 20 m/s². With the
+    /// default bias, the arrow points upward at rest.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (p, q, a) = (self.pos_w(), self.quat_w(), self.lin_acc_b());
         let place = from_row(&std::array::from_fn(|k| if k < 3 { p[(env, k)] } else { q[(env, k - 3)] }));
@@ -186,17 +188,17 @@ impl Sampled for Imu {
 }
 
 impl Imu {
-    /// Position in the environment \[m\], shape \[num_envs, 3\].
+    /// Position of the IMU in the environment \[m\], shape \[num_envs, 3\].
     pub fn pos_w(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("pos_w")
     }
 
-    /// Orientation in the environment, w x y z, shape \[num_envs, 4\].
+    /// Orientation of the IMU in the environment, w x y z, shape \[num_envs, 4\].
     pub fn quat_w(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("quat_w")
     }
 
-    /// Velocity \[m/s\] in the axes of the IMU, shape \[num_envs, 3\].
+    /// Velocity of the IMU's origin in the environment \[m/s\], in the axes of the IMU, shape \[num_envs, 3\].
     pub fn lin_vel_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("lin_vel_b")
     }
@@ -206,8 +208,9 @@ impl Imu {
         self.sampler.values("ang_vel_b")
     }
 
-    /// Acceleration including the gravity bias \[m/s²\] in the axes of the IMU, shape \[num_envs, 3\]. With the default
-    /// bias it is 0 in free fall and 9.81 upward at rest.
+    /// Acceleration of the IMU's origin including the gravity bias \[m/s²\], in the axes of the IMU, shape
+    /// \[num_envs, 3\]. With the default bias, it is 0 in free fall; at rest it is minus gravity, such as 9.81 m/s²
+    /// upward.
     pub fn lin_acc_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("lin_acc_b")
     }

@@ -22,7 +22,7 @@ pub struct JointStateCfg {
     /// Name patterns of the joints to measure (`uid/joint`, or `joint` alone), in the order they are reported; `None`
     /// measures all. These are the movable joints of robots, and the hinge and slide joints of MJCF files.
     pub joints: Option<Vec<String>>,
-    /// Rate, history, latency and noise; the channels are `positions`, `velocities` and `efforts`.
+    /// Rate, history, latency, dropout and noise; the channels are `positions`, `velocities` and `efforts`.
     pub sampling: SamplingCfg,
 }
 
@@ -137,7 +137,8 @@ impl JointState {
         self.sampler.values("velocities")
     }
 
-    /// Efforts \[N m or N\], shape \[num_envs, joints\]; 0 before the first measurement or reset.
+    /// Efforts of the drives or actuators on the joints \[N m or N\], shape \[num_envs, joints\]: see
+    /// [`SceneState::joint_efforts`]. 0 before the first measurement or reset.
     pub fn efforts(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("efforts")
     }

@@ -19,13 +19,14 @@ use std::fmt;
 #[serde(default, deny_unknown_fields)]
 pub struct JointWrenchCfg {
     /// Name patterns of the links whose joints are measured (`uid/link`, or `link` alone), in the order they are
-    /// reported. Links that fixed joints fuse to others have no joint to measure.
+    /// reported. A link that fixed joints fuse to another link has no joint to measure, which is an error: see
+    /// `frames`.
     pub links: Vec<String>,
     /// Name patterns of links in whose frames to measure, reported after `links`. Each gives the wrench of the joint
     /// that moves the named link, about the origin and in the axes of the named link. If the link is fused to another
     /// link, this is the joint of the other link. The mount of a real force-torque sensor is such a link.
     pub frames: Vec<String>,
-    /// Rate, history, latency and noise; the channels are `forces` and `torques`.
+    /// Rate, history, latency, dropout and noise; the channels are `forces` and `torques`.
     pub sampling: SamplingCfg,
     /// Shows arrows of every force, 1 m for 500 N, and of every torque, 1 m for 50 N m, at their frames
     /// ([`Sensor::markers`]).
@@ -43,8 +44,8 @@ pub struct JointWrenchCfg {
 ///
 /// The sign is that of the wrench **on the link**: a load that hangs from its joint reads an upward force of its
 /// weight. Gravity and contacts of the link are not part of the wrench, but the reaction to them is. The effort of the
-/// drive along the joint axis is part of the wrench. For the root of a fixed robot, the wrench is that of the world on
-/// the robot; for a floating base it is 0.
+/// drive along the joint axis is part of the wrench. For the root of a fixed robot or a static object, the wrench is
+/// that of the world on it; for a floating base or a free object it is 0.
 #[derive(Clone, Debug)]
 pub struct JointWrench {
     measured: Vec<MeasuredWrench>,
@@ -82,8 +83,9 @@ impl SensorCfg for JointWrenchCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing, an empty selection of `links` and `frames`, a link that is fused to another one
-    /// (the error names it), or an invalid sampling configuration.
+    /// A pattern that matches nothing, a link that two patterns of one list match, an empty selection of `links` and
+    /// `frames`, an entry of `links` that is fused to another link (the error names that link), or an invalid sampling
+    /// configuration.
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;
         for &link in &links {
@@ -198,7 +200,8 @@ impl JointWrench {
         &self.names
     }
 
-    /// Forces on the links through their joints \[N\], in the axes of each link or frame, shape (N, B, 3).
+    /// Forces on the links through their joints \[N\], in the axes of each link or frame, shape (N, B, 3). Captured at
+    /// [`Sampled::force_stamps`], as the torques.
     pub fn forces(&self) -> ArrayView3<'_, f64> {
         self.sampler.values_as("forces", (self.sampler.num_envs(), self.measured.len(), 3))
     }

@@ -14,23 +14,25 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
 
-/// Configuration of a [`MujocoSensor`].
+/// Selection of MuJoCo's own sensors that a [`MujocoSensor`] reads, and their sampling.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MujocoSensorCfg {
     /// Name patterns of the sensors to read (`uid/sensor`, or `sensor` alone), in the order they are reported; `None`
     /// reads all.
     pub sensors: Option<Vec<String>>,
-    /// Rate, history, latency and noise of the channel `values`; noise is rejected if a sensor is a quaternion.
+    /// Rate, history, latency, dropout and noise of the channel `values`; noise is rejected if one of the sensors is a
+    /// quaternion.
     pub sampling: SamplingCfg,
 }
 
 /// Values of MuJoCo sensors in all environments. Shapes: N environments, D values, sensor by sensor.
 ///
-/// The values are MuJoCo's numbers, bit for bit. They refer to two instants, as all states do. Sensors of positions and
-/// velocities are captured at [`Sampled::stamps`]. Sensors of accelerations and forces ([`EngineSensor::force_stage`]) are
-/// captured at [`Sampled::force_stamps`], one step earlier. After a reset or a write to the state, both refer to the
-/// current state.
+/// Without noise, the values are MuJoCo's numbers, bit for bit. They refer to two instants, as all states do. Sensors
+/// of positions and velocities are captured at [`Sampled::stamps`]. Sensors of accelerations and forces
+/// ([`EngineSensor::force_stage`]) are captured at [`Sampled::force_stamps`], one step of the engine earlier. After a
+/// reset or a write to the state, both refer to the current state. [`SampleChannel::stamp`] of the only channel
+/// `values` is [`Stamp::Force`] if all sensors are of accelerations and forces, else [`Stamp::State`].
 #[derive(Clone, Debug)]
 pub struct MujocoSensor {
     sensors: Vec<EngineSensor>,
@@ -155,12 +157,13 @@ impl MujocoSensor {
         self.columns.iter().map(ExactSizeIterator::len).collect()
     }
 
-    /// Unit of each sensor; `None` if the unit depends on the observed quantity and is unknown.
+    /// Unit of each sensor, `1` for numbers without a unit; `None` if the unit depends on the observed quantity and is
+    /// unknown.
     pub fn units(&self) -> Vec<Option<&str>> {
         self.sensors.iter().map(|s| s.unit.as_deref()).collect()
     }
 
-    /// Columns of the sensor `name`: the full name, or the part after the first slash.
+    /// Range of the sensor `name` on the axis D: `name` is the full name, or the part after the first slash.
     ///
     /// # Errors
     ///

@@ -13,24 +13,25 @@ use std::ops::Range;
 const MAX_NOISE: f64 = 1e100;
 
 /// Noise of the numbers of one channel, independent for each number: `round(value + bias + std * n)`, with n standard
-/// normal. All parameters are 0 to 1e100. A channel with bounds, such as distances, saturates at them. Infinite values
-/// (nothing was hit) stay infinite.
+/// normal. All parameters are 0 to 1e100. In a channel with bounds, such as distances, noisy values are clamped to the
+/// bounds. Infinite values (nothing was hit) stay infinite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoiseCfg {
     /// Standard deviation of the white noise of each measurement, in the unit of the channel.
     pub std: f64,
-    /// Standard deviation of the bias, which is sampled at every reset, in the unit of the channel.
+    /// Standard deviation of the bias at the reset, in the unit of the channel. Every reset samples a new bias, which
+    /// stays constant unless it has a random walk.
     pub bias_std: f64,
-    /// Random walk of the bias: its standard deviation after one second, in the unit of the channel per sqrt(s). It
-    /// grows with the square root of time.
+    /// Random walk that is added to the bias: its standard deviation one second after the reset, in the unit of the
+    /// channel per sqrt(s). It grows with the square root of time.
     pub bias_walk: f64,
     /// Quantization step: values are rounded to multiples of this, in the unit of the channel; 0 for no rounding.
     pub resolution: f64,
 }
 
 impl NoiseCfg {
-    /// Creates white noise only.
+    /// Creates white noise only, with this standard deviation in the unit of the channel.
     pub fn white(std: f64) -> Self {
         Self { std, ..Self::default() }
     }

@@ -1,7 +1,7 @@
 //! Sampling of numeric sensors: rate, history, latency, dropout and noise.
 //!
-//! A sensor declares its [`SampleChannel`]s and reads the true values of one environment; the [`Sampler`] does the rest.
-//! [`crate::joint_state`] is the template.
+//! A sensor declares its [`SampleChannel`]s and reads the true values of one environment; the [`Sampler`] does the
+//! rest. [`crate::joint_state`] is the template.
 
 use crate::delay::{self, DelayLine};
 use crate::error::SensorError;
@@ -36,10 +36,12 @@ pub struct SamplingCfg {
     /// stamp of its capture. All sensors see a write to the state of an environment at once: outdated values are never
     /// read.
     pub latency_steps: u32,
-    /// Probability that a measurement is lost on its way, 0 to 1; the previous measurement stays.
+    /// Probability that a measurement is lost on its way, 0 to 1: the previous measurement stays, and the lost one is
+    /// neither counted nor in the history. The values of a reset or a write to the state are never lost.
     pub dropout: f64,
-    /// Noise by channel name. The random numbers depend only on the seed of the simulation, the environment and the
-    /// name of the sensor.
+    /// Noise by channel name. The random numbers of an environment are one sequence, keyed by the seed of the
+    /// simulation, the index of the environment and the name of the sensor. They do not depend on other sensors or on
+    /// the number of threads.
     pub noise: BTreeMap<String, NoiseCfg>,
 }
 
@@ -75,7 +77,7 @@ pub enum Stamp {
 pub struct SampleChannel {
     /// Name of the channel, also in [`SamplingCfg::noise`].
     pub name: &'static str,
-    /// Count of numbers per environment.
+    /// Number of values per environment.
     pub width: usize,
     /// Unit, such as `m/s` or `rad or m`; empty if the numbers have no unit or the unit is unknown. If the units of the
     /// [columns](Sampled::columns) differ, the units of all columns, separated by commas.
@@ -84,7 +86,8 @@ pub struct SampleChannel {
     pub stamp: Stamp,
     /// True if noise can be added: false for counts, and for quaternions, whose length must stay 1.
     pub noisy: bool,
-    /// Smallest and largest value that can be measured; noisy values are clamped to them. Infinite for no bound.
+    /// Smallest and largest measured value. Values with noise are clamped to this range; values without noise are not.
+    /// Infinite for no bound.
     pub range: [f64; 2],
 }
 
@@ -95,7 +98,7 @@ impl SampleChannel {
         Self { name, width, unit: Cow::Borrowed(""), stamp: Stamp::State, noisy: true, range }
     }
 
-    /// Creates a channel of `width` numbers that can have noise and are clamped to `range`.
+    /// Creates a channel of `width` numbers that can have noise; noisy values are clamped to `range`.
     pub fn bounded(name: &'static str, width: usize, range: [f64; 2]) -> Self {
         Self { range, ..Self::new(name, width) }
     }
@@ -160,8 +163,9 @@ impl Sampler {
     ///
     /// # Errors
     ///
-    /// A period that is not a whole number of steps; noise of an unknown channel, or noise parameters that are negative
-    /// or not finite; a dropout that is not a probability; a history or a latency that does not fit into memory.
+    /// A physics step that is not positive; an invalid period, or one that is not a whole number of steps; noise of a
+    /// channel that is unknown or cannot have noise, or noise parameters outside 0 to 1e100; a dropout that is not a
+    /// probability; a history or a latency that does not fit into memory.
     pub fn new(
         sensor: &'static str,
         requires: StateFields,
@@ -235,6 +239,10 @@ impl Sampler {
     /// # Errors
     ///
     /// Same as [`check`](Self::check). Nothing is measured then.
+    ///
+    /// # Panics
+    ///
+    /// If the steps of an environment went backwards without [`reset`](Self::reset).
     pub fn update(&mut self, state: &SceneState, mut read: impl FnMut(usize, &mut [f64])) -> Result<(), SensorError> {
         self.check(state)?;
         for env in 0..self.expected.num_envs() {
@@ -309,8 +317,8 @@ impl Sampler {
     }
 
     /// Refreshes the current values of the environments `env_ids` from `state`, with noise: see
-    /// [`Sensor::refresh`](crate::Sensor::refresh). Measurements in flight still enter the history and are counted, but
-    /// do not replace the refreshed values.
+    /// [`Sensor::refresh`](crate::Sensor::refresh). Biases do not change. Measurements in flight still enter the
+    /// history and are counted, but do not replace the refreshed values.
     ///
     /// # Errors
     ///
@@ -394,12 +402,12 @@ impl Sampler {
         arrival.map_or(due, |arrival| arrival.min(due))
     }
 
-    /// Schedule of the measurements.
+    /// Period of the measurements in physics steps.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
     }
 
-    /// Time between measurements \[s\].
+    /// Time between measurements \[s\], after rounding to whole physics steps.
     pub fn period(&self) -> f64 {
         self.period
     }
@@ -430,7 +438,8 @@ impl Sampler {
         found.unwrap_or_else(|| panic!("this sampler was built without the channel {channel:?}"))
     }
 
-    /// Current values of a channel, shape \[num_envs, width\].
+    /// Current values of a channel, shape \[num_envs, width\]: those of the latest measurement, reset or refresh; 0
+    /// before.
     ///
     /// # Panics
     ///
@@ -531,7 +540,8 @@ pub trait Sampled {
     fn sampler(&self) -> &Sampler;
 
     /// Names of the bodies, joints or other items that the numbers of each channel belong to, in order. A channel has
-    /// one or more numbers for each item, consecutively. Empty if the items have no names.
+    /// one or more consecutive numbers for each item. Exceptions are channels of the sensor as a whole, such as
+    /// `source_pos_w` of a frame transformer. Empty if the items have no names.
     fn columns(&self) -> &[String] {
         &[]
     }
@@ -542,7 +552,7 @@ pub trait Sampled {
         &[]
     }
 
-    /// Schedule of the measurements.
+    /// Period of the measurements in physics steps.
     fn schedule(&self) -> Schedule {
         self.sampler().schedule()
     }
@@ -568,18 +578,20 @@ pub trait Sampled {
         self.sampler().delivered_stamps(1)
     }
 
-    /// Times of past measurements \[s\], newest first, shape \[num_envs, history_length\]; 0 where not filled yet.
+    /// Times of past positions and velocities \[s\], newest first, shape \[num_envs, history_length\]; 0 where not
+    /// filled yet.
     fn stamp_history(&self) -> ArrayView2<'_, f64> {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 0)
     }
 
-    /// Times of past forces, efforts and accelerations \[s\], newest first, shape \[num_envs, history_length\].
+    /// Times of past forces, efforts and accelerations \[s\], newest first, shape \[num_envs, history_length\]; 0 where
+    /// not filled yet.
     fn force_stamp_history(&self) -> ArrayView2<'_, f64> {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 1)
     }
 
     /// Number of measurements delivered since the last reset, shape \[num_envs\]. Unread measurements of a lazy sensor
-    /// count; the refresh of a reset does not.
+    /// count; lost measurements and the refreshes of resets and writes do not.
     fn sample_counts(&self) -> ArrayView1<'_, u64> {
         self.sampler().counts()
     }

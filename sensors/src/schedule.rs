@@ -24,8 +24,8 @@ impl Schedule {
     ///
     /// # Errors
     ///
-    /// A step that is not positive; a period that is negative or not finite; without `round_period`, a period that is
-    /// not a whole number of steps.
+    /// A step that is not positive and finite; a period that is negative, not finite, or at least 2^53 steps; without
+    /// `round_period`, a period that differs from a whole number of steps by more than 1e-8 of it.
     pub fn new(update_period: f64, dt: f64, round_period: bool) -> Result<Self, SensorError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SensorError::InvalidTimeStep { dt });
@@ -71,7 +71,7 @@ struct Phase {
 }
 
 impl Phases {
-    /// Step that marks a quarantined environment for [`due_in`](Self::due_in): no measurement is due there.
+    /// Step that marks a quarantined (diverged) environment for [`due_in`](Self::due_in): no measurement is due there.
     pub const QUARANTINED: u64 = u64::MAX;
 
     /// The schedule.
@@ -80,7 +80,8 @@ impl Phases {
     }
 
     /// Returns true if environment `env`, which is at physics step `step`, measures now. Measurements are due at whole
-    /// periods after the reset, not at the reset itself. Repeated calls at the same step return true only once.
+    /// periods after the reset, not at the reset itself. Repeated calls at the same step return true only once. A due
+    /// step that is skipped is not caught up: the next call at a due step returns true.
     ///
     /// `step` is [`kinetoscope_scene::SceneState::step`]. A quarantined environment, whose step does not change,
     /// measures nothing.
@@ -93,9 +94,9 @@ impl Phases {
         self.take_due_count(env, step) > 0
     }
 
-    /// Returns the number of measurements of environment `env`, which is at physics step `step`, since the last query.
-    /// The number is 0 if [`is_due`](Self::is_due) would return false, else at least 1. It exceeds 1 if due steps were
-    /// not queried, as for a lazy sensor that was not read.
+    /// Returns the number of measurements of environment `env`, which is at physics step `step`, that fell due since
+    /// the last query. The number is 0 if [`is_due`](Self::is_due) would return false, else at least 1. It exceeds 1 if
+    /// due steps were not queried, as for a lazy sensor that was not read.
     ///
     /// # Panics
     ///
@@ -121,7 +122,8 @@ impl Phases {
         if run.is_multiple_of(period) { run / period - before } else { 0 }
     }
 
-    /// Returns the steps until the next environment is due, at least 1, with the environments at `steps`.
+    /// Returns the steps until the next environment is due, at least 1, with the environments at `steps`; one period if
+    /// all environments are quarantined.
     pub fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> u64 {
         self.min_wait(steps, |wait| wait)
     }

@@ -47,7 +47,8 @@ pub(crate) fn select_or_all(
     patterns.map_or_else(|| Ok((0..names.len()).collect()), |patterns| select(patterns, names, what))
 }
 
-/// Writes the numbers of `fields` in environment `env` and these columns to `row`, one field after the other.
+/// Writes the numbers of `fields` in environment `env` and these columns to `row`, one field after the other; fields
+/// that are `None` are skipped.
 pub(crate) fn read_columns(fields: [&Option<Array2<f64>>; 3], columns: &[usize], env: usize, row: &mut [f64]) {
     let numbers =
         fields.into_iter().flatten().flat_map(|field| columns.iter().map(move |&column| field[(env, column)]));

@@ -13,7 +13,7 @@ use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
-/// Configuration of a sensor: plain data with public fields and a `Default`.
+/// Configuration of a sensor: plain data with public fields.
 pub trait SensorCfg {
     /// The sensor built from this configuration.
     type Sensor: Sensor;
@@ -36,8 +36,8 @@ pub trait SensorCfg {
     /// take effect at once.
     ///
     /// Return a schedule only if a measurement depends on the state at its instant alone. [`Sensor::update`] must also
-    /// count correctly with [`Phases::take_due_count`](crate::Phases::take_due_count), as a [`Sampler`](crate::Sampler) does.
-    /// For sensors with a sampler, [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides. The
+    /// count correctly with [`Phases::take_due_count`](crate::Phases::take_due_count), as a [`Sampler`](crate::Sampler)
+    /// does. For sensors with a sampler, [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides. The
     /// [`Camera`](crate::camera::Camera) stores and renders its frames itself.
     fn lazy(&self, dt: f64) -> Option<Schedule> {
         let _ = dt;
@@ -48,7 +48,7 @@ pub trait SensorCfg {
     ///
     /// # Errors
     ///
-    /// Invalid configurations: a period, an index, a size.
+    /// Invalid configurations, such as a period, a name, an index or a size.
     fn build(&self, context: &SensorContext) -> Result<Self::Sensor, SensorError>;
 }
 
@@ -60,12 +60,16 @@ pub trait SensorCfg {
 /// and `&dyn Sensor` converts to `&dyn Any`, from which the owner recovers the concrete type.
 pub trait Sensor: Any + fmt::Debug + Send + Sync {
     /// Measures in the environments that are due at `state`, which holds at least the required fields. Each environment
-    /// is at its own instant ([`SceneState::step`]).
+    /// is at its own step ([`SceneState::step`]).
     ///
     /// # Errors
     ///
     /// [`SensorError::MissingFields`] or [`SensorError::WrongShape`] if the state does not fit. Nothing is measured
     /// then.
+    ///
+    /// # Panics
+    ///
+    /// If the steps of an environment went backwards without [`reset`](Self::reset).
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError>;
 
     /// Resets the environments `env_ids`. The current value is refreshed from `state`, taken after the reset, so
@@ -78,24 +82,24 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
     /// Refreshes the current value of the environments `env_ids` after a write to their state, so outdated values are
-    /// never read. This is not a measurement: history and schedule continue unchanged.
+    /// never read. This is not a measurement: history, counts and schedule do not change.
     ///
     /// # Errors
     ///
     /// Same as [`reset`](Self::reset). Nothing is refreshed then.
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
-    /// Markers that visualize the last measurement in environment `env`: rendered in viewers, never measured. They are
-    /// shown if [`SensorCfg::debug_vis`] says so. `pose` returns the current pose of a body of the body axis, where a
-    /// viewer draws it.
+    /// Markers that visualize the current value in environment `env`, in the frame of the environment: rendered in
+    /// viewers, never measured. They are shown initially if [`SensorCfg::debug_vis`] returns true. `pose` returns the
+    /// current pose of a body, given its index on the body axis, where a viewer draws the body.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let _ = (env, pose);
         Vec::new()
     }
 
-    /// Physics steps until the next measurement of any environment, at least 1, with the environments at `step`. The
-    /// owner may skip updates before. The step of a quarantined environment is
-    /// [`Phases::QUARANTINED`](crate::Phases::QUARANTINED).
+    /// Physics steps until the next measurement of any environment is captured or delivered, at least 1, with the
+    /// environments at `step`. The owner may skip the updates until then. The step of a quarantined (diverged)
+    /// environment is [`Phases::QUARANTINED`](crate::Phases::QUARANTINED).
     fn due_in(&self, step: &[u64]) -> u64 {
         let _ = step;
         1
@@ -113,9 +117,10 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
 pub struct SensorContext {
     /// Number of environments.
     pub num_envs: usize,
-    /// Physics step \[s\].
+    /// Time step of the simulation \[s\], the unit of [`SceneState::step`]. With substeps, it spans several steps of
+    /// the physics engine.
     pub dt: f64,
-    /// Gravity \[m/s²\], in world axes.
+    /// Gravity \[m/s²\], in world axes, such as (0, 0, -9.81).
     pub gravity: Vector3<f64>,
     /// Name of the sensor, part of the key of its random numbers.
     pub name: Arc<str>,
@@ -126,19 +131,24 @@ pub struct SensorContext {
     /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, the uid of an object,
     /// `uid/body` or `uid/site` of an MJCF file.
     pub bodies: Arc<[String]>,
-    /// For every body, the index of the body that moves it. This is the body itself if it has its own joint or cannot
-    /// move, else the body that fixed joints fuse it to. As long as `bodies`, or empty if unknown.
+    /// For every body, the index of the body that moves it. For a robot, this is the nearest link, the link itself or
+    /// one above it, that no fixed joint attaches to its parent. For a body or site of an MJCF file, it is the body
+    /// that MuJoCo welds it to; a body or site welded to the world has its own index. An object has its own index. As
+    /// long as `bodies`, or empty if unknown.
     pub moving_bodies: Arc<[usize]>,
-    /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
+    /// Names of the joints in the order of the joint axis of [`SceneState`], `uid/joint`: the movable joints of robots,
+    /// and the hinge and slide joints of MJCF files.
     pub joints: Arc<[String]>,
     /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot
     /// joint, `uid/actuator` for an actuator of an MJCF file.
     pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,
-    /// Scene of the visual geometry; present for sensors that require [`StateFields::VISIBLE`] or [`StateFields::INSTANCES`].
+    /// Scene of the visual geometry; present for sensors that require [`StateFields::VISIBLE`] or
+    /// [`StateFields::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
-    /// Scenes of environments that differ from `scene`; present for the same sensors.
+    /// Render scene of each environment with its own sizes or colors, shape \[num_envs\]; empty if all environments use
+    /// `scene`, or if `scene` is `None`.
     pub own_scenes: Vec<EnvScene>,
     /// True if an existing sensor is rebuilt after a scene change; checks made only at creation are skipped.
     pub rebuilt: bool,
@@ -151,8 +161,9 @@ pub struct SensorContext {
 }
 
 impl SensorContext {
-    /// Returns the index of a body on the body axis. `name` is the full name (`uid/link`), or the part after the first
-    /// slash if only one body has it. The prefixes `{ENV}/` and `{ENV_REGEX_NS}/` are ignored.
+    /// Returns the index of a body on the body axis. `name` is not a pattern: it is the full name (`uid/link`, or the
+    /// uid of an object), or the part after the first slash if only one body has it. The prefixes `{ENV}/` and
+    /// `{ENV_REGEX_NS}/` are ignored.
     ///
     /// # Errors
     ///
@@ -197,16 +208,16 @@ fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
 pub struct EngineSensor {
     /// Full name, `uid/sensor`.
     pub name: String,
-    /// Type name of the engine.
+    /// Type of the sensor, such as `framepos`: the name of its MJCF element.
     pub kind: Arc<str>,
-    /// Unit of the values; `None` if unknown.
+    /// Unit of the values, `1` for numbers without a unit; `None` if unknown.
     pub unit: Option<Arc<str>>,
     /// Index of the first value in [`SceneState::sensordata`].
     pub first: usize,
     /// Number of values.
     pub width: usize,
-    /// True for quantities that the engine solves for (accelerations, forces), captured at [`SceneState::force_time`].
-    /// False for positions and velocities, captured at [`SceneState::time`].
+    /// True if the engine computes the values with accelerations and forces, for the instant
+    /// [`SceneState::force_time`]. False for positions and velocities, at [`SceneState::time`].
     pub force_stage: bool,
     /// True if the values are a quaternion, w x y z.
     pub is_quaternion: bool,

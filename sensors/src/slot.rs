@@ -10,7 +10,8 @@ use kinetoscope_scene::StateFields;
 /// An eager or [lazy](crate::SensorCfg::lazy) sensor in its owner. The owner forwards all updates, resets and refreshes
 /// to the slot, and reads the sensor through it.
 ///
-/// After an error, the sensor is not called any more; reading returns the error.
+/// After an error, the sensor is not called any more; reading returns the error. The methods that forward a state
+/// therefore return no errors.
 #[derive(Debug)]
 pub struct SensorSlot {
     requires: StateFields,
@@ -41,8 +42,9 @@ impl SensorAndError {
 }
 
 impl SensorSlot {
-    /// Creates a slot for a sensor of `num_envs` environments. `requires` are the requirements of its configuration,
-    /// and `lazy` its schedule if it is lazy. The slot must be reset before any other call.
+    /// Creates a slot for a sensor of `num_envs` environments. `requires` are the requirements of its configuration;
+    /// `lazy` is the schedule of a lazy sensor, `None` for an eager one. All environments must be reset before any
+    /// other call.
     pub fn new(sensor: Box<dyn Sensor>, requires: StateFields, lazy: Option<Schedule>, num_envs: usize) -> Self {
         let holder = SensorAndError { sensor, error: None };
         Self {
@@ -89,7 +91,7 @@ impl SensorSlot {
         }
     }
 
-    /// Forwards [`Sensor::reset`] at once. Stored states of these environments are dropped.
+    /// Forwards [`Sensor::reset`] at once. Stored states of these environments are dropped without being measured.
     pub fn reset(&mut self, env_ids: &[usize], state: &SceneState) {
         if let Some(holder) = self.sensor.value_mut() {
             holder.call(|sensor| sensor.reset(env_ids, state));
@@ -129,7 +131,8 @@ impl SensorSlot {
         }
     }
 
-    /// Forwards [`Sensor::due_in`].
+    /// Physics steps until the next update of the slot: [`Sensor::due_in`] of an eager sensor (`u64::MAX` after a
+    /// panic), or the schedule of a lazy one.
     pub fn due_in(&self, step: &[u64]) -> u64 {
         match &self.phases {
             Some(phases) => phases.due_in(step.iter().copied()),

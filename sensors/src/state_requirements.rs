@@ -32,7 +32,7 @@ impl StateRequirements {
         self.lengths.num_envs
     }
 
-    /// Checks a state.
+    /// Checks that a state has the required fields, with the shapes of the scene.
     ///
     /// # Errors
     ///

@@ -111,7 +111,7 @@ impl SensorCfg for CameraCfg {
 }
 
 impl CameraCfg {
-    /// Creates the rasterizer of all rows.
+    /// Creates the renderer of all views.
     fn rasterizer(&self, context: &SensorContext) -> ParallelRenderer {
         let marked = u32::from(self.draw_markers) << Marker::GROUP;
         let raster = RasterCfg { groups: self.raster.groups | marked, ..self.raster };
@@ -123,7 +123,7 @@ impl CameraCfg {
         rasterizer
     }
 
-    /// Rejects flow without two consecutive frames of one instant each.
+    /// Rejects flow together with latency, dropout, a history or a shutter of nonzero span.
     fn check_flow(&self) -> Result<(), CameraError> {
         let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
         match self.channels.flow {
@@ -148,7 +148,7 @@ impl CameraCfg {
         Ok(())
     }
 
-    /// Creates the lens rays of all rows.
+    /// Creates the lens rays of all views; `rows` is their number, one per environment of the camera.
     fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<LensRayTables, CameraError> {
         if !self.lens.is_pinhole() && !self.renderer.traces_visibility(true) {
             let (lens, renderer) = (self.lens.name(), self.renderer.name());
@@ -159,7 +159,7 @@ impl CameraCfg {
         Ok(LensRayTables::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
     }
 
-    /// Rejects sizes whose allocation would fail and abort the process.
+    /// Rejects sizes whose allocation would fail and abort the process; `views` is the number of environments.
     fn check_memory(
         &self,
         views: usize,

@@ -64,9 +64,9 @@ pub struct CameraCfg {
     /// Aperture of the lens, for depth of field; `None` is a point. Needs [`Renderer::RayTraced`].
     pub aperture: Option<Aperture>,
     /// Exposure and readout times, for motion blur and rolling shutters; by default an image shows one instant. Needs
-    /// [`Renderer::RayTraced`]. The first image after a reset or a write to the state shows one instant.
+    /// [`Renderer::RayTraced`]. The image that a reset or a write to the state shows at once is of one instant.
     pub shutter: Shutter,
-    /// Near limit: smallest depth along the optical axis \[m\]. If rays of the lens do not all go forward
+    /// Near limit: smallest depth along the optical axis \[m\], above 0. If rays of the lens do not all go forward
     /// ([`Lens::is_forward`](lens::Lens::is_forward)), smallest distance along the ray.
     pub near: f64,
     /// Far limit: largest depth along the optical axis \[m\], or largest distance along the ray, as
@@ -80,13 +80,14 @@ pub struct CameraCfg {
     pub round_period: bool,
     /// Measured channels.
     pub channels: Channels,
-    /// Value of depth and distance at pixels without a hit.
+    /// Value of depth and distance where nothing is hit.
     pub depth_miss: DepthMiss,
     /// Renderer of the images.
     pub renderer: Renderer,
-    /// Render settings.
+    /// Render settings: samples per pixel, shadows, tone curve, geom groups and others.
     pub raster: RasterCfg,
-    /// Environments of the camera, in this order; `None` is all environments.
+    /// Environments that the camera renders, in the order of the first axis of its arrays; `None` is all environments.
+    /// No index may repeat.
     pub env_ids: Option<Vec<usize>>,
     /// Renders images when they are read (and only then), not when they are due. The images are the same, because the
     /// state is captured when they are due.
@@ -97,11 +98,13 @@ pub struct CameraCfg {
     /// Latency in physics steps, from the capture of an image until it can be read. The image keeps the stamp of its
     /// capture. All sensors see a write to the state of an environment at once: outdated values are never read.
     pub latency_steps: u32,
-    /// Probability that an image is lost on its way, 0 to 1; the previous image stays.
+    /// Probability that an image is lost on its way, 0 to 1: the previous image stays, and the lost one is neither
+    /// counted nor in the history. The images of a reset or a write to the state are never lost.
     pub dropout: f64,
-    /// Noise by channel name, independent at every pixel. Noise of `depth` and `distance` is in \[m\]: depth stays from
-    /// `near` to `far`, distance stays at least `near`, and misses stay misses. Noise of `color` is in steps of its 8
-    /// bits, independent for red, green and blue; results are rounded to bytes.
+    /// Noise by channel name, for `color`, `depth` and `distance`, independent at every pixel. Noise of `depth` and
+    /// `distance` is in \[m\]: depth stays from `near` to `far`, distance stays at least `near`, and misses stay
+    /// misses. Noise of `color` is in steps of its 8 bits, independent for red, green and blue; results are rounded to
+    /// bytes.
     ///
     /// The random numbers depend only on the seed of the simulation, the environment, the camera name, the image index
     /// and the pixel. They are computed from these keys, so laziness, the time of reading and the number of threads do
@@ -115,7 +118,7 @@ pub struct CameraCfg {
     /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
     /// Renders the markers of other sensors into the channel `color`: ray hits, contact forces, frames, view frustums.
-    /// Each sensor shows its markers if [`SensorCfg::debug_vis`](crate::SensorCfg::debug_vis) says so. All other
+    /// A sensor whose markers are off ([`SensorCfg::debug_vis`](crate::SensorCfg::debug_vis)) adds none. All other
     /// channels stay the same.
     ///
     /// Markers show the last measurement of each sensor at the instant of the image. Markers of cameras that render

@@ -1,7 +1,7 @@
 //! Color maps of camera channels.
 
 /// Returns the color of a depth \[m\] between `near` (dark, then blue) and `far` (dark red): Google's Turbo color map.
-/// Depths outside get the colors of the ends; `inf` (nothing was hit) is black.
+/// Depths outside get the colors of the ends; a depth that is not finite (nothing was hit) is black.
 ///
 /// Source: Mikhailov's polynomial approximation of Turbo (2019).
 pub fn depth_color(depth: f32, [near, far]: [f32; 2]) -> [u8; 3] {

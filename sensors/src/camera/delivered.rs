@@ -54,8 +54,8 @@ impl HistoryImages {
 
 impl Camera {
     /// Capture times of the latest delivered frames \[s\], shape (N). Equal to [`stamps`](Self::stamps), except with a
-    /// latency after a write to the state or a move of the camera. Before the first frame is delivered, the time of the
-    /// reset.
+    /// latency after a write to the state, until a frame captured after the write is delivered. Equal to the stamps
+    /// also before the first frame is delivered.
     pub fn latest_delivered_stamps(&self) -> Array1<f64> {
         let shown = self.stamps();
         Array1::from_shape_fn(shown.len(), |row| match self.frames.latest_if_not_shown(row) {
@@ -64,7 +64,8 @@ impl Camera {
         })
     }
 
-    /// Camera poses at the capture of the latest delivered frames, in the layout of [`pose_w`](Self::pose_w).
+    /// Camera poses of the latest delivered frames, in the layout of [`pose_w`](Self::pose_w): the pose of the parent
+    /// at the capture, and the local pose at the delivery. Without a latency, they equal `pose_w`.
     pub fn latest_delivered_pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let mut poses = self.pose_w(convention);
         for (row, mut pose) in poses.rows_mut().into_iter().enumerate() {
@@ -77,8 +78,8 @@ impl Camera {
         poses
     }
 
-    /// Intrinsic matrices of the latest delivered frames, in the layout of
-    /// [`intrinsic_matrices`](Self::intrinsic_matrices).
+    /// Intrinsic matrices of the latest delivered frames at their delivery, in the layout of
+    /// [`intrinsic_matrices`](Self::intrinsic_matrices). Without a latency, they equal `intrinsic_matrices`.
     pub fn latest_delivered_intrinsic_matrices(&self) -> Array3<f64> {
         let shown = self.intrinsic_matrices();
         Array3::from_shape_fn(shown.raw_dim(), |(row, i, j)| match self.frames.latest_if_not_shown(row) {
@@ -118,7 +119,7 @@ impl Camera {
         self.cfg.history_length
     }
 
-    /// Number of frames in the history of environment `env`.
+    /// Number of frames in the history of environment `env`, at most [`history_length`](Self::history_length).
     ///
     /// # Errors
     ///
@@ -140,7 +141,8 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::ChannelOff`], and [`CameraError::Render`] while the history holds a frame that cannot be rendered.
+    /// [`CameraError::ChannelOff`], and [`CameraError::Render`] while the history holds a frame that cannot be
+    /// rendered.
     pub fn history<C: ListedChannel>(&self) -> Result<HistoryView<'_, C>, SensorError> {
         self.require_channel::<C>()?;
         let (rows, length, (height, width)) = (self.env_ids().len(), self.history_length(), self.image_shape());

@@ -7,7 +7,8 @@ use kinetoscope_render::RenderError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// Size, intrinsics, depth range or number of samples are invalid.
+    /// Size, intrinsics, depth range, number of samples, aperture, shutter or renderer are invalid, or do not fit
+    /// together.
     #[error("invalid camera view: {0}")]
     View(RenderError),
     /// The image of an environment cannot be rendered. It is rendered again after the next capture, or at the next read
@@ -36,7 +37,7 @@ pub enum CameraError {
         /// Numbers per row.
         columns: usize,
     },
-    /// The position of the camera and its target coincide, or a number is not finite.
+    /// The position of the camera and its target coincide, or a number is not finite (or too large for the renderer).
     #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite, and they must differ")]
     LookAt {
         /// Position of the camera \[m\].

@@ -49,12 +49,13 @@ impl CameraConvention {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Extrinsics {
-    /// Body that the camera is attached to: `uid/link`, or the link alone if only one body has this name. Links that
-    /// were fused into another link count too. `None` is the frame of the environment.
+    /// Body that the camera is attached to: `uid/link`, the link alone if only one body has this name, or the uid of an
+    /// object. A link that fixed joints fuse to another link is allowed. `None` is the frame of the environment.
     pub parent: Option<String>,
-    /// Pose in the frame of the parent, or of the environment.
+    /// Pose in the frame of the parent, or of the environment without a parent.
     pub placement: Placement,
-    /// Axis convention of [`Placement::Pose`]; the same for free and attached cameras.
+    /// Axis convention of [`Placement::Pose`], the same for free and attached cameras; [`Placement::LookAt`] does not
+    /// use it.
     pub convention: CameraConvention,
 }
 
@@ -71,7 +72,8 @@ pub enum Placement {
         #[serde(default, with = "kinetoscope_scene::file_format::rotation")]
         rotation: UnitQuaternion<f64>,
     },
-    /// A position and a target: see [`look_at_pose`].
+    /// A position and a target, in the frame of the parent, or of the environment for free cameras: see
+    /// [`look_at_pose`].
     LookAt {
         /// Position of the camera \[m\].
         eye: [f64; 3],

@@ -180,7 +180,8 @@ impl DeliveredFrames {
 }
 
 impl FrameBuffer {
-    /// Returns the number of frames of an environment that are in flight at once.
+    /// Returns the maximum number of frames of an environment that are in flight at once; 0 for a camera without
+    /// latency, history and dropout.
     pub(super) fn max_pending(cfg: &CameraCfg, schedule: Schedule) -> usize {
         let keeps_frames = cfg.latency_steps > 0 || cfg.history_length > 0 || cfg.dropout > 0.0;
         if keeps_frames { delay::capacity(cfg.latency_steps.into(), schedule.period_steps()) } else { 0 }

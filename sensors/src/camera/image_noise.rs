@@ -67,7 +67,7 @@ impl ImageNoise {
         }))
     }
 
-    /// Adds noise to a frame in which misses are infinite.
+    /// Adds noise to a frame whose misses are +inf; misses stay. `ticket` is the key of the random numbers.
     pub(crate) fn apply(&self, frame: &mut FrameMut<'_>, ticket: &RngKey) {
         if let (Some(noise), Some(bytes)) = (&self.color, frame.color.as_deref_mut()) {
             // Four pixels have twelve numbers: alpha has no noise.

@@ -126,7 +126,7 @@ impl Motion {
         self.shutter.as_ref().map(|shutter| &shutter.open_poses[row])
     }
 
-    /// Opens the shutter of a row if its next frame is due after the span of the shutter.
+    /// Opens the shutter of a row if its next frame is due in exactly the steps of the shutter span.
     pub(super) fn open_shutter_if_due(&mut self, row: usize, phases: &Phases, seen: &Observation<'_>) {
         if let Some(shutter) = &mut self.shutter
             && phases.steps_until_due(row, seen.state.step[seen.env]) == shutter.steps

@@ -37,6 +37,7 @@ impl SensorNoiseModel {
     }
 
     /// Applies imperfections and noise to images in which misses are infinite; each image is processed by one thread.
+    /// `tickets` are the keys of the random numbers, one per image.
     pub(super) fn apply(&mut self, jobs: &mut [RenderJob<'_>], tickets: &[RngKey]) {
         let Self { imperfections, tone, noise, workers, pool } = self;
         let noise = noise.as_ref();

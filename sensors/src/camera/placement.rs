@@ -40,8 +40,8 @@ pub trait PlaceRows {
 /// pose from the next image on. A stereo camera is placed by the [origin](super::StereoOrigin) of its rig. Values
 /// persist over a reset, until [`restore`](Self::restore).
 pub trait CameraPlacement: PlaceRows {
-    /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]`
-    /// \[m\], shape (N, 7).
+    /// Poses of the cameras, or of the origin of a stereo rig, in the frame of the parent (of the environment, for a
+    /// free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     fn local_pose(&self, convention: CameraConvention) -> Array2<f64>;
 
     /// Sets intrinsics: one for each of `env_ids` (`None` is all environments of the camera), or one for all. Both

@@ -42,13 +42,13 @@ use std::sync::{Arc, Mutex};
 ///
 /// A camera is perfect by default. Optionally it has a [`history`](Self::history), latency, dropout, noise, and
 /// imperfections of real cameras ([`CameraCfg::imperfections`]). It stays lazy and gives the same bits: each capture is
-/// kept until it is delivered or read. Setters affect the shown frame and frames in flight; the history stays as it was
-/// captured.
+/// kept until it is delivered or read. Setters affect the shown frame and frames in flight; frames in the history keep
+/// the pose and the intrinsics of their delivery.
 ///
 /// Returned views borrow the camera, so images are not overwritten while they are read. The first axis of all arrays is
 /// the environments of the camera, [`env_ids`](Self::env_ids). Poses are in the frame of the environment, lengths in
-/// meters. If the state of an environment cannot be rendered (a pose that is not finite), reads fail until the next
-/// capture.
+/// meters. If the state of one environment cannot be rendered (a pose that is not finite), image reads fail for all
+/// environments until a valid state of that environment is captured.
 pub struct Camera {
     pub(super) cfg: CameraCfg,
     pub(super) path: String,
@@ -219,12 +219,12 @@ impl Camera {
         self.cfg.channels
     }
 
-    /// Update period of the camera in physics steps.
+    /// Period between images in physics steps.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
     }
 
-    /// Time between images \[s\].
+    /// Time between images \[s\], after rounding to whole physics steps.
     pub fn update_period(&self) -> f64 {
         self.schedule().period_steps() as f64 * self.dt
     }
@@ -239,12 +239,14 @@ impl Camera {
         self.viewpoints.parent.is_some()
     }
 
-    /// Time of the shown frames \[s\] since the last reset of the environment, shape (N).
+    /// Time of the shown frames \[s\] since the last reset of the environment, shape (N): that of their capture, or of
+    /// a later write to the state.
     pub fn stamps(&self) -> ArrayView1<'_, f64> {
         self.frames.stamps()
     }
 
-    /// Number of frames delivered since the last reset, read or not, shape (N). The refresh of a reset does not count.
+    /// Number of frames delivered since the last reset, read or not, shape (N). The images of a reset or of a write to
+    /// the state do not count.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.frames.counts()
     }
@@ -294,7 +296,8 @@ impl Camera {
         Ok(self.images.get_or_update(make, draw)?.images()?)
     }
 
-    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
+    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3), as last set. The corner
+    /// of the first pixel is at (0, 0).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         Array3::from_shape_fn((self.viewpoints.len(), 3, 3), |(row, i, j)| {
             self.viewpoints.row(row).pixels.matrix()[(i, j)]
@@ -326,8 +329,8 @@ impl Camera {
         self.viewpoints.ray_bytes()
     }
 
-    /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN for
-    /// an attached camera before its first capture.
+    /// Poses in the environment at the captured instant, with the local poses as last set, rows
+    /// `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN for an attached camera before its first capture.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.pose_from_optical(&pose)));
         Array2::from(

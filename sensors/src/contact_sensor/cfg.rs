@@ -18,29 +18,31 @@ pub struct ContactSensorCfg {
     /// Name patterns of the bodies to watch (`uid/link`, `link` alone, or the uid of an object), in the order they are
     /// reported. Links that are fused to others, such as feet behind a fixed joint, are separate bodies here.
     pub bodies: Vec<String>,
-    /// Filters: groups of counterpart bodies, one name pattern each, for [`ContactSensor::force_matrix_w`]. `ground`
-    /// and `world` match everything that belongs to the world. Filters do not affect net forces, which include every
+    /// Filters: groups of counterpart bodies, one name pattern each, for [`ContactSensor::force_matrix_w`]. The names
+    /// `ground` and `world` stand for everything that belongs to the world: the ground plane, terrain, and the world
+    /// geoms of MJCF files. Static objects have their own uid. Filters do not affect net forces, which include every
     /// contact.
     pub filters: Vec<String>,
-    /// Reports the poses of the bodies.
+    /// Reports the positions and orientations of the bodies.
     pub track_pose: bool,
     /// Reports air and contact times. Contact is then checked in every physics step, whatever the period, and the
     /// sensor is never lazy.
     pub track_air_time: bool,
     /// Reports the mean contact point of each body, and of each body with each filter.
     pub track_contact_points: bool,
-    /// Reports friction forces by filter, for [`ContactSensor::friction_matrix_w`]. The sum over all counterparts is
-    /// always reported.
+    /// Reports friction forces by filter, for [`ContactSensor::friction_matrix_w`]; needs `filters`. The sum over all
+    /// counterparts is always reported.
     pub track_friction_forces: bool,
-    /// Contact threshold: a body is in contact if its net normal force exceeds this \[N\].
+    /// Contact threshold of air times and markers \[N\]: a body is in contact if the norm of its net normal force
+    /// exceeds the threshold. Opposite forces cancel in the net force.
     pub force_threshold: f64,
-    /// Rate, history, latency and noise. Channels that can have noise: `net_forces_w`, `friction_forces_w`,
+    /// Rate, history, latency, dropout and noise. Channels that can have noise: `net_forces_w`, `friction_forces_w`,
     /// `total_forces_w`, `force_matrix_w`, and, where they are tracked, `friction_matrix_w`, `contact_points_w`,
-    /// `contact_point_matrix_w` and `pos_w`.
+    /// `contact_point_matrix_w` and `pos_w`. Air times follow from forces without noise.
     pub sampling: SamplingCfg,
-    /// Shows a red ball at every body in contact and a green ball at every other body
-    /// ([`Sensor::markers`](crate::Sensor::markers)). An arrow shows the net normal force, 1 m for 500 N. The forces
-    /// are those of the last measurement, at the current positions of the bodies.
+    /// Shows a red ball and an arrow of the net normal force, 1 m for 500 N, at every body in contact, and a green ball
+    /// at every other body ([`Sensor::markers`](crate::Sensor::markers)). The forces are those of the last measurement,
+    /// at the current positions of the bodies.
     pub debug_vis: bool,
 }
 
@@ -86,9 +88,9 @@ impl SensorCfg for ContactSensorCfg {
     /// # Errors
     ///
     /// - An empty selection of bodies.
-    /// - A pattern that matches nothing, or a body that another pattern matches.
-    /// - A filter that matches only the watched body itself, or friction by filter without filters.
-    /// - A negative threshold, or an invalid sampling configuration.
+    /// - A pattern that is not a regular expression or matches nothing, or a body that two patterns of `bodies` match.
+    /// - A filter that matches only the single watched body, or friction by filter without filters.
+    /// - A threshold that is negative or not finite, or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<ContactSensor, SensorError> {
         let bodies = select(&self.bodies, &context.bodies, "body")?;
         if bodies.is_empty() {

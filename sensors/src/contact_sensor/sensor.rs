@@ -60,7 +60,7 @@ impl Sensor for ContactSensor {
         sampler.refresh(env_ids, state, |env, row| read(pairs, air.as_ref(), state, env, row))
     }
 
-    /// One step if air times are tracked.
+    /// Returns 1 if air times are tracked.
     fn due_in(&self, step: &[u64]) -> u64 {
         if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
     }
@@ -131,7 +131,7 @@ impl ContactSensor {
         &self.filters
     }
 
-    /// Contact threshold of the net normal force \[N\].
+    /// Contact threshold of the norm of the net normal force \[N\].
     pub fn force_threshold(&self) -> f64 {
         self.threshold
     }
@@ -207,9 +207,9 @@ impl ContactSensor {
         self.sampler.has("friction_matrix_w").then(|| self.past_pairs("friction_matrix_w"))
     }
 
-    /// Mean of the contact points of each body, with equal weights \[m\], shape (N, B, 3), in the environment; `None`
-    /// unless tracked. Without a contact, [`contact_counts`](Self::contact_counts) is 0, and the point is meaningless:
-    /// 0, plus the noise of the channel. Isaac Lab returns NaN instead.
+    /// Mean of the contact points of each body, with equal weights \[m\], shape (N, B, 3), in the frame of the
+    /// environment; `None` unless points are tracked. Without a contact, [`contact_counts`](Self::contact_counts) is 0,
+    /// and the point is meaningless: 0, plus the noise of the channel. Isaac Lab returns NaN instead.
     pub fn contact_points_w(&self) -> Option<ArrayView3<'_, f64>> {
         self.sampler.has("contact_points_w").then(|| self.vectors("contact_points_w"))
     }
@@ -220,7 +220,7 @@ impl ContactSensor {
     }
 
     /// Mean of the contact points between the bodies of each filter and each body, with equal weights \[m\], shape
-    /// (N, B, M, 3), in the environment; `None` unless points are tracked. Without a contact,
+    /// (N, B, M, 3), in the frame of the environment; `None` unless points are tracked. Without a contact,
     /// [`contact_count_matrix`](Self::contact_count_matrix) is 0, and the point is meaningless, as in
     /// [`contact_points_w`](Self::contact_points_w).
     pub fn contact_point_matrix_w(&self) -> Option<ArrayView4<'_, f64>> {
@@ -235,13 +235,14 @@ impl ContactSensor {
         self.sampler.has(counts).then(|| self.sampler.values_as(counts, shape))
     }
 
-    /// Positions of the bodies \[m\], shape (N, B, 3); `None` unless tracked. Positions are captured at
-    /// [`Sampled::stamps`], forces at [`Sampled::force_stamps`].
+    /// Positions of the bodies in the frame of the environment \[m\], shape (N, B, 3); `None` unless poses are tracked.
+    /// Positions are captured at [`Sampled::stamps`], forces and contact points at [`Sampled::force_stamps`].
     pub fn pos_w(&self) -> Option<ArrayView3<'_, f64>> {
         self.sampler.has("pos_w").then(|| self.vectors("pos_w"))
     }
 
-    /// Orientations of the bodies, w x y z, shape (N, B, 4); `None` unless tracked.
+    /// Orientations of the bodies in the frame of the environment, w x y z, shape (N, B, 4); `None` unless poses are
+    /// tracked.
     pub fn quat_w(&self) -> Option<ArrayView3<'_, f64>> {
         let shape = (self.sampler.num_envs(), self.names.len(), 4);
         self.sampler.has("quat_w").then(|| self.sampler.values_as("quat_w", shape))
@@ -251,31 +252,33 @@ impl ContactSensor {
         self.sampler.has(channel).then(|| self.sampler.values(channel))
     }
 
-    /// Time since the last contact of each body \[s\], shape (N, B), 0 in contact; `None` unless air times are tracked.
-    /// Times are whole numbers of physics steps, counted from the reset on.
+    /// Time since the last contact of each body, or since the reset if there was none \[s\], shape (N, B), 0 in
+    /// contact; `None` unless air times are tracked. Times are whole numbers of physics steps.
     pub fn current_air_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional_values("current_air_time")
     }
 
-    /// Duration of the current contact of each body \[s\], shape (N, B), 0 without a contact; `None` unless air times
-    /// are tracked.
+    /// Duration of the current contact of each body, counted from the reset at the earliest \[s\], shape (N, B), 0
+    /// without a contact; `None` unless air times are tracked.
     pub fn current_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional_values("current_contact_time")
     }
 
-    /// Duration of the air phase of each body before its last contact began \[s\], shape (N, B); `None` unless air
-    /// times are tracked.
+    /// Duration of the air phase of each body before its last contact began \[s\], shape (N, B), 0 if no contact began
+    /// since the reset; `None` unless air times are tracked. The first air phase counts from the reset on.
     pub fn last_air_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional_values("last_air_time")
     }
 
-    /// Duration of the last finished contact of each body \[s\], shape (N, B); `None` unless air times are tracked.
+    /// Duration of the last finished contact of each body \[s\], shape (N, B), 0 if no contact ended since the reset;
+    /// `None` unless air times are tracked.
     pub fn last_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional_values("last_contact_time")
     }
 
     /// True where contact of a body began since the previous measurement, however short it was, shape (N, B); `None`
-    /// unless air times are tracked. A contact that exists at a reset does not count.
+    /// unless air times are tracked. A contact that exists at a reset does not count. With dropout, a lost measurement
+    /// also loses the contacts that began since the measurement before it.
     pub fn first_contact(&self) -> Option<Array2<bool>> {
         self.optional_values("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
     }

@@ -51,7 +51,7 @@ pub enum RayError {
         /// Direction of the ray.
         direction: [f64; 3],
     },
-    /// The rays of all environments do not fit into memory.
+    /// The rays of all environments do not fit into memory, or their number of bytes exceeds the limit.
     #[error("{envs} environments with {rays} rays each do not fit into memory (at most {limit} bytes)")]
     Memory {
         /// Number of environments.

@@ -53,8 +53,8 @@ impl Rays for Vec<Ray> {
     }
 }
 
-/// Casts the rays of a sensor in many environments. The bits do not depend on the number of threads. Only the first
-/// casts allocate memory.
+/// Casts the rays of a sensor in many environments. Hits are the same bit for bit with any number of threads. Only the
+/// first casts allocate memory.
 #[derive(Clone)]
 pub(crate) struct Scan<R: Rays> {
     pool: ThreadPool,
@@ -204,7 +204,8 @@ impl<R: Rays> Scan<R> {
         });
     }
 
-    /// Passes the hits of an environment in the last cast to `show`, with the index of the ray, in any order.
+    /// Passes the hits of an environment in the last cast to `show`, with the index of the ray, in any order. An
+    /// environment that was not cast has no hits.
     pub(crate) fn each_hit(&self, env: usize, mut show: impl FnMut(usize, &RayHit)) {
         let (slot, per_view) = (self.input.slots[env], self.jobs_per_view());
         let first = if slot == NO_SLOT { self.job_hits.len() } else { slot * per_view };

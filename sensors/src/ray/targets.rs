@@ -7,7 +7,8 @@ use kinetoscope_scene::RenderScene;
 use serde::{Deserialize, Serialize};
 
 /// Targets of rays: visual geometry as seen by cameras (the visuals of robots, not their collision shapes), of some
-/// geom groups.
+/// geom groups. Tendons, skins and flexes, whose shapes change, are never targets. Instances that an environment hides
+/// are not hit there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum HitTargets {
@@ -18,9 +19,10 @@ pub enum HitTargets {
     /// hit in environments that show them. When the sensor is added, each pattern must match an instance that some
     /// environment shows.
     Named(Vec<String>),
-    /// All instances, except tendons, skins and flexes, whose shapes change.
+    /// All instances.
     Everything {
-        /// Excludes the parent body of the sensor, with everything fused to it.
+        /// Excludes the parent body of the sensor, with everything fused to it; without effect for a sensor without a
+        /// parent.
         exclude_parent: bool,
     },
 }

@@ -24,8 +24,9 @@ pub struct PixelBox {
 pub struct Box2d {
     /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
-    /// Box around the pixels that see the segment; `None` if no pixel does. With a shutter of nonzero span, each row
-    /// has its own instant.
+    /// Box around the pixels that see the segment; `None` if no pixel does. With a
+    /// [shutter](crate::camera::CameraCfg::shutter) of nonzero span, each row of pixels shows the middle of its own
+    /// exposure.
     pub tight: Option<PixelBox>,
     /// Box around the whole part of the segment in the view frustum, occluded or not; `None` if all of it is outside.
     ///
@@ -43,8 +44,8 @@ pub struct Box2d {
 }
 
 impl Segmentation {
-    /// Returns the 2D boxes of the segments of a level in the image of environment `env`, in the order of
-    /// [`segments`](Self::segments). Segments without a box are left out.
+    /// Returns the 2D boxes of the segments of a level in the shown image of environment `env`, in the order of
+    /// [`segments`](Self::segments). Segments without a tight and without a loose box are left out.
     ///
     /// If the lens bends lines or the shutter has a nonzero span, each segment is rendered once more in isolation for
     /// its loose box: see [`occlusions`](Self::occlusions).
@@ -52,8 +53,8 @@ impl Segmentation {
     /// # Errors
     ///
     /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) if the camera does not measure the mask, errors of
-    /// reading the mask, and an environment that the camera does not see. [`Render`](crate::camera::CameraError::Render) if
-    /// an isolated segment cannot be rendered.
+    /// reading the mask, and an environment that the camera does not see.
+    /// [`Render`](crate::camera::CameraError::Render) if an isolated segment cannot be rendered.
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;

@@ -8,17 +8,18 @@ use kinetoscope_render::Layer;
 use kinetoscope_scene::{Instance, Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// A box around a segment, aligned with the axes of the segment's frame. This is the frame of the link; for an object
-/// with several links the frame of its first link; for a class the frame of its first object.
+/// A box around a segment, aligned with the axes of the segment's frame. For a link, this is the frame of the link; for
+/// an object with several links, that of its first link; for a class, that of its first object. First is the rendered
+/// part with the smallest mask id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Box3d {
     /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
     /// Pose of the segment's frame in the environment.
     pub pose: Pose,
-    /// Smallest coordinates in that frame \[m\].
+    /// Smallest coordinates in the segment's frame \[m\].
     pub min: [f64; 3],
-    /// Largest coordinates in that frame \[m\].
+    /// Largest coordinates in the segment's frame \[m\].
     pub max: [f64; 3],
 }
 

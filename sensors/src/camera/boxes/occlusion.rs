@@ -7,7 +7,7 @@ use crate::error::SensorError;
 use ndarray::Axis;
 
 /// Occlusion of a segment in an image. Both counts refer to the same instants: with a shutter of nonzero span, each row
-/// has its own instant, as in the mask.
+/// of pixels has its own instant, as in the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Occlusion {
     /// Segment id, see [`Segmentation::segments`].
@@ -36,8 +36,8 @@ impl Segmentation {
     /// # Errors
     ///
     /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) if the camera does not measure the mask, errors of
-    /// reading the mask, and an environment that the camera does not see. [`Render`](crate::camera::CameraError::Render) if
-    /// a segment cannot be rendered.
+    /// reading the mask, and an environment that the camera does not see.
+    /// [`Render`](crate::camera::CameraError::Render) if a segment cannot be rendered.
     pub fn occlusions(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Occlusion>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;

@@ -305,7 +305,8 @@ mod tests {
                     assert!(low <= least + slack && high >= most - slack, "{shape:?} {turn}: {found:?} {extremes:?}");
                     if nearest > 0.5 {
                         whole += 1;
-                        // 1 - cos(pi / 512) is 1.9e-5: of 0.3 m, 520 pixels and depths above 0.5 m 6e-3 pixels, twice at a slant.
+                        // 1 - cos(pi / 512) is 1.9e-5: of 0.3 m, 520 pixels and depths above 0.5 m 6e-3 pixels, twice
+                        // at a slant.
                         assert!(low >= least - 2e-2 && high <= most + 2e-2, "{shape:?} {turn}: {found:?} {extremes:?}");
                     }
                 }

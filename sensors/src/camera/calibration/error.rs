@@ -19,7 +19,7 @@ pub(super) const FIELDS: [&str; 8] = [
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// The file cannot be opened or written.
+    /// The file cannot be read or written.
     #[error("{}: {error}", .path.display())]
     File {
         /// Path of the file.

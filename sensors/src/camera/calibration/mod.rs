@@ -91,7 +91,8 @@ impl DistortionModel {
 ///
 /// In a file, the *center* of the first pixel is at (0, 0), as in OpenCV. In [`Intrinsics`] and [`Lens`], its corner
 /// is. So principal points are half a pixel less here: that of a centered camera of 640 pixels is 319.5.
-/// [`from_intrinsics`](Self::from_intrinsics), [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) convert between the two.
+/// [`from_intrinsics`](Self::from_intrinsics), [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to)
+/// convert between the two.
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{CameraCfg, CameraInfo};
@@ -128,12 +129,13 @@ pub struct CameraInfo {
     pub camera_matrix: Matrix3<f64>,
     /// Model of the coefficients D.
     pub distortion_model: DistortionModel,
-    /// D, in the order of the model.
+    /// D, in the order of the model; missing ones are 0.
     pub distortion_coefficients: Vec<f64>,
-    /// R: rotation of the rectified images. Raw images do not depend on it.
+    /// R: rotation from the camera frame to the frame of the rectified images, as in ROS. Raw images do not depend on
+    /// R.
     pub rectification_matrix: Matrix3<f64>,
-    /// P: projection of the rectified images \[pixels\], from the center of the first pixel. Raw images do not depend
-    /// on it.
+    /// P: projection from the frame of the rectified images to their pixels, counted from the center of the first
+    /// pixel. Raw images do not depend on P.
     pub projection_matrix: Matrix3x4<f64>,
 }
 
@@ -224,7 +226,8 @@ impl CameraInfo {
     ///
     /// # Errors
     ///
-    /// [`CalibrationError::Lens`] if `camera_info` has no model for the lens.
+    /// [`CalibrationError::Lens`] if `camera_info` has no model for the lens; [`CalibrationError::Camera`] for invalid
+    /// intrinsics.
     pub fn from_intrinsics(
         name: &str,
         [width, height]: [usize; 2],
@@ -248,7 +251,7 @@ impl CameraInfo {
         })
     }
 
-    /// Focal lengths and principal point of raw images.
+    /// Focal lengths and principal point of raw images, counted from the corner of the first pixel.
     pub fn intrinsics(&self) -> Intrinsics {
         let k = &self.camera_matrix;
         let [cx, cy] = [0, 1].map(|axis| k[(axis, 2)] + Self::FIRST_PIXEL_CENTER);
@@ -280,8 +283,8 @@ impl CameraInfo {
 }
 
 impl Camera {
-    /// Returns the calibration of the camera in environment `env`, named `name`, as ROS nodes need it to read its
-    /// images.
+    /// Returns the calibration of the camera in environment `env`, named `name`, with its current intrinsics. R is the
+    /// identity and P is K, as in [`CameraInfo::from_intrinsics`].
     ///
     /// # Errors
     ///

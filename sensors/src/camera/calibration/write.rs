@@ -25,7 +25,7 @@ impl CameraInfo {
         out
     }
 
-    /// Writes a calibration file.
+    /// Writes a calibration file; an existing file is replaced.
     ///
     /// # Errors
     ///

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 /// Longer or shorter exposure, relative to the exposure at which a fully lit white surface has radiance 1.
 ///
 /// The renderers multiply radiance by this factor before the tone curve
-/// ([`ImageRenderer::exposure_compensation`](kinetoscope_render::ImageRenderer::exposure_compensation)), so highlights that clip at 0 stops keep their detail
-/// at fewer stops. All other imperfections are applied after it.
+/// ([`ImageRenderer::exposure_compensation`](kinetoscope_render::ImageRenderer::exposure_compensation)), so highlights
+/// that clip at 0 stops keep their detail at fewer stops. All other imperfections are applied after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Exposure {

@@ -21,7 +21,8 @@ use std::f64::consts::FRAC_PI_2;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Holes {
-    /// Largest measured angle between the ray and the surface normal \[rad\], 0 to pi/2.
+    /// Largest measured angle between the ray and the surface normal \[rad\], 0 to pi/2; pi/2 disables holes at grazing
+    /// angles.
     pub max_angle: f64,
     /// Position of the projector on the camera's x axis \[m\], -1000 to 1000: positive is to the right; 0 disables
     /// shadows.

@@ -111,7 +111,8 @@ impl Imperfections {
         !self.of_light() && !self.of_depth()
     }
 
-    /// Checks all parameters, and that a camera with these channels measures the affected channels.
+    /// Checks all parameters, and that `channels` has color for effects on light, and depth or distance for effects on
+    /// depth.
     pub(crate) fn check(&self, channels: Channels) -> Result<(), SensorError> {
         let off = |channel| Err(CameraError::ChannelOff { channel, enabled: channels.names() }.into());
         if self.of_light() && !channels.color {

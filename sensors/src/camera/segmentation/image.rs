@@ -13,8 +13,8 @@ impl Segmentation {
         out
     }
 
-    /// Converts as [`segment`](Self::segment), into an existing array. Allocates only if the shapes differ; `out` then
-    /// takes the shape of the mask.
+    /// Like [`segment`](Self::segment), but writes to `out`. If the shapes differ, `out` is reallocated in the shape of
+    /// the mask.
     pub fn segment_into<D: Dimension>(
         &self,
         level: SegmentLevel,
@@ -44,8 +44,8 @@ impl Segmentation {
         out
     }
 
-    /// Converts as [`colorize`](Self::colorize), into an existing array. Allocates only if the shapes differ; `out`
-    /// then takes the shape of the mask.
+    /// Like [`colorize`](Self::colorize), but writes to `out`. If the shapes differ, `out` is reallocated with shape
+    /// (N, H, W, 4).
     pub fn colorize_into(&self, level: SegmentLevel, mask: ArrayView3<'_, i32>, out: &mut Array4<u8>) {
         let (n, height, width) = mask.dim();
         if out.dim() != (n, height, width, 4) {

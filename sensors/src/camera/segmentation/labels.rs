@@ -7,14 +7,16 @@ use kinetoscope_scene::pattern::{PatternError, closest_names};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// An entity with its own mask id: a link of a robot, a rigid object, a geom of the world.
+/// An entity with its own mask id, such as a link of a robot, a rigid object, a body of an MJCF file, a tendon or a
+/// geom of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SegmentedEntity {
     /// Mask id, from 1 on.
     pub id: i32,
-    /// Name of the robot, of the object or of the geom of the world.
+    /// Name of the robot, of the object, of the geom of the world, or the uid of the MJCF file.
     pub object: String,
-    /// Name of the link, if the object has several.
+    /// Name of the link of a robot, of the body of an MJCF file or of the tendon; `None` for rigid objects and geoms of
+    /// the world.
     pub link: Option<String>,
     /// Semantic class, unless a label assigns another one.
     pub class: String,
@@ -57,7 +59,8 @@ pub enum SegmentLevel {
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationCfg {
     /// Patterns and classes. A pattern is a regular expression. It must match the whole name of an object (`arm`, which
-    /// means all its links), `object/link`, or the link alone. Entities without a match keep their own class.
+    /// means all its links), `object/link`, or the link alone. No two patterns may match the same entity. Entities
+    /// without a match keep their own class.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub labels: Vec<(String, String)>,
 }
@@ -117,8 +120,9 @@ impl Segmentation {
     /// # Errors
     ///
     /// [`CameraError::MaskId`] for a mask id that is 0, negative or given twice, or whose class has no name;
-    /// [`SensorError::Pattern`] for a pattern that is not a regular expression or matches nothing (with the nearest
-    /// names), and an entity that two patterns match.
+    /// [`SensorError::UnknownName`] for a pattern that matches nothing, with the nearest names;
+    /// [`SensorError::Pattern`] for a pattern that is not a regular expression, and for an entity that two patterns
+    /// match.
     pub fn new(things: impl IntoIterator<Item = SegmentedEntity>, cfg: &SegmentationCfg) -> Result<Self, SensorError> {
         let mut things: Vec<SegmentedEntity> = things.into_iter().collect();
         things.sort_by_key(|thing| thing.id);

@@ -149,8 +149,8 @@ fn nearest_rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQua
 impl StereoCamera {
     /// Returns the calibrations of both cameras in environment `env`, named `name` with `/left` or `/right` added: K
     /// and D of raw images, and R and P of the [rectification](Rectification). ROS nodes read them as a calibrated
-    /// stereo pair. [`StereoCameraCfg::from_camera_infos`] is the inverse. Rectified images keep the principal points and focal
-    /// lengths of raw images if the cameras are parallel and side by side, with the same fx, fy and cy.
+    /// stereo pair. [`StereoCameraCfg::from_camera_infos`] is the inverse. Rectified images keep the principal points
+    /// and focal lengths of raw images if the cameras are parallel and side by side, with the same fx, fy and cy.
     ///
     /// P projects points of the rectified *left* frame to rectified images. For the right camera it is
     /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the baseline b \[m\]. Source: ROS, message

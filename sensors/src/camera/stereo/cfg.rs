@@ -49,23 +49,24 @@ pub struct StereoCameraCfg {
     /// The left camera, and everything common to both cameras: size, range, rate, renderer. Its extrinsics place
     /// [`origin`](Self::origin).
     pub camera: CameraCfg,
-    /// Focal lengths and principal point of the right camera; `None` copies the left camera.
+    /// Focal lengths and principal point of the right camera; `None` uses those of the left camera.
     pub intrinsics_right: Option<Intrinsics>,
-    /// Lens of the right camera, as [`CameraCfg::lens`]; `None` copies the left camera.
+    /// Lens of the right camera, as [`CameraCfg::lens`]; `None` uses that of the left camera.
     pub lens_right: Option<Lens>,
-    /// Channels of the right camera; `None` copies the left camera.
+    /// Channels of the right camera; `None` uses those of the left camera.
     pub channels_right: Option<Channels>,
-    /// Imperfections of the right camera, as [`CameraCfg::imperfections`]; `None` copies the left camera, for the
-    /// channels that the right camera measures. The [baseline](crate::camera::imperfection::Holes::baseline) of a
+    /// Imperfections of the right camera, as [`CameraCfg::imperfections`]; `None` uses those of the left camera, for
+    /// the channels that the right camera measures. The [baseline](crate::camera::imperfection::Holes::baseline) of a
     /// projector is relative to each camera.
     pub imperfections_right: Option<Imperfections>,
-    /// Noise of the right camera, as [`CameraCfg::noise`]; `None` copies the left camera, for the channels that the
-    /// right camera measures.
+    /// Noise of the right camera, as [`CameraCfg::noise`]; `None` uses that of the left camera, for the channels that
+    /// the right camera measures. The random numbers of both cameras are independent.
     pub noise_right: Option<BTreeMap<String, NoiseCfg>>,
     /// Position of the right camera in the optical frame of the left camera (x right, y down, z forward) \[m\],
     /// independent of the convention of the extrinsics.
     pub left_to_right_pos: [f64; 3],
-    /// Rotation from the optical frame of the right camera to that of the left camera.
+    /// Orientation of the right camera in the optical frame of the left camera: the rotation maps vectors of the right
+    /// optical frame to the left one.
     #[serde(with = "kinetoscope_scene::file_format::rotation")]
     pub left_to_right_rot: UnitQuaternion<f64>,
     /// Point of the rig that the extrinsics place.

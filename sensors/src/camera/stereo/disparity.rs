@@ -65,8 +65,8 @@ impl StereoCamera {
         Ok(pixels)
     }
 
-    /// True if [`disparity`](Self::disparity) is available: the cameras are parallel and side by side, their fx, fy and
-    /// cy are equal, and the left camera measures depth.
+    /// True if [`disparity`](Self::disparity) is available: both lenses are pinholes, the cameras are parallel and side
+    /// by side, their fx, fy and cy are equal, and the left camera measures depth.
     pub fn has_disparity(&self) -> bool {
         self.left().channels().depth && self.baseline().is_ok()
     }

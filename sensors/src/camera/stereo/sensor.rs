@@ -43,7 +43,7 @@ impl StereoCamera {
         &self.right
     }
 
-    /// Pose of the right optical frame in the left optical frame.
+    /// Pose of the right optical frame in the left optical frame, as configured.
     pub fn left_from_right(&self) -> Pose {
         self.rig.left_from_right
     }

@@ -23,7 +23,7 @@ const BYTES_PER_RAY: usize = 40 + 40 + 24;
 /// Configuration of a [`RayCasterCamera`]: a pinhole camera that casts one ray through the center of every pixel.
 ///
 /// Unlike [`CameraCfg`](crate::camera::CameraCfg), it measures only the geometry of the chosen targets, and every
-/// number comes from an exact ray. To see a whole scene, the rasterizer is faster.
+/// number comes from an exact ray. To see a whole scene, a [`CameraCfg`](crate::camera::CameraCfg) is faster.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCameraCfg {
@@ -35,16 +35,16 @@ pub struct RayCasterCameraCfg {
     pub intrinsics: Intrinsics,
     /// Pose of the camera, and the body that it is attached to.
     pub extrinsics: Extrinsics,
-    /// Largest distance along the ray \[m\].
+    /// Maximum distance of a hit along the ray \[m\], above 0 and finite in single precision.
     pub max_distance: f64,
     /// Value of depth and distance where nothing is hit; [`DepthMiss::Far`] is `max_distance`.
     pub depth_miss: DepthMiss,
     /// Targets of the rays.
     pub targets: HitTargets,
-    /// Geom groups of the targets: bit k is group k.
+    /// Geom groups of the targets: bit k is group k; by default groups 0, 1 and 2.
     pub groups: u32,
-    /// Rate, history, latency and noise. Only the channel `distances` can have noise: the distance along the ray of
-    /// each pixel \[m\], from which depth and points follow. Noisy distances are clamped to the range from 0 to
+    /// Rate, history, latency, dropout and noise. Only the channel `distances` can have noise: the distance along the
+    /// ray of each pixel \[m\], from which depth and points follow. Noisy distances are clamped to the range from 0 to
     /// `max_distance`.
     ///
     /// Normals, masks and misses are exact: hits stay hits and misses stay misses. The mask distinguishes a hit at

@@ -18,12 +18,12 @@ pub struct RayImages {
 }
 
 impl RayImages {
-    /// Distance along the optical axis, shape (N, H, W) \[m\].
+    /// Depth along the optical axis, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn depth(&self) -> ArrayView3<'_, f32> {
         self.depth.view()
     }
 
-    /// Distance along the ray of the pixel, shape (N, H, W) \[m\].
+    /// Distance along the ray of the pixel, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn distance(&self) -> ArrayView3<'_, f32> {
         self.distance.view()
     }
@@ -38,7 +38,8 @@ impl RayImages {
         self.mask.view()
     }
 
-    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
+    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3). The corner of the first
+    /// pixel is at (0, 0).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         Array3::from_shape_fn((self.viewpoints.len(), 3, 3), |(env, i, j)| {
             self.viewpoints[env].intrinsics.matrix()[(i, j)]

@@ -30,8 +30,8 @@ use std::fmt;
 /// and depth and points follow, so all three stay on the ray. Noisy distances are from 0 to the largest distance of the
 /// rays, and misses stay misses. Normals, masks, poses and intrinsics are exact.
 ///
-/// Setters of [`CameraPlacement`] take effect with the next image. Poses, intrinsics and points belong to the shown
-/// images, whatever their latency.
+/// Setters of [`CameraPlacement`] take effect with the next image, which may be that of a reset or of a write to the
+/// state. Poses, intrinsics and points belong to the shown images, whatever their latency.
 #[derive(Clone, Debug)]
 pub struct RayCasterCamera {
     path: String,
@@ -143,7 +143,7 @@ impl RayCasterCamera {
         Cow::Owned(images)
     }
 
-    /// Shown images.
+    /// Shown images, in all environments: those that the methods of this sensor return.
     pub fn images(&self) -> &RayImages {
         &self.model.images
     }
@@ -158,7 +158,7 @@ impl RayCasterCamera {
         (self.rays.rays().height, self.rays.rays().width)
     }
 
-    /// Distance along the optical axis, shape (N, H, W) \[m\]; misses have the configured value.
+    /// Depth along the optical axis, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn depth(&self) -> ArrayView3<'_, f32> {
         self.model.images.depth.view()
     }
@@ -184,18 +184,20 @@ impl RayCasterCamera {
         self.model.images.mask.view()
     }
 
-    /// Number of images delivered since the last reset, shape (N); the refresh of a reset does not count.
+    /// Number of images delivered since the last reset, shape (N); the images of a reset or of a write to the state do
+    /// not count.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.sample_counts()
     }
 
-    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the current images \[pixels\], shape (N, 3, 3).
-    /// Intrinsics that were set since then apply from the next image on.
+    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the shown images \[pixels\], shape (N, 3, 3). The
+    /// corner of the first pixel is at (0, 0). Intrinsics that were set after an image apply from the next image on.
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         self.model.images.intrinsic_matrices()
     }
 
-    /// Poses in the environment at the instant of the images, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    /// Camera poses in the environment at the instant of the shown images, rows `[x, y, z, qw, qx, qy, qz]` \[m\],
+    /// shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         self.model.images.pose_w(convention)
     }

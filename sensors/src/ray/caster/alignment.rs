@@ -7,18 +7,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum RayAlignment {
-    /// Rays rotate with the body.
+    /// Rays move and rotate with the body.
     #[default]
     Base,
-    /// Rays rotate about the vertical only, by the yaw of the body: both origins and directions. A height scanner stays
-    /// level when its robot tilts.
+    /// Rays move with the body and rotate with its yaw only, about the vertical: both origins and directions. A height
+    /// scanner stays level when its robot tilts.
     Yaw,
-    /// Rays keep the axes of the environment.
+    /// Rays move with the body and keep the axes of the environment.
     World,
 }
 
 impl RayAlignment {
-    /// Name in Isaac Lab.
+    /// Name in Isaac Lab: `base`, `yaw` or `world`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Base => "base",

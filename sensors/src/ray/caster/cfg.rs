@@ -40,26 +40,27 @@ const BYTES_PER_RAY: usize = 40 + 80 + 32;
 /// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 ///
-/// Lists of the geometry seen along an axis of a mesh are built once for each mesh and axis. This happens when
-/// neighboring rays first run within about 7° of that axis. It allocates memory, mostly at the reset right after the
-/// sensor is built, but also in a later step if rays or meshes rotate to another axis.
+/// For rays within about 7° of an axis of a mesh, a lookup structure is built once for each mesh and axis, when such
+/// rays are first cast. It allocates memory, mostly at the reset right after the sensor is built, but also in a later
+/// step if rays or meshes rotate to another axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCfg {
-    /// Body that the rays move with: `uid/link`, or the link alone if only one body has this name. Links that were
-    /// fused into another link count too. `None` is the frame of the environment.
+    /// Body that the rays move with: `uid/link`, the link alone if only one body has this name, or the uid of an
+    /// object. A link that fixed joints fuse to another link is allowed. `None` is the frame of the environment.
     pub parent: Option<String>,
-    /// Pose of the pattern on the body; it rotates both origins and directions.
+    /// Pose of the pattern in the frame of the body as [aligned](RayAlignment); the pose rotates both origins and
+    /// directions.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
-    /// Alignment of the rays with the body.
+    /// Alignment of the rays with the body; without effect if `parent` is `None`.
     pub alignment: RayAlignment,
-    /// Pattern of the rays, x forward, y left, z up.
+    /// Pattern of the rays, x forward, y left, z up in its own frame.
     pub pattern: RayPattern,
     /// Maximum distance of a hit from the start of its ray \[m\], above 0; may be infinite.
     pub max_distance: f64,
-    /// Range of the position drift \[m\]: an offset along each axis of the environment frame, sampled uniformly at
-    /// every reset.
+    /// Smallest and largest position drift \[m\]: an offset along each axis of the environment frame, sampled uniformly
+    /// and independently at every reset.
     pub drift: [f64; 2],
     /// Targets of the rays.
     pub targets: HitTargets,
@@ -111,7 +112,7 @@ impl SensorCfg for RayCasterCfg {
     /// # Errors
     ///
     /// An invalid pattern, distance, offset or drift; an unknown parent or target; a period that is not a whole number
-    /// of steps; rays that do not fit into memory.
+    /// of steps or another invalid sampling parameter; rays that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCaster, SensorError> {
         let parent = self.parent.as_deref().map(|name| context.body(name)).transpose()?;
         let number = |what, value, allowed| RayError::Number { what, owner: "ray caster", value, allowed };

@@ -15,8 +15,8 @@ use std::fmt;
 
 /// Distances along rays that move with a body, in all environments; [`Sampled`] gives their stamps and counts.
 ///
-/// All values are in the frame of the environment \[m\]. A ray without a hit has the distance +inf, the point
-/// (+inf, +inf, +inf), the normal 0 and the id 0. No value is ever NaN.
+/// All values are in the frame of the environment, lengths in \[m\]. A ray without a hit has the distance +inf, the
+/// point (+inf, +inf, +inf), the normal 0 and the id 0. No value is ever NaN.
 #[derive(Clone, Debug)]
 pub struct RayCaster {
     path: String,
@@ -171,8 +171,8 @@ impl RayCaster {
         self.hits.points.view()
     }
 
-    /// [`hits`](Self::hits) of the latest delivered measurement, from the distances of [`Sampler::latest_delivered`]; computed
-    /// at every call.
+    /// [`hits`](Self::hits) of the latest delivered measurement, from the distances of [`Sampler::latest_delivered`];
+    /// computed at every call.
     pub fn latest_delivered_hits(&self) -> Array3<f64> {
         let [distances, ids, pos, quat] =
             ["distances", "ids", "pos_w", "quat_w"].map(|channel| self.sampler().latest_delivered(channel));
@@ -208,12 +208,13 @@ impl RayCaster {
         self.sampler().values_as("normals", (self.sampler().num_envs(), self.num_rays(), 3))
     }
 
-    /// Origins of the rays, shape (N, B, 3) \[m\]; computed at every call.
+    /// Origins of the rays at the current measurement, shape (N, B, 3) \[m\]; computed at every call.
     pub fn ray_starts(&self) -> Array3<f64> {
         self.map_rays(|ray| ray.origin)
     }
 
-    /// Unit directions of the rays, shape (N, B, 3); computed at every call.
+    /// Unit directions of the rays at the current measurement, in the frame of the environment, shape (N, B, 3);
+    /// computed at every call.
     pub fn ray_directions(&self) -> Array3<f64> {
         self.map_rays(|ray| ray.direction)
     }
@@ -231,22 +232,24 @@ impl RayCaster {
         out
     }
 
-    /// Position of the parent body including drift, without the offset, as in Isaac Lab, shape (N, 3) \[m\].
+    /// Position of the parent body including drift, without the offset, as in Isaac Lab, shape (N, 3) \[m\]. Without a
+    /// parent, the drift alone.
     pub fn pos_w(&self) -> ArrayView2<'_, f64> {
         self.sampler().values("pos_w")
     }
 
-    /// Rotation of the parent body, w x y z, shape (N, 4).
+    /// Rotation of the parent body before the alignment, w x y z, shape (N, 4); the identity without a parent.
     pub fn quat_w(&self) -> ArrayView2<'_, f64> {
         self.sampler().values("quat_w")
     }
 
-    /// Past distances, newest first, shape (N, history_length, B) \[m\]; 0 where not filled yet.
+    /// Past distances, newest first, shape (N, history_length, B) \[m\]: +inf for a miss, 0 where not filled yet.
     pub fn distance_history(&self) -> ArrayView3<'_, f64> {
         self.sampler().history("distances")
     }
 
-    /// Indices of the scene instances that rays can hit.
+    /// Indices in [`RenderScene::instances`](kinetoscope_scene::RenderScene::instances) of the instances that rays can
+    /// hit.
     pub fn target_instances(&self) -> impl Iterator<Item = usize> {
         self.rays.targets().instances()
     }

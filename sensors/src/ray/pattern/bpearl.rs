@@ -20,7 +20,7 @@ pub struct Bpearl {
     pub horizontal_fov_deg: f64,
     /// Angle between neighboring azimuths \[deg\].
     pub horizontal_resolution_deg: f64,
-    /// Elevations of the beams: 0 is level, 90 along z \[deg\].
+    /// Elevations of the beams \[deg\]: 0 is in the xy plane, 90 is along +z.
     pub vertical_deg: Vec<f64>,
 }
 

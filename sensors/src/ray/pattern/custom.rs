@@ -4,7 +4,7 @@ use super::{PatternImpl, UnnormalizedRay};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
-/// User-defined rays.
+/// User-defined rays, in the frame of the sensor; both lists have the same length.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Custom {

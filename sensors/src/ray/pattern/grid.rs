@@ -15,7 +15,7 @@ pub enum GridOrder {
     Yx,
 }
 
-/// Parallel rays over a rectangle around the sensor, as in height scanners.
+/// Parallel rays over a rectangle in the xy plane around the sensor, as in height scanners.
 ///
 /// Along an axis of length L there are ceil((L + 1e-9) / resolution) rays, the first one at -L / 2, as in Isaac Lab. If
 /// the length is not a multiple of the resolution, the rays are off center, unless [`centered`](Self::centered).

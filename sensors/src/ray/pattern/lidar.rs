@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Lidar {
-    /// Number of elevations.
+    /// Number of elevations; a single one is the first of `vertical_fov_deg`.
     pub channels: usize,
-    /// Lowest and highest elevation, positive above the horizon \[deg\].
+    /// Elevations of the first and the last channel, positive above the horizon \[deg\].
     pub vertical_fov_deg: [f64; 2],
     /// First and last azimuth, from x toward y \[deg\].
     pub horizontal_fov_deg: [f64; 2],

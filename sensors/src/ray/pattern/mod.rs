@@ -67,7 +67,7 @@ impl RayPattern {
         self.inner().count() as usize
     }
 
-    /// Generates the rays, with unit directions.
+    /// Generates the rays in the frame of the sensor, with unit directions.
     ///
     /// # Errors
     ///
