@@ -234,7 +234,8 @@ impl Batch {
         self.run_chunks_then(job, |_| {});
     }
 
-    /// As [`run_chunks`](Self::run_chunks); `then` is called after each chunk that the calling thread has processed.
+    /// Runs `job` once for every chunk, in parallel. Calls `then` after each chunk that the calling thread has
+    /// processed.
     fn run_chunks_then(&mut self, job: impl Fn(&mut LockedChunk) + Sync, then: impl FnMut(&LockedChunk) + Send) {
         let chunks = &self.chunks;
         for share in &chunks.shares {
@@ -325,7 +326,8 @@ impl Batch {
         })
     }
 
-    /// Accesses environment `index` without its deferred forward pass: the data may be [stale](SimEnv::forward_if_dirty).
+    /// Accesses environment `index` without its deferred forward pass: the data may be out of date
+    /// ([`SimEnv::forward_if_dirty`]).
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.

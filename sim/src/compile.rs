@@ -280,7 +280,7 @@ fn index_mjcf(model: &mj::Model, part: &MjcfData) -> Result<MjcfIndexing> {
     })
 }
 
-/// Owner of every geom, for mask ids and labels.
+/// Returns the mask ids and labels of all geoms and tendons.
 fn assign_geom_owners(
     model: &mj::Model,
     contents: &EntitySet,

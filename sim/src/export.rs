@@ -331,8 +331,8 @@ fn unreadable_textures(mesh: &TriMesh) -> Vec<String> {
         .collect()
 }
 
-/// Writes a texture as PNG, the only image format that MuJoCo reads. Returns `None` if the texture is missing or
-/// unreadable; the material then keeps only its color.
+/// Writes a texture as PNG, the only image format that MuJoCo reads. Returns the name of the texture asset; `None` if
+/// the texture is missing or unreadable, in which case the material has only its color.
 fn export_texture(
     source: &TextureSource,
     name: &str,

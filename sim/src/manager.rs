@@ -121,7 +121,8 @@ impl SimulationManager {
     /// is 1e-6 rad after 1 s.
     ///
     /// # Errors
-    /// The files, names, drives or meshes of the robot are invalid.
+    /// The name is taken, the simulation has 30 robots and articulations already, or the files, names, drives or meshes
+    /// of the robot are invalid.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
         self.add_with_role(cfg, RobotKind::Robot)
     }
@@ -236,8 +237,8 @@ impl SimulationManager {
     /// rebuilds the sensor and clears its history.
     ///
     /// # Errors
-    /// The configuration is invalid, the name is taken, or the sensor needs a quantity that the simulation does not
-    /// gather.
+    /// The configuration is invalid, another sensor has the name, or the sensor needs a quantity that the simulation
+    /// does not gather.
     pub fn add_sensor<C>(&mut self, uid: impl Into<String>, cfg: C) -> Result<SensorId<C::Sensor>>
     where
         C: SensorCfg + Send + 'static,
@@ -499,9 +500,9 @@ impl SimulationManager {
     /// meshes for both supported MuJoCo versions.
     ///
     /// Returns diagnostics for everything left out: unreadable visual meshes and textures, and elements of MJCF files
-    /// compiled by MuJoCo 4.x that 2.2.2 lacks. Armature that an export adds to drives for stability gives a
-    /// diagnostic, too. A comment in `robot.mjcf2.xml` lists those elements. `diagnostics.txt` in `dir` holds the
-    /// earlier diagnostics followed by these.
+    /// compiled by MuJoCo 4.x that 2.2.2 lacks. A comment in `robot.mjcf2.xml` lists those elements. Armature that the
+    /// export adds to drives for stability gives a diagnostic, too. `diagnostics.txt` in `dir` holds the earlier
+    /// diagnostics followed by these.
     ///
     /// # Errors
     /// A file cannot be written.

@@ -54,7 +54,7 @@ pub(crate) struct CapturedStep {
 }
 
 impl BodyAxis {
-    /// Creates the plan of a compiled scene; `carriers` is
+    /// Creates the body axis of a compiled scene; `carriers` is
     /// [`moving_bodies`](kinetoscope_sensors::SensorContext::moving_bodies).
     pub(crate) fn new(
         model: &Model,

@@ -77,7 +77,7 @@ pub enum PlanError {
         /// The problem and the fix.
         reason: String,
     },
-    /// The dynamics of the description cannot be computed, which a drive type needs.
+    /// The drive type needs the dynamics of the description, which cannot be computed.
     #[error(transparent)]
     Dynamics(#[from] DynamicsError),
 }

@@ -293,7 +293,8 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
     Ok(())
 }
 
-/// Checks the integrator: implicit drives need one that adds nothing to the acceleration that the solver found.
+/// Checks the integrator: implicit drives need one that adds nothing to the acceleration that the solver found: Euler,
+/// or implicitfast on MuJoCo 4.x.
 fn check_integrator(cfg: &RobotCfg, role: &RobotKind, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,

@@ -97,7 +97,7 @@ impl Robot<'_> {
     /// With the integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the
     /// velocity in the last MuJoCo step of length h, (v' - v) / h. They differ from (v' - v) / h in three cases. With
     /// [`DriveModel::Actuator`](crate::DriveModel::Actuator), MuJoCo integrates viscous joint damping B implicitly: v'
-    /// - v = h M a / (M + h B) for a single joint. The integrators implicit and implicitfast add further velocity
+    /// = v + h M a / (M + h B) for a single joint. The integrators implicit and implicitfast add further velocity
     /// terms. With RK4 they are the accelerations of an intermediate stage. In all these cases, compute accelerations
     /// from differences of [`qvel`](Robot::qvel).
     #[doc(alias = "get_qacc")]

@@ -49,8 +49,8 @@ struct ActuatorTarget {
     tendon: Option<String>,
 }
 
-/// Finds the actuation of each joint of the file that follows no other joint. Warns about actuators that are replaced,
-/// and about features that no drive reproduces.
+/// Finds the actuation of each joint of the file, in its order. Actuators on joints that follow another count for the
+/// followed joint. Warns about actuators that are replaced, and about features that no drive reproduces.
 pub(super) fn of_joints(
     owner: &str,
     model: &Model,
