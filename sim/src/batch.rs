@@ -79,8 +79,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Batch {
-    /// Creates `num_envs` environments in the initial state of `model`. `threads` threads step them: the calling thread
-    /// and threads of `pool`.
+    /// Creates `num_envs` environments in the initial state of `model`. Up to `threads` threads step them: the calling
+    /// thread and threads of `pool`.
     ///
     /// # Errors
     /// A number is zero, or memory or threads cannot be allocated.
@@ -122,7 +122,8 @@ impl Batch {
         Ok(Self { chunks, pool, model: model.clone(), num_envs })
     }
 
-    /// The model that all environments were created from.
+    /// The model that all environments were created from. An environment may have a model of its own, with other
+    /// properties.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -132,17 +133,17 @@ impl Batch {
         self.num_envs
     }
 
-    /// Number of threads that step, the calling one included.
+    /// Number of threads that step, the calling thread included: at most one per chunk of environments.
     pub fn threads(&self) -> usize {
         self.chunks.shares.len()
     }
 
-    /// Does `count` steps in every environment.
+    /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
         self.run_chunks(|taken| taken.for_each_env(|_, env, _| env.step(count)));
     }
 
-    /// As [`step`](Self::step), and captures quantities of the last step in the environments.
+    /// Steps as [`step`](Self::step) does, and captures quantities of the last step in all environments.
     pub(crate) fn step_and_capture(&mut self, count: u32, capture: CaptureRequest) {
         self.run_chunks(|taken| taken.for_each_env(|_, env, _| env.step_and_capture(count, Some(&capture))));
     }
@@ -158,14 +159,14 @@ impl Batch {
         });
     }
 
-    /// Does `count` steps in every environment and copies the slices that `read_values` returns to `outs`, one row per
+    /// Does `count` MuJoCo steps in every environment and copies the slices that `read` returns to `outs`, one row per
     /// environment: `batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel])`.
     ///
     /// The thread that stepped an environment reads it immediately, while its data is in that core's cache. A separate
     /// read of 1024 humanoids after the step takes 2 % of the step time.
     ///
     /// # Panics
-    /// The sizes of `outs` and of the slices differ, or `read_values` panics.
+    /// The sizes of `outs` and of the slices differ, or `read` panics.
     #[track_caller]
     pub fn step_and_read<const K: usize>(
         &mut self,
@@ -221,7 +222,7 @@ impl Batch {
         }
     }
 
-    /// Runs `job` once for every environment, in parallel.
+    /// Runs `job` once for every environment, in parallel, with the index of the environment.
     ///
     /// # Panics
     /// `job` panics.
@@ -233,7 +234,8 @@ impl Batch {
         self.run_chunks_then(job, |_| {});
     }
 
-    /// As [`run_chunks`](Self::run_chunks); `then` is called after each chunk that the calling thread has processed.
+    /// Runs `job` once for every chunk, in parallel. Calls `then` after each chunk that the calling thread has
+    /// processed.
     fn run_chunks_then(&mut self, job: impl Fn(&mut LockedChunk) + Sync, then: impl FnMut(&LockedChunk) + Send) {
         let chunks = &self.chunks;
         for share in &chunks.shares {
@@ -266,7 +268,7 @@ impl Batch {
         })
     }
 
-    /// Reads all environments in order.
+    /// Reads all environments in order, on the calling thread.
     pub fn for_each(&self, mut read: impl FnMut(usize, &SimEnv)) {
         for (c, chunk) in self.chunks.chunks.iter().enumerate() {
             for (i, env) in lock(chunk).envs.iter_mut().enumerate() {
@@ -324,7 +326,8 @@ impl Batch {
         })
     }
 
-    /// Accesses environment `index` without its deferred forward pass: the data may be [stale](SimEnv::forward_if_dirty).
+    /// Accesses environment `index` without its deferred forward pass: the data may be out of date
+    /// ([`SimEnv::forward_if_dirty`]).
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
@@ -354,7 +357,7 @@ impl LockedChunk<'_> {
 }
 
 impl Chunks {
-    /// Locks chunk `c`.
+    /// Locks the chunk with index `c`.
     fn lock_chunk(&self, c: usize) -> LockedChunk<'_> {
         LockedChunk {
             first: c * self.chunk_size,

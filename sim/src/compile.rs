@@ -30,7 +30,8 @@ use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
-/// Compiles a scene. Self-collision pairs that overlap in the initial pose are excluded and reported.
+/// Compiles a scene, with all environments in their initial state. Self-collision pairs of robots that overlap in the
+/// initial pose are excluded and reported.
 pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &EntitySet, pool: &ThreadPool) -> Result<Simulation> {
     let first = compile_scene(cfg, contents, &[])?;
     if !contents.robots.iter().any(|r| r.cfg().self_collision) {
@@ -43,7 +44,8 @@ pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &EntitySet, pool: &T
     compile_scene(cfg, contents, &excluded)?.into_simulation(cfg, pool, excluded)
 }
 
-/// Builds the MJCF document of a scene, for running or for an export.
+/// Adds a scene to the MJCF document `mjcf`, for a simulation or an export. `excluded` has pairs of MuJoCo bodies that
+/// never collide, in addition to those of `contents`.
 pub(crate) fn document(
     cfg: &SimulationManagerCfg,
     contents: &EntitySet,
@@ -188,7 +190,7 @@ fn compile_scene(
     })
 }
 
-/// Marks the geoms that stand in for visual meshes.
+/// Marks the geoms that stand in for visual meshes; they only have a pose.
 fn find_visual_proxies(model: &mj::Model, contents: &EntitySet, robots: &[RobotIndexing]) -> Vec<bool> {
     let mut proxies = vec![false; model.ngeom()];
     for (data, index) in contents.robots.iter().zip(robots) {
@@ -278,7 +280,7 @@ fn index_mjcf(model: &mj::Model, part: &MjcfData) -> Result<MjcfIndexing> {
     })
 }
 
-/// Owner of every geom, for mask ids and labels.
+/// Returns the mask ids and labels of all geoms and tendons.
 fn assign_geom_owners(
     model: &mj::Model,
     contents: &EntitySet,
@@ -465,7 +467,7 @@ impl CompiledScene {
     }
 }
 
-/// Pairs of bodies of one robot that overlap in the initial pose.
+/// Pairs of MuJoCo bodies of one robot that penetrate each other in the initial pose.
 fn overlapping_pairs(built: &CompiledScene, contents: &EntitySet) -> Result<Vec<(String, String)>> {
     // Uses an environment because its buffers grow until all contacts fit.
     let mut env = SimEnv::new(&with_small_buffers(&built.model), &built.table)?;

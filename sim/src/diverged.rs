@@ -3,13 +3,13 @@
 use crate::ids::EnvId;
 use std::fmt;
 
-/// An environment in which a step failed. It stays in its last valid state until it is reset. `Display` gives
-/// `step 12: bad acceleration`.
+/// An environment in which a step failed or a written state was rejected. It stays in its last valid state until it is
+/// reset. `Display` gives `step 12: bad acceleration`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DivergedEnv {
     /// The environment.
     pub env: EnvId,
-    /// Number of completed steps since the last reset.
+    /// Number of completed MuJoCo steps since the last reset.
     pub step: u64,
     /// Description of the failure.
     pub reason: String,

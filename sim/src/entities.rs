@@ -38,7 +38,7 @@ impl<'a> Entities<'a> {
         self.sim.find_robot(uid, "robot", RobotData::is_robot)
     }
 
-    /// All robots and articulations with their uids, in insertion order.
+    /// All robots and articulations with their uids, in insertion order of both together.
     pub fn robot_ids(&self) -> Vec<(&'a str, RobotId)> {
         let robots = self.sim.entities.robots.iter().enumerate();
         robots.map(|(index, robot)| (robot.uid(), RobotId { manager: self.sim.serial, index })).collect()
@@ -84,7 +84,7 @@ impl<'a> Entities<'a> {
         of(true).chain(of(false)).map(|data| data.uid()).collect()
     }
 
-    /// Handle of the robot or articulation `uid`, for read access that both share.
+    /// Handle of the robot or articulation `uid`, for methods that both share.
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
@@ -139,13 +139,15 @@ impl<'a> Entities<'a> {
         &self.sim.entities.terrains[self.sim.index_of(id.manager, id.index)]
     }
 
-    /// Names of all bodies, in the order in which sensors and viewers number them: links of all robots (`uid/link`),
-    /// objects, then bodies and sites of attached MJCF files (`uid/body`).
+    /// Names of all bodies, in the order in which sensors and viewers number them: links of all robots and
+    /// articulations (`uid/link`, fused links included), objects (`uid`), then bodies and named sites of attached MJCF
+    /// files (`uid/body`, `uid/site`).
     pub fn body_names(&self) -> Arc<[String]> {
         self.sim.entities.body_names()
     }
 
-    /// Positions and velocities of all joints in MuJoCo's layout (`qpos`, `qvel`), shapes (N, nq) and (N, nv).
+    /// Positions and velocities of all joints of the whole scene in MuJoCo's layout (`qpos`, `qvel`), shapes (N, nq)
+    /// and (N, nv). [`state_names`](Self::state_names) names the columns.
     pub fn engine_states(&self) -> [Array2<f64>; 2] {
         let model = self.sim.simulation.batch.model();
         let mut states =
@@ -159,8 +161,9 @@ impl<'a> Entities<'a> {
         states
     }
 
-    /// Column names of the controls of a [rollout](SimulationManager::rollout): movable joints of all robots
-    /// (`uid/joint`), then actuators of all attached MJCF files (`uid/actuator`), each in insertion order.
+    /// Column names of the controls of a [rollout](SimulationManager::rollout): movable joints of all robots and
+    /// articulations (`uid/joint`), then actuators of all attached MJCF files (`uid/actuator`), each in insertion
+    /// order.
     pub fn control_names(&self) -> Vec<String> {
         let parts = self.sim.entities.mjcf_models.iter();
         let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.scoped_name(name)));

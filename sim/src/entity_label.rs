@@ -2,10 +2,11 @@
 
 use std::fmt;
 
-/// A robot or passive articulation in error messages: `robot "arm"`, `articulation "drawer"`.
+/// Label of a robot, passive articulation or attached MJCF file in error messages: `robot "arm"`, `articulation
+/// "drawer"`, `MJCF part "gripper"`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EntityLabel {
-    /// Type of the entity: `robot` or `articulation`.
+    /// Type of the entity: `robot`, `articulation` or `MJCF part`.
     pub kind: &'static str,
     /// Uid of the entity.
     pub uid: String,
@@ -31,14 +32,14 @@ impl From<&String> for EntityLabel {
     }
 }
 
-/// Compares the uid.
+/// Compares the uid only, not the kind.
 impl PartialEq<str> for EntityLabel {
     fn eq(&self, uid: &str) -> bool {
         self.uid == uid
     }
 }
 
-/// Compares the uid.
+/// Compares the uid only, not the kind.
 impl PartialEq<&str> for EntityLabel {
     fn eq(&self, uid: &&str) -> bool {
         self.uid == *uid

@@ -25,7 +25,8 @@ pub(crate) struct EntitySet {
     pub(crate) mjcf_models: Vec<Arc<MjcfData>>,
     pub(crate) groups: Vec<RigidObjectGroupData>,
     pub(crate) welds: Vec<WeldData>,
-    /// Pairs of names between which collisions are disabled.
+    /// Pairs of names between which collisions are disabled, as given to
+    /// [`SimulationManager::exclude_collision`](crate::SimulationManager::exclude_collision).
     pub(crate) collision_exclusions: Vec<[String; 2]>,
 }
 
@@ -58,7 +59,7 @@ impl EntitySet {
         links.chain(bodies).chain(objects).chain(terrains).collect()
     }
 
-    /// Checks that the name `uid` is free and usable.
+    /// Checks that no entity has the name `uid`, and its syntax. Names of sensors are separate.
     pub(crate) fn check_uid_free(&self, uid: &str) -> Result<()> {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
         let objects = objects.chain(self.mjcf_models.iter().map(|p| p.uid()));
@@ -78,8 +79,8 @@ impl EntitySet {
         GROUND_MASK_ID + 1 + (links + self.objects.len() + self.terrains.len() + bodies) as i32
     }
 
-    /// Names of the bodies in the order of the body axis: links of all robots (`uid/link`), objects, then bodies and
-    /// sites of attached MJCF files (`uid/body`).
+    /// Names of the bodies in the order of the body axis: links of all robots (`uid/link`), objects (`uid`), then
+    /// bodies and named sites of attached MJCF files (`uid/body`).
     pub(crate) fn body_names(&self) -> Arc<[String]> {
         let links = self.robots.iter().flat_map(|r| {
             let links = r.description().named_links().iter();
@@ -102,7 +103,7 @@ impl EntitySet {
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
     }
 
-    /// Indices in [`body_names`](Self::body_names) of a body, or of all links of a robot; `None` for the world.
+    /// Indices in [`body_names`](Self::body_names) of a body or site, or of all links of a robot; `None` for `world`.
     ///
     /// # Errors
     /// The name is unknown.
@@ -123,8 +124,10 @@ impl EntitySet {
         Ok(Some(found))
     }
 
-    /// For every body in the order of [`body_names`](Self::body_names), the index of the body that moves it: the
-    /// nearest ancestor link, itself included, that no fixed joint attaches to its parent.
+    /// For every body in the order of [`body_names`](Self::body_names), the index of the body that moves it. For a
+    /// robot, this is the nearest link, the link itself or one above it, that no fixed joint attaches to its parent. An
+    /// object is its own. For an attached MJCF file, it is the body that MuJoCo welds the frame to; a frame welded to
+    /// the world is its own.
     pub(crate) fn moving_bodies(&self) -> Arc<[usize]> {
         let mut carriers = Vec::new();
         for robot in &self.robots {

@@ -26,9 +26,9 @@ use std::sync::Arc;
 pub enum EnvStatus {
     /// The environment runs.
     Running,
-    /// A step failed. The environment stays in its last valid state until it is reset.
+    /// A step failed, or a written state was rejected. The environment stays in its last valid state until it is reset.
     Diverged {
-        /// Number of completed steps since the last reset.
+        /// Number of completed MuJoCo steps since the last reset.
         step: u64,
         /// Reason of the failure.
         reason: Divergence,
@@ -38,11 +38,12 @@ pub enum EnvStatus {
 /// Reason of a divergence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Divergence {
-    /// A position, velocity or acceleration is not finite or too large.
+    /// A position, velocity or acceleration is not finite or too large: MuJoCo's warning.
     Warning(Warning),
     /// MuJoCo's engine reported an error.
     Engine(EngineError),
-    /// Contacts or constraints need larger buffers than the memory limit of an environment allows.
+    /// Contacts or constraints need more memory than the limit of an environment, 2 GiB. Contains the sizes that the
+    /// buffers would have grown to.
     BuffersExhausted(Buffers),
 }
 
@@ -95,7 +96,7 @@ struct ColdState {
 }
 
 impl SimEnv {
-    /// Creates an environment in the model's initial state and runs one forward pass.
+    /// Creates an environment in the model's initial state and runs `mj_step1`.
     ///
     /// # Errors
     /// MuJoCo cannot allocate its data.
@@ -127,9 +128,10 @@ impl SimEnv {
         &self.data
     }
 
-    /// Writes state or inputs, followed by one forward pass that updates all derived quantities. A non-finite state is
-    /// rejected: the environment diverges, in the state before the write. Every step overwrites `qfrc_applied` and the
-    /// controls of drives from [`DriveState`].
+    /// Writes state or inputs, then runs `mj_step1`, which updates all quantities that depend on positions and
+    /// velocities. Accelerations and forces keep the values of the last step. A non-finite state is rejected: the state
+    /// before the write is restored, and the environment is marked as diverged. Every step overwrites `qfrc_applied`
+    /// and the controls of drives from [`DriveState`].
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
         // Quaternions that `change` leaves alone must be normalized once, not twice.
         self.raw_quats.restore(&mut self.data);
@@ -177,7 +179,7 @@ impl SimEnv {
         self.forward(&good);
     }
 
-    /// As [`set_welds`](Self::set_welds), without the forward pass.
+    /// Attaches these welds and releases all others, without a forward pass.
     fn replace_welds(&mut self, welds: Vec<Weld>) {
         if welds == self.cold.welds {
             return;
@@ -199,7 +201,7 @@ impl SimEnv {
         self.cold.inputs.save(&self.data);
     }
 
-    /// External wrenches and weightless bodies.
+    /// External wrenches, and bodies with gravity compensation.
     pub(crate) fn wrenches(&self) -> &Wrenches {
         static NONE: Wrenches = Wrenches { list: Vec::new(), gravity_compensated: Vec::new() };
         self.wrenches.as_deref().unwrap_or(&NONE)
@@ -230,7 +232,8 @@ impl SimEnv {
         self.dirty = false;
     }
 
-    /// Resets to the model's initial state, modified by `change`. A diverged environment runs again.
+    /// Resets to the model's initial state, modified by `change`. Targets, controls, wrenches and welds are reset;
+    /// gains, limits and gravity compensation stay. A diverged environment runs again.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
         self.dirty = false;
         self.data.reset();
@@ -339,7 +342,7 @@ impl SimEnv {
         self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
     }
 
-    /// Number of steps since the last reset.
+    /// Number of MuJoCo steps since the last reset.
     pub fn steps(&self) -> u64 {
         self.steps
     }
@@ -349,7 +352,7 @@ impl SimEnv {
         &self.cold.warnings
     }
 
-    /// Number of times the buffers were doubled.
+    /// Number of times a buffer was doubled since the environment was created.
     pub fn buffer_growths(&self) -> u32 {
         self.cold.buffer_growths
     }
@@ -364,12 +367,12 @@ impl SimEnv {
         self.drives.prefetch();
     }
 
-    /// Does `count` steps. A diverged environment does none.
+    /// Does `count` MuJoCo steps. A diverged environment does not step.
     pub fn step(&mut self, count: u32) {
         self.step_and_capture(count, None);
     }
 
-    /// As [`step`](Self::step), and captures the quantities of `capture` in the last step.
+    /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step.
     pub(crate) fn step_and_capture(&mut self, count: u32, capture: Option<&CaptureRequest>) {
         for left in (0..count).rev() {
             if self.diverged.is_some() {
@@ -507,12 +510,14 @@ impl SimEnv {
         &self.cold.captured
     }
 
-    /// Time of the state for which forces and accelerations were last solved \[s\].
+    /// Time of the state for which forces and accelerations were last solved \[s\]: the start of the last step, or the
+    /// current time after a write or reset.
     pub(crate) fn solved_time(&self) -> f64 {
         if self.solved_current { self.data.time() } else { self.data.time() - self.data.model().timestep() }
     }
 
-    /// Runs one forward pass over positions and velocities, growing the buffers as needed. On failure, restores `good`.
+    /// Runs one forward pass (`mj_step1`), growing the buffers as needed. On failure, restores `good` and marks the
+    /// environment as diverged.
     fn forward(&mut self, good: &IntegrationState) {
         let state = self.current_motion();
         self.raw_quats.save(&self.data);

@@ -50,7 +50,7 @@ pub enum Error {
         #[source]
         error: Box<kinetoscope_scene::mesh::MeshError>,
     },
-    /// A drive property or a start position is invalid.
+    /// Drives or start positions of a robot are invalid, or its dynamics cannot be computed.
     #[error("{robot}: {error}")]
     DrivePlan {
         /// The robot or articulation.
@@ -156,7 +156,7 @@ pub enum Error {
         #[source]
         error: Box<PatternError>,
     },
-    /// The version of the MuJoCo library differs from that of the headers.
+    /// The version of the MuJoCo library differs from the version that this program was built for.
     #[error(transparent)]
     MujocoVersion(#[from] VersionError),
     /// The batch of environments cannot be created.
@@ -165,7 +165,7 @@ pub enum Error {
     /// MuJoCo's engine reported an error.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// A number of the configuration is out of range.
+    /// A value of a configuration or an argument is invalid.
     #[error("{field} is {value}; {expected}")]
     Config {
         /// Name of the field.
@@ -196,7 +196,7 @@ pub enum Error {
         /// Version of MuJoCo.
         version: String,
     },
-    /// A uid is already in use.
+    /// A uid is already in use, or reserved (`world`, `ground`).
     #[error(
         "the uid {0:?} is taken; give each robot, object, terrain and sensor a uid of its own (for objects and terrains, \"world\" and \"ground\" are taken)"
     )]
@@ -209,7 +209,7 @@ pub enum Error {
     /// The overview of all environments cannot be rendered.
     #[error("the overview cannot be rendered: {0}; choose fewer environments")]
     Overview(String),
-    /// The object or the base of the robot is fixed and cannot be moved.
+    /// The static object has no velocity, or the base of the robot is fixed and cannot be moved.
     #[error(
         "{0:?} is fixed at its init_pose; to move it, make an object BodyType::Dynamic (or Kinematic, to set its pose \
          directly), or give a robot fix_base: false"
@@ -226,7 +226,7 @@ pub enum Error {
         /// The object.
         object: String,
     },
-    /// The scene has more robots than contact bits.
+    /// The scene has the maximum number of robots and articulations, which is the content of this error.
     #[error(
         "a scene can have at most {0} robots and articulations: MuJoCo has 31 contact bits to tell self-collisions from others"
     )]
@@ -238,7 +238,7 @@ pub enum Error {
         what: &'static str,
         /// The name given.
         name: String,
-        /// Names that exist, nearest first.
+        /// Existing names: the most similar ones, nearest first, or all uids of the kind in insertion order.
         candidates: Vec<String>,
     },
     /// An entity of a scene has another type than requested.
@@ -328,7 +328,7 @@ pub enum Error {
         argument: &'static str,
         /// Shape given.
         found: Vec<usize>,
-        /// Expected shape.
+        /// Expected shape, with one row for each selected environment. A single row is accepted as well.
         expected: Vec<usize>,
         /// Meaning of the axes.
         meaning: &'static str,
@@ -338,9 +338,9 @@ pub enum Error {
     NotFinite {
         /// Name of the argument.
         argument: &'static str,
-        /// Row of the array.
+        /// Row of the array, from 0.
         row: usize,
-        /// Column of the array.
+        /// Column of the array, from 0.
         column: usize,
         /// The item that the value belongs to: `joint "a"`, `object "cube"`.
         item: String,
@@ -352,9 +352,9 @@ pub enum Error {
     OutOfRange {
         /// Name of the argument.
         argument: &'static str,
-        /// Row of the array.
+        /// Row of the array, from 0.
         row: usize,
-        /// Column of the array.
+        /// Column of the array, from 0.
         column: usize,
         /// The item that the value belongs to: `joint "a"`.
         item: String,
@@ -363,7 +363,7 @@ pub enum Error {
         /// Allowed values.
         expected: String,
     },
-    /// The joint has no drive in the model.
+    /// The joint has no drive, because it was added as a passive joint.
     #[error(
         "{argument}: joint {joint:?} of {robot} has no drive in the model, because it was added with the drive type none, or \
          its file leaves it passive; add the entity with another drive type, and make joints passive with set_drive_type"
@@ -421,7 +421,7 @@ pub enum Error {
     /// Segmentation labels name an unknown item, or one item twice.
     #[error("labels: {0}")]
     SegmentationLabels(#[source] Box<kinetoscope_sensors::SensorError>),
-    /// A sensor needs a quantity that is not gathered.
+    /// A sensor needs a quantity that this crate does not gather.
     #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]
     SensorRequires {
         /// The sensor.
@@ -455,7 +455,7 @@ pub enum Error {
         #[source]
         error: std::io::Error,
     },
-    /// A texture cannot be converted.
+    /// A texture cannot be written as PNG in an export.
     #[error("{path}: not a readable PNG or JPEG image: {reason}")]
     Image {
         /// The file.

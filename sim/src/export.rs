@@ -23,7 +23,8 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Writes all files to `dir`, which is created if missing.
+/// Writes all files to `dir`, which is created if missing; existing files are replaced. Returns diagnostics about
+/// elements that the exported files lack or that differ from the simulation. `diagnostics` are the earlier ones.
 pub(crate) fn dump(
     cfg: &SimulationManagerCfg,
     contents: &EntitySet,
@@ -70,7 +71,8 @@ pub(crate) fn dump(
     Ok(omitted)
 }
 
-/// Elements of MJCF files that are left out of `file` because the MuJoCo version lacks them.
+/// Returns a diagnostic for each element of an MJCF part or robot file that `file` lacks because the `target` MuJoCo
+/// does not support it.
 fn unsupported_elements(mjcf: &Mjcf, target: SupportedVersion, file: &str) -> Vec<Diagnostic> {
     let version = if target == SupportedVersion::V2 { "2.2.2" } else { "4.x" };
     let of_part = |part: &Arc<PartDocument>| {
@@ -329,8 +331,8 @@ fn unreadable_textures(mesh: &TriMesh) -> Vec<String> {
         .collect()
 }
 
-/// Writes a texture as PNG, the only image format that MuJoCo reads. Returns `None` if the texture is missing or
-/// unreadable; the material then keeps only its color.
+/// Writes a texture as PNG, the only image format that MuJoCo reads. Returns the name of the texture asset; `None` if
+/// the texture is missing or unreadable, in which case the material has only its color.
 fn export_texture(
     source: &TextureSource,
     name: &str,

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct EnvId(pub usize);
 
-/// Handle of a robot, valid for the manager that created it.
+/// Handle of a robot, valid for the manager that created it. A passive articulation has such a handle too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RobotId {
     pub(crate) manager: u64,
@@ -34,7 +34,8 @@ pub struct TerrainId {
     pub(crate) index: usize,
 }
 
-/// Mask of the selected environments, shape (num_envs,); all are selected for `None`.
+/// Mask of the selected environments, shape (num_envs,); all are selected for `None`. Repeated ids are allowed; an id
+/// out of range is an error.
 pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<bool>> {
     let Some(ids) = env_ids else { return Ok(vec![true; num_envs]) };
     let mut mask = vec![false; num_envs];
@@ -44,7 +45,8 @@ pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec
     Ok(mask)
 }
 
-/// Indices of the selected environments in the given order; all environments for `None`.
+/// Indices of the selected environments in the given order; all environments for `None`. Repeated ids are allowed; an
+/// id out of range is an error.
 pub(crate) fn env_list(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
     env_mask(env_ids, num_envs)?;
     Ok(env_ids.map_or_else(|| (0..num_envs).collect(), |ids| ids.iter().map(|id| id.0).collect()))

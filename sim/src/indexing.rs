@@ -6,9 +6,9 @@ use kinetoscope_mujoco as mj;
 /// Indices of one robot in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotIndexing {
-    /// Addresses of each drivable joint.
+    /// Addresses of each drivable joint, in the order of `joint_names`.
     pub joints: Vec<JointIndexing>,
-    /// Frame of each link.
+    /// Frame of each link, in the order of `link_names`.
     pub links: Vec<BodyFrame>,
     /// The body of the root link.
     pub root: BodyIndexing,
@@ -58,7 +58,7 @@ pub(crate) struct JointIndexing {
 pub(crate) struct MjcfIndexing {
     /// Bodies of the file; the first is the body that holds the content of the file's world.
     pub bodies: Vec<usize>,
-    /// Geoms of the file.
+    /// Geoms of the file, those of its world included.
     pub geoms: Vec<usize>,
     /// Addresses in `qpos` of all positions of the file.
     pub qpos: Vec<usize>,
@@ -66,7 +66,7 @@ pub(crate) struct MjcfIndexing {
     pub dofs: Vec<usize>,
     /// Actuators of the file.
     pub actuators: Vec<usize>,
-    /// Joints of the file with one degree of freedom.
+    /// Addresses of the file's hinge and slide joints, in file order. `drive` is `None`.
     pub joints: Vec<JointIndexing>,
     /// Indices in `ctrl` of the file's actuators.
     pub controls: Vec<usize>,

@@ -31,7 +31,7 @@ pub enum LightKindCfg {
     },
 }
 
-/// Configuration of a light. `Default` is a white directional light from above, slightly tilted.
+/// Configuration of a light. `Default` is a gray (0.8) directional light from above, slightly tilted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LightCfg {
@@ -40,7 +40,8 @@ pub struct LightCfg {
     /// Position in the environment \[m\]; unused by directional lights and domes.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub position: Vector3<f64>,
-    /// Direction of the emitted light; unused by point lights and domes.
+    /// Direction of the emitted light, from the light to the scene; its length does not matter. Unused by point lights
+    /// and domes, but never zero.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub direction: Vector3<f64>,
     /// Color, 0..=1.

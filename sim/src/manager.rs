@@ -57,7 +57,7 @@ pub struct SimulationManager {
 }
 
 impl SimulationManager {
-    /// Creates an empty simulation.
+    /// Creates a simulation with the configured ground and lights, without other entities.
     ///
     /// # Errors
     /// A number of the configuration is out of range, or the MuJoCo library differs from the version this program was
@@ -102,7 +102,8 @@ impl SimulationManager {
         self.cfg.num_envs
     }
 
-    /// Number of threads that step, the calling thread included.
+    /// Number of threads that step, the calling thread included: at most that of the configuration, fewer for few
+    /// environments.
     pub fn threads(&self) -> usize {
         self.simulation.batch.threads()
     }
@@ -120,7 +121,8 @@ impl SimulationManager {
     /// is 1e-6 rad after 1 s.
     ///
     /// # Errors
-    /// The files, names, drives or meshes of the robot are invalid.
+    /// The name is taken, the simulation has 30 robots and articulations already, or the files, names, drives or meshes
+    /// of the robot are invalid.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
         self.add_with_role(cfg, RobotKind::Robot)
     }
@@ -230,12 +232,13 @@ impl SimulationManager {
     }
 
     /// Adds a sensor to all environments. The crate `kinetoscope_sensors` has the built-in sensors; other crates can
-    /// add their own. A sensor sees links, movable joints and drives of all robots in insertion order, followed by
-    /// those of attached MJCF files. Adding an entity later rebuilds the sensor and clears its history.
+    /// add their own. A sensor sees links, movable joints and drives of all robots and articulations in insertion
+    /// order, then rigid objects, then bodies, joints and actuators of attached MJCF files. Adding an entity later
+    /// rebuilds the sensor and clears its history.
     ///
     /// # Errors
-    /// The configuration is invalid, the name is taken, or the sensor needs a quantity that the simulation does not
-    /// gather.
+    /// The configuration is invalid, another sensor has the name, or the sensor needs a quantity that the simulation
+    /// does not gather.
     pub fn add_sensor<C>(&mut self, uid: impl Into<String>, cfg: C) -> Result<SensorId<C::Sensor>>
     where
         C: SensorCfg + Send + 'static,
@@ -412,7 +415,8 @@ impl SimulationManager {
     }
 
     /// Steps all environments `steps` times by `physics_dt`. `update(n)` equals n calls of `update(1)`, bit for bit.
-    /// Sensors measure and [observers](crate::Observer) are called after the steps at which they are due.
+    /// Sensors measure and [observers](crate::Observer) are called after the steps at which they are due. Diverged
+    /// environments do not step.
     pub fn update(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {
@@ -433,7 +437,9 @@ impl SimulationManager {
         }
     }
 
-    /// Resets environments to their initial state, all of them for `env_ids = None`. Diverged environments run again.
+    /// Resets environments to their initial state and time 0, all of them for `env_ids = None`. Targets and controls
+    /// return to their initial values, external wrenches end, and welds are released. Properties, gains, limits and
+    /// gravity compensation stay. Diverged environments run again. Ids may repeat.
     ///
     /// # Errors
     /// An environment does not exist; then no environment is reset.
@@ -465,14 +471,15 @@ impl SimulationManager {
         Ok(())
     }
 
-    /// Simulation time of each environment \[s\].
+    /// Simulation time of each environment since its last reset \[s\].
     pub fn time(&self) -> Vec<f64> {
         let mut times = Vec::with_capacity(self.num_envs());
         self.simulation.batch.for_each(|_, env| times.push(env.data().time()));
         times
     }
 
-    /// Environments in which a step failed, with the reason. They stay frozen in their last valid state until reset.
+    /// Environments in which a step failed or a written state was rejected, with the reason. They stay frozen in their
+    /// last valid state until reset.
     pub fn diverged(&self) -> Vec<DivergedEnv> {
         let mut diverged = Vec::new();
         self.simulation.batch.for_each(|i, env| {
@@ -483,7 +490,8 @@ impl SimulationManager {
         diverged
     }
 
-    /// Diagnostics of all entities added so far: everything repaired, ignored or unusual.
+    /// Diagnostics of all entities added so far: everything repaired, ignored or unusual. Diagnostics of visual meshes
+    /// are added when the visual scene is first built.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }
@@ -492,8 +500,9 @@ impl SimulationManager {
     /// meshes for both supported MuJoCo versions.
     ///
     /// Returns diagnostics for everything left out: unreadable visual meshes and textures, and elements of MJCF files
-    /// compiled by MuJoCo 4.x that 2.2.2 lacks. A comment in `robot.mjcf2.xml` lists those elements. `diagnostics.txt`
-    /// in `dir` holds the earlier diagnostics followed by these.
+    /// compiled by MuJoCo 4.x that 2.2.2 lacks. A comment in `robot.mjcf2.xml` lists those elements. Armature that the
+    /// export adds to drives for stability gives a diagnostic, too. `diagnostics.txt` in `dir` holds the earlier
+    /// diagnostics followed by these.
     ///
     /// # Errors
     /// A file cannot be written.

@@ -23,7 +23,7 @@ pub(crate) struct BodyAxis {
     geom_owners: Vec<Option<u32>>,
     /// Frame of each body on the body axis.
     bodies: Vec<BodyFrame>,
-    /// True if a body of the body axis is a separate MuJoCo body, false if it is fused to another one.
+    /// True if a body of the body axis is its own entry in `moving_bodies`, false if it is fused to another body.
     is_moving_body: Vec<bool>,
 }
 
@@ -38,20 +38,24 @@ pub(crate) struct CaptureRequest {
 #[derive(Debug, Default)]
 pub(crate) struct CapturedStep {
     pub(crate) contacts: Vec<Contact>,
-    /// Poses `[x, y, z, qw, qx, qy, qz]` \[m\], 7 numbers per body.
+    /// Poses `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] at the start of the step, 7 numbers per body.
     pub(crate) poses: Vec<f64>,
-    /// Linear, then angular velocity \[m/s, rad/s\] in world axes, 6 numbers per body.
+    /// Velocity of the frame, then angular velocity \[m/s, rad/s\] in world axes at the start of the step, 6 numbers
+    /// per body.
     pub(crate) velocities: Vec<f64>,
-    /// Linear, then angular acceleration \[m/s², rad/s²\] in world axes, 6 numbers per body.
+    /// Acceleration of the frame, then angular acceleration \[m/s², rad/s²\] in world axes, 6 numbers per body; 0 at
+    /// rest, gravity in free fall.
     pub(crate) accelerations: Vec<f64>,
-    /// Force, then torque \[N, N m\] of the parent joint in link axes, 6 numbers per body.
+    /// Force, then torque \[N, N m\] about the link origin that each link receives from its parent, in link axes, 6
+    /// numbers per body; NaN for a fused link.
     pub(crate) wrenches: Vec<f64>,
     /// Scratch memory for velocities of the engine.
     scratch: Vec<f64>,
 }
 
 impl BodyAxis {
-    /// Creates the plan of a compiled scene; `carriers` is defined in [`kinetoscope_sensors::SensorContext`].
+    /// Creates the body axis of a compiled scene; `carriers` is
+    /// [`moving_bodies`](kinetoscope_sensors::SensorContext::moving_bodies).
     pub(crate) fn new(
         model: &Model,
         robots: &[RobotIndexing],

@@ -16,12 +16,13 @@ fn vector_at(values: &[f64], first: usize) -> Vector3<f64> {
     Vector3::new(values[first], values[first + 1], values[first + 2])
 }
 
-/// Reference point of the spatial vectors of a body.
+/// Reference point of the spatial vectors of a body, in the environment \[m\].
 fn reference_point(data: &Data, body: usize) -> Vector3<f64> {
     vector_at(data.subtree_com(), 3 * data.model().body_rootid()[body] as usize)
 }
 
-/// Velocity of the point of `body` at `point` and angular velocity of the body, in world axes.
+/// Velocity of the point of `body` at `point` (in the environment \[m\]) and angular velocity of the body, in world
+/// axes.
 pub(crate) fn body_velocity(data: &Data, body: usize, point: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let angular = vector_at(data.cvel(), 6 * body);
     [vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body))), angular]

@@ -10,7 +10,7 @@ impl DriveMode for Acceleration {
         "acceleration"
     }
 
-    /// Effective inertia I at the initial pose: tau = I (k (q* - q) + d (v* - v)).
+    /// Effective inertia I at the initial joint positions: tau = I (k (q* - q) + d (v* - v)).
     fn gain_scale(&self, joint: &JointInfo) -> Option<f64> {
         Some(joint.effective_inertia)
     }

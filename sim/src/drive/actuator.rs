@@ -33,8 +33,9 @@ pub enum Scheme {
     ImplicitDamping,
 }
 
-/// Returns the largest time step \[s\] at which the law is stable in MuJoCo; infinite without gains. `damping` is the
-/// damping of the joints, which MuJoCo integrates at the end of the step in both schemes.
+/// Returns the largest time step \[s\] at which the law is stable in MuJoCo; infinite without gains, and 0 if no step
+/// is stable (a mass matrix that is not positive definite). `damping` is the damping of the joints, which MuJoCo
+/// integrates at the end of the step in both schemes.
 ///
 /// The explicit step `(M + h B) (v' - v) = -h (Kp q + Kd v + B v)`, `q' = q + h v'` is stable exactly while
 /// `4 M + 2 h B - 2 h Kd - h² Kp` is positive definite; with Kd at the end of the step like B, while
@@ -77,8 +78,8 @@ pub fn stable_timestep(
     low
 }
 
-/// Returns [`stable_timestep`] of a robot's drives at its start positions; `None` if the dynamics of the description
-/// cannot be computed.
+/// Returns [`stable_timestep`] \[s\] of a robot's drives at its start positions, with mimic joints coupled to their
+/// drivers; `None` if the dynamics of the description cannot be computed.
 pub fn stable_timestep_of(
     scheme: Scheme,
     description: &RobotDescription,
@@ -108,7 +109,7 @@ pub fn stable_timestep_of(
     Some(stable_timestep(scheme, &mass_matrix, &kp.select_rows(&free), &kd.select_rows(&free), &damping))
 }
 
-/// Returns a warning if the drives are unstable at the time step `dt` \[s\].
+/// Returns a warning if the drives, evaluated explicitly, are unstable at the MuJoCo time step `dt` \[s\].
 pub fn warn_if_unstable(
     description: &RobotDescription,
     plans: &[JointPlan],

@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 pub enum PerJoint {
     /// Same number for every joint.
     All(f64),
-    /// Pairs (pattern or control part, number); joints without a matching key keep the default.
+    /// Pairs (pattern or control part, number). Joints without a matching key keep the default; a key without a match,
+    /// or two keys for one joint, are an error.
     By(Vec<(String, f64)>),
 }
 
@@ -34,28 +35,29 @@ impl<K: Into<String>, const N: usize> From<[(K, f64); N]> for PerJoint {
     }
 }
 
-/// Drive properties of a robot. Every field is a number for all joints or a map `{pattern: value}`.
+/// Drive properties of a robot. A [`PerJoint`] field is a number for all joints or a map `{pattern: value}`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveCfg {
-    /// Meaning of stiffness and damping.
+    /// Meaning of stiffness and damping, for all driven joints.
     pub drive_type: DriveType,
-    /// Evaluation of the drive law.
+    /// Evaluation of the drive law, for joints without an explicit model in `actuators`.
     pub model: DriveModel,
     /// Explicit actuator models by joint pattern or control part; joints without a match are driven by `model`. The
     /// models use the gains and limits below. A joint that the drive type leaves passive has no actuator. Exports
     /// replace the models by MuJoCo actuators with the same gains.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub actuators: Vec<(String, ActuatorModel)>,
-    /// Stiffness \[N m/rad or N/m\] (drive type `force`). If unset, the stiffness of the position actuators in the file
-    /// of an [MJCF robot](crate::RobotCfg::mjcf) (drive type `force` only), or else 10⁴.
+    /// Stiffness \[N m/rad or N/m\] for drive type `force`, \[1/s²\] for `acceleration`. If unset, the stiffness of the
+    /// position actuators in the file of an [MJCF robot](crate::RobotCfg::mjcf) (drive type `force` only), or else 10⁴.
     pub stiffness: PerJoint,
-    /// Damping \[N m s/rad or N s/m\] (drive type `force`). If unset, as for the stiffness, or else 10³.
+    /// Damping \[N m s/rad or N s/m\] for drive type `force`, \[1/s\] for `acceleration`. If unset, the damping of the
+    /// position and velocity actuators in the file of an MJCF robot (drive type `force` only), or else 10³.
     pub damping: PerJoint,
-    /// Effort limit \[N m or N\]; if unset, that of the file.
+    /// Effort limit \[N m or N\]; infinite for no limit. If unset, that of the file, where 0 means no limit.
     pub max_effort: Option<PerJoint>,
-    /// Velocity limit \[rad/s or m/s\]; if unset, that of the URDF. It is reported only; [`DcMotor`] is the only drive
-    /// law that uses it.
+    /// Velocity limit \[rad/s or m/s\]; infinite for no limit. If unset, that of the URDF, where 0 means no limit. It
+    /// is reported only; [`DcMotor`] is the only drive law that uses it.
     ///
     /// [`DcMotor`]: super::DcMotor
     pub max_velocity: Option<PerJoint>,
@@ -85,10 +87,11 @@ impl Default for DriveCfg {
 
 /// EmbodiChain's default stiffness, for joints without a configured stiffness and without one in their file.
 pub(super) const DEFAULT_STIFFNESS: f64 = 1e4;
-/// EmbodiChain's default damping.
+/// EmbodiChain's default damping, for joints without a configured damping and without one in their file.
 pub(super) const DEFAULT_DAMPING: f64 = 1e3;
 
-/// Drive properties of one joint that the configuration sets; `None` for the others.
+/// Drive properties of one joint as the configuration sets them; `None` for those that it leaves to the file or the
+/// defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGains {
     /// Stiffness, if the configuration sets one.
@@ -120,7 +123,7 @@ pub enum DriveCfgError {
         #[source]
         error: PatternError,
     },
-    /// A value is negative or not finite.
+    /// A value is negative or not finite (limits may be infinite).
     #[error("drive property {property}: {value} is not a finite number >= 0")]
     Value {
         /// Name of the property.

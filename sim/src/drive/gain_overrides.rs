@@ -85,8 +85,8 @@ impl DriveState {
         self.overrides[drive][kind as usize]
     }
 
-    /// Overrides the given gains (in torque units) and effort limit of a drive, even if a value equals the current or
-    /// nominal one.
+    /// Overrides stiffness, damping (in torque units) and effort limit of a drive, even if a value equals the current
+    /// or nominal one. `None` leaves a value unchanged.
     pub(crate) fn override_gains(&mut self, drive: usize, values: [Option<f64>; 3]) {
         for (kind, value) in GainKind::ALL.into_iter().zip(values) {
             if let Some(value) = value {
@@ -135,20 +135,20 @@ impl DriveState {
         self.clear_override(drive, GainKind::Stiffness);
     }
 
-    /// As [`set_stiffness`](Self::set_stiffness), for the damping.
+    /// Sets the damping of a drive as [`set_stiffness`](Self::set_stiffness) sets the stiffness.
     pub(crate) fn set_drive_damping(&mut self, drive: usize, value: f64) {
         self.update_setting(drive, |setting| setting.damping = value);
         self.clear_override(drive, GainKind::Damping);
     }
 
-    /// As [`set_stiffness`](Self::set_stiffness), for the effort limit.
+    /// Sets the effort limit of a drive as [`set_stiffness`](Self::set_stiffness) sets the stiffness.
     pub(crate) fn set_max_effort(&mut self, drive: usize, max_effort: f64) {
         self.set_limits(drive, |gains| Gains { max_effort, ..gains });
         self.clear_override(drive, GainKind::MaxEffort);
     }
 
     /// Changes the meaning of stiffness and damping of a drive. User values keep their numbers; overrides keep their
-    /// value in torque units.
+    /// value in torque units. `None` for `inertia` keeps the earlier inertia.
     pub(crate) fn set_drive_type(&mut self, drive: usize, drive_type: DriveType, inertia: Option<f64>) {
         let (gains, setting) = self.base_gains(drive);
         self.gains.set_if_changed(drive, gains);
@@ -163,7 +163,7 @@ impl DriveState {
         self.overrides.set_if_changed(drive, drawn);
     }
 
-    /// Overridden gains (in torque units) and effort limit of a drive; `None` without override.
+    /// Override values of stiffness, damping (in torque units) and effort limit of a drive; `None` without override.
     pub(crate) fn override_values(&self, drive: usize) -> [Option<f64>; 3] {
         GainKind::ALL.map(|kind| self.gain_override(drive, kind).map(|drawn| drawn.value))
     }

@@ -2,7 +2,8 @@
 
 use super::{DriveType, JointInfo, PdGains};
 
-/// Configuration of one drive in the user's units; [`Gains`] has the values that the drive law uses.
+/// Drive type, stiffness and damping of one drive in the unit of the drive type; [`Gains`] has the values that the
+/// drive law uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveSetting {
     /// Meaning of stiffness and damping.
@@ -11,17 +12,18 @@ pub struct DriveSetting {
     pub stiffness: f64,
     /// Damping, in the unit of the drive type.
     pub damping: f64,
-    /// Inertia that the joint feels at the initial pose \[kg m² or kg\]; `None` until a drive type needs it.
+    /// Inertia that the joint feels at the initial joint positions \[kg m² or kg\]; `None` until a drive type needs it.
     pub inertia: Option<f64>,
 }
 
 impl DriveSetting {
-    /// Factor from stiffness and damping to torque units; `None` for a passive joint.
+    /// Factor from stiffness and damping to torque units; `None` for [`DriveType::None`]. NaN if the drive type needs
+    /// an inertia and `inertia` is `None`.
     pub fn gain_scale(&self) -> Option<f64> {
         self.drive_type.mode().gain_scale(&JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) })
     }
 
-    /// Gains in torque units; `None` for a passive joint.
+    /// Gains in torque units; `None` for [`DriveType::None`].
     pub fn torque_gains(&self) -> Option<PdGains> {
         self.gain_scale().map(|unit| PdGains { kp: self.stiffness * unit, kd: self.damping * unit })
     }
@@ -36,7 +38,8 @@ pub struct Gains {
     pub kd: f64,
     /// Effort limit \[N m or N\]; infinite without a limit.
     pub max_effort: f64,
-    /// Velocity limit \[rad/s or m/s\]; infinite without a limit. Reported only: it bounds nothing by itself.
+    /// Velocity limit \[rad/s or m/s\]; infinite without a limit. Only [`DcMotor`](super::DcMotor) uses it; other
+    /// drives do not enforce it.
     pub max_velocity: f64,
 }
 

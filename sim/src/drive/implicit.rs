@@ -27,12 +27,12 @@ const UNLIMITED: f64 = 1e15;
 /// Value of `D` for a drive without gains; its row carries no force.
 const IDLE_STIFFNESS: f64 = 1e-6;
 
-/// True if the row carries the drive. Without gains, only the feed-forward effort acts, which needs no row.
+/// True if the row applies the drive. Without gains, only the feed-forward effort acts, which needs no row.
 fn has_gains(gains: &Gains) -> bool {
     gains.kp > 0.0 || gains.kd > 0.0
 }
 
-/// Rewrites the friction row of one drive.
+/// Rewrites the friction row of one drive. `row` counts the friction rows of degrees of freedom from 0.
 pub(super) fn apply(drive: &Drive, row: usize, gains: &Gains, target: &Target, data: &mut mj::Data) {
     let h = data.model().timestep();
     let (q, v) = (data.qpos()[drive.qpos], data.qvel()[drive.dof]);
@@ -64,7 +64,7 @@ pub(super) fn effort(row: usize, gains: &Gains, feedforward: f64, data: &mj::Dat
     }
 }
 
-/// The explicit half of the implicit damping: `-B v` (the armature holds the other half).
+/// Adds the explicit part of the implicit damping, `-B v`, to `qfrc_applied`. The armature contains the other part.
 pub(super) fn apply_damping(table: &DriveTable, coefficients: &[f64], data: &mut mj::Data) {
     for (&(dof, _), damping) in table.damped.iter().zip(coefficients) {
         if *damping != 0.0 {
@@ -74,8 +74,9 @@ pub(super) fn apply_damping(table: &DriveTable, coefficients: &[f64], data: &mut
     }
 }
 
-/// Turns the drives of `dofs` in a compiled model into constraint rows: every degree of freedom in `dofs` gets a
-/// friction row, and gain and bias of the actuators become zero (`ctrl` still holds the target).
+/// Turns the drives of `dofs`, with the actuators `actuators`, in a compiled model into constraint rows: every degree
+/// of freedom in `dofs` gets a friction row, and gain and bias of the actuators become zero (`ctrl` still holds the
+/// target).
 pub(crate) fn prepare(compiled: &mut mj::Compiled, dofs: &[usize], actuators: &[usize]) {
     for &dof in dofs {
         // Any positive value makes MuJoCo build the row; `apply` writes the limit.

@@ -59,12 +59,14 @@ macro_rules! drive_modes {
 }
 
 drive_modes! {
-    /// Gains are torques (forces) per angle (length).
+    /// Stiffness in N m/rad or N/m, damping in N m s/rad or N s/m.
     #[default]
     Force => force::Force,
-    /// Gains are accelerations: multiplied by the inertia the joint feels.
+    /// Stiffness in 1/s², damping in 1/s. The drive multiplies both by the inertia that the joint feels at the initial
+    /// joint positions.
     Acceleration => acceleration::Acceleration,
-    /// No drive: the joint moves freely.
+    /// No drive: no stiffness and damping act. Efforts of [`RobotMut::set_qf_target`](crate::RobotMut::set_qf_target)
+    /// and the joint's own friction, damping and limits remain.
     None => none::Passive,
 }
 

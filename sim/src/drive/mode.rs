@@ -3,7 +3,7 @@
 /// Properties of a joint that a drive mode uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointInfo {
-    /// Inertia that the joint feels at the initial pose, `1 / (M⁻¹)_ii` \[kg m² or kg\].
+    /// Inertia that the joint feels at the initial joint positions, `1 / (M⁻¹)_ii` \[kg m² or kg\].
     pub effective_inertia: f64,
 }
 
@@ -21,7 +21,8 @@ pub trait DriveMode: std::fmt::Debug + Sync {
     /// Name in configuration files, as in EmbodiChain.
     fn name(&self) -> &'static str;
 
-    /// Factor from stiffness and damping to the gains of [`PdGains`], in torque units; `None` for a passive joint.
+    /// Factor from stiffness and damping to the gains of [`PdGains`], in torque units; `None` for the drive type
+    /// without a drive.
     fn gain_scale(&self, joint: &JointInfo) -> Option<f64>;
 
     /// True if the unit depends on [`JointInfo::effective_inertia`], which is NaN for other modes.

@@ -12,7 +12,7 @@ use kinetoscope_robot::dynamics::{Configuration, Dynamics, DynamicsError};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
-/// Resolved properties of one drivable joint (revolute, continuous, prismatic), mimic joints included.
+/// Resolved properties of one drivable joint (revolute, continuous, prismatic), mimic and passive joints included.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPlan {
     /// Id of the joint in the description.
@@ -21,20 +21,23 @@ pub struct JointPlan {
     pub actuator: Option<PdGains>,
     /// Explicit actuator model; `None` for a joint with the robot's drive model.
     pub model: Option<ActuatorModel>,
-    /// User values that the actuator's gains are computed from.
+    /// Drive type, stiffness and damping, in the unit of the drive type: from the configuration, else the file, else
+    /// defaults. The actuator's gains are computed from them. A joint that an MJCF file couples by a nonlinear
+    /// equality, or leaves passive and that has no configured gains or model, has [`DriveType::None`].
     pub setting: DriveSetting,
     /// Effort limit \[N m or N\]; infinite without a limit.
     pub max_effort: f64,
     /// Velocity limit \[rad/s or m/s\]; infinite without a limit. It is the no-load speed of a
     /// [`DcMotor`](crate::DcMotor); other drives do not enforce it.
     pub max_velocity: f64,
-    /// Dry friction \[N m or N\].
+    /// Dry friction \[N m or N\]: that of the configuration, else that of the file, else 0.
     pub friction: f64,
-    /// Rotor inertia \[kg m² or kg\].
+    /// Rotor inertia \[kg m² or kg\]: that of the configuration, else that of an MJCF file, else 0.
     pub armature: f64,
-    /// Viscous damping \[N m s/rad or N s/m\].
+    /// Viscous damping of the joint itself, from the file \[N m s/rad or N s/m\].
     pub damping: f64,
-    /// The joint's own position limits \[rad or m\]; `None` without limits.
+    /// The joint's own position limits \[rad or m\]; `None` without limits. A mimic joint whose limits leave its driver
+    /// no range has the limits that follow from the driver's range.
     pub limit: Option<[f64; 2]>,
     /// Range of position targets \[rad or m\]: the joint's own limits, narrowed by those of joints that mimic it;
     /// infinite without limits.
@@ -74,7 +77,7 @@ pub enum PlanError {
         /// The problem and the fix.
         reason: String,
     },
-    /// The description's dynamics cannot be computed.
+    /// The drive type needs the dynamics of the description, which cannot be computed.
     #[error(transparent)]
     Dynamics(#[from] DynamicsError),
 }
@@ -82,7 +85,8 @@ pub enum PlanError {
 /// Resolves all drivable joints of `description`, in its order.
 ///
 /// # Errors
-/// A pattern or a value of the configuration is invalid.
+/// A pattern or a value of the configuration is invalid, an actuator model does not fit its joint, or the drive type
+/// needs dynamics that cannot be computed.
 pub fn plan(
     description: &RobotDescription,
     drive: &DriveCfg,
@@ -148,7 +152,7 @@ pub fn plan(
     Ok((plans, diagnostics))
 }
 
-/// User values of a joint's drive: from the configuration, or else the file, or else EmbodiChain's defaults. A joint
+/// Returns the setting of a joint's drive: from the configuration, else the file, else EmbodiChain's defaults. A joint
 /// that is passive in its file is driven only if the configuration names it. A joint that a coupling moves is never
 /// driven.
 fn drive_setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> DriveSetting {
@@ -308,7 +312,7 @@ pub(crate) fn followed_position(
 /// The joint-space inertia of a robot at its start positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartInertia {
-    /// The matrix with rotor inertias; a floating base has the first six columns.
+    /// The matrix with rotor inertias \[kg m², kg m or kg\]; a floating base has the first six columns.
     pub matrix: DMatrix<f64>,
     /// Column of each drivable joint.
     pub columns: Vec<usize>,

@@ -29,15 +29,16 @@ pub struct Drive {
     pub qpos: usize,
     /// Address of the joint's velocity in `qvel`.
     pub dof: usize,
-    /// Index of the control input that holds the target.
+    /// Index of its control in `ctrl`. The control is the position target of a constraint row, the effort of an
+    /// explicit model, or the control for which MuJoCo's actuator computes the drive law.
     pub ctrl: usize,
     /// Realization in MuJoCo.
     pub realization: Realization,
-    /// Initial gains and limits.
+    /// Nominal gains in torque units, and limits.
     pub initial: Gains,
-    /// User values that the gains are computed from.
+    /// Drive type, stiffness and damping, in the unit of the drive type, that the gains are computed from.
     pub setting: DriveSetting,
-    /// Range of position targets \[rad or m\].
+    /// Nominal range of position targets \[rad or m\].
     pub range: [f64; 2],
 }
 
@@ -58,7 +59,7 @@ pub struct DriveTable {
 /// Explicit actuator model of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExplicitDrive {
-    /// Index of the drive.
+    /// Index of the drive in [`DriveTable::drives`].
     pub drive: usize,
     /// The model.
     pub model: ActuatorModel,
@@ -147,23 +148,25 @@ struct InitialDrives {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveState {
     initial: Arc<InitialDrives>,
-    /// Gains, one per drive.
+    /// Gains in torque units and limits that the drive law uses, overrides included; one per drive.
     pub gains: CowArray<Gains>,
-    /// User values that the gains are computed from, one per drive.
+    /// Drive type, stiffness and damping, in the unit of the drive type, that the gains are computed from; one per
+    /// drive. Overrides are included.
     pub settings: CowArray<DriveSetting>,
     /// Overrides of gains, which are properties of the environment and not part of its state.
     pub(super) overrides: CowArray<GainOverrides>,
     /// Range of position targets \[rad or m\], one per drive.
     pub ranges: CowArray<[f64; 2]>,
-    /// Position targets \[rad or m\].
+    /// Position targets \[rad or m\], one per drive.
     pub position: Box<[f64]>,
-    /// Velocity targets \[rad/s or m/s\].
+    /// Velocity targets \[rad/s or m/s\], one per drive.
     pub velocity: CowArray<f64>,
-    /// Feed-forward efforts \[N m or N\]; they stay until changed.
+    /// Feed-forward efforts \[N m or N\], one per drive; they stay until changed or reset.
     pub feedforward: CowArray<f64>,
-    /// Effort of each drive in the last step \[N m or N\].
+    /// Effort of each drive in the last successful MuJoCo step, after its limit \[N m or N\]; 0 after a reset.
     pub effort: Box<[f64]>,
-    /// Generalized forces applied by the user, by degree of freedom; the implicit damping adds to them.
+    /// Generalized forces applied by the user, one per degree of freedom; they stay until changed or reset. Each step
+    /// adds forces of the drives and of the implicit damping in `qfrc_applied`, not here.
     pub applied: CowArray<f64>,
     /// Memory of explicit models from step to step.
     pub memory: Box<[f64]>,
@@ -175,7 +178,8 @@ pub struct DriveState {
 }
 
 impl DriveState {
-    /// Creates drives at rest at the model's initial positions. Clones share all arrays that none of them has changed.
+    /// Creates drives whose targets are the model's initial positions (`qpos0`), at rest. Clones share all arrays that
+    /// none of them has changed.
     pub fn new(table: &Arc<DriveTable>, model: &mj::Model) -> Self {
         let n = table.drives.len();
         let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
@@ -227,7 +231,8 @@ impl DriveState {
         self.memory = memory;
     }
 
-    /// Resets targets and forces to rest at the model's initial positions; gains and limits stay.
+    /// Resets targets, efforts and applied forces to rest at the model's initial positions; gains, limits and ranges
+    /// stay.
     pub(crate) fn reset(&mut self) {
         let initial = &*self.initial;
         self.position.copy_from_slice(&initial.position);
@@ -262,13 +267,14 @@ impl DriveState {
         self.gains.set_if_changed(drive, change(self.gains[drive]));
     }
 
-    /// Changes the range of position targets of a drive; the current target is clamped to it.
+    /// Changes the range of position targets of a drive; the current target is clamped to the range.
     pub(crate) fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
         self.ranges.set_if_changed(drive, [low, high]);
         self.position[drive] = self.position[drive].clamp(low, high);
     }
 
-    /// Copies gains, limits, targets and effort from drive `from` of `other` to drive `to`.
+    /// Copies gains, overrides, limits, targets, effort and the memory of the explicit model from drive `from` of
+    /// `other` to drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
         self.gains.set_if_changed(to, other.gains[from]);
         self.settings.set_if_changed(to, other.settings[from]);
@@ -377,7 +383,8 @@ impl DriveState {
         }
     }
 
-    /// Reads the effort of every drive after `mj_step2`.
+    /// Reads the effort of every drive \[N m or N\] after `mj_step2` and before `mj_step1`, and replaces the content of
+    /// `efforts`.
     pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {

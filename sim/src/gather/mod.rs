@@ -70,7 +70,7 @@ pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneS
     state
 }
 
-/// Writes steps and times of all environments to `state`.
+/// Writes physics steps since the last reset and times of all environments to `state`.
 pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
     simulation.batch.for_each(|i, env| {
         state.step[i] = env.steps() / u64::from(substeps);
@@ -79,7 +79,8 @@ pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut S
     });
 }
 
-/// Writes the step count of every environment to `clocks`, for the schedules of sensors.
+/// Writes the physics steps since the last reset of every environment to `clocks`, for the schedules of sensors. A
+/// diverged environment gets [`Phases::QUARANTINED`].
 pub(crate) fn gather_step_counts(simulation: &Simulation, substeps: u32, clocks: &mut Vec<u64>) {
     clocks.resize(simulation.batch.num_envs(), 0);
     simulation.batch.for_each(|i, env| {
@@ -88,7 +89,7 @@ pub(crate) fn gather_step_counts(simulation: &Simulation, substeps: u32, clocks:
     });
 }
 
-/// Fills the arrays that `requires` names, which must be allocated.
+/// Fills the arrays that `requires` names, which must be allocated, and steps and times.
 pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
     gather_steps(simulation, substeps, state);
     if requires.is_empty() {

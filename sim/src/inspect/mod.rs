@@ -40,12 +40,12 @@ const MIMIC_TOLERANCE: f64 = 1e-6;
 /// Robot files and position to inspect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InspectCfg {
-    /// The URDF files.
+    /// The URDF files; empty if `mjcf` is set.
     pub urdf: UrdfCfg,
     /// The MJCF file of an MJCF robot ([`RobotCfg::mjcf`]), instead of URDF files. A body with several joints has a
     /// massless link behind each joint but the last.
     pub mjcf: Option<MjcfFile>,
-    /// True if the root moves freely.
+    /// True for a floating base: its six degrees of freedom are part of the dynamics. Default false: a fixed base.
     pub floating_base: bool,
     /// Positions \[rad or m\] by joint name. Joints without a position are at 0, or at `ref` of an MJCF file. Joints
     /// that follow others (mimic joints, or curves of an MJCF file) have the implied position.
@@ -66,10 +66,10 @@ pub enum InspectError {
         name: String,
         /// Joints that have a position, closest name first.
         candidates: Vec<String>,
-        /// Number of joints that have a position.
+        /// Number of joints that have a position; `candidates` may be fewer.
         total: usize,
     },
-    /// A position is given for a joint without a single degree of freedom.
+    /// A position is given for a joint with no or several degrees of freedom: fixed, floating or planar.
     #[error("{at}: qpos: joint {name:?} is {kind}; only revolute, continuous and prismatic joints have a position")]
     JointUnmovable {
         /// File and line of the joint.
@@ -94,7 +94,7 @@ pub enum InspectError {
     PositionNotFinite {
         /// Name of the joint.
         name: String,
-        /// Position given.
+        /// Position given \[rad or m\]: infinite or NaN.
         value: f64,
     },
     /// Dynamics cannot be computed.
@@ -118,7 +118,7 @@ impl From<Error> for InspectError {
 /// Reads the files and creates the report.
 ///
 /// # Errors
-/// [`add_robot`](crate::SimulationManager::add_robot) rejects the files, or a position is invalid.
+/// The files cannot be loaded as a robot, a position is invalid, or the dynamics cannot be computed.
 pub fn inspect(cfg: &InspectCfg) -> Result<RobotReport, InspectError> {
     let robot = RobotCfg {
         urdf: cfg.urdf.clone(),
@@ -144,7 +144,8 @@ pub fn inspect(cfg: &InspectCfg) -> Result<RobotReport, InspectError> {
     Ok(RobotReport::new(cfg, &description, &kinematics, qpos, &GRAVITY, &diagnostics))
 }
 
-/// Configuration with the given positions, in the order of the drivable joints.
+/// Returns the configuration with the given positions, in the order of the drivable joints. Adds a warning for each
+/// ignored position of a joint that follows another.
 fn configuration(
     description: &RobotDescription,
     cfg: &InspectCfg,
@@ -222,7 +223,7 @@ fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Dia
     }
 }
 
-/// Warnings about joint limits.
+/// Warnings about joint limits, such as ranges of mimic joints.
 fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
     let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
     let (_, mut diagnostics) =
@@ -233,7 +234,7 @@ fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Res
     Ok(diagnostics)
 }
 
-/// Sorts by file in the given order, then by line.
+/// Sorts by file in the given order, then by line. Diagnostics without a location come first, other files last.
 fn sort_by_location(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
     let files: Vec<_> = cfg.files().collect();
     diagnostics.sort_by_key(|d| {

@@ -14,21 +14,22 @@ use serde::Serialize;
 /// Report on a robot in one position.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobotReport {
-    /// Name of the robot.
+    /// Name of the robot in its merged URDF; `robot` for an MJCF file.
     pub robot: String,
     /// The files, as given.
     pub files: Vec<String>,
-    /// Sum of the link masses \[kg\].
+    /// Sum of the link masses, completed ones included \[kg\].
     pub total_mass: f64,
-    /// Center of mass in the world \[m\]; `None` for a massless robot.
+    /// Center of mass at `qpos` in the frame of the root link \[m\]; `None` for a massless robot.
     pub com: Option<[f64; 3]>,
-    /// All links in the order of the merged files, including links fixed to others.
+    /// All links in the order of the merged files, including links fixed to others. For an MJCF file: bodies, named
+    /// sites, and frames between joints.
     pub links: Vec<LinkReport>,
     /// All joints in the order of the merged files, including fixed joints.
     pub joints: Vec<JointReport>,
     /// Joints with one degree of freedom in the order of the merged files, including mimic joints.
     pub joint_names: Vec<String>,
-    /// Position of each of `joint_names` \[rad or m\].
+    /// Position of each of `joint_names` \[rad or m\]; mimic joints have the implied one.
     pub qpos: Vec<f64>,
     /// Names of the generalized velocities: rows and columns of `mass_matrix`, entries of `gravity_torque`. They are
     /// `joint_names`. With a floating base, `base.vx` to `base.wz` come first: the velocity of the root's origin in
@@ -51,13 +52,13 @@ pub struct LinkReport {
     pub name: String,
     /// The parent link; `None` for the root.
     pub parent: Option<String>,
-    /// Mass \[kg\]; 0 if the file gives none.
+    /// Mass \[kg\], from the file or completed from shapes; 0 without one.
     pub mass: f64,
-    /// Center of mass in the link frame \[m\]; `None` if the file gives no inertia.
+    /// Center of mass in the link frame \[m\]; `None` without inertia (file or completed).
     pub com: Option<[f64; 3]>,
-    /// Inertia \[kg m²\] about the center of mass in link axes; `None` if the file gives none.
+    /// Inertia \[kg m²\] about the center of mass in link axes; `None` without inertia (file or completed).
     pub inertia: Option<[[f64; 3]; 3]>,
-    /// Pose in the world, `[x, y, z, qw, qx, qy, qz]`. The root is at the origin.
+    /// Pose at `qpos` in the frame of the root link, `[x, y, z, qw, qx, qy, qz]` \[m\].
     pub pose: [f64; 7],
 }
 
@@ -75,15 +76,17 @@ pub struct JointReport {
     pub child: String,
     /// Axis in the joint frame.
     pub axis: [f64; 3],
-    /// Lower limit \[rad or m\]; `None` for an unlimited joint. 0 if the file gives only the upper limit.
+    /// Lower position limit \[rad or m\]; `None` for an unlimited joint, and for one without a single degree of
+    /// freedom. 0 if the file gives only the upper limit.
     pub lower: Option<f64>,
-    /// Upper limit \[rad or m\]; `None` for an unlimited joint. 0 if the file gives only the lower limit.
+    /// Upper position limit \[rad or m\]; `None` for an unlimited joint, and for one without a single degree of
+    /// freedom. 0 if the file gives only the lower limit.
     pub upper: Option<f64>,
     /// Effort limit of the file \[N m or N\]; `None` if it gives none.
     pub effort: Option<f64>,
     /// Velocity limit of the file \[rad/s or m/s\]; `None` if it gives none.
     pub velocity: Option<f64>,
-    /// Mimic relation; `None` for an independent joint.
+    /// Mimic relation as in the file, chains not resolved; `None` for a joint without a linear relation.
     pub mimic: Option<MimicReport>,
 }
 
@@ -105,7 +108,7 @@ pub struct ReportWarning {
     pub kind: &'static str,
     /// The file; `None` if the warning belongs to no file.
     pub file: Option<String>,
-    /// Line, counted from 1.
+    /// Line, counted from 1; `None` without a file.
     pub line: Option<u32>,
     /// Sentence that names the element.
     pub message: String,

@@ -40,7 +40,7 @@ fn pluralized(n: usize, what: &str) -> String {
 }
 
 impl RobotReport {
-    /// The report without its warnings, for programs that display these in another way.
+    /// The report as text without its warnings, for programs that display these in another way.
     pub fn without_warnings(&self) -> impl fmt::Display {
         fmt::from_fn(|f| self.write_robot(f))
     }

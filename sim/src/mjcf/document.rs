@@ -32,7 +32,7 @@ pub struct Mjcf {
     pub bodies: Vec<Body>,
     /// Lights fixed in the world.
     pub lights: Vec<Light>,
-    /// Pairs of bodies that never collide.
+    /// Pairs of names of bodies that never collide.
     pub excludes: Vec<(String, String)>,
     /// Equality constraints between joints.
     pub equalities: Vec<JointEquality>,
@@ -42,7 +42,7 @@ pub struct Mjcf {
     pub friction_tendons: Vec<FrictionTendon>,
     /// Actuators.
     pub actuators: Vec<Actuator>,
-    /// Keyframes: named positions of all joints.
+    /// Keyframes: named positions of all joints and controls of all actuators.
     pub keyframes: Vec<Keyframe>,
     /// MJCF files that are embedded in the scene.
     pub parts: Vec<Arc<PartDocument>>,
@@ -51,7 +51,7 @@ pub struct Mjcf {
 /// Physics options: `<option>`, and the default friction of geoms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhysicsOption {
-    /// Physics step \[s\].
+    /// Time step of MuJoCo \[s\]: the physics step divided by the number of substeps.
     pub timestep: f64,
     /// Gravity \[m/s²\].
     pub gravity: Vector3<f64>,
@@ -109,7 +109,7 @@ pub enum FrictionCone {
 /// Mesh asset: `<mesh>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshAsset {
-    /// Unique name.
+    /// Name of the mesh, unique in the document.
     pub name: String,
     /// Triangles of the mesh.
     pub content: MeshContent,
@@ -136,7 +136,7 @@ pub enum MeshContent {
 /// Height field asset: `<hfield>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightFieldAsset {
-    /// Unique name.
+    /// Name of the height field, unique in the document.
     pub name: String,
     /// File next to the document, in MuJoCo's binary format.
     pub file: String,
@@ -147,7 +147,7 @@ pub struct HeightFieldAsset {
 /// Texture asset: `<texture type="2d">`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureAsset {
-    /// Unique name.
+    /// Name of the texture, unique in the document.
     pub name: String,
     /// PNG file next to the document.
     pub file: String,
@@ -156,7 +156,7 @@ pub struct TextureAsset {
 /// Material asset: `<material>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialAsset {
-    /// Unique name.
+    /// Name of the material, unique in the document.
     pub name: String,
     /// RGBA color.
     pub rgba: [f64; 4],
@@ -167,7 +167,7 @@ pub struct MaterialAsset {
 /// Body: `<body>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
-    /// Unique name.
+    /// Name of the body, unique in the document.
     pub name: String,
     /// Index of the parent in [`Mjcf::bodies`].
     pub parent: usize,
@@ -196,7 +196,7 @@ pub struct Inertial {
     pub com: Vector3<f64>,
     /// Principal axes in the body frame, `body_from_principal`.
     pub axes: UnitQuaternion<f64>,
-    /// Principal moments \[kg m²\].
+    /// Principal moments about the center of mass \[kg m²\].
     pub moments: Vector3<f64>,
     /// Location of the declaration.
     pub source: Option<SourceLocation>,
@@ -205,7 +205,7 @@ pub struct Inertial {
 /// Joint: `<joint>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Unique name.
+    /// Name of the joint, unique in the document.
     pub name: String,
     /// Type of the joint.
     pub kind: JointType,
@@ -217,7 +217,7 @@ pub struct Joint {
     pub damping: f64,
     /// Dry friction \[N m or N\].
     pub frictionloss: f64,
-    /// Rotor inertia \[kg m² or kg\].
+    /// Rotor inertia \[kg m² or kg\]; may include the implicit damping of [`drive::implicit`](crate::drive::implicit).
     pub armature: f64,
     /// Location of the declaration.
     pub source: Option<SourceLocation>,
@@ -267,7 +267,7 @@ pub struct Geom {
     pub friction: Option<[f64; 3]>,
     /// Contact compliance; `None` for MuJoCo's defaults.
     pub surface: Option<ContactParams>,
-    /// RGBA color; `None` for MuJoCo's gray.
+    /// RGBA color; `None` for the color of `material`, or MuJoCo's gray without a material.
     pub rgba: Option<[f64; 4]>,
     /// Name of the material.
     pub material: Option<String>,
@@ -334,7 +334,7 @@ pub enum Shape {
 /// Named frame: `<site>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Site {
-    /// Unique name.
+    /// Name of the site, unique in the document.
     pub name: String,
     /// Pose in the body frame.
     pub pose: Pose,
@@ -343,17 +343,17 @@ pub struct Site {
 /// Light: `<light>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
-    /// Unique name.
+    /// Name of the light, unique in the document.
     pub name: String,
-    /// Position \[m\].
+    /// Position in the world \[m\]; unused by directional lights.
     pub position: Vector3<f64>,
-    /// Direction of the light.
+    /// Unit direction of the emitted light, in the world; unused by point lights.
     pub direction: Vector3<f64>,
-    /// Diffuse color.
+    /// Diffuse color, RGB in 0..=1.
     pub diffuse: [f64; 3],
     /// Type of the light.
     pub kind: LightKindCfg,
-    /// Constant, linear and quadratic attenuation.
+    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation.
     pub attenuation: [f64; 3],
     /// Radius of the light \[m\]; not supported by MuJoCo 2.2.2.
     pub radius: f64,
@@ -364,7 +364,7 @@ pub struct Light {
 /// Equality constraint between joints, `<equality><joint>`: `follower = offset + multiplier * driver`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointEquality {
-    /// Unique name.
+    /// Name of the equality constraint, unique in the document.
     pub name: String,
     /// Name of the constrained joint, `joint1` in MJCF.
     pub follower: String,
@@ -381,7 +381,7 @@ pub struct JointEquality {
 /// Weld constraint that is inactive at first: `<equality><weld>`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WeldEquality {
-    /// Unique name.
+    /// Name of the weld, unique in the document.
     pub name: String,
     /// Name of the first body.
     pub first: String,
@@ -392,7 +392,7 @@ pub struct WeldEquality {
 /// Tendon of one joint with dry friction: `<tendon><fixed>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionTendon {
-    /// Unique name.
+    /// Name of the tendon, unique in the document.
     pub name: String,
     /// Name of the joint.
     pub joint: String,
@@ -403,7 +403,7 @@ pub struct FrictionTendon {
 /// Actuator, `<actuator><general>`: force = clamp(gain ctrl - kp q - kd v).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actuator {
-    /// Unique name.
+    /// Name of the actuator, unique in the document.
     pub name: String,
     /// Name of the joint.
     pub joint: String,
@@ -415,7 +415,7 @@ pub struct Actuator {
     pub kd: f64,
     /// Largest force \[N m or N\]; `None` without a limit.
     pub force_limit: Option<f64>,
-    /// Range of the control; `None` without a limit.
+    /// Range of the control, in its unit; `None` without a limit.
     pub ctrl_range: Option<[f64; 2]>,
     /// Location of the joint.
     pub source: Option<SourceLocation>,
@@ -426,7 +426,7 @@ pub struct Actuator {
 pub struct Keyframe {
     /// Name of the keyframe.
     pub name: String,
-    /// Positions of all joints in MuJoCo's order.
+    /// Positions of all joints in MuJoCo's layout of `qpos`.
     pub qpos: Vec<f64>,
     /// Controls of all actuators in order.
     pub ctrl: Vec<f64>,

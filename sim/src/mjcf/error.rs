@@ -9,7 +9,7 @@ pub const MAX_BODY_DEPTH: usize = match kinetoscope_mujoco::BUILD_VERSION {
     kinetoscope_mujoco::SupportedVersion::V4 => 480,
 };
 
-/// Error of adding a robot to an MJCF document.
+/// A robot that MJCF cannot represent.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RobotMjcfError {
@@ -23,7 +23,7 @@ pub enum RobotMjcfError {
         link: String,
         /// Location of the link.
         source_line: SourceLocation,
-        /// Number of moving bodies from the root to the link.
+        /// Number of bodies from the root to the link, both included.
         depth: usize,
     },
 }

@@ -56,9 +56,9 @@ pub(crate) struct RobotMjcfCfg<'a> {
     pub contact: GeomRole,
     /// True if the root link is fixed in the world.
     pub fix_base: bool,
-    /// Pose of the root link in the environment.
+    /// Pose of the root link in the environment; for an MJCF file, pose of the file's world.
     pub base_pose: Pose,
-    /// Plan of each drivable joint.
+    /// Plan of each drivable joint, in the order of the description.
     pub plans: &'a [JointPlan],
     /// Convex hulls of collision meshes.
     pub hulls: &'a BTreeMap<MeshKey, TriMesh>,
@@ -77,7 +77,7 @@ pub(crate) struct RobotLayout {
     pub free_joint: Option<String>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_contact_exclusions: Vec<(String, String)>,
-    /// Owner of every named geom.
+    /// Link and visual of every named geom.
     pub geoms: Vec<GeomOwner>,
     /// Joints whose damping is integrated with the drives; see [`crate::drive::implicit`].
     pub damped: Vec<DampedJoint>,
@@ -119,7 +119,7 @@ pub(crate) struct LinkFrame {
 /// Adds a robot to `mjcf`.
 ///
 /// # Errors
-/// The tree is deeper than MuJoCo can read.
+/// The tree has more than [`MAX_BODY_DEPTH`] bodies one below the other.
 pub(crate) fn add(
     description: &RobotDescription,
     cfg: &RobotMjcfCfg<'_>,
@@ -211,8 +211,8 @@ impl RobotWriter<'_, '_> {
         Ok(())
     }
 
-    /// Parent and pose of the body behind a joint. MuJoCo allows free joints only on children of the world: a floating
-    /// link below a fixed base becomes a child of the world.
+    /// Returns the parent body, and the pose in its frame, of the body that a joint moves. MuJoCo allows free joints
+    /// only on children of the world: a floating link below a fixed base becomes a child of the world.
     fn parent_for(&self, kind: JointKind, parent: usize, pose: Pose) -> (usize, Pose) {
         let is_root = self.mjcf.bodies[parent].parent == 0;
         if kind == JointKind::Floating && self.cfg.fix_base && is_root {

@@ -13,17 +13,17 @@ use crate::objects::rigid_object_data::{BodyType, RigidObjectData};
 use crate::objects::terrain::Terrain;
 use kinetoscope_scene::Pose;
 
-/// Contact bit of the ground and of objects.
+/// Contact bit of the ground, terrains and objects.
 pub(crate) const WORLD_BIT: i32 = 1;
 /// All usable bits: MuJoCo's are signed 32-bit numbers.
 const ALL_BITS: i32 = i32::MAX;
 
-/// Contact bits of the ground and of objects, which collide with everything.
+/// Contact bits of the ground, terrains and objects, which collide with each other and with robots.
 pub(crate) const WORLD_CONTACT: GeomRole =
     GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, visible: true };
 
-/// Contact bits of robot `index`. It collides with the world and with other robots, and with itself if `self_collision`
-/// is set.
+/// Contact bits of robot `index`. It collides with the ground, terrains, objects and other robots, and with itself if
+/// `self_collision` is set.
 pub(crate) fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
     let bit = 1 << (index + 1).min(MAX_ROBOTS);
     let conaffinity = if self_collision { ALL_BITS } else { ALL_BITS & !bit };

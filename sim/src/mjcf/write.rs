@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 pub struct MjcfText {
     /// XML text.
     pub xml: String,
-    /// Element of the user's file that caused each line of `xml`.
+    /// Location in the user's file of the element that caused each line of `xml`; `None` for lines without one.
     pub sources: Vec<Option<SourceLocation>>,
 }
 
@@ -35,7 +35,7 @@ impl MjcfText {
     }
 }
 
-/// Writes the document for `target`.
+/// Writes the document as MJCF for the MuJoCo version `target`.
 pub fn write(mjcf: &Mjcf, target: SupportedVersion) -> MjcfText {
     let mut out = MjcfWriter {
         xml: String::new(),

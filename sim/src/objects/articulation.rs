@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub struct ArticulationCfg {
     /// Name of the articulation, unique in the simulation; prefix of its names in MuJoCo.
     pub uid: String,
-    /// URDF files of the articulation.
+    /// URDF files of the articulation; empty if [`mjcf`](Self::mjcf) is set.
     #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
     /// MJCF file of the articulation, instead of URDF files; see [`RobotCfg::mjcf`]. If [`drive`](Self::drive) is
@@ -41,15 +41,18 @@ pub struct ArticulationCfg {
     /// Drives, such as the spring of a door closer (a stiffness, and a target at 0); `None` for passive joints.
     /// Stiffness and damping that it does not set are those of [`DriveCfg::default`], which are made for robots.
     pub drive: Option<DriveCfg>,
-    /// Dry friction \[N m or N\]. If unset, that of `drive`, or else that of the file. It leaves joints passive.
+    /// Dry friction \[N m or N\]. If unset, that of `drive`, or else that of the file. Setting it gives no joint a
+    /// drive.
     pub friction: Option<PerJoint>,
     /// Rotor inertia \[kg m² or kg\]. If unset, that of `drive`, or else 0 for joints of a URDF and the value of an
-    /// MJCF file. It leaves joints passive.
+    /// MJCF file. Setting it gives no joint a drive.
     pub armature: Option<PerJoint>,
-    /// Surface properties of links besides their colors, by link pattern. A link may match only one pattern.
+    /// Surface properties of links besides their colors, for rendering only, by link pattern. A link may match only one
+    /// pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
-    /// True if the links collide with each other.
+    /// True if the links collide with each other. Links connected by a joint, and links that overlap in the initial
+    /// pose, never collide.
     pub self_collision: bool,
     /// Settings for the convex hulls of collision meshes.
     pub hull: HullCfg,
@@ -116,12 +119,13 @@ pub type Articulation<'a> = Robot<'a>;
 pub type ArticulationMut<'a> = RobotMut<'a>;
 
 impl SimulationManager {
-    /// Adds an articulation, such as a cabinet with drawers or a door, to every environment. It is compiled as by
-    /// [`add_robot`](Self::add_robot). Sensors and [`properties`](Self::properties) name its links and joints like
-    /// those of robots, `uid/link` and `uid/joint`. A simulation holds up to 30 robots and articulations.
+    /// Adds an articulation, such as a cabinet with drawers or a door, to every environment. The model is compiled in
+    /// this call, as in [`add_robot`](Self::add_robot). Sensors and [`properties`](Self::properties) name its links and
+    /// joints like those of robots, `uid/link` and `uid/joint`. A simulation holds up to 30 robots and articulations
+    /// together.
     ///
     /// # Errors
-    /// As [`add_robot`](Self::add_robot).
+    /// Same errors as [`add_robot`](Self::add_robot).
     pub fn add_articulation(&mut self, cfg: ArticulationCfg) -> Result<ArticulationId> {
         let (cfg, class) = cfg.into_robot_cfg();
         self.add_with_role(cfg, RobotKind::Articulation(class)).map(ArticulationId)

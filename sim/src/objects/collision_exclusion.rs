@@ -6,10 +6,11 @@ use crate::manager::SimulationManager;
 impl SimulationManager {
     /// Excludes collisions between two entities from now on, in all environments.
     ///
-    /// Names are those of objects (`uid`), links (`uid/link`), all links of a robot (`uid`), bodies of MJCF parts
-    /// (`uid/body`), and `world` for the ground and all terrains. Between links of one robot, this removes pairs from
-    /// its self-collision. A link behind a fixed joint is one body with its parent link. A robot with itself stands for
-    /// all pairs of its links. A pair that is excluded already changes nothing.
+    /// Names are those of objects (`uid`, also `group.object`), links (`uid/link`), all links of a robot or
+    /// articulation (`uid`), bodies of MJCF parts (`uid/body`), and `world` for the ground, all terrains and geoms
+    /// directly in the world of an MJCF part. Between links of one robot, this removes pairs from its self-collision. A
+    /// link behind a fixed joint is one body with its parent link. A robot with itself stands for all pairs of its
+    /// links. A pair that is excluded already changes nothing.
     ///
     /// # Errors
     /// A name is unknown (the error lists the nearest names), or both names are the same single body.

@@ -22,12 +22,13 @@ pub(super) struct FreeBody<'a> {
 }
 
 impl FreeBody<'_> {
-    /// Poses `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
+    /// Poses `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
     pub(super) fn poses(&self) -> Array2<f64> {
         self.rows(|env| to_row(&body_pose(env.data(), self.index.body)))
     }
 
-    /// Velocities of the frame, then angular velocities, in world axes, shape (N, 6); 0 for a fixed body.
+    /// Velocities of the frame, then angular velocities, in world axes, shape (N, 6); 0 for a body without a free
+    /// joint.
     pub(super) fn velocities(&self) -> Array2<f64> {
         self.rows(|env| {
             let Some((_, dof)) = self.index.free_joint else { return [0.0; 6] };
@@ -229,7 +230,7 @@ impl FreeBodyMut<'_> {
         place.ok_or_else(|| Error::FixedBody(self.owner.into()))
     }
 
-    /// Checks the shape and the numbers of an argument with poses and velocities.
+    /// Checks the environments (each once), the shape and the numbers of an argument.
     pub(super) fn check_columns(
         &self,
         argument: &'static str,

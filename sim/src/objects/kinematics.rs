@@ -19,8 +19,9 @@ use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, AsArray, Ix2};
 /// Result of [`Robot::compute_ik`], with one entry per selected environment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IkResult {
-    /// Positions of the joints \[rad or m\], shape (N, dof of the part). Joints that do not move the frame keep their
-    /// initial positions; mimic joints follow. Where `success` is false, these are the best positions found.
+    /// Positions of the joints \[rad or m\], shape (N, joints): columns as in [`compute_fk`](Robot::compute_fk). Joints
+    /// that do not move the frame keep their initial positions; mimic joints follow. Where `success` is false, these
+    /// are the best positions found.
     pub qpos: Array2<f64>,
     /// True where the frame is within the tolerances of its target, shape (N,).
     pub success: Array1<bool>,
@@ -113,7 +114,7 @@ impl Robot<'_> {
     /// of the column of its driver.
     ///
     /// # Errors
-    /// As [`compute_fk`](Self::compute_fk).
+    /// Same errors as [`compute_fk`](Self::compute_fk).
     pub fn jacobian<'n>(
         &self,
         tip: impl Into<TipFrame<'n>>,
@@ -362,8 +363,8 @@ impl Robot<'_> {
         }
     }
 
-    /// Finds a joint that moves the end of the chain by a polynomial coupling, and that is searched or follows a
-    /// searched joint.
+    /// Finds the column of a joint with a polynomial coupling that moves the end of the chain, and that is in `free` or
+    /// follows a joint in `free`.
     fn polynomial_follower(&self, chain: &Chain, free: &[usize]) -> Option<usize> {
         let (description, plans) = (self.description(), self.data.plans());
         let column_of = |joint: JointId| plans.iter().position(|plan| plan.joint == joint);
@@ -388,8 +389,8 @@ impl Robot<'_> {
         Error::Kinematics { robot: self.data.label(), error: Box::new(error) }
     }
 
-    /// Fills `positions` with the current positions of all joints in an environment, and returns the pose of the link
-    /// `base`.
+    /// Writes the current positions of all joints in environment `env`, in the order of `qpos`, to `positions` \[rad or
+    /// m\]. Returns the pose of the link `base` in the environment.
     fn read_positions(&self, env: usize, base: LinkId, positions: &mut [f64]) -> Pose {
         self.simulation.batch.read(env, |env| {
             for (position, joint) in positions.iter_mut().zip(&self.indexing().joints) {
@@ -403,7 +404,7 @@ impl Robot<'_> {
         self.indexing().links[link.0].pose(env.data())
     }
 
-    /// Checks positions of the joints `columns`.
+    /// Checks the shape and the numbers of positions of the joints `columns`. Repeated environments are allowed.
     fn part_rows<'v>(
         &self,
         argument: &'static str,

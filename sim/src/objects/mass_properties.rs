@@ -19,7 +19,8 @@ pub(crate) struct MassProperties {
 }
 
 impl MassProperties {
-    /// Computes the mass properties of a configuration whose numbers are finite.
+    /// Computes the mass properties of a configuration whose numbers are finite: `mass`, `center_of_mass` and `inertia`
+    /// of the configuration, else those of the shape or `mesh`.
     pub(crate) fn of(cfg: &RigidObjectCfg, mesh: Option<&ObjectMesh>) -> Self {
         let mut found = match mesh.and_then(|mesh| mesh.inertia) {
             Some(unit) => Self::of_mesh(cfg, &unit),

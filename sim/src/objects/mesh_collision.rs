@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Collision geometry of an object from a mesh file.
 ///
 /// MuJoCo computes contacts between convex shapes only: a mesh that is not convex collides as one, several, or very
-/// many convex shapes. Mass and moments are always those of the mesh.
+/// many convex shapes. Mass and moments do not depend on this choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -25,8 +25,8 @@ pub enum MeshCollision {
     /// the tolerance. Each piece costs time while another body is near the object. The pieces of a closed mesh contain
     /// everything that the mesh encloses. The pieces of an open mesh, which a diagnostic names, contain its surface.
     Pieces(ConvexDecompositionCfg),
-    /// Every triangle exactly as in the file, as the front of a prism. This is for static and kinematic objects of up
-    /// to 2000 triangles. If the mesh is thinner than `thickness`, prisms protrude behind it. A body that penetrates
+    /// Every triangle exactly as in the file, as the front of a prism. Only static and kinematic objects of up to 2000
+    /// triangles support it. If the mesh is thinner than `thickness`, prisms protrude behind it. A body that penetrates
     /// the front by more than `thickness` falls through. Bodies rest at the correct position. Bodies that slide over
     /// edges between triangles are braked, because MuJoCo does not treat the triangles as one surface: a ball of 5 cm
     /// radius that slides along a smooth valley at 0.5 m/s, over an edge every 5 cm on both sides, still has more than
@@ -65,7 +65,7 @@ impl MeshCollision {
         }
     }
 
-    /// Convex shapes of a mesh file with the triangles `mesh`.
+    /// Returns the convex collision shapes of a mesh file. `mesh` has its scaled triangles.
     pub(super) fn shapes(
         &self,
         uid: &str,

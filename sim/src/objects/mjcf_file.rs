@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// MJCF file of a robot: see [`RobotCfg::mjcf`](crate::RobotCfg::mjcf).
+/// MJCF file of a robot or articulation: see [`RobotCfg::mjcf`](crate::RobotCfg::mjcf).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MjcfFile {
@@ -24,7 +24,7 @@ impl MjcfFile {
         Self { path: "text".into(), text: Some(text.into()) }
     }
 
-    /// Replaces its path by the result of `beside`; MJCF text has no path.
+    /// Replaces the path by the result of `beside`, unless `text` is set.
     pub(crate) fn resolve_path(&mut self, beside: impl Fn(&Path) -> PathBuf) {
         if self.text.is_none() {
             self.path = beside(&self.path);

@@ -43,37 +43,39 @@ impl<'a> MjcfPart<'a> {
         self.data.cfg()
     }
 
-    /// Compiled model of the file alone.
+    /// Compiled model of the file alone. Its indices and addresses are not those of the scene.
     pub fn model(&self) -> &'a Model {
         self.data.model()
     }
 
-    /// Names of its joints, in MuJoCo's order.
+    /// Names of its joints without the prefix `uid/`, in MuJoCo's order. An element without a name is called by its
+    /// kind and its index: `joint3`, `body2`, `actuator0`.
     pub fn joint_names(&self) -> &'a [String] {
         &self.data.names.joints
     }
 
-    /// Names of its bodies, in MuJoCo's order, without the world.
+    /// Names of its bodies without the prefix `uid/`, in MuJoCo's order, without the world.
     pub fn body_names(&self) -> &'a [String] {
         &self.data.names.bodies[1..]
     }
 
-    /// Names of its sites, in MuJoCo's order; a site without a name is called `site` with its index.
+    /// Names of its sites without the prefix `uid/`, in MuJoCo's order.
     pub fn site_names(&self) -> &'a [String] {
         &self.data.names.sites
     }
 
-    /// Names of its actuators, in MuJoCo's order: the columns of [`ctrl`](Self::ctrl).
+    /// Names of its actuators without the prefix `uid/`, in MuJoCo's order: the columns of [`ctrl`](Self::ctrl).
     pub fn actuator_names(&self) -> &'a [String] {
         &self.data.names.actuators
     }
 
-    /// Names of MuJoCo's own sensors in it, without those that a part cannot have (a diagnostic names each).
+    /// Names of MuJoCo's own sensors in it without the prefix `uid/`. Sensors that a part cannot have are left out; a
+    /// diagnostic names each.
     pub fn sensor_names(&self) -> &'a [String] {
         &self.data.sensor_names
     }
 
-    /// Indices of the actuators that match patterns, in the order of the patterns.
+    /// Indices of the actuators that match `patterns` (whole names without `uid/`), in the order of the patterns.
     ///
     /// # Errors
     /// A pattern matches nothing (with the nearest names), or an actuator is matched twice.
@@ -96,7 +98,7 @@ impl<'a> MjcfPart<'a> {
     /// of the body), a ball joint 3, any other joint 1.
     ///
     /// # Errors
-    /// As [`qpos_columns`](Self::qpos_columns).
+    /// Same errors as [`qpos_columns`](Self::qpos_columns).
     pub fn qvel_columns<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<Range<usize>>> {
         self.columns(patterns, self.model().jnt_dofadr(), [6, 3, 1])
     }
@@ -138,14 +140,15 @@ impl<'a> MjcfPart<'a> {
         self.rows(&self.indices().dofs, |env, place| env.data().qvel()[place])
     }
 
-    /// Controls of its actuators, in the units that the file gives them, shape (N, nu).
+    /// Controls of its actuators as set, not clamped, in the units that the file gives them, shape (N, nu).
     #[doc(alias = "get_ctrl")]
     pub fn ctrl(&self) -> Array2<f64> {
         self.rows(&self.indices().controls, |env, place| env.data().ctrl()[place])
     }
 
-    /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step. After a
-    /// reset or a write they are 0, or those of the current state if a sensor needs solved quantities.
+    /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step, also
+    /// after a write. After a reset they are 0. If a sensor needs solved quantities, a write or a reset replaces them
+    /// by the forces in the new state.
     #[doc(alias = "get_actuator_force")]
     pub fn actuator_force(&self) -> Array2<f64> {
         self.rows(&self.indices().actuators, |env, place| env.data().actuator_force()[place])
@@ -266,8 +269,9 @@ impl<'a> MjcfPartMut<'a> {
     }
 
     /// Writes positions of all joints into the state, in the layout of [`qpos`](MjcfPart::qpos): rows of nq numbers for
-    /// `env_ids` (`None` for all environments; a single row applies to all of them). Quaternions are normalized. A
-    /// forward pass follows, so that later reads belong to the new state.
+    /// `env_ids` (`None` for all environments; a single row applies to all of them). Positions are not clamped to joint
+    /// ranges. Quaternions are normalized. A forward pass follows, so that later reads of positions and velocities
+    /// belong to the new state.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;
@@ -297,7 +301,7 @@ impl<'a> MjcfPartMut<'a> {
     }
 
     /// Writes velocities of all joints into the state, in the layout of [`qvel`](MjcfPart::qvel): rows of nv numbers,
-    /// as in [`write_qpos`](Self::write_qpos).
+    /// for environments as in [`write_qpos`](Self::write_qpos).
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated environment, or a value that is not finite; then nothing is written.

@@ -39,11 +39,11 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MjcfPartCfg {
-    /// Name of the part, unique in the simulation; prefix of its names.
+    /// Name of the part, unique in the simulation; prefix of the names of its elements (`uid/body`).
     pub uid: String,
-    /// Path of the file; with `text`, only its name in error messages.
+    /// Path of the file. If `text` is set, no file is read and the path only appears in error messages.
     pub path: PathBuf,
-    /// MJCF text, which must not refer to files; `None` for the content of the file.
+    /// MJCF source text, without references to other files. `None` reads the file at `path`.
     pub text: Option<String>,
     /// Pose of the file's world in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
@@ -72,7 +72,7 @@ impl Default for MjcfPartCfg {
 }
 
 impl MjcfPartCfg {
-    /// Creates the configuration of a file whose world is the environment.
+    /// Creates the configuration of the file at `path`, placed so that the file's world coincides with the environment.
     pub fn file(uid: impl Into<String>, path: impl Into<PathBuf>) -> Self {
         Self { uid: uid.into(), path: path.into(), ..Self::default() }
     }
@@ -334,7 +334,7 @@ pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: 
 }
 
 impl MjcfPartCfg {
-    /// Replaces its path by the result of `beside`; MJCF text has no path.
+    /// Replaces the path by the result of `beside`, unless `text` is set.
     pub(crate) fn resolve_path(&mut self, beside: impl Fn(&Path) -> PathBuf) {
         if self.text.is_none() {
             self.path = beside(&self.path);

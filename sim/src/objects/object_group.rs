@@ -42,7 +42,7 @@ impl<'a> RigidObjectGroup<'a> {
         self.data.objects.is_empty()
     }
 
-    /// Names of the objects in the simulation, `group.object`, in order.
+    /// Names of the objects in the simulation, `group.object`, in the order of the configuration.
     pub fn names(&self) -> Vec<&'a str> {
         self.contents.objects[self.data.objects.clone()].iter().map(|object| object.uid()).collect()
     }
@@ -53,7 +53,8 @@ impl<'a> RigidObjectGroup<'a> {
         self.gather(|body| body.poses())
     }
 
-    /// Velocities of the objects' frames, then angular velocities, in world axes \[m/s, rad/s\], shape (N, K, 6).
+    /// Velocities of the objects' frames, then angular velocities, in world axes \[m/s, rad/s\], shape (N, K, 6); 0 for
+    /// objects that are not dynamic.
     #[doc(alias = "get_velocity")]
     pub fn velocity(&self) -> Array3<f64> {
         self.gather(|body| body.velocities())
@@ -163,8 +164,8 @@ impl<'a> RigidObjectGroupMut<'a> {
 }
 
 impl SimulationManager {
-    /// Adds several rigid objects that are read and written together, compiled as by [`add_robot`](Self::add_robot).
-    /// Each is also available as a single object, called `group.object`, by
+    /// Adds several rigid objects that are read and written together. The model is compiled in this call, as in
+    /// [`add_robot`](Self::add_robot). Each is also available as a single object, called `group.object`, by
     /// [`rigid_object_id`](crate::Entities::rigid_object_id).
     ///
     /// # Errors

@@ -14,14 +14,14 @@ use std::sync::Arc;
 pub(crate) struct ObjectMesh {
     /// Convex collision shapes.
     pub(crate) collision: Vec<Arc<TriMesh>>,
-    /// Visual mesh: the triangles of a file; `None` if the hull is visible.
+    /// Visual mesh: the triangles of a file; `None` for a cone, whose collision shape is visible.
     pub(crate) visual: Option<Arc<TriMesh>>,
-    /// Mass properties for a density of 1 kg/m³; `None` if the shape gives them.
+    /// Mass properties for a density of 1 kg/m³; `None` for a cone, whose shape gives them.
     pub(crate) inertia: Option<RigidInertia>,
 }
 
 impl ObjectMesh {
-    /// Creates the meshes of a shape; `None` for a shape that MuJoCo has.
+    /// Creates the meshes of a cone or mesh file; `None` for a primitive shape of MuJoCo.
     pub(crate) fn of(cfg: &RigidObjectCfg, diagnostics: &mut Vec<Diagnostic>) -> Result<Option<Self>> {
         cfg.mesh_collision.check(cfg)?;
         let (uid, collision) = (&cfg.uid, &cfg.mesh_collision);

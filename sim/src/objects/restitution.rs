@@ -30,7 +30,7 @@ pub(crate) const IMPEDANCE: [f64; 5] = [0.9999, 0.9999, 0.001, 0.5, 2.0];
 /// Weight of these contact parameters (`solmix`) against those of other surfaces, which have 1.
 pub(crate) const SOLMIX: f64 = 1e6;
 
-/// Restitution of a contact with a damping ratio of 0 to below 1.
+/// Coefficient of restitution of a contact with the damping ratio `ratio`, 0 to below 1.
 fn restitution(ratio: f64) -> f64 {
     let omega = (1.0 - ratio * ratio).sqrt();
     (-ratio / omega * (2.0 * ratio * omega).atan2(ratio * ratio - omega * omega)).exp()

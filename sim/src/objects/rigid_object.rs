@@ -41,7 +41,8 @@ impl<'a> RigidObject<'a> {
         self.data.mask_id
     }
 
-    /// Configured mass \[kg\]. [`mass`](Self::mass) gives the mass in each environment.
+    /// Mass of the configuration \[kg\]: `mass`, else `density` times the volume. [`mass`](Self::mass) gives the mass
+    /// in each environment.
     pub fn nominal_mass(&self) -> f64 {
         self.data.mass_properties.mass
     }
@@ -104,7 +105,8 @@ impl<'a> RigidObjectMut<'a> {
     /// [`write_pose`](Self::write_pose).
     ///
     /// # Errors
-    /// As [`write_pose`](Self::write_pose); static and kinematic objects have no velocity.
+    /// An object that is not dynamic; wrong shape, an unknown or repeated environment, or a value that is not finite.
+    /// Then nothing is written.
     pub fn write_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,

@@ -39,13 +39,13 @@ pub struct RigidObjectCfg {
     pub uid: String,
     /// Shape of the object.
     pub shape: ObjectShape,
-    /// Collision geometry of a mesh file.
+    /// Collision geometry of an [`ObjectShape::Mesh`]; other shapes collide as they are.
     pub mesh_collision: MeshCollision,
-    /// Type of motion.
+    /// Type of motion: dynamic (the default), kinematic or static.
     pub body_type: BodyType,
     /// Mass \[kg\]; `None` to compute it from `density`.
     pub mass: Option<f64>,
-    /// Density \[kg/m³\].
+    /// Density \[kg/m³\], used only without `mass`.
     pub density: f64,
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); `None` for the simulation's
     /// default. In a contact, MuJoCo takes the larger value of the two surfaces.
@@ -59,7 +59,8 @@ pub struct RigidObjectCfg {
     /// [`RigidObjectMut::set_damping`](crate::RigidObjectMut::set_damping) or the [property](crate::Property) changes
     /// it at run time, in single environments.
     pub linear_damping: f64,
-    /// Angular damping \[N m s/rad\]: the torque `-angular_damping w` against the angular velocity.
+    /// Angular damping \[N m s/rad\]: the torque `-angular_damping w` against the angular velocity. Both dampings must
+    /// be 0 for an object that is not dynamic.
     pub angular_damping: f64,
     /// Coefficient of restitution, 0.14 to 1: the fraction of the velocity that is left after a bounce. `None` for
     /// MuJoCo's soft contacts, which leave about 0.1.
@@ -79,7 +80,7 @@ pub struct RigidObjectCfg {
     pub init_pose: Pose,
     /// RGBA color in 0..=1; for a mesh, it applies where the file gives no color.
     pub rgba: [f64; 4],
-    /// Surface properties besides the color.
+    /// Surface properties besides the color, for rendering only.
     pub surface: SurfaceCfg,
     /// Semantic class in the table of mask ids; `None` for `object`.
     pub semantic_class: Option<String>,

@@ -28,7 +28,8 @@ impl RigidObject<'_> {
             .remove_axis(Axis(1))
     }
 
-    /// Center of mass in the object's frame in each environment \[m\], shape (N, 3).
+    /// Center of mass in the object's frame in each environment \[m\], shape (N, 3). An object that is not dynamic has
+    /// the configured one.
     #[doc(alias = "get_center_of_mass")]
     pub fn center_of_mass(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().com.iter().copied().collect();
@@ -37,7 +38,7 @@ impl RigidObject<'_> {
 
     /// Principal moments of inertia about the center of mass in each environment \[kg m²\], shape (N, 3), along x, y
     /// and z of the object's frame. For a mesh without a configured `inertia`, they are along its principal axes, the
-    /// largest first.
+    /// largest first. An object that is not dynamic has the configured moments.
     #[doc(alias = "get_inertia")]
     pub fn inertia(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().moments.iter().copied().collect();
@@ -88,7 +89,7 @@ impl RigidObject<'_> {
         wrenches
     }
 
-    /// Reads numbers of the body in each environment; an object that is not dynamic has the configured numbers.
+    /// Reads numbers of the body in each environment; returns `nominal` for an object that is not dynamic.
     fn read_body_values(
         &self,
         width: usize,
@@ -108,8 +109,8 @@ impl RigidObject<'_> {
 
 impl RigidObjectMut<'_> {
     /// Sets the mass \[kg\] of the object in `env_ids` (`None` for all environments): one number for each, or one for
-    /// all of them. The configured moments of inertia are scaled in proportion, as with another density. The mass
-    /// survives resets; a forward pass follows.
+    /// all of them. The moments of inertia become the configured ones, scaled in proportion as with another density;
+    /// moments of [`set_inertia`](Self::set_inertia) are lost. The mass survives resets; a forward pass follows.
     ///
     /// # Errors
     /// The object is not dynamic; wrong shape, an unknown or repeated environment, or a mass that is not finite or
@@ -144,8 +145,9 @@ impl RigidObjectMut<'_> {
         self.set(argument, meaning, &[Property::Inertia], moments.into(), env_ids)
     }
 
-    /// Sets sliding friction, torsional \[m\] and rolling \[m\]: rows of 3, as in [`set_mass`](Self::set_mass). In a
-    /// contact, MuJoCo takes the larger value of the two surfaces: a slippery object needs a slippery ground, too.
+    /// Sets sliding friction, torsional \[m\] and rolling \[m\], of objects of every type of motion: rows of 3, as in
+    /// [`set_mass`](Self::set_mass). In a contact, MuJoCo takes the larger value of the two surfaces: a slippery object
+    /// needs a slippery ground, too.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated environment, or a coefficient that is negative or not finite; then nothing

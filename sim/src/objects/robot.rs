@@ -46,7 +46,8 @@ impl<'a> Robot<'a> {
         self.data.uid()
     }
 
-    /// Merged robot as its files describe it, with its payloads.
+    /// Description of the robot from its files, with payloads added. Inertias that URDF files lack are completed as
+    /// [`UrdfCfg`](kinetoscope_robot::urdf::UrdfCfg) says.
     pub fn description(&self) -> &'a RobotDescription {
         self.data.description()
     }
@@ -56,7 +57,8 @@ impl<'a> Robot<'a> {
         self.data.plans.len()
     }
 
-    /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
+    /// Names of the movable joints with one degree of freedom, mimic joints included, in the order of the merged URDF,
+    /// or of the MJCF file. They have no prefix `uid/`.
     pub fn joint_names(&self) -> &'a [String] {
         &self.data.joint_names
     }
@@ -67,7 +69,7 @@ impl<'a> Robot<'a> {
         self.data.description.named_links().iter().map(|l| l.name.as_str()).collect()
     }
 
-    /// Names of the control parts.
+    /// Names of the control parts, in alphabetical order.
     pub fn control_parts(&self) -> Vec<&'a str> {
         self.data.parts.keys().map(String::as_str).collect()
     }
@@ -97,7 +99,8 @@ impl<'a> Robot<'a> {
             .ok_or_else(|| unknown_name_error("joint", name, self.joint_names().iter().map(String::as_str)))
     }
 
-    /// True if a joint follows another joint.
+    /// True for a mimic joint: a linear function of another joint. Joints with a nonlinear equality of an MJCF file are
+    /// not mimic joints.
     ///
     /// # Errors
     /// The joint does not exist.
@@ -105,13 +108,15 @@ impl<'a> Robot<'a> {
         Ok(self.plan(joint)?.mimic.is_some())
     }
 
-    /// Plan of a joint of the description.
+    /// Plan of a joint of the description, by its column.
     pub(super) fn plan(&self, joint: JointIndex) -> Result<&JointPlan> {
         let (what, index, count) = ("joint", joint.0, self.data.plans.len());
         self.data.plans.get(index).ok_or(Error::UnknownIndex { what, index, count })
     }
 
-    /// Driver, ratio and offset of every joint; itself, 1 and 0 for a joint that follows no other.
+    /// Driver, multiplier and offset \[rad or m\] of each joint, in the order of [`joint_names`](Self::joint_names):
+    /// `position = multiplier * driver + offset`. A joint that is not a mimic joint has itself, 1 and 0. Chains of
+    /// mimic joints are resolved; nonlinear equalities of MJCF files are not included.
     pub fn mimic_drivers(&self) -> Vec<(JointIndex, f64, f64)> {
         (0..self.dof())
             .map(|i| match self.data.plans[i].mimic {
@@ -136,7 +141,8 @@ impl<'a> Robot<'a> {
         self.gather(|env, joint| env.data().qvel()[joint.dof])
     }
 
-    /// Efforts of the drives in the last step \[N m or N\], shape (N, dof); 0 for joints without a drive.
+    /// Efforts of the drives in the last MuJoCo step, after the effort limit \[N m or N\], shape (N, dof). They include
+    /// the efforts of [`set_qf_target`](RobotMut::set_qf_target). 0 for joints without a drive, and after a reset.
     #[doc(alias = "get_qf")]
     pub fn qf(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
@@ -167,7 +173,7 @@ impl<'a> Robot<'a> {
     }
 
     /// Initial joint positions \[rad or m\], to which [`reset`](crate::SimulationManager::reset) returns, shape (N,
-    /// dof).
+    /// dof): those of the configuration or file, clamped to the limits. All rows are equal.
     #[doc(alias = "default_joint_pos")]
     #[doc(alias = "get_default_qpos")]
     pub fn default_qpos(&self) -> Array2<f64> {
@@ -175,7 +181,8 @@ impl<'a> Robot<'a> {
         Array2::from_shape_fn((n, self.dof()), |(_, joint)| self.data.plans[joint].initial)
     }
 
-    /// Initial pose of the root link: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
+    /// Initial pose of the root link, moved by `ground_clearance`: rows `[x, y, z, qw, qx, qy, qz]` in the environment
+    /// \[m\], shape (N, 7).
     #[doc(alias = "get_default_root_pose")]
     pub fn default_root_pose(&self) -> Array2<f64> {
         let row = to_row(&self.data.root_pose());
@@ -248,8 +255,9 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Sets position targets \[rad or m\]: rows for `env_ids` (`None` for all environments; a single row applies to all
-    /// of them), columns for `joint_ids` (`None` for all joints). Targets are clamped to the joint limits. Columns of
-    /// joints without a drive (passive and mimic joints) are accepted and ignored.
+    /// of them), columns for `joint_ids` (`None` for all joints). Targets are clamped to
+    /// [`qpos_limits`](Robot::qpos_limits). Columns of joints without a drive (passive and mimic joints) are accepted
+    /// and ignored.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.
@@ -289,8 +297,8 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Sets efforts \[N m or N\] that are added to the efforts of the drives, before the sum is clamped to their
-    /// limits. They stay until changed or reset, and are 0 at first. A joint without a drive (drive type `None`) gets
-    /// the effort itself, clamped to its own limit. Rows and columns as in [`set_qpos_target`](Self::set_qpos_target);
+    /// limits. They stay until changed or reset, and are 0 at first. A passive joint gets the effort itself, clamped to
+    /// its limit ([`qf_limits`](Robot::qf_limits)). Rows and columns as in [`set_qpos_target`](Self::set_qpos_target);
     /// columns of mimic joints are accepted and ignored.
     ///
     /// # Errors
@@ -332,7 +340,8 @@ impl<'a> RobotMut<'a> {
         Ok(())
     }
 
-    /// Writes joint positions \[rad or m\] into the state, clamped to the limits; targets stay. Rows and columns as in
+    /// Writes joint positions \[rad or m\] into the state, clamped to the joints' own limits, not to the range of
+    /// [`set_qpos_limits`](Self::set_qpos_limits); targets stay. Rows and columns as in
     /// [`set_qpos_target`](Self::set_qpos_target); mimic joints are written as given. A forward pass follows, so that
     /// later reads belong to the new state.
     ///
@@ -356,11 +365,11 @@ impl<'a> RobotMut<'a> {
         Ok(())
     }
 
-    /// Writes joint velocities \[rad/s or m/s\] into the state; targets stay. Rows and columns as in
-    /// [`write_qpos`](Self::write_qpos).
+    /// Writes joint velocities \[rad/s or m/s\] into the state, not clamped; targets stay. A forward pass follows. Rows
+    /// and columns as in [`write_qpos`](Self::write_qpos).
     ///
     /// # Errors
-    /// As [`write_qpos`](Self::write_qpos).
+    /// Same errors as [`write_qpos`](Self::write_qpos).
     pub fn write_qvel<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,
@@ -392,7 +401,8 @@ impl<'a> RobotMut<'a> {
     /// in [`write_root_pose`](Self::write_root_pose).
     ///
     /// # Errors
-    /// As [`write_root_pose`](Self::write_root_pose).
+    /// The base is fixed; wrong shape, an unknown or repeated environment, or a value that is not finite. Then nothing
+    /// is written.
     pub fn write_root_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct RobotCfg {
     /// Name of the robot, unique in the simulation; prefix of its names in MuJoCo.
     pub uid: String,
-    /// URDF files of the robot.
+    /// URDF files of the robot; empty if [`mjcf`](Self::mjcf) is set.
     #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
     /// MJCF file of the robot, instead of URDF files.
@@ -75,7 +75,8 @@ pub struct RobotCfg {
     /// ```
     #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
     pub mjcf: Option<MjcfFile>,
-    /// Named groups of joints: patterns that each match whole joint names.
+    /// Named groups of joints: a list of patterns for each name. A pattern matches whole joint names, and must match at
+    /// least one; no joint may match two patterns of a part. Parts may share joints.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub control_parts: Vec<(String, Vec<String>)>,
     /// Drive properties.
@@ -86,25 +87,27 @@ pub struct RobotCfg {
     /// placed as in the file.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Initial height of the lowest collision point of the robot above the ground at z = 0 \[m\], instead of the z of
-    /// [`init_pose`](Self::init_pose). `None` leaves the robot at `init_pose`.
+    /// Initial height of the lowest collision point of the robot in its initial position above the plane z = 0 \[m\],
+    /// instead of the z of [`init_pose`](Self::init_pose). `None` leaves the robot at `init_pose`.
     pub ground_clearance: Option<f64>,
     /// Initial positions by joint pattern or control part \[rad or m\]. Other joints start at 0, or at the `ref` of an
     /// MJCF file. All initial positions are clamped to the joint limits; a mimic joint starts at the position that its
     /// driver implies.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
-    /// Payloads by link pattern \[kg\]: a point mass at the link's center of mass, or a ball with the density of water
-    /// at the origin of a link without mass.
+    /// Payloads by link pattern \[kg\], each added to every matching link: a point mass at the link's center of mass,
+    /// or a ball with the density of water at the origin of a link without mass.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub payload: Vec<(String, f64)>,
-    /// Surface properties of links besides their colors, by link pattern. A link may match only one pattern.
+    /// Surface properties of links besides their colors, for rendering only, by link pattern. A link may match only one
+    /// pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Fraction of the range of each joint between its soft limits, 0 to 1: see
     /// [`Robot::soft_qpos_limits`](crate::Robot::soft_qpos_limits).
     pub soft_limit_factor: f64,
-    /// True if the links of this robot collide with each other.
+    /// True if the links of this robot collide with each other. Links connected by a joint, and links that overlap in
+    /// the initial pose, never collide.
     pub self_collision: bool,
     /// Settings for the convex hulls of collision meshes.
     pub hull: HullCfg,

@@ -18,7 +18,8 @@ impl Robot<'_> {
     /// Heights of the lowest collision points of links in the environment \[m\], in the order of
     /// [`link_names`](Self::link_names), shape (N, links); +∞ for a link without collision shapes.
     ///
-    /// They are exact for MuJoCo's primitives, and for meshes, which collide as their convex hulls.
+    /// They are exact for MuJoCo's primitives, and for meshes, which collide as their convex hulls. Planes and height
+    /// fields of a link do not count.
     #[doc(alias = "get_link_lowest_heights")]
     pub fn link_lowest_heights(&self) -> Array2<f64> {
         let links: Vec<usize> = (0..self.link_names().len()).collect();
@@ -41,7 +42,7 @@ impl Robot<'_> {
     /// collide with the ground.
     ///
     /// # Errors
-    /// The link does not exist.
+    /// The index of the link does not exist.
     pub fn is_link_fixed(&self, link: LinkId) -> Result<bool> {
         let links = &self.indexing().links;
         let frame = links.get(link.0).ok_or(Error::UnknownIndex { what: "link", index: link.0, count: links.len() })?;

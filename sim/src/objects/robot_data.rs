@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JointIndex(pub usize);
 
-/// Loaded robot: everything that does not change while the simulation runs.
+/// Loaded robot or articulation: everything that does not change while the simulation runs.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotData {
     cfg: RobotCfg,
@@ -154,7 +154,7 @@ impl RobotData {
         self.role == RobotKind::Robot
     }
 
-    /// Merged robot as its files describe it, with its payloads.
+    /// Description of the robot from its files, with completed inertias and payloads.
     pub(crate) fn description(&self) -> &RobotDescription {
         &self.description
     }
@@ -189,7 +189,7 @@ impl RobotData {
         file_error(&self.cfg, self.label(), error)
     }
 
-    /// Initial pose of the root link.
+    /// Initial pose of the root link in the environment, moved by `ground_clearance`.
     pub(crate) fn root_pose(&self) -> Pose {
         self.file.as_ref().map_or(self.cfg.init_pose, |file| self.cfg.init_pose * file.root_pose())
     }
@@ -209,8 +209,8 @@ fn file_error(cfg: &RobotCfg, robot: EntityLabel, error: RobotFileError) -> Erro
     Error::RobotFile { robot, file: path.unwrap_or_default(), error: Box::new(error) }
 }
 
-/// Describes a robot from its files, without payloads, with diagnostics about the files. With a `scene`, the
-/// diagnostics include settings of its MJCF file that differ from the scene's.
+/// Describes a robot from its files, with completed inertias and without payloads, and returns diagnostics about the
+/// files. With a `scene`, the diagnostics include settings of its MJCF file that differ from the scene's.
 pub(crate) fn describe_robot(
     cfg: &RobotCfg,
     named: &EntityLabel,
@@ -252,7 +252,7 @@ fn explicit_drive_plans(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan
     plans.iter().map(|plan| JointPlan { actuator: explicit(plan), ..plan.clone() }).collect()
 }
 
-/// Adds the payloads of links.
+/// Adds the configured payloads to the links of the description.
 fn add_payloads(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     if let Some((_, mass)) = cfg.payload.iter().find(|(_, mass)| !(mass.is_finite() && *mass >= 0.0)) {
         let expected = "a payload must be a finite mass >= 0 kg";
@@ -293,7 +293,8 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
     Ok(())
 }
 
-/// Checks the integrator: implicit drives need one that adds nothing to the acceleration that the solver found.
+/// Checks the integrator: implicit drives need one that adds nothing to the acceleration that the solver found: Euler,
+/// or implicitfast on MuJoCo 4.x.
 fn check_integrator(cfg: &RobotCfg, role: &RobotKind, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,

@@ -16,15 +16,15 @@ use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
 
 impl Robot<'_> {
-    /// Stiffness of the drives, in the unit of each drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
-    /// joints without a drive.
+    /// Stiffness of the drives, in the unit of each [drive type](DriveType), shape (N, dof); 0 for joints without a
+    /// drive. Randomized values are included.
     #[doc(alias = "get_stiffness")]
     pub fn stiffness(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].stiffness))
     }
 
-    /// Damping of the drives, in the unit of each drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
-    /// joints without a drive. The viscous friction of the joint itself is not part of it.
+    /// Damping of the drives, in the unit of each [drive type](DriveType), shape (N, dof); 0 for joints without a
+    /// drive. Randomized values are included. The viscous friction of the joint itself is not part of it.
     #[doc(alias = "get_damping")]
     pub fn damping(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].damping))
@@ -52,9 +52,10 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the stiffness of drives \[N m/rad or N/m for drive type `force`\]; all other settings stay. The stiffness
-    /// survives resets. Rows are for `env_ids` (`None` for all environments; a single row applies to all of them),
-    /// columns for `joint_ids` (`None` for all joints); columns of mimic joints are accepted and ignored.
+    /// Sets the stiffness of drives, in the unit of each [drive type](DriveType); all other settings stay. A randomized
+    /// stiffness is replaced. The stiffness survives resets. Rows are for `env_ids` (`None` for all environments; a
+    /// single row applies to all of them), columns for `joint_ids` (`None` for all joints); columns of mimic joints are
+    /// accepted and ignored.
     ///
     /// Drives of [`DriveModel::Implicit`](crate::DriveModel::Implicit) are stable with any gains. Explicit actuator
     /// models are not, and only [`add_robot`](crate::SimulationManager::add_robot) warns about them: gains that are set
@@ -94,12 +95,12 @@ impl RobotMut<'_> {
         })
     }
 
-    /// Sets the damping of drives \[N m s/rad or N s/m for drive type `force`\]; otherwise as
+    /// Sets the damping of drives, in the unit of each [drive type](DriveType); otherwise as
     /// [`set_stiffness`](Self::set_stiffness). Nothing warns about an explicit model that becomes unstable. The viscous
     /// friction of the joint itself stays.
     ///
     /// # Errors
-    /// As [`set_stiffness`](Self::set_stiffness).
+    /// Same errors as [`set_stiffness`](Self::set_stiffness).
     pub fn set_damping<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,
@@ -122,7 +123,7 @@ impl RobotMut<'_> {
     /// unstable: see [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
-    /// An unknown or repeated joint or environment; a joint that was added without a drive, or has a drive of
+    /// An unknown or repeated joint or environment; a selected joint that was added without a drive, or has a drive of
     /// [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     pub fn set_drive_type(
         &mut self,

@@ -21,7 +21,7 @@ impl RobotMut<'_> {
     /// them). Poses are relative to the environment: `env_origins` are not added.
     ///
     /// # Errors
-    /// As [`write_root_pose`](Self::write_root_pose); then nothing is written.
+    /// Same errors as [`write_root_pose`](Self::write_root_pose); then nothing is written.
     pub fn write_root_state<'t>(
         &mut self,
         states: impl AsArray<'t, f64, Ix2>,
@@ -49,7 +49,7 @@ impl RobotMut<'_> {
     /// [`write_qvel`](Self::write_qvel), shape (N, joints) each.
     ///
     /// # Errors
-    /// As [`write_qpos`](Self::write_qpos), for either argument; then nothing is written.
+    /// Same errors as [`write_qpos`](Self::write_qpos), for either argument; then nothing is written.
     pub fn write_joint_state<'t, 'v>(
         &mut self,
         positions: impl AsArray<'t, f64, Ix2>,

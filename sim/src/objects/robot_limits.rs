@@ -18,9 +18,10 @@ impl Robot<'_> {
         self.range_limits(|range| range)
     }
 
-    /// Soft limits \[rad or m\], shape (N, dof, 2): the fraction `soft_limit_factor` of the range of
-    /// [`qpos_limits`](Self::qpos_limits), around its middle. Nothing enforces them: they are for rewards and planners.
-    /// Infinite without limits.
+    /// Soft limits \[rad or m\], shape (N, dof, 2): the fraction
+    /// [`soft_limit_factor`](crate::RobotCfg::soft_limit_factor) of the range of [`qpos_limits`](Self::qpos_limits),
+    /// around its middle. Nothing enforces them: they are for rewards and planners. A range with an infinite end is its
+    /// own soft range.
     pub fn soft_qpos_limits(&self) -> Array3<f64> {
         let factor = self.data.cfg().soft_limit_factor;
         self.range_limits(|[low, high]| {
@@ -31,7 +32,8 @@ impl Robot<'_> {
     }
 
     /// Speed limits \[rad/s or m/s\], shape (N, dof); infinite without a limit. They are those of the files, unless the
-    /// configuration or [`set_qvel_limits`](RobotMut::set_qvel_limits) gives others. They are reported only; see there.
+    /// configuration or [`set_qvel_limits`](RobotMut::set_qvel_limits) gives others. Only [`DcMotor`](crate::DcMotor)
+    /// uses them; nothing else enforces them.
     pub fn qvel_limits(&self) -> Array2<f64> {
         let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_velocity));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
@@ -65,8 +67,8 @@ impl RobotMut<'_> {
     /// Sets the range of position targets \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (`None` for
     /// all environments; a single row applies to all of them), joints as `joint_ids` (`None` for all joints). Current
     /// targets are clamped at once; delayed targets of [`DelayedPd`](crate::DelayedPd) are clamped when they act. The
-    /// range may be tighter than the robot's own limits and be widened again, up to those. Mimic joints are accepted
-    /// and ignored.
+    /// range may be tighter than the robot's own limits and be widened again, up to those. Entries of mimic joints are
+    /// accepted and ignored.
     ///
     /// The range limits commands only. The joint stops are in MuJoCo's model and stay unchanged: a load may push a
     /// joint beyond a tighter range. [`compute_ik`](Robot::compute_ik) searches within the limits that the robot was

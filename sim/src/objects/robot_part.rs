@@ -31,12 +31,12 @@ impl RobotPartMut<'_> {
         &self.joints
     }
 
-    /// Sets position targets \[rad or m\], clamped to the limits: rows for `env_ids` (`None` for all environments; a
-    /// single row applies to all of them), a column for each joint of the part. Columns of mimic joints are accepted
-    /// and ignored.
+    /// Sets position targets \[rad or m\], clamped to [`qpos_limits`](crate::Robot::qpos_limits): rows for `env_ids`
+    /// (`None` for all environments; a single row applies to all of them), a column for each joint of the part. Columns
+    /// of mimic joints are accepted and ignored.
     ///
     /// # Errors
-    /// As [`RobotMut::set_qpos_target`]; then nothing is set.
+    /// Same errors as [`RobotMut::set_qpos_target`]; then nothing is set.
     #[doc(alias = "set_qpos")]
     pub fn set_qpos_target<'t>(
         &mut self,
@@ -50,7 +50,7 @@ impl RobotPartMut<'_> {
     /// [`set_qpos_target`](Self::set_qpos_target).
     ///
     /// # Errors
-    /// As [`RobotMut::set_qvel_target`]; then nothing is set.
+    /// Same errors as [`RobotMut::set_qvel_target`]; then nothing is set.
     #[doc(alias = "set_qvel")]
     pub fn set_qvel_target<'t>(
         &mut self,
@@ -64,7 +64,7 @@ impl RobotPartMut<'_> {
     /// and columns as in [`set_qpos_target`](Self::set_qpos_target).
     ///
     /// # Errors
-    /// As [`RobotMut::set_qf_target`]; then nothing is set.
+    /// Same errors as [`RobotMut::set_qf_target`]; then nothing is set.
     #[doc(alias = "set_qf")]
     pub fn set_qf_target<'t>(&mut self, efforts: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.robot.set_qf_target(efforts, Some(&self.joints), env_ids)

@@ -13,7 +13,8 @@ use crate::randomization::Property;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 
 impl Robot<'_> {
-    /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints without friction.
+    /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints without friction. Randomized values are
+    /// included.
     #[doc(alias = "get_friction")]
     pub fn friction(&self) -> Array2<f64> {
         self.property(Property::DryFriction)
@@ -26,7 +27,7 @@ impl Robot<'_> {
         self.property(Property::JointDamping)
     }
 
-    /// Rotor inertia of the joints \[kg m² or kg\], shape (N, dof).
+    /// Rotor inertia of the joints \[kg m² or kg\], shape (N, dof); 0 for joints without one.
     #[doc(alias = "get_armature")]
     pub fn armature(&self) -> Array2<f64> {
         self.property(Property::Armature)

@@ -33,31 +33,32 @@ impl Robot<'_> {
     /// and on the second axis of [`link_poses`](Self::link_poses).
     ///
     /// # Errors
-    /// As [`find_joints`](Self::find_joints).
+    /// Same errors as [`find_joints`](Self::find_joints).
     pub fn find_links<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<LinkId>> {
         let found = pattern::select(patterns, &self.link_names(), "link").map_err(|error| self.name_error(error))?;
         Ok(found.into_iter().map(LinkId).collect())
     }
 
-    /// Names of the joints that follow no other joint.
+    /// Names of all joints except mimic joints, in joint order.
     pub fn active_joint_names(&self) -> Vec<&str> {
         self.active_joints().map(|joint| self.joint_names()[joint.0].as_str()).collect()
     }
 
-    /// Indices of the joints that follow another joint; [`mimic_drivers`](Self::mimic_drivers) gives their drivers and
-    /// ratios.
+    /// Indices of the mimic joints. [`mimic_drivers`](Self::mimic_drivers) has the driver, multiplier and offset of
+    /// every joint.
     #[doc(alias = "mimic_ids")]
     pub fn mimic_joint_ids(&self) -> Vec<JointIndex> {
         (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_some()).collect()
     }
 
-    /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic joints.
+    /// Number of joints except mimic joints, passive joints included.
     pub fn active_dof(&self) -> usize {
         self.active_joints().count()
     }
 
     /// True if a joint has a drive, for which [`set_qpos_target`](crate::RobotMut::set_qpos_target) sets a target.
-    /// Passive joints and joints that follow another have no drive.
+    /// Passive joints and joints that follow another have no drive. A drive that
+    /// [`set_drive_type`](crate::RobotMut::set_drive_type) switched to `None` still counts.
     ///
     /// # Errors
     /// The joint does not exist.
@@ -65,8 +66,8 @@ impl Robot<'_> {
         Ok(self.plan(joint)?.actuator.is_some())
     }
 
-    /// Indices of the joints of a control part that follow no other joint, in the order of its patterns; `None` for all
-    /// joints. It is equivalent to EmbodiChain's `get_joint_ids` with `remove_mimic`.
+    /// Indices of the joints of a control part except mimic joints, in the order of its patterns. `None` selects from
+    /// all joints. It is equivalent to EmbodiChain's `get_joint_ids` with `remove_mimic`.
     ///
     /// # Errors
     /// The part does not exist; the error lists the existing parts.
@@ -90,14 +91,15 @@ impl Robot<'_> {
 /// Accelerations and targets of joints.
 impl Robot<'_> {
     /// Joint accelerations that MuJoCo's solver found in the last step \[rad/s² or m/s²\] (`qacc`), shape (N, dof); 0
-    /// before the first step. The solver computes them from positions, velocities and forces. A write to the state
-    /// leaves them unchanged until the next step, or until [`write_qacc`](RobotMut::write_qacc).
+    /// before the first step and after a reset. The solver computes them from positions, velocities and forces. A write
+    /// to the state leaves them unchanged until the next step, or until [`write_qacc`](RobotMut::write_qacc).
     ///
     /// With the integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the
-    /// velocity in the step, (v' - v) / h. They differ from it where something acts on the velocity after the solver:
-    /// the viscous damping of joints of a robot of [`DriveModel::Actuator`](crate::DriveModel::Actuator) (v' - v is h M
-    /// a / (M + h B) for a single joint), and velocity terms of the integrators implicit and implicitfast. With RK4
-    /// they are those of a stage inside the step. Use the difference of [`qvel`](Robot::qvel) in these cases.
+    /// velocity in the last MuJoCo step of length h, (v' - v) / h. They differ from (v' - v) / h in three cases. With
+    /// [`DriveModel::Actuator`](crate::DriveModel::Actuator), MuJoCo integrates viscous joint damping B implicitly: v'
+    /// = v + h M a / (M + h B) for a single joint. The integrators implicit and implicitfast add further velocity
+    /// terms. With RK4 they are the accelerations of an intermediate stage. In all these cases, compute accelerations
+    /// from differences of [`qvel`](Robot::qvel).
     #[doc(alias = "get_qacc")]
     pub fn qacc(&self) -> Array2<f64> {
         // The warm start is the acceleration of the last step, and a new forward pass keeps it.
@@ -110,8 +112,8 @@ impl Robot<'_> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.velocity[drive]))
     }
 
-    /// Effort targets of [`set_qf_target`](RobotMut::set_qf_target) \[N m or N\], shape (N, dof); 0 for mimic joints. A
-    /// passive joint has the applied effort, clamped to its limit.
+    /// Effort targets of [`set_qf_target`](RobotMut::set_qf_target) as set, not clamped \[N m or N\], shape (N, dof); 0
+    /// for mimic joints. Only the effort of a passive joint is clamped to its limit.
     #[doc(alias = "get_target_qf")]
     pub fn qf_target(&self) -> Array2<f64> {
         self.gather(|env, joint| match joint.drive {
@@ -124,7 +126,7 @@ impl Robot<'_> {
 /// State of the root link.
 impl Robot<'_> {
     /// Initial pose, velocity and angular velocity of the root link in the layout of [`root_state`](Self::root_state),
-    /// shape (N, 13): the pose of the configuration, at rest.
+    /// shape (N, 13): the pose of [`default_root_pose`](Self::default_root_pose), at rest.
     #[doc(alias = "get_default_root_state")]
     pub fn default_root_state(&self) -> Array2<f64> {
         let pose = to_row(&self.data.root_pose());
@@ -256,7 +258,8 @@ impl RobotMut<'_> {
     /// for equal targets. In all other cases, use [`snapshot`](crate::SimulationManager::snapshot).
     ///
     /// # Errors
-    /// As [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo treats as divergence.
+    /// Same errors as [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo treats as
+    /// divergence.
     pub fn write_qacc<'t>(
         &mut self,
         accelerations: impl AsArray<'t, f64, Ix2>,
@@ -278,7 +281,7 @@ impl RobotMut<'_> {
     /// the velocity of the link's frame.
     ///
     /// # Errors
-    /// As [`write_root_pose`](Self::write_root_pose).
+    /// Same errors as [`write_root_velocity`](Self::write_root_velocity).
     pub fn write_root_com_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,

@@ -60,7 +60,8 @@ fn first_repeat(chosen: &[usize]) -> Option<(usize, usize)> {
     chosen.iter().enumerate().find_map(|(second, &index)| places[index].replace(second).map(|first| (first, second)))
 }
 
-/// Rejects columns that are selected twice: it would be ambiguous which of them applies. `of` describes a column.
+/// Rejects columns that are selected twice: it would be ambiguous which of them applies. `of` describes the item of a
+/// column.
 pub(super) fn check_unique_columns(
     argument: &'static str,
     chosen: &[usize],
@@ -84,7 +85,7 @@ pub(super) fn check_unique_indices(
     }
 }
 
-/// Selected environments, each once.
+/// Selected environments in the given order; all for `None`. A repeated environment is an error.
 pub(super) fn unique_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
     let envs = env_list(env_ids, num_envs)?;
     if env_ids.is_some() {
@@ -93,7 +94,7 @@ pub(super) fn unique_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num
     Ok(envs)
 }
 
-/// Checked table: every number is valid, every environment exists.
+/// Checked table: every number is valid, every environment exists. Environments may repeat.
 #[derive(Debug)]
 pub(super) struct EnvRows<'v> {
     envs: Vec<usize>,

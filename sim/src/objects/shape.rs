@@ -46,7 +46,7 @@ pub enum ObjectShape {
         /// Height from the base to the tip \[m\].
         height: f64,
     },
-    /// A mesh file: STL, OBJ, DAE or GLB.
+    /// A mesh file: STL, OBJ, DAE, GLB or glTF.
     ///
     /// Cameras and ray casters see the triangles of the file. The collision shape is their convex hull, as for links of
     /// a robot, unless [`RigidObjectCfg::mesh_collision`](crate::RigidObjectCfg::mesh_collision) selects convex pieces
@@ -82,12 +82,12 @@ impl ObjectShape {
         Self::Box { size: [size; 3] }
     }
 
-    /// Creates the shape of a mesh file without scaling.
+    /// Creates the shape of a mesh file with scale 1 and the default hull settings.
     pub fn mesh(path: impl Into<PathBuf>) -> Self {
         Self::Mesh { path: path.into(), scale: no_scale(), hull: HullCfg::default() }
     }
 
-    /// Sizes that must be positive.
+    /// Sizes \[m\], or absolute scale factors of a mesh; all must be positive.
     pub(crate) fn sizes(&self) -> Vec<f64> {
         match *self {
             Self::Box { size } => size.to_vec(),
@@ -112,8 +112,8 @@ impl ObjectShape {
         })
     }
 
-    /// Center of mass for uniform density \[m\]: that of a cone is a quarter of its height above the base. `None` for a
-    /// mesh.
+    /// Center of mass for uniform density in the frame of the shape \[m\]: that of a cone is a quarter of its height
+    /// above the base. `None` for a mesh.
     pub fn center(&self) -> Option<Vector3<f64>> {
         match *self {
             Self::Cone { height, .. } => Some(Vector3::new(0.0, 0.0, -height / 4.0)),
@@ -151,7 +151,7 @@ impl ObjectShape {
         })
     }
 
-    /// Converts to a shape of MuJoCo; `mesh` is the name of the mesh for a shape that MuJoCo does not have.
+    /// Converts to a shape of MuJoCo; `mesh` is the name of the mesh asset for a cone or a mesh file.
     pub(crate) fn to_mjcf(&self, mesh: String) -> Shape {
         match *self {
             Self::Box { size } => Shape::Box(size.map(|s| s / 2.0)),

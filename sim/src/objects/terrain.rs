@@ -52,7 +52,7 @@ pub struct TerrainCfg {
     pub friction: Option<[f64; 3]>,
     /// RGBA color in 0..=1.
     pub rgba: [f64; 4],
-    /// Surface properties besides the color.
+    /// Surface properties besides the color, for rendering only.
     pub surface: SurfaceCfg,
 }
 
@@ -73,7 +73,8 @@ impl Default for TerrainCfg {
 }
 
 impl TerrainCfg {
-    /// Creates the terrain of a generator, called `uid`.
+    /// Creates the configuration of a terrain called `uid`, with the heights and the size of a generator. All other
+    /// fields have their defaults.
     ///
     /// # Errors
     /// [`Error::Terrain`] for an error of the generator.

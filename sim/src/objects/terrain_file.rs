@@ -58,7 +58,7 @@ impl TryFrom<TerrainFile> for TerrainCfg {
     }
 }
 
-/// Serializes heights as rows.
+/// Serializes heights as an array of rows.
 pub(super) fn rows<S: Serializer>(heights: &Array2<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(heights.rows().into_iter().map(|row| row.to_vec()))
 }

@@ -68,8 +68,8 @@ impl<'a> WeldMut<'a> {
         Weld::new(self.cfg, self.simulation, self.index)
     }
 
-    /// Attaches the two bodies at their current relative pose, in `env_ids` (`None` for all environments). A weld that
-    /// already holds gets the current relative pose. A forward pass follows.
+    /// Attaches the two bodies at their current relative pose, in `env_ids` (`None` for all environments). Each
+    /// environment has its own pose. A weld that already holds gets the current relative pose. A forward pass follows.
     ///
     /// The weld holds until it is released, the environment is reset, or a snapshot is restored in which it does not
     /// hold: a snapshot records the welds that hold and their relative poses.
@@ -87,7 +87,7 @@ impl<'a> WeldMut<'a> {
     /// Releases the two bodies, in `env_ids` (`None` for all environments). A forward pass follows.
     ///
     /// # Errors
-    /// As [`attach`](Self::attach).
+    /// Same errors as [`attach`](Self::attach).
     pub fn release(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.set_attached("release", env_ids, false)
     }
@@ -112,12 +112,12 @@ impl<'a> WeldMut<'a> {
 }
 
 impl SimulationManager {
-    /// Adds a weld between two existing bodies, compiled as by [`add_robot`](Self::add_robot). It does not hold until
-    /// it is [attached](WeldMut::attach).
+    /// Adds a weld between two existing bodies. The model is compiled in this call, as in
+    /// [`add_robot`](Self::add_robot). The weld does not hold until it is [attached](WeldMut::attach).
     ///
     /// # Errors
-    /// The name is taken, a body does not exist or is a whole robot, both bodies are the same or connected by fixed
-    /// joints, or neither of them can move.
+    /// The name is taken, a body does not exist or names a robot with several links, both bodies are the same or
+    /// connected by fixed joints, or neither of them can move.
     pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
         self.check_world_uid(&cfg.uid)?;
         let model = self.simulation.batch.model();

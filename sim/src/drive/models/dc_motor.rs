@@ -26,7 +26,7 @@ pub struct DcMotor {
 }
 
 impl DcMotor {
-    /// Smallest and largest effort at a speed.
+    /// Smallest and largest effort \[N m or N\] at a joint velocity \[rad/s or m/s\].
     fn range(&self, velocity: f64, gains: &Gains) -> [f64; 2] {
         let (stall, limit) = (self.saturation_effort, gains.max_effort);
         let fastest = 1.0 + limit / stall;

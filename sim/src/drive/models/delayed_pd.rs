@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 /// `delay` steps ago. Its measurements are not delayed.
 ///
 /// A target that is set before step n acts from step n + `delay` on. Until then, and after a reset, the targets are
-/// those at the start: the initial positions. Steps are MuJoCo's, `physics_dt / substeps` long.
-/// [`RobotMut::set_delay`](crate::RobotMut::set_delay) changes the delay at run time, per environment.
+/// those of the start: the initial positions, with velocity and effort 0. Steps are MuJoCo's, `physics_dt / substeps`
+/// long. [`RobotMut::set_delay`](crate::RobotMut::set_delay) changes the delay at run time, per environment.
 ///
 /// Step n uses the targets of step n - delay, with the delay at step n. If the delay grows by k, the last k applied
 /// targets act again, in their order. If it shrinks by k, the next k targets never act.
@@ -19,14 +19,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DelayedPd {
-    /// Initial delay \[steps\].
+    /// Delay of the targets when the robot is added \[MuJoCo steps\].
     pub delay: u32,
-    /// Largest delay that [`RobotMut::set_delay`](crate::RobotMut::set_delay) accepts \[steps\]. A value below `delay`
-    /// counts as `delay`.
+    /// Largest delay that [`RobotMut::set_delay`](crate::RobotMut::set_delay) accepts \[MuJoCo steps\]. A value below
+    /// `delay` counts as `delay`.
     pub max_delay: u32,
 }
 
-/// Largest supported delay \[steps\]: each step takes 24 bytes in each environment.
+/// Largest supported delay \[MuJoCo steps\]: each step takes 24 bytes in each environment.
 const MAX_DELAY_STEPS: u32 = 10_000;
 
 /// Layout of the memory of a drive: its delay, the ring position of the next target, the ring buffer of targets.
@@ -35,17 +35,17 @@ const NEXT: usize = 1;
 const RING: usize = 2;
 
 impl DelayedPd {
-    /// Capacity of the ring buffer: the largest delay \[steps\].
+    /// Capacity of the ring buffer: the largest delay \[MuJoCo steps\].
     pub fn delay_capacity(&self) -> u32 {
         self.delay.max(self.max_delay)
     }
 
-    /// Current delay, read from the memory of a drive \[steps\].
+    /// Current delay, read from the memory of a drive \[MuJoCo steps\].
     pub(crate) fn delay_of(memory: &[f64]) -> u32 {
         memory[DELAY] as u32
     }
 
-    /// Changes the delay of a drive with this memory; the stored targets stay.
+    /// Changes the delay of a drive with this memory \[MuJoCo steps\]; the stored targets stay.
     pub(crate) fn set_delay(memory: &mut [f64], steps: u32) {
         memory[DELAY] = f64::from(steps);
     }

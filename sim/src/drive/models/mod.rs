@@ -19,7 +19,7 @@ pub use ideal_pd::IdealPd;
 use super::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
-/// State of a joint at the start of the step, the input of an actuator model.
+/// State of a joint at the start of a MuJoCo step, the input of an actuator model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
     /// Position \[rad or m\].
@@ -42,12 +42,12 @@ pub trait ActuatorLaw: std::fmt::Debug {
     /// The problem and the fix, as a sentence.
     fn check(&self, gains: &Gains) -> Result<(), String>;
 
-    /// Initial memory of the model, which it keeps from step to step in each environment.
+    /// Initial memory of the model in each environment; its length is the size of the memory.
     fn initial_memory(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Resets the memory; `target` is the target of the drive at the start.
+    /// Resets the memory, after a reset of the environment; `target` has the current targets of the drive.
     fn reset_memory(&self, _target: &Target, _memory: &mut [f64]) {}
 
     /// Largest decrease of the effort per speed \[N m s/rad or N s/m\]: the damping that decides on stability.
@@ -79,7 +79,7 @@ macro_rules! actuator_models {
                 vec![$(Self::$variant($example),)*]
             }
 
-            /// Drive law of the model.
+            /// Returns the law of the model.
             pub fn law(&self) -> &dyn ActuatorLaw {
                 match self {
                     $(Self::$variant(model) => model,)*
@@ -106,7 +106,7 @@ actuator_models! {
     DelayedPd(DelayedPd) = DelayedPd::default(),
 }
 
-/// `kp (q* - q) + kd (v* - v) + tau_ff`, without limit.
+/// PD effort `kp (q* - q) + kd (v* - v) + tau_ff` before the effort limit \[N m or N\].
 fn proportional_derivative(now: &JointMotion, target: &Target, gains: &Gains) -> f64 {
     gains.kp * (target.position - now.position) + gains.kd * (target.velocity - now.velocity) + target.feedforward
 }

@@ -42,9 +42,9 @@ pub struct PartLines {
     pub source: SourceLocation,
     /// Textures, materials, meshes and height fields.
     pub assets: Vec<String>,
-    /// Bodies of the world.
+    /// Elements of the scene's world: geoms of the file's world, bodies, and the static body of the part.
     pub bodies: Vec<String>,
-    /// Geom pairs with contact parameters, and body pairs that never collide.
+    /// Geom pairs with their own contact parameters, and body pairs that never collide.
     pub contacts: Vec<String>,
     /// Equality constraints.
     pub equalities: Vec<String>,
@@ -78,13 +78,13 @@ impl fmt::Display for OmittedElement {
     }
 }
 
-/// Element of a file that a part cannot represent.
+/// Element of a file that cannot be attached to a scene.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{element} {name:?} cannot be imported into a scene: {what}")]
 pub struct PartError {
     /// Kind of the element, as in MJCF.
     pub element: &'static str,
-    /// Name in the file; the index of an element without a name.
+    /// Name in the file, or a generated name (`body3`); the index for an element of a kind without names.
     pub name: String,
     /// Unsupported property.
     pub what: String,
@@ -203,8 +203,8 @@ impl PartWriter<'_> {
         Ok(PartLines { omitted: self.left_out.into_inner(), ..lines })
     }
 
-    /// True if the target is MuJoCo 4.x. Otherwise records that `property` of an element is left out, since only models of
-    /// 4.x have it.
+    /// Returns true if the target is MuJoCo 4.x. Otherwise records that `property` of an element is left out, since
+    /// only models of 4.x have it.
     fn supports_v4(&self, element: &'static str, index: usize, what: &str) -> bool {
         if self.target == SupportedVersion::V2 {
             let (name, property) = (self.names.of(element, index), what.into());

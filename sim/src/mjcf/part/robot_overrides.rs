@@ -13,7 +13,7 @@ pub struct RobotOverrides {
     pub joints: Vec<PassiveJointProperties>,
     /// Attachment of the root body.
     pub base: RootAttachment,
-    /// MuJoCo's `contype` and `conaffinity` for every geom that collides in the file.
+    /// MuJoCo's `contype` and `conaffinity` for every geom that collides in the file or is in `colliding`.
     pub contact: [i32; 2],
     /// Indices of the geom pairs that are omitted.
     pub pairs: BTreeSet<usize>,

@@ -13,13 +13,13 @@ use kinetoscope_scene::source_location::SourceLocation;
 /// Coupling of a joint to another joint.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Coupling {
-    /// Linear coupling, `ratio * position + offset`, to a joint of the file.
+    /// Linear coupling, `multiplier * position + offset`, to a joint of the file.
     Mimic {
         /// Location of the equality.
         source: SourceLocation,
         /// Index of the followed joint.
         driver: usize,
-        /// Ratio.
+        /// Factor of the position of the followed joint.
         multiplier: f64,
         /// Offset \[rad or m\].
         offset: f64,
@@ -31,7 +31,7 @@ pub(super) enum Coupling {
 /// Polynomial coupling of a joint: `y - y0 = Σ coefficients[k] (x - x0)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PolynomialRelation {
-    /// Index of the followed joint; `None` for a joint that stays at c0.
+    /// Index of the followed joint; `None` for a joint that stays at `y0 + c0`.
     pub(super) driver: Option<usize>,
     /// Coefficients in ascending order, the constant first.
     pub(super) coefficients: [f64; 5],

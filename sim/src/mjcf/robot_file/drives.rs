@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 pub(super) struct JointActuation {
     /// Drive that is equivalent to the actuators.
     pub(super) drive: FileActuation,
-    /// Largest effort \[N m or N\]; `None` if an actuator has no limit.
+    /// Largest effort \[N m or N\]; `None` without a limit.
     pub(super) effort: Option<f64>,
 }
 
@@ -49,8 +49,8 @@ struct ActuatorTarget {
     tendon: Option<String>,
 }
 
-/// Finds the actuation of each joint of the file that follows no other joint. Warns about actuators that are replaced,
-/// and about features that no drive reproduces.
+/// Finds the actuation of each joint of the file, in its order. Actuators on joints that follow another count for the
+/// followed joint. Warns about actuators that are replaced, and about features that no drive reproduces.
 pub(super) fn of_joints(
     owner: &str,
     model: &Model,
@@ -169,7 +169,7 @@ fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<ActuatorT
     }
 }
 
-/// True for a hinge or a slide.
+/// Returns true for a hinge or a slide.
 pub(super) fn is_single_dof(model: &Model, joint: usize) -> bool {
     matches!(mjcf_keywords::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
 }

@@ -14,7 +14,7 @@ pub enum RobotFileError {
     /// MuJoCo rejects the file; its message names element and line.
     #[error("{0}")]
     Compile(#[source] CompileError),
-    /// A part cannot represent an element of the file.
+    /// The file has an element that cannot be attached to a scene.
     #[error(transparent)]
     Part(#[from] PartError),
     /// The file has no body.
@@ -23,7 +23,7 @@ pub enum RobotFileError {
     /// The file's world has several child bodies.
     #[error("the file has {} top-level bodies ({}), but a robot has exactly one; split the file, or {AS_A_PART}", .roots.len(), format_first(.roots))]
     MultipleRoots {
-        /// Names of these bodies.
+        /// Names of these bodies, in quotes.
         roots: Vec<String>,
     },
     /// The file has no hinge and no slide joint.
@@ -48,7 +48,7 @@ pub enum RobotFileError {
         /// Name of the body.
         body: String,
     },
-    /// The base is configured as free, but a joint attaches the root body to the world.
+    /// The base is configured as free, but a hinge or slide attaches the root body to the world.
     #[error(
         "{at}: joint {joint:?} connects the root body {body:?} to the world, so the base cannot be free; set fix_base: \
          true, or move the joint to a child body"

@@ -48,7 +48,7 @@ pub struct MjcfRobotFile {
     model: Model,
     names: PartNames,
     root: Root,
-    /// Body of the file, and pose in that body, for each named link.
+    /// For each named link (body or site): index of its body in the file, and pose of the link in that body.
     links: Vec<(usize, Pose)>,
     /// Joint of the description for each joint of the file; `None` for a free joint.
     joints: Vec<Option<JointId>>,
@@ -143,7 +143,7 @@ impl MjcfRobotFile {
         &self.sensors
     }
 
-    /// Pose of the root link in the file's world.
+    /// Initial pose of the root link in the file's world.
     pub(crate) fn root_pose(&self) -> Pose {
         if self.root.is_world { Pose::identity() } else { tree::body_pose(&self.model, self.root.body) }
     }
@@ -151,7 +151,7 @@ impl MjcfRobotFile {
     /// Adds the robot to `mjcf`. The base pose of `cfg` is the pose of the file's world.
     ///
     /// # Errors
-    /// A part cannot represent an element of the file.
+    /// The file has an element that cannot be attached to a scene.
     pub(crate) fn add(
         &self,
         description: &RobotDescription,
@@ -207,7 +207,7 @@ impl MjcfRobotFile {
         })
     }
 
-    /// Names of the tendons of the file.
+    /// Names of the tendons of the file, without the uid; generated for tendons without a name.
     pub(crate) fn tendon_names(&self) -> &[String] {
         &self.names.tendons
     }
@@ -292,7 +292,7 @@ impl MjcfRobotFile {
         loaded
     }
 
-    /// True for each body that never moves.
+    /// Returns true for each body of the file that never moves; false for all but the world with a free base.
     fn static_bodies(&self, fix_base: bool) -> Vec<bool> {
         let m = &self.model;
         let root = if self.root.free_joint.is_some() { self.root.body } else { 0 };

@@ -155,7 +155,7 @@ pub(super) fn warn_contacts(
     }
 }
 
-/// Geoms of the robot whose bits disable collisions, but which the file pairs with geoms of its world.
+/// Geoms of the robot whose bits disable collisions, but that the file pairs with geoms of its world.
 pub(super) fn pair_only_geoms(model: &Model) -> BTreeSet<usize> {
     let mut geoms = BTreeSet::new();
     for pair in omitted_pairs(model, true) {
