@@ -74,7 +74,7 @@ impl StreamField {
 /// Type of the values of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ElementType {
-    /// Unsigned 8-bit integers: color.
+    /// Unsigned 8-bit integers: color and albedo.
     U8,
     /// Signed 32-bit integers: mask ids.
     I32,

@@ -140,10 +140,10 @@ impl<'a> EnvPropertiesMut<'a> {
     /// Restores a snapshot like [`SimulationManager::restore`], together with the properties of each environment at the
     /// time of the snapshot.
     ///
-    /// These are its own values, randomized gains included, and the number of its randomizations, so that the next
-    /// randomization gives the values that it gave then. Properties that were nominal become nominal. The simulation
-    /// continues bit-identically, also from a file in a manager that was built alike, whatever was randomized or set in
-    /// between.
+    /// The properties are the environment's own values, randomized gains included, and the number of its
+    /// randomizations, so that the next randomization gives the values of the one that followed the snapshot.
+    /// Properties that were nominal become nominal. The simulation continues bit-identically, also from a file in a
+    /// manager that was built alike, whatever was randomized or set in between.
     ///
     /// ```
     /// use kinetoscope_sim::{
