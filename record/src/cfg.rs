@@ -16,21 +16,22 @@ pub struct RecorderCfg {
     pub format: Option<Format>,
     /// Recorded topics.
     pub topics: Vec<Topic>,
-    /// Recorded environments; `None` for all.
+    /// Recorded environments, in any order without repetitions; `None` for all.
     pub envs: Option<Vec<EnvId>>,
     /// Physics steps between two rows of states, targets and poses. Sensors are recorded whenever they measure. See
     /// [`stream_periods`](Self::stream_periods) for other rates.
     pub period_steps: u64,
-    /// Rates of single streams: the name of a stream, and the number of physics steps between two of its rows.
+    /// Periods of single streams: the name of a stream, and the number of physics steps between two of its rows.
     ///
-    /// A name is that of the file, such as `arm/link_poses`, or a prefix such as `camera` for all its streams. The last
-    /// entry that matches a stream applies. A sensor with a rate is recorded at these steps, with its last measurement,
-    /// if that is new. Datasets of episodes have a single frame rate and do not support this.
+    /// A name is that of the file, such as `arm/link_poses`, or a prefix such as `camera` for all its streams. A name
+    /// without a recorded stream is an error. The last entry that matches a stream applies. A sensor with a period is
+    /// recorded at these steps, with its last measurement, if that is new. Results of tasks have no period. Datasets of
+    /// episodes (LeRobot, HDF5) have a single frame rate: any entry is an error.
     pub stream_periods: Vec<(String, u64)>,
     /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. When all of them
     /// wait to be written, the simulation waits. The pool may take up to 16 GiB.
     pub packets: usize,
-    /// True to store the scene in the file.
+    /// True to store the scene in an MCAP file or a NumPy archive; other formats do not contain it.
     ///
     /// MCAP files and NumPy archives get the scene as MJCF with its meshes, once, when the recording begins. Such a
     /// file is enough to show the recording (`kinetoscope replay`).
@@ -46,12 +47,14 @@ pub struct RecorderCfg {
     /// it.
     pub task: String,
     /// True to replace an existing file when the new one is complete, and to replace the partial file of a killed
-    /// recording. Folders are replaced only if a recorder wrote them.
+    /// recording. Without this, an existing file is an error. Folders that are not empty are replaced only if a
+    /// recorder wrote them.
     pub overwrite: bool,
 }
 
 impl RecorderCfg {
-    /// Records everything that the format supports, in all environments, at every step.
+    /// Creates a configuration that records everything that the format supports, in all environments: states at every
+    /// physics step, sensors whenever they measure.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), ..Self::default() }
     }

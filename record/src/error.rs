@@ -120,7 +120,8 @@ pub enum RecordError {
         period_steps: u64,
         /// Rows per second \[Hz\].
         found: f64,
-        /// Values of `period_steps` that give a whole rate, the nearest first.
+        /// Values of [`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) that give a whole rate, the
+        /// nearest first; empty if none does.
         candidates: Vec<u64>,
     },
     /// A stream is missing in an environment of a dataset, whose rows must be complete.
@@ -129,7 +130,7 @@ pub enum RecordError {
          topics that match"
     )]
     MissingStream {
-        /// The folder.
+        /// The folder or file of the dataset.
         path: PathBuf,
         /// The missing stream, such as `camera/color`.
         stream: String,
@@ -162,7 +163,7 @@ pub enum RecordError {
         /// Name of the sensor.
         sensor: String,
     },
-    /// A camera renders none of the recorded environments.
+    /// A camera sensor exists in none of the recorded environments.
     #[error("sensor {sensor:?} is not in any recorded environment")]
     SensorNotInEnvs {
         /// Name of the sensor.

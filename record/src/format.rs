@@ -12,10 +12,10 @@ pub enum Format {
     /// MCAP file of ROS 2 messages, for Foxglove and Rerun. After the process is killed, [`recover`](crate::recover)
     /// restores what the writer thread had received half a second before. Rows that waited for that thread are lost.
     Mcap,
-    /// NumPy archive: arrays (T, N, ...), one for each field, and their times.
+    /// NumPy archive: arrays (T, N, ...), one for each field, and their times. A killed process leaves no data.
     Npz,
-    /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters, and `times.csv` with their
-    /// times.
+    /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters (0 for a miss), and
+    /// `times.csv` with their times. Other channels are not supported.
     Images,
     /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode. An episode lasts from one reset
     /// of an environment to the next. Frames are the rows of the recording, from the first complete one on. Their rate
@@ -75,12 +75,13 @@ fn is_png_image(stream: &StreamSchema) -> bool {
 }
 
 impl Format {
-    /// All formats with their file name extensions, such as `mcap`. An empty extension is a folder of images.
+    /// All formats with their file name extensions, such as `mcap`. The extension is empty for a folder of images.
+    /// Formats that this build does not support are included.
     pub fn all() -> impl Iterator<Item = (Self, &'static str)> {
         ALL.iter().map(|known| (known.format, known.extension))
     }
 
-    /// Format of a path, by its extension.
+    /// Format of a path, by its extension in upper or lower case. A path without an extension is a folder of images.
     ///
     /// # Errors
     /// No format has this extension; the error lists the known ones.
@@ -96,7 +97,7 @@ impl Format {
         ALL.iter().find(|known| known.format == self).unwrap_or(&ALL[0])
     }
 
-    /// Name in messages.
+    /// Name in messages, with its article, such as `an MCAP file`.
     pub fn name(self) -> &'static str {
         self.info().name
     }

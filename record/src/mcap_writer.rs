@@ -145,7 +145,7 @@ pub(crate) fn options() -> WriteOptions {
 
 impl McapWriter {
     /// Creates a file. `origins` are the origins of all environments in the world \[m\], shape (N, 3). `start` is the
-    /// time at which the recording begins \[s\]. `attachments` are attachments: names, media types, bytes.
+    /// time at which the recording begins \[s\]. `attachments` has the name, media type and content of each.
     pub(crate) fn create(
         mut part: PartialFile,
         storage: Box<dyn Storage>,

@@ -23,7 +23,7 @@ impl ElementType {
     }
 }
 
-/// Types of numbers in array files.
+/// Types of numbers in array files: `u8`, `i32`, `f32` and `f64`.
 pub trait NpyElement: Copy {
     /// Element type in the file.
     const ELEMENT: ElementType;

@@ -16,8 +16,9 @@
 //! An environment without a new value in a row, because its sensor measures at other times, repeats its last value and
 //! time.
 //!
-//! A reset or a write adds a row of the states of all environments. With `every` above 1, the states of the other
-//! environments in such a row lie between two of their regular rows. They have the time at which they were read.
+//! A reset or a write adds a row of the states of all environments. With
+//! [`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) above 1, the states of the other environments in
+//! such a row lie between two of their regular rows. They have the time at which they were read.
 //!
 //! Until the end, rows are in unnamed files in the same folder. A killed process leaves only an empty `NAME.part`.
 

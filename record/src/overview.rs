@@ -14,11 +14,13 @@ use kinetoscope_sim::{OffscreenScene, SimulationManager};
 pub struct OverviewCfg {
     /// Width and height \[pixels\].
     pub size: [usize; 2],
-    /// Images per second of simulation time \[Hz\], rounded to a whole number of physics steps between two.
+    /// Images per second of simulation time \[Hz\], rounded to a whole number of physics steps between two images, at
+    /// least one.
     pub fps: f64,
     /// Viewpoint \[m\] in the world, where environments stand side by side
     /// ([`kinetoscope_sim::SimulationManagerCfg::env_origins`]). With `None`, everything but the ground fills two
-    /// thirds of the image when the recording begins, which leaves room for motion.
+    /// thirds of the image when the recording begins, which leaves room for motion; a given `target` only shifts this
+    /// viewpoint.
     pub eye: Option<[f64; 3]>,
     /// Point in the center of the image \[m\]; `None` for the center of everything but the ground when the recording
     /// begins.
@@ -52,6 +54,8 @@ pub(crate) struct OverviewRenderer {
 }
 
 impl OverviewRenderer {
+    /// Creates the renderer with the viewpoint for the current state.
+    ///
     /// # Errors
     /// The rate, the size or the viewpoint is invalid.
     pub(crate) fn new(sim: &mut SimulationManager, cfg: &OverviewCfg) -> Result<Self> {

@@ -8,13 +8,13 @@ use crate::stream::{ElementType, StreamField, StreamSchema};
 pub struct Event {
     /// Kind of the event.
     pub kind: EventKind,
-    /// Environments, in ascending order.
+    /// Recorded environments that the event concerns, in ascending order.
     pub env_ids: Vec<usize>,
     /// Simulation time of each environment after the event \[s\].
     pub times: Vec<f64>,
     /// Physics steps since the recording began.
     pub step: u64,
-    /// Time of the recording \[s\].
+    /// Time on the clock of the recording \[s\], which continues over resets.
     pub recorded_time: f64,
     /// Text of a note, or reason of a divergence; else empty.
     pub text: String,

@@ -53,8 +53,8 @@ const QPOS_WIDTHS: [usize; 4] = [7, 4, 1, 1];
 const FREE: i32 = 0;
 
 impl Playback {
-    /// Opens a recording for playback in the scene that the file contains, or in the scene of `scene`, a simulation
-    /// built like the recorded one. Returns the playback and the simulation that displays the motion.
+    /// Opens a recording for playback. The scene is that of `scene`, a simulation built like the recorded one; for
+    /// `None`, it is the scene in the file. Returns the playback and a new simulation that displays the motion.
     ///
     /// # Errors
     /// The recording contains no scene and none is given, the scene cannot be compiled, or no motion was recorded.
@@ -125,7 +125,8 @@ impl Playback {
         &self.times
     }
 
-    /// Joints of the scene without recorded values. They stay in their initial state.
+    /// Joints (`uid/joint`) without recorded values in at least one recorded environment. There they stay in their
+    /// initial state.
     pub fn joints_without_data(&self) -> &[String] {
         &self.joints_without_data
     }
@@ -135,8 +136,9 @@ impl Playback {
         self.times.partition_point(|frame| *frame <= time + 1e-9).saturating_sub(1)
     }
 
-    /// Sets the simulation to one of the [`times`](Self::times): each number has its last value recorded until then.
-    /// Numbers that are not finite are skipped.
+    /// Sets the simulation to the time with index `frame` in [`times`](Self::times); a larger index is the last one.
+    /// Each number has its last value recorded until then, or its first value before that. Numbers that are not finite
+    /// are skipped. Velocities and the simulation time are not set.
     ///
     /// # Errors
     /// A recorded quaternion has length zero.

@@ -16,7 +16,7 @@ pub(crate) struct PngWriter {
 }
 
 impl PngWriter {
-    /// Encodes RGBA pixels without their alpha channel.
+    /// Encodes RGBA pixels as an RGB PNG file, without their alpha channel. `size` is width and height.
     pub(crate) fn encode_rgb(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<&[u8]> {
         self.pixels.clear();
         for pixel in rgba.as_chunks::<4>().0 {
@@ -25,7 +25,8 @@ impl PngWriter {
         self.encode(size, ExtendedColorType::Rgb8)
     }
 
-    /// Encodes depths \[m\] as 16-bit millimeters: 0 for a miss, 65535 for 65.535 m and more.
+    /// Encodes depths \[m\] as a PNG file of 16-bit millimeters. A miss (infinite or NaN) is 0; 65.535 m and more is
+    /// 65535. `size` is width and height.
     pub(crate) fn encode_depth(&mut self, depths: &[f32], size: [usize; 2]) -> WriteResult<&[u8]> {
         self.pixels.clear();
         for depth in depths {
@@ -45,7 +46,7 @@ impl PngWriter {
     }
 }
 
-/// Depth in whole millimeters.
+/// Depth \[m\] in whole millimeters.
 fn depth_mm(depth: f32) -> u16 {
     // Larger depths saturate. An infinite depth, a miss, becomes 0.
     if depth.is_finite() { (depth * MM_PER_METER).round() as u16 } else { 0 }

@@ -35,7 +35,8 @@ pub trait Record {
     /// environment in a step, the recorder records the state after that reset for this step.
     ///
     /// # Errors
-    /// A name is unknown, a file exists or cannot be written, or the format does not support a requested topic.
+    /// A name is unknown, a number of the configuration is out of range, there is nothing to record, a file exists or
+    /// cannot be written, or the format does not support a requested topic.
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId>;
 
     /// Writes a text about an environment, or about all recorded ones, into the recording, at the last step
@@ -51,7 +52,8 @@ pub trait Record {
     /// Ends a recording. The file is complete and has its name when this returns.
     ///
     /// # Errors
-    /// The file could not be written, a recorded stream changed its shape, or a sensor failed. A readable partial file
+    /// The file could not be written, no frame was recorded (animations and datasets), a recorded stream was removed or
+    /// changed its shape, a sensor failed, or the recorder was removed before. If the partial file is readable, it
     /// remains as `NAME.part`, and the error contains its path.
     ///
     /// # Panics
@@ -85,7 +87,7 @@ impl Record for SimulationManager {
 pub struct RecordingSummary {
     /// Output file or folder.
     pub path: PathBuf,
-    /// Size of the output \[bytes\].
+    /// Size of the output \[bytes\]; 0 until the recording is finished.
     pub bytes: u64,
     /// Number of recorded packets: steps at which something was due, and events.
     pub packets: u64,
@@ -236,7 +238,7 @@ impl Recorder {
         self.sources.iter().map(|source| &source.stream)
     }
 
-    /// Summary so far. The size is known at the end.
+    /// Summary so far. [`RecordingSummary::bytes`] is 0.
     pub fn summary(&self) -> &RecordingSummary {
         &self.summary
     }
@@ -260,8 +262,8 @@ impl Recorder {
         self.failure.is_some() || ended || self.failed.load(Ordering::Relaxed)
     }
 
-    /// Waits until the file contains everything that was recorded so far, or an error occurs. [`RecordingSummary::waits`] does
-    /// not count this wait.
+    /// Waits until the writer thread has written everything that was recorded so far, or an error occurs. The data may
+    /// still be in a buffer of the writer. [`RecordingSummary::waits`] does not count this wait.
     pub fn wait_until_written(&mut self) {
         while self.empty_packets.len() < self.cfg.packets && !self.has_failed() {
             // The writer thread is gone if this fails.
@@ -320,8 +322,8 @@ impl Recorder {
         })
     }
 
-    /// Records the due streams, and the state streams of environments `changed_envs`. With the `result` of a step of a task,
-    /// records only that result.
+    /// Records the due streams, and the state streams of environments `changed_envs`. With the `result` of a step of a
+    /// task, records only that result.
     fn record_due(
         &mut self,
         sim: &mut SimulationManager,

@@ -23,7 +23,8 @@ pub struct Recovered {
     pub damage: Option<String>,
 }
 
-/// Makes a complete file from the partial file of a killed recording. `path` is the intended name of the recording.
+/// Makes a complete MCAP file from the partial file of a killed recording. `path` is the intended name of the
+/// recording, without `.part`.
 ///
 /// The new file contains the scene and the messages of all chunks before the first incomplete or damaged one. The
 /// partial file is then deleted. It is kept if it has damage other than an incomplete last chunk

@@ -41,7 +41,7 @@ pub struct Difference {
     pub env: usize,
     /// Name of the array, such as `arm/joint_states/positions`.
     pub array: String,
-    /// Index of the value in the row of the environment.
+    /// Index of the value in the array's row of the environment.
     pub column: usize,
     /// Recorded value.
     pub recorded: f64,
@@ -87,16 +87,18 @@ type SourceFn = fn(&SimulationManager, &str, &[usize]) -> Result<StreamSource>;
 
 /// Replays a NumPy archive or an MCAP file in `sim`, which must be built as the recorded simulation was.
 ///
-/// Restores the initial state, applies the recorded actions and resets, and compares the states after every step. The
-/// file must contain the targets of every robot and the controls of every MJCF part that move something, at every step
-/// ([`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) 1). If a step has several rows because of events, the first and
-/// the last are compared.
+/// Restores the initial state and properties, applies the recorded actions and resets, and compares joint states, poses
+/// of links and objects, and states of MJCF parts after every step, as far as they are recorded. The file must contain
+/// the targets of every robot and the controls of every MJCF part that move something, at every step
+/// ([`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) 1). If a step has several rows because of events,
+/// the first and the last are compared.
 ///
 /// External wrenches, welds, gains and poses of kinematic objects are not recorded and not repeated. The first
 /// difference shows when they mattered.
 ///
 /// # Errors
-/// The file is not a complete recording, or is of another scene, another MuJoCo version or another time step.
+/// The file is not a complete recording, lacks required targets, controls or steps, or is of another scene, another
+/// MuJoCo version or another time step. A difference is not an error, but a [`ReplayResult`].
 pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<ReplayResult> {
     let archive = RecordedArrays::open(path.as_ref())?;
     let dt = sim.cfg().physics_dt;
@@ -156,7 +158,8 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Rep
     Replay { archive, states, targets, steps }.run(sim)
 }
 
-/// Number of environments of a NumPy archive or an MCAP file.
+/// Number of environments of the recorded simulation, also those that were not recorded, from a NumPy archive or an
+/// MCAP file of a recorder.
 ///
 /// # Errors
 /// The file is not such a recording, or is incomplete.

@@ -5,7 +5,7 @@ use kinetoscope_sensors::{SampleChannel, Stamp};
 /// Metadata of values that are recorded together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StreamSchema {
-    /// Name, such as `arm/joint_states` or `camera/color`.
+    /// Name without the environment, such as `arm/joint_states` or `camera/color`.
     pub name: String,
     /// Meaning of the values.
     pub kind: StreamKind,
@@ -13,7 +13,8 @@ pub struct StreamSchema {
     pub element_type: ElementType,
     /// Fields, in their order in a row.
     pub fields: Vec<StreamField>,
-    /// Recorded environments. Each has one row at a time.
+    /// Recorded environments, in ascending order; for the overview image, only the first one. A row has the values of
+    /// one environment.
     pub env_ids: Vec<usize>,
 }
 
@@ -45,9 +46,11 @@ pub struct StreamField {
     pub shape: Vec<usize>,
     /// True if a sensor measures the field at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and
     /// accelerations. The engine solves for them at the beginning of the step that leads to positions and velocities.
+    /// False for the efforts of [`Topic::JointStates`](crate::Topic::JointStates), which have the stamp of the
+    /// positions.
     pub at_force_time: bool,
-    /// Unit, as the sensor reports it ([`SampleChannel::unit`](kinetoscope_sensors::SampleChannel::unit)); empty if it reports
-    /// none.
+    /// Unit that a sensor reports ([`SampleChannel::unit`](kinetoscope_sensors::SampleChannel::unit)); empty without a
+    /// report, and for states, images and ray casters.
     pub unit: String,
 }
 
@@ -71,7 +74,7 @@ impl StreamField {
 /// Type of the values of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ElementType {
-    /// Unsigned 8-bit integers: color.
+    /// Unsigned 8-bit integers: color and albedo.
     U8,
     /// Signed 32-bit integers: mask ids.
     I32,
@@ -96,17 +99,17 @@ pub struct Distortion {
 pub enum StreamKind {
     /// Joint positions, velocities and efforts, or their targets.
     Joints {
-        /// Names of the joints.
+        /// Names of the joints, without the name of the robot.
         names: Vec<String>,
     },
     /// Poses in the frame of the environment, rows `[x, y, z, qw, qx, qy, qz]` \[m\].
     Poses {
-        /// Names of the frames.
+        /// Names of the frames: `uid/link`, `uid/body`, or the uid of an object.
         frames: Vec<String>,
     },
     /// An image, row by row from the top left.
     Image {
-        /// Name of the camera.
+        /// Name of the camera: the uid of the sensor; with `/left` or `/right` for a stereo camera.
         camera: String,
         /// Name of the channel.
         channel: String,
@@ -138,7 +141,7 @@ pub enum StreamKind {
     EngineState,
     /// Result of a step of a task: `reward`, and `terminated` and `truncated` as 1 or 0.
     TaskResult,
-    /// Values of any other sensor.
+    /// Values of any other sensor, or the state of an MJCF part (without names).
     SensorValues {
         /// Names of the bodies, links, joints, actuators or frames of the rows, in order; empty without names.
         rows: Vec<String>,

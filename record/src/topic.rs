@@ -4,19 +4,22 @@
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Topic {
-    /// All topics below that exist when the recording begins and that the format supports.
+    /// All topics below that exist when the recording begins and that the format supports, with the exceptions noted at
+    /// [`EngineStates`](Self::EngineStates) and [`Overview`](Self::Overview). An animation gets the first camera only,
+    /// in its first recorded environment.
     Everything,
-    /// Joint positions, velocities and efforts of the robot or articulation of this name.
+    /// Joint positions, velocities and efforts of the robot or articulation of this name. The efforts are those of the
+    /// step that led to the positions.
     JointStates(String),
     /// Joint position, velocity and effort targets of the robot or articulation of this name: the actions.
     Targets(String),
-    /// Link poses of the robot or articulation of this name.
+    /// Link poses, in the environment, of the robot or articulation of this name.
     LinkPoses(String),
-    /// Pose of the rigid object of this name.
+    /// Pose, in the environment, of the rigid object of this name.
     ObjectPose(String),
     /// Positions, velocities and controls of the MJCF part of this name.
     MjcfState(String),
-    /// Body poses of the MJCF part of this name.
+    /// Body poses, in the environment, of the MJCF part of this name.
     BodyPoses(String),
     /// Simulation time, positions and velocities of all joints of the scene in MuJoCo's order, named `clock`, `qpos`
     /// and `qvel` ([`kinetoscope_sim::Entities::engine_states`](kinetoscope_sim::Entities::engine_states)).
@@ -26,13 +29,14 @@ pub enum Topic {
     /// Rewards and episode ends of the task in the simulation. A task such as an `Env` publishes them after each of its
     /// steps ([`StepResult`](kinetoscope_sim::StepResult)).
     TaskResults,
-    /// Overview image of all environments, rendered with the settings of `RecorderCfg::overview`. Its name is that of a camera `stage` in
-    /// the first recorded environment.
+    /// Overview image of all environments, also of those that are not recorded, rendered with the settings of
+    /// [`RecorderCfg::overview`](crate::RecorderCfg::overview). Its name is that of a camera `stage` in the first
+    /// recorded environment.
     ///
     /// [`Everything`](Self::Everything) includes it only in formats of images, and only if there is no camera.
     Overview,
-    /// All channels of the sensor of this name, at each arrival of a measurement. Cameras and ray-caster cameras also
-    /// record their intrinsics and pose.
+    /// All channels of the sensor of this name that the format supports, at each arrival of a measurement. Cameras and
+    /// ray-caster cameras also record their intrinsics and pose.
     ///
     /// A measurement with a latency has the values and the time stamp of its capture. Measurements that were pending
     /// during a write to the state are recorded, although the sensor itself drops them.

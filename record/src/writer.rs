@@ -71,8 +71,8 @@ pub(crate) struct WriterFailure {
 
 /// Writes packets until the channel closes, then completes the file.
 ///
-/// After an error, packets are returned unwritten, and `failed` and `reason` are set. If the recorder sets `failed`, the
-/// file is not completed.
+/// After an error, packets are returned unwritten, and `failed` and `reason` are set. If the recorder sets `failed`,
+/// the file is not completed.
 pub(crate) fn run(
     mut sink: Box<dyn FormatWriter>,
     streams: &[StreamSchema],

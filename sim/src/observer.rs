@@ -14,8 +14,8 @@ use std::marker::PhantomData;
 /// returns. Long work belongs on a thread of the observer, with copies of the data. Adding an observer changes no
 /// result: steps are split where observers are due, and `update(n)` equals n calls of `update(1)`.
 pub trait Observer: Any + Send {
-    /// Number of physics steps until the next call, at least 1; [`u64::MAX`] for never. Called before every block of
-    /// steps.
+    /// Number of physics steps until the next [`SimEvent::Stepped`]; 0 counts as 1, and [`u64::MAX`] is never. Called
+    /// before every block of steps.
     fn due_in(&self, sim: &SimulationManager) -> u64;
 
     /// Handles an event. Changes made here, including steps, are reported to the other observers but not to this one.
@@ -41,18 +41,20 @@ pub trait Observer: Any + Send {
 pub enum SimEvent {
     /// Steps were done and the observer is due.
     Stepped,
-    /// Environments were reset.
+    /// Environments were reset by [`SimulationManager::reset`].
     Reset {
         /// The environments, in ascending order.
         env_ids: Vec<EnvId>,
     },
     /// The state of environments was written since the last step: joints, poses, welds, randomized properties, a
-    /// snapshot. Reported once, directly before the next step or before an observer is added or removed.
+    /// restored snapshot. Targets, controls and wrenches are not part of the state. Reported once, directly before the
+    /// next step or before an observer is added or removed.
     Written {
         /// The environments, in ascending order.
         env_ids: Vec<EnvId>,
     },
-    /// An entity was added, so the model and its arrays are new.
+    /// The model was compiled again, because an entity or a collision exclusion was added. The model and its arrays are
+    /// new.
     Compiled,
 }
 
@@ -165,15 +167,15 @@ impl<'a> Observers<'a> {
         id.manager == self.sim.serial && self.sim.slot_index(id).is_ok()
     }
 
-    /// True if an observer announces events of type `E` ([`Observer::publishes`]). Recorders check this when they
-    /// start.
+    /// True if an observer announces events of type `E` ([`Observer::publishes`]). An observer that is handling an
+    /// event right now is not asked. Recorders check this when they start.
     pub fn is_published<E: Any>(&self) -> bool {
         let mut observers = self.sim.observers.slots.iter().filter_map(|seat| seat.observer.as_ref());
         observers.any(|observer| observer.publishes(TypeId::of::<E>()))
     }
 
     /// Number of physics steps done by [`update`](SimulationManager::update) since the simulation was created. Resets
-    /// do not change it, so observers can schedule by it.
+    /// and restored snapshots do not change it, so observers can schedule by it.
     pub fn steps(&self) -> u64 {
         self.sim.observers.steps
     }
@@ -190,7 +192,8 @@ impl<'a> ObserversMut<'a> {
         Self { sim }
     }
 
-    /// Publishes an event of any type to all observers ([`Observer::on_published`]). The simulation does not store it.
+    /// Publishes an event of any type to all observers ([`Observer::on_published`]), except one that is handling an
+    /// event right now. The simulation does not store it.
     pub fn publish<E: Any>(self, event: &E) {
         self.sim.notify_each_with(|observer, sim| observer.on_published(sim, event));
     }
@@ -205,7 +208,7 @@ impl<'a> ObserversMut<'a> {
         ObserverId { manager: self.sim.serial, number, observer: PhantomData }
     }
 
-    /// Removes an observer and returns it, after reporting earlier writes to it.
+    /// Removes an observer and returns it. Earlier writes are reported to all observers first, also to this one.
     ///
     /// # Errors
     /// The observer was removed before, or is handling an event right now.

@@ -24,7 +24,7 @@ pub struct Rollout {
     pub states: Array3<f64>,
     /// Final states; [`restore`](SimulationManager::restore) copies them to the environments.
     pub final_states: Snapshot,
-    /// Diverged rows, each with the reason.
+    /// Index of each diverged row, with the step and the reason.
     pub diverged: Vec<(usize, String)>,
 }
 
@@ -110,14 +110,14 @@ impl SimulationManager {
     /// Simulates copies of environments under `controls`, shape (N, T, C): N rows with the controls of T physics steps.
     /// [`control_names`](crate::Entities::control_names) has the names of the C columns.
     ///
-    /// The controls of a robot are position targets \[rad or m\], clamped to the limits in the row's initial state, as
-    /// [`set_qpos_target`](crate::RobotMut::set_qpos_target) does. Columns of joints that follow others or have no
-    /// drive are ignored. The controls of an attached MJCF file are those of
+    /// The controls of a robot are position targets \[rad or m\], clamped to the target range in the row's initial
+    /// state, as [`set_qpos_target`](crate::RobotMut::set_qpos_target) does. Columns of joints that follow others or
+    /// have no drive are ignored. The controls of an attached MJCF file are those of
     /// [`set_ctrl`](crate::MjcfPartMut::set_ctrl). Other targets and inputs stay as they are in the initial state.
     ///
     /// Row k runs in a copy of the k-th of `env_ids` (all environments for `None`), with its model. An environment can
-    /// be named several times, to try several controls from its state. A single row of controls is used for all
-    /// environments. Row k starts in the k-th state of `start`, or in the current state of its environment for `None`.
+    /// be named several times, to try several controls from its state. If `controls` has a single row, all environments
+    /// use it. Row k starts in the k-th state of `start`, or in the current state of its environment for `None`.
     /// A single state in `start` is used for all rows.
     ///
     /// The environments keep their state, bit for bit. To continue from the end of a rollout,

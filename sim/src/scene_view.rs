@@ -44,13 +44,13 @@ impl<'a> SceneView<'a> {
         Self { sim }
     }
 
-    /// MJCF document of the running simulation.
+    /// MJCF document that the shared model was compiled from, without properties of single environments.
     pub fn mjcf(&self) -> &'a str {
         &self.sim.simulation.xml
     }
 
-    /// Entity and link of each value in the mask channel of cameras, the same in all environments. Ids never change
-    /// when entities are added.
+    /// Entity and link of each value in the mask channel of cameras, in ascending order of the values, the same in all
+    /// environments. Ids never change when entities are added.
     pub fn mask_ids(&self) -> &'a [MaskId] {
         self.sim.simulation.mask_ids()
     }
@@ -66,8 +66,9 @@ impl<'a> SceneView<'a> {
     }
 
     /// Markers of the last measurements of all sensors with enabled markers, for
-    /// [`OffscreenScene::overview`](crate::OffscreenScene::overview). [`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)
-    /// or [`SceneViewMut::set_debug_vis`] enables them.
+    /// [`OffscreenScene::overview`](crate::OffscreenScene::overview).
+    /// [`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis) or [`SceneViewMut::set_debug_vis`] enables
+    /// them.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, None)
     }
@@ -94,7 +95,7 @@ impl<'a> SceneView<'a> {
         self.sim.sensors.debug_vis(self.sim.sensors.index_of(id))
     }
 
-    /// The point of view that was set last; `None` if none was set.
+    /// The point of view that [`SceneViewMut::set_camera_view`] set last; `None` before the first call.
     pub fn viewpoint(&self) -> Option<Viewpoint> {
         self.sim.viewpoint
     }
@@ -131,10 +132,13 @@ impl<'a> SceneViewMut<'a> {
         Self { sim }
     }
 
-    /// Writes MuJoCo's data of one environment directly, for quantities outside this API. A forward pass follows. A
-    /// non-finite state is rejected: the environment diverges, in the state before the write.
+    /// Writes MuJoCo's data of one environment directly, for quantities outside this API. Then `mj_step1` updates all
+    /// quantities that depend on positions and velocities; accelerations and constraint forces are updated by the next
+    /// step. A non-finite state is rejected: the state before the write is restored, and the environment is marked as
+    /// diverged.
     ///
-    /// Every step overwrites `qfrc_applied` and the controls of drives.
+    /// Every step overwrites `qfrc_applied`, the controls of drives, and `xfrc_applied` of bodies with external
+    /// wrenches or gravity compensation.
     ///
     /// # Errors
     /// The environment does not exist.
@@ -184,9 +188,9 @@ impl<'a> SceneViewMut<'a> {
         Ok(())
     }
 
-    /// Render scene of an environment, in the order of [`EnvVisualState::instances`]. All environments without own sizes or
-    /// colors share one scene until an entity is added. Shapes that [deform](kinetoscope_scene::Instance::is_deformable) are
-    /// not updated to the current time.
+    /// Render scene of an environment, in the order of [`EnvVisualState::instances`]. All environments without own
+    /// sizes or colors share one scene until an entity is added. Shapes that
+    /// [deform](kinetoscope_scene::Instance::is_deformable) are not updated to the current time.
     ///
     /// # Errors
     /// The environment does not exist.
@@ -220,9 +224,9 @@ impl<'a> SceneViewMut<'a> {
     /// [`body_names`](crate::Entities::body_names).
     ///
     /// The forces act from the next step on, until other forces are set for the body, the environment is reset, or an
-    /// entity is added. An empty list ends them. Their resultant stays constant in the world frame while the body
-    /// moves; to model a spring, set it again in every step. Wrenches of
-    /// [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) act in addition.
+    /// entity is added. An empty list ends them. Their resultant at the center of mass (force and torque) stays
+    /// constant in the world frame while the body moves; to model a spring, set the forces again in every step.
+    /// Wrenches of [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) act in addition.
     ///
     /// # Errors
     /// The environment or the body does not exist, or a number is not finite; then nothing changes.

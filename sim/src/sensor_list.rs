@@ -71,7 +71,7 @@ struct SensorEntry {
 }
 
 impl SensorEntry {
-    /// The sensor, unless it is known to have failed.
+    /// The sensor; `None` if it has failed.
     fn running(&self) -> Option<&SensorSlot> {
         self.slot.as_ref().ok().filter(|slot| !slot.has_failed())
     }

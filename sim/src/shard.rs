@@ -19,7 +19,7 @@ pub struct Shard {
 }
 
 impl Default for Shard {
-    /// A single process.
+    /// A single process: rank 0 of 1.
     fn default() -> Self {
         Self { rank: 0, world: 1 }
     }

@@ -32,7 +32,7 @@ pub(crate) struct Simulation {
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
     pub(crate) initial_state: Arc<InitialState>,
-    /// Lengths of the arrays of a saved state.
+    /// Layout of saved states, which distinguishes snapshots of this scene from those of others.
     pub(crate) layout: Arc<StateLayout>,
     /// Model elements whose properties can differ per environment; filled on first use.
     pub(crate) property_tables: OnceLock<Arc<PropertyTables>>,
@@ -132,7 +132,9 @@ impl Simulation {
     }
 
     /// Copies the state of every entity that `old` has too, matched by name: positions, velocities, warm start,
-    /// targets, time. Divergence is copied as well: a diverged environment stays frozen until it is reset.
+    /// targets, controls, wrenches, attached welds, time. Forces of
+    /// [`set_point_forces`](crate::SceneViewMut::set_point_forces) end. Divergence is copied as well: a diverged
+    /// environment stays frozen until it is reset.
     pub(crate) fn transfer_state_from(&mut self, old: &Self) {
         let (old_model, model) = (old.batch.model(), self.batch.model());
         let mut qpos = Vec::new();

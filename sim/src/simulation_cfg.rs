@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct SimulationManagerCfg {
     /// Number of environments.
     pub num_envs: usize,
-    /// Physics time step \[s\].
+    /// Physics time step \[s\]; MuJoCo's time step is `physics_dt / substeps`.
     pub physics_dt: f64,
     /// MuJoCo steps per `physics_dt`.
     pub substeps: u32,
@@ -35,9 +35,9 @@ pub struct SimulationManagerCfg {
     /// Seed of random numbers. The physics uses no random numbers. Sensor noise and randomized properties use random
     /// streams keyed by this seed, the global index of the environment, and their purpose.
     pub seed: u64,
-    /// Number of threads that step; every core for `None`.
+    /// Number of threads for stepping, rendering and ray casting; every core for `None`.
     pub threads: Option<usize>,
-    /// Distance between environments in the overview \[m\].
+    /// Distance between neighboring environments in the overview \[m\]. Physics does not depend on it.
     pub arena_space: f64,
     /// Rank of this process and number of processes, if several processes simulate together.
     pub shard: Shard,
@@ -54,7 +54,7 @@ pub struct SimulationManagerCfg {
 pub struct GroundCfg {
     /// Half of the side length of the rendered plane \[m\]; for collisions the plane is infinite.
     pub half_size: f64,
-    /// Color, 0..=1.
+    /// RGB display color (sRGB), 0..=1.
     pub color: [f64; 3],
     /// True if cameras see a checker pattern with squares of 0.5 m, slightly lighter and darker than the color.
     pub checker: bool,
@@ -106,6 +106,7 @@ impl SimulationManagerCfg {
     /// Origins of the environments in the overview \[m\], shape (N, 3): a grid with `arena_space` between neighbors.
     ///
     /// rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k is in row k div cols, column k mod cols.
+    /// Rows follow each other along -x, columns along +y. The center of the grid is the origin.
     pub fn env_origins(&self) -> Array2<f64> {
         let n = self.num_envs;
         let rows = n.div_ceil(n.isqrt().max(1));
@@ -120,8 +121,8 @@ impl SimulationManagerCfg {
         origins
     }
 
-    /// Number of threads for rendering and ray casting: [`threads`](Self::threads), or every core. Stepping uses at
-    /// most one thread per environment.
+    /// Number of threads for rendering and ray casting: [`threads`](Self::threads), or the number of cores. Stepping
+    /// uses at most one thread per environment.
     pub fn num_threads(&self) -> usize {
         self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get))
     }

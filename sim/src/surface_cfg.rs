@@ -25,7 +25,8 @@ pub struct SurfaceCfg {
     pub emission: Option<f64>,
     /// Strength of specular highlights, 0..=1.
     pub specular: Option<f64>,
-    /// Sharpness of specular highlights, 0..=1: the exponent is 128 times this.
+    /// Sharpness of specular highlights, 0..=1: the exponent is 128 times this. Replaces a roughness of the file or
+    /// model, unless `roughness` is set.
     pub shininess: Option<f64>,
     /// Fraction of light in perfect mirror reflection, 0..=1. All renderers apply it to opaque planes and the +z face
     /// of boxes; for other shapes, only path-traced frames do.

@@ -7,7 +7,7 @@ pub struct Viewpoint {
     pub eye: [f64; 3],
     /// Point in the center of the image.
     pub target: [f64; 3],
-    /// Number of calls of [`SceneViewMut::set_camera_view`](crate::SceneViewMut::set_camera_view) so far. Open views
-    /// follow when it changes.
+    /// Number of successful calls of [`SceneViewMut::set_camera_view`](crate::SceneViewMut::set_camera_view) so far.
+    /// Open views move to this point of view when the number changes.
     pub revision: u64,
 }

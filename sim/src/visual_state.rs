@@ -11,13 +11,15 @@ pub struct EnvVisualState {
     /// Reason of the divergence; `None` while the environment runs.
     pub diverged: Option<String>,
     /// Scene with the environment's own sizes or colors, or with shapes that
-    /// [deform](kinetoscope_scene::Instance::is_deformable).
+    /// [deform](kinetoscope_scene::Instance::is_deformable); empty if the environment uses the shared
+    /// [`VisualScene::scene`](crate::VisualScene::scene).
     pub env_scene: EnvScene,
-    /// Poses of the instances in the world, in the order of the instances of [`VisualScene::scene`](crate::VisualScene::scene).
+    /// Poses of the instances, in the order of the instances of [`VisualScene::scene`](crate::VisualScene::scene).
     pub instances: Vec<PoseF32>,
     /// Lights of that scene at their current poses.
     pub lights: Vec<Light>,
-    /// Poses of links and objects, in the order of [`Entities::body_names`](crate::Entities::body_names).
+    /// Poses of links, objects, and bodies and sites of MJCF parts, in the order of
+    /// [`Entities::body_names`](crate::Entities::body_names).
     pub bodies: Vec<Pose>,
     /// Center of mass \[m\] and mass \[kg\] of each MuJoCo body with a mass.
     pub mass_points: Vec<([f64; 3], f64)>,
@@ -36,7 +38,8 @@ pub struct JointAxis {
     pub is_slide: bool,
 }
 
-/// Motion of a link or object; see [`SceneView::body_motion`](crate::SceneView::body_motion).
+/// Pose, velocities and carried mass of a link, an object, or a body of an MJCF part; see
+/// [`SceneView::body_motion`](crate::SceneView::body_motion).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyMotion {
     /// Pose of the body frame in the environment.
@@ -45,7 +48,8 @@ pub struct BodyMotion {
     pub linear: [f64; 3],
     /// Angular velocity \[rad/s\], in world axes.
     pub angular: [f64; 3],
-    /// Mass of the body and of its subtree \[kg\].
+    /// Mass of the body and of all bodies below it in the kinematic tree \[kg\]. Links that fixed joints connect are
+    /// one body.
     pub carried_mass: f64,
     /// True if no force moves the body: it is welded to the world, or it is a mocap body.
     pub is_fixed: bool,

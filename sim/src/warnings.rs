@@ -26,8 +26,9 @@ impl<'a> Warnings<'a> {
         Self { sim }
     }
 
-    /// Counts of all warnings that occurred, by name: diagnostics, MuJoCo's warnings over all environments, and the
-    /// number of diverged environments (`environment-diverged`).
+    /// Counts of all warnings that occurred, by name: diagnostics and MuJoCo's warnings over all environments.
+    /// `environment-diverged` is the number of environments that are diverged now; a reset ends it. Names that did not
+    /// occur are omitted.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         let mut counts: BTreeMap<String, u64> =
             count_by_name(self.sim.diagnostics()).into_iter().map(|(name, n)| (name.to_string(), n as u64)).collect();

@@ -22,7 +22,8 @@ pub enum WrenchFrame {
 /// External wrench on a body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wrench {
-    /// Owner of the wrench: robot and link.
+    /// Owner of the wrench: indices of the robot and its link. For user forces, [`USER_FORCE_OWNER`] and the index of
+    /// the body.
     pub(crate) owner: (usize, usize),
     /// Index of the MuJoCo body.
     pub(crate) body: usize,
@@ -34,7 +35,8 @@ pub(crate) struct Wrench {
     pub(crate) torque: Vector3<f64>,
 }
 
-/// Stands for the robot in [`Wrench::owner`] for forces of [`SceneViewMut::set_user_wrench`](crate::SceneViewMut::set_user_wrench).
+/// Stands for the robot in [`Wrench::owner`] for forces of
+/// [`SceneViewMut::set_point_forces`](crate::SceneViewMut::set_point_forces).
 const USER_FORCE_OWNER: usize = MAX_ROBOTS;
 
 /// All external wrenches and weightless bodies of one environment.
@@ -83,8 +85,8 @@ impl Wrenches {
         }
     }
 
-    /// Wrenches for another model; `body` maps old to new body indices. User forces ([`set_user_wrench`](Self::set_user_wrench)) are dropped,
-    /// because their owner index is invalid there.
+    /// Wrenches for another model; `body` maps old to new body indices. User forces
+    /// ([`set_user_wrench`](Self::set_user_wrench)) are dropped, because their owner index is invalid there.
     pub(crate) fn remapped(&self, body: impl Fn(usize) -> Option<usize>) -> Self {
         let moved = |wrench: &Wrench| Some(Wrench { body: body(wrench.body)?, ..wrench.clone() });
         Self {

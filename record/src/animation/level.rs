@@ -61,8 +61,8 @@ impl H264Level {
         [(8 * self.max_fs).isqrt() * MB_SIZE, self.max_fs * MB_SIZE * MB_SIZE]
     }
 
-    /// The lowest level for a stream. `frames` are duration (in units of 1 / `max_mbps` s) and size (in bytes) of
-    /// each frame.
+    /// The lowest level for a stream, or [`HIGHEST`] if no level suffices. `squares` are macroblocks per row and rows.
+    /// `frames` are duration (in units of 1 / `per_second` s) and size (in bytes) of each frame.
     pub(super) fn lowest_for(
         squares: [usize; 2],
         per_second: u32,
@@ -102,7 +102,8 @@ impl H264Level {
 mod tests {
     use super::*;
 
-    /// Level of frames of these sides \[pixels\], at this rate \[Hz\], each of this many bytes.
+    /// Returns the code of the lowest level for three seconds of frames with these sides \[pixels\], rate \[Hz\] and
+    /// size \[bytes\].
     fn of(sides: [usize; 2], rate: u32, bytes: u32) -> u8 {
         let shown = 90_000 / rate;
         H264Level::lowest_for(sides.map(|side| side.div_ceil(MB_SIZE)), 90_000, (0..3 * rate).map(|_| [shown, bytes]))

@@ -56,7 +56,7 @@ pub(crate) enum Role {
     TargetEfforts,
     /// Object poses.
     Objects,
-    /// Time, positions and velocities in MuJoCo's order.
+    /// Simulation time, positions and velocities in MuJoCo's order.
     EngineState,
     /// Channel of a sensor.
     Sensor {
@@ -72,7 +72,7 @@ const TARGETS: [Role; 3] = [Role::Action, Role::TargetVelocities, Role::TargetEf
 const CONTROLS: [Role; 3] = [Role::Positions, Role::Velocities, Role::Action];
 
 impl Role {
-    /// True if the value of a frame comes with the next row.
+    /// True for targets and controls: the value of a frame is that of the next row.
     pub(crate) fn is_action(&self) -> bool {
         matches!(self, Self::Action | Self::TargetVelocities | Self::TargetEfforts)
     }
@@ -94,7 +94,8 @@ pub(crate) fn supports(stream: &StreamSchema) -> bool {
     }
 }
 
-/// True for poses of objects. Poses of links follow from joints and are not supported.
+/// True for the pose stream of a rigid object (`uid/pose`). Datasets leave out poses of links and bodies, because joint
+/// positions determine them.
 fn is_object(stream: &StreamSchema) -> bool {
     matches!(&stream.kind, StreamKind::Poses { frames } if stream.name == format!("{}/pose", frames.join("/")))
 }

@@ -125,7 +125,7 @@ fn transforms(message: &Message) -> Vec<(String, [f64; 7])> {
     all.iter().filter_map(one).collect()
 }
 
-/// Splits a topic or a frame such as `/env_2/arm/targets` into the environment and the rest.
+/// Splits a topic or a frame such as `/env_2/arm/targets` into 2 and `arm/targets`; `None` without an environment.
 fn of_env(name: &str) -> Option<(usize, &str)> {
     let (env, rest) = name.trim_start_matches('/').strip_prefix("env_")?.split_once('/')?;
     Some((env.parse().ok()?, rest))

@@ -39,16 +39,16 @@ enum Content {
     Npz(Box<RecordedArrays>),
 }
 
-/// A recorded topic of one environment.
+/// A topic of a recording. Most topics belong to one environment, whose prefix is part of the name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordedTopic {
     /// Name, such as `/env_0/arm/joint_states`, for archives too.
     pub name: String,
     /// Message type, or `numbers` or `images` for an archive.
     pub kind: String,
-    /// Number of messages or rows.
+    /// Number of messages, or of rows of an archive. A row may repeat the last value of an environment.
     pub count: u64,
-    /// Names of its numbers, such as `position[J1]`; empty for images and texts.
+    /// Names of its numbers, such as `position[J1]`; empty for images, texts, and messages that cannot be read.
     pub fields: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ pub struct FieldSelector {
 }
 
 impl FieldSelector {
-    /// Selects a number of a topic.
+    /// Selects the number `field`, such as `position[J1]`, of a topic.
     pub fn new(topic: impl Into<String>, field: impl Into<String>) -> Self {
         Self { topic: topic.into(), field: field.into() }
     }
@@ -119,8 +119,9 @@ impl Recording {
         &self.warnings
     }
 
-    /// Finds a topic by its full name or the end of it. `arm/joint_states` and `/joint_states` find
-    /// `/env_0/arm/joint_states` if there is one arm. Without `env`, the first environment is used.
+    /// Finds a topic by its full name, whatever `env` is, or by the end of its name in environment `env`.
+    /// `arm/joint_states` and `/joint_states` find `/env_0/arm/joint_states` if there is one arm. For `None`, the first
+    /// environment with such a topic is used.
     ///
     /// # Errors
     /// No topic or more than one matches. The error lists the nearest or the matching names.
@@ -155,7 +156,7 @@ impl Recording {
         }
     }
 
-    /// Recorded environments, in ascending order.
+    /// Environments with topics, in ascending order.
     pub fn env_ids(&self) -> Vec<usize> {
         let mut envs: Vec<usize> = self.topics.iter().filter_map(|topic| env_of(&topic.name)).collect();
         envs.sort_unstable();
@@ -163,7 +164,8 @@ impl Recording {
         envs
     }
 
-    /// Reads numbers over time: one series for each of `wanted`, in the order of the file.
+    /// Reads numbers over time: one series for each of `wanted`, with its samples in the order of the file. A topic
+    /// that is given by the end of its name is that of the first environment, as in [`topic`](Self::topic).
     ///
     /// A message without the number, such as a transform message of other frames, has no sample, nor has an unreadable
     /// message ([`warnings`](Self::warnings)).

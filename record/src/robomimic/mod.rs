@@ -16,7 +16,7 @@
 //! | `obs/CAMERA_image` | (T, H, W, 3) | color, u8, one chunk for each image, compressed by deflate |
 //! | `next_obs/...` | | the same observations after the action |
 //!
-//! `env_kwargs` has `task`, `physics_dt`, `period_steps` and `columns`.
+//! `env_kwargs` has `task`, `physics_dt`, `every` (physics steps between two frames) and `columns`.
 //!
 //! Until the end, rows and compressed images are in two unnamed files in the same folder, because the number and the
 //! lengths of episodes are not known before. A killed process leaves nothing.
@@ -95,7 +95,8 @@ struct Episode {
     blocks: Vec<BlockPosition>,
 }
 
-/// Name of a role below an episode; for observations, below `obs` and `next_obs`.
+/// Path of the dataset of a role, relative to the group of an episode. Paths of observations are relative to its groups
+/// `obs` and `next_obs`.
 fn name_of(role: &Role) -> String {
     let flat = |name: &str| name.replace('/', "_");
     match role {

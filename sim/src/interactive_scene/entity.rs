@@ -36,7 +36,7 @@ pub enum EntityCfg {
     Mjcf(Box<MjcfPartCfg>),
     /// A weld, initially released. Its uid is the name of the entity.
     Weld(Box<WeldCfg>),
-    /// A sensor of any type.
+    /// A sensor of any type. Its uid is the name of the entity.
     Sensor(Box<dyn AnySensorCfg>),
 }
 
@@ -155,7 +155,7 @@ impl AnySensorId {
         Self { id: Arc::new(id), index: id.index(), type_name: short_type_name::<S>() }
     }
 
-    /// The handle, if the sensor has type `S`.
+    /// The handle; `None` if the sensor does not have type `S`.
     pub fn get<S: Sensor>(&self) -> Option<SensorId<S>> {
         self.id.downcast_ref().copied()
     }

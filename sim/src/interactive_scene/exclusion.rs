@@ -5,7 +5,7 @@ use crate::manager::SimulationManager;
 use crate::pattern::strip_env_prefix;
 use kinetoscope_scene::source_location::SourceLocation;
 
-/// Pair of bodies or robots that never collide.
+/// Pair of bodies or robots whose contacts are excluded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExclusionCfg {
     /// Names, as in [`SimulationManager::exclude_collision`]; a prefix `{ENV}/` or `{ENV_REGEX_NS}/` is ignored.

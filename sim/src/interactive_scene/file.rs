@@ -40,7 +40,8 @@ impl SceneCfg {
     /// which JSON is a subset; all other files are TOML.
     ///
     /// # Errors
-    /// As [`from_toml`](Self::from_toml) and [`from_yaml`](Self::from_yaml), or the file cannot be read.
+    /// As [`from_toml`](Self::from_toml) and [`from_yaml`](Self::from_yaml); [`Error::File`] if the file cannot be
+    /// read.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_file_with(path, &EntityTypes::default())
     }
@@ -61,8 +62,8 @@ impl SceneCfg {
     ///
     /// # Errors
     /// [`Error::SceneFile`] with file and line: the text is not TOML, a key or an entity type is unknown (the message
-    /// lists the known ones), a value has the wrong type, or the generator of a terrain rejects its parameters. All
-    /// other numbers and names are checked when the scene is built.
+    /// lists the known ones), an entity has no `type` or has a `uid`, a value has the wrong type, or the generator of a
+    /// terrain rejects its parameters. All other numbers and names are checked when the scene is built.
     pub fn from_toml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let reader = Reader { text: Some(text), file: file.as_ref(), types };
         let root = DeTable::parse(text).map_err(|e| reader.toml_error(&e, 0..0))?;
@@ -80,11 +81,12 @@ impl SceneCfg {
         reader.scene(yaml::table(root.as_ref()).map_err(wrong)?)
     }
 
-    /// Writes the scene as the text of a scene file, with the entity types of `types`. Paths are written unchanged.
+    /// Writes the scene as the text of a TOML scene file, with the entity types of `types`. Paths are written
+    /// unchanged.
     ///
     /// # Errors
     /// [`Error::SceneFileWrite`]: `types` lacks the type of a sensor, or TOML cannot represent a value (a seed above
-    /// 2^63 - 1, a path that is not Unicode).
+    /// 2^63 - 1, a path that is not Unicode). [`Error::DuplicateUid`]: two entities have the same name.
     pub fn to_toml(&self, types: &EntityTypes) -> Result<String> {
         let fail = |what: &str, reason: String| Error::SceneFileWrite { what: what.into(), reason };
         let simulation = toml::Table::try_from(&self.simulation);

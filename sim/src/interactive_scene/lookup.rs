@@ -47,7 +47,8 @@ impl InteractiveScene {
         Ok(self.sim.robot(self.robot_id(name)?))
     }
 
-    /// Returns a robot for commands and writes. Writes act at once, so there is no counterpart to `write_data_to_sim`.
+    /// Returns a robot for commands and writes. Writes act at once, so there is no counterpart to Isaac Lab's
+    /// `write_data_to_sim`.
     ///
     /// # Errors
     /// As [`robot_id`](Self::robot_id).
@@ -159,10 +160,10 @@ impl InteractiveScene {
         Ok(self.sim.entities().terrain(self.terrain_id(name)?))
     }
 
-    /// Returns the handle of an attached MJCF file by the name of its entity.
+    /// Returns the handle of an MJCF part (an attached MJCF file) by the name of its entity.
     ///
     /// # Errors
-    /// The entity does not exist, or is not an attached MJCF file.
+    /// The entity does not exist, or is not an MJCF part.
     pub fn mjcf_id(&self, name: &str) -> Result<MjcfId> {
         match self.find(name)? {
             EntityHandle::Mjcf(id) => Ok(*id),
@@ -170,7 +171,7 @@ impl InteractiveScene {
         }
     }
 
-    /// Returns an attached MJCF file for reading.
+    /// Returns an MJCF part for reading.
     ///
     /// # Errors
     /// As [`mjcf_id`](Self::mjcf_id).
@@ -178,7 +179,7 @@ impl InteractiveScene {
         Ok(self.sim.mjcf_part(self.mjcf_id(name)?))
     }
 
-    /// Returns an attached MJCF file for commands and writes.
+    /// Returns an MJCF part for commands and writes.
     ///
     /// # Errors
     /// As [`mjcf_id`](Self::mjcf_id).
@@ -225,10 +226,11 @@ impl InteractiveScene {
         id.ok_or_else(|| handle.type_mismatch(name, format!("sensor of type {}", short_type_name::<S>())))
     }
 
-    /// Returns a sensor of type `S` for reading.
+    /// Returns a sensor of type `S` for reading. A [lazy](kinetoscope_sensors::SensorCfg::lazy) sensor runs its pending
+    /// measurement now.
     ///
     /// # Errors
-    /// As [`sensor_id`](Self::sensor_id), or the sensor failed in an earlier step.
+    /// As [`sensor_id`](Self::sensor_id), or the sensor failed, in an earlier step or now.
     pub fn sensor<S: Sensor>(&self, name: &str) -> Result<&S> {
         self.sim.sensor(self.sensor_id(name)?)
     }

@@ -45,7 +45,7 @@ use std::path::Path;
 /// num_envs = 2
 ///
 /// [entities.cube]            # the name of the entity
-/// type = "rigid_object"      # its type, see EntityTypes; all other keys are fields of its configuration
+/// type = "rigid_object"      # its type, see EntityTypes; all other keys are fields of its configuration, without uid
 /// shape.box.size = [0.2, 0.2, 0.2]
 ///
 /// [entities.touch]
@@ -62,7 +62,7 @@ pub struct SceneCfg {
     /// Names and configurations, in the order of declaration. A prefix `{ENV}/` or `{ENV_REGEX_NS}/` of a name is
     /// ignored: every entity exists in every environment.
     pub entities: Vec<(String, EntityCfg)>,
-    /// Pairs that never collide.
+    /// Pairs of bodies or robots whose contacts are excluded.
     pub exclusions: Vec<ExclusionCfg>,
     /// File and line of the declaration by entity name, for error messages; empty for a scene from Rust.
     pub sources: BTreeMap<String, SourceLocation>,
@@ -77,28 +77,30 @@ impl SceneCfg {
     /// Adds an entity: a [`RobotCfg`](crate::RobotCfg), an [`ArticulationCfg`](crate::ArticulationCfg), a
     /// [`RigidObjectCfg`](crate::RigidObjectCfg), a [`RigidObjectGroupCfg`](crate::RigidObjectGroupCfg), a
     /// [`TerrainCfg`](crate::TerrainCfg), an [`MjcfPartCfg`](crate::MjcfPartCfg), a [`WeldCfg`](crate::WeldCfg), or the
-    /// configuration of any sensor.
+    /// configuration of any sensor. The name replaces the `uid` in `cfg`.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, cfg: impl Into<EntityCfg>) -> Self {
         self.entities.push((name.into(), cfg.into()));
         self
     }
 
-    /// Adds a pair of bodies or robots that never collide. Names are as in [`SimulationManager::exclude_collision`]; a
-    /// prefix `{ENV}/` or `{ENV_REGEX_NS}/` is ignored. [`InteractiveScene::new`] checks the names.
+    /// Adds a pair of bodies or robots whose contacts are excluded. Names are as in
+    /// [`SimulationManager::exclude_collision`]; a prefix `{ENV}/` or `{ENV_REGEX_NS}/` is ignored.
+    /// [`InteractiveScene::new`] checks the names.
     #[must_use]
     pub fn exclude_collision(mut self, one: impl Into<String>, other: impl Into<String>) -> Self {
         self.exclusions.push(ExclusionCfg { pair: [one.into(), other.into()], at: None });
         self
     }
 
-    /// Names of the entities, in the order of declaration.
+    /// Names of the entities without the prefix, in the order of declaration.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
         self.entities.iter().map(|(name, _)| strip_env_prefix(name))
     }
 }
 
-/// A running scene: a simulation and the names of its entities.
+/// A running scene: a simulation and the names of its entities. A prefix `{ENV}/` or `{ENV_REGEX_NS}/` of a name is
+/// ignored in lookups.
 #[derive(Debug)]
 pub struct InteractiveScene {
     sim: SimulationManager,
@@ -112,7 +114,7 @@ impl InteractiveScene {
     ///
     /// # Errors
     /// Two entities have the same name, or the configuration of the simulation, of an entity or of an exclusion is
-    /// invalid. With a known position in a file, the error is [`Error::Entity`] or [`Error::Exclusion`].
+    /// invalid. For an entity or an exclusion from a file, the error is [`Error::Entity`] or [`Error::Exclusion`].
     pub fn new(cfg: SceneCfg) -> Result<Self> {
         let mut taken: Vec<&str> = Vec::new();
         for name in cfg.keys() {
@@ -189,7 +191,7 @@ impl InteractiveScene {
     /// Clears the buffers that environments keep beside their state, in all of them for `env_ids = None`, as Isaac
     /// Lab's `reset` does. Sensors restart from the current state, external wrenches end, and actuator models lose
     /// their memory (delays, motor states). Positions, velocities, targets and time stay; a diverged environment stays
-    /// diverged. [`reset_to_default`](Self::reset_to_default) resets robots and objects.
+    /// diverged. Observers receive no event. [`reset_to_default`](Self::reset_to_default) resets robots and objects.
     ///
     /// # Errors
     /// An environment does not exist; then no environment is reset.
@@ -214,7 +216,7 @@ impl InteractiveScene {
     /// Steps all environments by a time \[s\], which must be a whole number of `physics_dt`.
     ///
     /// # Errors
-    /// The time is not a whole number of steps; then nothing is done.
+    /// The time is negative, is not a whole number of steps, or is more than `u32::MAX` steps; then nothing is done.
     pub fn update_for(&mut self, seconds: f64) -> Result<()> {
         let steps = seconds / self.sim.cfg().physics_dt;
         let whole = steps.round();

@@ -59,7 +59,8 @@ impl Default for EntityTypes {
 
 impl EntityTypes {
     /// Adds a sensor type under a name; a type of the same name is replaced. Paths in its configuration are not made
-    /// relative to the file, because only the sensor knows which of its strings are paths.
+    /// relative to the file, because only the sensor knows which of its strings are paths. A configuration type with
+    /// several names is written under the first one.
     #[must_use]
     pub fn with_sensor<C>(self, name: impl Into<String>) -> Self
     where

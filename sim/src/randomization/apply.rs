@@ -39,7 +39,7 @@ impl ModelPatcher {
     }
 
     /// Prepares environment `index`, which is `env`, for these properties. `own` are its own values, from
-    /// [`Properties::own`].
+    /// [`Properties::overrides`].
     pub(crate) fn prepare(
         &mut self,
         properties: &Properties,

@@ -26,8 +26,8 @@ impl SimulationManager {
 /// `mj_setConst`) are computed for it. All other environments share everything.
 ///
 /// Random numbers are keyed by the seed of the simulation, the global index of the environment, the number of its
-/// previous randomizations, and the property and name. So they depend neither on the number of environments and
-/// processes, nor on other environments, nor on other random quantities.
+/// previous randomizations (calls that selected it), and the property and name. So they depend neither on the number of
+/// environments and processes, nor on other environments, nor on other random quantities.
 ///
 /// Properties stay until they are randomized or set again, gains of drives included.
 /// [`reset`](crate::SimulationManager::reset) and [`restore`](crate::SimulationManager::restore) keep them
@@ -48,7 +48,7 @@ impl<'a> EnvProperties<'a> {
         Self { sim }
     }
 
-    /// Returns the properties of an environment.
+    /// Returns a copy of the properties of an environment. Changes to the copy have no effect.
     ///
     /// # Errors
     /// The environment does not exist.
@@ -60,7 +60,7 @@ impl<'a> EnvProperties<'a> {
 
     /// Memory of an environment's own properties \[bytes\]: the struct and the arrays of the model that it does not
     /// share (with those of the welds that hold), and the values. 0 if all properties are nominal, whatever welds hold.
-    /// One whole copy of the model is kept in addition, for all environments.
+    /// Gains and limits of drives do not count. One whole copy of the model is kept in addition, for all environments.
     ///
     /// # Errors
     /// The environment does not exist.
@@ -73,7 +73,7 @@ impl<'a> EnvProperties<'a> {
     }
 }
 
-/// Write access to properties of environments: randomizes, resets and restores them; see
+/// Write access to properties of environments: randomizes, sets, resets and restores them; see
 /// [`SimulationManager::properties_mut`].
 #[derive(Debug)]
 pub struct EnvPropertiesMut<'a> {
@@ -89,8 +89,9 @@ impl<'a> EnvPropertiesMut<'a> {
     /// forward pass follows, when the environment is read or stepped.
     ///
     /// # Errors
-    /// An environment does not exist, a pattern matches nothing or one name twice, a range is empty, or a value is
-    /// invalid, such as a negative mass; then nothing changes.
+    /// An environment does not exist, a pattern is invalid or matches nothing, two terms of one property match the same
+    /// name, the ends of a range are not finite or in the wrong order, or a value is invalid, such as a negative mass;
+    /// then nothing changes.
     pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
         let resolved = randomization.resolve(&self.sim.properties().of(EnvId(0))?)?;
         let keys = self.rng_keys();
@@ -106,9 +107,10 @@ impl<'a> EnvPropertiesMut<'a> {
         })
     }
 
-    /// Changes properties by a function. Its arguments are random numbers of the environment, the index of the
-    /// environment in this manager, and its properties. The function may ignore the random numbers, and just set
-    /// properties.
+    /// Changes properties by a function, which is called once for each selected environment (all for `None`), in
+    /// ascending order. Its arguments are random numbers of the environment, the index of the environment in this
+    /// manager, and its properties. The function may ignore the random numbers, and just set properties. Each call
+    /// counts as a randomization of these environments.
     ///
     /// # Errors
     /// An environment does not exist, the function fails, or a value is invalid; then nothing changes.
@@ -121,7 +123,9 @@ impl<'a> EnvPropertiesMut<'a> {
         self.randomize_counted(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
     }
 
-    /// Resets environments to the nominal properties, gains of drives included. They then share the whole model again.
+    /// Resets environments to the nominal properties (all environments for `None`), gains and effort limits of drives
+    /// included, also those that were set at run time. The environments then share the whole model again. The number of
+    /// their randomizations stays.
     ///
     /// # Errors
     /// An environment does not exist.
@@ -136,14 +140,15 @@ impl<'a> EnvPropertiesMut<'a> {
     /// Restores a snapshot like [`SimulationManager::restore`], together with the properties of each environment at the
     /// time of the snapshot.
     ///
-    /// These are its own values, randomized gains included, and the number of its randomizations, so that the next
-    /// randomization gives the values that it gave then. Properties that were nominal become nominal. The simulation
-    /// continues bit-identically, also from a file in a manager that was built alike, whatever was randomized or set in
-    /// between.
+    /// The properties are the environment's own values, randomized gains included, and the number of its
+    /// randomizations, so that the next randomization gives the values of the one that followed the snapshot.
+    /// Properties that were nominal become nominal. The simulation continues bit-identically, also from a file in a
+    /// manager that was built alike, whatever was randomized or set in between.
     ///
     /// ```
     /// use kinetoscope_sim::{
-    ///     RandomizationOp, EnvId, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
+    ///     RandomizationOp, EnvId, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager,
+    ///     SimulationManagerCfg,
     /// };
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;

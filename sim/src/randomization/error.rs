@@ -7,7 +7,7 @@ use kinetoscope_scene::RenderSceneError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RandomizationError {
-    /// The patterns of a property match nothing, or one name twice.
+    /// A pattern of a property is not a regular expression or matches nothing, or two patterns match the same name.
     #[error("{property}: {error}")]
     Pattern {
         /// Name of the property.

@@ -13,10 +13,12 @@ use std::sync::Arc;
 /// stored with the drives instead.
 pub(crate) type PropertyOverrides = [Option<Box<[f64]>>; Property::ALL.len()];
 
-/// Properties of one environment.
+/// Properties of one environment, as a copy. Changes act on the environment only inside
+/// [`EnvPropertiesMut::randomize_with`](crate::EnvPropertiesMut::randomize_with).
 ///
-/// Names are `uid/link` and `uid/joint` of robots and MJCF parts, and the uid of objects and terrains; the names of the
-/// ground and of gravity are `ground` and `gravity`. Links behind fixed joints are part of the link they are fused to.
+/// Names are `uid/link` and `uid/joint` of robots and articulations, `uid/body`, `uid/joint` and, for the world,
+/// `uid/geom` of MJCF parts, and the uid of objects and terrains. The names of the ground and of gravity are `ground`
+/// and `gravity`. Links behind fixed joints are part of the link they are fused to.
 #[derive(Clone, Debug)]
 pub struct Properties {
     pub(super) tables: Arc<PropertyTables>,
@@ -76,8 +78,8 @@ impl Properties {
         names
     }
 
-    /// Names of the elements that a randomization of a property changes. It keeps nominal opacities, so it does not
-    /// change the visible color of an element that is nominally invisible.
+    /// Names of the elements that a randomization of a property changes. For colors, elements with a nominal opacity of
+    /// 0 are left out: a randomization keeps opacities, so they stay invisible.
     pub(super) fn randomizable_names(&self, property: Property) -> Vec<&str> {
         let table = self.tables.get(property);
         let is_seen = |name: &str| {
@@ -132,7 +134,8 @@ impl Properties {
         Ok(&values[element * property.width()..(element + 1) * property.width()])
     }
 
-    /// Sets a value, for all shapes of a body with several. The value is checked when the environment takes it over.
+    /// Sets a value, for all shapes of a body with several. Setting a mass also sets the moments of inertia
+    /// ([`Property::Mass`]). The value is checked when the change is applied to the environment, not here.
     ///
     /// # Errors
     /// No element of this name has the property, or the number of values is not that of the property.

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Property {
-    /// Mass of a link or object \[kg\], 1 number. Setting it scales the nominal moments of inertia in proportion, as
-    /// another density would. Values computed from the files stay nominal: `total_mass` and `nominal_mass`, the
-    /// inertias behind the gains of [`crate::DriveType`](crate::DriveType), and
+    /// Mass of a link or object that can move \[kg\], 1 number. Setting it replaces the moments of inertia by the
+    /// nominal ones scaled in proportion, as another density would. Values computed from the files stay nominal:
+    /// `total_mass` and `nominal_mass`, the inertias behind the gains of [`crate::DriveType`](crate::DriveType), and
     /// [`dynamics`](kinetoscope_robot::dynamics) of a description.
     Mass,
     /// Center of mass in the link's (object's) own frame \[m\], 3 numbers. MuJoCo 4.x does not support it for a freely
@@ -35,10 +35,11 @@ pub enum Property {
     /// Gravity \[m/s²\], 3 numbers; the name is `gravity`. An [`Imu`](kinetoscope_sensors::Imu) still adds the nominal
     /// gravity, unless its `gravity_bias` gives another.
     Gravity,
-    /// Proportional gain of a drive \[N m/rad or N/m\], 1 number; the name is that of the joint. Drives of
+    /// Proportional gain of a drive, 1 number \[N m/rad or N/m\], in these units for every
+    /// [`DriveType`](crate::DriveType); the name is that of the joint. Drives of
     /// [`DriveModel::Actuator`](crate::DriveModel::Actuator) do not have the properties of gains and limits.
     Stiffness,
-    /// Derivative gain of a drive \[N m s/rad or N s/m\], 1 number.
+    /// Derivative gain of a drive, 1 number \[N m s/rad or N s/m\], in these units for every drive type.
     DriveDamping,
     /// Largest effort of a drive \[N m or N\], 1 number, which may be infinite.
     MaxEffort,
@@ -50,18 +51,19 @@ pub enum Property {
     /// Meshes, planes and height fields have no size of their own in an environment; in a body with other shapes they
     /// stay as they are. MuJoCo stores the vertices of a mesh and the heights of a field once for all uses, with the
     /// values that its compiler derives from them. A plane collides everywhere, whatever its size. A size for a body
-    /// without any other shape is the error [`RandomizationError::NoSizeProperty`](super::RandomizationError::NoSizeProperty), which
-    /// suggests alternatives.
+    /// without any other shape is the error
+    /// [`RandomizationError::NoSizeProperty`](super::RandomizationError::NoSizeProperty), which suggests alternatives.
     ///
     /// Mass, center of mass and moments stay: they are properties of their own. Sizes of sites stay too: a touch sensor
     /// of an MJCF file measures contacts in its nominal volume. Frames of links and joints stay in place, so that
     /// [`compute_fk`](crate::Robot::compute_fk) and [`compute_ik`](crate::Robot::compute_ik) are valid in every
-    /// environment. Use [`TipFrame::with_tcp`](kinetoscope_robot::kinematics::TipFrame::with_tcp) for the tip of a link that
-    /// became longer.
+    /// environment. Use [`TipFrame::with_tcp`](kinetoscope_robot::kinematics::TipFrame::with_tcp) for the tip of a link
+    /// that became longer.
     Size,
-    /// Color and opacity of the visible shapes of a link, an object or a terrain, 4 sRGB numbers from 0 to 1. It
-    /// multiplies a texture, and overrides the colors of materials and mesh files, for all parts of a mesh. The nominal
-    /// color is MuJoCo's: gray 0.5 for a mesh file with colors of its own, which return with that color.
+    /// Color and opacity of the visible shapes of a link, an object or a terrain, not of the ground: 4 sRGB numbers
+    /// from 0 to 1. It multiplies a texture, and overrides the colors of materials and mesh files, for all parts of a
+    /// mesh. The nominal color is MuJoCo's, which is gray 0.5 for a mesh file with colors of its own. Setting the
+    /// nominal color restores the colors of the file.
     Color,
     /// Position of a static object in the environment \[m\], 3 numbers.
     Position,

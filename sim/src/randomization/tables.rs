@@ -267,8 +267,9 @@ pub(super) enum FrictionLocation {
     Tendon(usize),
 }
 
-/// Finds the dry friction of a joint; `None` if its drive uses the friction row and it has no tendon. The writer of the
-/// scene adds the tendons: wherever drives are rows, every joint with a drive has one, also with an explicit model.
+/// Finds the dry friction of a joint; `None` if its drive uses the friction row and it has no tendon. Where drives are
+/// rows, the writer of the scene adds a tendon for each driven joint with friction, also with an explicit model. If
+/// [`DriveCfg::friction`](crate::DriveCfg::friction) is set, every driven joint of the robot has one.
 pub(super) fn friction_location(model: &Model, drives: &DriveTable, joint: usize) -> Option<FrictionLocation> {
     let tendon = format!("{}/friction", model.name(ObjectKind::Joint, joint)?);
     if let Some(tendon) = model.id(ObjectKind::Tendon, &tendon) {

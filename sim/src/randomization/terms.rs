@@ -8,16 +8,17 @@ use kinetoscope_scene::KeyedRng;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Random operation on a property. Numbers are sampled uniformly from a range and change the nominal value, not the
-/// previous random value. For a color, red, green and blue are randomized; the opacity stays nominal.
+/// Random operation on a property. Numbers are sampled uniformly from a range `[low, high]` and change the nominal
+/// value, not the previous random value. For moments of inertia, the nominal value is scaled to the current mass. For a
+/// color, red, green and blue are randomized; the opacity stays nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RandomizationOp {
     /// Multiplies all numbers of the property by one random factor.
     Scale([f64; 2]),
-    /// Adds a random summand to each number.
+    /// Adds a random summand, in the unit of the property, to each number. Each number has its own summand.
     Add([f64; 2]),
-    /// Replaces each number by a random value.
+    /// Replaces each number by its own random value, in the unit of the property.
     Set([f64; 2]),
 }
 
@@ -37,7 +38,8 @@ pub struct RandomizationTerm {
     pub property: Property,
     /// Regular expression that matches whole names (see [`Properties`]).
     pub pattern: String,
-    /// Random operation. Elements with the same name get the same random numbers.
+    /// Random operation. Elements with the same name, such as the shapes of one body, get the same random numbers;
+    /// different names get different ones.
     pub draw: RandomizationOp,
 }
 

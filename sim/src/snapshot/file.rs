@@ -49,8 +49,9 @@ impl Snapshot {
     /// Reads a file that [`save`](Self::save) wrote.
     ///
     /// # Errors
-    /// The file cannot be read, or is not a complete, undamaged snapshot of this format and this MuJoCo version. Each
-    /// case is a [`SnapshotError`] of its own.
+    /// [`Error::File`] if the file cannot be read. A [`SnapshotError`] if it is not a complete, undamaged snapshot of
+    /// this format and this MuJoCo version, with a variant for each case. The scene is checked when the snapshot is
+    /// restored.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|error| Error::File { path: path.into(), error })?;

@@ -81,8 +81,8 @@ impl Snapshot {
         self.entries.iter().map(|entry| entry.state.motion.values().first().copied().unwrap_or(0.0)).collect()
     }
 
-    /// Index of the state for each of `requested` environments, after a check that the snapshot is of this scene; a single
-    /// state applies to all.
+    /// Index of the state for each of `requested` environments, after a check that the snapshot is of this scene; a
+    /// single state applies to all.
     pub(crate) fn states_for(&self, requested: usize, simulation: &Simulation) -> Result<Vec<usize>> {
         if let Some(difference) = self.layout.difference(&simulation.layout) {
             return Err(SnapshotError::OtherScene { difference }.into());
@@ -121,8 +121,8 @@ impl SimulationManager {
 
     /// Restores environments from a snapshot: the k-th of `env_ids` from the k-th state, or all of them from a single
     /// state. If `env_ids` is `None`, each state is restored to the environment that it was taken from. For a repeated
-    /// environment, the last state counts. A forward pass follows, and the sensors of these environments restart, as
-    /// after a reset.
+    /// environment, the last state counts. Properties of the environments stay. A forward pass follows, and the sensors
+    /// of these environments restart, as after a reset.
     ///
     /// # Errors
     /// An environment does not exist, the snapshot is of another scene, or it holds another number of states; then

@@ -12,21 +12,24 @@ use std::sync::Arc;
 pub struct MaskId {
     /// Value in the mask channel. Never 0, which is the background.
     pub id: i32,
-    /// Robot, rigid object or geom of the world; in a model without a simulation, the first body of the tree.
+    /// Uid of the robot, articulation, object, terrain or MJCF part, or `ground`. In a model without a simulation: the
+    /// first body of the kinematic tree, the geom or site of the world, the tendon, the skin or the flex.
     pub object: String,
-    /// Link of a robot; tendon of a robot or a part.
+    /// Link, body of an MJCF part, or tendon; `None` for the ground, terrains, objects and geoms of the world. In a
+    /// model without a simulation, the body.
     pub link: Option<String>,
-    /// Class: `ground`, `terrain`, `robot`, `object` or the configured class of the object; `world`, `body`, `tendon`,
-    /// `skin` and `flex` in a model without a simulation.
+    /// Semantic class: the configured one, else `ground`, `terrain`, `robot`, `articulation`, `object` or `mjcf`. In a
+    /// model without a simulation: `world`, `body`, `tendon`, `skin` or `flex`.
     pub class: String,
-    /// Name of the body in MuJoCo.
+    /// Name of the body in MuJoCo, or `body` with its index without a name; the world body for tendons, skins and
+    /// flexes.
     pub body: String,
-    /// Names of the geoms in MuJoCo; an unnamed geom has its number.
+    /// Names of the geoms in MuJoCo; a geom without a name is called `geom` with its index.
     pub geoms: Vec<String>,
 }
 
 impl MaskId {
-    /// Full name: the object, or `object/link`.
+    /// Full name: `object`, or `object/link`; for a tendon of a simulation, `object/tendon`.
     pub fn name(&self) -> String {
         self.link.as_ref().map_or_else(|| self.object.clone(), |link| format!("{}/{link}", self.object))
     }
@@ -84,7 +87,7 @@ pub(super) struct ElementIdentity {
     pub(super) mask_id: i32,
     /// Name: `uid/link`, the uid of an object, or the name of a geom of the world.
     pub(super) name: Arc<str>,
-    /// Index on the body axis of sensors; `None` for the world, and for a model without sensors.
+    /// Index on the body axis of sensors; `None` for the world, and for a model without a simulation.
     pub(super) body: Option<u32>,
 }
 

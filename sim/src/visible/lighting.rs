@@ -46,7 +46,8 @@ impl<'a> Lighting<'a> {
     }
 }
 
-/// Distance of a skybox in MuJoCo's renderer relative to that of the far clipping plane, measured in its images.
+/// Distance of a skybox in MuJoCo's renderer relative to that of the far clipping plane, measured in images of that
+/// renderer.
 const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
 
 /// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns messages about

@@ -297,8 +297,8 @@ impl VisualScene {
     }
 
     /// One message for each element that is not rendered: unreadable textures, skyboxes and meshes, invalid geoms and
-    /// sites, signed distance fields, image-based lights, and rods of slider-cranks. If the scene has too many triangles, one message says
-    /// that the scene is not rendered.
+    /// sites, signed distance fields, image-based lights, and rods of slider-cranks. If the scene has too many
+    /// triangles, one message says that the scene is not rendered.
     pub fn omitted(&self) -> &[String] {
         &self.left_out
     }

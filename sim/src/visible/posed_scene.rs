@@ -38,7 +38,7 @@ pub struct ModelCamera {
     pub fovy: f64,
 }
 
-/// Free camera: the initial viewpoint of MuJoCo's viewers for a model.
+/// Viewpoint onto a model, such as the free camera of MuJoCo's viewers; +z is up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeCamera {
     /// Position of the camera \[m\].
@@ -55,10 +55,12 @@ pub struct FreeCamera {
 const DEFAULT_VIEW_DIRECTION: [f64; 3] = [-0.664, 0.608, -0.435];
 
 impl OffscreenScene {
-    /// Creates the offscreen scene of an MJCF file, at the positions `qpos` (`None` for those of the file).
+    /// Creates the offscreen scene of an MJCF file, with its sites, at the positions `qpos` (`None` for the file's
+    /// initial positions, MuJoCo's `qpos0`).
     ///
     /// # Errors
-    /// MuJoCo rejects the file, or `qpos` does not have one finite number for each position of the model.
+    /// The file cannot be read, MuJoCo rejects it, or `qpos` does not have one finite number for each position of the
+    /// model.
     pub fn of_mjcf(path: impl AsRef<Path>, qpos: Option<&[f64]>) -> Result<Self> {
         let path = path.as_ref();
         if let Err(error) = std::fs::metadata(path) {
@@ -96,8 +98,9 @@ impl OffscreenScene {
 
     /// Creates the offscreen scene of several environments side by side (`None` for all environments), at
     /// [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins). Each marker is shown in its
-    /// environment. The ground is rendered once; lights and cameras are those of environment 0. Everything else is
-    /// rendered in every environment, so a terrain that is larger than the space between environments overlaps.
+    /// environment. The ground is rendered once. Lights and cameras are those of environment 0 at their poses in that
+    /// environment, not moved to its origin. Everything else is rendered in every environment, so a terrain that is
+    /// larger than the space between environments overlaps.
     ///
     /// # Errors
     /// An environment does not exist, or there are more triangles than can be rendered.
@@ -143,7 +146,7 @@ impl OffscreenScene {
         }
     }
 
-    /// Render scene of the model.
+    /// Visual scene of the model, with deforming shapes at this instant.
     pub fn visible(&self) -> &Arc<VisualScene> {
         &self.visual_scene
     }
@@ -153,12 +156,13 @@ impl OffscreenScene {
         self.visual_scene.mask_ids()
     }
 
-    /// Cameras of the model file.
+    /// Cameras of the model: those of the MJCF file, or of all MJCF files in a simulation. Camera sensors are not
+    /// included.
     pub fn cameras(&self) -> &[ModelCamera] {
         &self.cameras
     }
 
-    /// Camera of the model file called `name`.
+    /// Camera of the model called `name`, one of [`cameras`](Self::cameras).
     ///
     /// # Errors
     /// The camera does not exist; the error lists the nearest names.
@@ -182,8 +186,8 @@ impl OffscreenScene {
     }
 
     /// Viewpoint from which all rendered shapes, except the ground and shapes that surround the rest, fill an image of
-    /// `size` pixels. The direction is that of [`free_camera`](Self::free_camera) for an MJCF file; it is from the
-    /// front, the side and above for a simulation. The clipping planes leave room for other viewpoints.
+    /// `size` pixels (width, height). The direction is that of [`free_camera`](Self::free_camera) for an MJCF file; it
+    /// is from the front, the side and above for a simulation. The clipping planes leave room for other viewpoints.
     pub fn first_view(&self, size: [usize; 2]) -> FreeCamera {
         let FreeCamera { eye, target, fovy, clip: [near, far] } = self.free_camera;
         let [width, height] = size.map(|n| n.max(1) as f64);
