@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     Ok(if warned || !diverged.is_empty() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
-/// Reads the state, as a training program does after each step.
+/// Reads joint positions, or the state of a scene, as a training program does after each step.
 fn read_state(model: &Model) {
     match model.robot {
         Some(robot) => drop(model.sim.robot(robot).qpos()),

@@ -19,7 +19,8 @@ pub(crate) enum Channel {
     Normal,
 }
 
-/// Writes a channel of a frame as a PNG file. A channel that the frame does not have is black.
+/// Writes a channel of a frame as a PNG file, with depths colored from the nearest to the farthest. A channel that the
+/// frame does not have is black.
 ///
 /// # Errors
 /// The file cannot be written, or its name does not end in `.png`.

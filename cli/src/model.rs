@@ -62,7 +62,7 @@ pub(crate) struct Setup {
     pub(crate) default_arena_space: f64,
     /// Number of stepping threads; `None` uses that of a scene file, else every core.
     pub(crate) threads: Option<usize>,
-    /// True to add a ground plane below a robot.
+    /// True to add a ground plane below a robot; ignored for scenes.
     pub(crate) ground: bool,
     pub(crate) spawn_height: Option<f64>,
 }
@@ -102,7 +102,7 @@ impl Setup {
 #[derive(Debug)]
 pub(crate) struct Model {
     pub(crate) sim: SimulationManager,
-    /// Robot of the input files; `None` for a scene.
+    /// Robot of the input files; `None` for an MJCF scene or a scene file.
     pub(crate) robot: Option<RobotId>,
     /// MJCF file that is a scene; `None` for other input.
     pub(crate) mjcf: Option<MjcfId>,
@@ -189,8 +189,8 @@ impl ModelArgs {
     }
 
     /// Builds the simulation. URDF files form one robot. An MJCF file is a robot if possible; otherwise (several root
-    /// bodies, ball joints, or no hinge or slide joint) it is a scene with its own world geoms and no additional
-    /// ground.
+    /// bodies, ball joints, or no hinge or slide joint; see [`may_be_scene`]) it is a scene with its own world geoms
+    /// and no additional ground. `setup.ground` applies to robots only.
     ///
     /// # Errors
     /// Errors of the files, or flags that do not apply to a scene.
@@ -220,7 +220,8 @@ impl ModelArgs {
         Ok(model)
     }
 
-    /// Builds a robot, or a scene. A robot on a free base starts at the pose of the file, but never below the ground.
+    /// Builds a robot, or a scene. Without a spawn height, a robot on a free base starts at the pose of the file,
+    /// raised if it would start below the ground.
     fn mjcf(&self, setup: &Setup, path: &Path) -> Result<Model> {
         /// Tolerance for rounding \[m\].
         const SLACK: f64 = 1e-6;
@@ -258,7 +259,7 @@ impl ModelArgs {
         Ok(Model::of(InteractiveScene::new(cfg)?.into_sim()))
     }
 
-    /// Returns an error if robot flags are given for a scene.
+    /// Returns an error if `--floating-base` or `--spawn-height` is given for a scene.
     fn refuse_robot_flags(&self, setup: &Setup, path: &Path) -> Result<()> {
         let flags = [("--floating-base", self.floating_base), ("--spawn-height", setup.spawn_height.is_some())];
         match flags.iter().find(|(_, given)| *given) {

@@ -137,7 +137,7 @@ impl RenderArgs {
     /// Returns the camera view of a model.
     ///
     /// # Errors
-    /// The file has no such camera, or a size or angle is invalid.
+    /// The file has no camera of the given name, or a size, a point or an angle is invalid.
     pub(crate) fn view(&self, still: &OffscreenScene) -> Result<View> {
         let free = still.first_view([self.width, self.height]);
         let (pose, fovy) = match (&self.camera, self.eye, self.target) {

@@ -71,7 +71,7 @@ fn driven(arm_joints: &str, hand_joints: &str) -> RobotCfg {
     }
 }
 
-/// The link that carries the hand, as `uid/link`.
+/// The link that carries the hand, as `uid/link`; the root link if arm and hand come from one file.
 pub(crate) fn tip(robot: Robot<'_>) -> String {
     let description = robot.description();
     let joins = |parent: &str, child: &str| parent == "arm" && child == "hand";

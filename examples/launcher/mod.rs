@@ -283,7 +283,7 @@ impl Launcher {
         Ok(())
     }
 
-    /// The folder of `--out`, otherwise the working directory. Creates the folder if `create`.
+    /// The folder of `--out`, otherwise the working directory. Creates the folder if `create` is true.
     ///
     /// # Errors
     /// The folder cannot be created.
@@ -337,7 +337,7 @@ pub(crate) fn check_camera_id(camera_id: usize, sim: &SimulationManager) -> Resu
     }
 }
 
-/// Positions of the tutorial's cameras \[m\]: two places in alternation.
+/// Position of the tutorial's camera in each environment \[m\]: two places in alternation.
 pub(crate) fn alternating_eyes(num_envs: usize) -> Vec<[f64; 3]> {
     (0..num_envs).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect()
 }
@@ -382,7 +382,8 @@ pub(crate) struct MainLoop {
 pub(crate) const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 impl MainLoop {
-    /// Starts the clock. `cycle` is the length of the bar if the number of steps is open.
+    /// Starts the clock and handles Ctrl+C from now on. `cycle` is the length of the bar if the number of steps is
+    /// open.
     pub(crate) fn new(launcher: &Launcher, cycle: u64) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
@@ -418,7 +419,7 @@ impl MainLoop {
         self.end.clone()
     }
 
-    /// The last step of a block of at most `length` steps.
+    /// Number of steps at the end of a block of at most `length` steps after `step`; the block ends at `--steps`.
     pub(crate) fn end_of_block(&self, step: u64, length: u64) -> u64 {
         (step + length).min(self.steps.unwrap_or(u64::MAX))
     }
@@ -442,7 +443,7 @@ impl MainLoop {
         self.bar.set_position(step);
     }
 
-    /// Finishes the bar; returns the environment steps per second since the start.
+    /// Finishes the bar; returns `steps` of all environments per second of time since [`new`](Self::new).
     pub(crate) fn env_steps_per_second(&self, steps: u64, num_envs: usize) -> f64 {
         let seconds = self.start.elapsed().as_secs_f64();
         self.bar.finish_and_clear();
