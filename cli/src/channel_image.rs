@@ -11,11 +11,11 @@ use std::path::Path;
 pub(crate) enum Channel {
     /// Rendered color
     Color,
-    /// Distance from the camera; near is warm
+    /// Depth along the optical axis, in colors from dark blue (nearest) to red (farthest)
     Depth,
-    /// Instance segmentation: one color per object
+    /// Segmentation: one color per link, object or geom of the world
     Mask,
-    /// Surface normals
+    /// Surface normals as colors
     Normal,
 }
 

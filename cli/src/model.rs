@@ -16,7 +16,7 @@ pub(crate) struct ModelArgs {
     /// URDF files, each attached to the tip of the previous one; or one MJCF file; or one scene file (TOML, YAML, JSON)
     #[arg(required = true, value_name = "FILE.urdf|FILE.xml|SCENE.toml")]
     files: Vec<PathBuf>,
-    /// Let the root of a robot move freely
+    /// Let the root of a robot move freely instead of fixing it in the world; not for scenes
     #[arg(long, alias = "floating_base")]
     pub(crate) floating_base: bool,
     /// Folder of a ROS package for package:// URIs; may be repeated
@@ -34,11 +34,12 @@ pub(crate) struct ModelArgs {
 /// Initial height of a robot, and the ground.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct SpawnArgs {
-    /// Initial height of the robot's lowest collision point above the ground [default: 0 with --floating-base; else the
-    /// root link starts at height 0]
+    /// Initial height of the robot's lowest collision point above the ground [default: the root link starts at height
+    /// 0, or at the pose of an MJCF file; with --floating-base, a URDF robot starts on the ground, and an MJCF robot is
+    /// raised if it would start below the ground]
     #[arg(long, alias = "spawn_height", value_name = "METERS", allow_negative_numbers = true)]
     pub(crate) spawn_height: Option<f64>,
-    /// Omit the ground
+    /// Omit the ground below a robot; the ground of a scene stays
     #[arg(long, alias = "no_ground")]
     pub(crate) no_ground: bool,
 }

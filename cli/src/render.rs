@@ -35,16 +35,17 @@ pub(crate) struct Args {
 /// Camera and renderer settings.
 #[derive(Debug, clap::Args)]
 pub(crate) struct RenderArgs {
-    /// Camera of an MJCF file
+    /// Name of a camera in the MJCF file; without it and --eye, the image shows the whole model
     #[arg(long, conflicts_with_all = ["eye", "target"])]
     camera: Option<String>,
-    /// Camera position, in meters
+    /// Camera position in the world, in meters
     #[arg(long, value_name = "X,Y,Z", requires = "target", value_parser = parse_point, allow_hyphen_values = true)]
     eye: Option<Point>,
-    /// Point that the camera looks at, in meters
+    /// Point in the world that the camera looks at, in meters
     #[arg(long, value_name = "X,Y,Z", requires = "eye", value_parser = parse_point, allow_hyphen_values = true)]
     target: Option<Point>,
-    /// Vertical field of view in degrees [default: that of the camera, or 45]
+    /// Vertical field of view, in degrees [default: that of --camera or of the MJCF file; 45 with --eye and for other
+    /// files]
     #[arg(long)]
     fovy: Option<f64>,
     /// Image width, in pixels

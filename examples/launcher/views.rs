@@ -122,7 +122,7 @@ mod shown {
             super::super::make_folder(out)?;
             let path = out.join(name);
             sim.screenshot(&path)?;
-            println!("Drawn to {}", path.display());
+            println!("Image written to {}", path.display());
             Ok(())
         }
 
