@@ -34,13 +34,13 @@ struct Args {
     robot: Option<PathBuf>,
     #[command(flatten)]
     spawn: SpawnFlags,
-    /// Steps between summaries of the sensors; 0 for none
+    /// Steps between printed summaries of the sensors; 0 for no summaries
     #[arg(long, alias = "print_every", default_value_t = 1)]
     print_every: u64,
-    /// Steps between resets with other joint angles; 0 for none
+    /// Steps between resets to the start pose with random joint angles; 0 for no resets
     #[arg(long, alias = "reset_every", default_value_t = 500)]
     reset_every: u64,
-    /// Mass on the back, in kilograms
+    /// Mass added to the base link, in kilograms
     #[arg(long, default_value_t = 0.0)]
     payload: f64,
     /// Stiffness of the drives, in N m/rad

@@ -37,7 +37,7 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Turn the controller off: the wheels stand still
+    /// Turn the controller off: the wheels do not turn, and the robots fall
     #[arg(long, alias = "no_feedback")]
     no_feedback: bool,
     /// Scale factor of the pushes

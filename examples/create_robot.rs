@@ -23,7 +23,7 @@ struct Args {
     launcher: Launcher,
     #[command(flatten)]
     robot: ArmWithHand,
-    /// Close the hand at its upper joint limits and open it at the lower ones, for hands that bend that way
+    /// Close the hand at the upper joint limits and open it at the lower ones, for hands whose fingers close that way
     #[arg(long, alias = "swap_hand")]
     swap_hand: bool,
 }
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result {
     if args.launcher.renderer != Renderer::Auto {
-        println!("This example has no camera: --renderer has no effect (create_sensor draws).");
+        println!("This example has no camera: --renderer has no effect (create_sensor has a camera).");
     }
     println!("Creating simulation...");
     let mut sim = SimulationManager::new(SimulationManagerCfg {

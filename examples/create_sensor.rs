@@ -35,7 +35,7 @@ struct Args {
     /// Attach the camera to a link of the robot instead of placing it above the cube
     #[arg(long, alias = "attach_sensor")]
     attach_sensor: bool,
-    /// Parent link of the camera; the tip of the arm by default
+    /// Parent link of the camera, as uid/link [default: the link of the arm that carries the hand]
     #[arg(long, alias = "attach_link", requires = "attach_sensor")]
     attach_link: Option<String>,
     /// Width of the images, in pixels
@@ -50,10 +50,11 @@ struct Args {
     /// Write images even if a window shows them; without a window they are always written
     #[arg(long)]
     save: bool,
-    /// Also write depth, mask and normals as .npy, shape (N, H, W, ...)
+    /// Write images even if a window shows them, and depth, mask and normals of all environments as .npy, shape (N, H,
+    /// W, ...)
     #[arg(long)]
     raw: bool,
-    /// Ray tracing, as --renderer rt
+    /// Same as --renderer rt; without effect beside --renderer hybrid, fast-rt or rt
     #[arg(long, alias = "enable_rt")]
     enable_rt: bool,
     #[command(flatten)]
@@ -333,7 +334,7 @@ impl ImageWriter {
 }
 
 fn print_table(album: &ImageWriter, sim: &SimulationManager) {
-    println!("\n{:<28} {:>6} {:>5} {:>18}  seen", "image", "step", "env", "depth [m]");
+    println!("\n{:<28} {:>6} {:>5} {:>18}  objects", "image", "step", "env", "depth [m]");
     for file in &album.files {
         let number = |key: &str| file[key].as_f64().unwrap_or(f64::NAN);
         let ids: Vec<i64> = file["ids"].as_array().into_iter().flatten().filter_map(Value::as_i64).collect();

@@ -29,7 +29,7 @@ use std::time::Instant;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Render through this lens only; may be given several times [default: all of them]
+    /// Render through this lens only, such as panorama; may be repeated [default: one lens of each kind]
     #[arg(long = "lens", value_name = "NAME", conflicts_with = "camera_info")]
     lenses: Vec<String>,
     /// Render through the lens of a ROS camera_info file, with its size and intrinsics
@@ -262,7 +262,7 @@ fn reprojection_error(camera: &Camera) -> launcher::Result<f64> {
     let mut worst = 0.0f64;
     for ((y, x), point) in map.rows().into_iter().enumerate().map(|(k, p)| ((k / map.dim().1, k % map.dim().1), p)) {
         if point[0].is_finite() {
-            let [u, v] = optics.project([0, 1, 2].map(|k| f64::from(point[k]))).ok_or("a point is not seen again")?;
+            let [u, v] = optics.project([0, 1, 2].map(|k| f64::from(point[k]))).ok_or("a point has no projection")?;
             worst = worst.max((u - x as f64 - 0.5).hypot(v - y as f64 - 0.5));
         }
     }

@@ -39,7 +39,7 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Sliding friction between hand and cube; between cube and furniture it stays 1
+    /// Sliding friction between hand and cube; between cube and furniture it is 1, or this value if that is larger
     #[arg(long, default_value_t = 1.0)]
     friction: f64,
 }

@@ -21,19 +21,20 @@ struct Args {
     /// URDF files, each attached to the tip of the one before; or one MJCF file (.xml)
     #[arg(required = true, value_name = "FILE.urdf|FILE.xml")]
     files: Vec<PathBuf>,
-    /// Let the root move freely: six more rows of the dynamics, ahead of the joints
+    /// Let the root move freely: its six velocities are the first rows of the dynamics, before the joints
     #[arg(long, alias = "floating_base")]
     floating_base: bool,
-    /// Folder of a package of package:// addresses; may be repeated
+    /// Folder of a ROS package for package:// URIs; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
-    /// Folder for meshes and packages that are not found relative to the URDF, as Isaac Gym's asset root
+    /// Additional search folder for meshes and packages that are not found relative to the URDF, like Isaac Gym's asset
+    /// root
     #[arg(long, value_name = "DIR", value_parser = folder)]
     asset_root: Option<PathBuf>,
-    /// Refuse URDF files that deviate from the format; otherwise deviations are warnings
+    /// Treat deviations from the URDF format as errors instead of warnings
     #[arg(long)]
     strict: bool,
-    /// Joint positions [rad or m], by default 0 or the MJCF file's own; mimic joints follow their driver
+    /// Joint positions [rad or m]; other joints are at 0, or at `ref` of an MJCF file, and mimic joints follow
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position)]
     qpos: Vec<(String, f64)>,
     /// Write the report to a file as JSON; `-` writes JSON to the terminal instead of the tables

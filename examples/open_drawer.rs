@@ -34,7 +34,7 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Dry friction of the drawer's slide [N]; above 0
+    /// Dry friction of the drawer's slide [N]; must be above 0
     #[arg(long, alias = "slide_friction", default_value_t = 2.0)]
     slide_friction: f64,
 }

@@ -30,19 +30,21 @@ struct Args {
     /// MJCF or URDF file
     #[arg(value_name = "FILE.xml|FILE.urdf")]
     file: PathBuf,
-    /// Positions of all joints in MuJoCo's order (MJCF) or in the order of the URDF, separated by commas
+    /// Positions [rad or m], separated by commas: all of MuJoCo's qpos for an MJCF file, one for each joint for a URDF
+    /// file
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     qpos: Option<Vec<f64>>,
     /// Name of a camera in the file
     #[arg(long, conflicts_with_all = ["eye", "target"])]
     camera: Option<String>,
-    /// Position of the camera, x,y,z in meters
+    /// Position of the camera in the world: x,y,z in meters
     #[arg(long, requires = "target", value_parser = point, allow_hyphen_values = true)]
     eye: Option<Point>,
-    /// Target of the camera, x,y,z in meters
+    /// Point in the world that the camera looks at: x,y,z in meters
     #[arg(long, requires = "eye", value_parser = point, allow_hyphen_values = true)]
     target: Option<Point>,
-    /// Vertical field of view in degrees; by default that of the file's camera, otherwise 45
+    /// Vertical field of view, in degrees [default: that of --camera or of the MJCF file; 45 with --eye and for other
+    /// files]
     #[arg(long)]
     fovy: Option<f64>,
     /// Width of the image, in pixels
@@ -51,7 +53,7 @@ struct Args {
     /// Height of the image, in pixels
     #[arg(long, default_value_t = 480)]
     height: usize,
-    /// Shadows of the lights
+    /// Render the shadows of lights
     #[arg(long, value_enum, default_value_t = Switch::On)]
     shadows: Switch,
     /// Samples per pixel of the color: 1 or 4
@@ -62,22 +64,23 @@ struct Args {
     renderer: Renderer,
     #[command(flatten)]
     paths: PathFlags,
-    /// Rays for ambient occlusion, with --renderer hybrid
+    /// Rays for ambient occlusion per sample, with --renderer hybrid; 0 for no ambient occlusion
     #[arg(long, default_value_t = 0)]
     ao_rays: u16,
-    /// Time limit of path tracing, after which the example ends with an error
+    /// Time limit of --renderer rt, in seconds, after which the example ends with an error
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
-    /// Rendered geom groups, as in MuJoCo's viewers
+    /// Rendered geom groups, separated by commas; the default is that of MuJoCo's viewers
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
     groups: Vec<u8>,
-    /// Rendering threads; every core by default
+    /// Number of rendering threads [default: every core]
     #[arg(long)]
     threads: Option<usize>,
     /// Render repeatedly for this many seconds and report images per second
     #[arg(long)]
     bench: Option<f64>,
-    /// Also render the color with the rasterizer, and write both side by side: raster-and-rt.png, for any --renderer
+    /// Also render the color with the rasterizer, and write both side by side, for example raster-and-rt.png; requires
+    /// --renderer rt, fast-rt or hybrid
     #[arg(long)]
     compare: bool,
     /// Folder for color.png, depth.png, mask.png, normal.png and meta.json
@@ -114,7 +117,7 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> launcher::Result {
     let renderer = args.renderer.for_cameras(args.paths)?;
     if args.time_limit.is_some() && args.renderer != Renderer::Rt {
-        return Err("--time-limit is of path tracing: use it with --renderer rt".into());
+        return Err("--time-limit is for path tracing: use it with --renderer rt".into());
     }
     if args.compare && renderer == Known::Raster {
         return Err(
@@ -263,7 +266,7 @@ fn view(args: &Args, still: &OffscreenScene) -> launcher::Result<(View, Pose, f6
 fn write_images(args: &Args, view: &View, frame: &Frame) -> launcher::Result {
     let (Some(color), Some(depth), Some(mask), Some(normal)) = (&frame.color, &frame.depth, &frame.mask, &frame.normal)
     else {
-        return Err("a channel was not drawn".into());
+        return Err("a channel was not rendered".into());
     };
     let size = [view.width, view.height];
     let range = image_file::finite_range(depth.iter().copied()).unwrap_or([0.0, 1.0]);

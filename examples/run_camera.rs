@@ -30,10 +30,11 @@ struct Args {
     /// Number of objects in each environment
     #[arg(long, default_value_t = 8)]
     objects: usize,
-    /// The environment whose camera images are shown and saved
+    /// Environment whose pixels and points are reported, and whose images --save writes
     #[arg(long, alias = "camera_id", default_value_t = 0)]
     camera_id: usize,
-    /// Show the points that the camera sees as balls, in the colors of the objects, in an image of all environments
+    /// Write an image of the environments, run_camera.png, with the camera's points as balls in the colors of the
+    /// objects
     #[arg(long)]
     draw: bool,
     /// Write every channel as PNG, depth and mask as .npy, the points as .ply
@@ -96,7 +97,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("\npixels of camera {} by class: {classes:?}", args.camera_id);
     let points = colored_points(&sim, camera, args.camera_id)?;
     let error = reprojection_error(sim.sensor(camera)?, args.camera_id)?;
-    println!("{} points; seen by the camera again, they are {error:.1e} pixels off at most", points.len());
+    println!("{} points; their largest reprojection error is {error:.1e} pixels", points.len());
     if args.save {
         let path = out.join("points.ply");
         cloud::write_ply(&path, &points)?;

@@ -32,7 +32,7 @@ struct Args {
     /// Link of the source frame
     #[arg(long, default_value = "base")]
     source: String,
-    /// Links of the target frames, a pattern that matches whole names
+    /// Links of the target frames: a regular expression that matches whole names
     #[arg(long, default_value = ".*")]
     targets: String,
 }
@@ -143,7 +143,7 @@ fn pose_line(sim: &SimulationManager, frames: SensorId<FrameTransformer>, target
     let p = [0, 1, 2].map(|k| format!("{:7.4}", p[(0, target, k)])).join(", ");
     let q = [0, 1, 2, 3].map(|k| format!("{:7.4}", q[(0, target, k)])).join(", ");
     let name = &frames.target_frame_names()[target];
-    Ok(format!("t = {time:5.2} s: {name:<34} at ({p}) m, turned by ({q}), seen from the source"))
+    Ok(format!("t = {time:5.2} s: {name:<34} at ({p}) m, rotated by ({q}), in the source frame"))
 }
 
 /// The poses of every frame in environment 0.

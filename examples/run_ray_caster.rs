@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Steps between resets with new places and velocities; 0 for none
+    /// Steps between resets of the balls to random positions and velocities; 0 for one reset at the start
     #[arg(long, alias = "reset_every", default_value_t = 250)]
     reset_every: u64,
     /// Distance between neighboring rays, in meters

@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// The environment whose camera images are saved
+    /// Environment whose points are evaluated, and whose images --save writes
     #[arg(long, alias = "camera_id", default_value_t = 0)]
     camera_id: usize,
     /// Write depth, distance and normals as PNG, depth as .npy, the points as .ply
@@ -98,7 +98,7 @@ fn run(args: &Args) -> launcher::Result {
     let error = cloud::reprojection_error(&map, lens(of, args.camera_id), &pose(of, args.camera_id));
     // The terrain stands in the middle of its environment, without rotation.
     if points.is_empty() {
-        return Err("the camera sees nothing of the terrain".into());
+        return Err("no ray of the camera hits the terrain".into());
     }
     let off = points.iter().map(|p| {
         let height = sim.entities().terrain(terrain).height_at([f64::from(p[0]), f64::from(p[1])]);
@@ -108,7 +108,7 @@ fn run(args: &Args) -> launcher::Result {
     let (beside, on): (Vec<f64>, Vec<f64>) = off.partition(|off| off.is_infinite());
     let worst = on.into_iter().fold(0.0, f64::max);
     println!("\n{} points; they lie on the terrain to {worst:.1e} m, {} beside it", points.len(), beside.len());
-    println!("Seen by the camera again, they are {error:.1e} pixels off at most");
+    println!("Their largest reprojection error is {error:.1e} pixels");
     if args.save {
         let range = image_file::finite_range(points.iter().map(|p| p[2])).unwrap_or([0.0, 1.0]);
         let colored: Vec<_> = points.iter().map(|p| (*p, gray(p[2], range))).collect();

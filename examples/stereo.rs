@@ -25,7 +25,7 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// The environment whose images are written
+    /// Environment whose images are written
     #[arg(long, alias = "camera_id", default_value_t = 0)]
     camera_id: usize,
     /// Width of the images, in pixels
@@ -99,7 +99,7 @@ fn run(args: &Args) -> launcher::Result {
     }
     let points = pair.points(args.width);
     if points.is_empty() {
-        return Err("the eyes see nothing".into());
+        return Err("the cameras see nothing: no pixel has a disparity".into());
     }
     cloud::write_ply(&out.join(files[3]), &points)?;
     let (compared, error) = pair.disparity_error(args.width);
@@ -107,7 +107,7 @@ fn run(args: &Args) -> launcher::Result {
     let [low, high] = range.unwrap_or([0.0; 2]);
     println!("\nDisparities from {low:.2} to {high:.2} pixels; {} points", points.len());
     println!(
-        "{compared} points are seen by both cameras. The right camera's depth is that of a disparity {error:.1e} pixels"
+        "{compared} points are visible to both cameras. The right camera's depth is that of a disparity {error:.1e} pixels"
     );
     println!("from the left one's, for 9 of 10 points at most");
     println!("Written to {}: {}", out.display(), files.join(", "));

@@ -133,7 +133,7 @@ fn run(args: &Args) -> launcher::Result {
         .collect();
     println!("Written to {}", out.join("surfaces.png").display());
     if !matches!(renderer, Renderer::RayTraced { .. }) {
-        println!("This renderer draws glass and water opaque: --renderer rt follows light through them.");
+        println!("This renderer shows glass and water as opaque: --renderer rt refracts light in them.");
     }
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::mujoco::version_string(),

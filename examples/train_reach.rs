@@ -37,10 +37,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub(crate) struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Policy updates
+    /// Number of policy updates
     #[arg(long, default_value_t = 32)]
     iterations: usize,
-    /// Standard deviation of the perturbations
+    /// Standard deviation of the perturbations of the policy's weights
     #[arg(long, default_value_t = 0.15)]
     noise: f64,
     /// Learning rate of the weights

@@ -39,10 +39,10 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Calibration error of the cameras [m], along x and y of the image
+    /// Error of the assumed camera position [m], along both x and y of the image
     #[arg(long, default_value_t = 0.0)]
     miscalibrated: f64,
-    /// Empty masks
+    /// Ignore the masks, so that no cube is found
     #[arg(long)]
     blind: bool,
 }
@@ -121,7 +121,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     };
     let tip = TipFrame::of_part("arm").at("ee_link");
     let mut motion = MotionPlayer::new(&mut sim, robot, "arm", tip, &progress)?;
-    progress.print_line("To where the whole table is seen...");
+    progress.print_line("To a view of the whole table...");
     let mut commands = vec![above([PLACE[0], PLACE[1], TABLE + LOOK_HEIGHT]); motion.sim.num_envs()];
     motion.move_joint_space(&commands, 2.5)?;
     let mut found = vec![false; commands.len()];
@@ -145,7 +145,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         let largest = errors.iter().fold(0.0, |most: f64, x| most.max(*x));
         let (seen, all) = (errors.len(), commands.len());
         progress.print_line(&format!(
-            "Look {:>2}: {seen} of {all} cubes are seen, {:.1} mm away at most",
+            "Image {:>2}: {seen} of {all} cubes visible, largest position error {:.1} mm",
             look + 1,
             1e3 * largest
         ));

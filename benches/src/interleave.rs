@@ -34,13 +34,14 @@ pub(crate) trait Contender {
 
 /// Largest share of one core that other programs may take in a valid round.
 const MAX_OTHER_LOAD: f64 = 0.05;
-/// On a machine that is always busy, the search for quiet rounds ends after this multiple of the planned length.
+/// On a machine that is always busy, the search for quiet rounds ends after this multiple of the planned length. With
+/// fewer than [`FEWEST_ROUNDS`] of them, all rounds count.
 const PATIENCE: f64 = 4.0;
 
 /// Parameters of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MeasurementCfg {
-    /// Length of the measurement \[s\].
+    /// Total length of the rounds without load of other programs \[s\]; at least five such rounds are measured.
     pub(crate) seconds: f64,
     /// The work restarts once a side has done this many steps.
     pub(crate) restart_after: u32,

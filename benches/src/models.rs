@@ -133,7 +133,7 @@ impl Case {
     }
 }
 
-/// Every second state of one environment, beginning at the initial state.
+/// Every second state of one environment, beginning two steps after its initial state.
 fn trajectory(model: &Model) -> BenchResult<Vec<State>> {
     let mut batch = Batch::new(model, &Arc::new(DriveTable::default()), 1, 1, ThreadPool::new())?;
     let mut states = Vec::new();
@@ -179,7 +179,7 @@ pub(crate) fn arm_with_hand(
     Ok((sim, robot))
 }
 
-/// Sets the targets of arm and hand to one of two poses.
+/// Sets the targets of arm and hand to one of two poses, which differ in the wrist and in the opening of the hand.
 pub(crate) fn drive_sr5(sim: &mut SimulationManager, robot: RobotId, closed: bool) -> BenchResult<()> {
     let arm = sim.robot(robot).joint_ids("arm")?;
     let hand = sim.robot(robot).joint_ids("hand")?;

@@ -5,8 +5,8 @@ use std::fs;
 /// Unit of times below /proc \[s\]: Linux shows them in hundredths of a second on every architecture.
 const TICK: f64 = 0.01;
 
-/// Processor time \[s\] used since boot by processes other than this one and the processes `ours`; `None` without
-/// /proc.
+/// Processor time \[s\], of all cores together, used since boot by processes other than this one and the processes
+/// `ours`; `None` without /proc.
 pub(crate) fn seconds(ours: &[u32]) -> Option<f64> {
     let busy = busy_ticks(&fs::read_to_string("/proc/stat").ok()?)?;
     let mut own = process_ticks(&fs::read_to_string("/proc/self/stat").ok()?)?;

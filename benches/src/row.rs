@@ -15,13 +15,13 @@ pub(crate) struct Row {
     pub(crate) unit: String,
     /// Kinetoscope's number.
     pub(crate) ours: f64,
-    /// The baseline's number; `None` if the baseline is not on the machine.
+    /// The baseline's number; `None` if the row has no baseline, or if the baseline is not on the machine.
     #[serde(rename = "rival")]
     pub(crate) baseline: Option<f64>,
     /// Name of the baseline.
     #[serde(rename = "rival_name")]
     pub(crate) baseline_name: String,
-    /// Speed ratio; above 1 our side is better.
+    /// Ratio of the speeds, or of another quality; above 1 our side is better. `None` without a baseline's number.
     pub(crate) ratio: Option<f64>,
     /// Number of threads of both sides.
     pub(crate) threads: usize,

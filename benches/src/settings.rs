@@ -6,6 +6,6 @@ pub(crate) type BenchResult<T> = Result<T, Box<dyn std::error::Error>>;
 /// Length of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Time for one comparison \[s\], without the setup.
+    /// Nominal time for one comparison \[s\], without the setup; some benchmarks use a multiple of it.
     pub(crate) seconds: f64,
 }

@@ -131,7 +131,7 @@ fn measure_window(arm: &Arm, display: &Display, seconds: f64) -> BenchResult<[f6
     swing(&mut sim, robot, &window, seconds)
 }
 
-/// Moves the arms for some seconds.
+/// Moves the arms for `seconds` of wall-clock time. Returns images per second, and simulated seconds per second.
 fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: f64) -> BenchResult<[f64; 2]> {
     let (start, first, before) = (Instant::now(), sim.observers().steps(), window.frame_count());
     while start.elapsed().as_secs_f64() < seconds {

@@ -8,7 +8,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::OffscreenScene;
 use std::time::Instant;
 
-/// Steps per second and images per second of a robot on this machine, on every core
+/// Measure steps per second and images per second of a model on this machine
 ///
 /// These rates are of this program alone. To compare with other simulators in one run, see `cargo xtask bench` in the
 /// source tree.
@@ -22,10 +22,10 @@ pub(crate) struct Args {
     /// Number of environments [default: that of a scene file, else 64]
     #[arg(long, alias = "num_envs")]
     num_envs: Option<usize>,
-    /// Number of stepping threads [default: every core]
+    /// Number of stepping threads [default: that of a scene file, else every core]; images use every core
     #[arg(long)]
     threads: Option<usize>,
-    /// Duration of each measurement, in seconds
+    /// Duration of each of the two measurements (steps, images), in seconds
     #[arg(long, default_value_t = 2.0)]
     seconds: f64,
     #[command(flatten)]
@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     Ok(if warned || !diverged.is_empty() { CommandStatus::Warned } else { CommandStatus::Done })
 }
 
-/// Reads the state, as a training program does after each step.
+/// Reads joint positions, or the state of a scene, as a training program does after each step.
 fn read_state(model: &Model) {
     match model.robot {
         Some(robot) => drop(model.sim.robot(robot).qpos()),

@@ -11,15 +11,16 @@ use std::path::Path;
 pub(crate) enum Channel {
     /// Rendered color
     Color,
-    /// Distance from the camera; near is warm
+    /// Depth along the optical axis, in colors from dark blue (nearest) to red (farthest)
     Depth,
-    /// Instance segmentation: one color per object
+    /// Segmentation: one color per link, object or geom of the world
     Mask,
-    /// Surface normals
+    /// Surface normals as colors
     Normal,
 }
 
-/// Writes a channel of a frame as a PNG file. A channel that the frame does not have is black.
+/// Writes a channel of a frame as a PNG file, with depths colored from the nearest to the farthest. A channel that the
+/// frame does not have is black.
 ///
 /// # Errors
 /// The file cannot be written, or its name does not end in `.png`.

@@ -9,16 +9,17 @@ use kinetoscope::sim::inspect::{InspectCfg, InspectError, inspect};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Tree, joints, masses, dynamics and warnings of a robot, with the file lines of the warnings
+/// Report tree, joints, masses, dynamics and warnings of a robot or scene, with the file lines of the warnings
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
-    /// Joint positions [rad or m]; joints without a value are at 0
+    /// Joint positions [rad or m]; other joints are at 0, or at `ref` of an MJCF file, and mimic joints follow. Not for
+    /// scenes
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = parse_joint_position, allow_hyphen_values = true)]
     qpos: Vec<(String, f64)>,
-    /// Write the report to a JSON file
+    /// Also write the report to a JSON file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }

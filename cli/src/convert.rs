@@ -5,7 +5,7 @@ use crate::excerpt;
 use crate::model::{ModelArgs, Setup};
 use std::path::{Path, PathBuf};
 
-/// Convert a robot to MJCF for plain MuJoCo: one file for 2.2.2 and one for 4.x, with meshes and textures beside them
+/// Convert a model to MJCF for plain MuJoCo: one file for 2.2.2 and one for 4.x, with meshes and textures beside them
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
@@ -14,7 +14,7 @@ pub(crate) struct Args {
     /// Output folder; created if missing
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Write to a folder that is not empty
+    /// Write even if the folder is not empty; files of the same names are replaced
     #[arg(long)]
     force: bool,
 }

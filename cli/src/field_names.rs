@@ -1,6 +1,6 @@
 //! Patterns and compact lists of recorded field names.
 
-/// Merges names that differ only in their brackets: `position[J1, J2]`, `data[0..11]`.
+/// Merges names that differ only in their brackets: `position[J1, J2]`, `data[0..11]` for the numbers 0 to 11.
 pub(crate) fn group_fields(fields: &[String]) -> Vec<String> {
     let mut groups: Vec<((&str, &str), Vec<&str>)> = Vec::new();
     for field in fields {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Returns a flag that Ctrl+C sets. Ctrl+C also calls `on_interrupt`; a second Ctrl+C exits the program at once.
+/// Returns a flag that Ctrl+C sets. Ctrl+C also calls `on_interrupt`; another Ctrl+C more than a second after the first
+/// exits the program at once.
 pub(crate) fn on_ctrl_c(on_interrupt: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);

@@ -23,7 +23,8 @@ use clap::{Parser, Subcommand};
 use command_status::CommandStatus;
 use std::process::ExitCode;
 
-/// Tools for robots and scenes from URDF and MJCF: check, convert, render, view, benchmark, replay. No GPU, no OpenGL
+/// Tools for robots and scenes from URDF and MJCF: check, convert, render, view, benchmark, plot and replay recordings.
+/// They need no GPU and no OpenGL
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope", version, after_help = HELP)]
 struct Args {
@@ -35,12 +36,12 @@ const HELP: &str = "\
 Examples:
   kinetoscope check arm.urdf hand.urdf          tree, joints, masses, dynamics, and problems in the files
   kinetoscope convert arm.urdf -o arm_mjcf      MJCF for both supported MuJoCo versions, with meshes
-  kinetoscope render humanoid.xml -o out.png    an image
+  kinetoscope render humanoid.xml -o out.png    an image of the initial state
   kinetoscope view arm.urdf                     simulation in a window; --serve for a browser
   kinetoscope view humanoid.xml --floating-base a robot on a free base
   kinetoscope view scene.toml                   a scene of robots, objects and sensors
   kinetoscope bench arm.urdf --num-envs 64      steps and images per second on this machine
-  kinetoscope plot run.mcap                     list the topics; --topic, --field and --out plot values
+  kinetoscope plot run.mcap                     list the topics; with --topic, --field and --out: plot values
   kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
   kinetoscope recover run.mcap                  complete the file of an interrupted recording
 

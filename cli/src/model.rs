@@ -16,7 +16,7 @@ pub(crate) struct ModelArgs {
     /// URDF files, each attached to the tip of the previous one; or one MJCF file; or one scene file (TOML, YAML, JSON)
     #[arg(required = true, value_name = "FILE.urdf|FILE.xml|SCENE.toml")]
     files: Vec<PathBuf>,
-    /// Let the root of a robot move freely
+    /// Let the root of a robot move freely instead of fixing it in the world; not for scenes
     #[arg(long, alias = "floating_base")]
     pub(crate) floating_base: bool,
     /// Folder of a ROS package for package:// URIs; may be repeated
@@ -34,11 +34,12 @@ pub(crate) struct ModelArgs {
 /// Initial height of a robot, and the ground.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct SpawnArgs {
-    /// Initial height of the robot's lowest collision point above the ground [default: 0 with --floating-base; else the
-    /// root link starts at height 0]
+    /// Initial height of the robot's lowest collision point above the ground [default: the root link starts at height
+    /// 0, or at the pose of an MJCF file; with --floating-base, a URDF robot starts on the ground, and an MJCF robot is
+    /// raised if it would start below the ground]
     #[arg(long, alias = "spawn_height", value_name = "METERS", allow_negative_numbers = true)]
     pub(crate) spawn_height: Option<f64>,
-    /// Omit the ground
+    /// Omit the ground below a robot; the ground of a scene stays
     #[arg(long, alias = "no_ground")]
     pub(crate) no_ground: bool,
 }
@@ -62,7 +63,7 @@ pub(crate) struct Setup {
     pub(crate) default_arena_space: f64,
     /// Number of stepping threads; `None` uses that of a scene file, else every core.
     pub(crate) threads: Option<usize>,
-    /// True to add a ground plane below a robot.
+    /// True to add a ground plane below a robot; ignored for scenes.
     pub(crate) ground: bool,
     pub(crate) spawn_height: Option<f64>,
 }
@@ -102,7 +103,7 @@ impl Setup {
 #[derive(Debug)]
 pub(crate) struct Model {
     pub(crate) sim: SimulationManager,
-    /// Robot of the input files; `None` for a scene.
+    /// Robot of the input files; `None` for an MJCF scene or a scene file.
     pub(crate) robot: Option<RobotId>,
     /// MJCF file that is a scene; `None` for other input.
     pub(crate) mjcf: Option<MjcfId>,
@@ -189,8 +190,8 @@ impl ModelArgs {
     }
 
     /// Builds the simulation. URDF files form one robot. An MJCF file is a robot if possible; otherwise (several root
-    /// bodies, ball joints, or no hinge or slide joint) it is a scene with its own world geoms and no additional
-    /// ground.
+    /// bodies, ball joints, or no hinge or slide joint; see [`may_be_scene`]) it is a scene with its own world geoms
+    /// and no additional ground. `setup.ground` applies to robots only.
     ///
     /// # Errors
     /// Errors of the files, or flags that do not apply to a scene.
@@ -220,7 +221,8 @@ impl ModelArgs {
         Ok(model)
     }
 
-    /// Builds a robot, or a scene. A robot on a free base starts at the pose of the file, but never below the ground.
+    /// Builds a robot, or a scene. Without a spawn height, a robot on a free base starts at the pose of the file,
+    /// raised if it would start below the ground.
     fn mjcf(&self, setup: &Setup, path: &Path) -> Result<Model> {
         /// Tolerance for rounding \[m\].
         const SLACK: f64 = 1e-6;
@@ -258,7 +260,7 @@ impl ModelArgs {
         Ok(Model::of(InteractiveScene::new(cfg)?.into_sim()))
     }
 
-    /// Returns an error if robot flags are given for a scene.
+    /// Returns an error if `--floating-base` or `--spawn-height` is given for a scene.
     fn refuse_robot_flags(&self, setup: &Setup, path: &Path) -> Result<()> {
         let flags = [("--floating-base", self.floating_base), ("--spawn-height", setup.spawn_height.is_some())];
         match flags.iter().find(|(_, given)| *given) {

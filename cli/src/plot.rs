@@ -28,7 +28,7 @@ pub(crate) struct Args {
     /// Environment, if the topic name does not contain it [default: the first recorded one]
     #[arg(long)]
     env: Option<usize>,
-    /// Output file
+    /// Output file; its extension selects the format
     #[arg(short, long, value_name = "FILE.svg|FILE.png")]
     out: Option<PathBuf>,
     /// Title of the plot [default: the topics]
@@ -44,8 +44,8 @@ pub(crate) struct Args {
 
 const HELP: &str = "\
 Examples:
-  kinetoscope plot run.mcap                       lists what there is
-  kinetoscope plot run.mcap --topic joint_states  lists its numbers
+  kinetoscope plot run.mcap                       lists the topics
+  kinetoscope plot run.mcap --topic joint_states  lists the fields of a topic
   kinetoscope plot run.mcap --topic joint_states --field 'position[*]' --out plot.svg
 
 Exit codes: 0 done; 1 done, with warnings; 2 refused.";

@@ -11,7 +11,7 @@ pub(crate) struct Args {
     /// Recording, by its final name (run.mcap) or its partial file (run.mcap.part)
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Name of the complete file, instead of the final name of the recording
+    /// Name of the complete file [default: the final name of the recording]
     #[arg(short, long, value_name = "OUT")]
     out: Option<PathBuf>,
 }

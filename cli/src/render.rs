@@ -35,16 +35,17 @@ pub(crate) struct Args {
 /// Camera and renderer settings.
 #[derive(Debug, clap::Args)]
 pub(crate) struct RenderArgs {
-    /// Camera of an MJCF file
+    /// Name of a camera in the MJCF file; without it and --eye, the image shows the whole model
     #[arg(long, conflicts_with_all = ["eye", "target"])]
     camera: Option<String>,
-    /// Camera position, in meters
+    /// Camera position in the world, in meters
     #[arg(long, value_name = "X,Y,Z", requires = "target", value_parser = parse_point, allow_hyphen_values = true)]
     eye: Option<Point>,
-    /// Point that the camera looks at, in meters
+    /// Point in the world that the camera looks at, in meters
     #[arg(long, value_name = "X,Y,Z", requires = "eye", value_parser = parse_point, allow_hyphen_values = true)]
     target: Option<Point>,
-    /// Vertical field of view in degrees [default: that of the camera, or 45]
+    /// Vertical field of view, in degrees [default: that of --camera or of the MJCF file; 45 with --eye and for other
+    /// files]
     #[arg(long)]
     fovy: Option<f64>,
     /// Image width, in pixels
@@ -137,7 +138,7 @@ impl RenderArgs {
     /// Returns the camera view of a model.
     ///
     /// # Errors
-    /// The file has no such camera, or a size or angle is invalid.
+    /// The file has no camera of the given name, or a size, a point or an angle is invalid.
     pub(crate) fn view(&self, still: &OffscreenScene) -> Result<View> {
         let free = still.first_view([self.width, self.height]);
         let (pose, fovy) = match (&self.camera, self.eye, self.target) {

@@ -21,28 +21,28 @@ pub(crate) struct Args {
     /// Recording, .mcap or .npz
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Recorded scene file, if the recording does not contain its scene, or for --verify
+    /// Scene file of the recorded simulation, used instead of the scene in the recording; required by --verify
     #[arg(long, value_name = "SCENE.toml|yaml")]
     scene: Option<PathBuf>,
-    /// Show the recording in browsers at this address instead of a window
+    /// Show the recording in browsers instead of a window; the default address is 127.0.0.1:8080
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
     /// Write images to this folder instead of opening a window
     #[arg(long, value_name = "DIR", conflicts_with = "serve", requires = "at")]
     out: Option<PathBuf>,
-    /// Times of the images, in seconds of recording time
+    /// Times of the images, in seconds of the recording's time stamps; each shows the last frame at or before its time
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "out", allow_hyphen_values = true)]
     at: Vec<f64>,
-    /// Width of the images, in pixels
+    /// Width of the images of --out, in pixels
     #[arg(long, default_value_t = 960)]
     width: usize,
-    /// Height of the images, in pixels
+    /// Height of the images of --out, in pixels
     #[arg(long, default_value_t = 540)]
     height: usize,
-    /// Run the recorded actions again and compare every number, bit for bit
+    /// Run the recorded actions again in the scene of --scene, and compare every number bit for bit
     #[arg(long, requires = "scene", conflicts_with_all = ["serve", "out"])]
     verify: bool,
-    /// End after this number of seconds instead of when the window is closed
+    /// End after this number of seconds of real time, if the window is not closed earlier
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["out", "verify"])]
     seconds: Option<f64>,
 }
@@ -53,8 +53,9 @@ Examples:
   kinetoscope replay run.mcap --out images --at 0,1.5,3
   kinetoscope replay run.mcap --verify --scene scene.toml
 
-Exit codes: 0 shown until it was closed, drawn, or the same to the last bit; 1 shown or drawn, with warnings (something of the
-recording or of the scene was left out), or --verify found a difference; 2 refused, or the display was lost.";
+Exit codes: 0 shown, images written, or --verify found every number equal; 1 shown or images written, with warnings
+(something of the recording or of the scene was left out), or --verify found a difference; 2 refused, or the display was
+lost.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if args.verify {

@@ -128,11 +128,11 @@ pub(crate) struct SceneReport {
     others: Vec<(String, &'static str)>,
 }
 
-/// Inspects the robots of a scene.
-///
 impl SceneReport {
+    /// Inspects the robots and articulations of a scene file, each alone, and lists its other entities.
+    ///
     /// # Errors
-    /// A robot cannot be inspected.
+    /// A robot or articulation cannot be inspected.
     pub(crate) fn of(file: &str, cfg: &SceneCfg) -> Result<Self> {
         let (mut robots, mut others) = (Vec::new(), Vec::new());
         for (key, (_, entity)) in cfg.keys().zip(&cfg.entities) {
@@ -152,7 +152,7 @@ impl SceneReport {
         Ok(Self { file: file.to_owned(), num_envs: simulation.num_envs, dt: simulation.physics_dt, robots, others })
     }
 
-    /// True if a robot has warnings.
+    /// True if a robot or articulation has warnings.
     pub(crate) fn has_warnings(&self) -> bool {
         self.robots.iter().any(|(_, report)| !report.warnings.is_empty())
     }

@@ -34,21 +34,21 @@ pub(crate) struct Args {
     /// Distance between environments, in meters [default: that of a scene file, else 2]
     #[arg(long, alias = "arena_space")]
     arena_space: Option<f64>,
-    /// Number of stepping threads [default: every core]
+    /// Number of stepping threads [default: that of a scene file, else every core]
     #[arg(long)]
     threads: Option<usize>,
-    /// End after this number of steps
+    /// End after this number of steps; otherwise run until the window is closed, or until Ctrl+C
     #[arg(long)]
     steps: Option<u64>,
     /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset;
-    /// .mp4, .gif, .webp or .apng for the first camera; a folder for PNG files of all cameras. Without this flag, the
-    /// record button starts a recording.mcap
+    /// .mp4, .gif, .webp or .apng for the first camera, or for all environments side by side if there is no camera; a
+    /// folder for PNG files of all cameras. Without this flag, the record button records to recording.mcap
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replace the file of --record and the partial file of an interrupted recording
     #[arg(long, requires = "record")]
     overwrite: bool,
-    /// Simulated seconds per second, until a viewer sets another speed
+    /// Simulated seconds per second of real time, until a viewer sets another speed
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
 }

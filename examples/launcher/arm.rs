@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Files and joints of an arm with a hand.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ArmWithHand {
-    /// One URDF or MJCF (.xml) file with both, instead of --arm-urdf and --hand-urdf
+    /// One URDF or MJCF (.xml) file of an arm with its hand, instead of --arm-urdf and --hand-urdf
     #[arg(long, value_name = "FILE", conflicts_with_all = ["arm_urdf", "hand_urdf"])]
     robot: Option<PathBuf>,
     /// URDF of the arm
@@ -20,10 +20,10 @@ pub(crate) struct ArmWithHand {
     /// URDF of the hand
     #[arg(long, alias = "hand_urdf", default_value = "revo1_left/revo1_left.urdf")]
     hand_urdf: PathBuf,
-    /// Joints of the arm, a pattern that matches whole names
+    /// Joints of the arm: a regular expression that matches whole names
     #[arg(long, alias = "arm_joints", default_value = "JOINT[1-6]")]
     arm_joints: String,
-    /// Joints of the hand, a pattern that matches whole names
+    /// Joints of the hand: a regular expression that matches whole names
     #[arg(long, alias = "hand_joints", default_value = "LEFT_.*")]
     hand_joints: String,
 }
@@ -71,7 +71,7 @@ fn driven(arm_joints: &str, hand_joints: &str) -> RobotCfg {
     }
 }
 
-/// The link that carries the hand, as `uid/link`.
+/// The link that carries the hand, as `uid/link`; the root link if arm and hand come from one file.
 pub(crate) fn tip(robot: Robot<'_>) -> String {
     let description = robot.description();
     let joins = |parent: &str, child: &str| parent == "arm" && child == "hand";

@@ -13,7 +13,7 @@ use image::{Rgb, RgbImage};
 const SIZE: [u32; 2] = [640, 360];
 const MARGIN: [i32; 4] = [56, 36, 20, 36];
 
-/// Plots numbers from 0 to 1 in their order.
+/// Plots numbers over their count from 1 on; the vertical axis is from 0 to 1, and other values are clamped.
 pub(crate) fn plot(title: &str, values: &[f64]) -> RgbImage {
     let mut canvas = Canvas(RgbImage::from_pixel(SIZE[0], SIZE[1], Rgb([250, 250, 250])));
     let [left, top, right, bottom] = MARGIN;

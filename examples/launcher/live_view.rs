@@ -8,13 +8,13 @@ use std::path::PathBuf;
 /// `--serve`, `--record`, `--steps` and `--headless` of examples that inspect a model and take no steps by themselves.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct LiveViewFlags {
-    /// Show the moving model in browsers, in real time, until Ctrl+C; the address defaults to 127.0.0.1:8080
+    /// Simulate the model and show it in browsers, in real time, until Ctrl+C; the address defaults to 127.0.0.1:8080
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
-    /// Record the moving model until Ctrl+C; the file name selects the format, as in every example
+    /// Simulate the model and record it until Ctrl+C; the file name selects the format, as in every example
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Number of physics steps to show or record, instead of running until Ctrl+C
+    /// Number of physics steps to show or record [default: until Ctrl+C]
     #[arg(long)]
     steps: Option<u64>,
     /// Accepted as in every example; this one never opens a window

@@ -37,14 +37,14 @@ pub(crate) struct Launcher {
     /// Number of environments
     #[arg(long, alias = "num_envs", default_value_t = 1)]
     pub(crate) num_envs: usize,
-    /// Number of steps; without it the example runs until Ctrl+C
+    /// Maximum number of steps [default: until the task of the example is done, the window is closed, or Ctrl+C]
     #[arg(long)]
     pub(crate) steps: Option<u64>,
     /// Run without a window
     #[arg(long)]
     pub(crate) headless: bool,
-    /// Show the simulation in browsers, at real-time speed until a viewer changes it; the address defaults to
-    /// 127.0.0.1:8080. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
+    /// Also show the simulation in browsers, in real time until a viewer changes the speed; the address defaults to
+    /// 127.0.0.1:8080. An address that other machines can reach (0.0.0.0:8080) requires the printed token
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = SERVE)]
     pub(crate) serve: Option<String>,
     /// Device of the physics: cpu; cuda and cuda:N are refused with an explanation
@@ -52,19 +52,19 @@ pub(crate) struct Launcher {
     pub(crate) device: Device,
     #[command(flatten)]
     elsewhere: CompatibilityFlags,
-    /// Renderer of the images
+    /// Renderer of the cameras; some examples support only auto and raster
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
     pub(crate) renderer: Renderer,
-    /// Distance between environments in the overview, in meters
+    /// Distance between environments in the overview, in meters [default: chosen by the example]
     #[arg(long, alias = "arena_space")]
     pub(crate) arena_space: Option<f64>,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Threads that step the environments; every core by default
+    /// Number of threads that step the environments [default: every core]
     #[arg(long)]
     pub(crate) threads: Option<usize>,
-    /// Folder for images
+    /// Folder for images [default: the working directory in examples that always write images; no images in others]
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
     /// Folder for every stage of the pipeline: merged URDF, description, MJCF for both supported MuJoCo versions,
@@ -75,23 +75,23 @@ pub(crate) struct Launcher {
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
     /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset,
-    /// .hdf5 for robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera, or for the
-    /// stage if the scene has no camera; a folder for PNG files of all cameras. Recording starts at once; without the
-    /// flag the record button of window and browser starts a recording.mcap
+    /// .hdf5 for robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera, or for all
+    /// environments side by side if the scene has no camera; a folder for PNG files of all cameras. Recording starts at
+    /// once; without the flag, the record button of window and browser records to recording.mcap in the folder of --out
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Image source of an animation of --record: `stage` for all environments side by side, or the name of a camera (of
-    /// environment 0). Other formats record every camera, and also the stage if it is named here
+    /// environment 0). Other formats record every camera, and with `stage` also all environments side by side
     #[arg(long, alias = "record_view", value_name = "NAME", requires = "record")]
     pub(crate) record_view: Option<String>,
-    /// Replace the file of --record, including the remains of a recording that was killed
+    /// Replace the file of --record, and the partial file of an interrupted recording
     #[arg(long, requires = "record")]
     pub(crate) overwrite: bool,
-    /// Physics steps from one recorded row of states to the next
+    /// Physics steps from one recorded row of states to the next; sensors are recorded whenever they measure
     #[arg(long, value_name = "STEPS", default_value_t = 1)]
     pub(crate) record_every: u64,
-    /// Recording period of single streams: NAME=STEPS, where NAME is as in the file, such as arm/link_poses=10 or
-    /// camera=30
+    /// Recording period of single streams in physics steps: NAME=STEPS, where NAME is as in the file, such as
+    /// arm/link_poses=10, or a prefix of it, such as camera=30
     #[arg(long, value_name = "NAME=STEPS,...", value_delimiter = ',', value_parser = rate)]
     pub(crate) record_rate: Vec<(String, u64)>,
     /// The recording shared by `--record` and the record buttons, created on first use.
@@ -148,7 +148,7 @@ struct CompatibilityFlags {
 impl CompatibilityFlags {
     /// One line for each given flag without effect here, with the reason.
     fn notes(&self) -> Vec<String> {
-        let cameras = "cameras draw on the CPU, with or without a window";
+        let cameras = "cameras render on the CPU, with or without a window";
         let flags = [
             (self.gpu_id.is_some(), "--gpu-id", "physics and cameras run on the CPU; --threads chooses how many cores"),
             (self.enable_cameras, "--enable-cameras", cameras),
@@ -163,7 +163,7 @@ impl CompatibilityFlags {
 /// renderer refuse the others ([`Launcher::simulation`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Renderer {
-    /// The default
+    /// The default of the example
     Auto,
     /// Rasterizer
     Raster,
@@ -204,7 +204,7 @@ impl Renderer {
         let PathFlags { rt_samples, rt_bounces, rt_noisy } = flags;
         if self != Self::Rt && (rt_samples.is_some() || rt_bounces.is_some() || rt_noisy) {
             return Err(
-                "--rt-samples, --rt-bounces and --rt-noisy are of path tracing: use them with --renderer rt".into()
+                "--rt-samples, --rt-bounces and --rt-noisy are for path tracing: use them with --renderer rt".into()
             );
         }
         let renderer = match self {
@@ -242,7 +242,7 @@ impl Launcher {
             let name = self.renderer.name();
             return Err(format!(
                 "--renderer {name} is not for this example: use --renderer raster or auto here, or create_sensor, stereo, \
-                 fisheye, surfaces or render_model, which draw by rays too"
+                 fisheye, surfaces or render_model, which also support ray tracing"
             )
             .into());
         }
@@ -283,7 +283,7 @@ impl Launcher {
         Ok(())
     }
 
-    /// The folder of `--out`, otherwise the working directory. Creates the folder if `create`.
+    /// The folder of `--out`, otherwise the working directory. Creates the folder if `create` is true.
     ///
     /// # Errors
     /// The folder cannot be created.
@@ -337,7 +337,7 @@ pub(crate) fn check_camera_id(camera_id: usize, sim: &SimulationManager) -> Resu
     }
 }
 
-/// Positions of the tutorial's cameras \[m\]: two places in alternation.
+/// Position of the tutorial's camera in each environment \[m\]: two places in alternation.
 pub(crate) fn alternating_eyes(num_envs: usize) -> Vec<[f64; 3]> {
     (0..num_envs).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect()
 }
@@ -382,7 +382,8 @@ pub(crate) struct MainLoop {
 pub(crate) const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 impl MainLoop {
-    /// Starts the clock. `cycle` is the length of the bar if the number of steps is open.
+    /// Starts the clock and handles Ctrl+C from now on. `cycle` is the length of the bar if the number of steps is
+    /// open.
     pub(crate) fn new(launcher: &Launcher, cycle: u64) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
@@ -418,7 +419,7 @@ impl MainLoop {
         self.end.clone()
     }
 
-    /// The last step of a block of at most `length` steps.
+    /// Number of steps at the end of a block of at most `length` steps after `step`; the block ends at `--steps`.
     pub(crate) fn end_of_block(&self, step: u64, length: u64) -> u64 {
         (step + length).min(self.steps.unwrap_or(u64::MAX))
     }
@@ -442,7 +443,7 @@ impl MainLoop {
         self.bar.set_position(step);
     }
 
-    /// Finishes the bar; returns the environment steps per second since the start.
+    /// Finishes the bar; returns `steps` of all environments per second of time since [`new`](Self::new).
     pub(crate) fn env_steps_per_second(&self, steps: u64, num_envs: usize) -> f64 {
         let seconds = self.start.elapsed().as_secs_f64();
         self.bar.finish_and_clear();

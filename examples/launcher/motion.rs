@@ -43,19 +43,19 @@ impl<'a> MotionPlayer<'a> {
         self.step
     }
 
-    /// True for each environment in which every pose so far was reachable.
+    /// True for each environment in which every pose so far was reachable, and every line without a jump of the joints.
     pub(crate) fn planned(&self) -> &[bool] {
         &self.reachable
     }
 
-    /// Moves to one pose per environment along a joint-space interpolation.
+    /// Moves the tip to one pose per environment along a joint-space interpolation.
     pub(crate) fn move_joint_space(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
         let end = self.solve(poses, &start, f64::INFINITY)?;
         self.play(&self.arm.clone(), &[start, end], seconds, |_| ())
     }
 
-    /// Moves to one pose per environment on a straight line, starting at the frame of the current targets.
+    /// Moves the tip to one pose per environment on a straight line, starting at its pose for the current targets.
     pub(crate) fn move_linear(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
         let from = trial::poses(&self.sim.robot(self.robot).compute_fk(&start, self.tip, None)?);
@@ -70,7 +70,7 @@ impl<'a> MotionPlayer<'a> {
         self.play(&self.arm.clone(), &waypoints, seconds, |_| ())
     }
 
-    /// Moves joints to positions, the same in every environment.
+    /// Moves joints to positions \[rad or m\] by name, the same in every environment.
     pub(crate) fn move_joints(&mut self, positions: &[(&str, f64)], seconds: f64) -> Result {
         let robot = self.sim.robot(self.robot);
         let joints =
@@ -90,8 +90,9 @@ impl<'a> MotionPlayer<'a> {
         self.sim.robot(self.robot).qpos_target().select(Axis(1), &columns)
     }
 
-    /// Inverse-kinematics solutions for poses, started from the joint positions `near`. An environment without a
-    /// solution keeps these positions.
+    /// Inverse-kinematics solutions for poses, started from the joint positions `near`. A joint that moves by more than
+    /// `leap` \[rad\] counts as no solution. After a pose without a solution, an environment keeps its positions for
+    /// the rest of the run.
     fn solve(&mut self, poses: &[Pose], near: &Array2<f64>, leap: f64) -> Result<Array2<f64>> {
         let found =
             self.sim.robot(self.robot).compute_ik(poses, self.tip, &IkCfg::default(), Some(near.view()), None)?;
@@ -106,7 +107,8 @@ impl<'a> MotionPlayer<'a> {
         Ok(positions)
     }
 
-    /// Plays waypoints at equal intervals with a smooth start and end.
+    /// Sets the targets of `joints` along waypoints, with a smooth start and end, and calls `watch` after every step.
+    /// Ends early if the example should stop.
     fn play(
         &mut self,
         joints: &[JointIndex],

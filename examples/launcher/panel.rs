@@ -35,10 +35,10 @@ pub(crate) struct CameraChannels<'a> {
 }
 
 impl<'a> CameraChannels<'a> {
-    /// The images of a camera in its environment number `row`.
+    /// The images of a camera in row `row`, with one row for each environment that the camera observes.
     ///
     /// # Errors
-    /// One of the four channels is not enabled, or cannot be rendered.
+    /// Color, depth, mask or normals are not enabled, or cannot be rendered.
     pub(crate) fn of(camera: &'a Camera, row: usize) -> super::Result<Self> {
         let (height, width) = camera.image_shape();
         Ok(Self {

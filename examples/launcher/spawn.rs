@@ -6,8 +6,8 @@ use kinetoscope::prelude::*;
 /// Start height of the robot, and the ground.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct SpawnFlags {
-    /// Height of the lowest collision point of the robot above the ground at the start, in meters. The default is the
-    /// pose of the example or of the MJCF file
+    /// Initial height of the robot's lowest collision point above the ground, in meters [default: the start pose of the
+    /// example or of the MJCF file]
     #[arg(long, alias = "spawn_height", value_name = "METERS", allow_negative_numbers = true)]
     spawn_height: Option<f64>,
     /// Leave out the ground: the robot falls

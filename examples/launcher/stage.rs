@@ -10,10 +10,11 @@ use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::OffscreenScene;
 use std::path::Path;
 
-/// Renders all environments side by side, seen from `eye` toward `target` \[m\], and writes a PNG.
+/// Renders all environments side by side, with markers in the frames of their environments, and writes a PNG of 1280 by
+/// 720 pixels. `eye` and `target` are the position of the camera and its target in the frame of the overview \[m\].
 ///
 /// # Errors
-/// The scene is too large to render, or the file cannot be written.
+/// The scene is too large to render, the points coincide, or the file cannot be written.
 pub(crate) fn write(
     sim: &mut SimulationManager,
     markers: &[(EnvId, Marker)],

@@ -50,7 +50,7 @@ pub(crate) struct TrialResults<'a> {
     pub(crate) what: &'a str,
     /// The deciding setting: its key in the report, and its value in the unit of the key.
     pub(crate) setting: (&'a str, f64),
-    /// One row for each environment, with the key `success`.
+    /// One row for each environment, a JSON object with the boolean key `success`.
     pub(crate) table: Vec<Value>,
     pub(crate) steps: u64,
     /// Environment steps per second.
@@ -145,7 +145,7 @@ impl ImageSeries {
         Ok(Self { out, name, camera, taken: 0 })
     }
 
-    /// Writes the next image.
+    /// Writes the next color image; does nothing without `--out`.
     ///
     /// # Errors
     /// The file cannot be written.

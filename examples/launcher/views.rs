@@ -38,7 +38,7 @@ mod shown {
         });
     }
 
-    /// Resumes a paused simulation so that the program can end.
+    /// Resumes a paused simulation and sets it to unlimited speed, so that the program can end.
     pub(crate) fn release_pause() {
         if let Some(key) = RESUME_HANDLE.get() {
             key.send(Command::Resume);
@@ -80,8 +80,8 @@ mod shown {
     }
 
     impl Launcher {
-        /// Opens a window for sensor images of `size` (width, height), scaled to at most 1600 by 1200 \[pixels\].
-        /// `None` if the simulation itself has no window.
+        /// Opens a window for sensor images of `size` (width, height), scaled down to at most 1600 by 1200 \[pixels\].
+        /// `None` if the simulation itself has no window, or if no window can be opened.
         pub(crate) fn open_sensor_window(&self, title: &str, size: [usize; 2]) -> Option<SensorWindow> {
             self.window.0.get()?;
             let scale = [1600.0, 1200.0].iter().zip(size).fold(1.0_f64, |scale, (most, n)| scale.min(most / n as f64));
@@ -113,7 +113,7 @@ mod shown {
             Ok(())
         }
 
-        /// Renders the stage as in a newly opened window to a PNG in the folder of `--out`, if given.
+        /// Renders all environments as in a newly opened window to a PNG in the folder of `--out`, if given.
         ///
         /// # Errors
         /// The file cannot be written.
@@ -122,7 +122,7 @@ mod shown {
             super::super::make_folder(out)?;
             let path = out.join(name);
             sim.screenshot(&path)?;
-            println!("Drawn to {}", path.display());
+            println!("Image written to {}", path.display());
             Ok(())
         }
 
@@ -202,7 +202,7 @@ impl Launcher {
         }
     }
 
-    /// Renders nothing: this build has no stage view.
+    /// Renders nothing: this build has no overview of the environments.
     ///
     /// # Errors
     /// `--out` is given.

@@ -11,7 +11,8 @@ pub struct ImageCheck<'a> {
     pub size: [usize; 2],
     /// Largest difference of a pixel, in the unit of the pixels.
     pub tolerance: f64,
-    /// Largest share of pixels that differ more, for example silhouettes that two renderers round differently.
+    /// Largest share of the compared pixels that may differ more, for example silhouettes that two renderers round
+    /// differently.
     pub outliers: f64,
 }
 
@@ -52,7 +53,8 @@ impl ImageCheck<'_> {
         );
     }
 
-    /// Counts the pixels that differ by more than the tolerance, and those that have an expected value. For controls.
+    /// Returns the number of pixels that differ by more than the tolerance, and of those that have an expected value.
+    /// For controls.
     pub fn count(&self, found: &[f32], expected: impl Fn(usize, usize) -> Option<f64>) -> [usize; 2] {
         let of_pixel = |(k, &found): (usize, &f32)| {
             let expected = expected(k % self.size[0], k / self.size[0])?;

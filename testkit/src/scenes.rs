@@ -44,7 +44,8 @@ impl TestRng {
     }
 }
 
-/// A scene with two of every shape, each within `reach` of the origin \[m\], and a checkered plane.
+/// A scene with two of every shape, with positions within `reach` of the origin along each axis \[m\], and a checkered
+/// plane at z = -1. Returns the scene and the poses of its instances.
 pub fn random_scene(random: &mut TestRng, reach: f64) -> (RenderScene, Vec<PoseF32>) {
     let shapes = every_shape().into_iter().chain(every_shape());
     let mut color = || random.within(0.1, 1.0) as f32;
@@ -72,7 +73,7 @@ pub fn checker_plane() -> Instance {
     Instance::new(Plane::INFINITE, material, 100)
 }
 
-/// A triangle mesh of a bumpy sphere.
+/// A triangle mesh of a bumpy sphere with a mean radius of 0.3 m.
 pub fn bumpy_sphere(segments: usize) -> Arc<RenderMesh> {
     let mut mesh = Shape::from(Sphere { radius: 0.3 }).tessellate(segments);
     for p in &mut mesh.positions {
@@ -97,7 +98,8 @@ pub fn every_shape() -> Vec<Shape> {
     ]
 }
 
-/// A figure of about 25 primitives in human shape, on a checkered ground.
+/// A figure of 22 primitives in human shape and three objects, on a checkered ground. Returns the scene and the poses
+/// of its instances.
 pub fn humanoid() -> (RenderScene, Vec<PoseF32>) {
     let skin = Material { rgba: [0.8, 0.6, 0.4, 1.0], ..Material::default() };
     let mut instances = vec![checker_plane()];

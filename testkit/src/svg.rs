@@ -1,6 +1,6 @@
 //! Reading of SVG plots, using only the labels of their axes.
 
-/// Value and pixel position of two labels of an axis.
+/// Value and position \[pixels\] of two labels of an axis, `[[value, position]; 2]`.
 pub type Ticks = [[f64; 2]; 2];
 
 fn attribute(line: &str, name: &str) -> Option<f64> {

@@ -2,7 +2,7 @@
 
 use std::borrow::Borrow;
 
-/// A limit on an error, with its derivation.
+/// A limit on an error, with its derivation: the larger of an absolute and a relative limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Largest absolute error, in the unit of the value.
@@ -34,7 +34,7 @@ impl Tolerance {
         Self::mixed(operations * f64::EPSILON, "rounding in double precision")
     }
 
-    /// Largest absolute error of a value.
+    /// Largest absolute error of a value: the larger of both limits.
     pub const fn limit(&self, expected: f64) -> f64 {
         self.absolute.max(self.relative * expected.abs())
     }

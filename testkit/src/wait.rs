@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 /// Longest wait. An event that has not occurred by then does not occur, even on a busy machine.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Waits until `found` returns a value.
+/// Waits until `found` returns a value, and panics after [`TIMEOUT`].
 #[track_caller]
 pub fn until_some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -18,7 +18,7 @@ pub fn until_some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// Waits until a condition holds.
+/// Waits until a condition holds, and panics after [`TIMEOUT`].
 #[track_caller]
 pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
     until_some(what, || holds().then_some(()));

@@ -104,7 +104,7 @@ pub fn camera([width, height]: [usize; 2], eye: [f64; 3], target: [f64; 3], chan
     }
 }
 
-/// Bits of the state that determines the next step of an environment, of the efforts, and the number of contacts.
+/// Bits of time, state, warm start, position targets and efforts of an environment, and its number of contacts.
 pub fn bits_of(env: &SimEnv) -> Vec<u64> {
     let data = env.data();
     [&[data.time()], data.qpos(), data.qvel(), data.qacc_warmstart(), &env.drives.position, &env.drives.effort]
@@ -129,7 +129,7 @@ pub struct RecordedWorld {
     pub sim: SimulationManager,
     /// The bundled arm.
     pub arm: RobotId,
-    /// A cube of 0.1 m.
+    /// A cube with edges of 0.1 m.
     pub cube: RigidObjectId,
     /// A camera of 32x24 pixels with color, depth and mask.
     pub camera: SensorId<Camera>,

@@ -14,7 +14,7 @@ use kinetoscope::sensors::camera::colormap::{depth_color, mask_color};
 use kinetoscope_viewer::{OrbitCamera, ScreenshotCfg};
 use std::fs::File;
 
-/// Size of the overview \[pixels\]; the camera has half of it.
+/// Size of the overview \[pixels\]; each image of the camera has about half of its width and height.
 const SIZE: [u32; 2] = [352, 264];
 /// Space between the images \[pixels\].
 const GAP: u32 = 4;
@@ -24,7 +24,7 @@ const STEPS: u32 = 8;
 const FRAMES: usize = 14;
 /// Depth range of the colors \[m\].
 const DEPTH: [f32; 2] = [0.4, 2.2];
-/// Largest difference of a color value that counts as no change.
+/// Largest difference of a color channel, of 255, that counts as no change.
 const TOLERANCE: u8 = 3;
 /// A transparent color far from all others, so that the quantization keeps it apart from them.
 const UNCHANGED: Rgba<u8> = Rgba([255, 0, 255, 0]);
@@ -85,7 +85,7 @@ fn main() {
     }
 }
 
-/// The overview, with depth over mask on its right.
+/// Renders the overview, with depth above mask on its right.
 fn compose(sim: &mut SimulationManager, camera: SensorId<kinetoscope::sensors::camera::Camera>) -> RgbaImage {
     let eye = OrbitCamera::look_at([2.6, -2.4, 1.7], [0.1, 0.0, 0.35]);
     let size = SIZE.map(|side| side as usize);
@@ -108,7 +108,8 @@ fn compose(sim: &mut SimulationManager, camera: SensorId<kinetoscope::sensors::c
     image
 }
 
-/// The image with transparent pixels where it equals the shown one, which compress well; the other pixels are shown next.
+/// Returns the image with transparent pixels where it differs from `shown` by at most [`TOLERANCE`]; they compress
+/// well. Copies all other pixels to `shown`. The first image is returned as it is.
 fn changes(image: &RgbaImage, shown: &mut Option<RgbaImage>) -> RgbaImage {
     let Some(shown) = shown else { return shown.insert(image.clone()).clone() };
     let mut out = image.clone();

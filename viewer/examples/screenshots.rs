@@ -18,7 +18,7 @@ use std::time::Instant;
 
 const SIZE: [usize; 2] = [960, 540];
 
-/// Sixteen arms in a raised pose, each beside a cube.
+/// Sixteen arms after 1.5 s of motion to a bent pose, each beside a cube and with a camera.
 fn arms() -> SimulationManager {
     let cfg = SimulationManagerCfg { num_envs: 16, physics_dt: 0.01, arena_space: 2.0, ..Default::default() };
     let mut sim = SimulationManager::new(cfg).unwrap();

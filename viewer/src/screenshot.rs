@@ -16,13 +16,14 @@ use std::sync::Arc;
 pub struct ScreenshotCfg {
     /// Image size: pixels per row, rows.
     pub size: [usize; 2],
-    /// Camera. `None` frames the shown environments, like the initial view of a window.
+    /// Camera. `None` frames the shown environments, like the initial view of a window; with [`EnvSelection::All`], the
+    /// view set by [`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view) applies instead.
     pub camera: Option<OrbitCamera>,
     /// Environments in the image.
     pub envs: EnvSelection,
-    /// Overlays drawn on the scene.
+    /// Overlays and geom groups. `trails` has no effect: a screenshot has no past positions.
     pub overlays: Overlays,
-    /// Number of rendering threads. `None` uses every core. The image does not depend on this number.
+    /// Number of rendering threads, at least one. `None` uses every core. The image does not depend on this number.
     pub threads: Option<usize>,
 }
 
@@ -36,7 +37,7 @@ impl Default for ScreenshotCfg {
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScreenshotError {
-    /// The file name extension is not `.png`.
+    /// The file name extension is not `.png`, in upper or lower case.
     #[error("{path}: unsupported image format .{end}; use a file name that ends in .png")]
     Extension {
         /// Path of the image file.
@@ -86,7 +87,7 @@ pub enum ScreenshotError {
 /// Screenshots of a simulation.
 pub trait Screenshot {
     /// Writes an image of the current state to a PNG file: all environments in their grid, 960 by 540 pixels, seen from
-    /// the initial camera of a window.
+    /// the initial camera of a window ([`overview_camera`](Self::overview_camera)).
     ///
     /// An existing file is replaced once the new file is complete. The simulation does not change.
     ///
@@ -114,10 +115,12 @@ pub trait Screenshot {
     /// file is unchanged after an error.
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError>;
 
-    /// Returns a camera from which all environments fill an image of `size` pixels, in their current state.
+    /// Returns the camera set by [`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view). Without one,
+    /// returns a camera from which all environments, without the ground, fill an image of `size` pixels (width, height)
+    /// in their current state.
     fn overview_camera(&mut self, size: [usize; 2]) -> OrbitCamera;
 
-    /// Renders the image and returns it as a canvas with four bytes per pixel.
+    /// Renders the current state with the settings `cfg` and returns the image, without writing a file.
     ///
     /// # Errors
     /// The size or the environment is invalid, or the renderer returned an error.
@@ -171,7 +174,8 @@ impl Screenshot for SimulationManager {
     }
 }
 
-/// Returns a camera from which the shown environments fill the image.
+/// Returns a camera from which the shown environments fill the image, or the camera set by the program if all are
+/// shown.
 fn framing_camera(snapshot: &Snapshot, shown: EnvSelection, size: [usize; 2]) -> OrbitCamera {
     match shown {
         EnvSelection::All => OrbitCamera::overview(snapshot, size),

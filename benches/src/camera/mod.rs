@@ -9,11 +9,11 @@
 //! images per second of each side. OSMesa uses all cores and is compared with two of our threads; the other baselines
 //! use one core and are compared with one thread.
 //!
-//! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; reflections are off
-//! on both sides. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings (`baselines/mujoco_osmesa.py`). "OSMesa
-//! by hand" calls the library with two passes instead of three, which that class does not offer. Shadow maps have the
-//! default size of each side, 4096 texels in MuJoCo and at most 1024 in ours. Another row reduces MuJoCo's shadow maps
-//! to the size of ours.
+//! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples. Reflections are off
+//! in MuJoCo; ours has them in `full`. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings
+//! (`baselines/mujoco_osmesa.py`). "OSMesa by hand" calls the library with two passes instead of three, which that
+//! class does not offer. Shadow maps have the default size of each side, 4096 texels in MuJoCo and at most 1024 in
+//! ours. Another row reduces MuJoCo's shadow maps to the size of ours.
 
 mod hardware_limits;
 mod ray_casting;

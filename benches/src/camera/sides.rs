@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 pub(super) enum Quality {
     /// No shadows, one sample per pixel.
     Plain,
-    /// Shadows, four samples per pixel.
+    /// Shadows, four samples per pixel; in ours also reflections.
     Full,
     /// The baseline's default settings; as `Full` in ours.
     Defaults,
@@ -184,7 +184,7 @@ impl BaselineRenderer {
         }
     }
 
-    /// Number of images per step: a whole batch, or as many as take a fraction of a second.
+    /// Number of images per step of this baseline: a whole batch, or as many as take a fraction of a second.
     pub(super) fn images(self, work: &Work) -> usize {
         match self {
             Self::Warp => work.envs,

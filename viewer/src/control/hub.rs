@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Maximum number of queued commands. [`Viewer::send`] returns `false` beyond it.
+/// Maximum number of queued commands of all viewers. [`Viewer::send`] returns `false` beyond it.
 const MAX_QUEUED_COMMANDS: usize = 4096;
 /// Reason for a command that could not be [sent](Viewer::send).
 pub(crate) const NOT_STEPPING: &str = "the simulation accepts no commands because the program does not step it";
@@ -34,7 +34,7 @@ struct Inbox {
     next: u64,
 }
 
-/// Commands, viewers and combined requests since the last [`Hub::collect`].
+/// Commands since the last [`Hub::collect`], and the current viewers with their combined requests.
 #[derive(Debug)]
 pub(super) struct CollectedCommands {
     pub(super) commands: VecDeque<(u64, Command)>,
@@ -97,7 +97,7 @@ impl Hub {
 }
 
 /// Handle of a viewer: receives snapshots and sends commands. It can move to another thread. Dropping it undoes its
-/// pause, speed and spring.
+/// pause, speed and spring, and stops a recording that it started, at the next step.
 #[derive(Debug)]
 pub struct Viewer {
     hub: Arc<Hub>,
@@ -135,8 +135,9 @@ impl Viewer {
         }
     }
 
-    /// Sends a command to the simulation. Returns `false` if the simulation has ended, or if 4096 commands are already
-    /// queued because `update` is not called.
+    /// Queues a command for the simulation; it may still be refused
+    /// ([`RunState::last_refusal`](crate::RunState::last_refusal)). Returns `false` if the simulation has ended, or if
+    /// 4096 commands of all viewers are already queued because `update` is not called.
     pub fn send(&self, command: Command) -> bool {
         let mut inbox = lock(&self.hub.inbox);
         let last = inbox.commands.back_mut().filter(|(from, last)| *from == self.number && command.supersedes(last));
@@ -151,7 +152,7 @@ impl Viewer {
         !self.has_ended()
     }
 
-    /// Replaces the snapshot contents that this viewer requests.
+    /// Replaces the rate and the snapshot contents that this viewer requests.
     pub fn set_request(&self, wants: SnapshotRequest) {
         lock(&self.hub.inbox).viewers.insert(self.number, wants);
         self.hub.inbox_changed.notify_all();

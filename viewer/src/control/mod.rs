@@ -17,38 +17,42 @@ use crate::scene_view::EnvSelection;
 use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
 
 /// A request of a viewer to the simulation. Commands run between two steps, on the simulation's thread.
+/// [`RunState::last_refusal`](crate::RunState::last_refusal) has the reason if a command cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Command {
     /// Pauses the simulation: `update` blocks until any viewer resumes it, or until all viewers that paused it are
     /// dropped.
     Pause,
-    /// Resumes the simulation.
+    /// Resumes the simulation, regardless of the viewers that paused it.
     Resume,
     /// Pauses a running simulation and resumes a paused one.
     TogglePause,
-    /// Runs this many steps and pauses again. The steps run inside the program's calls of `update`; `update(n)` does n
-    /// steps in total.
+    /// Runs this many steps, then pauses; a running simulation pauses after them, too. The steps run inside the
+    /// program's calls of `update`; `update(n)` does n steps in total. During playback: pauses and moves ahead by this
+    /// many frames.
     Step(u32),
     /// Sets the speed of simulated time. The latest setting counts; when its viewer is dropped, the previous setting of
     /// another viewer applies again.
     SetSpeed(Speed),
-    /// Resets one environment to its initial state; `None` resets all environments.
+    /// Resets one environment to its initial state; `None` resets all environments. During playback: returns to the
+    /// first frame.
     Reset(Option<EnvId>),
-    /// Sets the drive target of a joint in one environment; `None` sets it in all environments. The program may
-    /// overwrite the target before the next step.
+    /// Sets the position target of a joint's drive. Targets are clamped to the joint limits; joints without a drive
+    /// ignore them. The program may overwrite the target before the next step.
     SetTarget {
-        /// The robot.
+        /// The robot or articulation.
         robot: RobotId,
         /// The joint.
         joint: JointIndex,
         /// The environment; `None` for all.
         env: Option<EnvId>,
-        /// Drive target \[rad or m\].
+        /// Position target \[rad or m\].
         value: f64,
     },
-    /// Pulls a body with a spring until [`Release`](Self::Release), the next drag of the same viewer, or the drop of
-    /// that viewer. The stiffness scales with the mass: a free body follows as a critically damped oscillator.
+    /// Pulls a body with a spring until [`Release`](Self::Release), the next drag of the same viewer, the drop of that
+    /// viewer, or the addition of an entity to the simulation. The stiffness scales with the mass: a free body follows
+    /// as a critically damped oscillator.
     Drag {
         /// The environment.
         env: EnvId,
@@ -59,7 +63,7 @@ pub enum Command {
         /// Target position of the spring's other end, in the environment frame \[m\].
         target: [f64; 3],
     },
-    /// Ends the drag of this viewer.
+    /// Ends the drag of this viewer, if any.
     Release,
     /// Starts (`true`) or stops (`false`) the recording through the simulation's [`RecordButton`].
     Record(bool),
@@ -90,7 +94,7 @@ pub enum Speed {
     #[default]
     Unlimited,
     /// Simulated seconds per wall-clock second, or fewer if the machine is too slow: 1 is real time, 0.1 is slow
-    /// motion.
+    /// motion. A factor outside [`FACTOR_RANGE`](Self::FACTOR_RANGE) is refused.
     Factor(f64),
 }
 
@@ -109,12 +113,15 @@ impl Speed {
     }
 }
 
-/// Optional snapshot contents that a viewer requests, in addition to poses.
+/// Rate of snapshots, and their contents in addition to poses, that a viewer requests. All viewers of a simulation get
+/// the same snapshots, at the highest requested rate and with all requested contents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SnapshotRequest {
-    /// Maximum number of snapshots per second of wall-clock time, clamped to 0.1 to 1000.
+    /// Number of snapshots per second of wall-clock time, clamped to 0.1 to 1000. A simulation that does not change or
+    /// steps more slowly publishes fewer.
     pub rate: f64,
-    /// Environments whose contacts and contact forces are included. Computing them costs as much as a simulation step.
+    /// Environments whose contacts and contact forces are included; `None` for no contacts. Computing them costs as
+    /// much as a simulation step.
     pub contacts: Option<EnvSelection>,
     /// Debug markers of sensors: see `debug_vis` in their configurations.
     pub markers: bool,
@@ -131,7 +138,7 @@ impl Default for SnapshotRequest {
 }
 
 impl SnapshotRequest {
-    /// Requests nothing.
+    /// Requests no contents besides poses, at the lowest rate.
     pub(crate) const EMPTY: Self = Self { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
 
     /// Combines the requests of two viewers.
@@ -154,8 +161,8 @@ pub trait ViewerExt {
     /// Adds a viewer. Its first snapshot is available at once; further snapshots follow with the steps. All viewers of
     /// a simulation share one [`ViewController`], which the first viewer adds.
     ///
-    /// The pause, speed and spring of a viewer end when the viewer is dropped. After the last viewer is dropped, the
-    /// simulation runs freely and as fast as it can.
+    /// The pause, speed and spring of a viewer, and a recording that it started, end when the viewer is dropped. After
+    /// the last viewer is dropped, the simulation runs freely and as fast as it can.
     fn viewer(&mut self, wants: SnapshotRequest) -> Viewer;
 
     /// Sets the record button that all viewers show. A recording that the previous button was running is stopped.

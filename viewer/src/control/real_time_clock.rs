@@ -56,7 +56,7 @@ impl RealTimeClock {
             ((now, steps), (now, steps), (now, steps), None);
     }
 
-    /// Returns simulated seconds per second over the last half second, or `None` before the first measurement.
+    /// Returns simulated seconds per second of the last complete measurement, or `None` before the first one.
     pub(super) fn measured(&self) -> Option<f64> {
         self.measured
     }

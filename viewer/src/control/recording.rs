@@ -15,7 +15,7 @@ pub trait RecordControl: Send {
     /// Returns the reason of a failure, as a text that viewers display.
     fn set(&mut self, sim: &mut SimulationManager, on: bool) -> Result<(), String>;
 
-    /// Returns the current state. Called whenever a snapshot is published.
+    /// Returns the current state. Called whenever a snapshot is published and before each press of the button.
     fn state(&self, sim: &SimulationManager) -> RecordingState;
 }
 
@@ -32,7 +32,8 @@ pub struct RecordingState {
 /// [`ViewerExt::set_record_button`](super::ViewerExt::set_record_button). Clones refer to the same button.
 ///
 /// A simulation has one button, which all its windows and browser views show. A button that is set later replaces it. A
-/// recording started by a viewer stops when that viewer is dropped; a recording started by the program continues.
+/// recording started by a viewer stops when that viewer is dropped; viewers cannot stop a recording started by the
+/// program.
 #[derive(Clone)]
 pub struct RecordButton(Arc<Mutex<dyn RecordControl>>);
 

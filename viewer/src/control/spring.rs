@@ -56,7 +56,7 @@ impl Spring {
     /// Applies the force of this spring alone to the next step.
     ///
     /// # Errors
-    /// The environment or body does not exist, or if a number is not finite.
+    /// The environment or body does not exist, or a number is not finite.
     pub(super) fn apply(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
         let force = self.current_force(sim)?;
         sim.scene_mut().set_point_forces(self.env, self.body, force.as_slice())

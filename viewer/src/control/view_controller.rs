@@ -24,8 +24,8 @@ const MAX_WAIT: Duration = Duration::from_millis(100);
 /// Publishes snapshots of a simulation to all its viewers and runs their commands between steps. See
 /// [`ViewerExt`](super::ViewerExt).
 ///
-/// A paused simulation blocks inside [`Observer::on_event`], on the thread that called `update`. It continues when the
-/// last viewer is dropped.
+/// A paused simulation blocks inside [`Observer::on_event`], on the thread that called `update`, until a viewer resumes
+/// it or the viewers that paused it are dropped.
 #[derive(Debug)]
 pub struct ViewController {
     hub: Arc<Hub>,
@@ -33,7 +33,7 @@ pub struct ViewController {
     /// Created at the first step with viewers, from the time step of the simulation.
     clock: Option<RealTimeClock>,
     request: SnapshotRequest,
-    /// Step at which the simulation is paused; `None` while running.
+    /// Step at which the simulation pauses, or paused; `None` while running without a step limit.
     pause_at: Option<u64>,
     /// Viewers that paused the simulation. It resumes when the last of them is dropped.
     paused_by: BTreeSet<u64>,

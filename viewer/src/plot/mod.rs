@@ -26,7 +26,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
-    /// The file name extension is neither `.svg` nor `.png`.
+    /// The file name extension is neither `.svg` nor `.png`, in upper or lower case.
     #[error("{path}: unsupported plot format .{end}; use a file name that ends in .svg or .png")]
     Extension {
         /// Path of the plot file.

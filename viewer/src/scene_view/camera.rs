@@ -11,11 +11,12 @@ use kinetoscope_sim::{EnvId, SensorId, SimulationManager};
 /// View of a camera sensor in one environment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraView {
-    /// Pose and pinhole intrinsics of the camera, in the environment frame.
+    /// Pose in the environment frame and pinhole intrinsics, at the time of the last measurement.
     pub view: View,
     /// Lens model that bends the rays; a pinhole by default.
     pub lens: Lens,
-    /// Markers of other sensors that are drawn into the color image; empty if the camera configuration disables them.
+    /// Markers of other sensors that are rendered into the color image; empty unless the camera's configuration enables
+    /// them.
     pub markers: Vec<Marker>,
 }
 

@@ -134,7 +134,7 @@ fn with_markers(scene: &RenderScene, poses: &[PoseF32], markers: &[Marker]) -> O
     Some((scene, poses.iter().copied().chain(places).collect()))
 }
 
-/// Color of a pixel, by its index.
+/// Returns the color of a pixel, by its index.
 type PixelColor<'a> = &'a dyn Fn(usize) -> [u8; 3];
 
 /// Scales a view down to at most `width` pixels per row.

@@ -21,8 +21,8 @@ impl Canvas {
         canvas
     }
 
-    /// Creates an image from RGBA bytes, row by row from the top left, such as one environment of a camera's color. The
-    /// opacity is ignored. Returns `None` unless there are 4 * width * height bytes.
+    /// Creates an image from RGBA bytes, row by row from the top left, such as one environment of a camera's color. All
+    /// pixels become opaque. Returns `None` unless there are 4 * width * height bytes.
     pub fn from_rgba(width: usize, height: usize, rgba: &[u8]) -> Option<Self> {
         let mut canvas = Self::new(width, height);
         if rgba.len() != canvas.bytes.len() {
@@ -34,7 +34,7 @@ impl Canvas {
         Some(canvas)
     }
 
-    /// Changes the size. If the size differs, the content becomes black.
+    /// Changes the size. If the size differs, all pixels become black; otherwise the content is kept.
     pub fn resize(&mut self, width: usize, height: usize) {
         if self.size != [width, height] {
             self.size = [width, height];
@@ -48,12 +48,12 @@ impl Canvas {
         self.size
     }
 
-    /// Bytes of the image.
+    /// RGBA bytes of the image, row by row from the top left.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Bytes of the image, writable. The fourth byte of each pixel stays 255.
+    /// RGBA bytes of the image, writable. Callers keep the fourth byte of each pixel at 255.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         &mut self.bytes
     }
@@ -65,7 +65,7 @@ impl Canvas {
         self.bytes.get(at..at + 3).map(|rgb| [rgb[0], rgb[1], rgb[2]])
     }
 
-    /// Sets the color of a pixel; ignored outside the image.
+    /// Sets the color of the pixel in column `x` and row `y`; ignored outside the image.
     pub fn set(&mut self, x: i32, y: i32, color: [u8; 3]) {
         self.blend(x, y, color, 255);
     }
@@ -83,7 +83,8 @@ impl Canvas {
         }
     }
 
-    /// Fills a rectangle, with an opacity of 0 to 255, clipped to the image.
+    /// Fills the rectangle of this width and height \[pixels\] with the top left pixel `[x, y]`, clipped to the image.
+    /// An opacity of 255 is opaque.
     pub fn fill(&mut self, [x, y]: [i32; 2], [width, height]: [i32; 2], color: [u8; 3], opacity: u8) {
         let [w, h] = self.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
         for row in y.max(0)..y.saturating_add(height).min(h) {
@@ -93,7 +94,8 @@ impl Canvas {
         }
     }
 
-    /// Draws a line from pixel to pixel, one pixel wide, clipped to the image.
+    /// Draws a line one pixel wide between two points \[pixels\], clipped to the image; the center of the first pixel
+    /// is at (0.5, 0.5). A coordinate that is not finite draws nothing.
     pub fn line(&mut self, from: [f32; 2], to: [f32; 2], color: [u8; 3]) {
         let Some([from, to]) = clip_line(from, to, self.size.map(|n| n as f32)) else { return };
         let delta = [to[0] - from[0], to[1] - from[1]];
@@ -104,7 +106,8 @@ impl Canvas {
         }
     }
 
-    /// Draws text with its top left corner at a pixel, on a dark background for contrast.
+    /// Draws text, which may have several lines, with its top left corner at a pixel. A translucent dark background
+    /// behind the text extends up to two pixels beyond it.
     pub fn text(&mut self, text: &str, [x, y]: [i32; 2], font: &MonoFont<'_>, color: [u8; 3]) {
         let cell = font.character_size;
         let (columns, lines) = text.lines().fold((0, 0), |(w, n), line| (w.max(line.chars().count()), n + 1));
@@ -115,7 +118,7 @@ impl Canvas {
         let Ok(_) = Text::with_baseline(text, Point::new(x, y), style, Baseline::Top).draw(self);
     }
 
-    /// Copies `image` with its top left corner to a pixel, clipped to this image.
+    /// Copies `image` into this image, with its top left corner at a pixel, clipped to this image.
     pub fn draw_image(&mut self, image: &Self, [x, y]: [usize; 2]) {
         let [width, height] = self.size;
         let [w, h] = image.size;

@@ -7,15 +7,17 @@ use std::sync::Arc;
 /// Geom group of markers. MuJoCo uses the groups 0 to 5.
 pub(super) const MARKER_GROUP: u8 = 31;
 
-/// The merged render scene, with the origin of each instance.
+/// The merged render scene, with the environment and the index there of each instance.
 #[derive(Debug, Default)]
 pub(super) struct MergedScene {
-    /// Render scene. The mask id of an instance is its index in `instance_sources` plus one; markers have [`Marker::MASK_ID`].
+    /// Render scene; `None` if it would have too many triangles. The mask id of an instance is its index in
+    /// `instance_sources` plus one; markers have [`Marker::MASK_ID`].
     pub(super) scene: Option<RenderScene>,
     pub(super) poses: Vec<PoseF32>,
     /// Environment and instance index of each instance; markers come last and have no entry.
     pub(super) instance_sources: Vec<(usize, usize)>,
-    /// True for each instance of `instance_sources` that is the ground. The ground is not moved to the origin of its environment.
+    /// True for each instance of `instance_sources` that is the ground. The ground is not moved to the origin of its
+    /// environment.
     is_ground: Vec<bool>,
     instances: Vec<Instance>,
     /// Sources of `instances`, which are rebuilt only when this key changes.
@@ -42,8 +44,8 @@ pub(super) fn shown_envs(snapshot: &Snapshot, shown: EnvSelection) -> impl Itera
 }
 
 impl MergedScene {
-    /// Updates the merged scene from a snapshot. The ground is included once. `markers` are in the frames of their
-    /// environments.
+    /// Updates the merged scene from a snapshot. The ground is included once. `markers` have the index of their
+    /// environment and are in its frame.
     pub(super) fn update(&mut self, snapshot: &Snapshot, shown: EnvSelection, markers: &[(usize, Marker)]) {
         let scenes: Vec<Arc<RenderScene>> =
             shown_envs(snapshot, shown).filter_map(|(_, env)| snapshot.env_scene(env)).collect();

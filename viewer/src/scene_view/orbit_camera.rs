@@ -5,7 +5,8 @@ use kinetoscope_render::View;
 use kinetoscope_scene::camera_fit::{CameraFit, DEFAULT_FILL, DEFAULT_REACH, PosedScene};
 use nalgebra::Vector3;
 
-/// An orbit camera that turns about a target point, pans, zooms and flies. The image's up direction is the world's +z.
+/// An orbit camera that turns about a target point, pans, zooms and flies. The world's +z points up in the image; the
+/// camera never rolls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbitCamera {
     /// Target point in the center of the image, in the frame of the overview \[m\].
@@ -32,8 +33,9 @@ const MAX_ELEVATION: f64 = 1.55;
 const DISTANCE_RANGE: [f64; 2] = [0.02, 1e4];
 
 impl OrbitCamera {
-    /// Creates a camera at `eye` that looks at `target` \[m\], or `None` if the points coincide or are not finite. The
-    /// distance is clamped to 0.02 m to 10 km and the elevation to ±1.55 rad; the position then differs from `eye`.
+    /// Creates a camera at `eye` that looks at `target`, in the frame of the overview \[m\], with a `fovy` of 45°.
+    /// Returns `None` if the points coincide or are not finite. The distance is clamped to 0.02 m to 10 km and the
+    /// elevation to ±1.55 rad; the position then differs from `eye`.
     pub fn look_at(eye: [f64; 3], target: [f64; 3]) -> Option<Self> {
         let way = Vector3::from(target) - Vector3::from(eye);
         let distance = way.norm();
@@ -52,8 +54,8 @@ impl OrbitCamera {
     }
 
     /// Returns the camera set by the program ([`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view)), if
-    /// any. Otherwise returns a camera from which all environments, without the ground, fill an image of `size` pixels,
-    /// seen obliquely from above.
+    /// any. Otherwise returns a camera from which all environments, without the ground and large surroundings, fill an
+    /// image of `width` by `height` pixels, seen obliquely from above.
     pub fn overview(snapshot: &Snapshot, [width, height]: [usize; 2]) -> Self {
         if let Some(eye) = snapshot.viewpoint.and_then(|view| Self::look_at(view.eye, view.target)) {
             return eye;
@@ -75,8 +77,9 @@ impl OrbitCamera {
         Self::frame_scenes(&placed, [width, height])
     }
 
-    /// Returns a camera from which the scenes, without the ground, fill an image of `size` pixels, seen obliquely from
-    /// above. `placed` may contain one scene at several times.
+    /// Returns a camera from which the scenes, without the ground and large surroundings ([`CameraFit::fit`]), fill an
+    /// image of `width` by `height` pixels, seen obliquely from above. `placed` may contain one scene at several
+    /// instants. Returns the default camera if there is nothing to frame.
     pub fn frame_scenes(placed: &[PosedScene<'_>], [width, height]: [usize; 2]) -> Self {
         let eye = Self::default();
         let (forward, aspect) = (eye.direction(), width.max(1) as f64 / height.max(1) as f64);
@@ -86,13 +89,13 @@ impl OrbitCamera {
         Self { target: placement.target, distance: distance.clamp(DISTANCE_RANGE[0], DISTANCE_RANGE[1]), ..eye }
     }
 
-    /// Viewing direction, a unit vector.
+    /// Viewing direction, from the camera to the target: a unit vector.
     pub fn direction(&self) -> [f64; 3] {
         let (sin, cos) = self.elevation.sin_cos();
         [cos * self.azimuth.cos(), cos * self.azimuth.sin(), sin]
     }
 
-    /// Position of the camera \[m\].
+    /// Position of the camera in the frame of the overview \[m\].
     pub fn position(&self) -> [f64; 3] {
         let forward = self.direction();
         [0, 1, 2].map(|k| self.target[k] - self.distance * forward[k])
@@ -109,7 +112,8 @@ impl OrbitCamera {
         self.target = (Vector3::from(self.target) + by).into();
     }
 
-    /// Orbits about the target, for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows.
+    /// Orbits about the target, for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows. The
+    /// scene turns with the mouse, by half a turn per `height` pixels.
     pub fn orbit(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let scale = std::f64::consts::PI / height.max(1) as f64;
         self.azimuth = (self.azimuth - dx * scale).rem_euclid(std::f64::consts::TAU);
@@ -117,7 +121,7 @@ impl OrbitCamera {
     }
 
     /// Turns the camera in place, for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows. The
-    /// target moves.
+    /// image moves with the mouse: a drag to the right turns the camera to the left. The target moves.
     pub fn look_around(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let eye = Vector3::from(self.position());
         self.orbit([-dx, -dy], height);
@@ -132,18 +136,19 @@ impl OrbitCamera {
         self.shift((up * dy - right * dx) * scale);
     }
 
-    /// Zooms in by steps of a mouse wheel; negative steps zoom out.
+    /// Zooms in by steps of a mouse wheel: each multiplies the distance to the target by 0.85. Negative steps zoom out.
     pub fn zoom(&mut self, steps: f64) {
         self.distance = (self.distance * 0.85f64.powf(steps)).clamp(DISTANCE_RANGE[0], DISTANCE_RANGE[1]);
     }
 
-    /// Moves the camera ahead, to the right, and up along +z \[m\].
+    /// Moves camera and target: along the viewing direction, to the right in the horizontal plane, and up along +z
+    /// \[m\].
     pub fn translate(&mut self, [ahead, right, up]: [f64; 3]) {
         let [to_right, _] = self.axes();
         self.shift(Vector3::from(self.direction()) * ahead + to_right * right + Vector3::z() * up);
     }
 
-    /// Returns the pinhole view of an image of `width` by `height` pixels.
+    /// Returns the pinhole view of an image of `width` by `height` pixels, each clamped to 1 to [`View::MAX_SIDE`].
     pub fn view(&self, width: usize, height: usize) -> View {
         let [eye, target] = [self.position(), self.target].map(|p| p.map(|x| x as f32));
         let near = (0.01 * self.distance).clamp(0.005, 0.05) as f32;

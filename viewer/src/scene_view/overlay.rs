@@ -18,19 +18,19 @@ use nalgebra::Vector3;
 /// Overlays and geom groups that are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overlays {
-    /// Debug markers of sensors.
+    /// Debug markers of the sensors that enable them (`debug_vis`).
     pub sensors: bool,
     /// Contact forces, as arrows at the contact points. The arrow length grows with the logarithm of the force.
     pub contacts: bool,
-    /// Frames of links and objects.
+    /// Frames of links, objects and bodies of MJCF files.
     pub frames: bool,
-    /// Joint axes.
+    /// Axes of hinge and slide joints.
     pub joints: bool,
-    /// Centers of mass, as discs with four quarters.
+    /// Centers of mass of all bodies with a mass, as discs with four quarters.
     pub centers_of_mass: bool,
-    /// Names of links and objects.
+    /// Names of links and objects, without the uid of the robot.
     pub names: bool,
-    /// Trails of past positions of bodies.
+    /// Trails of past positions of bodies, if [`ViewOptions::trails`](super::ViewOptions::trails) has them.
     pub trails: bool,
     /// Visual shapes: geom groups 0 to 2.
     pub visuals: bool,
@@ -66,7 +66,8 @@ impl Overlays {
         visuals | collisions
     }
 
-    /// Returns the markers of the shown environments, with the index of their environment.
+    /// Returns the markers of the enabled overlays in the shown environments: environment index, and marker in the
+    /// frame of that environment.
     pub(super) fn markers(&self, snapshot: &Snapshot, shown: EnvSelection) -> Vec<(usize, Marker)> {
         let mut markers = Vec::new();
         for (k, env) in shown_envs(snapshot, shown) {
@@ -90,7 +91,7 @@ impl Overlays {
         markers
     }
 
-    /// Draws frames, joint axes, centers of mass and names on top of the image.
+    /// Draws the enabled overlays among frames, joint axes, centers of mass and names on top of the image.
     pub(super) fn draw_on_top(&self, snapshot: &Snapshot, shown: EnvSelection, view: &View, canvas: &mut Canvas) {
         for (_, env) in shown_envs(snapshot, shown) {
             let mut line = |from: Vector3<f64>, way: Vector3<f64>, rgba: [f32; 4]| {
@@ -156,7 +157,8 @@ fn force_arrow(contact: &Contact) -> Option<Marker> {
     Marker::arrow(contact.point, (force / size.max(1e-9) * length).into(), color::FORCE).filter(|_| length > 1e-4)
 }
 
-/// Returns the start and the vector of a joint axis arrow \[m\]; the joint is at its center.
+/// Returns the tail and the vector of the arrow along a joint axis \[m\], in the environment frame. The middle of the
+/// arrow is the anchor of the joint.
 fn joint_arrow(joint: &JointAxis) -> (Vector3<f64>, Vector3<f64>) {
     let axis = Vector3::from(joint.axis);
     (Vector3::from(joint.anchor) - axis * (0.5 * JOINT_AXIS_LENGTH), axis * JOINT_AXIS_LENGTH)

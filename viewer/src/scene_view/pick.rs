@@ -36,7 +36,8 @@ impl Selection {
         Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, point_in_body })
     }
 
-    /// Returns the current pose of the body, or `None` for the world and for bodies that no longer exist.
+    /// Returns the current pose of the body in the environment frame, or `None` for the world and for bodies or
+    /// environments that no longer exist.
     pub fn pose(&self, snapshot: &Snapshot) -> Option<Pose> {
         snapshot.envs.get(self.env)?.snapshot.bodies.get(self.body?).copied()
     }
@@ -69,7 +70,7 @@ impl Selection {
         Some((count, sum.into()))
     }
 
-    /// Returns the current position of the point in the environment frame \[m\].
+    /// Returns the current position of the point in the environment frame \[m\]: it moves with the body.
     pub fn current_point(&self, snapshot: &Snapshot) -> [f64; 3] {
         self.pose(snapshot).map_or(self.point, |pose| (pose * Point3::from(self.point_in_body)).into())
     }
@@ -101,7 +102,8 @@ pub(crate) fn selection_text(picked: &Selection, snapshot: &Snapshot) -> Vec<Str
     lines
 }
 
-/// Returns the environments whose contacts are needed, for the force overlay and for the selected body.
+/// Returns the environments whose contacts are needed, for the force overlay and for the selected body; `None` if no
+/// contacts are needed.
 pub(crate) fn required_contacts(
     shown: EnvSelection,
     overlays: &Overlays,

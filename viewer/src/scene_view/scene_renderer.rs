@@ -23,16 +23,16 @@ pub(crate) struct SceneRenderer {
     assembly: MergedScene,
 }
 
-/// Contents of an image besides the scene.
+/// Environments and overlays to draw: geom groups, markers, the selected point, trails, the mouse spring.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ViewOptions<'a> {
     /// Environments in the image.
     pub(crate) envs: EnvSelection,
-    /// Overlays.
+    /// Enabled overlays and geom groups.
     pub(crate) overlays: Overlays,
-    /// Selected point.
+    /// Selected point, shown as a ball, with the frame of its body.
     pub(crate) selection: Option<&'a Selection>,
-    /// Trails of bodies.
+    /// Trails of bodies; drawn only if [`Overlays::trails`] is enabled.
     pub(crate) trails: Option<&'a Trails>,
     /// Mouse spring: its environment and its two ends in the environment frame \[m\].
     pub(crate) spring: Option<(usize, [[f64; 3]; 2])>,
@@ -45,7 +45,7 @@ impl SceneRenderer {
         Self { rasterizer: ParallelRenderer::new(cfg, threads), cfg, assembly: MergedScene::default() }
     }
 
-    /// Limits the number of threads for the next images.
+    /// Limits the number of threads for the next images, from one to the number of [`new`](Self::new).
     pub(crate) fn set_max_threads(&mut self, most: usize) {
         self.rasterizer.use_threads(most);
     }
@@ -55,13 +55,14 @@ impl SceneRenderer {
         self.cfg.samples
     }
 
-    /// Sets the number of samples per pixel, 1 or 4.
+    /// Sets the number of samples per pixel, 1 or 4, for the next images.
     pub(crate) fn set_samples(&mut self, samples: u8) {
         self.cfg.samples = samples;
     }
 
     /// Renders a snapshot through `view`, whose pose is in the frame of the overview. A single environment stays at its
-    /// place in the overview. The canvas is resized to the view.
+    /// place in the overview. All environments have the lights of the first one in the image. The canvas is resized to
+    /// the view.
     ///
     /// # Errors
     /// The view is invalid, or the renderer failed.
@@ -104,7 +105,7 @@ impl SceneRenderer {
         Ok(())
     }
 
-    /// Returns the object at a pixel, or `None` for the sky. Markers are ignored.
+    /// Returns the object at a pixel, or `None` for the sky. Markers and geom groups that are not drawn are ignored.
     pub(crate) fn pick(
         &mut self,
         snapshot: &Snapshot,

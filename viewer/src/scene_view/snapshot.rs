@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Selection of environments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum EnvSelection {
-    /// All environments, in their grid.
+    /// All environments, side by side in their grid.
     #[default]
     All,
     /// One environment, by index.
@@ -19,7 +19,7 @@ pub enum EnvSelection {
 }
 
 impl EnvSelection {
-    /// True if an environment is selected.
+    /// True if environment `env` is selected.
     pub fn contains(self, env: usize) -> bool {
         self == Self::All || self == Self::One(env)
     }
@@ -33,17 +33,18 @@ impl EnvSelection {
     }
 }
 
-/// The state of all environments at one time. Snapshots are immutable. Quantities of an environment are in its frame;
-/// [`viewpoint`](Self::viewpoint) is in the frame of the overview.
+/// The state of all environments at one time. Quantities of an environment are in its frame;
+/// [`viewpoint`](Self::viewpoint) is in the frame of the overview, in which environments are placed at their
+/// [`origin`](SnapshotEnv::origin).
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Sequence number, from 1, increasing.
+    /// Sequence number, from 1, increasing; some numbers may be skipped.
     pub number: u64,
     /// Run state of the simulation.
     pub run: RunState,
-    /// Render scene shared by all environments, without poses.
+    /// Render scene of all environments that have no own [`env_scene`](EnvVisualState::env_scene), without poses.
     pub scene: Option<Arc<RenderScene>>,
-    /// Object of each mask id.
+    /// Elements (links, objects, world geoms) with their mask ids.
     pub mask_ids: Arc<[MaskId]>,
     /// Names of bodies, joints and cameras.
     pub names: Arc<Names>,
@@ -52,26 +53,28 @@ pub struct Snapshot {
     pub viewpoint: Option<Viewpoint>,
     /// State of each environment.
     pub envs: Vec<SnapshotEnv>,
-    /// Environments whose contacts are included.
+    /// Environments whose contacts are included; `None` if no viewer requested contacts.
     pub contacts_included: Option<EnvSelection>,
 }
 
 /// Run state of a simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunState {
-    /// Physics steps since the simulation was created. During playback: index of the frame.
+    /// Physics steps since the simulation was created; resets do not change it. During playback: index of the frame.
     pub steps: u64,
-    /// True while paused.
+    /// True while paused; false while the steps of [`Command::Step`](crate::Command::Step) run.
     pub paused: bool,
     /// Requested speed.
     pub speed: Speed,
-    /// Simulated seconds per wall-clock second, over the last half second; `None` before the first measurement.
+    /// Simulated seconds per wall-clock second, measured over half a second. `None` before the first measurement, again
+    /// after each speed change or resume, and during playback.
     pub measured_speed: Option<f64>,
-    /// Reason of the last refused command; `None` after a later command succeeded.
+    /// Reason of the last refused command, failed recording or failed mouse spring. A later successful command clears
+    /// it; a successful `Drag` or `Release` clears only reasons of the mouse spring.
     pub last_refusal: Option<String>,
-    /// Number of refused commands so far. It distinguishes a repeated refusal with the same reason.
+    /// Number of these refusals and failures so far. It distinguishes a repeated one with the same reason.
     pub refusal_count: u64,
-    /// State of the recording; `None` without a record button.
+    /// State of the recording; `None` without a record button and during playback.
     pub recording: Option<RecordingState>,
     /// Playback position; `None` for a running simulation.
     pub timeline: Option<Timeline>,
@@ -93,19 +96,19 @@ pub struct Timeline {
 pub struct Names {
     /// Links (`uid/link`), objects, and bodies of MJCF files.
     pub bodies: Arc<[String]>,
-    /// Joints of all robots, robot by robot.
+    /// Joints of all robots and articulations, one after the other.
     pub joints: Vec<JointEntry>,
     /// Camera sensors of every kind. The cameras of a stereo pair are named `NAME/left` and `NAME/right`.
     pub cameras: Vec<String>,
-    /// Mask id of the ground, which is drawn once for all environments.
+    /// Mask id of the ground, which is rendered once for all environments; `None` without a ground.
     pub(crate) ground: Option<i32>,
     camera_ids: Vec<CameraId>,
 }
 
-/// Name and properties of a robot joint.
+/// Name and properties of a joint of a robot or articulation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointEntry {
-    /// The robot.
+    /// The robot or articulation.
     pub robot: RobotId,
     /// Index of the joint in the robot.
     pub joint: JointIndex,
@@ -122,19 +125,20 @@ pub struct JointEntry {
 pub struct SnapshotEnv {
     /// Position of the environment's origin in the overview \[m\].
     pub origin: [f64; 3],
-    /// Poses and other visible state.
+    /// Poses, time, lights and other visible state.
     pub snapshot: EnvVisualState,
-    /// Contacts with their forces, if a viewer requested them. Bodies are indices into [`Names::bodies`].
+    /// Contacts with their forces; empty unless requested for this environment. Bodies are indices into
+    /// [`Names::bodies`].
     pub contacts: Vec<Contact>,
-    /// Debug markers of sensors.
+    /// Debug markers of sensors. Empty unless requested.
     pub markers: Vec<Marker>,
-    /// Position, target, lower and upper limit of each joint of [`Names::joints`] \[rad or m\], shape (num_joints, 4).
-    /// Empty unless requested.
+    /// Position, position target, lower and upper limit of each joint of [`Names::joints`] \[rad or m\], shape
+    /// (num_joints, 4); unlimited joints have infinite limits. Empty unless requested.
     pub joints: Vec<[f64; 4]>,
     /// Drive effort of each joint in the last step \[N m or N\]; 0 without a drive. Empty unless requested.
     pub efforts: Vec<f64>,
-    /// View of each camera of [`Names::cameras`]; `None` where a camera does not observe this environment. Empty unless
-    /// requested.
+    /// View of each camera of [`Names::cameras`]; `None` if a camera does not observe this environment or has not
+    /// measured yet. Empty unless requested.
     pub views: Vec<Option<CameraView>>,
 }
 
@@ -160,7 +164,8 @@ impl Names {
         Self { bodies: sim.entities().body_names(), joints, cameras, ground, camera_ids }
     }
 
-    /// True if the names still apply to `sim`. Added sensors are detected by the number of cameras.
+    /// True if `sim` still has as many cameras. Other added entities are reported by
+    /// [`invalidate_names`](super::SnapshotPool::invalidate_names).
     pub(super) fn apply_to(&self, sim: &SimulationManager) -> bool {
         camera::count(sim) == self.cameras.len()
     }
@@ -229,7 +234,8 @@ impl Snapshot {
         }
     }
 
-    /// Returns a copy with a single environment, or with no environment if the index is invalid.
+    /// Returns a copy with a single environment and without a viewpoint, or with no environment if the index is
+    /// invalid.
     pub(crate) fn with_single_env(&self, env: usize) -> Self {
         Self { viewpoint: None, envs: self.envs.get(env).into_iter().cloned().collect(), ..self.clone() }
     }

@@ -9,11 +9,11 @@ use embedded_graphics::mono_font::ascii::FONT_6X10;
 use kinetoscope_render::View;
 use std::collections::VecDeque;
 
-/// Positions per trail.
+/// Maximum number of positions of a trail.
 const MAX_POINTS: usize = 120;
 /// Maximum number of bodies with trails.
 const MAX_BODIES: usize = 1024;
-/// Distance between two positions of a trail \[m\].
+/// Minimum distance between two positions of a trail \[m\].
 const MIN_DISTANCE: f64 = 0.01;
 
 /// Trails of the bodies of the shown environments, environment by environment, for at most 1024 bodies. The image notes
@@ -28,8 +28,9 @@ pub(crate) struct Trails {
 }
 
 impl Trails {
-    /// Appends the current positions. Trails restart when the bodies change, when an environment is reset, and for
-    /// environments that had no trails.
+    /// Appends the current position of each body that moved by more than 1 cm. A trail restarts when its body jumps by
+    /// more than 1 m, as in most resets. All trails restart when the number of bodies changes, and when an environment
+    /// without trails is shown.
     pub(crate) fn add(&mut self, snapshot: &Snapshot, shown: EnvSelection) {
         let bodies = snapshot.names.bodies.len();
         let (first_env, wanted) = match shown {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 pub(super) enum Command {
     /// Acknowledges an image or a state, so that the next one can be sent.
     Seen { what: Seen },
-    /// Sets the image size \[pixels\].
+    /// Sets the size of the page's image area \[pixels\]; large images are rendered at lower resolution.
     Size { width: usize, height: usize },
     /// Orbits the camera by fractions of the image height.
     Orbit { dx: f64, dy: f64 },
@@ -20,7 +20,7 @@ pub(super) enum Command {
     Home,
     /// Shows one environment, or all for `None`.
     Environment { env: Option<usize> },
-    /// Shows the images of a camera sensor, or none for `None`.
+    /// Shows the images of a camera sensor; `None` hides them.
     Camera { name: Option<String> },
     /// Enables or disables an overlay.
     Overlay { name: String, on: bool },
@@ -30,7 +30,7 @@ pub(super) enum Command {
     Play,
     /// Runs one step, then pauses.
     Step,
-    /// Resets the shown environment, or all.
+    /// Resets the shown environment, or all environments if all are shown.
     Reset,
     /// Seeks to a time of a recording \[s\].
     Seek { time: f64 },
@@ -49,7 +49,8 @@ pub(super) enum Command {
     Release,
     /// Starts or stops the recording.
     Record { on: bool },
-    /// Sets the target of a joint \[rad or m\] in the shown environment, or in all.
+    /// Sets the position target of a joint \[rad or m\] in the shown environment, or in all environments if all are
+    /// shown.
     Target { robot: String, joint: String, value: f64 },
 }
 

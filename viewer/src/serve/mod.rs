@@ -51,12 +51,13 @@ use viewer_session::ViewerHub;
 pub struct ServeCfg {
     /// Maximum number of simultaneous viewers. Further viewers are refused with status 503 (Service Unavailable).
     pub max_viewers: usize,
-    /// Maximum number of images per second for each viewer.
+    /// Number of snapshots per second that each viewer requests, and so the number of its images per second, up to 40.
+    /// Another viewer or a window with a higher rate raises both.
     pub max_fps: f64,
-    /// JPEG quality of the images, 1 to 100.
+    /// JPEG quality of the images, clamped to 1 to 100.
     pub jpeg_quality: u8,
-    /// Speed of simulated time until a viewer changes it, and again after the last viewer has left. `None` keeps the
-    /// current speed: that set by a window, otherwise as fast as the machine can step.
+    /// Speed of simulated time until a viewer changes it, and again 10 s after the last viewer has left. `None` keeps
+    /// the current speed: that set by a window, otherwise as fast as the machine can step.
     pub speed: Option<Speed>,
     /// Record button of the simulation. `None` keeps the button that another view has set, if any.
     pub record_button: Option<RecordButton>,
@@ -89,7 +90,7 @@ impl ServerHandle {
         self.address
     }
 
-    /// Number of connected viewers.
+    /// Number of connected viewers; 0 after the view has ended.
     pub fn viewers(&self) -> usize {
         self.context.upgrade().map_or(0, |house| house.viewers())
     }
@@ -108,11 +109,13 @@ impl ServerHandle {
 
 /// Browser views of a simulation.
 pub trait Serve {
-    /// Serves the simulation to browsers at `address`: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080` or `8080`; port
-    /// 0 selects a free port. Viewers can watch and control the simulation while the program steps it.
+    /// Serves the simulation to browsers at `address`: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080` or `8080` (a
+    /// port alone is on 127.0.0.1; an address alone has port 8080). Port 0 selects a free port. Viewers can watch and
+    /// control the simulation while the program steps it.
     ///
     /// # Errors
-    /// The address is invalid, does not belong to this machine, or is in use; the error suggests alternatives.
+    /// The address is invalid, does not belong to this machine, or is in use (these errors suggest alternatives), or
+    /// the operating system provides no thread or no random numbers.
     fn serve(&mut self, address: &str) -> Result<ServerHandle, ServeError> {
         self.serve_with(address, ServeCfg::default())
     }

@@ -19,8 +19,8 @@ use tungstenite::handshake::derive_accept_key;
 const MAX_OTHER_CONNECTIONS: usize = 32;
 /// Interval between two checks for new connections.
 const ACCEPT_INTERVAL: Duration = Duration::from_millis(15);
-/// Time without viewers after which the settings of the last viewer are undone. A viewer that lost its connection or
-/// reloads the page returns earlier.
+/// Time without viewers after which pause, speed and recording set by browsers are undone. A viewer that lost its
+/// connection or reloads the page returns earlier.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Path of the WebSocket endpoint.
 const WEBSOCKET_PATH: &str = "/live";

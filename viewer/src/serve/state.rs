@@ -54,7 +54,7 @@ pub(super) fn scene_contents(snapshot: &Snapshot, overlays: &Overlays) -> Value 
     })
 }
 
-/// Returns the state, with the joints of the shown environment, or of the first.
+/// Returns the state, with time and joints of the shown environment, or of the first environment if all are shown.
 pub(super) fn state(snapshot: &Snapshot, shown: EnvSelection, picked: Option<&Selection>, viewers: usize) -> Value {
     let (index, environment) = match shown {
         EnvSelection::All => (0, None),
@@ -113,7 +113,7 @@ fn selection_json(picked: &Selection, snapshot: &Snapshot) -> Value {
     })
 }
 
-/// Finds a driven joint by the names of its robot and its own.
+/// Finds a driven joint by the name of its robot and the name of the joint.
 pub(super) fn find_joint<'a>(names: &'a Names, robot: &str, joint: &str) -> Result<&'a JointEntry, String> {
     let of_robot: Vec<&JointEntry> = names.joints.iter().filter(|name| split_name(name).0 == robot).collect();
     if of_robot.is_empty() {

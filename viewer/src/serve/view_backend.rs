@@ -8,7 +8,7 @@ pub(super) trait ViewBackend: Send + Sync {
     /// Creates the session of a new client.
     fn open_session(&self) -> Box<dyn ViewSession>;
 
-    /// Called after all clients have been gone for a while.
+    /// Called once after all clients have been gone for some seconds.
     fn on_idle(&self);
 }
 

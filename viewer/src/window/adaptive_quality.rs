@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// Samples per pixel of images at rest, and of slow images in motion.
+/// Samples per pixel of images at rest (`FINE`), and of slow images in motion (`COARSE`).
 const FINE: u8 = 4;
 const COARSE: u8 = 1;
 /// Target for the time of rendering and sending an image: 30 frames per second.

@@ -17,7 +17,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// An input event of a window.
+/// An input event of a window. Positions are pixels of the rendered image, from the top left corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
     /// A key was pressed.
@@ -34,7 +34,7 @@ pub enum Input {
     Move([f64; 2]),
     /// The wheel was turned by steps at a pixel; positive is away from the user.
     Wheel(f64, [f64; 2]),
-    /// The image of the window was resized: pixels per row, rows.
+    /// The rendered image was resized with the window: pixels per row, rows.
     Resize([usize; 2]),
     /// The window lost the keyboard focus.
     FocusLost,
@@ -95,9 +95,9 @@ pub struct App {
     env_selection: EnvSelection,
     /// Environment of the camera panel and the sliders.
     env: usize,
-    /// Camera sensor whose view fills the window.
+    /// Camera sensor whose view fills the window, as an index into the camera names; `None` for the free camera.
     window_sensor: Option<usize>,
-    /// Camera sensor of the panel.
+    /// Camera sensor of the panel, as an index into the camera names; `None` while the panel is closed.
     panel_sensor: Option<usize>,
     overlays: Overlays,
     selection: Option<Selection>,
@@ -172,7 +172,8 @@ impl App {
         }
     }
 
-    /// Sets the snapshot to render.
+    /// Sets the snapshot to render. Moves the free camera to a new view of
+    /// [`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view), and with a followed selection.
     pub fn set_snapshot(&mut self, snapshot: Arc<Snapshot>) {
         self.env = self.env.min(snapshot.envs.len().saturating_sub(1));
         let changes = snapshot.viewpoint.map_or(0, |view| view.revision);
@@ -195,8 +196,8 @@ impl App {
         self.queue_spring();
     }
 
-    /// Records if the last command was queued: `heard` is false if the simulation has ended or its command queue is
-    /// full. The image then shows a message.
+    /// Records the result of sending the last command: `heard` is false if the simulation has ended or its command
+    /// queue is full. The image then shows a message.
     pub fn set_send_result(&mut self, heard: bool) {
         self.send_failed = !heard;
     }
@@ -211,7 +212,7 @@ impl App {
         self.camera = Some(eye);
     }
 
-    /// Returns the free camera.
+    /// Returns the free camera; before the first snapshot, the default camera.
     pub fn camera(&self) -> OrbitCamera {
         self.camera.unwrap_or_default()
     }
@@ -221,7 +222,7 @@ impl App {
         self.overlays
     }
 
-    /// Returns the selected point.
+    /// Returns the selected point; `None` without a selection.
     pub fn selection(&self) -> Option<&Selection> {
         self.selection.as_ref()
     }
@@ -249,7 +250,7 @@ impl App {
         !self.held_keys.is_empty() || self.adaptive_quality.is_some_and(|fineness| fineness.needs_refinement(now))
     }
 
-    /// Returns the environments in the image. A camera sensor shows its environment alone.
+    /// Returns the environments in the image: only the chosen one if the window shows a camera sensor.
     fn visible_envs(&self) -> EnvSelection {
         if self.shows_sensor() { EnvSelection::One(self.env) } else { self.env_selection }
     }

@@ -23,7 +23,7 @@ impl Default for ImageWindowCfg {
     }
 }
 
-/// A window that shows the most recent image, like `imshow` of OpenCV.
+/// A window that shows the image of the last call of [`show`](Self::show), like `imshow` of OpenCV.
 ///
 /// The window has its own thread, so it stays responsive while the program computes for minutes. Dropping the value
 /// closes the window.
@@ -54,8 +54,8 @@ impl ImageWindow {
         Ok(Self { window, latest })
     }
 
-    /// Replaces the image on the window and returns at once. An image of another size than the window is scaled to fit, with
-    /// black bars where the proportions differ.
+    /// Replaces the image of the window and returns at once; has no effect after the window was closed. An image of
+    /// another size than the window is scaled to fit, with black bars where the proportions differ.
     pub fn show(&self, image: Canvas) {
         let mut latest = self.latest.image.lock().unwrap_or_else(PoisonError::into_inner);
         *latest = (latest.0 + 1, Arc::new(image));

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Key {
-    /// A letter in lower case, a digit, or a punctuation character.
+    /// A letter in lower case, a digit, a punctuation character, or a space.
     Char(char),
     /// Escape.
     Escape,

@@ -34,7 +34,7 @@ pub struct WindowCfg {
     pub size: [usize; 2],
     /// X display, such as `:0`. `None` uses the environment variable `DISPLAY`.
     pub display: Option<String>,
-    /// Speed of simulated time after the window opens. `None` keeps the current speed.
+    /// Speed of simulated time after the window opens; `update` waits to keep it. `None` keeps the current speed.
     pub speed: Option<Speed>,
     /// Maximum number of rendering threads. `None` uses every core. Half of them, but at least one, render while
     /// physics needs all available time ([`App::new`]).
@@ -105,8 +105,8 @@ impl Closed {
     }
 }
 
-/// Handle of an open window. Dropping the handle does not close the window. It stays open until the user closes it, the
-/// simulation is dropped, or [`close`](Self::close) is called.
+/// Handle of an open window; clones refer to the same window. Dropping the handle does not close the window. It stays
+/// open until the user closes it, the simulation is dropped, or [`close`](Self::close) is called.
 #[derive(Clone, Debug)]
 pub struct Window {
     shared: Arc<WindowState>,
@@ -183,11 +183,12 @@ pub trait OpenWindow {
         self.open_window_with(WindowCfg::default())
     }
 
-    /// Opens a window on its own thread. The window renders while `update` steps, and `update` blocks while the user
-    /// pauses.
+    /// Opens a window on its own thread. The window renders while `update` steps. `update` blocks while the user
+    /// pauses, and waits while the simulation is ahead of the chosen speed.
     ///
     /// After the window is closed, its display is lost, or the display does not respond for 15 s, the simulation
-    /// continues as fast as it can. Several windows may be open at the same time.
+    /// continues as fast as it can, or at the speed that another viewer has set. Several windows may be open at the
+    /// same time.
     ///
     /// # Errors
     /// [`WindowError::NoDisplay`] if no display is available, [`WindowError::Thread`] if no thread can be started.

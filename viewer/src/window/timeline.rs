@@ -34,13 +34,14 @@ pub(super) fn draw(canvas: &mut Canvas, snapshot: &Snapshot) {
     canvas.text(&format!("{end:.2} s"), [right + 8, top + 3], &FONT_6X10, GRAY);
 }
 
-/// Returns the recording time at a pixel, or `None` outside the timeline strip.
+/// Returns the recording time \[s\] at a pixel, or `None` above the strip at the lower edge or without a recording.
 pub(super) fn time_at(snapshot: &Snapshot, size: [usize; 2], [x, y]: [f64; 2]) -> Option<f64> {
     snapshot.run.timeline?;
     (y >= size[1] as f64 - HEIGHT).then(|| time_at_x(snapshot, size[0], x))?
 }
 
-/// Returns the recording time at a horizontal pixel position, also outside of the timeline.
+/// Returns the recording time \[s\] at a horizontal pixel position; beyond the ends of the timeline, its first or last
+/// time. `None` without a recording.
 pub(super) fn time_at_x(snapshot: &Snapshot, width: usize, x: f64) -> Option<f64> {
     let Timeline { start, end, .. } = snapshot.run.timeline?;
     let [left, right] = x_range(width);

@@ -37,11 +37,12 @@ pub enum PlayError {
 /// Playback of a recording in a simulation.
 pub trait Play {
     /// Shows a recording to the viewers of this simulation (windows and browsers) instead of stepping, for as long as
-    /// `go_on` returns true. `go_on` is called many times a second.
+    /// `go_on` returns true. `go_on` is called at least ten times a second. Afterwards, the simulation has the state of
+    /// the last shown frame.
     ///
-    /// Playback starts at the first frame and pauses at the last. Viewers can pause, show single frames, change the
-    /// speed, and seek ([`Command::Seek`]); a reset returns to the first frame. Frames are not interpolated: the last
-    /// frame at or before the current time is shown.
+    /// Playback starts at the first frame in real time and pauses at the last. Viewers can pause, show single frames,
+    /// change the speed, and seek ([`Command::Seek`]); a reset returns to the first frame. Frames are not interpolated:
+    /// the last frame at or before the current time is shown.
     ///
     /// # Errors
     /// The recording is empty, its times are invalid, or a frame cannot be shown.

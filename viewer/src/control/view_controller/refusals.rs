@@ -23,7 +23,8 @@ pub(super) struct Refusals {
 }
 
 impl Refusals {
-    /// Records the result of a command. A success clears the last refusal of the same kind; other commands clear any.
+    /// Records the result of a command. A success of a spring command clears only a refusal of the spring; any other
+    /// success clears every refusal.
     pub(super) fn record_result(&mut self, kind: CommandKind, done: Result<(), String>) {
         match done {
             Ok(()) => {
