@@ -331,6 +331,7 @@ impl Instance {
     }
 
     /// Triangles of the shape, if it is a mesh or a height field.
+    #[inline]
     pub fn mesh(&self) -> Option<&crate::shape::RenderMesh> {
         self.shape.mesh().map(Arc::as_ref)
     }

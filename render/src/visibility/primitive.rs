@@ -201,38 +201,50 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             let face = select_u(by_x, one(0, p.x), select_u(by_y, one(2, p.y), one(4, p.z)));
             PrimitiveHit { hit, t, normal, face }
         }
-        _ => ray_by_ray(s, shape, &o, &d, near),
+        _ => ray_by_ray(s, shape, o, d, near),
     }
 }
 
 /// Version of [`intersect`] for every shape with a closed form, by [`Shape::intersect`].
+#[inline(always)]
+fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: f32) -> PrimitiveHit<S> {
+    let lanes = {
+        #[inline(always)]
+        |v: V3<S>| [v.x.array(), v.y.array(), v.z.array()]
+    };
+    let LaneHits { t, normal: [x, y, z], face } = intersect_lanes(shape, lanes(o), lanes(d), near);
+    let (t, normal) = (load(s, &t), V3 { x: load(s, &x), y: load(s, &y), z: load(s, &z) });
+    PrimitiveHit { hit: t.simd_lt(splat(s, f32::MAX)), t, normal, face: load_u(s, &face) }
+}
+
+/// Hits of [`intersect_lanes`], as in [`PrimitiveHit`]; `t` is [`EMPTY`] on a miss.
+struct LaneHits {
+    t: [f32; LANES],
+    normal: [[f32; LANES]; 3],
+    face: [u32; LANES],
+}
+
+/// Intersects sixteen rays, one after the other. Arguments and result are arrays and not [`V3`], because references to
+/// vectors would keep those of [`intersect`] in memory for all shapes.
 #[cold]
 #[inline(never)]
-fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> PrimitiveHit<S> {
-    s.vectorize(
-        #[inline(always)]
-        || {
-            let [origins, directions] = [o, d].map(|v| [v.x.array(), v.y.array(), v.z.array()]);
-            let (mut ts, mut normals, mut faces) = ([EMPTY; LANES], [[0.0; LANES]; 3], [0; LANES]);
-            for k in 0..LANES {
-                let [o, d] = [&origins, &directions].map(|v| [0, 1, 2].map(|axis| f64::from(v[axis][k])));
-                let length = dot(d, d).sqrt();
-                // Rays start at the near plane.
-                let ray = Ray { origin: add_scaled(o, near.into(), d), direction: scale(d, 1.0 / length) };
-                let found = if ray.is_finite() { shape.intersect(&ray, f64::INFINITY) } else { None };
-                let Some(found) = found else { continue };
-                let inward = dot(found.normal, ray.at(found.t)) < 0.0 && !shape.is_one_sided();
-                ts[k] = (f64::from(near) + found.t / length) as f32;
-                for (lanes, component) in normals.iter_mut().zip(found.normal) {
-                    lanes[k] = (if inward { -component } else { component }) as f32;
-                }
-                faces[k] = shape.face(&found, &ray) as u32;
-            }
-            let t = load(s, &ts);
-            let normal = V3 { x: load(s, &normals[0]), y: load(s, &normals[1]), z: load(s, &normals[2]) };
-            PrimitiveHit { hit: t.simd_lt(splat(s, f32::MAX)), t, normal, face: load_u(s, &faces) }
-        },
-    )
+fn intersect_lanes(shape: &Shape, origins: [[f32; LANES]; 3], directions: [[f32; LANES]; 3], near: f32) -> LaneHits {
+    let mut hits = LaneHits { t: [EMPTY; LANES], normal: [[0.0; LANES]; 3], face: [0; LANES] };
+    for k in 0..LANES {
+        let [o, d] = [&origins, &directions].map(|v| [0, 1, 2].map(|axis| f64::from(v[axis][k])));
+        let length = dot(d, d).sqrt();
+        // Rays start at the near plane.
+        let ray = Ray { origin: add_scaled(o, near.into(), d), direction: scale(d, 1.0 / length) };
+        let found = if ray.is_finite() { shape.intersect(&ray, f64::INFINITY) } else { None };
+        let Some(found) = found else { continue };
+        let inward = dot(found.normal, ray.at(found.t)) < 0.0 && !shape.is_one_sided();
+        hits.t[k] = (f64::from(near) + found.t / length) as f32;
+        for (lanes, component) in hits.normal.iter_mut().zip(found.normal) {
+            lanes[k] = (if inward { -component } else { component }) as f32;
+        }
+        hits.face[k] = shape.face(&found, &ray) as u32;
+    }
+    hits
 }
 
 #[cfg(test)]
@@ -266,7 +278,7 @@ mod tests {
                     at_level!(level, s => {
                         let [x, y, z] = directions.each_ref().map(|d| load(s, d));
                         let (o, d) = (V3::splat(s, from), V3 { x, y, z });
-                        let [fast, general] = [intersect(s, shape, o, d, 0.01), ray_by_ray(s, shape, &o, &d, 0.01)];
+                        let [fast, general] = [intersect(s, shape, o, d, 0.01), ray_by_ray(s, shape, o, d, 0.01)];
                         let [both, one] = [fast.hit.to_bitmask() & general.hit.to_bitmask(),
                             fast.hit.to_bitmask() ^ general.hit.to_bitmask()];
                         differ += one.count_ones();

@@ -86,12 +86,11 @@ pub enum HullError {
         /// The tolerance \[m\].
         tolerance: f64,
     },
-    /// All points are in a plane, within the tolerance, and no thickness is configured.
+    /// All points are in a plane, within the tolerance, and were not thickened: no thickness is configured, the
+    /// thickness is too small for single precision, or the points belong to a closed mesh to decompose.
     #[error(
         "the points are coplanar: their largest distance from a plane is {deviation:e} m, the tolerance is \
          {tolerance:e} m; set HullCfg::min_thickness to thicken them"
-    /// All points are in a plane, within the tolerance, and were not thickened: no thickness is configured, the
-    /// thickness is too small for single precision, or the points belong to a closed mesh to decompose.
     )]
     Coplanar {
         /// Largest distance from the plane \[m\].

@@ -125,6 +125,7 @@ impl Shape {
     }
 
     /// Prepared triangles of a shape that is made of triangles; `None` for other shapes.
+    #[inline]
     pub fn mesh(&self) -> Option<&Arc<RenderMesh>> {
         match self.geometry() {
             ShapeKind::ClosedForm(_) => None,

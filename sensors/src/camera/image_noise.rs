@@ -67,12 +67,12 @@ impl ImageNoise {
         }))
     }
 
-    /// Adds noise to a frame whose misses are +inf; misses stay. `ticket` is the key of the random numbers.
-    pub(crate) fn apply(&self, frame: &mut FrameMut<'_>, ticket: &RngKey) {
+    /// Adds noise to a frame whose misses are +inf; misses stay. `key` is the key of the random numbers.
+    pub(crate) fn apply(&self, frame: &mut FrameMut<'_>, key: &RngKey) {
         if let (Some(noise), Some(bytes)) = (&self.color, frame.color.as_deref_mut()) {
             // Four pixels have twelve numbers: alpha has no noise.
             for (k, pixels) in (0..).zip(bytes.chunks_mut(16)) {
-                let blocks = [0, 1, 2].map(|b| self.sample_block(noise, 0, ticket, 3 * k + b));
+                let blocks = [0, 1, 2].map(|b| self.sample_block(noise, 0, key, 3 * k + b));
                 let errors = blocks.as_flattened().chunks_exact(3);
                 for (pixel, errors) in pixels.chunks_exact_mut(4).zip(errors) {
                     for (byte, error) in pixel.iter_mut().zip(errors) {
@@ -85,7 +85,7 @@ impl ImageNoise {
         for ((channel, (noise, numbers)), range) in (1..).zip(channels).zip(self.ranges) {
             let (Some(noise), Some(numbers)) = (noise, numbers) else { continue };
             for (block, numbers) in (0..).zip(numbers.chunks_mut(4)) {
-                let errors = self.sample_block(noise, channel, ticket, block);
+                let errors = self.sample_block(noise, channel, key, block);
                 // Misses have no noise.
                 for (number, error) in numbers.iter_mut().zip(errors).filter(|(number, _)| number.is_finite()) {
                     *number = noise.quantize_and_clamp(f64::from(*number) + error, range) as f32;
@@ -95,19 +95,19 @@ impl ImageNoise {
     }
 
     /// Returns the noise of a block of four numbers of a channel.
-    fn sample_block(&self, noise: &NoiseCfg, channel: u8, ticket: &RngKey, block: u32) -> [f64; 4] {
+    fn sample_block(&self, noise: &NoiseCfg, channel: u8, key: &RngKey, block: u32) -> [f64; 4] {
         let mut errors = [0.0; 4];
         let mut add = |size: f64, numbers: [f64; 4]| {
             errors.iter_mut().zip(numbers).for_each(|(error, number)| *error += size * number);
         };
         if noise.bias_std > 0.0 {
-            add(noise.bias_std, ticket.biases(RngStream::bias(channel), block));
+            add(noise.bias_std, key.biases(RngStream::bias(channel), block));
         }
         if noise.bias_walk > 0.0 {
-            add(noise.bias_walk * self.sqrt_period, ticket.random_walks(RngStream::random_walk(channel), block));
+            add(noise.bias_walk * self.sqrt_period, key.random_walks(RngStream::random_walk(channel), block));
         }
         if noise.std > 0.0 {
-            add(noise.std, ticket.normals(RngStream::white(channel), block));
+            add(noise.std, key.normals(RngStream::white(channel), block));
         }
         errors
     }

@@ -37,11 +37,11 @@ impl SensorNoiseModel {
     }
 
     /// Applies imperfections and noise to images in which misses are infinite; each image is processed by one thread.
-    /// `tickets` are the keys of the random numbers, one per image.
-    pub(super) fn apply(&mut self, jobs: &mut [RenderJob<'_>], tickets: &[RngKey]) {
+    /// `keys` are the keys of the random numbers, one per image.
+    pub(super) fn apply(&mut self, jobs: &mut [RenderJob<'_>], keys: &[RngKey]) {
         let Self { imperfections, tone, noise, workers, pool } = self;
         let noise = noise.as_ref();
-        pool.for_each(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), rng_key)| {
+        pool.for_each(workers, jobs.iter_mut().zip(keys), |(), ((shot, frame), rng_key)| {
             imperfections.apply(frame, *tone, ImageContext { view: shot.view, rays: shot.lens, rng_key });
             if let Some(noise) = noise {
                 noise.apply(frame, rng_key);

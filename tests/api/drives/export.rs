@@ -111,9 +111,8 @@ fn followers_track() {
         drive: gains(100.0, 10.0),
         ..worlds::urdf_robot("robot", assets::path("revo1_left/revo1_left.urdf").unwrap())
     });
-    let model = mj::compile_file(export.files.write("tracked.xml", &export.xml))
-        .unwrap_or_else(|e| panic!("{e}"))
-        .into_model();
+    let model =
+        mj::compile_file(export.files.write("tracked.xml", &export.xml)).unwrap_or_else(|e| panic!("{e}")).into_model();
     let mut data = mj::Data::new(&model).unwrap();
     data.ctrl_mut().iter_mut().for_each(|ctrl| *ctrl = 0.5);
     let equalities: Vec<([usize; 2], [f64; 2])> = (0..model.neq())
