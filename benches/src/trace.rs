@@ -45,8 +45,8 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
 
     let geometry = Channels { depth: true, mask: true, ..Channels::default() };
     let empty = RenderScene::empty();
-    let mut seen = ImageLoop::new(Renderer::FastRayTraced, geometry, shot(&robot, &poses, &view));
-    let mut without = ImageLoop::new(Renderer::FastRayTraced, geometry, shot(&empty, &[], &view));
+    let mut seen = ImageLoop::new(Renderer::FastRayTraced, geometry, request(&robot, &poses, &view));
+    let mut without = ImageLoop::new(Renderer::FastRayTraced, geometry, request(&empty, &[], &view));
     let rays = times(settings, &mut [&mut seen, &mut without])?;
     let per_second = pixels / rays.per_step(0);
     let hits = seen.frame.mask.iter().flatten().filter(|&&id| id != 0).count() as f64;
@@ -66,9 +66,9 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let inside = View::look_at(SIZE, 0.9, [1.2, -1.1, 1.1], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0])?;
     let color = Channels { color: true, ..Channels::default() };
     let by = |max_bounces| Renderer::RayTraced { samples: 1, max_bounces, denoise: false, seed: 0 };
-    let mut whole = ImageLoop::new(by(4), color, shot(&boxed, &poses, &inside));
-    let mut without_shadows = ImageLoop::new(by(4), color, shot(&unshaded, &poses, &inside));
-    let mut first = ImageLoop::new(by(0), color, shot(&boxed, &poses, &inside));
+    let mut whole = ImageLoop::new(by(4), color, request(&boxed, &poses, &inside));
+    let mut without_shadows = ImageLoop::new(by(4), color, request(&unshaded, &poses, &inside));
+    let mut first = ImageLoop::new(by(0), color, request(&boxed, &poses, &inside));
     let paths = times(settings, &mut [&mut whole, &mut without_shadows, &mut first])?;
     let (per_second, cast) = (pixels / paths.per_step(0), whole.rasterizer.progress().rays() as f64);
     rows.extend([
@@ -95,7 +95,7 @@ fn times(settings: &Settings, sides: &mut [&mut dyn Contender]) -> BenchResult<T
     measure(MeasurementCfg { seconds: 2.0 * settings.seconds, restart_after: RESTART_AFTER }, sides)
 }
 
-fn shot<'a>(scene: &'a RenderScene, poses: &'a [PoseF32], view: &'a View) -> RenderRequest<'a> {
+fn request<'a>(scene: &'a RenderScene, poses: &'a [PoseF32], view: &'a View) -> RenderRequest<'a> {
     RenderRequest { scene, poses, view, lights: None, lens: None, previous: None }
 }
 
@@ -103,14 +103,14 @@ fn shot<'a>(scene: &'a RenderScene, poses: &'a [PoseF32], view: &'a View) -> Ren
 struct ImageLoop<'a> {
     rasterizer: ParallelRenderer,
     frame: Frame,
-    shot: RenderRequest<'a>,
+    request: RenderRequest<'a>,
 }
 
 impl<'a> ImageLoop<'a> {
-    fn new(renderer: Renderer, channels: Channels, shot: RenderRequest<'a>) -> Self {
+    fn new(renderer: Renderer, channels: Channels, request: RenderRequest<'a>) -> Self {
         let mut rasterizer = ParallelRenderer::new(RasterCfg { samples: 1, ..RasterCfg::default() }, 1);
         rasterizer.set_renderer(renderer);
-        Self { rasterizer, frame: Frame::new(SIZE[0], SIZE[1], channels), shot }
+        Self { rasterizer, frame: Frame::new(SIZE[0], SIZE[1], channels), request }
     }
 }
 
@@ -122,7 +122,7 @@ impl Contender for ImageLoop<'_> {
     fn block(&mut self, steps: u32) -> BenchResult<Duration> {
         let start = Instant::now();
         for _ in 0..steps {
-            self.rasterizer.render(&mut [(self.shot, self.frame.as_mut())]).map_err(|(_, error)| error)?;
+            self.rasterizer.render(&mut [(self.request, self.frame.as_mut())]).map_err(|(_, error)| error)?;
         }
         Ok(start.elapsed())
     }

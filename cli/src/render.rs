@@ -190,14 +190,14 @@ impl RenderArgs {
 /// Rendering failed.
 pub(crate) fn images_per_second(
     rasterizer: &mut ParallelRenderer,
-    shot: RenderRequest<'_>,
+    request: RenderRequest<'_>,
     seconds: f64,
 ) -> Result<f64> {
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
-    let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
+    let mut frame = Frame::new(request.view.width, request.view.height, channels);
     let (start, mut images) = (Instant::now(), 0u32);
     let draw = || loop {
-        rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
+        rasterizer.render(&mut [(request, frame.as_mut())]).map_err(|(_, error)| error)?;
         images += 1;
         let elapsed = start.elapsed().as_secs_f64();
         if elapsed >= seconds {

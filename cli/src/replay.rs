@@ -70,17 +70,17 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let envs = recording.env_ids().last().map_or(1, |last| last.saturating_add(1));
     let scene = args.scene.as_deref().map(|file| build_scene(file, envs)).transpose()?;
     warned |= scene.as_ref().is_some_and(|(_, warned)| *warned);
-    let (film, sim) = Playback::open(&recording, scene.as_ref().map(|(scene, _)| scene.sim()))?;
-    if !film.joints_without_data().is_empty() {
+    let (playback, sim) = Playback::open(&recording, scene.as_ref().map(|(scene, _)| scene.sim()))?;
+    if !playback.joints_without_data().is_empty() {
         warned = true;
         eprintln!(
             "warning: no recorded state of {}: they keep their initial state",
-            film.joints_without_data().join(", ")
+            playback.joints_without_data().join(", ")
         );
     }
     match &args.out {
-        Some(folder) => draw(args, film, sim, folder)?,
-        None => show(args, film, sim)?,
+        Some(folder) => draw(args, playback, sim, folder)?,
+        None => show(args, playback, sim)?,
     }
     Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })
 }
@@ -102,8 +102,8 @@ fn verify(args: &Args) -> Result<CommandStatus> {
     Ok(if verdict.is_identical() { CommandStatus::Done } else { CommandStatus::Warned })
 }
 
-fn draw(args: &Args, mut film: Playback, mut sim: SimulationManager, folder: &Path) -> Result<()> {
-    let (first, last) = (film.times()[0], film.times()[film.times().len() - 1]);
+fn draw(args: &Args, mut playback: Playback, mut sim: SimulationManager, folder: &Path) -> Result<()> {
+    let (first, last) = (playback.times()[0], playback.times()[playback.times().len() - 1]);
     if let Some(time) = args.at.iter().find(|time| !(first..=last).contains(*time)) {
         return Err(format!("--at {time}: the recording is from {first} s to {last} s").into());
     }
@@ -111,14 +111,14 @@ fn draw(args: &Args, mut film: Playback, mut sim: SimulationManager, folder: &Pa
     // All images have the same camera, which frames everything that is visible at any of these times.
     let mut stills = Vec::new();
     for time in &args.at {
-        film.seek(&mut sim, film.frame_at(*time))?;
+        playback.seek(&mut sim, playback.frame_at(*time))?;
         stills.push(OffscreenScene::overview(&mut sim, None, &[])?);
     }
     let (size, placed) = ([args.width, args.height], stills.iter().map(OffscreenScene::placed).collect::<Vec<_>>());
     let cfg =
         ScreenshotCfg { size, camera: Some(OrbitCamera::frame_scenes(&placed, size)), ..ScreenshotCfg::default() };
     for time in &args.at {
-        film.seek(&mut sim, film.frame_at(*time))?;
+        playback.seek(&mut sim, playback.frame_at(*time))?;
         let path = folder.join(format!("replay_{time:.3}s.png"));
         sim.screenshot_with(&path, &cfg)?;
         println!("{}", path.display());
@@ -126,11 +126,11 @@ fn draw(args: &Args, mut film: Playback, mut sim: SimulationManager, folder: &Pa
     Ok(())
 }
 
-fn show(args: &Args, mut film: Playback, mut sim: SimulationManager) -> Result<()> {
+fn show(args: &Args, mut playback: Playback, mut sim: SimulationManager) -> Result<()> {
     let start = std::time::Instant::now();
     // A new viewer sees the first frame at once, not the initial state of the scene.
-    film.seek(&mut sim, 0)?;
-    let mut film = RecordingPlayback(film);
+    playback.seek(&mut sim, 0)?;
+    let mut playback = RecordingPlayback(playback);
     // Ctrl+C needs no action of its own, because `keep_playing` is called many times a second.
     let interrupted = interrupt::on_ctrl_c(|| ());
     let keep_playing = || {
@@ -141,14 +141,14 @@ fn show(args: &Args, mut film: Playback, mut sim: SimulationManager) -> Result<(
         Some(address) => {
             let served = sim.serve_with(address, ServeCfg { speed: Some(Speed::REAL_TIME), ..ServeCfg::default() })?;
             println!("Open {} in a browser; Ctrl+C ends the replay.", served.url());
-            sim.play(&mut film, &mut || keep_playing())?;
+            sim.play(&mut playback, &mut || keep_playing())?;
             served.close(&mut sim)?;
         }
         None => {
             let title = format!("{} - Kinetoscope", args.file.display());
             let window = sim.open_window_with(WindowCfg { title, ..WindowCfg::default() })?;
             println!("A window shows {}: closing it, or Ctrl+C here, ends it.", args.file.display());
-            sim.play(&mut film, &mut || window.is_open() && keep_playing())?;
+            sim.play(&mut playback, &mut || window.is_open() && keep_playing())?;
             if let Some(reason) = window.closed().as_ref().and_then(Closed::error) {
                 return Err(format!("the window was lost: {reason}").into());
             }

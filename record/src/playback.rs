@@ -67,11 +67,11 @@ impl Playback {
             })?,
         };
         let (sim, part) = scene_file::unpack(&packed, recording.path())?;
-        let film = Self::in_scene(recording, &sim, part)?;
-        if film.times.is_empty() {
+        let playback = Self::in_scene(recording, &sim, part)?;
+        if playback.times.is_empty() {
             return Err(malformed("no motion of its scene was recorded; record joint states, poses or states"));
         }
-        Ok((film, sim))
+        Ok((playback, sim))
     }
 
     fn in_scene(recording: &Recording, sim: &SimulationManager, part: MjcfId) -> Result<Self> {

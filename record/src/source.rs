@@ -120,14 +120,14 @@ impl StreamSource {
 
     /// The overview image of all environments, recorded as that of the first of `envs`.
     pub(crate) fn overview(sim: &mut SimulationManager, cfg: &OverviewCfg, envs: &[usize]) -> Result<Self> {
-        let painter = OverviewRenderer::new(sim, cfg)?;
+        let renderer = OverviewRenderer::new(sim, cfg)?;
         let [width, height] = cfg.size;
         let kind = StreamKind::Image { camera: "stage".into(), channel: "color".into(), height, width };
         let (parts, what) = (vec![StreamField::new("", [height, width, 4])], SourceKind::Overview(cfg.clone()));
         let period_steps = Some(cfg.period_steps(sim.cfg().physics_dt));
         let first = envs.get(..1).unwrap_or_default();
         let source = Self::new("stage/color".into(), kind, ElementType::U8, parts, first, what);
-        Ok(Self { period_steps, overview_renderer: Some(painter), ..source })
+        Ok(Self { period_steps, overview_renderer: Some(renderer), ..source })
     }
 
     pub(crate) fn joint_states(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
@@ -384,7 +384,7 @@ impl StreamSource {
             }
         }
         match (&mut self.overview_renderer, &mut block.values) {
-            (Some(painter), ValueBuffer::U8(pixels)) => painter.render(sim, pixels)?,
+            (Some(renderer), ValueBuffer::U8(pixels)) => renderer.render(sim, pixels)?,
             _ => self.copy(sim, result, &mut block.values)?,
         }
         let wanted = self.rows.len() * self.stream.width();

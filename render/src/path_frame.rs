@@ -86,7 +86,7 @@ fn trace_colors(
     });
     let camera_rays =
         CameraRayGenerator { projection, lens, thin_lens: first.aperture.as_ref().and_then(ThinLens::from_aperture) };
-    let (lamps, rows) = film.rows(ROWS);
+    let (light_sources, rows) = film.rows(ROWS);
     // A noise number of 0 leaves the seed as it is.
     let seed = seed ^ noise;
     let (scene, motion) = (request.scene, moving.as_ref());
@@ -98,7 +98,7 @@ fn trace_colors(
         samples,
         max_bounces,
         seed,
-        lights: lamps,
+        lights: light_sources,
         strategy: MisStrategy::Both,
     };
     // Not read from the progress object afterwards: another thread may have resumed it meanwhile, with rows missing.

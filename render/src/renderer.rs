@@ -151,11 +151,11 @@ impl Renderer {
     }
 
     /// Number of paths of an image; 0 without path tracing or without color.
-    pub(crate) fn path_count(self, shot: &RenderRequest<'_>, frame: &FrameMut<'_>) -> u64 {
+    pub(crate) fn path_count(self, render_request: &RenderRequest<'_>, frame: &FrameMut<'_>) -> u64 {
         match self {
-            Self::RayTraced { samples, .. } if frame.color.is_some() => {
-                (shot.view.width as u64).saturating_mul(shot.view.height as u64).saturating_mul(samples.into())
-            }
+            Self::RayTraced { samples, .. } if frame.color.is_some() => (render_request.view.width as u64)
+                .saturating_mul(render_request.view.height as u64)
+                .saturating_mul(samples.into()),
             _ => 0,
         }
     }

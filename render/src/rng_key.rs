@@ -151,8 +151,8 @@ mod tests {
         let times = [1, 2, 3, 5, 8, 100, 777];
         let n = 20_000;
         let places = |due_images: u32| -> Vec<f64> {
-            let ticket = RngKey { due_images, epoch: 5, ..RngKey::new(1, 2, "eye") };
-            (0..n / 4).flat_map(|block| ticket.random_walks(RngStream::random_walk(1), block)).collect()
+            let key = RngKey { due_images, epoch: 5, ..RngKey::new(1, 2, "eye") };
+            (0..n / 4).flat_map(|block| key.random_walks(RngStream::random_walk(1), block)).collect()
         };
         let walks: Vec<Vec<f64>> = times.iter().map(|&time| places(time)).collect();
         for (s, at_s) in times.iter().zip(&walks) {

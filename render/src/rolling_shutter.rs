@@ -32,28 +32,29 @@ impl RollingShutter {
     /// Renders row `y` of an image, at the middle of its exposure, into a frame of that row.
     pub(super) fn render_row(
         &mut self,
-        brush: &mut RasterScratch,
+        scratch: &mut RasterScratch,
         style: RenderSettings<'_>,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         interval: &ShutterInterval<'_>,
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
         let Self { prepared, poses, frame, size } = self;
         let ShutterInterval { opened, clock } = interval;
-        let wanted = (shot.view.width, row.channels());
+        let wanted = (render_request.view.width, row.channels());
         if *size != wanted {
             (*frame, *size) = (Frame::new(wanted.0, BLOCK, wanted.1), wanted);
         }
         let time = clock.at(y, 0.5);
         let at = |from: &PoseF32, to: &PoseF32| Motion::between(from, to).map_or(*to, |m| PoseF32::from(&m.at(time)));
         poses.clear();
-        poses.extend(opened.poses.iter().zip(shot.poses).map(|(from, to)| at(from, to)));
-        let world_from_camera = at(&opened.world_from_camera, &shot.view.world_from_camera);
-        let shot = RenderRequest { poses, view: &View { world_from_camera, ..*shot.view }, ..*shot };
-        prepared.prepare_row(style, &shot, &frame.as_mut(), y)?;
+        poses.extend(opened.poses.iter().zip(render_request.poses).map(|(from, to)| at(from, to)));
+        let world_from_camera = at(&opened.world_from_camera, &render_request.view.world_from_camera);
+        let render_request =
+            RenderRequest { poses, view: &View { world_from_camera, ..*render_request.view }, ..*render_request };
+        prepared.prepare_row(style, &render_request, &frame.as_mut(), y)?;
         let block = y / BLOCK;
-        brush.render_band(prepared, &shot, &mut frame.as_mut(), block..block + 1);
+        scratch.render_band(prepared, &render_request, &mut frame.as_mut(), block..block + 1);
         row.take_row(frame, y % BLOCK, wanted.0);
         Ok(())
     }

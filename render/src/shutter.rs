@@ -104,12 +104,12 @@ impl Shutter {
     /// For poses at shutter opening that are invalid, or not old enough.
     pub(crate) fn exposure_interval<'a>(
         &self,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         take: &FrameSample<'a>,
     ) -> Result<Option<ShutterInterval<'a>>, RenderError> {
         let Some(opened) = take.shutter_open.filter(|_| !self.is_instant()) else { return Ok(None) };
         let ShutterOpenState { poses, world_from_camera, age } = opened;
-        let expected = shot.scene.instances().len();
+        let expected = render_request.scene.instances().len();
         if poses.len() != expected {
             return Err(RenderError::PoseCount { expected, found: poses.len() });
         }
@@ -119,12 +119,12 @@ impl Shutter {
         if !world_from_camera.is_rigid() {
             return Err(RenderError::CameraPose { pose: world_from_camera });
         }
-        let span = self.span(shot.view.height);
+        let span = self.span(render_request.view.height);
         // Tolerance of half a nanosecond: times are sums.
         if !(age + 5e-10 >= span && age > 0.0 && age.is_finite()) {
             return Err(RenderError::ShutterPoses { age, span });
         }
-        let last_row = shot.view.height.saturating_sub(1);
+        let last_row = render_request.view.height.saturating_sub(1);
         let clock = RowClock { last_row, row: self.row_time / age, exposure: self.exposure_time / age };
         Ok(Some(ShutterInterval { opened, clock }))
     }

@@ -110,7 +110,7 @@ struct ObserverSlot {
 
 impl fmt::Debug for ObserverList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_list().entries(self.slots.iter().map(|seat| seat.number)).finish()
+        f.debug_list().entries(self.slots.iter().map(|slot| slot.number)).finish()
     }
 }
 
@@ -146,19 +146,19 @@ impl<'a> Observers<'a> {
     /// The handle belongs to another manager.
     #[track_caller]
     pub fn get<O: Observer>(&self, id: ObserverId<O>) -> Result<&'a O> {
-        let seat = &self.sim.observers.slots[self.sim.slot_index(id)?];
-        let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
+        let slot = &self.sim.observers.slots[self.sim.slot_index(id)?];
+        let any: Option<&dyn Any> = slot.observer.as_deref().map(|observer| observer as &dyn Any);
         any.and_then(|any| any.downcast_ref()).ok_or(Error::ObserverUnavailable)
     }
 
     /// Handles of all observers of type `O` in insertion order, without one that is handling an event right now.
     pub fn ids<O: Observer>(&self) -> Vec<ObserverId<O>> {
-        let is = |seat: &&ObserverSlot| {
-            let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
+        let is = |slot: &&ObserverSlot| {
+            let any: Option<&dyn Any> = slot.observer.as_deref().map(|observer| observer as &dyn Any);
             any.is_some_and(|any| any.is::<O>())
         };
         let id =
-            |seat: &ObserverSlot| ObserverId { manager: self.sim.serial, number: seat.number, observer: PhantomData };
+            |slot: &ObserverSlot| ObserverId { manager: self.sim.serial, number: slot.number, observer: PhantomData };
         self.sim.observers.slots.iter().filter(is).map(id).collect()
     }
 
@@ -170,7 +170,7 @@ impl<'a> Observers<'a> {
     /// True if an observer announces events of type `E` ([`Observer::publishes`]). An observer that is handling an
     /// event right now is not asked. Recorders check this when they start.
     pub fn is_published<E: Any>(&self) -> bool {
-        let mut observers = self.sim.observers.slots.iter().filter_map(|seat| seat.observer.as_ref());
+        let mut observers = self.sim.observers.slots.iter().filter_map(|slot| slot.observer.as_ref());
         observers.any(|observer| observer.publishes(TypeId::of::<E>()))
     }
 
@@ -220,8 +220,8 @@ impl<'a> ObserversMut<'a> {
         self.sim.slot_index(id)?;
         self.sim.notify_written();
         let index = self.sim.slot_index(id)?;
-        let seat = self.sim.observers.slots.remove(index);
-        let any: Option<Box<dyn Any>> = seat.observer.map(|observer| observer as Box<dyn Any>);
+        let slot = self.sim.observers.slots.remove(index);
+        let any: Option<Box<dyn Any>> = slot.observer.map(|observer| observer as Box<dyn Any>);
         any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::ObserverUnavailable)
     }
 
@@ -235,8 +235,8 @@ impl<'a> ObserversMut<'a> {
     #[track_caller]
     pub fn get_mut<O: Observer>(self, id: ObserverId<O>) -> Result<&'a mut O> {
         let index = self.sim.slot_index(id)?;
-        let seat = &mut self.sim.observers.slots[index];
-        let any: Option<&mut dyn Any> = seat.observer.as_deref_mut().map(|observer| observer as &mut dyn Any);
+        let slot = &mut self.sim.observers.slots[index];
+        let any: Option<&mut dyn Any> = slot.observer.as_deref_mut().map(|observer| observer as &mut dyn Any);
         any.and_then(|any| any.downcast_mut()).ok_or(Error::ObserverUnavailable)
     }
 }
@@ -245,7 +245,7 @@ impl SimulationManager {
     #[track_caller]
     fn slot_index<O>(&self, id: ObserverId<O>) -> Result<usize> {
         assert!(id.manager == self.serial, "this handle belongs to another SimulationManager");
-        let place = self.observers.slots.iter().position(|seat| seat.number == id.number);
+        let place = self.observers.slots.iter().position(|slot| slot.number == id.number);
         place.filter(|&i| self.observers.slots[i].observer.is_some()).ok_or(Error::ObserverUnavailable)
     }
 
@@ -262,7 +262,7 @@ impl SimulationManager {
             .observers
             .slots
             .iter()
-            .filter_map(|seat| Some((seat.number, seat.observer.as_ref()?.due_in(self).max(1))))
+            .filter_map(|slot| Some((slot.number, slot.observer.as_ref()?.due_in(self).max(1))))
             .collect();
         let first = waits.iter().map(|(_, wait)| *wait).min().unwrap_or(u64::MAX);
         let block = u32::try_from(first).unwrap_or(u32::MAX).min(steps);
@@ -287,7 +287,7 @@ impl SimulationManager {
     }
 
     fn notify_each_with(&mut self, tell: impl Fn(&mut dyn Observer, &mut Self)) {
-        let numbers: Vec<u64> = self.observers.slots.iter().map(|seat| seat.number).collect();
+        let numbers: Vec<u64> = self.observers.slots.iter().map(|slot| slot.number).collect();
         for number in numbers {
             self.notify(number, &tell);
         }
@@ -295,12 +295,12 @@ impl SimulationManager {
 
     fn notify(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) {
         // An observer that is handling an event receives no event of its own changes.
-        let Some(seat) = self.observers.slots.iter_mut().find(|seat| seat.number == number) else { return };
-        let Some(mut observer) = seat.observer.take() else { return };
+        let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) else { return };
+        let Some(mut observer) = slot.observer.take() else { return };
         tell(observer.as_mut(), self);
         // An observer that was removed meanwhile is dropped here.
-        if let Some(seat) = self.observers.slots.iter_mut().find(|seat| seat.number == number) {
-            seat.observer = Some(observer);
+        if let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) {
+            slot.observer = Some(observer);
         }
     }
 }

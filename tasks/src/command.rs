@@ -24,7 +24,7 @@ impl CommandTerm {
         sample: impl Fn(&mut EpisodeRng) -> [f64; K] + Send + 'static,
     ) -> Self {
         let columns = columns.map(String::from).to_vec();
-        Self { name: name.into(), columns, sample: Box::new(move |dice| sample(dice).to_vec()) }
+        Self { name: name.into(), columns, sample: Box::new(move |rng| sample(rng).to_vec()) }
     }
 
     pub(crate) fn check(&self) -> Result<()> {
@@ -32,13 +32,13 @@ impl CommandTerm {
     }
 
     /// Draws the values of an episode.
-    pub(crate) fn sample(&self, dice: &mut EpisodeRng) -> Result<Vec<f64>> {
-        let values = (self.sample)(dice);
+    pub(crate) fn sample(&self, rng: &mut EpisodeRng) -> Result<Vec<f64>> {
+        let values = (self.sample)(rng);
         match values.iter().position(|value| !value.is_finite()) {
             None => Ok(values),
             Some(k) => {
                 let what = format!("the value of the command term {:?}", self.name);
-                let (env, column) = (dice.env().0, self.columns[k].clone());
+                let (env, column) = (rng.env().0, self.columns[k].clone());
                 Err(EnvError::NotFinite { what, env, column, value: values[k] })
             }
         }

@@ -421,9 +421,9 @@ impl Env {
     ) -> Result<()> {
         for event in self.terms.events.iter().filter(|event| due(event.mode)) {
             let what = name(&event.name);
-            let mut dice: Vec<EpisodeRng> =
+            let mut episode_rngs: Vec<EpisodeRng> =
                 envs.iter().map(|&env| self.episodes[env].key.episode_rng(env, &what)).collect();
-            (event.apply)(&mut self.state.sim, &mut dice)
+            (event.apply)(&mut self.state.sim, &mut episode_rngs)
                 .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
         }
         Ok(())
@@ -433,16 +433,16 @@ impl Env {
     fn run_interval_events(&mut self, envs: &[usize]) -> Result<()> {
         for (k, event) in self.terms.events.iter().enumerate() {
             let EventMode::Interval { steps } = event.mode else { continue };
-            let mut dice = Vec::new();
+            let mut episode_rngs = Vec::new();
             for &env in envs {
                 let (row, now) = (&mut self.episodes[env], self.state.episode_steps[env]);
                 if row.next_event_steps[k] == now {
                     row.next_event_steps[k] = now.saturating_add(draw_interval(row.key, env, &event.name, now, steps));
-                    dice.push(row.key.episode_rng(env, &format!("event/{}/{now}", event.name)));
+                    episode_rngs.push(row.key.episode_rng(env, &format!("event/{}/{now}", event.name)));
                 }
             }
-            if !dice.is_empty() {
-                (event.apply)(&mut self.state.sim, &mut dice)
+            if !episode_rngs.is_empty() {
+                (event.apply)(&mut self.state.sim, &mut episode_rngs)
                     .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
             }
         }

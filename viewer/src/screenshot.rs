@@ -168,8 +168,8 @@ impl Screenshot for SimulationManager {
         let view = cfg.camera.unwrap_or_else(|| framing_camera(&snapshot, cfg.envs, cfg.size)).view(width, height);
         let look = ViewOptions { envs: cfg.envs, overlays: cfg.overlays, ..ViewOptions::default() };
         let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-        let mut painter = SceneRenderer::new(cfg.threads.unwrap_or_else(cores).max(1));
-        painter.draw(&snapshot, &view, &look, &mut canvas).map_err(ScreenshotError::Draw)?;
+        let mut renderer = SceneRenderer::new(cfg.threads.unwrap_or_else(cores).max(1));
+        renderer.draw(&snapshot, &view, &look, &mut canvas).map_err(ScreenshotError::Draw)?;
         Ok(canvas)
     }
 }

@@ -133,9 +133,9 @@ impl Scene {
             self.eye = [0, 1, 2].map(|k| target[k] + distance_scale * (far[k] - target[k]));
             let mut frame = Frame::new(size[0], size[1], Channels { depth: true, ..Channels::default() });
             let view = self.view(size)?;
-            let shot =
+            let request =
                 RenderRequest { scene: &drawn, poses: &poses, view: &view, lights: None, lens: None, previous: None };
-            rasterizer.render(&mut [(shot, frame.as_mut())]).map_err(|(_, error)| error)?;
+            rasterizer.render(&mut [(request, frame.as_mut())]).map_err(|(_, error)| error)?;
             let hits = frame.depth.iter().flatten().filter(|depth| depth.is_finite()).count();
             covered = hits as f64 / (size[0] * size[1]) as f64;
             if covered > share { nearest = distance_scale } else { farthest = distance_scale }

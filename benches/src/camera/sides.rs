@@ -98,20 +98,21 @@ impl<'s> OurRenderer<'s> {
     fn draw(&mut self) -> BenchResult<()> {
         let Self { scene, batch, rasterizer, view, poses, lights, frames, .. } = self;
         let seen = scene.visible.scene();
-        let (things, lamps) = (seen.instances().len(), seen.lights.len());
+        let (things, light_count) = (seen.instances().len(), seen.lights.len());
         batch.for_each(|i, env| {
-            let lights = &mut lights[i * lamps..(i + 1) * lamps];
+            let lights = &mut lights[i * light_count..(i + 1) * light_count];
             scene.visible.read_poses(env.data(), &mut poses[i * things..(i + 1) * things], lights);
         });
-        let shot = |i: usize| RenderRequest {
+        let render_request = |i: usize| RenderRequest {
             scene: seen,
             poses: &poses[i * things..(i + 1) * things],
             view,
-            lights: Some(&lights[i * lamps..(i + 1) * lamps]),
+            lights: Some(&lights[i * light_count..(i + 1) * light_count]),
             lens: None,
             previous: None,
         };
-        let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(i, frame)| (shot(i), frame.as_mut())).collect();
+        let mut jobs: Vec<_> =
+            frames.iter_mut().enumerate().map(|(i, frame)| (render_request(i), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).map_err(|(index, error)| format!("image {index}: {error}").into())
     }
 

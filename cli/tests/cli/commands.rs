@@ -238,8 +238,8 @@ fn starts_on_the_ground() {
         let (out, err, code) = shell.run(&line);
         assert_eq!(code, 0, "{line}: {out}{err}");
         let scene = kinetoscope::record::Recording::open(shell.path("a.mcap")).unwrap();
-        let (mut film, mut sim) = kinetoscope::record::Playback::open(&scene, None).unwrap();
-        film.seek(&mut sim, 0).unwrap();
+        let (mut playback, mut sim) = kinetoscope::record::Playback::open(&scene, None).unwrap();
+        playback.seek(&mut sim, 0).unwrap();
         // A recorded scene is a single MJCF entity.
         let part = sim.mjcf_part(sim.entities().mjcf_id("scene").unwrap());
         part.body_pose("robot/body").unwrap()[(0, 2)]

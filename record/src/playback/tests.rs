@@ -61,16 +61,16 @@ fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
 
 /// Largest difference of displayed and original positions and quaternions, with the body and the step.
 fn largest_difference(
-    film: &mut Playback,
+    playback: &mut Playback,
     sim: &mut SimulationManager,
     all: &[Vec<(String, Array2<f64>)>],
 ) -> (f64, String) {
     let mut largest = (0.0, String::new());
     for (step, expected) in all.iter().enumerate() {
         // The state after a step is the last one recorded at its time. The recording begins at step 3, at 0.03 s.
-        let frame = film.frame_at(0.01 * (step + 3) as f64);
-        film.seek(sim, frame).unwrap();
-        let part = sim.mjcf_part(film.part);
+        let frame = playback.frame_at(0.01 * (step + 3) as f64);
+        playback.seek(sim, frame).unwrap();
+        let part = sim.mjcf_part(playback.part);
         let mut compared = 0;
         for (name, expected) in expected.iter().filter(|(name, _)| part.body_names().contains(name)) {
             let found = part.body_pose(name).unwrap();
@@ -98,22 +98,22 @@ fn poses_of_a_recording() {
     for name in ["run.mcap", "run.npz"] {
         let path = folder.path().join(name);
         let all = recorded(&path, true);
-        let (mut film, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+        let (mut playback, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
         assert_eq!(sim.num_envs(), 2);
-        assert!(film.joints_without_data().is_empty(), "{:?}", film.joints_without_data());
-        assert_eq!(film.times().len(), STEPS + 1, "{name}: {:?}", film.times());
+        assert!(playback.joints_without_data().is_empty(), "{:?}", playback.joints_without_data());
+        assert_eq!(playback.times().len(), STEPS + 1, "{name}: {:?}", playback.times());
         // The same joints and the same engine, with a model that was written with all digits.
-        let largest = largest_difference(&mut film, &mut sim, &all);
+        let largest = largest_difference(&mut playback, &mut sim, &all);
         assert!(largest.0 < 1e-9, "{name}: {largest:?}");
         // Seeks forward and backward.
-        film.seek(&mut sim, STEPS).unwrap();
-        let end = sim.mjcf_part(film.part).qpos();
-        film.seek(&mut sim, 0).unwrap();
-        assert_ne!(sim.mjcf_part(film.part).qpos(), end);
-        film.seek(&mut sim, usize::MAX).unwrap();
-        assert_eq!(sim.mjcf_part(film.part).qpos(), end);
+        playback.seek(&mut sim, STEPS).unwrap();
+        let end = sim.mjcf_part(playback.part).qpos();
+        playback.seek(&mut sim, 0).unwrap();
+        assert_ne!(sim.mjcf_part(playback.part).qpos(), end);
+        playback.seek(&mut sim, usize::MAX).unwrap();
+        assert_eq!(sim.mjcf_part(playback.part).qpos(), end);
         // Control: states of the next step differ.
-        assert!(largest_difference(&mut film, &mut sim, &all[1..]).0 > 1e-4);
+        assert!(largest_difference(&mut playback, &mut sim, &all[1..]).0 > 1e-4);
     }
 }
 
@@ -126,21 +126,21 @@ fn divergence() {
     for name in ["run.mcap", "run.npz"] {
         let path = folder.path().join(name);
         recorded(&path, true);
-        let (mut film, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
-        let mut at = |film: &mut Playback, frame: usize| {
-            film.seek(&mut sim, frame).unwrap();
-            let part = sim.mjcf_part(film.part);
+        let (mut playback, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+        let mut at = |playback: &mut Playback, frame: usize| {
+            playback.seek(&mut sim, frame).unwrap();
+            let part = sim.mjcf_part(playback.part);
             (part.qpos(), part.body_pose("hand").unwrap())
         };
-        let (whole, last) = (at(&mut film, STEPS), at(&mut film, LOST));
-        let lost_at = film.times[LOST];
-        for track in film.tracks.iter_mut().filter(|track| track.env == 1) {
+        let (whole, last) = (at(&mut playback, STEPS), at(&mut playback, LOST));
+        let lost_at = playback.times[LOST];
+        for track in playback.tracks.iter_mut().filter(|track| track.env == 1) {
             let lost = track.samples.times.iter().position(|time| *time > lost_at + 1e-9).unwrap();
             track.samples.values[lost..].fill(f64::NAN);
         }
         for from in [0, 5, LOST, STEPS - 1] {
-            at(&mut film, from);
-            let seen = at(&mut film, STEPS);
+            at(&mut playback, from);
+            let seen = at(&mut playback, STEPS);
             assert_eq!(seen.0.row(1), last.0.row(1), "{name}: from {from}");
             assert_eq!(seen.1.row(1), last.1.row(1), "{name}: from {from}");
             // Control: the other environment continues.
@@ -157,8 +157,8 @@ fn without_a_scene() {
     let recording = Recording::open(&path).unwrap();
     let error = Playback::open(&recording, None).unwrap_err().to_string();
     assert!(error.contains("does not contain its scene"), "{error}");
-    let (mut film, mut sim) = Playback::open(&recording, Some(&busy())).unwrap();
-    let largest = largest_difference(&mut film, &mut sim, &all);
+    let (mut playback, mut sim) = Playback::open(&recording, Some(&busy())).unwrap();
+    let largest = largest_difference(&mut playback, &mut sim, &all);
     assert!(largest.0 < 1e-9, "{largest:?}");
     // A scene without these names.
     let error = Playback::open(&recording, Some(&falling(2))).unwrap_err().to_string();
@@ -171,8 +171,8 @@ fn unrecorded_joints() {
     let (_folder, path) = scratch("run.mcap");
     let cfg = RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]);
     record(&mut busy(), cfg, |sim| sim.update(3));
-    let (film, _) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
-    let unmoved = film.joints_without_data();
+    let (playback, _) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+    let unmoved = playback.joints_without_data();
     assert!(unmoved.iter().any(|joint| joint == "cube/free"), "{unmoved:?}");
     assert!(!unmoved.iter().any(|joint| joint.starts_with("arm/")), "{unmoved:?}");
 }
@@ -185,8 +185,8 @@ fn recovered_recording() {
     sim.update(40);
     drop(sim);
     assert!(recover(&path).unwrap().messages > 0);
-    let (film, sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
-    assert!(film.joints_without_data().is_empty() && sim.num_envs() == 2);
+    let (playback, sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+    assert!(playback.joints_without_data().is_empty() && sim.num_envs() == 2);
 }
 
 #[test]

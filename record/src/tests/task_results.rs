@@ -30,8 +30,8 @@ fn task() -> Env {
         .termination(TerminationTerm::new("far", move |now| {
             Ok(now.sim().robot(cart).qpos().column(0).mapv(|x| x.abs() > 0.1))
         }))
-        .event(EventTerm::on_reset("scatter", move |sim, dice| {
-            for die in dice {
+        .event(EventTerm::on_reset("scatter", move |sim, rng| {
+            for die in rng {
                 let start = array![[die.uniform_range(-0.05, 0.05)]];
                 sim.robot_mut(cart).write_qpos(&start, Some(&[JointIndex(0)]), Some(&[die.env()]))?;
             }

@@ -96,7 +96,7 @@ impl Packet {
     pub(super) fn in_local_frame<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
         let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));
         let zero = D::splat(s, 0.0);
-        let mut met = zero.le(limit);
+        let mut hit = zero.le(limit);
         if radius < f64::INFINITY {
             let to_middle = axes(
                 #[inline(always)]
@@ -109,9 +109,9 @@ impl Packet {
                 |k| to_middle[k] + (-t) * direction[k],
             );
             let r = D::splat(s, radius);
-            met = met & dot_3(beside, beside).le(r * r) & zero.le(t + r) & (t - r).le(limit);
+            hit = hit & dot_3(beside, beside).le(r * r) & zero.le(t + r) & (t - r).le(limit);
         }
-        if met.to_bitmask() == 0 {
+        if hit.to_bitmask() == 0 {
             return None;
         }
         let from = axes(
@@ -121,7 +121,7 @@ impl Packet {
         Some(Self {
             origin: rotate_inverse(pose, from),
             direction: rotate_inverse(pose, direction),
-            limit: met.select(limit, D::splat(s, -1.0)).array(),
+            limit: hit.select(limit, D::splat(s, -1.0)).array(),
         })
     }
 }

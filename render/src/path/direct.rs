@@ -30,17 +30,17 @@ impl PathTracer<'_> {
         let matt = point.bsdf.scattered_fraction();
         let mut out = [0.0; 3];
         let mut origin = None;
-        for (lamp, k) in self.lights.lights.iter().zip(4..) {
-            let choice = if lamp.has_size() { path.sample.sample_2d(dims + k) } else { [0.0; 2] };
-            let Some(light) = lamp.sample(point.position, choice) else { continue };
-            out = add_scaled(out, light.strength * matt, times(point.bsdf.diffuse_albedo, lamp.ambient));
+        for (source, k) in self.lights.lights.iter().zip(4..) {
+            let choice = if source.has_size() { path.sample.sample_2d(dims + k) } else { [0.0; 2] };
+            let Some(light) = source.sample(point.position, choice) else { continue };
+            out = add_scaled(out, light.strength * matt, times(point.bsdf.diffuse_albedo, source.ambient));
             let scatter = point.bsdf.evaluate(local, basis.to_local(light.direction));
-            let sent =
-                [0, 1, 2].map(|c| PI * (scatter.diffuse[c] * lamp.diffuse[c] + scatter.specular[c] * lamp.specular[c]));
+            let sent = [0, 1, 2]
+                .map(|c| PI * (scatter.diffuse[c] * source.diffuse[c] + scatter.specular[c] * source.specular[c]));
             if sent.iter().all(|&x| x <= 0.0) {
                 continue;
             }
-            let passes = if lamp.cast_shadow {
+            let passes = if source.cast_shadow {
                 let origin = *origin.get_or_insert_with(|| self.shadow_ray_origin(s, point, path));
                 let (direction, distance) = light.seen_from(point.position, origin);
                 path.rays += 1;

@@ -146,29 +146,29 @@ impl SceneLights {
         forward: bool,
     ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
-        let Self { lights: lamps, emitters, environment, sky, skybox, haze } = self;
+        let Self { lights: light_sources, emitters, environment, sky, skybox, haze } = self;
         skybox.clone_from(&scene.skybox);
         emitters.prepare(scene, tracer);
         *environment = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
         *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
-        lamps.clear();
-        lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LIGHTS).map(LightSource::new));
+        light_sources.clear();
+        light_sources.extend(lights.iter().filter(|l| l.active).take(MAX_LIGHTS).map(LightSource::new));
         // After the other lights, and not counted in their limit: it is a point, and needs no random numbers.
         if scene.headlight.active {
             let axis = forward.then(|| view.world_from_camera.rotation.map(|row| row[2]));
-            lamps.push(match scene.headlight.to_directional(scene.lighting_space, axis) {
+            light_sources.push(match scene.headlight.to_directional(scene.lighting_space, axis) {
                 Some(light) => LightSource::new(&light),
                 None => LightSource::headlight(&scene.headlight, view, forward),
             });
         }
-        for lamp in lamps {
+        for source in light_sources {
             if scene.lighting_space == LightingSpace::Display {
-                for color in [&mut lamp.ambient, &mut lamp.diffuse, &mut lamp.specular] {
+                for color in [&mut source.ambient, &mut source.diffuse, &mut source.specular] {
                     *color = linear(color.map(|x| x as f32));
                 }
             }
-            lamp.cast_shadow &= shadows;
+            source.cast_shadow &= shadows;
         }
     }
 
@@ -287,11 +287,11 @@ impl PathTracer<'_> {
         loop {
             path.rays += 1;
             let hit = self.tracer.closest_hit(s, &ray, limit, time, path.stack);
-            let met = hit.and_then(|hit| {
+            let found_hit = hit.and_then(|hit| {
                 let footprint = width + spread * hit.distance;
                 Some((hit, SurfaceInteraction::new(self.scene, &ray, &hit, footprint)?))
             });
-            let Some((hit @ Hit { distance, .. }, point)) = met else {
+            let Some((hit @ Hit { distance, .. }, point)) = found_hit else {
                 let below = usize::from(ray.direction[2] <= 0.0);
                 let beyond = if clear { self.lights.sky(ray.direction) } else { self.lights.environment[below] };
                 light = add(light, times(throughput, beyond));

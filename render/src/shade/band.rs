@@ -72,7 +72,7 @@ impl RasterScratch {
     pub(crate) fn render_band(
         &mut self,
         plan: &PreparedFrame,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         frame: &mut FrameMut<'_>,
         rows: Range<usize>,
     ) {
@@ -92,7 +92,7 @@ impl RasterScratch {
             if frame.wants(Stage::Color) && plan.planes > 1 {
                 self.edges.reserve();
             }
-            at_level!(level, s => self.render_tile(s, plan, shot, projection, frame, top));
+            at_level!(level, s => self.render_tile(s, plan, render_request, projection, frame, top));
         }
     }
 
@@ -102,19 +102,24 @@ impl RasterScratch {
         &mut self,
         s: S,
         plan: &PreparedFrame,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         projection: &Projection,
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
         let Self { tile, layer, blended_tile, rasterizer, stack, shade_stack, colors, edges, .. } = self;
         let list = &plan.list;
-        let view = CameraView { projection, lens: shot.lens, placed: &list.placed, first_ids: shot.scene.first_ids() };
+        let view = CameraView {
+            projection,
+            lens: render_request.lens,
+            placed: &list.placed,
+            first_ids: render_request.scene.first_ids(),
+        };
         let mut draw = |tile: &mut Tile, item: &DrawItem| {
             if plan.traces_visibility {
                 plan.tracer.draw(s, stack, tile, &view, item);
             } else {
-                rasterizer.draw(s, tile, projection, shot.scene, &list.placed, item);
+                rasterizer.draw(s, tile, projection, render_request.scene, &list.placed, item);
             }
         };
         for item in &list.opaque {
@@ -125,7 +130,7 @@ impl RasterScratch {
         let [wants_detail, wants_albedo, wants_flow] = wanted;
         // Shading has shared references only, so its stack is in a cell.
         let shade_stack = RefCell::new(shade_stack);
-        let context = plan.context(shot, projection, &shade_stack, wanted);
+        let context = plan.context(render_request, projection, &shade_stack, wanted);
         let veils = !list.blended.is_empty();
         if veils {
             blended_tile.copy(tile);
@@ -184,7 +189,7 @@ impl RasterScratch {
                 draw(layer, item);
             }
             let Some((_, item)) = items.first() else { continue };
-            let alpha = shot.scene.instances()[item.instance as usize].material.rgba[3];
+            let alpha = render_request.scene.instances()[item.instance as usize].material.rgba[3];
             for (block, row, [x, y]) in groups(tile, size) {
                 let corner = [x as f32, (y - 2 * row) as f32];
                 s.vectorize(

@@ -314,12 +314,12 @@ pub(crate) fn shade<S: Simd>(
             }
         }
     }
-    for lamp in &lighting.lights {
-        let light = &lamp.light;
-        let Some((to, strength)) = lamp.illumination(s, at.position, lanes) else { continue };
+    for prepared in &lighting.lights {
+        let light = &prepared.light;
+        let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
         let facing = max(n.dot(to), zero);
         let mut lit = strength;
-        if let Some(map) = lamp.shadow.and_then(|k| shadows.get(k)) {
+        if let Some(map) = prepared.shadow.and_then(|k| shadows.get(k)) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
                 lit = lit * map.visibility(s, at.position, at.normal, source.placed.error, matters);
@@ -328,7 +328,7 @@ pub(crate) fn shade<S: Simd>(
         if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
-                lit = lit * rays.visibility(s, light, lamp.along.map(|x| -x), at.point(), matters);
+                lit = lit * rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters);
             }
         }
         for (k, diffuse) in diffuse.iter_mut().enumerate() {

@@ -44,12 +44,12 @@ impl MotionVectors {
     /// # Errors
     ///
     /// For a previous frame of another scene, or with an invalid view or pose.
-    pub(crate) fn prepare(&mut self, shot: &RenderRequest<'_>) -> Result<(), RenderError> {
+    pub(crate) fn prepare(&mut self, render_request: &RenderRequest<'_>) -> Result<(), RenderError> {
         self.list.clear();
         self.previous = None;
-        let Some(PreviousState { poses, view }) = shot.previous else { return Ok(()) };
+        let Some(PreviousState { poses, view }) = render_request.previous else { return Ok(()) };
         view.validate()?;
-        let expected = shot.scene.instances().len();
+        let expected = render_request.scene.instances().len();
         if poses.len() != expected {
             return Err(RenderError::PoseCount { expected, found: poses.len() });
         }
@@ -57,9 +57,9 @@ impl MotionVectors {
             return Err(RenderError::InstancePose { instance, pose: *pose });
         }
         let numbers = |view: &View| [view.fx, view.fy, view.cx, view.cy];
-        let (then, now) = (numbers(view), numbers(shot.view));
-        let same = then == now && view.world_from_camera == shot.view.world_from_camera;
-        self.list.extend(poses.iter().zip(shot.poses).map(|(before, now)| InstanceMotion {
+        let (then, now) = (numbers(view), numbers(render_request.view));
+        let same = then == now && view.world_from_camera == render_request.view.world_from_camera;
+        self.list.extend(poses.iter().zip(render_request.poses).map(|(before, now)| InstanceMotion {
             is_static: same && before == now,
             camera_from_instance: view.world_from_camera.inverse_times(before),
         }));
@@ -68,8 +68,11 @@ impl MotionVectors {
             let [fx, fy, cx, cy] = then.map(f64::from);
             if then == now { *rays.optics() } else { rays.optics().with_pixels(PixelIntrinsics { fx, fy, cx, cy }) }
         };
-        self.previous =
-            Some(shot.lens.map_or(PreviousProjection::Pinhole(then), |rays| PreviousProjection::Lens(behind(rays))));
+        self.previous = Some(
+            render_request
+                .lens
+                .map_or(PreviousProjection::Pinhole(then), |rays| PreviousProjection::Lens(behind(rays))),
+        );
         Ok(())
     }
 

@@ -87,26 +87,26 @@ impl PreparedFrame {
     pub(crate) fn prepare(
         &mut self,
         style: RenderSettings<'_>,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         frame: &FrameMut<'_>,
     ) -> Result<(), RenderError> {
         self.projection = None;
-        let View { width, height, .. } = *shot.view;
-        shot.view.validate()?;
+        let View { width, height, .. } = *render_request.view;
+        render_request.view.validate()?;
         frame.validate(width * height)?;
-        self.prepare_part(style, shot, frame)
+        self.prepare_part(style, render_request, frame)
     }
 
     /// As [`prepare`](Self::prepare), for one row of the image; the frame covers the row of blocks that contains it.
     pub(crate) fn prepare_row(
         &mut self,
         style: RenderSettings<'_>,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         frame: &FrameMut<'_>,
         row: usize,
     ) -> Result<(), RenderError> {
         self.projection = None;
-        self.prepare_part(style, shot, frame)?;
+        self.prepare_part(style, render_request, frame)?;
         self.only_row = Some(row % BLOCK);
         Ok(())
     }
@@ -114,12 +114,12 @@ impl PreparedFrame {
     fn prepare_part(
         &mut self,
         style: RenderSettings<'_>,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         frame: &FrameMut<'_>,
     ) -> Result<(), RenderError> {
         let RenderSettings { cfg, renderer, aperture, shutter, exposure_compensation, assets } = style;
         (self.map_count, self.only_row) = (0, None);
-        let RenderRequest { scene, poses, view, .. } = *shot;
+        let RenderRequest { scene, poses, view, .. } = *render_request;
         view.validate()?;
         if !matches!(cfg.samples, 1 | 4) {
             return Err(RenderError::Samples { samples: cfg.samples });
@@ -139,12 +139,12 @@ impl PreparedFrame {
         shutter.check()?;
         check_exposure_optics(renderer, aperture, shutter)?;
         if frame.wants(Stage::Flow) {
-            self.motion_vectors.prepare(shot)?;
+            self.motion_vectors.prepare(render_request)?;
         }
         let projection = Projection::from(view);
         let wants_color = frame.wants(Stage::Color);
         let multisampled = wants_color && cfg.samples == 4 && !renderer.is_path_tracing();
-        if let Some(lens) = shot.lens {
+        if let Some(lens) = render_request.lens {
             check_lens(lens, renderer, view, if multisampled { 4 } else { 1 })?;
         }
         let shaded = wants_color && !renderer.is_path_tracing();
@@ -159,17 +159,17 @@ impl PreparedFrame {
         self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded && cfg.reflections);
         let casts_rays = self.shadow_rays || self.occlusion_rays > 0 || self.first_mirror.is_some();
         if shaded {
-            self.prepare_lights(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
+            self.prepare_lights(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, render_request);
         }
         self.planes = if multisampled { SAMPLES.len() } else { 1 };
-        self.traces_visibility = renderer.traces_visibility(shot.lens.is_some());
+        self.traces_visibility = renderer.traces_visibility(render_request.lens.is_some());
         let parts = match renderer {
             _ if self.traces_visibility => Granularity::Instances,
             Renderer::Raster if cfg.lod => Granularity::LodClusters,
             _ => Granularity::FullClusters,
         };
         let keep = |instance: &Instance| Layer::for_instance(instance, cfg.groups);
-        self.list.build(&projection, shot.lens, scene, poses, parts, keep);
+        self.list.build(&projection, render_request.lens, scene, poses, parts, keep);
         if self.traces_visibility || casts_rays {
             self.tracer.prepare_geometry(scene, assets, keep);
         }
@@ -182,20 +182,20 @@ impl PreparedFrame {
     }
 
     /// Prepares lights and their shadow maps.
-    fn prepare_lights(&mut self, cfg: RasterCfg, shot: &RenderRequest<'_>) {
-        let RenderRequest { scene, poses, view, lights, lens, .. } = *shot;
+    fn prepare_lights(&mut self, cfg: RasterCfg, render_request: &RenderRequest<'_>) {
+        let RenderRequest { scene, poses, view, lights, lens, .. } = *render_request;
         let lights = lights.unwrap_or(&scene.lights);
         // Indices of lights with shadow maps, and those of their maps.
         let mut maps: [Option<(usize, usize)>; MAX_SHADOWS] = [None; MAX_SHADOWS];
         if cfg.shadows {
             let side = shadow_side(cfg, view);
-            let lamps = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
+            let light_sources = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
             let mut views = [None; MAX_LIGHTS];
             let mut casting = [0; MAX_LIGHTS];
-            let lamps = lamps.filter(|(_, l)| l.cast_shadow);
-            let lamps = lamps.filter_map(|(k, light)| Some((k, LightView::from_light(light)?)));
-            for ((k, lamp), (view, of)) in lamps.zip(views.iter_mut().zip(&mut casting)) {
-                (*view, *of) = (Some(lamp), k);
+            let light_sources = light_sources.filter(|(_, l)| l.cast_shadow);
+            let light_sources = light_sources.filter_map(|(k, light)| Some((k, LightView::from_light(light)?)));
+            for ((k, light_view), (view, of)) in light_sources.zip(views.iter_mut().zip(&mut casting)) {
+                (*view, *of) = (Some(light_view), k);
             }
             let receivers = match lens {
                 None => {
@@ -204,14 +204,14 @@ impl PreparedFrame {
                 }
                 Some(_) => shadow_fit::unbounded_extents(),
             };
-            for ((lamp, receivers), k) in views.iter().flatten().zip(&receivers).zip(casting) {
+            for ((light_view, receivers), k) in views.iter().flatten().zip(&receivers).zip(casting) {
                 if self.map_count == MAX_SHADOWS {
                     break;
                 }
                 if self.shadows.len() == self.map_count {
                     self.shadows.push(ShadowMap::empty());
                 }
-                if self.shadows[self.map_count].prepare(lamp, receivers, scene, poses, cfg, side) {
+                if self.shadows[self.map_count].prepare(light_view, receivers, scene, poses, cfg, side) {
                     maps[self.map_count] = Some((k, self.map_count));
                     self.map_count += 1;
                 }
@@ -253,17 +253,19 @@ impl PreparedFrame {
     /// Context for shading pixels; the flags select the stages `surface`, `albedo` and `flow`.
     pub(crate) fn context<'a>(
         &'a self,
-        shot: &RenderRequest<'a>,
+        render_request: &RenderRequest<'a>,
         projection: &'a Projection,
         stack: &'a RefCell<&'a mut TraversalStack>,
         [surface, albedo, flow]: [bool; 3],
     ) -> ShadingContext<'a> {
         let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
         let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
-        let only_first = shot.scene.lighting_space == LightingSpace::Display;
+        let only_first = render_request.scene.lighting_space == LightingSpace::Display;
         let mirrors = self.first_mirror.map(|first| {
             let tracer = &self.tracer;
-            let others = shot.scene.instances()[first + 1..].iter().any(|instance| mirror::reflectance(instance) > 0.0);
+            let others = render_request.scene.instances()[first + 1..]
+                .iter()
+                .any(|instance| mirror::reflectance(instance) > 0.0);
             let bounds = (only_first || !others)
                 .then(|| tracer.bounds_without(first as u32))
                 .flatten()
@@ -272,15 +274,17 @@ impl PreparedFrame {
         });
         ShadingContext {
             projection,
-            lens: shot.lens,
-            poses: shot.poses,
+            lens: render_request.lens,
+            poses: render_request.poses,
             placed: &self.list.placed,
             shade: ShadeContext {
-                scene: shot.scene,
+                scene: render_request.scene,
                 lighting: &self.lighting,
                 shadows: &self.shadows[..self.map_count],
                 shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
-                pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel_spacing() as f32),
+                pixel: render_request
+                    .lens
+                    .map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel_spacing() as f32),
             },
             mirrors,
             surface,
@@ -347,8 +351,8 @@ fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
 }
 
 /// Number of triangles of all meshes, at their level of detail.
-fn triangle_count(cfg: RasterCfg, shot: &RenderRequest<'_>) -> usize {
-    let RenderRequest { scene, poses, view, .. } = *shot;
+fn triangle_count(cfg: RasterCfg, render_request: &RenderRequest<'_>) -> usize {
+    let RenderRequest { scene, poses, view, .. } = *render_request;
     if !cfg.lod {
         return scene.triangle_count();
     }
@@ -362,10 +366,10 @@ fn triangle_count(cfg: RasterCfg, shot: &RenderRequest<'_>) -> usize {
 }
 
 /// Approximate time of a frame \[ns\]: decides if another thread pays off.
-pub(crate) fn estimate_cost_ns(cfg: RasterCfg, shot: &RenderRequest<'_>, frame: &FrameMut<'_>) -> usize {
-    let RenderRequest { scene, view, .. } = *shot;
+pub(crate) fn estimate_cost_ns(cfg: RasterCfg, render_request: &RenderRequest<'_>, frame: &FrameMut<'_>) -> usize {
+    let RenderRequest { scene, view, .. } = *render_request;
     let wants_color = frame.wants(Stage::Color);
-    let (pixels, triangles) = (view.width.saturating_mul(view.height), triangle_count(cfg, shot));
+    let (pixels, triangles) = (view.width.saturating_mul(view.height), triangle_count(cfg, render_request));
     let shadows = if wants_color && cfg.shadows {
         let texels = shadow_side(cfg, view).pow(2);
         scene.lights.len().min(MAX_SHADOWS) * (2 * texels + 20 * triangles) + 5 * pixels

@@ -265,7 +265,7 @@ impl ShadowBand<'_> {
         level: SimdLevel,
         scene: &RenderScene,
         tile: &mut Tile,
-        painter: &mut VisibilityRasterizer,
+        rasterizer: &mut VisibilityRasterizer,
     ) {
         let Self { projection, list, first, max_texels, nearness, range } = self;
         let wide = projection.width / BLOCK;
@@ -274,7 +274,7 @@ impl ShadowBand<'_> {
         tile.clear([0, first * BLOCK], [wide, rows], 1, projection.farthest());
         at_level!(level, s => {
             for item in &list.opaque {
-                painter.draw(s, tile, projection, scene, &list.placed, item);
+                rasterizer.draw(s, tile, projection, scene, &list.placed, item);
             }
             tile.finish();
             s.vectorize(

@@ -156,8 +156,9 @@ fn failed_jobs() {
     for (threads, count) in [(1, 3), (2, 3), (4, 3), (2, 5), (2, 9)] {
         let mut frames = vec![still.frame(); count];
         let failed = |k| k == 1 || k == count - 1;
-        let shot = |k| RenderRequest { poses: if failed(k) { &[] } else { &still.poses }, ..still.request() };
-        let mut jobs: Vec<_> = frames.iter_mut().enumerate().map(|(k, frame)| (shot(k), frame.as_mut())).collect();
+        let render_request = |k| RenderRequest { poses: if failed(k) { &[] } else { &still.poses }, ..still.request() };
+        let mut jobs: Vec<_> =
+            frames.iter_mut().enumerate().map(|(k, frame)| (render_request(k), frame.as_mut())).collect();
         let (index, _) = ParallelRenderer::new(still.cfg, threads).render(&mut jobs).unwrap_err();
         assert_eq!(index, 1);
         for (k, frame) in frames.iter().enumerate() {

@@ -388,8 +388,8 @@ fn display_sum() {
         let (scene, poses) = instances([(Plane::INFINITE, matte([base, 0.5 * base, 0.25 * base]), PoseF32::IDENTITY)]);
         let mut scene = unlit(scene);
         scene.lighting_space = LightingSpace::Display;
-        let lamp = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
-        scene.lights = directions.map(lamp).to_vec();
+        let directional = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
+        scene.lights = directions.map(directional).to_vec();
         let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
         let still = TestFrame::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
         let renderers = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];

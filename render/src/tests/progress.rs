@@ -39,13 +39,14 @@ fn done(samples: u64) -> Numbers {
 #[test]
 fn totals() {
     let ((scene, poses), view) = (humanoid(), view([33, 21]));
-    let shot = |poses| RenderRequest { scene: &scene, poses, view: &view, lights: None, lens: None, previous: None };
+    let render_request =
+        |poses| RenderRequest { scene: &scene, poses, view: &view, lights: None, lens: None, previous: None };
     for threads in [1, 3] {
         let mut rasterizer = rasterizer(8, threads);
         let progress = rasterizer.progress().clone();
         assert_eq!((progress.total(), progress.fraction(), progress.remaining()), (0, None, None));
         let mut frames = [0, 1].map(|_| Frame::new(33, 21, Channels::ALL));
-        let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot(&poses), frame.as_mut())).collect();
+        let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (render_request(&poses), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).unwrap();
         assert_eq!(numbers(&progress), done(2 * 33 * 21 * 8));
         // Each path has at least one ray; with two bounces at most three, and one shadow ray for each light at each
@@ -62,7 +63,8 @@ fn totals() {
     broken[0].rotation = [[0.0; 3]; 3];
     let mut rasterizer = rasterizer(8, 2);
     let [mut first, mut second] = [0, 1].map(|_| Frame::new(33, 21, Channels::ALL));
-    let result = rasterizer.render(&mut [(shot(&broken), first.as_mut()), (shot(&poses), second.as_mut())]);
+    let result =
+        rasterizer.render(&mut [(render_request(&broken), first.as_mut()), (render_request(&poses), second.as_mut())]);
     assert!(matches!(result, Err((0, RenderError::InstancePose { .. }))));
     assert_eq!(numbers(rasterizer.progress()), done(33 * 21 * 8));
 }
@@ -76,7 +78,8 @@ fn cancel() {
     frame.color.as_mut().unwrap().fill(77);
     frame.mask.as_mut().unwrap().fill(5);
     let before = frame.clone();
-    let shot = RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
+    let render_request =
+        RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
     let progress = rasterizer.progress().clone();
     let canceler = std::thread::spawn({
         let progress = progress.clone();
@@ -90,7 +93,7 @@ fn cancel() {
             left
         }
     });
-    let (index, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
+    let (index, error) = rasterizer.render(&mut [(render_request, frame.as_mut())]).unwrap_err();
     let left = canceler.join().unwrap();
     let RenderError::Canceled { samples, total } = error else { panic!("{error}") };
     assert_eq!((index, total), (0, 64 * 64 * u64::from(Renderer::MAX_SAMPLES)));
@@ -100,19 +103,19 @@ fn cancel() {
     assert_eq!(frame, before);
     // It stays canceled until it is resumed.
     rasterizer.set_renderer(paths(1));
-    let (_, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
+    let (_, error) = rasterizer.render(&mut [(render_request, frame.as_mut())]).unwrap_err();
     assert_eq!(error, RenderError::Canceled { samples: 0, total: 64 * 64 });
     assert_eq!(frame, before);
     progress.resume();
-    rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap();
+    rasterizer.render(&mut [(render_request, frame.as_mut())]).unwrap();
     assert!(frame != before && progress.fraction() == Some(1.0));
     // A clone of a renderer has its own progress and is not canceled with the original.
     let mut clone = rasterizer.clone();
     progress.cancel();
     clone.set_renderer(paths(2));
-    clone.render(&mut [(shot, frame.as_mut())]).unwrap();
+    clone.render(&mut [(render_request, frame.as_mut())]).unwrap();
     assert_eq!((clone.progress().samples(), progress.samples()), (2 * 64 * 64, 64 * 64));
-    assert!(rasterizer.render(&mut [(shot, frame.as_mut())]).is_err());
+    assert!(rasterizer.render(&mut [(render_request, frame.as_mut())]).is_err());
     let single = ImageRenderer { renderer: paths(4), ..ImageRenderer::default() };
     let clone = single.clone();
     single.progress.cancel();

@@ -285,8 +285,8 @@ impl RayTracer {
         let most = if matches!(body, Some(InstanceGeometry::Closed(_))) { 1 } else { MAX_FRONT_HITS };
         let (mut from, mut left, mut count) = (*ray, limit, 0);
         for _ in 0..most {
-            let met = self.intersect(thing, &from, left, time, stack);
-            let Some(hit) = met.and_then(|found| self.hit(found, time)) else { break };
+            let found_hit = self.intersect(thing, &from, left, time, stack);
+            let Some(hit) = found_hit.and_then(|found| self.hit(found, time)) else { break };
             count += i32::from(dot(hit.normal, ray.direction) < 0.0);
             let onward =
                 hit.distance + RAY_OFFSET * from.origin.iter().fold(hit.distance.max(1.0), |m, x| m.max(x.abs()));

@@ -265,13 +265,13 @@ mod tests {
             Cylinder { radius: 0.25, half_length: 0.4 }.into(),
             Box { half: [0.2, 0.3, 0.4] }.into(),
         ];
-        let mut dice = crate::geometry::TestRng(41);
+        let mut rng = crate::geometry::TestRng(41);
         for shape in &shapes {
             let (mut hits, mut differ) = (0, 0);
             for packet in 0..300 {
                 // From outside, and from inside; some directions are not of unit length.
-                let from = dice.point(if packet % 3 == 0 { 0.15 } else { 2.0 }).map(|x| x as f32);
-                let to: [[f64; 3]; LANES] = std::array::from_fn(|_| dice.point(0.5));
+                let from = rng.point(if packet % 3 == 0 { 0.15 } else { 2.0 }).map(|x| x as f32);
+                let to: [[f64; 3]; LANES] = std::array::from_fn(|_| rng.point(0.5));
                 let directions: [[f32; LANES]; 3] =
                     std::array::from_fn(|axis| to.map(|to| to[axis] as f32 - from[axis]));
                 for level in all_levels() {

@@ -73,15 +73,15 @@ mod tests {
     /// six times that fail once in 5e8 seeds, and the seeds here are fixed.
     #[test]
     fn moments() {
-        let dice = Philox::keyed(3, 1, "camera");
+        let rng = Philox::keyed(3, 1, "camera");
         let n = 200_000.0;
-        let normals: Vec<f64> = (0..50_000).flat_map(|k| dice.normals([k, 0, 7, 1])).collect();
+        let normals: Vec<f64> = (0..50_000).flat_map(|k| rng.normals([k, 0, 7, 1])).collect();
         let moment = |numbers: &[f64], power: i32| numbers.iter().map(|x| x.powi(power)).sum::<f64>() / n;
         let root = f64::sqrt(n);
         for (power, expected, variance) in [(1, 0.0, 1f64), (2, 1.0, 2.0), (4, 3.0, 96.0)] {
             assert!((moment(&normals, power) - expected).abs() < 6.0 * variance.sqrt() / root, "moment {power}");
         }
-        let uniforms: Vec<f64> = (0..50_000).flat_map(|k| dice.uniforms([0, k, 7, 1])).collect();
+        let uniforms: Vec<f64> = (0..50_000).flat_map(|k| rng.uniforms([0, k, 7, 1])).collect();
         assert!((moment(&uniforms, 1) - 0.5).abs() < 6.0 * (1.0 / 12.0_f64).sqrt() / root);
         let second: f64 = uniforms.iter().map(|x| (x - 0.5).powi(2)).sum::<f64>() / n;
         assert!((second - 1.0 / 12.0).abs() < 6.0 * (1.0 / 180.0_f64).sqrt() / root);
@@ -90,7 +90,7 @@ mod tests {
         let near = product(&normals, &normals[1..]);
         assert!(near.abs() < 6.0 / root, "{near}");
         let [a, b, c] = [Philox::keyed(4, 1, "camera"), Philox::keyed(3, 2, "camera"), Philox::keyed(3, 1, "camerb")];
-        let places = [[0, 1, 7, 1], [0, 0, 8, 1], [0, 0, 7, 2], [1, 0, 7, 1]].map(|place| (&dice, place));
+        let places = [[0, 1, 7, 1], [0, 0, 8, 1], [0, 0, 7, 2], [1, 0, 7, 1]].map(|place| (&rng, place));
         for (key, [x, y, z, w]) in places.into_iter().chain([&a, &b, &c].map(|key| (key, [0, 0, 7, 1]))) {
             let others: Vec<f64> = (0..50_000).flat_map(|k| key.normals([x + k, y, z, w])).collect();
             assert!(product(&normals, &others).abs() < 6.0 / root, "{key:?} {:?}", [x, y, z, w]);

@@ -68,7 +68,7 @@ impl CapturedFrame {
     }
 
     /// Captures an environment. The state must be checked before.
-    fn capture(&mut self, seen: &Observation<'_>, ticket: RngKey, opening: Option<&ShutterOpenPoses>) {
+    fn capture(&mut self, seen: &Observation<'_>, key: RngKey, opening: Option<&ShutterOpenPoses>) {
         let Observation { state, env, .. } = *seen;
         let Some(visible) = &state.visible else { return };
         copy_row(&mut self.poses, &visible.instance_poses, env);
@@ -76,7 +76,7 @@ impl CapturedFrame {
         self.scene.clone_from(state.visible_scene(env));
         self.world_from_parent = Some(seen.parent_pose());
         self.stamp = state.time[env];
-        self.rng_key = ticket;
+        self.rng_key = key;
         if let Some(markers) = &state.markers {
             self.markers.clone_from(&markers[env]);
         }
@@ -193,10 +193,10 @@ impl FrameBuffer {
         schedule: Schedule,
         scene: &RenderScene,
         viewpoints: &Viewpoints,
-        ticket: RngKey,
+        key: RngKey,
     ) -> Self {
         let rows = viewpoints.len();
-        let frame = CapturedFrame::new(scene, ticket, !cfg.shutter.is_instant());
+        let frame = CapturedFrame::new(scene, key, !cfg.shutter.is_instant());
         let arrived = DeliveredFrame { frame: frame.clone(), viewpoint: *viewpoints.row(0), rays: None };
         let latency = u64::from(cfg.latency_steps);
         Self {
@@ -220,18 +220,18 @@ impl FrameBuffer {
         &mut self,
         row: usize,
         seen: &Observation<'_>,
-        ticket: RngKey,
+        key: RngKey,
         opening: Option<&ShutterOpenPoses>,
         viewpoints: &Viewpoints,
     ) -> bool {
-        if self.dropout > 0.0 && ticket.uniforms(RngStream::DROPOUT, 0)[0] < self.dropout {
+        if self.dropout > 0.0 && key.uniforms(RngStream::DROPOUT, 0)[0] < self.dropout {
             return false;
         }
         if let Some(delay) = &mut self.delay {
-            delay.push(row, seen.state.step[seen.env]).capture(seen, ticket, opening);
+            delay.push(row, seen.state.step[seen.env]).capture(seen, key, opening);
             return false;
         }
-        self.shown[row].capture(seen, ticket, opening);
+        self.shown[row].capture(seen, key, opening);
         self.stamps[row] = self.shown[row].stamp;
         self.delivered.push(FrameSource::with_current_viewpoint(row, &self.shown[row], viewpoints));
         true
@@ -252,11 +252,11 @@ impl FrameBuffer {
     }
 
     /// Shows the current state of an environment after a reset or a write. This is not a measurement.
-    pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>, ticket: RngKey) {
+    pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>, key: RngKey) {
         if let Some(delay) = &mut self.delay {
             delay.refresh(row, seen.state.step[seen.env]);
         }
-        self.shown[row].capture(seen, ticket, None);
+        self.shown[row].capture(seen, key, None);
         self.stamps[row] = self.shown[row].stamp;
     }
 

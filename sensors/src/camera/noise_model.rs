@@ -41,8 +41,8 @@ impl SensorNoiseModel {
     pub(super) fn apply(&mut self, jobs: &mut [RenderJob<'_>], keys: &[RngKey]) {
         let Self { imperfections, tone, noise, workers, pool } = self;
         let noise = noise.as_ref();
-        pool.for_each(workers, jobs.iter_mut().zip(keys), |(), ((shot, frame), rng_key)| {
-            imperfections.apply(frame, *tone, ImageContext { view: shot.view, rays: shot.lens, rng_key });
+        pool.for_each(workers, jobs.iter_mut().zip(keys), |(), ((request, frame), rng_key)| {
+            imperfections.apply(frame, *tone, ImageContext { view: request.view, rays: request.lens, rng_key });
             if let Some(noise) = noise {
                 noise.apply(frame, rng_key);
             }

@@ -252,10 +252,10 @@ impl VisualScene {
         if let Some(light) = lighting::dome_light_sum(lights) {
             scene.ambient = Hemisphere { sky: light, ground: light };
         }
-        for (index, lamp) in lights.iter().enumerate() {
+        for (index, light_cfg) in lights.iter().enumerate() {
             let light = model.id(ObjectKind::Light, &light_name(index)).and_then(|light| scene.lights.get_mut(light));
             if let Some(light) = light {
-                light.radius = lamp.radius as f32;
+                light.radius = light_cfg.radius as f32;
             }
         }
         self

@@ -81,7 +81,7 @@ fn renderers() {
         RenderRequest { scene: &scene, poses: &poses, view: &small, lights: None, lens: None, previous: None };
     let moving = RenderRequest { previous: Some(PreviousState { poses: &moved, view: &small }), ..static_request };
     let lens = RenderRequest { view: &wide, lens: Some(&rays), ..static_request };
-    for (what, shot, channels, renderer) in [
+    for (what, request, channels, renderer) in [
         ("still", static_request, FOUR, Renderer::Hybrid),
         ("still", static_request, FOUR, Renderer::FastRayTraced),
         ("still", static_request, FOUR, paths(2)),
@@ -90,11 +90,11 @@ fn renderers() {
         ("lens", lens, FOUR, Renderer::FastRayTraced),
         ("lens", lens, FOUR, paths(1)),
     ] {
-        let mut frame = Frame::new(shot.view.width, shot.view.height, channels);
+        let mut frame = Frame::new(request.view.width, request.view.height, channels);
         let mut rasterizer = ImageRenderer::default();
         rasterizer.renderer = renderer;
         assert_steady(&format!("{what}, {renderer:?}"), || {
-            rasterizer.render_request(&shot, &mut frame.as_mut()).unwrap();
+            rasterizer.render_request(&request, &mut frame.as_mut()).unwrap();
         });
     }
 }
@@ -114,8 +114,8 @@ fn rolling_shutter() {
     rasterizer.renderer = paths(2);
     rasterizer.aperture = Some(Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 });
     rasterizer.shutter = Shutter { row_time: 1e-3, exposure_time: 0.01 };
-    let shot = RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
-    assert_steady("paths", || rasterizer.render_sample(&shot, &take, &mut frame.as_mut()).unwrap());
+    let request = RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
+    assert_steady("paths", || rasterizer.render_sample(&request, &take, &mut frame.as_mut()).unwrap());
 }
 
 /// Objects that enter the light and the image, approach and separate cause no further allocation.
@@ -156,9 +156,9 @@ fn batches() {
         let counting = Arc::new(AllocationCounter::default());
         let mut rasterizer = ParallelRenderer::new(RasterCfg::default(), 3).with_pool(counting.pool(3));
         let mut images = vec![Frame::new(view.width, view.height, FOUR); frames];
-        let shot =
+        let request =
             RenderRequest { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, previous: None };
-        let mut jobs: Vec<_> = images.iter_mut().map(|frame| (shot, frame.as_mut())).collect();
+        let mut jobs: Vec<_> = images.iter_mut().map(|frame| (request, frame.as_mut())).collect();
         let mut draw = || {
             rasterizer.render(&mut jobs).unwrap();
             counting.allocations.swap(0, Ordering::Relaxed)

@@ -25,9 +25,9 @@ pub fn reset_joints_by_offset(
     velocities: [f64; 2],
 ) -> Result<EventTerm> {
     let (_, joints) = find_joints(sim, robot, patterns)?;
-    Ok(EventTerm::on_reset(name, move |sim, dice| {
+    Ok(EventTerm::on_reset(name, move |sim, rng| {
         let starts = sim.robot(robot).default_qpos();
-        for die in dice {
+        for die in rng {
             let env = die.env();
             let mut drawn =
                 |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.uniform_range(low, high));

@@ -24,8 +24,8 @@ pub struct RootRanges {
 /// from the default root pose. With a fixed base, the event returns an error.
 pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> EventTerm {
     let drawn = |die: &mut EpisodeRng, ranges: [[f64; 2]; 3]| ranges.map(|[low, high]| die.uniform_range(low, high));
-    EventTerm::on_reset(name, move |sim, dice| {
-        for die in dice {
+    EventTerm::on_reset(name, move |sim, rng| {
+        for die in rng {
             let start: [f64; 7] = {
                 let starts = sim.robot(robot).default_root_pose();
                 std::array::from_fn(|k| starts[(die.env().0, k)])

@@ -58,9 +58,9 @@ pub(crate) fn all_terms_task(cfg: SimulationManagerCfg) -> Env {
     let pole = sim.robot(robot).link_id("pole").unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: 2, episode_steps: Some(40) })
         .action(push)
-        .command(CommandTerm::new("goal", ["x"], |dice| [dice.uniform_range(-0.5, 0.5)]))
-        .event(EventTerm::new("masses", EventMode::Startup, |sim, dice| {
-            for die in dice {
+        .command(CommandTerm::new("goal", ["x"], |rng| [rng.uniform_range(-0.5, 0.5)]))
+        .event(EventTerm::new("masses", EventMode::Startup, |sim, rng| {
+            for die in rng {
                 let mass = die.uniform_range(0.5, 2.0);
                 sim.properties_mut().randomize_with(Some(&[die.env()]), |_, _, properties| {
                     properties.set(Property::Mass, "cart/cart", &[mass])?;
@@ -69,15 +69,15 @@ pub(crate) fn all_terms_task(cfg: SimulationManagerCfg) -> Env {
             }
             Ok(())
         }))
-        .event(EventTerm::on_reset("start", move |sim, dice| {
-            for die in dice {
+        .event(EventTerm::on_reset("start", move |sim, rng| {
+            for die in rng {
                 let start = array![[die.uniform_range(-0.2, 0.2), die.uniform_range(-0.1, 0.1)]];
                 sim.robot_mut(robot).write_qpos(&start, None, Some(&[die.env()]))?;
             }
             Ok(())
         }))
-        .event(EventTerm::new("gust", EventMode::Interval { steps: [5, 15] }, move |sim, dice| {
-            for die in dice {
+        .event(EventTerm::new("gust", EventMode::Interval { steps: [5, 15] }, move |sim, rng| {
+            for die in rng {
                 let force = array![[[0.2 * die.normal(), 0.0, 0.0]]];
                 let (none, world) = (Array3::zeros((1, 1, 3)), WrenchFrame::World);
                 sim.robot_mut(robot).set_external_wrench(&force, &none, world, Some(&[pole]), Some(&[die.env()]))?;

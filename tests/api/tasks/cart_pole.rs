@@ -98,8 +98,8 @@ fn loop_by_hand() {
         .termination(TerminationTerm::new("fell", move |now| {
             Ok(now.sim().robot(robot).qpos().column(1).mapv(|angle| angle.abs() > FALLEN))
         }))
-        .event(EventTerm::on_reset("start", move |sim, dice| {
-            for die in dice {
+        .event(EventTerm::on_reset("start", move |sim, rng| {
+            for die in rng {
                 let start = start(die.seed(), die.global_env(), die.episode());
                 sim.robot_mut(robot).write_qpos(&start, None, Some(&[die.env()]))?;
             }

@@ -129,9 +129,9 @@ type Log = Arc<Mutex<Vec<(usize, u64, u64)>>>;
 fn events() {
     let log = |times: &Log, name: &'static str, when: EventMode| {
         let times = Arc::clone(times);
-        EventTerm::new(name, when, move |_, dice| {
+        EventTerm::new(name, when, move |_, rng| {
             let mut times = times.lock().unwrap();
-            times.extend(dice.iter().map(|die| (die.env().0, die.episode(), die.seed())));
+            times.extend(rng.iter().map(|die| (die.env().0, die.episode(), die.seed())));
             Ok(())
         })
     };

@@ -75,8 +75,9 @@ fn our_images(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, MaskIds
     let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
     let mut frame = Frame::new(SIZE[0], SIZE[1], channels);
     let cfg = RasterCfg { shadows: false, samples: 1, lod: false, ..RasterCfg::default() };
-    let shot = RenderRequest { scene, poses: &poses, view: &view, lights: Some(&lights), lens: None, previous: None };
-    ImageRenderer::new(cfg).render_request(&shot, &mut frame.as_mut()).unwrap();
+    let request =
+        RenderRequest { scene, poses: &poses, view: &view, lights: Some(&lights), lens: None, previous: None };
+    ImageRenderer::new(cfg).render_request(&request, &mut frame.as_mut()).unwrap();
     let color = frame.color.unwrap().as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
     let images = Images { depth: frame.depth.unwrap(), ids: frame.mask.unwrap(), color };
     let mask_of = |geom: usize| {

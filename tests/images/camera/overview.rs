@@ -93,8 +93,8 @@ fn persistent_threads() {
     let draw = |rasterizer: &mut ParallelRenderer| {
         let views = [0.0, 0.4, 0.8, 1.2].map(|shift| View { cx: 200.0 + 100.0 * shift, ..above() });
         let mut frames = [(); 4].map(|()| Frame::new(SIZE[0], SIZE[1], channels));
-        let shots = views.iter().map(|view| still.render_request(view)).zip(&mut frames);
-        let mut jobs: Vec<_> = shots.map(|(shot, frame)| (shot, frame.as_mut())).collect();
+        let requests = views.iter().map(|view| still.render_request(view)).zip(&mut frames);
+        let mut jobs: Vec<_> = requests.map(|(request, frame)| (request, frame.as_mut())).collect();
         rasterizer.render(&mut jobs).unwrap();
         drop(jobs);
         frames

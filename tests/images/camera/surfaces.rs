@@ -177,8 +177,8 @@ fn dome() {
     };
     let (first, second) = (LightCfg::dome(0.5, [1.0, 0.75, 0.0]), LightCfg::dome(2.0, [0.25; 3]));
     let expected = |c: [f32; 3]| [0, 1, 2].map(|k| 0.5 * decode_srgb([1.0, 0.75, 0.0][k]) + 2.0 * decode_srgb(c[k]));
-    let (found, lamps) = ambient(vec![first.clone(), LightCfg::default(), second]);
-    assert_eq!((found.sky, found.ground, lamps), (expected([0.25; 3]), expected([0.25; 3]), 1));
+    let (found, light_count) = ambient(vec![first.clone(), LightCfg::default(), second]);
+    assert_eq!((found.sky, found.ground, light_count), (expected([0.25; 3]), expected([0.25; 3]), 1));
     let (own, _) = ambient(vec![LightCfg::default()]);
     assert!(own.sky[2] > own.sky[0] && own.ground != own.sky, "the control: {own:?}");
     // The same in a scene file.

@@ -54,9 +54,9 @@ impl TestRng {
     pub(crate) fn primitives(&mut self, count: usize, free: usize, size: [f64; 2]) -> Data {
         let mut world = "<geom name='floor' type='plane' size='5 5 .1'/>".to_string();
         for k in 0..count {
-            world += &self.body([k, free], [[-1.0, 1.0], [-1.0, 1.0], [0.2, 1.4]], |dice| {
+            world += &self.body([k, free], [[-1.0, 1.0], [-1.0, 1.0], [0.2, 1.4]], |rng| {
                 let kind = ["sphere", "capsule", "ellipsoid", "cylinder", "box"][k % 5];
-                let [s, t, r] = dice.numbers([size; 3]);
+                let [s, t, r] = rng.numbers([size; 3]);
                 format!("<geom name='g{k}' type='{kind}' size='{s} {t} {r}'/>")
             });
         }

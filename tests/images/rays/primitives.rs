@@ -10,16 +10,16 @@ const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
 /// Rays from 20 m away, from close by, and from inside of shapes. Half of the bodies are welded to the world.
 #[test]
 fn shapes() {
-    let mut dice = TestRng(1);
+    let mut rng = TestRng(1);
     for scene in 0..6 {
-        let data = dice.primitives(24, 2, [0.05, 0.25]);
+        let data = rng.primitives(24, 2, [0.05, 0.25]);
         let mut rays = Vec::new();
         for _ in 0..4000 {
-            let ray = dice.ray(20.0, 1.0);
+            let ray = rng.ray(20.0, 1.0);
             let origin = [ray.origin[0], ray.origin[1], ray.origin[2].abs()];
             rays.push(ray_through(origin, Ray { origin, ..ray }.at(19.0)));
         }
-        rays.extend((0..4000).map(|_| dice.ray(1.0, 1.0)));
+        rays.extend((0..4000).map(|_| rng.ray(1.0, 1.0)));
         check(&format!("scene {scene}"), &data, &rays, 3000);
     }
 }
@@ -28,14 +28,14 @@ fn shapes() {
 /// the upper ends of the field's walls apart from its triangles.
 #[test]
 fn terrain_and_meshes() {
-    let mut dice = TestRng(2);
-    let terrain = height_field(33, |_| dice.number(0.0, 1.0) as f32);
-    let vertices: Vec<String> = (0..30).map(|_| dice.point(0.3).map(|x| format!("{x}")).join(" ")).collect();
+    let mut rng = TestRng(2);
+    let terrain = height_field(33, |_| rng.number(0.0, 1.0) as f32);
+    let vertices: Vec<String> = (0..30).map(|_| rng.point(0.3).map(|x| format!("{x}")).join(" ")).collect();
     // Without faces MuJoCo uses the convex hull.
     let hull = format!("<mesh name='hull' vertex='{}'/>", vertices.join("  "));
     let mut world = "<geom name='terrain' type='hfield' hfield='h' euler='3 -2 40' pos='.1 .2 0'/>".to_string();
     for k in 0..14 {
-        world += &dice.body([k, 3], [[-1.5, 1.5], [-1.5, 1.5], [0.6, 1.8]], |_| {
+        world += &rng.body([k, 3], [[-1.5, 1.5], [-1.5, 1.5], [0.6, 1.8]], |_| {
             format!("<geom name='m{k}' type='mesh' mesh='{}'/>", ["hull", "fan"][k % 2])
         });
     }
@@ -43,8 +43,8 @@ fn terrain_and_meshes() {
     let data = data_with(&assets, &world, &[terrain]);
     let mut rays = Vec::new();
     for k in 0..8000 {
-        let origin = dice.numbers([[-8.0, 8.0], [-8.0, 8.0], [0.9, 20.0]]);
-        let target = dice.numbers([[-2.0, 2.0], [-1.5, 1.5], [0.0, 1.0]]);
+        let origin = rng.numbers([[-8.0, 8.0], [-8.0, 8.0], [0.9, 20.0]]);
+        let target = rng.numbers([[-2.0, 2.0], [-1.5, 1.5], [0.0, 1.0]]);
         rays.push(match k % 4 {
             0 => Ray { origin: [target[0], target[1], 20.0], direction: DOWN },
             _ => ray_through(origin, target),
@@ -63,10 +63,10 @@ fn ten_micrometers() {
         ))
     };
     let (data, moved) = (at(0.5), at(0.500_01));
-    let mut dice = TestRng(3);
+    let mut rng = TestRng(3);
     let mut down = Vec::new();
     for _ in 0..2000 {
-        let [x, y] = dice.numbers([[-0.3, 0.8], [-0.2, 0.2]]);
+        let [x, y] = rng.numbers([[-0.3, 0.8], [-0.2, 0.2]]);
         down.push(Ray { origin: [x, y, 20.0], direction: DOWN });
     }
     check("in place", &data, &down, 1900);

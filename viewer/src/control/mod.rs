@@ -171,16 +171,16 @@ pub trait ViewerExt {
 
 impl ViewerExt for SimulationManager {
     fn viewer(&mut self, wants: SnapshotRequest) -> Viewer {
-        let viewer = with_view_controller(self, |conductor, sim| {
-            let viewer = conductor.add_viewer(wants);
-            conductor.publish(sim);
+        let viewer = with_view_controller(self, |controller, sim| {
+            let viewer = controller.add_viewer(wants);
+            controller.publish(sim);
             viewer
         });
         viewer.unwrap_or_else(Viewer::ended)
     }
 
     fn set_record_button(&mut self, button: RecordButton) {
-        with_view_controller(self, |conductor, sim| conductor.set_button(sim, button));
+        with_view_controller(self, |controller, sim| controller.set_button(sim, button));
     }
 }
 
@@ -192,8 +192,8 @@ fn with_view_controller<T>(
     let known = sim.observers().ids::<ViewController>().first().copied();
     let id = known.unwrap_or_else(|| sim.observers_mut().add(ViewController::new()));
     // The controller is removed and added again, because `act` needs the whole simulation. No other code removes it.
-    let mut conductor = sim.observers_mut().remove(id).ok()?;
-    let done = act(&mut conductor, sim);
-    sim.observers_mut().add(conductor);
+    let mut controller = sim.observers_mut().remove(id).ok()?;
+    let done = act(&mut controller, sim);
+    sim.observers_mut().add(controller);
     Some(done)
 }

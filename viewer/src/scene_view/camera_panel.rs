@@ -64,15 +64,15 @@ impl CameraPanel {
         self.rasterizer.set_cfg(cfg());
         let (poses, lights) = (stage.snapshot.instances.as_slice(), Some(stage.snapshot.lights.as_slice()));
         let lens = self.rays.as_ref().filter(|_| has_distortion);
-        let shot = RenderRequest { scene: &scene, poses, view: &view, lights, lens, previous: None };
-        if self.rasterizer.render(&mut [(shot, self.frame.as_mut())]).is_err() {
+        let request = RenderRequest { scene: &scene, poses, view: &view, lights, lens, previous: None };
+        if self.rasterizer.render(&mut [(request, self.frame.as_mut())]).is_err() {
             return false;
         }
         if let Some((scene, poses)) = with_markers(&scene, poses, &looks.markers) {
             self.rasterizer.set_cfg(RasterCfg { groups: cfg().groups | 1 << MARKER_GROUP, ..cfg() });
-            let shot = RenderRequest { scene: &scene, poses: &poses, ..shot };
+            let request = RenderRequest { scene: &scene, poses: &poses, ..request };
             let frame = FrameMut { color: self.frame.color.as_deref_mut(), ..FrameMut::default() };
-            if self.rasterizer.render(&mut [(shot, frame)]).is_err() {
+            if self.rasterizer.render(&mut [(request, frame)]).is_err() {
                 return false;
             }
         }

@@ -20,13 +20,13 @@ pub(crate) struct MouseSpring {
 impl MouseSpring {
     /// Grabs the body at a pixel; `None` if the pixel shows no body.
     pub(crate) fn grab(
-        painter: &mut SceneRenderer,
+        renderer: &mut SceneRenderer,
         snapshot: &Snapshot,
         view: &View,
         look: &ViewOptions<'_>,
         pixel: [f64; 2],
     ) -> Option<Self> {
-        let picked = painter.pick(snapshot, view, look, pixel)?;
+        let picked = renderer.pick(snapshot, view, look, pixel)?;
         picked.body?;
         let origin = snapshot.envs.get(picked.env)?.origin;
         let in_overview = [0, 1, 2].map(|k| (picked.point[k] + origin[k]) as f32);

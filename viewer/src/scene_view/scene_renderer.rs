@@ -94,9 +94,10 @@ impl SceneRenderer {
         if let Some(scene) = &self.assembly.scene {
             let groups = look.overlays.geom_groups() | 1 << MARKER_GROUP;
             self.rasterizer.set_cfg(RasterCfg { groups, ..self.cfg });
-            let shot = RenderRequest { scene, poses: &self.assembly.poses, view, lights, lens: None, previous: None };
+            let request =
+                RenderRequest { scene, poses: &self.assembly.poses, view, lights, lens: None, previous: None };
             let frame = FrameMut { color: Some(canvas.bytes_mut()), ..FrameMut::default() };
-            self.rasterizer.render(&mut [(shot, frame)]).map_err(|(_, error)| error)?;
+            self.rasterizer.render(&mut [(request, frame)]).map_err(|(_, error)| error)?;
         }
         if let Some(trails) = look.trails.filter(|_| look.overlays.trails) {
             trails.draw(snapshot, look.envs, view, canvas);
@@ -122,7 +123,7 @@ impl SceneRenderer {
         let frame = FrameMut { mask: Some(&mut mask), position: Some(&mut position), ..FrameMut::default() };
         // A single pixel costs nothing, so full detail is used.
         self.rasterizer.set_cfg(RasterCfg { groups: look.overlays.geom_groups(), lod: false, ..self.cfg });
-        let shot = RenderRequest {
+        let request = RenderRequest {
             scene,
             poses: &self.assembly.poses,
             view: &pixel,
@@ -130,7 +131,7 @@ impl SceneRenderer {
             lens: None,
             previous: None,
         };
-        self.rasterizer.render(&mut [(shot, frame)]).ok()?;
+        self.rasterizer.render(&mut [(request, frame)]).ok()?;
         let &(env, instance) = self.assembly.instance_sources.get(usize::try_from(mask[0] - 1).ok()?)?;
         Selection::new(snapshot, env, instance, position)
     }

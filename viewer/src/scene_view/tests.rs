@@ -36,16 +36,16 @@ impl Sample {
     }
 }
 
-fn painted(painter: &mut SceneRenderer, snapshot: &Snapshot, view: &View, look: &ViewOptions<'_>) -> Canvas {
+fn painted(scene_renderer: &mut SceneRenderer, snapshot: &Snapshot, view: &View, look: &ViewOptions<'_>) -> Canvas {
     let mut canvas = Canvas::default();
-    painter.draw(snapshot, view, look, &mut canvas).unwrap();
+    scene_renderer.draw(snapshot, view, look, &mut canvas).unwrap();
     canvas
 }
 
 #[test]
 fn picking() {
     let (sample, snapshot) = stage(4);
-    let mut painter = SceneRenderer::new(1);
+    let mut scene_renderer = SceneRenderer::new(1);
     let origins = sample.sim.cfg().env_origins();
     for env in 0..4 {
         let origin = Vector3::from([0, 1, 2].map(|k| origins[(env, k)]));
@@ -53,7 +53,7 @@ fn picking() {
             let target = origin + Vector3::from(at);
             OrbitCamera::look_at((target + Vector3::new(0.3, 0.2, 1.5)).into(), target.into()).unwrap().view(201, 101)
         };
-        let mut pick = |view: &View| painter.pick(&snapshot, view, &ViewOptions::default(), [100.5, 50.5]);
+        let mut pick = |view: &View| scene_renderer.pick(&snapshot, view, &ViewOptions::default(), [100.5, 50.5]);
         // The center of the upper face of the cube, and of the plate, at the image center.
         for (name, at) in [("cube", [0.0, 0.0, 2.0 * CUBE_HALF_EDGE]), ("arm/plate", [1.0, 0.0, 0.525])] {
             let picked = pick(&above(at)).unwrap();
@@ -77,14 +77,14 @@ fn picking() {
 #[test]
 fn selected_cube() {
     let (_, snapshot) = stage(1);
-    let mut painter = SceneRenderer::new(1);
+    let mut scene_renderer = SceneRenderer::new(1);
     for distance in [0.8, 3.0] {
         let eye = OrbitCamera {
             distance,
             ..OrbitCamera::look_at([0.3, 0.2, 1.5], [0.0, 0.0, 2.0 * CUBE_HALF_EDGE]).unwrap()
         };
         let view = eye.view(201, 101);
-        let picked = painter.pick(&snapshot, &view, &ViewOptions::default(), [100.5, 50.5]).unwrap();
+        let picked = scene_renderer.pick(&snapshot, &view, &ViewOptions::default(), [100.5, 50.5]).unwrap();
         let cube = picked.body.unwrap() as u32;
         let mut sum = Vector3::zeros();
         for contact in &snapshot.envs[0].contacts {
@@ -96,12 +96,12 @@ fn selected_cube() {
         let text = selection_text(&picked, &snapshot).join("\n");
         assert!(text.starts_with("cube  (environment 0") && text.contains("+19.6"), "{text}");
         let look = ViewOptions { selection: Some(&picked), ..ViewOptions::default() };
-        let with = painted(&mut painter, &snapshot, &view, &look);
+        let with = painted(&mut scene_renderer, &snapshot, &view, &look);
         // A disc of radius 4 has 50 pixels. At least half of the marker is above the face; the tips of the axes add
         // some pixels.
-        let marked = differing_pixels(&with, &painted(&mut painter, &snapshot, &view, &ViewOptions::default()));
+        let marked = differing_pixels(&with, &painted(&mut scene_renderer, &snapshot, &view, &ViewOptions::default()));
         assert!((25..90).contains(&marked), "{marked} pixels from {distance} m");
-        assert_eq!(painter.pick(&snapshot, &view, &look, [100.5, 50.5]), Some(picked));
+        assert_eq!(scene_renderer.pick(&snapshot, &view, &look, [100.5, 50.5]), Some(picked));
     }
 }
 
@@ -109,25 +109,30 @@ fn selected_cube() {
 #[test]
 fn environments() {
     let (_, snapshot) = stage(4);
-    let mut painter = SceneRenderer::new(2);
+    let mut scene_renderer = SceneRenderer::new(2);
     let view = OrbitCamera::overview(&snapshot, [160, 120]).view(160, 120);
     let red =
         |canvas: &Canvas| canvas.bytes().chunks(4).filter(|p| p[0] > 100 && p[1] < p[0] / 2 && p[2] < p[0] / 2).count();
-    let all = painted(&mut painter, &snapshot, &view, &ViewOptions::default());
-    let one =
-        painted(&mut painter, &snapshot, &view, &ViewOptions { envs: EnvSelection::One(2), ..ViewOptions::default() });
+    let all = painted(&mut scene_renderer, &snapshot, &view, &ViewOptions::default());
+    let one = painted(
+        &mut scene_renderer,
+        &snapshot,
+        &view,
+        &ViewOptions { envs: EnvSelection::One(2), ..ViewOptions::default() },
+    );
     assert_eq!(all.dimensions(), [160, 120]);
     // Four red cubes, or one of them.
     let (all_red, one_red) = (red(&all), red(&one));
     assert!(one_red > 0 && all_red > 2 * one_red && all_red < 8 * one_red, "{all_red} {one_red}");
     // Rendering again, also with one thread, gives the same bits.
-    for painter in [&mut painter, &mut SceneRenderer::new(1)] {
-        assert!(painted(painter, &snapshot, &view, &ViewOptions::default()) == all);
+    for scene_renderer in [&mut scene_renderer, &mut SceneRenderer::new(1)] {
+        assert!(painted(scene_renderer, &snapshot, &view, &ViewOptions::default()) == all);
     }
     let overlays = Overlays { names: true, contacts: true, frames: true, ..Overlays::default() };
     for [width, height] in [[1, 1], [1, 500], [2000, 3]] {
         let view = OrbitCamera::default().view(width, height);
-        let canvas = painted(&mut painter, &snapshot, &view, &ViewOptions { overlays, ..ViewOptions::default() });
+        let canvas =
+            painted(&mut scene_renderer, &snapshot, &view, &ViewOptions { overlays, ..ViewOptions::default() });
         assert_eq!(canvas.dimensions(), [width, height]);
     }
 }
@@ -136,11 +141,11 @@ fn environments() {
 #[test]
 fn overlays() {
     let (mut sample, snapshot) = stage(2);
-    let mut painter = SceneRenderer::new(1);
+    let mut scene_renderer = SceneRenderer::new(1);
     let [x, y, _] = snapshot.envs[0].origin;
     let view = OrbitCamera { target: [x + 0.5, y, 0.3], distance: 1.5, ..OrbitCamera::default() }.view(200, 150);
     let mut draw = |snapshot: &Snapshot, overlays: Overlays, trails: Option<&Trails>| {
-        painted(&mut painter, snapshot, &view, &ViewOptions { overlays, trails, ..ViewOptions::default() })
+        painted(&mut scene_renderer, snapshot, &view, &ViewOptions { overlays, trails, ..ViewOptions::default() })
     };
     let none = Overlays { sensors: false, ..Overlays::default() };
     let plain = draw(&snapshot, none, None);

@@ -235,7 +235,7 @@ fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
         return response::send_error(stream, Status::UpgradeRequired, true);
     };
-    let Some(seat) = ViewerSlot::acquire(house) else {
+    let Some(slot) = ViewerSlot::acquire(house) else {
         return response::send_error(stream, Status::ServiceUnavailable, true);
     };
     let switch = format!(
@@ -248,5 +248,5 @@ fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
     if sent.is_ok() {
         websocket_session::run_session(stream, head.rest, house, house.backend.open_session());
     }
-    drop(seat);
+    drop(slot);
 }

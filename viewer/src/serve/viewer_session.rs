@@ -96,7 +96,7 @@ struct ViewerSession {
     camera: Option<String>,
     selection: Option<Selection>,
     mouse_spring: Option<MouseSpring>,
-    painter: SceneRenderer,
+    renderer: SceneRenderer,
     panel: CameraPanel,
     canvas: Canvas,
     /// Incremented by each change of the image that does not come from the simulation.
@@ -132,7 +132,7 @@ impl ViewerSession {
             camera: None,
             selection: None,
             mouse_spring: None,
-            painter: SceneRenderer::new(1),
+            renderer: SceneRenderer::new(1),
             panel: CameraPanel::new(1),
             canvas: Canvas::default(),
             view_revision: 1,
@@ -255,7 +255,7 @@ impl ViewerSession {
         let look = ViewOptions { envs: self.env_selection, overlays: self.overlays, ..ViewOptions::default() };
         let shared = Arc::clone(&self.shared);
         let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
-        find(&mut self.painter, &snapshot, &view, &look, pixel)
+        find(&mut self.renderer, &snapshot, &view, &look, pixel)
     }
 
     fn select(&mut self, picked: Option<Selection>) -> Result<(), String> {
@@ -323,7 +323,7 @@ impl ViewerSession {
         let look = ViewOptions { envs: self.env_selection, overlays, selection, trails, spring };
         let shared = Arc::clone(&self.shared);
         let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
-        self.painter.draw(snapshot, &view, &look, &mut self.canvas).ok()?;
+        self.renderer.draw(snapshot, &view, &look, &mut self.canvas).ok()?;
         let file = self.encode_jpeg()?;
         let description = json!({"shows": "stage", "type": "image/jpeg", "snapshot": snapshot.number});
         Some(EncodedImage { description, file })
@@ -412,8 +412,8 @@ impl ViewSession for ViewerSession {
                 self.send(control::Command::SetSpeed(Speed::Factor(factor)))
             }
             Command::Select { x, y } => {
-                let picked = self.with_view_at([x, y], |painter, snapshot, view, look, pixel| {
-                    painter.pick(snapshot, view, look, pixel)
+                let picked = self.with_view_at([x, y], |renderer, snapshot, view, look, pixel| {
+                    renderer.pick(snapshot, view, look, pixel)
                 });
                 self.select(picked)
             }

@@ -82,7 +82,7 @@ const PANEL_IMAGE_WIDTH: usize = 160;
 
 /// State of a simulation window.
 pub struct App {
-    painter: SceneRenderer,
+    renderer: SceneRenderer,
     panel: CameraPanel,
     /// Image of the camera panel.
     panel_canvas: Canvas,
@@ -142,7 +142,7 @@ impl App {
     /// requested speed.
     pub fn new(size: [usize; 2], threads: usize) -> Self {
         Self {
-            painter: SceneRenderer::new(threads),
+            renderer: SceneRenderer::new(threads),
             panel: CameraPanel::new(threads),
             panel_canvas: Canvas::default(),
             trails: Trails::default(),
@@ -421,7 +421,7 @@ impl App {
     fn begin_spring(&mut self, snapshot: &Snapshot, at: [f64; 2]) -> Option<DragMode> {
         let view = self.view();
         let look = ViewOptions { envs: self.visible_envs(), overlays: self.overlays, ..ViewOptions::default() };
-        let pull = MouseSpring::grab(&mut self.painter, snapshot, &view, &look, at)?;
+        let pull = MouseSpring::grab(&mut self.renderer, snapshot, &view, &look, at)?;
         self.selection = Some(pull.selection().clone());
         Some(DragMode::Spring(pull))
     }
@@ -478,7 +478,7 @@ impl App {
         let Some(snapshot) = self.snapshot.clone() else { return };
         let look = ViewOptions { envs: self.visible_envs(), overlays: self.overlays, ..ViewOptions::default() };
         let view = self.view();
-        self.selection = self.painter.pick(&snapshot, &view, &look, at);
+        self.selection = self.renderer.pick(&snapshot, &view, &look, at);
         self.followed_point = None;
         if let Some(picked) = self.selection.as_ref().filter(|picked| picked.body.is_some()) {
             self.env = picked.env;
@@ -538,19 +538,19 @@ impl App {
         };
         let (envs, overlays, selection) = (self.visible_envs(), self.overlays, self.selection.as_ref());
         let look = ViewOptions { envs, overlays, selection, trails: Some(&self.trails), spring };
-        self.painter.set_max_threads(self.thread_budget.threads(&snapshot.run, now));
+        self.renderer.set_max_threads(self.thread_budget.threads(&snapshot.run, now));
         // The snapshot number of a paused simulation changes only if a user changed something.
         let shows = (snapshot.number, view);
         let changed = self.last_rendered.replace(shows) != Some(shows);
         if let Some(fineness) = &mut self.adaptive_quality {
-            self.painter.set_samples(fineness.samples(changed, now));
+            self.renderer.set_samples(fineness.samples(changed, now));
         }
         let start = Instant::now();
         // The view of a window is always valid. If rendering fails, the canvas keeps its content.
-        let _ = self.painter.draw(&snapshot, &view, &look, canvas);
+        let _ = self.renderer.draw(&snapshot, &view, &look, canvas);
         if let Some(fineness) = &mut self.adaptive_quality {
             // The current image is not sent yet, so the duration of sending the last image serves as an estimate.
-            fineness.record_frame(self.painter.samples(), start.elapsed() + self.send_duration);
+            fineness.record_frame(self.renderer.samples(), start.elapsed() + self.send_duration);
         }
         let name = self.caption(&snapshot);
         let refused = if self.send_failed { Some(NOT_STEPPING) } else { snapshot.run.last_refusal.as_deref() };

@@ -415,14 +415,14 @@ fn sensor_view_of_one_environment() {
     }
     assert!(cubes > 3, "{cubes}");
     // Control: from the same pose without the camera, the other environment blocks the view.
-    let mut painter = SceneRenderer::new(1);
+    let mut renderer = SceneRenderer::new(1);
     let mut pose = through.world_from_camera;
     (0..3).for_each(|k| pose.translation[k] += [x, y, z][k] as f32);
     let view = View { world_from_camera: pose, ..through };
     let mut others = (0..48).flat_map(|v| (0..64).map(move |u| [f64::from(u) + 0.5, f64::from(v) + 0.5]));
     assert!(
         others
-            .any(|at| painter.pick(&snapshot, &view, &ViewOptions::default(), at).is_some_and(|other| other.env == 1))
+            .any(|at| renderer.pick(&snapshot, &view, &ViewOptions::default(), at).is_some_and(|other| other.env == 1))
     );
 }
 

@@ -134,7 +134,7 @@ pub(crate) fn play_fall(height: f64, watch: impl FnOnce(SocketAddr, &str) + Send
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
     sim.update(100);
     sim.finish_recording(recorder).unwrap();
-    let (film, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
+    let (playback, mut sim) = Playback::open(&Recording::open(&path).unwrap(), None).unwrap();
     let served =
         sim.serve_with("127.0.0.1:0", ServeCfg { speed: Some(Speed::REAL_TIME), ..ServeCfg::default() }).unwrap();
     let over = AtomicBool::new(false);
@@ -143,7 +143,7 @@ pub(crate) fn play_fall(height: f64, watch: impl FnOnce(SocketAddr, &str) + Send
             let _ends = Ends(&over);
             watch(served.address(), served.url());
         });
-        sim.play(&mut RecordingPlayback(film), &mut || !over.load(Ordering::Acquire)).unwrap();
+        sim.play(&mut RecordingPlayback(playback), &mut || !over.load(Ordering::Acquire)).unwrap();
     });
     served.close(&mut sim).unwrap();
 }

@@ -121,7 +121,7 @@ impl<S: Simd> Beam<S> {
             if z < end { z } else { end }
         };
         // One plain loop, which compilers vectorize.
-        let (mut from, mut met) = ([0.0f32; BVH_WIDTH], [0u32; BVH_WIDTH]);
+        let (mut from, mut hit) = ([0.0f32; BVH_WIDTH], [0u32; BVH_WIDTH]);
         for c in 0..BVH_WIDTH {
             let (z0, z1) = (near[c] * sign, far[c] * sign);
             from[c] = z0;
@@ -130,9 +130,9 @@ impl<S: Simd> Beam<S> {
             let deep = (z0 <= deepest) & (z1 >= start);
             let u = (al + pl * a + nl * b <= u1[c]) & (ah + ph * b + nh * a >= u0[c]);
             let v = (bl + ql * a + ml * b <= v1[c]) & (bh + qh * b + mh * a >= v0[c]);
-            met[c] = u32::from(deep & u & v) << c;
+            hit[c] = u32::from(deep & u & v) << c;
         }
-        (from, met.iter().fold(0, |bits, bit| bits | bit))
+        (from, hit.iter().fold(0, |bits, bit| bits | bit))
     }
 }
 
@@ -167,11 +167,11 @@ impl Bvh {
         let mut index = self.root as usize;
         loop {
             let node = &self.nodes[index];
-            let (near, mut met) = beam.intersect_children(node, deepest);
+            let (near, mut hit) = beam.intersect_children(node, deepest);
             let bottom = stack.len();
-            while met != 0 {
-                let k = met.trailing_zeros() as usize & (BVH_WIDTH - 1);
-                met &= met - 1;
+            while hit != 0 {
+                let k = hit.trailing_zeros() as usize & (BVH_WIDTH - 1);
+                hit &= hit - 1;
                 let (child, count) = (node.child[k], node.count[k]);
                 if count == 0 {
                     insert(stack, bottom, StackEntry { entry_distance: near[k], child, count });

@@ -104,19 +104,19 @@ impl Bvh {
                     short_limit = short.limit(limit);
                 } else {
                     let node = &self.nodes[first];
-                    let (near, mut met) = short.intersect_children(node, short_limit);
-                    if met != 0 {
+                    let (near, mut hit) = short.intersect_children(node, short_limit);
+                    if hit != 0 {
                         let child = |k: usize| StackEntry {
                             entry_distance: near[k],
                             child: node.child[k],
                             count: node.count[k],
                         };
-                        entry = child(met.trailing_zeros() as usize & (BVH_WIDTH - 1));
-                        met &= met - 1;
+                        entry = child(hit.trailing_zeros() as usize & (BVH_WIDTH - 1));
+                        hit &= hit - 1;
                         let bottom = stack.len();
-                        while met != 0 {
-                            let mut next = child(met.trailing_zeros() as usize & (BVH_WIDTH - 1));
-                            met &= met - 1;
+                        while hit != 0 {
+                            let mut next = child(hit.trailing_zeros() as usize & (BVH_WIDTH - 1));
+                            hit &= hit - 1;
                             if next.entry_distance < entry.entry_distance {
                                 std::mem::swap(&mut next, &mut entry);
                             }
@@ -197,12 +197,12 @@ impl EntryRay {
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         // One plain loop, which compilers vectorize.
         let mut near = [0.0f32; BVH_WIDTH];
-        let mut met = [0u32; BVH_WIDTH];
+        let mut hit = [0u32; BVH_WIDTH];
         for k in 0..BVH_WIDTH {
             near[k] = larger(larger((nx[k] - ox) * ix, (ny[k] - oy) * iy), larger((nz[k] - oz) * iz, 0.0));
             let far = smaller(smaller((fx[k] - ox) * ix, (fy[k] - oy) * iy), smaller((fz[k] - oz) * iz, limit));
-            met[k] = u32::from(near[k] <= far) << k;
+            hit[k] = u32::from(near[k] <= far) << k;
         }
-        (near, met.iter().fold(0, |bits, bit| bits | bit))
+        (near, hit.iter().fold(0, |bits, bit| bits | bit))
     }
 }

@@ -43,13 +43,13 @@ fn nearest_watertight(ray: &Ray, triangles: &[Triangle]) -> Option<f64> {
 }
 
 /// Triangles of all sizes, some of them slivers.
-pub(super) fn soup(dice: &mut TestRng, count: usize, at: V3) -> Vec<Triangle> {
+pub(super) fn soup(rng: &mut TestRng, count: usize, at: V3) -> Vec<Triangle> {
     let mut triangle = || {
-        let middle = dice.point(1.0);
-        let size = 10f64.powf(dice.uniform(-3.0, -0.3));
-        let squeeze = [0; 3].map(|_| if dice.uniform(0.0, 1.0) < 0.2 { 1e-3 } else { 1.0 });
+        let middle = rng.point(1.0);
+        let size = 10f64.powf(rng.uniform(-3.0, -0.3));
+        let squeeze = [0; 3].map(|_| if rng.uniform(0.0, 1.0) < 0.2 { 1e-3 } else { 1.0 });
         [0; 3].map(|_| {
-            let p = dice.point(size);
+            let p = rng.point(size);
             [0, 1, 2].map(|k| (at[k] + middle[k] + p[k] * squeeze[k]) as f32)
         })
     };
@@ -59,11 +59,11 @@ pub(super) fn soup(dice: &mut TestRng, count: usize, at: V3) -> Vec<Triangle> {
 /// The textbook formula and the watertight test agree on hits and distances.
 #[test]
 fn watertight_and_textbook() {
-    let mut dice = TestRng(3);
-    let triangles = soup(&mut dice, 400, [0.0; 3]);
+    let mut rng = TestRng(3);
+    let triangles = soup(&mut rng, 400, [0.0; 3]);
     let (mut hits, mut worst) = (0, 0.0f64);
     for _ in 0..2000 {
-        let ray = dice.ray(20.0, 1.0);
+        let ray = rng.ray(20.0, 1.0);
         for triangle in &triangles {
             let ours = ShearedRay::new(&ray).distance(triangle).filter(|t| *t >= 0.0);
             // Within 1e-9 of an edge, or nearly edge-on, rounding may decide differently.
@@ -83,15 +83,15 @@ fn watertight_and_textbook() {
 /// Rays along edges and through corners of a closed surface always hit it; with the textbook formula some slip through.
 #[test]
 fn edges() {
-    let mut dice = TestRng(4);
+    let mut rng = TestRng(4);
     // A tetrahedron with coordinates that are not round.
     let corner = [[-0.13f32, -0.37, -0.21], [0.71, -0.11, -0.17], [0.05, 0.53, -0.31], [0.11, 0.07, 0.59]];
     let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
     let triangles: Vec<Triangle> = faces.iter().map(|f: &[usize; 3]| f.map(|i| corner[i])).collect();
     let mut slipped = 0;
     for _ in 0..20_000 {
-        let (i, j) = (dice.uniform(0.0, 4.0) as usize, dice.uniform(0.0, 4.0) as usize);
-        let part = dice.uniform(0.0, 1.0);
+        let (i, j) = (rng.uniform(0.0, 4.0) as usize, rng.uniform(0.0, 4.0) as usize);
+        let part = rng.uniform(0.0, 1.0);
         let on_edge = [0, 1, 2].map(|k| f64::from(corner[i][k]) * part + f64::from(corner[j][k]) * (1.0 - part));
         // From the center of the solid outwards: every ray must hit.
         let origin = [0.185, 0.03, -0.025];
@@ -115,12 +115,12 @@ fn distance(mesh: &Mesh, ray: &Ray, limit: f64) -> Option<f64> {
 fn brute_force() {
     for (seed, count, at) in [(1, 1, 0.0), (2, 7, 0.0), (3, 300, 0.0), (4, 2000, 0.0), (5, 500, 1000.0), (6, 500, -3e4)]
     {
-        let mut dice = TestRng(seed);
-        let triangles = soup(&mut dice, count, [at; 3]);
+        let mut rng = TestRng(seed);
+        let triangles = soup(&mut rng, count, [at; 3]);
         let mesh = mesh_of(&triangles);
         let (mut hits, mut worst) = (0, 0.0f64);
         for k in 0..3000 {
-            let mut ray = dice.ray(if k % 3 == 0 { 20.0 } else { 1.5 }, 1.0);
+            let mut ray = rng.ray(if k % 3 == 0 { 20.0 } else { 1.5 }, 1.0);
             if k % 5 == 0 {
                 // Along an axis, where two of three sides of a box are parallel to the ray.
                 ray.direction = [0, 1, 2].map(|a| if a == k % 3 { if k % 2 == 0 { 1.0 } else { -1.0 } } else { 0.0 });
@@ -142,8 +142,8 @@ fn brute_force() {
 /// The control: a BVH without one of its triangles gives a different result.
 #[test]
 fn lost_triangle() {
-    let mut dice = TestRng(7);
-    let triangles = soup(&mut dice, 50, [0.0; 3]);
+    let mut rng = TestRng(7);
+    let triangles = soup(&mut rng, 50, [0.0; 3]);
     let mesh = mesh_of(&triangles[1..]);
     let [a, b, c] = triangles[0].map(|p| p.map(f64::from));
     let middle = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);

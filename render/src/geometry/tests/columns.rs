@@ -62,31 +62,31 @@ fn compare(tree: &Arc<MeshBvh>, columns: Option<&Columns>, rays: &[Ray], max_dis
 /// Packets of steep rays towards about `at`, from above and from below: along z on a grid of eighths, with exact hits
 /// of edges and corners; along z anywhere; parallel ones; fans to points of the grid; from within; and some that are
 /// not steep.
-fn steep(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
+fn steep(rng: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for kind in 0..240 {
         let sign = if kind % 2 == 0 { -1.0 } else { 1.0 };
         let eighth = |x: f64| (8.0 * x).round() / 8.0;
-        let first = dice.point(1.0);
-        let slope = [0; 2].map(|_| dice.uniform(-0.125, 0.125) * if kind % 12 == 2 { 2.0 } else { 0.9 });
+        let first = rng.point(1.0);
+        let slope = [0; 2].map(|_| rng.uniform(-0.125, 0.125) * if kind % 12 == 2 { 2.0 } else { 0.9 });
         let slanted = normalize([slope[0], slope[1], sign]).unwrap();
-        let far = if kind % 5 == 0 { 0.2 } else { 10f64.powf(dice.uniform(0.3, 2.0)) };
+        let far = if kind % 5 == 0 { 0.2 } else { 10f64.powf(rng.uniform(0.3, 2.0)) };
         for k in 0..WIDTH {
             let grid = [eighth(first[0]) + 0.125 * (k % 4) as f64, eighth(first[1]) + 0.125 * (k / 4) as f64];
-            let near = add_scaled(first, 0.3, dice.point(1.0));
+            let near = add_scaled(first, 0.3, rng.point(1.0));
             let (to, direction) = match kind % 6 {
                 0 => ([grid[0], grid[1], 0.0], [0.0, 0.0, sign]),
                 1 => (near, [0.0, -0.0, sign]),
                 2 => (near, slanted),
                 3 => ([grid[0], grid[1], eighth(first[2])], slanted),
-                4 => (near, normalize([dice.uniform(-0.1, 0.1), dice.uniform(-0.1, 0.1), sign]).unwrap()),
+                4 => (near, normalize([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), sign]).unwrap()),
                 _ => {
                     let from = [first[0], first[1], -9.0 * sign];
                     ([grid[0], grid[1], 0.0], normalize(sub([grid[0], grid[1], 0.0], from)).unwrap())
                 }
             };
             let mut ray = Ray { origin: add_scaled(add_scaled(to, -far, direction), 1.0, at), direction };
-            if dice.uniform(0.0, 1.0) < 0.01 {
+            if rng.uniform(0.0, 1.0) < 0.01 {
                 ray.origin[k % 3] = f64::NAN;
             }
             rays.push(ray);
@@ -96,9 +96,9 @@ fn steep(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
 }
 
 /// A height field of triangles: cells of an eighth around the origin, two triangles each, heights in sixty-fourths.
-fn sheet(dice: &mut TestRng, side: usize, height: f64) -> Vec<Triangle> {
+fn sheet(rng: &mut TestRng, side: usize, height: f64) -> Vec<Triangle> {
     let heights: Vec<f32> =
-        (0..side * side).map(|_| (height + f64::from(dice.uniform(0.0, 16.0) as u8) / 64.0) as f32).collect();
+        (0..side * side).map(|_| (height + f64::from(rng.uniform(0.0, 16.0) as u8) / 64.0) as f32).collect();
     let half = (side - 1) as f32 / 16.0;
     let point = |i: usize, j: usize| [i as f32 / 8.0 - half, j as f32 / 8.0 - half, heights[j * side + i]];
     let cell = |i: usize, j: usize| {
@@ -122,11 +122,11 @@ fn moved(triangles: &[Triangle], by: f32) -> Vec<Triangle> {
 
 #[test]
 fn steep_rays() {
-    let mut dice = TestRng(51);
-    let ground = sheet(&mut dice, 25, 0.0);
+    let mut rng = TestRng(51);
+    let ground = sheet(&mut rng, 25, 0.0);
     // All triangles twice: of equally near ones the first counts.
     let twice: Vec<Triangle> = ground.iter().chain(&ground).copied().collect();
-    let layers: Vec<Triangle> = (0..4).flat_map(|k| sheet(&mut dice, 25, 0.3 * f64::from(k) - 0.9)).collect();
+    let layers: Vec<Triangle> = (0..4).flat_map(|k| sheet(&mut rng, 25, 0.3 * f64::from(k) - 0.9)).collect();
     let rotated = ground.iter().map(|t| t.map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]]));
     let flat = ground.iter().map(|t| t.map(|p| [p[0], p[1], 0.25]));
     for (what, triangles, at) in [
@@ -136,8 +136,8 @@ fn steep_rays() {
         ("a turned sheet", rotated.collect(), 0.0),
         ("a flat sheet", flat.collect(), 0.0),
         ("a sheet far away", moved(&ground, 4096.0), 4096.0),
-        ("soup", soup(&mut dice, 1500, [0.0; 3]), 0.0),
-        ("soup far away", soup(&mut dice, 1500, [3000.0; 3]), 3000.0),
+        ("soup", soup(&mut rng, 1500, [0.0; 3]), 0.0),
+        ("soup far away", soup(&mut rng, 1500, [3000.0; 3]), 3000.0),
     ] {
         let mut all = Count::default();
         for (last, max_distance) in [(2, f64::INFINITY), (2, 3.0), (2, 0.5), (0, f64::INFINITY), (1, 3.0)] {
@@ -145,7 +145,7 @@ fn steep_rays() {
             let axes = [(last + 1) % 3, (last + 2) % 3, last];
             let tree: Vec<_> = triangles.iter().map(|t| t.map(|p| permuted(p, axes))).collect();
             let tree = Arc::new(MeshBvh::from_triangles(&tree));
-            let rays: Vec<Ray> = steep(&mut dice, [at; 3])
+            let rays: Vec<Ray> = steep(&mut rng, [at; 3])
                 .iter()
                 .map(|ray| Ray { origin: permuted(ray.origin, axes), direction: permuted(ray.direction, axes) })
                 .collect();
@@ -165,19 +165,19 @@ fn steep_rays() {
 /// and that to the sheet is not. The control: without slack, some hits are lost.
 #[test]
 fn slack() {
-    let mut dice = TestRng(52);
-    let flat = sheet(&mut dice, 33, 0.0);
+    let mut rng = TestRng(52);
+    let flat = sheet(&mut rng, 33, 0.0);
     let flat: Vec<Triangle> = flat.iter().map(|t| t.map(|p| [p[0] + 2.5, p[1] + 2.5, 1e-30 * p[2]])).collect();
     let tree = Arc::new(MeshBvh::from_triangles(&flat));
     let columns = Columns::with_size(tree.triangles(), &[[0.5, 0.5, 0.0], [4.5, 4.5, 1e-30]], ABOVE, [32, 32]).unwrap();
     let rays: Vec<Ray> = (0..12_000)
         .map(|k| {
             let corner = to_f64(tree.triangles()[k % 2048][k % 3]);
-            let slope = dice.uniform(0.05, 0.12);
-            let direction = normalize([slope, dice.uniform(-0.01, 0.01), -1.0]).unwrap();
-            let across = 8192.0 + corner[0] * dice.uniform(0.0, 1.0);
+            let slope = rng.uniform(0.05, 0.12);
+            let direction = normalize([slope, rng.uniform(-0.01, 0.01), -1.0]).unwrap();
+            let across = 8192.0 + corner[0] * rng.uniform(0.0, 1.0);
             let mut origin = add_scaled(corner, -across / direction[0], direction);
-            origin[0] += dice.uniform(-1e-12, 1e-12);
+            origin[0] += rng.uniform(-1e-12, 1e-12);
             Ray { origin, direction }
         })
         .collect();
@@ -192,13 +192,13 @@ fn slack() {
 /// that the BVH's boxes hide. The control: from closer, columns are used.
 #[test]
 fn far_rays() {
-    let mut dice = TestRng(57);
-    let tree = Arc::new(MeshBvh::from_triangles(&sheet(&mut dice, 25, 0.0)));
+    let mut rng = TestRng(57);
+    let tree = Arc::new(MeshBvh::from_triangles(&sheet(&mut rng, 25, 0.0)));
     let mut count = |sizes: f64| {
         // The sheet is 3 m wide.
         let ray = |_| {
-            let direction = normalize([dice.uniform(-0.1, 0.1), dice.uniform(-0.1, 0.1), -1.0]).unwrap();
-            Ray { origin: add_scaled(dice.point(1.6), -3.0 * sizes, direction), direction }
+            let direction = normalize([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), -1.0]).unwrap();
+            Ray { origin: add_scaled(rng.point(1.6), -3.0 * sizes, direction), direction }
         };
         let rays: Vec<Ray> = (0..16_000).map(ray).collect();
         compare(&tree, tree.columns(ABOVE), &rays, f64::INFINITY)
@@ -215,8 +215,8 @@ fn far_rays() {
 /// Columns exist only for meshes that are spread out, with triangles of similar size.
 #[test]
 fn meshes_without_columns() {
-    let mut dice = TestRng(53);
-    let ground = sheet(&mut dice, 25, 0.0);
+    let mut rng = TestRng(53);
+    let ground = sheet(&mut rng, 25, 0.0);
     let wall: Vec<Triangle> = ground.iter().map(|t| t.map(|p| [0.5, p[0], p[1]])).collect();
     let all = [[-1.5, -1.5, 0.0], [1.5, -1.5, 0.0], [1.5, 1.5, 0.0]];
     let mix = |(k, t): (usize, &Triangle)| if k.is_multiple_of(40) { all } else { *t };
@@ -235,9 +235,9 @@ fn meshes_without_columns() {
 /// A packet whose columns hold too many triangles uses the BVH.
 #[test]
 fn crowded_columns() {
-    let mut dice = TestRng(54);
-    let mut triangles = sheet(&mut dice, 33, 0.0);
-    triangles.extend(soup(&mut dice, 900, [0.0; 3]).iter().map(|t| t.map(|p| p.map(|x| 0.05 * x))));
+    let mut rng = TestRng(54);
+    let mut triangles = sheet(&mut rng, 33, 0.0);
+    triangles.extend(soup(&mut rng, 900, [0.0; 3]).iter().map(|t| t.map(|p| p.map(|x| 0.05 * x))));
     let tree = Arc::new(MeshBvh::from_triangles(&triangles));
     let rays = |x: f64| -> Vec<Ray> {
         let ray = |k: usize| [x + 0.01 * (k % 4) as f64, 0.01 * (k / 4) as f64, 2.0];
@@ -253,21 +253,20 @@ fn crowded_columns() {
 /// are rounded. The control: by the signs of edges alone, as in the paper, some are.
 #[test]
 fn edge_on() {
-    let mut dice = TestRng(55);
+    let mut rng = TestRng(55);
     let (mut rays, mut by_signs) = (0, 0);
     for _ in 0..200_000 {
-        let triangle: Triangle = [0; 3].map(|_| dice.point(1.0).map(|x| x as f32));
+        let triangle: Triangle = [0; 3].map(|_| rng.point(1.0).map(|x| x as f32));
         let [a, b, c] = triangle.map(to_f64);
         let (p, q) = (sub(b, a), sub(c, a));
-        let Some(direction) = normalize(add_scaled(scale(p, dice.uniform(-1.0, 1.0)), dice.uniform(-1.0, 1.0), q))
-        else {
+        let Some(direction) = normalize(add_scaled(scale(p, rng.uniform(-1.0, 1.0)), rng.uniform(-1.0, 1.0), q)) else {
             continue;
         };
         let Some(beside) = normalize(cross(direction, cross(p, q))) else { continue };
         let [x, y, z] = [a, b, c].map(|p| dot(beside, p));
         let (low, high) = (x.min(y).min(z), x.max(y).max(z));
-        let away = high + (high - low) * dice.uniform(1.0, 3.0) - x;
-        let origin = add_scaled(add_scaled(a, away, beside), -dice.uniform(0.0, 5.0), direction);
+        let away = high + (high - low) * rng.uniform(1.0, 3.0) - x;
+        let origin = add_scaled(add_scaled(a, away, beside), -rng.uniform(0.0, 5.0), direction);
         let ray = Ray { origin, direction };
         rays += 1;
         assert_eq!(ShearedRay::new(&ray).distance(&triangle), None, "{ray:?} {triangle:?}");
@@ -295,7 +294,7 @@ fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
 /// Height scanners over and beside fixed and moving meshes: whole scans give the same hits as every ray alone.
 #[test]
 fn scans() {
-    let mut dice = TestRng(56);
+    let mut rng = TestRng(56);
     let mesh = |triangles: &[Triangle]| {
         let positions = triangles.iter().flatten().copied().collect();
         let triangles = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
@@ -304,7 +303,7 @@ fn scans() {
             mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)),
         })
     };
-    let (ground, heap) = (mesh(&sheet(&mut dice, 40, 0.0)), mesh(&soup(&mut dice, 400, [0.0; 3])));
+    let (ground, heap) = (mesh(&sheet(&mut rng, 40, 0.0)), mesh(&soup(&mut rng, 400, [0.0; 3])));
     let targets = targets(&[ground.clone(), ground, heap.clone(), heap], 4, |k| k < 2);
     // The grid of a height scanner: 16 by 10 parallel rays, 0.1 m apart.
     let pattern: Vec<Ray> = (0..160)
@@ -313,13 +312,13 @@ fn scans() {
         .collect();
     let (mut hits, mut seen) = (0, [0; 4]);
     for round in 0..12 {
-        let mut placed = |far: f64| PoseF64::from(&pose::from_xyz_rpy(dice.point(far), dice.point(1.0)));
+        let mut placed = |far: f64| PoseF64::from(&pose::from_xyz_rpy(rng.point(far), rng.point(1.0)));
         // The first two at the same place: the first one counts.
         let poses = [PoseF64::IDENTITY, PoseF64::IDENTITY, placed(1.0), placed(1.0)];
         let poses = if round % 3 == 0 { poses } else { [PoseF64::IDENTITY, placed(0.3), poses[2], poses[3]] };
         let roll = if round % 2 == 0 { 0.0 } else { 0.4 };
-        let yaw = dice.uniform(-3.0, 3.0);
-        let at = pose::from_xyz_rpy([dice.uniform(-2.0, 2.0), dice.uniform(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
+        let yaw = rng.uniform(-3.0, 3.0);
+        let at = pose::from_xyz_rpy([rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
         let mut rays: Vec<Ray> = pattern.iter().map(|ray| ray.transformed_by(&PoseF64::from(&at))).collect();
         rays[round * 7].origin[1] = f64::NAN;
         for level in all_levels() {

@@ -49,20 +49,20 @@ impl ShapeVisitor for Compare<'_> {
 }
 
 /// Packets of every kind: parallel, from one point, crossing, and in all directions.
-fn packets(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
+fn packets(rng: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for kind in 0..160 {
-        let spread = 10f64.powf(dice.uniform(-3.0, 0.0));
+        let spread = 10f64.powf(rng.uniform(-3.0, 0.0));
         let first = match kind % 5 {
             // Along an axis, on a grid of eighths: exact hits of edges and corners.
             0 | 1 => {
                 let axis = kind / 5 % 3;
                 let sign = if kind % 2 == 0 { 1.0 } else { -1.0 };
                 let direction = [0, 1, 2].map(|k| if k == axis { sign } else { 0.0 });
-                let origin = dice.point(1.0).map(|x| (8.0 * x).round() / 8.0);
+                let origin = rng.point(1.0).map(|x| (8.0 * x).round() / 8.0);
                 Ray { origin: add_scaled(origin, -3.0, direction), direction }
             }
-            _ => dice.ray(if kind % 2 == 0 { 20.0 } else { 1.5 }, 1.0),
+            _ => rng.ray(if kind % 2 == 0 { 20.0 } else { 1.5 }, 1.0),
         };
         // Some lists end within a packet.
         let count = if kind % 4 == 0 { 5 } else { WIDTH };
@@ -70,11 +70,11 @@ fn packets(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
             let mut ray = first;
             match kind % 5 {
                 0 => ray.origin = [0, 1, 2].map(|a| first.origin[a] + 0.125 * ((k >> (a % 2)) & 1) as f64),
-                1 | 2 => ray.origin = add_scaled(first.origin, spread, dice.point(1.0)),
-                3 => ray.direction = normalize(add_scaled(first.direction, spread, dice.point(1.0))).unwrap(),
-                _ => ray = dice.ray(5.0, 1.0),
+                1 | 2 => ray.origin = add_scaled(first.origin, spread, rng.point(1.0)),
+                3 => ray.direction = normalize(add_scaled(first.direction, spread, rng.point(1.0))).unwrap(),
+                _ => ray = rng.ray(5.0, 1.0),
             }
-            if dice.uniform(0.0, 1.0) < 0.01 {
+            if rng.uniform(0.0, 1.0) < 0.01 {
                 ray.origin[k % 3] = f64::NAN;
             }
             ray.origin = [0, 1, 2].map(|a| ray.origin[a] + at[a]);
@@ -87,8 +87,8 @@ fn packets(dice: &mut TestRng, at: [f64; 3]) -> Vec<Ray> {
     rays
 }
 
-fn terrain(side: usize, dice: &mut TestRng) -> HeightField {
-    let elevation: Vec<f32> = (0..side * side).map(|_| (dice.uniform(0.0, 64.0) as u32) as f32 / 64.0).collect();
+fn terrain(side: usize, rng: &mut TestRng) -> HeightField {
+    let elevation: Vec<f32> = (0..side * side).map(|_| (rng.uniform(0.0, 64.0) as u32) as f32 / 64.0).collect();
     let half = (side - 1) as f64 / 16.0;
     HeightField::new([half, half, 0.5, 0.25], side, side, &elevation).unwrap()
 }
@@ -101,23 +101,23 @@ fn sheet(field: &HeightField) -> Vec<Triangle> {
 
 #[test]
 fn triangles() {
-    let mut dice = TestRng(31);
-    let sheet = sheet(&terrain(33, &mut dice));
+    let mut rng = TestRng(31);
+    let sheet = sheet(&terrain(33, &mut rng));
     // All triangles twice: of equally near ones the first counts.
     let twice: Vec<Triangle> = sheet.iter().chain(&sheet).copied().collect();
     let mut hits = 0;
     for (what, triangles, at) in [
-        ("soup", soup(&mut dice, 1500, [0.0; 3]), 0.0),
-        ("a few", soup(&mut dice, 5, [0.0; 3]), 0.0),
-        ("one", soup(&mut dice, 1, [0.0; 3]), 0.0),
-        ("far away", soup(&mut dice, 700, [3000.0; 3]), 3000.0),
+        ("soup", soup(&mut rng, 1500, [0.0; 3]), 0.0),
+        ("a few", soup(&mut rng, 5, [0.0; 3]), 0.0),
+        ("one", soup(&mut rng, 1, [0.0; 3]), 0.0),
+        ("far away", soup(&mut rng, 700, [3000.0; 3]), 3000.0),
         ("a sheet", sheet, 0.0),
         ("two sheets", twice, 0.0),
         ("nothing", vec![], 0.0),
     ] {
         let mesh = Mesh::from_bvh(Arc::new(MeshBvh::from_triangles(&triangles)));
         for max_distance in [f64::INFINITY, 3.0, 0.5] {
-            let rays = packets(&mut dice, [at; 3]);
+            let rays = packets(&mut rng, [at; 3]);
             Compare { rays: &rays, max_distance, what, hits: &mut hits }.run(&mesh);
         }
     }
@@ -127,10 +127,10 @@ fn triangles() {
 /// A limit equal to the distance includes the hit, the next smaller number does not, in packets and alone.
 #[test]
 fn limits() {
-    let mut dice = TestRng(32);
-    let mesh = Mesh::from_bvh(Arc::new(MeshBvh::from_triangles(&sheet(&terrain(17, &mut dice)))));
+    let mut rng = TestRng(32);
+    let mesh = Mesh::from_bvh(Arc::new(MeshBvh::from_triangles(&sheet(&terrain(17, &mut rng)))));
     let (mut hits, mut lost) = (0, 0);
-    for rays in packets(&mut dice, [0.0; 3]).chunks(WIDTH) {
+    for rays in packets(&mut rng, [0.0; 3]).chunks(WIDTH) {
         let Some(touch) = mesh.intersect(&rays[0], f64::INFINITY, &mut TraversalStack::default()) else { continue };
         for max_distance in [touch.t, touch.t.next_down()] {
             let before = hits;
@@ -143,21 +143,21 @@ fn limits() {
 
 #[test]
 fn height_fields() {
-    let mut dice = TestRng(33);
+    let mut rng = TestRng(33);
     let mut hits = 0;
     for side in [2, 3, 17, 40] {
-        let field = terrain(side, &mut dice);
+        let field = terrain(side, &mut rng);
         let solid = RayGeometry::from_shape(&Shape::from(field), &mut AssetCache::default());
-        let mut rays = packets(&mut dice, [0.0; 3]);
+        let mut rays = packets(&mut rng, [0.0; 3]);
         // Nearly straight down from above, some at points and along edges of the grid.
         for k in 0..200 * WIDTH {
-            let mut ray = Ray { origin: dice.point(2.5), direction: [0.0, 0.0, -1.0] };
+            let mut ray = Ray { origin: rng.point(2.5), direction: [0.0, 0.0, -1.0] };
             if (k / WIDTH).is_multiple_of(3) {
                 ray.origin = ray.origin.map(|x| (8.0 * x).round() / 8.0);
             }
-            ray.origin[2] = if k.is_multiple_of(11) { dice.uniform(-0.5, 1.0) } else { 3.0 };
+            ray.origin[2] = if k.is_multiple_of(11) { rng.uniform(-0.5, 1.0) } else { 3.0 };
             if !(k / WIDTH).is_multiple_of(4) {
-                let [x, y, _] = dice.point(0.3);
+                let [x, y, _] = rng.point(0.3);
                 ray.direction = normalize([x, if k.is_multiple_of(13) { 0.0 } else { y }, -1.0]).unwrap();
             }
             rays.push(ray);
@@ -173,8 +173,8 @@ fn height_fields() {
 /// The control of the tests above: neighbors of a height scanner traverse the BVH together.
 #[test]
 fn beams() {
-    let mut dice = TestRng(34);
-    let tree = MeshBvh::from_triangles(&sheet(&terrain(65, &mut dice)));
+    let mut rng = TestRng(34);
+    let tree = MeshBvh::from_triangles(&sheet(&terrain(65, &mut rng)));
     let origin = |k: usize| [0.03 + 0.125 * (k % 4) as f64, 0.125 * (k / 4) as f64, 20.0];
     let rays: Vec<Ray> = (0..WIDTH).map(|k| Ray { origin: origin(k), direction: [0.0, 0.0, -1.0] }).collect();
     let packet = Packet::from_rays(&rays, f64::INFINITY);
@@ -182,25 +182,25 @@ fn beams() {
         at_level!(level, s => {
             let shear = ShearedPacket::new(s, &packet).unwrap();
             let beam = Beam::enclosing(s, &packet, &shear, tree.bvh()).unwrap();
-            let mut met = 0;
+            let mut found_hit = 0;
             let mut walk = |budget| {
                 let limits = packet.limits(s);
                 tree.bvh().traverse_beam(&beam, limits, budget, &mut TraversalStack::default(), |leaf| {
-                    met += leaf.len();
+                    found_hit += leaf.len();
                     None
                 })
             };
             // Five by three cells are below the rays, with thirty of 8192 triangles, but not in leaves of their own.
             assert_eq!(walk(128), Traversal::Complete);
             assert_eq!(walk(8), Traversal::OverBudget, "the control");
-            assert!(met >= 30, "{met}");
+            assert!(found_hit >= 30, "{found_hit}");
         });
     }
 }
 
 /// One shape of each kind.
-fn shapes(dice: &mut TestRng) -> Vec<Shape> {
-    let field = terrain(17, dice);
+fn shapes(rng: &mut TestRng) -> Vec<Shape> {
+    let field = terrain(17, rng);
     vec![
         Plane { half: [0.4, 0.0] }.into(),
         Sphere { radius: 0.2 }.into(),
@@ -233,17 +233,17 @@ fn cast(world: &mut RayWorld, poses: &[PoseF64], rays: &[Ray]) -> Vec<RayHit> {
 /// instance.
 #[test]
 fn world() {
-    let mut dice = TestRng(35);
-    let shapes = shapes(&mut dice);
+    let mut rng = TestRng(35);
+    let shapes = shapes(&mut rng);
     let count = 5 * shapes.len();
     let poses: Vec<PoseF64> = (0..count)
         .map(|k| match k / shapes.len() {
             // Two of each at the same place, where surfaces are at the same distances.
             0 | 1 => PoseF64::IDENTITY,
-            _ => PoseF64::from(&kinetoscope_scene::pose::from_xyz_rpy(dice.point(1.5), dice.point(3.0))),
+            _ => PoseF64::from(&kinetoscope_scene::pose::from_xyz_rpy(rng.point(1.5), rng.point(3.0))),
         })
         .collect();
-    let rays = packets(&mut dice, [0.0; 3]);
+    let rays = packets(&mut rng, [0.0; 3]);
     let mut assets = AssetCache::default();
     let solids: Vec<RayGeometry> = shapes.iter().map(|shape| RayGeometry::from_shape(shape, &mut assets)).collect();
     let expected: Vec<Option<(u64, u32)>> = rays
@@ -291,17 +291,15 @@ fn world() {
 /// Fixed instances are placed again when they move; non-finite poses and rays hit nothing.
 #[test]
 fn placing() {
-    let mut dice = TestRng(23);
-    let shapes = shapes(&mut dice);
+    let mut rng = TestRng(23);
+    let shapes = shapes(&mut rng);
     let fixed = targets(&shapes, 16, |_| true);
     assert_eq!((fixed.len(), fixed.fixed_count()), (16, 16));
     let mut poses = || -> Vec<PoseF64> {
-        (0..16)
-            .map(|_| PoseF64::from(&kinetoscope_scene::pose::from_xyz_rpy(dice.point(2.0), dice.point(3.0))))
-            .collect()
+        (0..16).map(|_| PoseF64::from(&kinetoscope_scene::pose::from_xyz_rpy(rng.point(2.0), rng.point(3.0)))).collect()
     };
     let (a, b) = (poses(), poses());
-    let rays: Vec<Ray> = (0..200).map(|_| dice.ray(5.0, 2.0)).collect();
+    let rays: Vec<Ray> = (0..200).map(|_| rng.ray(5.0, 2.0)).collect();
     let fresh = |poses| cast(&mut RayWorld::new(&fixed), poses, &rays);
     let mut world = RayWorld::new(&fixed);
     assert!([&a, &b, &a].into_iter().all(|poses| cast(&mut world, poses, &rays) == fresh(poses)));

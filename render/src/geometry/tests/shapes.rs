@@ -46,12 +46,12 @@ fn solids() -> Vec<Shape> {
 /// is the gradient of the distance.
 #[test]
 fn surfaces() {
-    let mut dice = TestRng(1);
+    let mut rng = TestRng(1);
     for shape in solids() {
         let (name, mut hits, mut worst) = (shape.name(), 0, 0.0f64);
         for k in 0..20_000 {
             let (far, near) = if k % 2 == 0 { (20.0, 0.5) } else { (0.4, 1.0) };
-            let ray = dice.ray(far, near);
+            let ray = rng.ray(far, near);
             let off = |t: f64| outside(&shape, ray.at(t));
             let inside = outside(&shape, ray.origin) < 0.0;
             // Only every tenth ray: this is the slow part.

@@ -32,30 +32,30 @@ fn distance(solid: &RayGeometry, ray: &Ray) -> Option<(f64, [f64; 3])> {
 }
 
 /// Rough terrain with coordinates that single precision represents exactly, so that triangles match the grid.
-fn rough(dice: &mut TestRng, rows: usize, columns: usize) -> HeightField {
-    let elevation: Vec<f32> = (0..rows * columns).map(|_| (dice.uniform(0.0, 256.0) as u32) as f32 / 256.0).collect();
+fn rough(rng: &mut TestRng, rows: usize, columns: usize) -> HeightField {
+    let elevation: Vec<f32> = (0..rows * columns).map(|_| (rng.uniform(0.0, 256.0) as u32) as f32 / 256.0).collect();
     let half = |n: usize| (n - 1) as f64 / 8.0;
     HeightField::new([half(columns), half(rows), 1.5, 0.5], rows, columns, &elevation).unwrap()
 }
 
 #[test]
 fn brute_force() {
-    let mut dice = TestRng(11);
+    let mut rng = TestRng(11);
     for (rows, columns) in [(2, 2), (2, 9), (9, 9), (17, 33), (40, 23)] {
-        let field = rough(&mut dice, rows, columns);
+        let field = rough(&mut rng, rows, columns);
         let (walk, triangles) = (solid(&field), triangles(&field));
         let (mut hits, mut misses) = (0, 0);
         for k in 0..4000 {
             let mut ray = match k % 4 {
                 // From far, from near, and from inside the solid or just above it.
-                0 => dice.ray(20.0, 2.0),
-                1 => dice.ray(4.0, 2.0),
-                2 => Ray { origin: dice.point(1.0), direction: dice.direction() },
+                0 => rng.ray(20.0, 2.0),
+                1 => rng.ray(4.0, 2.0),
+                2 => Ray { origin: rng.point(1.0), direction: rng.direction() },
                 // Grazing.
                 _ => {
-                    let mut ray = dice.ray(6.0, 3.0);
-                    ray.origin[2] = dice.uniform(0.0, 2.0);
-                    ray.direction = normalize([ray.direction[0], ray.direction[1], dice.uniform(-0.05, 0.05)]).unwrap();
+                    let mut ray = rng.ray(6.0, 3.0);
+                    ray.origin[2] = rng.uniform(0.0, 2.0);
+                    ray.direction = normalize([ray.direction[0], ray.direction[1], rng.uniform(-0.05, 0.05)]).unwrap();
                     ray
                 }
             };
@@ -90,12 +90,12 @@ fn brute_force() {
 fn other_terrain() {
     let (a, b) = (rough(&mut TestRng(1), 9, 9), rough(&mut TestRng(2), 9, 9));
     let (walk, triangles) = (solid(&a), triangles(&b));
-    let mut dice = TestRng(3);
+    let mut rng = TestRng(3);
     let differ = |ray: &Ray| match (distance(&walk, ray), nearest(ray, &triangles, 0.0)) {
         (Some((t, _)), Some(u)) => (t - u).abs() > 1e-3,
         (t, u) => t.is_some() != u.is_some(),
     };
-    let differing = (0..1000).filter(|_| differ(&dice.ray(6.0, 1.0))).count();
+    let differing = (0..1000).filter(|_| differ(&rng.ray(6.0, 1.0))).count();
     assert!(differing > 300, "{differing}");
 }
 

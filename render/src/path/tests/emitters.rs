@@ -154,17 +154,17 @@ fn alpha() {
 /// Each of several emitters is sampled in proportion to its power: the sum is that of all emitters alone.
 #[test]
 fn sums() {
-    let lamp = |x: f32, emission: f32, half: f32| {
+    let emitter = |x: f32, emission: f32, half: f32| {
         (Instance::new(Plane { half: [half; 2] }, emissive(emission), 2), down([x, 0.2, 0.8]))
     };
-    let all = [lamp(-0.5, 1.0, 0.1), lamp(0.4, 4.0, 0.15), lamp(1.0, 0.5, 0.3)];
+    let all = [emitter(-0.5, 1.0, 0.1), emitter(0.4, 4.0, 0.15), emitter(1.0, 0.5, 0.3)];
     let light = |lights: &[(Instance, PoseF32)]| {
         let (instances, mut poses): (Vec<_>, Vec<_>) = lights.iter().cloned().unzip();
         poses.insert(0, PoseF32::IDENTITY);
         mean_light(&on_floor(matt(0.7), instances), &poses, &one_ray_view([1.2, 0.5, 0.4], [0.0; 3]), 512, 0)
     };
     let together = light(&all);
-    let alone = all.each_ref().map(|lamp| light(std::slice::from_ref(lamp)));
+    let alone = all.each_ref().map(|emitter| light(std::slice::from_ref(emitter)));
     let (sum, square) = alone.iter().fold((0.0, 0.0), |(sum, square), (mean, d)| (sum + mean, square + d * d));
     let off = 5.0 * (together.1.powi(2) + square).sqrt();
     assert!((together.0 - sum).abs() < off, "{together:?}, not {sum}");
@@ -237,8 +237,8 @@ fn far_from_own_frame() {
 fn both_strategies_after_bounces() {
     // The columns are the axes of a plane: the wall's normal is +x, the emitter's -x.
     let wall = PoseF32 { rotation: [[0., 0., 1.], [1., 0., 0.], [0., 1., 0.]], translation: [-0.5, 0.0, 0.0] };
-    let lamp = PoseF32 { rotation: [[0., 0., -1.], [1., 0., 0.], [0., -1., 0.]], translation: [0.1, 0.0, 0.7] };
-    let (poses, view) = ([PoseF32::IDENTITY, wall, lamp], one_ray_view([1.5, 0.4, 0.9], [0.6, 0.0, 0.0]));
+    let emitter = PoseF32 { rotation: [[0., 0., -1.], [1., 0., 0.], [0., -1., 0.]], translation: [0.1, 0.0, 0.7] };
+    let (poses, view) = ([PoseF32::IDENTITY, wall, emitter], one_ray_view([1.5, 0.4, 0.9], [0.6, 0.0, 0.0]));
     let sharp = Material { specular: 1.0, shininess: 0.6, ..matt(0.05) };
     let mirror = Material { reflectance: 0.5, ..matt(0.5) };
     for material in [matt(0.8), shiny(), sharp, mirror] {

@@ -39,10 +39,10 @@ fn plate() {
     let expected = (1.0 - 0.5 * (across + along)).powi(2);
     // From the ray's hit with the plate, at x = 0, to the height of the emitter, 0.9 below the plate.
     let x = t * inside.tan() + 0.9 * angle.tan();
-    let lamp = Material { emission: 1.0, ..matt(1.0) };
+    let emissive = Material { emission: 1.0, ..matt(1.0) };
     let shapes = vec![
         Instance::new(Box { half: [2.0, 2.0, 0.5 * t as f32] }, glass(n as f32), 1),
-        Instance::new(Sphere { radius: 0.02 }, lamp, 2),
+        Instance::new(Sphere { radius: 0.02 }, emissive, 2),
     ];
     let poses =
         [PoseF32::from_translation([0.0, 0.0, -0.5 * t as f32]), PoseF32::from_translation([x as f32, 0.0, -1.1])];

@@ -72,10 +72,10 @@ impl Segmentation {
             }
             return Ok(boxes.finish());
         }
-        camera.with_render_request(row, |rasterizer, shot, _| {
-            for (instance, pose) in shot.scene.instances().iter().zip(shot.poses) {
+        camera.with_render_request(row, |rasterizer, request, _| {
+            for (instance, pose) in request.scene.instances().iter().zip(request.poses) {
                 if Layer::for_instance(instance, rasterizer.groups()) != Layer::Hidden
-                    && let Some(extent) = projected_extent(shot.view, instance, pose)
+                    && let Some(extent) = projected_extent(request.view, instance, pose)
                 {
                     boxes.add_extent(instance.mask_id, extent);
                 }

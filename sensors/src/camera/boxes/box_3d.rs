@@ -56,9 +56,9 @@ impl Segmentation {
     pub fn boxes_3d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box3d>, SensorError> {
         let row = camera.row(env)?;
         camera.require_captured(row)?;
-        camera.with_render_request(row, |rasterizer, shot, _| {
+        camera.with_render_request(row, |rasterizer, request, _| {
             let drawn = |instance: &Instance| Layer::for_instance(instance, rasterizer.groups()) != Layer::Hidden;
-            let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));
+            let all = request.scene.instances().iter().zip(request.poses).filter(|(instance, _)| drawn(instance));
             let of = |id: i32| -> Option<Box3d> {
                 let parts = all.clone().filter(|(instance, _)| self.segment_of(level, instance.mask_id) == id);
                 // The first rendered instance of the segment, by mask id, gives the frame.

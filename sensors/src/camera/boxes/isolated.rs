@@ -33,9 +33,9 @@ impl<'a> IsolatedRenderer<'a> {
     ) -> Result<impl Iterator<Item = ([usize; 2], i32)> + '_, CameraError> {
         let Self { camera, row, env, ref mut frame } = *self;
         camera
-            .with_render_request(row, |rasterizer, shot, take| {
-                let scene = with_only(shot.scene, segment);
-                rasterizer.render_samples(&mut [(RenderRequest { scene: &scene, ..shot }, frame.as_mut())], &[take])
+            .with_render_request(row, |rasterizer, request, take| {
+                let scene = with_only(request.scene, segment);
+                rasterizer.render_samples(&mut [(RenderRequest { scene: &scene, ..request }, frame.as_mut())], &[take])
             })
             .map_err(|(_, error)| CameraError::Render { env, error })?;
         let width = camera.image_shape().1;

@@ -34,15 +34,15 @@ impl RadianceEffect for ShotNoise {
     }
 
     fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let (ticket, block) = (place.image.rng_key, place.pixel as u32);
+        let (key, block) = (place.image.rng_key, place.pixel as u32);
         let mean = light.map(|light| light * self.electrons);
         // Random numbers are only computed if a channel needs them.
         let normals =
-            mean.iter().any(|mean| *mean >= NORMAL_APPROXIMATION_MIN).then(|| ticket.normals(RngStream::SHOT, block));
+            mean.iter().any(|mean| *mean >= NORMAL_APPROXIMATION_MIN).then(|| key.normals(RngStream::SHOT, block));
         let uniforms = mean
             .iter()
             .any(|mean| *mean < NORMAL_APPROXIMATION_MIN)
-            .then(|| ticket.uniforms(RngStream::SHOT_LOW_LIGHT, block));
+            .then(|| key.uniforms(RngStream::SHOT_LOW_LIGHT, block));
         for (k, light) in light.iter_mut().enumerate() {
             let counted = match (normals, uniforms) {
                 (Some(normals), _) if mean[k] >= NORMAL_APPROXIMATION_MIN => mean[k] + mean[k].sqrt() * normals[k],

@@ -29,9 +29,9 @@ fn tone() -> &'static ToneLut {
 
 /// Random key of frame `number`.
 fn rng_key(number: u64) -> RngKey {
-    let mut ticket = RngKey::new(11, 3, "eye");
-    (0..number).for_each(|_| ticket.advance_scheduled());
-    ticket
+    let mut key = RngKey::new(11, 3, "eye");
+    (0..number).for_each(|_| key.advance_scheduled());
+    key
 }
 
 /// Imperfections with only the fields that `set` changes.
@@ -142,11 +142,11 @@ fn few_electrons() {
     for electrons in [0.5, 3.0, 20.0] {
         let light = tone().decode(128);
         let shot = ShotNoise { electrons: electrons / light };
-        let (view, ticket) = (view([SIDE; 2], 150.0), rng_key(1));
+        let (view, key) = (view([SIDE; 2], 150.0), rng_key(1));
         let mut counts = Vec::new();
         for pixel in 0..40_000 {
             let mut light = [light; 3];
-            shot.apply(&mut light, &PixelContext { image: pinhole(&view, &ticket), pixel });
+            shot.apply(&mut light, &PixelContext { image: pinhole(&view, &key), pixel });
             counts.extend(light.map(|light| light * shot.electrons));
         }
         assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
@@ -252,9 +252,9 @@ fn distances() {
         let baseline = if rays.is_none() { 0.075 } else { 0.0 };
         let holes = Some(Holes { baseline, ..Holes::default() });
         let all = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), holes, ..Imperfections::default() };
-        let ticket = rng_key(1);
+        let key = rng_key(1);
         let found =
-            lens_reach_with_effects(&all, &reaches, ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) });
+            lens_reach_with_effects(&all, &reaches, ImageContext { rays: rays.as_ref(), ..pinhole(&view, &key) });
         assert!(rays.is_some() || found.iter().any(|reach| reach.is_infinite()), "there are holes");
         let same = found.iter().zip(&reaches).filter(|(found, reach)| found == reach).count();
         assert!(same < 10, "there is noise, but for {same}");
@@ -330,8 +330,8 @@ fn grazing_holes() {
     for rays in lenses(&view) {
         let (mut inside, mut outside) = (0, 0);
         for normal in [[0.0, 0.0, -1.0], [0.8, 0.1, -0.6], [0.2, -0.9, -0.5], [-0.7, 0.7, -0.4]] {
-            let ticket = rng_key(1);
-            let image = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+            let key = rng_key(1);
+            let image = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &key) };
             let ray = |pixel| nalgebra::Vector3::from(image.ray(pixel));
             let normal = nalgebra::Vector3::from(normal).normalize();
             // A plane 2 m from the camera; rays that do not reach the plane are misses.
@@ -372,8 +372,8 @@ fn lens_depth_noise() {
     let (view, law) = (view([120, 90], 60.0), DepthNoise { constant: 1e-3, quadratic: 2e-3, offset: 0.0 });
     let all = only(|all| all.depth_noise = Some(law));
     for rays in lenses(&view) {
-        let ticket = rng_key(1);
-        let image = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
+        let key = rng_key(1);
+        let image = ImageContext { rays: rays.as_ref(), ..pinhole(&view, &key) };
         for z in [0.5f64, 3.0] {
             let errors: Vec<f64> = lens_reach_with_effects(&all, &[z as f32; 120 * 90], image)
                 .into_iter()
@@ -390,8 +390,8 @@ fn lens_depth_noise() {
 
 /// Radiance of a white image with vignetting, by pixel.
 fn remaining_radiance(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
-    let (view, ticket) = (view(size, 1.0), rng_key(1));
-    let image = ImageContext { rays: Some(rays), ..pinhole(&view, &ticket) };
+    let (view, key) = (view(size, 1.0), rng_key(1));
+    let image = ImageContext { rays: Some(rays), ..pinhole(&view, &key) };
     let shade = |pixel| {
         let mut light = [1.0; 3];
         Vignetting::default().apply(&mut light, &PixelContext { image, pixel });

@@ -152,9 +152,9 @@ impl Camera {
             DepthMiss::Far => Some(self.lens.far),
             DepthMiss::Zero => Some(0.0),
         };
-        for (shot, frame) in &mut jobs {
+        for (request, frame) in &mut jobs {
             if self.cfg.depth_miss == DepthMiss::Far {
-                clamp_hits_below_far(self.lens.far, shot.lens.is_some_and(|rays| !rays.is_forward()), frame);
+                clamp_hits_below_far(self.lens.far, request.lens.is_some_and(|rays| !rays.is_forward()), frame);
             }
             miss.into_iter().for_each(|value| frame.replace_misses(value));
         }
@@ -218,11 +218,11 @@ fn render_with_markers(
     markers: &[&[Marker]],
 ) -> Result<(), (usize, RenderError)> {
     let (mut stages, mut failed) = (Vec::new(), None);
-    for (index, ((shot, frame), markers)) in jobs.iter().zip(markers).enumerate() {
+    for (index, ((request, frame), markers)) in jobs.iter().zip(markers).enumerate() {
         if markers.is_empty() || frame.color.is_none() {
             continue;
         }
-        match MarkedScene::of(shot, &takes[index], markers) {
+        match MarkedScene::of(request, &takes[index], markers) {
             Ok(stage) => stages.push((index, Some(stage))),
             Err(error) => {
                 failed = failed.or(Some((index, error)));
@@ -231,14 +231,14 @@ fn render_with_markers(
             }
         }
     }
-    let shots: Vec<RenderRequest<'_>> = jobs.iter().map(|(shot, _)| *shot).collect();
-    let mut all: Vec<RenderJob<'_>> = jobs.iter_mut().map(|(shot, frame)| (*shot, frame.reborrow())).collect();
-    let (mut all_takes, mut of) = (takes.to_vec(), (0..shots.len()).collect::<Vec<_>>());
+    let requests: Vec<RenderRequest<'_>> = jobs.iter().map(|(request, _)| *request).collect();
+    let mut all: Vec<RenderJob<'_>> = jobs.iter_mut().map(|(request, frame)| (*request, frame.reborrow())).collect();
+    let (mut all_takes, mut of) = (takes.to_vec(), (0..requests.len()).collect::<Vec<_>>());
     for (index, stage) in &stages {
         let frame = FrameMut { color: all[*index].1.color.take(), ..FrameMut::default() };
         let Some(MarkedScene { scene, poses, shutter_open_poses }) = stage else { continue };
         let take = takes[*index];
-        all.push((RenderRequest { scene, poses, previous: None, ..shots[*index] }, frame));
+        all.push((RenderRequest { scene, poses, previous: None, ..requests[*index] }, frame));
         let shutter_open = take
             .shutter_open
             .zip(shutter_open_poses.as_deref())
@@ -260,16 +260,16 @@ struct MarkedScene {
 }
 
 impl MarkedScene {
-    fn of(shot: &RenderRequest<'_>, take: &FrameSample<'_>, markers: &[Marker]) -> Result<Self, RenderError> {
+    fn of(request: &RenderRequest<'_>, take: &FrameSample<'_>, markers: &[Marker]) -> Result<Self, RenderError> {
         let (added, places): (Vec<Instance>, Vec<PoseF32>) = markers.iter().flat_map(Marker::instances).unzip();
         let added = added.into_iter().map(|instance| Instance { group: Marker::GROUP, ..instance });
-        let instances = shot.scene.instances().iter().cloned().chain(added).collect();
+        let instances = request.scene.instances().iter().cloned().chain(added).collect();
         // Each marker can be rendered, but the total number of triangles may be too large.
-        let scene = shot.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
+        let scene = request.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
         let with = |poses: &[PoseF32]| poses.iter().chain(&places).copied().collect();
         Ok(Self {
             scene,
-            poses: with(shot.poses),
+            poses: with(request.poses),
             shutter_open_poses: take.shutter_open.as_ref().map(|opened| with(opened.poses)),
         })
     }

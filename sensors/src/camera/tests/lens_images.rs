@@ -80,8 +80,8 @@ fn channels() {
                 continue;
             };
             let (world, range) = (pose.rotation * ray, [cfg.near, cfg.far]);
-            let met = meets(eye, world, range);
-            let id_of = |met: Option<(f64, i32, Vector3<f64>)>| met.map_or(0, |m| m.1);
+            let found_hit = meets(eye, world, range);
+            let id_of = |found_hit: Option<(f64, i32, Vector3<f64>)>| found_hit.map_or(0, |m| m.1);
             // Single precision may differ if a ray offset by 1e-4, or a range longer by the same, hits another
             // instance.
             let mut others = (0..8).map(|n| {
@@ -89,11 +89,11 @@ fn channels() {
                 let by = 1.0 + f64::from(n & 1) * 2e-4 - 1e-4;
                 id_of(meets(eye, world + beside * world.norm(), range.map(|r| r * by)))
             });
-            if others.any(|id| id != id_of(met)) {
+            if others.any(|id| id != id_of(found_hit)) {
                 edges += 1;
                 continue;
             }
-            let Some((t, expected, n)) = met else {
+            let Some((t, expected, n)) = found_hit else {
                 assert!(missed, "{what}");
                 continue;
             };

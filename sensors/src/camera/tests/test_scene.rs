@@ -142,7 +142,7 @@ pub(super) fn frame_of(
     let mut rasterizer = ImageRenderer::new(cfg);
     (rasterizer.renderer, rasterizer.shutter) = (renderer, shutter);
     let mut frame = Frame::new(view.width, view.height, channels);
-    let shot = RenderRequest { scene, poses, view, lights: None, lens: None, previous: None };
-    rasterizer.render_sample(&shot, &FrameSample { noise: 0, shutter_open }, &mut frame.as_mut()).unwrap();
+    let request = RenderRequest { scene, poses, view, lights: None, lens: None, previous: None };
+    rasterizer.render_sample(&request, &FrameSample { noise: 0, shutter_open }, &mut frame.as_mut()).unwrap();
     frame
 }

@@ -46,18 +46,18 @@ pub trait Play {
     ///
     /// # Errors
     /// The recording is empty, its times are invalid, or a frame cannot be shown.
-    fn play(&mut self, film: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError>;
+    fn play(&mut self, playback: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError>;
 }
 
 impl Play for SimulationManager {
-    fn play(&mut self, film: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
-        let mut head = Playhead::new(film.times())?;
+    fn play(&mut self, playback: &mut dyn PlaybackSource, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
+        let mut head = Playhead::new(playback.times())?;
         let known = self.observers().ids::<ViewController>().first().copied();
         // The view controller is removed meanwhile, so that writes of the recording do not notify it.
         let taken = known.and_then(|id| self.observers_mut().remove(id).ok());
-        let mut conductor = taken.unwrap_or_else(ViewController::new);
-        let result = conductor.play(self, film, &mut head, go_on);
-        self.observers_mut().add(conductor);
+        let mut controller = taken.unwrap_or_else(ViewController::new);
+        let result = controller.play(self, playback, &mut head, go_on);
+        self.observers_mut().add(controller);
         result
     }
 }
@@ -180,7 +180,7 @@ impl ViewController {
     fn play(
         &mut self,
         sim: &mut SimulationManager,
-        film: &mut dyn PlaybackSource,
+        playback: &mut dyn PlaybackSource,
         head: &mut Playhead,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<(), PlayError> {
@@ -197,7 +197,7 @@ impl ViewController {
             self.dirty |= shown != Some((head.frame, head.playing));
             let rest = self.time_to_next_snapshot();
             if self.dirty && rest.is_zero() {
-                film.show(sim, head.frame).map_err(PlayError::Frame)?;
+                playback.show(sim, head.frame).map_err(PlayError::Frame)?;
                 shown = Some((head.frame, head.playing));
                 self.publish_frame(sim, head);
                 if !self.dirty {
@@ -287,14 +287,14 @@ mod tests {
         let steps = sim.observers().steps();
         let viewer = sim.viewer(SnapshotRequest { rate: 200.0, ..SnapshotRequest::default() });
         // The times do not begin at 0, like a recording that was started late.
-        let mut film = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
+        let mut playback = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
         let over = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 let _ends = Ends(&over);
                 act(&viewer);
             });
-            sim.play(&mut film, &mut || !over.load(Ordering::Acquire)).unwrap();
+            sim.play(&mut playback, &mut || !over.load(Ordering::Acquire)).unwrap();
         });
         assert_eq!(sim.observers().steps(), steps, "nothing was stepped");
         // The view controller is back: the simulation steps as before.

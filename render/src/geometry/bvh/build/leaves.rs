@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn least_cost() {
         let mut state = 1u32;
-        let mut dice = || {
+        let mut rng = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1u32 << 24) as f32
         };
@@ -124,8 +124,8 @@ mod tests {
             let count = 1 + round % 14;
             let things: Vec<BuildItem> = (0..count as u32)
                 .map(|k| {
-                    let lo = [dice() + 0.3 * k as f32, dice(), dice()];
-                    let long = dice() * dice();
+                    let lo = [rng() + 0.3 * k as f32, rng(), rng()];
+                    let long = rng() * rng();
                     BuildItem::item(lo, lo.map(|x| x + long), k, 1)
                 })
                 .collect();

@@ -143,12 +143,12 @@ impl HeightGrid {
             let clear = (highest + slack).lt(z0.min(z1));
             let close = active & !clear.to_bitmask();
             if close != 0 {
-                let (t, hx, hy, met) = intersect_cells(s, &cells, origin, along, [o[2], d[2]], from, leave);
+                let (t, hx, hy, hit) = intersect_cells(s, &cells, origin, along, [o[2], d[2]], from, leave);
                 let (normal, known) = self.normals(s, hx, hy);
-                let met = (met & known & t.le(limit)).to_bitmask() & close;
-                write_hits(touches, t, &normal, met);
-                done |= met;
-                active &= !met;
+                let hit = (hit & known & t.le(limit)).to_bitmask() & close;
+                write_hits(touches, t, &normal, hit);
+                done |= hit;
+                active &= !hit;
             }
             active &= inside.to_bitmask();
             if active == 0 {
@@ -179,7 +179,7 @@ fn intersect_cells<S: Simd>(
     let split = from.lt(diagonal) & diagonal.lt(to);
     // The segment before the diagonal, then, in lanes without a hit, the segment behind it.
     let (mut from, mut end, mut open) = (from, split.select(diagonal, to), zero.le(zero));
-    let (mut t, mut slopes, mut met) = (from, [zero; 2], zero.lt(zero));
+    let (mut t, mut slopes, mut hit) = (from, [zero; 2], zero.lt(zero));
     for _ in 0..2 {
         let right = zero.le(w + dw * (from * 0.5 + end * 0.5));
         let [h, hx, hy] = cells.plane(right);
@@ -189,13 +189,13 @@ fn intersect_cells<S: Simd>(
         let here = open & (first | last);
         t = here.select(first.select(from, inner), t);
         slopes = [here.select(hx, slopes[0]), here.select(hy, slopes[1])];
-        (met, open) = (met | here, open & split & !here);
+        (hit, open) = (hit | here, open & split & !here);
         if open.to_bitmask() == 0 {
             break;
         }
         (from, end) = (diagonal, to);
     }
-    (t, slopes[0], slopes[1], met)
+    (t, slopes[0], slopes[1], hit)
 }
 
 /// Writes the hits of some lanes.

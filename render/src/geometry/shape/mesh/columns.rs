@@ -330,19 +330,19 @@ impl Pairs {
         }
         let load = |v: &[[f64; WIDTH]; 3]| [D::load(s, &v[0]), D::load(s, &v[1]), D::load(s, &v[2])];
         let [origin, by] = [load(&lines[0]), load(&lines[1])];
-        let met = distances(
+        let hit = distances(
             s,
             &origin,
             &by,
             #[inline(always)]
             |corner, axis| D::load(s, &corners[corner][axes[axis]]),
         );
-        let Some((t, inside)) = met else { return };
-        let mut met = (inside & D::splat(s, 0.0).le(t)).to_bitmask();
+        let Some((t, inside)) = hit else { return };
+        let mut hit = (inside & D::splat(s, 0.0).le(t)).to_bitmask();
         let t = t.array();
-        while met != 0 {
-            let lane = met.trailing_zeros() as usize % WIDTH;
-            met &= met - 1;
+        while hit != 0 {
+            let lane = hit.trailing_zeros() as usize % WIDTH;
+            hit &= hit - 1;
             let (triangle, ray) = (self.triangles[lane], self.rays[lane] % WIDTH);
             let (limit, best) = (&mut nearest.limit[ray], &mut nearest.best[ray]);
             // On an edge the first triangle counts.
