@@ -189,6 +189,15 @@ impl ModelArgs {
         Ok(if kinds[at] == FileKind::Scene { Files::Scene(path) } else { Files::Mjcf(path) })
     }
 
+    /// Returns an error if `--floating-base` is given for an MJCF file that is rendered as it is.
+    pub(crate) fn refuse_floating_base(&self, path: &Path) -> Result<()> {
+        if self.floating_base {
+            let path = path.display();
+            return Err(format!("--floating-base: {path} is rendered as the file has it; leave the flag out").into());
+        }
+        Ok(())
+    }
+
     /// Builds the simulation. URDF files form one robot. An MJCF file is a robot if possible; otherwise (several root
     /// bodies, ball joints, or no hinge or slide joint; see [`may_be_scene`]) it is a scene with its own world geoms
     /// and no additional ground. `setup.ground` applies to robots only.

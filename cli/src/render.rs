@@ -96,7 +96,10 @@ Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or mi
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let (still, mut warned) = match args.model.files()? {
-        Files::Mjcf(path) => (load_mjcf(&path)?, false),
+        Files::Mjcf(path) => {
+            args.model.refuse_floating_base(&path)?;
+            (load_mjcf(&path)?, false)
+        }
         Files::Urdf(_) | Files::Scene(_) => {
             let mut model = args.model.build(&Setup::STATIC)?;
             (OffscreenScene::of_env(&mut model.sim, EnvId(0))?, model.print_warnings())

@@ -120,6 +120,9 @@ impl Model {
             ("ls_tolerance", opt.ls_tolerance.to_string()),
             ("o_friction", numbers(&opt.o_friction)),
             ("actuatorgroupdisable", opt.disableactuator.to_string()),
+            ("sdf_iterations", opt.sdf_iterations.to_string()),
+            ("sdf_initpoints", opt.sdf_initpoints.to_string()),
+            ("sleep_tolerance", opt.sleep_tolerance.to_string()),
         ]);
         let on = |on: bool| String::from(if on { "enable" } else { "disable" });
         options.extend(DISABLED.iter().map(|(bit, name)| (*name, on(opt.disableflags as u32 & bit == 0))));

@@ -56,11 +56,10 @@ impl Model {
         for (element, values, count, what) in numbers {
             // An infinite `springyield` has no effect.
             if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
-                return Some(UnsupportedFeature {
-                    element,
-                    index: at / (values.len() / count.max(1)).max(1),
-                    feature: what,
-                });
+                let row = at / (values.len() / count.max(1)).max(1);
+                let of_dofs = std::ptr::eq(values, array!(dof_dampingpoly));
+                let index = if of_dofs { self.dof_jntid()[row] as usize } else { row };
+                return Some(UnsupportedFeature { element, index, feature: what });
             }
         }
         let counts = [

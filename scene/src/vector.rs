@@ -33,12 +33,13 @@ pub fn scale(a: V3, k: f64) -> V3 {
     a.map(|x| x * k)
 }
 
-/// Vector scaled to length 1; `None` for a zero vector and for infinite numbers.
+/// Vector scaled to length 1; `None` for a zero vector and for numbers that are not finite.
 #[inline(always)]
 pub fn normalize(a: V3) -> Option<V3> {
     // Divided by the largest component first, because squares of tiny or huge numbers leave the range.
     let largest = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    if !(largest > 0.0 && largest.is_finite()) {
+    // `f64::max` skips NaN.
+    if !(largest > 0.0 && a.iter().all(|x| x.is_finite())) {
         return None;
     }
     let a = a.map(|x| x / largest);

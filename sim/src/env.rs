@@ -313,7 +313,9 @@ impl SimEnv {
         self.drives.set_from_flat(&state.drives);
         // A hand-made file may name a body that does not exist.
         let bodies = self.data.model().nbody();
-        let wrenches = state.wrenches.remapped(|body| (body < bodies).then_some(body));
+        let mut wrenches = state.wrenches.clone();
+        wrenches.list.retain(|wrench| wrench.body < bodies);
+        wrenches.gravity_compensated.retain(|body| *body < bodies);
         self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
         let welds = state.welds.iter().filter(|weld| self.data.model().is_weld(weld.equality)).copied().collect();
         self.replace_welds(welds);

@@ -456,7 +456,7 @@ pub enum Error {
         error: std::io::Error,
     },
     /// A texture cannot be written as PNG in an export.
-    #[error("{path}: not a readable PNG or JPEG image: {reason}")]
+    #[error("{path}: the texture cannot be written as PNG: {reason}")]
     Image {
         /// The file.
         path: PathBuf,

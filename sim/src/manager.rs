@@ -129,7 +129,7 @@ impl SimulationManager {
 
     /// Adds a robot or a passive articulation.
     pub(crate) fn add_with_role(&mut self, cfg: RobotCfg, role: RobotKind) -> Result<RobotId> {
-        self.entities.check_uid_free(&cfg.uid)?;
+        self.check_world_uid(&cfg.uid)?;
         if self.entities.robots.len() >= MAX_ROBOTS {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
         }

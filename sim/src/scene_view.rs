@@ -236,7 +236,7 @@ impl<'a> SceneViewMut<'a> {
         for (of, numbers) in forces.iter().flat_map(|(point, force)| [("the point", point), ("the force", force)]) {
             if let Some(column) = numbers.iter().position(|x| !x.is_finite()) {
                 let (item, value) = (of.to_string(), numbers[column]);
-                return Err(Error::NotFinite { argument: "pull", row: env.0, column, item, value });
+                return Err(Error::NotFinite { argument: "set_point_forces", row: env.0, column, item, value });
             }
         }
         self.sim.simulation.batch.write(env.0, |env| {

@@ -176,7 +176,7 @@ pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
     let compare =
         |env: &mut E, plan: &RunVariant, of: &dyn Fn(usize) -> bool, found: &mut Vec<Finding>, kind: FindingFn| {
             let names = env.observation_space().names().to_vec();
-            if let Some(other) = rollout(env, plan, &mut Vec::new())
+            if let Some(other) = rollout(env, plan, found)
                 && let Some(apart) = first_difference(&first, &other, &names, of)
             {
                 found.push(kind(apart));
@@ -199,8 +199,8 @@ pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
         let bounded = RunVariant { beyond_bounds_by: Some(0.0), ..plain };
         let names = env.observation_space().names().to_vec();
         let (at, beyond) = (
-            rollout(env, &bounded, &mut Vec::new()),
-            rollout(env, &RunVariant { beyond_bounds_by: Some(1.0), ..plain }, &mut Vec::new()),
+            rollout(env, &bounded, &mut found),
+            rollout(env, &RunVariant { beyond_bounds_by: Some(1.0), ..plain }, &mut found),
         );
         if let (Some(at), Some(beyond)) = (at, beyond)
             && let Some(apart) = first_difference(&at, &beyond, &names, &|_| true)

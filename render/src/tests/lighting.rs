@@ -34,6 +34,26 @@ fn byte(light: f32) -> f64 {
 /// A quarter for the polynomial, a half for rounding.
 const ROUNDING: f64 = 0.8;
 
+/// A light after many inactive ones has its shadow map: the images are equal to those of the light alone.
+///
+/// Regression: lights after the first 256 had no shadow map.
+#[test]
+fn late_lights() {
+    let view = look_at_view([101, 101], 0.9, [2.2, -0.3, 0.8], [1.0, 0., 0.]);
+    let mut frame = floor_and_box([1.0, 2.0, 0.1], translation(-1.0, 0.0, 1.0), 0.1, view);
+    frame.renderer = Renderer::Raster;
+    let light = Light { diffuse: [0.7; 3], direction: [1., 0., -1.], ..Light::default() };
+    let mut drawn = |before: usize, cast_shadow: bool| {
+        let inactive = Light { active: false, ..light };
+        frame.scene.lights = vec![inactive; before];
+        frame.scene.lights.push(Light { cast_shadow, ..light });
+        frame.draw().color().to_vec()
+    };
+    let alone = drawn(0, true);
+    assert!(alone != drawn(0, false), "the control: the light casts a shadow");
+    assert!(drawn(300, true) == alone);
+}
+
 /// The ray-traced shadow of a box over a floor: position of its edge, and brightness of the floor on both sides.
 #[test]
 fn hybrid_shadows() {

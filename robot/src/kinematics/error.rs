@@ -19,7 +19,7 @@ pub enum KinematicsError {
         link: String,
     },
     /// A control part ends in several links, so its last link is ambiguous.
-    #[error("control part {part:?} has several end links: {}; select one with Tip::at", quoted(.links))]
+    #[error("control part {part:?} has several end links: {}; select one with TipFrame", quoted(.links))]
     AmbiguousTip {
         /// Name of the part.
         part: String,

@@ -65,7 +65,7 @@ impl IkSolver {
                 Some(variable) => format!("not moved by variable {variable}"),
                 None => "without joints".into(),
             };
-            let expected = "every variable must move the frame: hold the other variables with Chain::held";
+            let expected = "every variable must move the frame: hold the other variables with Chain::reduced";
             return Err(KinematicsError::OutOfRange { field: "the chain", value, expected });
         }
         cfg.validate(joints)?;

@@ -98,8 +98,8 @@ impl OffscreenScene {
 
     /// Creates the offscreen scene of several environments side by side (`None` for all environments), at
     /// [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins). Each marker is shown in its
-    /// environment. The ground is rendered once. Lights and cameras are those of environment 0 at their poses in that
-    /// environment, not moved to its origin. Everything else is rendered in every environment, so a terrain that is
+    /// environment. The ground is rendered once. Lights and cameras are those of environment 0, moved to its
+    /// origin. Everything else is rendered in every environment, so a terrain that is
     /// larger than the space between environments overlaps.
     ///
     /// # Errors
@@ -126,7 +126,16 @@ impl OffscreenScene {
             overview::OverviewEnv { origin, scene: still.visual_scene.scene(), poses: &still.poses, markers }
         });
         let (visible, poses) = overview::side_by_side(&visible, &places.collect::<Vec<_>>())?;
-        Ok(Self { visual_scene: Arc::new(visible), poses, ..Self::of_env(sim, EnvId(0))? })
+        let mut first = Self::of_env(sim, EnvId(0))?;
+        let origin: [f64; 3] = [0, 1, 2].map(|k| origins[(0, k)]);
+        for light in &mut first.lights {
+            light.position = std::array::from_fn(|k| light.position[k] + origin[k] as f32);
+        }
+        for camera in &mut first.cameras {
+            let translation = &mut camera.world_from_camera.translation.vector;
+            *translation += nalgebra::Vector3::from(origin);
+        }
+        Ok(Self { visual_scene: Arc::new(visible), poses, ..first })
     }
 
     fn of_data(visible: &Arc<VisualScene>, data: &Data) -> Self {

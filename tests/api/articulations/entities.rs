@@ -134,6 +134,9 @@ fn refused_configurations() {
     let nowhere = ArticulationCfg { urdf: UrdfCfg::single("nowhere/cabinet.urdf"), ..b() };
     let rows = [
         ("twice", cabinet(), "DuplicateUid(\"cabinet\")", &[][..]),
+        // Regression: robots and articulations could have the name of MuJoCo's world and of the ground.
+        ("world", ArticulationCfg { uid: "world".into(), ..cabinet() }, "DuplicateUid(\"world\")", &[]),
+        ("ground", ArticulationCfg { uid: "ground".into(), ..cabinet() }, "DuplicateUid(\"ground\")", &[]),
         ("slash", ArticulationCfg { uid: "a/b".into(), ..cabinet() }, "InvalidUid(\"a/b\")", &[]),
         ("no file", nowhere, "", &["nowhere/cabinet.urdf"]),
         ("joint", ArticulationCfg { init_qpos, ..b() }, "", &["articulation \"b\": ", "init_qpos", "drawer_slide"]),

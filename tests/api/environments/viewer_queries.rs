@@ -114,8 +114,19 @@ fn external_force() {
     sim.update(1);
     let third = sim.rigid_object(id).velocity();
     assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
+    // A restored force acts as before, and an empty list ends it. Regression: a restored force could not be ended.
+    sim.scene_mut().set_point_forces(EnvId(1), 0, &[(point, force)]).unwrap();
+    let snapshot = sim.snapshot(None).unwrap();
+    sim.restore(&snapshot, None).unwrap();
+    sim.update(1);
+    let fourth = sim.rigid_object(id).velocity();
+    assert!((0..3).all(|k| (fourth[(1, k)] - third[(1, k)] - h * force[k] / mass).abs() < 1e-14), "{fourth}");
+    sim.scene_mut().set_point_forces(EnvId(1), 0, &[]).unwrap();
+    sim.update(1);
+    let fifth = sim.rigid_object(id).velocity();
+    assert!((0..3).all(|k| (fifth[(1, k)] - fourth[(1, k)]).abs() < 1e-14), "{fifth}");
     let refused = sim.scene_mut().set_point_forces(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
-    assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");
+    assert!(matches!(refused, Err(Error::NotFinite { argument: "set_point_forces", column: 1, .. })), "{refused:?}");
     let body = sim.scene_mut().set_point_forces(EnvId(0), 1, &[(point, force)]);
     assert!(matches!(body, Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })), "{body:?}");
     assert!(matches!(

@@ -24,7 +24,7 @@ fn names() {
     assert_says(robot.compute_fk(&qpos, TipFrame::of_link("ee_lnik"), None), &["link \"ee_lnik\"", "\"ee_link\""]);
     assert_says(robot.jacobian(TipFrame::of_part("arm").at("hnad"), None, None), &["link \"hnad\""]);
     // A hand ends in five fingers.
-    let several = ["control part \"hand\"", "\"left_index_dist\"", "\"left_thumb_dist\"", "Tip::at"];
+    let several = ["control part \"hand\"", "\"left_index_dist\"", "\"left_thumb_dist\"", "TipFrame"];
     assert_says(robot.jacobian("hand", None, None), &several);
     let ik = |tip: TipFrame<'_>| robot.compute_ik(&Pose::identity(), tip, &IkCfg::default(), None, None);
     assert_says(ik("hand".into()), &several);

@@ -142,6 +142,10 @@ fn newer_elements() {
     ] {
         assert_error(part(inside, after), "MjcfAttach", &parts);
     }
+    // Regression: behind a free joint, whose six degrees of freedom come first, the wrong joint was named.
+    let behind = "<mujoco><worldbody><body><freejoint/><geom size=\"0.1\"/></body><body pos=\"1 0 0\">\
+                  <joint name=\"hinge\" damping=\"1 -2 0\"/><geom size=\"0.1\"/></body></worldbody></mujoco>";
+    assert_error(empty(1).add_mjcf(MjcfPartCfg::text("part", behind)).map(drop), "MjcfAttach", &["joint \"hinge\""]);
     for (sensor, what) in [
         ("<contact name=\"x\" geom1=\"g\"/>", "the type contact"),
         ("<jointpos name=\"x\" joint=\"j\" delay=\"0.01\" nsample=\"3\"/>", "delay"),
@@ -176,6 +180,15 @@ fn ignored_settings() {
     }
     let settings = sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::SettingIgnored).count();
     assert_eq!(settings, 5, "{:#?}", sim.diagnostics());
+    // Regression: the settings of signed distance fields and of sleeping were not compared.
+    if BUILD_VERSION == SupportedVersion::V4 {
+        let text = "<mujoco><option sdf_iterations=\"50\" sleep_tolerance=\"0.1\"/><worldbody><geom size=\"1\"/></worldbody></mujoco>";
+        let mut sim = empty(1);
+        sim.add_mjcf(MjcfPartCfg::text("sdf", text)).unwrap();
+        for words in [["sdf_iterations is 50", "is used"], ["sleep_tolerance is 0.1", "is used"]] {
+            assert_eq!(count_diagnostics(&sim, &words), 1, "{words:?}: {:#?}", sim.diagnostics());
+        }
+    }
     // A setting that the file leaves at MuJoCo's default, and that differs in the scene, is reported too.
     let mut other = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() }).unwrap();
     other.add_mjcf(MjcfPartCfg::text("plain", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>")).unwrap();

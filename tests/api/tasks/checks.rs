@@ -33,6 +33,8 @@ pub(super) enum Fault {
     NanReward,
     StepFails,
     AcceptsWrongMask,
+    MaskedResetFails,
+    OutOfBoundsFails,
 }
 
 /// A valid task with a fault added.
@@ -78,6 +80,9 @@ impl VectorEnv for Broken {
 
     fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {
         (self.resets, self.ended_observations) = (self.resets + 1, None);
+        if self.fault == Fault::MaskedResetFails && mask.is_some_and(|mask| mask.len() == self.num_envs()) {
+            return Err(EnvError::ResetFirst { env: 1 });
+        }
         let mask = match (self.fault, mask) {
             (Fault::MaskIgnored, Some(mask)) if mask.len() == self.num_envs() => None,
             (Fault::AcceptsWrongMask, _) => None,
@@ -95,6 +100,10 @@ impl VectorEnv for Broken {
         self.steps += 1;
         if self.fault == Fault::StepFails && self.steps == 5 {
             return Err(EnvError::ResetFirst { env: 0 });
+        }
+        let high = self.action_space().high()[0];
+        if self.fault == Fault::OutOfBoundsFails && actions.iter().any(|action| *action > high) {
+            return Err(EnvError::ResetFirst { env: 2 });
         }
         let mut step = self.inner.step(actions)?;
         match self.fault {
@@ -123,7 +132,7 @@ type IsExpected = fn(&Finding) -> bool;
 #[test]
 fn broken_tasks() {
     assert_eq!(check(&mut Broken::new(Fault::None), 7), [], "the control");
-    let cases: [(Fault, IsExpected, &str); 11] = [
+    let cases: [(Fault, IsExpected, &str); 13] = [
         (
             Fault::RowMissing,
             |f| matches!(f, Finding::Shape { found, expected, .. } if found == &[3, 1] && expected == &[4, 1]),
@@ -150,6 +159,13 @@ fn broken_tasks() {
         (Fault::WrongFinalObservations, |f| matches!(f, Finding::FinalObservation { .. }), "final_observations"),
         (Fault::NanReward, |f| matches!(f, Finding::Reward { env: 2, value, .. } if value.is_nan()), "reward"),
         (Fault::StepFails, |f| matches!(f, Finding::UnexpectedError { what, .. } if what == "step 4"), "step 4"),
+        // Regression: findings of the runs with masked resets and with actions beyond their bounds were dropped.
+        (
+            Fault::MaskedResetFails,
+            |f| matches!(f, Finding::UnexpectedError { what, .. } if what == "a reset by mask"),
+            "a reset by mask",
+        ),
+        (Fault::OutOfBoundsFails, |f| matches!(f, Finding::UnexpectedError { what, .. } if what == "step 0"), "step 0"),
         (Fault::AcceptsWrongMask, |f| matches!(f, Finding::MissingError { .. }), "mask"),
     ];
     for (fault, is_it, word) in cases {

@@ -70,6 +70,28 @@ fn environments_and_markers() {
     assert_eq!(total(0), 0, "the ground is everywhere");
 }
 
+/// Lights and cameras of an MJCF file are at their places in environment 0, where its bodies are.
+///
+/// Regression: they were at their places without the origin of the environment.
+#[test]
+fn lights_and_cameras() {
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { arena_space: 3.0, ..cfg(4, 1) });
+    let file = "<mujoco><worldbody><light name='spot' pos='0.3 0.2 2'/><camera name='eye' pos='0.1 -0.2 1'/>\
+                <body pos='0.1 0.2 1'><freejoint/><geom size='0.1'/></body></worldbody></mujoco>";
+    sim.add_mjcf(MjcfPartCfg::text("part", file)).unwrap();
+    let origin = [0, 1].map(|k| sim.cfg().env_origins()[(0, k)]);
+    assert!(origin.iter().all(|x| *x != 0.0), "the control: {origin:?}");
+    let seen = OffscreenScene::overview(&mut sim, None, &[]).unwrap();
+    let camera = seen.camera("part/eye").unwrap().world_from_camera.translation;
+    let view = above();
+    let lights = seen.render_request(&view).lights.unwrap();
+    let spot = lights.iter().find(|light| light.position[2] == 2.0).unwrap();
+    for (k, [of_camera, of_light]) in [(0, [0.1, 0.3]), (1, [-0.2, 0.2])] {
+        assert!((camera.vector[k] - origin[k] - of_camera).abs() < 1e-12, "{camera}");
+        assert!((f64::from(spot.position[k]) - origin[k] - of_light).abs() < 1e-6, "{spot:?}");
+    }
+}
+
 #[test]
 fn selection_and_refusals() {
     let mut sim = balls(4);

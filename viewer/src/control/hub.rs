@@ -121,7 +121,8 @@ impl Viewer {
     /// Waits up to `timeout` for a snapshot with a number above `after` and returns it. Returns `None` after the
     /// timeout or the end of the simulation.
     pub fn wait(&self, after: u64, timeout: Duration) -> Option<Arc<Snapshot>> {
-        let end = Instant::now() + timeout;
+        // Longer timeouts overflow.
+        let end = Instant::now() + timeout.min(Duration::from_secs(u32::MAX.into()));
         let mut newest = lock(&self.hub.newest);
         loop {
             if let Some(snapshot) = newest.as_ref().filter(|snapshot| snapshot.number > after) {

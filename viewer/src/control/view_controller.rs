@@ -239,9 +239,6 @@ impl ViewController {
             }
             Command::Drag { env, body, anchor, target } => {
                 let spring = Spring { env, body, anchor, target };
-                if self.springs.get(&viewer).is_some_and(|old| old.body_ref() != spring.body_ref()) {
-                    self.release(sim, viewer);
-                }
                 spring.apply(sim).map_err(|error| error.to_string())?;
                 self.springs.insert(viewer, spring);
                 self.apply_springs(sim);
