@@ -4,14 +4,15 @@ use crate::command_status::Result;
 use crate::excerpt;
 use crate::file_kind::FileKind;
 use kinetoscope::assets;
+use kinetoscope::mujoco;
 use kinetoscope::prelude::*;
 use kinetoscope::robot::description::LinkId;
-use kinetoscope::robot::urdf::Strictness;
-use kinetoscope::sim::{Error, MjcfId, RobotFileError};
+use kinetoscope::robot::urdf::{self, Strictness};
+use kinetoscope::sim::{Error, FrictionCone, MjcfId, RobotFileError};
 use std::path::{Path, PathBuf};
 
 /// Files and loading options of a model.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub(crate) struct ModelArgs {
     /// URDF files, each attached to the tip of the previous one; or one MJCF file; or one scene file (TOML, YAML, JSON)
     #[arg(required = true, value_name = "FILE.urdf|FILE.xml|SCENE.toml")]
@@ -66,6 +67,36 @@ pub(crate) struct Setup {
     /// True to add a ground plane below a robot; ignored for scenes.
     pub(crate) ground: bool,
     pub(crate) spawn_height: Option<f64>,
+    /// Options of an MJCF file; `None` for the defaults of simulations.
+    pub(crate) options: Option<FileOptions>,
+}
+
+/// Options of an MJCF file that a simulation has as well.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FileOptions {
+    /// Time step \[s\].
+    timestep: f64,
+    /// Gravity \[m/s²\].
+    gravity: [f64; 3],
+    cone: FrictionCone,
+    impratio: f64,
+    iterations: u32,
+}
+
+impl FileOptions {
+    /// Reads the options of an MJCF file; `None` if it does not compile, which is reported later.
+    fn read(path: &Path) -> Option<Self> {
+        let model = mujoco::compile_file(path).ok()?.into_model();
+        let options = model.options();
+        let text = |name: &str| options.iter().find(|(known, _)| *known == name).map(|(_, value)| value.as_str());
+        Some(Self {
+            timestep: model.timestep(),
+            gravity: model.gravity(),
+            cone: if text("cone") == Some("elliptic") { FrictionCone::Elliptic } else { FrictionCone::Pyramidal },
+            impratio: text("impratio")?.parse().ok()?,
+            iterations: text("iterations")?.parse().ok()?,
+        })
+    }
 }
 
 impl Setup {
@@ -78,6 +109,7 @@ impl Setup {
         threads: None,
         ground: false,
         spawn_height: None,
+        options: None,
     };
 
     /// Settings of commands that step.
@@ -86,9 +118,24 @@ impl Setup {
         Self { num_envs, threads, ground: !no_ground, spawn_height, ..Self::STATIC }
     }
 
+    /// These settings with the options of an MJCF file, which is the whole simulation.
+    fn with_options_of(&self, path: &Path) -> Self {
+        Self { options: FileOptions::read(path), ..self.clone() }
+    }
+
     /// Returns the configuration of a simulation with one robot.
     fn cfg(&self) -> SimulationManagerCfg {
-        let defaults = SimulationManagerCfg::default();
+        let defaults = match self.options {
+            None => SimulationManagerCfg::default(),
+            Some(FileOptions { timestep, gravity, cone, impratio, iterations }) => SimulationManagerCfg {
+                physics_dt: timestep,
+                gravity: gravity.into(),
+                cone,
+                impratio,
+                solver_iterations: iterations,
+                ..Default::default()
+            },
+        };
         SimulationManagerCfg {
             num_envs: self.num_envs.unwrap_or(self.default_envs),
             arena_space: self.arena_space.unwrap_or(self.default_arena_space),
@@ -210,8 +257,11 @@ impl ModelArgs {
         }
         match self.files()? {
             Files::Urdf(urdf) => {
-                let clearance = setup.spawn_height.or(self.floating_base.then_some(0.0));
-                self.robot(setup, RobotCfg { urdf, ..Default::default() }, clearance)
+                // The link that a floating joint of the file hangs on stays fixed to the world.
+                let floats = has_floating_root(&urdf);
+                let args = Self { floating_base: self.floating_base && !floats, ..self.clone() };
+                let clearance = setup.spawn_height.or((self.floating_base || floats).then_some(0.0));
+                args.robot(setup, RobotCfg { urdf, ..Default::default() }, clearance)
             }
             Files::Mjcf(path) => self.mjcf(setup, &path),
             Files::Scene(path) => self.scene(setup, &path),
@@ -235,6 +285,7 @@ impl ModelArgs {
     fn mjcf(&self, setup: &Setup, path: &Path) -> Result<Model> {
         /// Tolerance for rounding \[m\].
         const SLACK: f64 = 1e-6;
+        let setup = &setup.with_options_of(path);
         let robot = || RobotCfg { mjcf: Some(MjcfFile::new(path)), ..Default::default() };
         let refused = match self.robot(setup, robot(), setup.spawn_height) {
             Ok(model) => {
@@ -323,4 +374,14 @@ fn parse_package(text: &str) -> std::result::Result<(String, PathBuf), String> {
 fn parse_folder(text: &str) -> std::result::Result<PathBuf, String> {
     let folder = PathBuf::from(text);
     if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is not a folder")) }
+}
+
+/// True if the root of the first component has a floating joint, so that the robot moves freely.
+fn has_floating_root(urdf: &UrdfCfg) -> bool {
+    let file = urdf.components.first().and_then(|first| urdf::parse_file(&first.urdf).ok());
+    file.is_some_and(|file| {
+        let joints = &file.robot.joints;
+        let is_root = |link: &str| joints.iter().all(|joint| joint.child.link != link);
+        joints.iter().any(|joint| joint.joint_type == urdf::urdf_rs::JointType::Floating && is_root(&joint.parent.link))
+    })
 }

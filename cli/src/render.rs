@@ -109,6 +109,10 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
         eprintln!("warning: {left_out}");
         warned = true;
     }
+    if !still.visible().scene().instances().iter().any(|instance| instance.visible) {
+        eprintln!("warning: the model has no visible shape: the image shows only the background");
+        warned = true;
+    }
     let view = args.look.view(&still)?;
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);

@@ -62,6 +62,8 @@ pub enum DiagnosticKind {
     XacroLeftover,
     /// An XML declaration is not at the beginning of its file: it is ignored.
     DeclarationMisplaced,
+    /// Numbers are separated by commas: the commas are ignored.
+    CommasIgnored,
     /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
     InertialIncomplete,
     /// Mass properties that were missing, or impossible for the shapes, were computed from the shapes. Without shapes,
@@ -124,6 +126,7 @@ impl DiagnosticKind {
             Self::NamespaceUnbound => "namespace-unbound",
             Self::XacroLeftover => "xacro-leftover",
             Self::DeclarationMisplaced => "declaration-misplaced",
+            Self::CommasIgnored => "commas-ignored",
             Self::InertialIncomplete => "inertial-incomplete",
             Self::InertiaFromShapes => "inertia-from-shapes",
             Self::InertiaImplausible => "inertia-implausible",

@@ -228,6 +228,13 @@ pub fn closest_names<'c>(name: &str, candidates: impl IntoIterator<Item = &'c st
     ranked.into_iter().map(|(_, c)| c).collect()
 }
 
+/// The candidate that `name` may be a misspelling of: at most a third of its characters, and at most three, differ.
+pub fn similar_name<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+    let nearest = candidates.into_iter().map(|c| (edit_distance(name, c), c)).min_by_key(|&(distance, _)| distance);
+    let most = 2 * (name.chars().count() / 3).min(3) + 1;
+    nearest.filter(|&(distance, _)| distance <= most).map(|(_, candidate)| candidate)
+}
+
 /// Twice the edit distance (insertions, deletions, replacements) of the first 64 characters in lower case, plus one if
 /// the whole names differ in any way, case included. The limit bounds the cost of malicious names.
 fn edit_distance(a: &str, b: &str) -> usize {
@@ -323,6 +330,15 @@ mod tests {
         assert!(text.contains("LEFT_THUMB") && text.contains("\"hand\"") && text.contains("\"LEFT_T.*\""), "{text}");
         let foot = assign(&entries(&[("foot", 1.0)]), &groups, &JOINTS, "joint");
         assert!(matches!(foot, Err(PatternError::NoMatch { .. })));
+    }
+
+    #[test]
+    fn similar_names() {
+        let known = ["inertial", "visual", "collision"];
+        assert_eq!(similar_name("colision", known), Some("collision"));
+        assert_eq!(similar_name("Visual", known), Some("visual"));
+        assert_eq!(similar_name("gravity", known), None);
+        assert_eq!(similar_name("contact", known), None);
     }
 
     #[test]

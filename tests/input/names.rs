@@ -109,9 +109,13 @@ fn uids() {
     };
     assert!((radius("ARM") / radius("arm") - 7.0).abs() < 0.1, "{} {}", radius("ARM"), radius("arm"));
     let dir = dirs[0].path();
-    for uid in ["world", "ground", "a\"b<c>&'", "日本", " ", "...", "%s", "İ", "i̇", "robot"] {
+    for uid in ["a\"b<c>&'", "日本", " ", "...", "%s", "İ", "i̇", "robot"] {
         let id = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_or_else(|e| panic!("{uid:?}: {e}"));
         assert_eq!(sim.entities().robot_id(uid).unwrap(), id);
+    }
+    for uid in ["world", "ground"] {
+        let error = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_err();
+        assert!(matches!(error, Error::DuplicateUid(_)), "{uid:?}: {error}");
     }
     // Names become parts of paths, including file paths.
     for uid in [".", "..", "a/b", "a\\b", "a\nb", ""] {

@@ -94,15 +94,19 @@ impl UrdfCfg {
 ///
 /// | deviation | lenient reading |
 /// |---|---|
-/// | a second `<material>`, `<inertial>` or `<axis>`, a second element in `<geometry>` | the first is used |
-/// | a box, sphere, cylinder or capsule with a size of 0 | the shape is left out |
+/// | a second `<material>`, `<inertial>`, `<axis>` or `<limit>`, a second element in `<geometry>` | the first is used |
+/// | a box, sphere, cylinder or capsule with a size of 0, a `<visual>` without `<geometry>` | it is left out |
 /// | an XML prefix without `xmlns:` | its elements and attributes are ignored |
 /// | xacro elements below the top level | they are ignored |
 /// | an XML declaration that is not at the beginning | it is ignored |
 /// | an `<inertial>` without `<mass>` or without `<inertia>` | the rest is computed from the shapes of the link |
+/// | an `<inertia>` without `ixy`, `ixz` or `iyz` | they are 0 |
+/// | commas with white space behind them between numbers | they are ignored |
+/// | NUL characters at the end of the file | they are ignored |
 /// | `<axis/>` without `xyz` on a fixed or floating joint | it is ignored |
 /// | one number in the `scale` of a mesh | it applies to all three axes |
 /// | `package:///path` | an absolute path, else a package with one slash too many |
+/// | `package://file` | a file in the folder of the URDF or in the asset root |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Strictness {

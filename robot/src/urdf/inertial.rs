@@ -95,10 +95,23 @@ fn read_partial(
 
 const MOMENTS: [&str; 6] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
 
-fn read_moments(reader: &Reader<'_>, inertia: Node<'_, '_>, owner: &str) -> Result<[f64; 6], UrdfError> {
+/// Reads the moments of inertia. Lenient reading takes missing products of inertia as 0.
+fn read_moments(reader: &mut Reader<'_>, inertia: Node<'_, '_>, owner: &str) -> Result<[f64; 6], UrdfError> {
     let mut moments = [0.0; 6];
+    let mut first_missing = None;
     for (name, moment) in MOMENTS.into_iter().zip(&mut moments) {
-        *moment = reader.required_number(inertia, name, owner, "all six of ixx ixy ixz iyy iyz izz")?;
+        let number = reader.required_number(inertia, name, owner, "all six of ixx ixy ixz iyy iyz izz");
+        *moment = match number {
+            Err(error @ UrdfError::AttributeMissing { .. }) if matches!(name, "ixy" | "ixz" | "iyz") => {
+                first_missing.get_or_insert(error);
+                0.0
+            }
+            number => number?,
+        };
+    }
+    if let Some(error) = first_missing {
+        let at = reader.source(inertia);
+        reader.warn_or_fail(DiagnosticKind::InertialIncomplete, at, error, "missing products of inertia are 0")?;
     }
     Ok(moments)
 }

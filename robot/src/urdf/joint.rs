@@ -164,7 +164,7 @@ fn read_limit(
     owner: &str,
     xml: &mut String,
 ) -> Result<Option<LimitMetadata>, UrdfError> {
-    let Some(limit) = reader.child(node, "limit", owner)? else {
+    let Some(limit) = reader.first_child(node, "limit", owner)? else {
         return match kind {
             JointKind::Revolute | JointKind::Prismatic => {
                 Err(UrdfError::LimitMissing { at: reader.source(node), joint: name.to_owned(), kind: kind.name() })
@@ -262,7 +262,8 @@ fn read_mimic(
 }
 
 fn warn_unlimited(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result<(), UrdfError> {
-    let limit = reader.child(node, "limit", owner)?;
+    // `read_limit` reports further limits.
+    let limit = reader.named(node, "limit").next();
     let effort = match limit {
         Some(limit) => reader.number(limit, "effort")?,
         None => None,

@@ -7,7 +7,7 @@ use super::reader::{Reader, format_element, format_number, format_numbers, write
 use super::rotation::rpy_of;
 use super::tree::owned;
 use crate::diagnostic::DiagnosticKind;
-use kinetoscope_scene::pattern::closest_names;
+use kinetoscope_scene::pattern::{closest_names, similar_name};
 use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::Node;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -211,8 +211,8 @@ pub(super) fn warn_unknown(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &
     let unknown = reader.elements(node).filter(|n| !known.contains(&n.tag_name().name()));
     for child in unknown.collect::<Vec<_>>() {
         let name = child.tag_name().name();
-        let like = closest_names(name, known.iter().copied()).first().copied().unwrap_or_default();
-        let message = format!("{owner}: <{name}> is not read and was ignored (<{like}>?)");
+        let hint = similar_name(name, known.iter().copied()).map_or_else(String::new, |like| format!(" (<{like}>?)"));
+        let message = format!("{owner}: <{name}> is not read and was ignored{hint}");
         let at = reader.source(child);
         reader.warn(DiagnosticKind::ElementIgnored, at, message);
     }
@@ -266,14 +266,21 @@ fn read_geometry(
     xml: &mut String,
 ) -> Result<bool, UrdfError> {
     let example = "write <geometry><box size=\"0.1 0.1 0.1\"/></geometry>";
-    let geometry = reader.required_child(node, "geometry", owner, example)?;
+    let geometry = match reader.required_child(node, "geometry", owner, example) {
+        Err(error @ UrdfError::ElementMissing { .. }) if node.tag_name().name() == "visual" => {
+            let at = reader.source(node);
+            reader.warn_or_fail(DiagnosticKind::ShapeEmpty, at, error, "the visual is left out")?;
+            return Ok(false);
+        }
+        found => found?,
+    };
     let mut shapes = reader.elements(geometry);
     let Some(shape) = shapes.next() else {
         return Err(UrdfError::ElementMissing {
             at: reader.source(geometry),
             owner: owner.to_owned(),
             element: "geometry".to_owned(),
-            child: "box",
+            child: "shape",
             fix: "it needs one of <box>, <cylinder>, <capsule>, <sphere>, <mesh>",
         });
     };

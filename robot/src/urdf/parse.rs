@@ -11,7 +11,7 @@ use super::joint::read_joint;
 use super::link::{Materials, read_link};
 use super::reader::{Reader, format_element, write_attribute};
 use super::tree::{JointEdge, NamedElement, Tree};
-use super::xml::repair;
+use super::xml::{blank_commas_and_nuls, repair};
 use crate::diagnostic::DiagnosticKind;
 use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::{Document, Node};
@@ -100,6 +100,10 @@ pub fn parse_str_with(text: &str, path: impl AsRef<Path>, strictness: Strictness
         return Err(UrdfError::FileEmpty { path: path.to_path_buf() });
     }
     let mut diagnostics = Vec::new();
+    let text = &*match strictness {
+        Strictness::Lenient => blank_commas_and_nuls(text, path, &mut diagnostics),
+        Strictness::Strict => text.into(),
+    };
     let repaired;
     let document = match Document::parse(text) {
         Err(error) if strictness == Strictness::Lenient => {

@@ -183,6 +183,13 @@ impl<'c> Resolver<'c> {
     fn package(&mut self, rest: &str) -> Resolved {
         let (package, file) = rest.split_once('/').unwrap_or((rest, ""));
         if package.is_empty() || file.is_empty() {
+            // `package://part.stl` is a file beside the URDF or in the asset root.
+            if self.strictness == Strictness::Lenient
+                && !package.is_empty()
+                && let found @ Resolved::Found(_) = self.resolve_path(package)
+            {
+                return found;
+            }
             let problem =
                 "the package or the file is missing; write package://name_of_package/meshes/part.stl".to_owned();
             return Resolved::Unsupported { problem };

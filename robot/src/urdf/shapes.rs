@@ -22,6 +22,11 @@ pub(super) struct ShapeConverter<'f> {
     warned_about_empty_package: bool,
 }
 
+/// True for a URI whose package is empty (`package:///part.stl`), or that is a file alone (`package://part.stl`).
+fn has_no_package(uri: &str) -> bool {
+    uri.split_once("://").is_some_and(|(_, rest)| rest.starts_with('/') || !rest.contains('/'))
+}
+
 impl<'f> ShapeConverter<'f> {
     pub(super) fn new(file: &'f UrdfFile, cfg: &'f UrdfCfg) -> Self {
         let mut materials = HashMap::new();
@@ -38,7 +43,8 @@ impl<'f> ShapeConverter<'f> {
     fn resolve(&mut self, uri: &str, at: &SourceLocation, diagnostics: &mut Vec<Diagnostic>) -> Resolved {
         let resolved = self.resolver.resolve(uri);
         if let Resolved::Found(path) = &resolved
-            && ["package:///", "model:///"].iter().any(|start| uri.trim().starts_with(start))
+            && ["package:", "model:"].iter().any(|start| uri.trim().starts_with(start))
+            && has_no_package(uri.trim())
             && !std::mem::replace(&mut self.warned_about_empty_package, true)
         {
             let message = format!(

@@ -92,7 +92,7 @@ fn mistakes() {
         ("no mass", inertial(INERTIA), "ElementMissing", &[":2: link \"l\": <inertial> has no <mass>", "<mass value="]),
         ("no inertia", inertial("<mass value=\"1\"/>"), "ElementMissing", &["has no <inertia>", "<inertia ixx="]),
         ("no mass value", inertial(&format!("<mass/>{INERTIA}")), "AttributeMissing", &["<mass> has no value"]),
-        ("no ixy", inertial("<mass value=\"1\"/><inertia ixx=\"1\"/>"), "AttributeMissing", &["<inertia> has no ixy"]),
+        ("no iyy", inertial("<mass value=\"1\"/><inertia ixx=\"1\"/>"), "AttributeMissing", &["<inertia> has no iyy"]),
         ("two inertials", inertial(&format!("<mass value=\"1\"/>{INERTIA}</inertial><inertial>")), "ElementRepeated", &[":2: link \"l\": a second <inertial>, the first is at robot.urdf:2"]),
         // Shapes.
         ("box", shape("<box size=\"1 0 1\"/>"), "Value", &["<box size=\"1 0 1\">", "positive"]),
@@ -293,6 +293,30 @@ fn lenient_reading() {
             &[":2: joint \"j\": a second <axis>"],
         ),
         (
+            "two limits",
+            revolute(&format!("{LIMIT}{LIMIT}<axis xyz=\"0 0 1\"/>")),
+            ElementRepeated,
+            &[":2: joint \"j\": a second <limit>", "the first is used"],
+        ),
+        (
+            "a visual without geometry",
+            link("<visual/>"),
+            ShapeEmpty,
+            &[":2: link \"l\": <visual> has no <geometry>", "the visual is left out"],
+        ),
+        (
+            "no products of inertia",
+            inertial("<mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/>"),
+            InertialIncomplete,
+            &["ixy", "missing products of inertia are 0"],
+        ),
+        (
+            "commas",
+            link(&visual("<material name=\"\"><color rgba=\"1, 0, 0, 1\"/></material>")),
+            CommasIgnored,
+            &["robot.urdf:2: the commas in \"1, 0, 0, 1\" were ignored"],
+        ),
+        (
             "material in a geometry",
             shape("<box size=\"1 1 1\"/><material name=\"m\"/>"),
             ElementRepeated,
@@ -384,12 +408,20 @@ fn lenient_reading() {
         let warning = file.diagnostics[0].to_string();
         assert!(needles.iter().all(|needle| warning.contains(needle)), "{what}: {warning}");
         let error = parse_strictly(&text).err().unwrap_or_else(|| panic!("{what} is read strictly")).to_string();
-        if !matches!(kind, NamespaceUnbound | DeclarationMisplaced) {
+        if !matches!(kind, NamespaceUnbound | DeclarationMisplaced | CommasIgnored) {
             assert!(warning.starts_with(&error), "{what}: {warning:?} does not begin with {error:?}");
         }
     }
 
     let read = |body: String| parse(&body).unwrap();
+    // NUL characters at the end, as in pybullet's humanoid. A decimal comma and the commas of a comment stay.
+    let file = read(format!("{}\n\0\0", link("<!-- <a b=\"1, 2\"/> -->")));
+    assert!(file.diagnostics.len() == 1 && file.diagnostics[0].to_string().contains("NUL"), "{:?}", file.diagnostics);
+    assert!(parse_strictly(&format!("{}\0", link(""))).is_err());
+    let decimal = parse(&link("<visual><origin xyz=\"0,5 0 0\"/></visual>")).unwrap_err().to_string();
+    assert!(decimal.contains("use a decimal point and spaces"), "{decimal}");
+    let file = read(inertial("<mass value=\"1\"/><inertia ixx=\"1\" iyy=\"2\" izz=\"3\"/>"));
+    assert_eq!(file.robot.links[0].inertial.inertia.iyy, 2.0);
     let file = read(link(&visual(&format!("{red}{}", red.replace("1 0 0", "0 0 1")))));
     assert_eq!(
         file.robot.links[0].visual[0].material.as_ref().unwrap().color.as_ref().unwrap().rgba.0,
@@ -406,9 +438,9 @@ fn lenient_reading() {
     assert_eq!((partial.density, partial.link_from_com.unwrap().translation.vector.z), (Some(7800.0), 3.0));
     // The repair of a text does not move the places of later elements; an error in a repaired line names its column.
     let text =
-        "<!-- c -->\n<?xml version=\"1.0\"?><robot drake:a=\"b\">\n<link name=\"l\"><b:c/><visual/></link></robot>";
+        "<!-- c -->\n<?xml version=\"1.0\"?><robot drake:a=\"b\">\n<link name=\"l\"><b:c/><collision/></link></robot>";
     let error = parse(text).unwrap_err().to_string();
-    assert!(error.starts_with("robot.urdf:3: link \"l\": <visual> has no <geometry>"), "{error}");
+    assert!(error.starts_with("robot.urdf:3: link \"l\": <collision> has no <geometry>"), "{error}");
     assert!(
         parse("<robot a:b=\"c\"><link name=\"l\"></robot>")
             .unwrap_err()
