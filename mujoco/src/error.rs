@@ -20,7 +20,7 @@ impl EngineError {
     }
 }
 
-/// MuJoCo rejected a model, or an asset has an invalid name or content.
+/// Compilation error: MuJoCo rejected the model, or an asset has an invalid name or content.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct CompileError {
     /// MuJoCo's message on one line. On 2.2.2, a hint about newer versions follows for an unknown keyword.

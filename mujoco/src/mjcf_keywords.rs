@@ -65,7 +65,8 @@ pub enum WrapType {
     Geom,
 }
 
-/// Kind of a point of a tendon's path, from its code (`wrap_type`).
+/// Type of a point on a tendon's path, from MuJoCo's `wrap_type` code; `None` for other codes. Spheres and cylinders
+/// are both [`WrapType::Geom`].
 pub fn wrap_type(code: i32) -> Option<WrapType> {
     let list = [
         (mj::mjWRAP_JOINT, WrapType::Joint),
@@ -153,7 +154,7 @@ pub struct SensorKeyword {
     pub object_syntax: SensorObjectSyntax,
     /// Unit of the values, `1` without a dimension; `None` if it depends on the object.
     pub unit: Option<&'static str>,
-    /// True if the values are a quaternion.
+    /// True if the values are a quaternion w x y z (`ballquat`, `framequat`).
     pub quaternion: bool,
 }
 

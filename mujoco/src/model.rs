@@ -224,8 +224,8 @@ impl Model {
         size_of::<ShallowModel>() + self.0.own.iter().map(array).sum::<usize>()
     }
 
-    /// Memory of all arrays of the compiled model, which its models share \[bytes\]. Includes arrays of which this
-    /// model has its own copy.
+    /// Memory of all arrays of the compiled model \[bytes\]. All models made from it share these arrays. Arrays that
+    /// this model replaced by its own copies are included.
     pub fn shared_bytes(&self) -> usize {
         self.header().nbuffer as usize
     }
@@ -272,12 +272,14 @@ impl Model {
         }
     }
 
-    /// Number of generalized positions: 7 for a free joint, 4 for a ball joint, 1 for a hinge or slide.
+    /// Number of generalized positions, the length of `qpos`: 7 for a free joint, 4 for a ball joint, 1 for a hinge or
+    /// slide.
     pub fn nq(&self) -> usize {
         self.header().nq as usize
     }
 
-    /// Number of degrees of freedom: 6 for a free joint, 3 for a ball joint, 1 for a hinge or slide.
+    /// Number of degrees of freedom, the length of `qvel`: 6 for a free joint, 3 for a ball joint, 1 for a hinge or
+    /// slide.
     pub fn nv(&self) -> usize {
         self.header().nv as usize
     }
@@ -465,7 +467,7 @@ impl Compiled {
     }
 
     /// Removes the control limits of `actuators`, given as indices. The drive limits its targets itself, and a control
-    /// may also carry a feed-forward effort.
+    /// may also carry a feedforward effort.
     pub fn unlimit_controls(&mut self, actuators: &[usize]) {
         for &i in actuators {
             self.actuator_ctrllimited_mut()[i] = Default::default();

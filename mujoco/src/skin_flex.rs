@@ -86,7 +86,8 @@ pub struct FlexArrays<'a> {
     pub elements: &'a [i32],
     /// Vertices of the boundary elements, `dimensions` for each, as indices within the flex.
     pub shell: &'a [i32],
-    /// Texture coordinates, with v downward; empty for a flex without texture coordinates.
+    /// Texture coordinates from the first of this flex to the end of the model's array, with v downward; empty for a
+    /// flex without texture coordinates.
     pub texcoords: &'a [[f32; 2]],
     /// Texture coordinates of the elements' vertices, as indices in [`texcoords`](Self::texcoords), in the layout of
     /// [`elements`](Self::elements).

@@ -163,7 +163,8 @@ impl UnnormalizedQuats {
 }
 
 impl UserInputs {
-    /// All numbers, and the active flags of equalities (empty on 2.2.2).
+    /// Numbers (controls, applied joint forces, applied body wrenches, mocap positions, mocap quaternions and user
+    /// data, in this order), and the active flags of equality constraints (empty on 2.2.2).
     pub fn values(&self) -> (&[f64], &[bool]) {
         #[cfg(mj4)]
         let active = &self.active[..];

@@ -5,7 +5,7 @@ use super::model::Model;
 /// A feature of a model element that cannot be written back as MJCF.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnsupportedFeature {
-    /// MJCF name of the element.
+    /// Kind of the element: `joint`, `geom`, `pair`, `tendon`, `actuator`, `flex` or `plugin`.
     pub element: &'static str,
     /// Index of the element among those of its kind; 0 for `flex` and `plugin`.
     pub index: usize,

@@ -224,7 +224,8 @@ impl Model {
         }
     }
 
-    /// Haze color at the end of infinite planes, 0..=1, and the fraction of their radius over which they fade.
+    /// Haze color (sRGB, 0..=1) at the end of infinite planes, and the fraction of their rendered radius over which
+    /// they fade into it.
     pub fn haze(&self) -> ([f32; 3], f32) {
         let visual = &self.header().vis;
         let [r, g, b, _] = visual.rgba.haze;

@@ -1,4 +1,4 @@
-//! Render request of a frame: scene, poses, view, and options.
+//! Inputs of a rendered frame, and options of the rasterizer.
 
 use crate::lens::LensRays;
 use crate::shade::tone::ToneCurve;
@@ -74,14 +74,15 @@ impl Default for RasterCfg {
     }
 }
 
-/// Render request of one frame.
+/// Inputs of one rendered frame. The renderer and its settings are those of the
+/// [`ImageRenderer`](crate::ImageRenderer).
 #[derive(Clone, Copy, Debug)]
 pub struct RenderRequest<'a> {
-    /// The scene.
+    /// Scene to render: instances, meshes, materials and lights.
     pub scene: &'a RenderScene,
     /// Pose of each instance, in the order of the scene: world from instance.
     pub poses: &'a [PoseF32],
-    /// The camera.
+    /// Camera: pose, image size, focal lengths, principal point, and near and far limits.
     pub view: &'a View,
     /// Lights that replace the scene's, for lights that move; `None` for the scene's.
     pub lights: Option<&'a [Light]>,

@@ -38,7 +38,8 @@ pub struct RobotDescription {
 pub struct Link {
     /// Unique name.
     pub name: String,
-    /// Location of the link element (URDF), or of the body, site or joint that the link stands for (MJCF).
+    /// Location of the link element (URDF), or of the body, site or joint that the link stands for (MJCF). An added
+    /// base link has the location of the root link of the first component.
     pub source: SourceLocation,
     /// Component of the robot that the link comes from (`arm`, `hand`, ...). It is empty for an added base link, and
     /// the name of the robot in a robot from MJCF.
@@ -153,7 +154,8 @@ pub enum Geometry {
     },
 }
 
-/// Material of a visual. Values that the `<visual>` does not give are those of the named material of the file.
+/// Material of a visual. If the `<visual>` gives a color or a texture, its own values apply alone; otherwise those of
+/// the named material of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the file, if any.

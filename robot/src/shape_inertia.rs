@@ -332,7 +332,8 @@ impl ShapeSolid {
         Inertial { source: link.source.clone(), link_from_com, mass, inertia }
     }
 
-    /// Distance \[m\] from a center of mass to the farthest corner of all shapes of the link, visual shapes included.
+    /// Largest distance \[m\] from `com` to a corner of the bounding boxes of the collision and visual shapes of the
+    /// link.
     fn reach_of_all(&self, link: &Link, com: &Vector3<f64>, hulls: &mut HullSet<'_>) -> f64 {
         let shapes = link.visuals.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
         shapes
@@ -342,7 +343,7 @@ impl ShapeSolid {
             .fold(self.reach(com), f64::max)
     }
 
-    /// Distance \[m\] from a center of mass to the farthest corner.
+    /// Largest distance \[m\] from `com` to a corner in `corners`.
     fn reach(&self, com: &Vector3<f64>) -> f64 {
         self.corners.iter().map(|corner| (corner - com).norm()).fold(0.0, f64::max)
     }

@@ -30,11 +30,11 @@ pub struct Light {
     pub position: [f32; 3],
     /// Direction of the emitted light in the environment frame; need not be a unit vector. Unused for point lights.
     pub direction: [f32; 3],
-    /// Ambient color.
+    /// Ambient color, RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub ambient: [f32; 3],
-    /// Diffuse color.
+    /// Diffuse color, RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub diffuse: [f32; 3],
-    /// Specular color.
+    /// Specular color, RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub specular: [f32; 3],
     /// Constant c, linear l and quadratic q attenuation: intensity is 1 / (c + l d + q d²) at a distance d \[m\].
     /// Unused for directional lights.
@@ -83,11 +83,11 @@ pub enum LightingSpace {
 /// The headlight: a light at every camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Headlight {
-    /// Ambient color.
+    /// Ambient color, RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub ambient: [f32; 3],
-    /// Diffuse color.
+    /// Diffuse color, RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub diffuse: [f32; 3],
-    /// Specular color.
+    /// Specular color, RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub specular: [f32; 3],
     /// True if the headlight is on.
     pub active: bool,
@@ -165,7 +165,7 @@ pub struct Haze {
     /// Color of the haze (sRGB, 0..=1); `None` is the sky behind the surface, or its horizon color for views below the
     /// horizon.
     pub color: Option<[f32; 3]>,
-    /// Distance from the camera at which the haze begins \[m\].
+    /// Distance from the camera at which the haze begins \[m\]. The haze increases smoothly up to [`end`](Self::end).
     pub start: f32,
     /// Distance from the camera beyond which only haze is visible \[m\].
     pub end: f32,

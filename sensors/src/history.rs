@@ -81,7 +81,7 @@ impl<T: Clone> History<T> {
         self.filled[env] = 0;
     }
 
-    /// All rows, newest first, shape \[num_envs, length, width\].
+    /// All rows, newest first, shape \[num_envs, length, width\]. Rows that are not filled yet have the default value.
     pub fn view(&self) -> ArrayView3<'_, T> {
         self.rows.view()
     }

@@ -143,7 +143,7 @@ impl JointState {
         self.sampler.values("efforts")
     }
 
-    /// Capture times of the efforts \[s\], shape \[num_envs\]: see [`SceneState::force_time`].
+    /// Capture times of the efforts since the last reset \[s\], shape \[num_envs\]: see [`SceneState::force_time`].
     pub fn effort_stamps(&self) -> ArrayView1<'_, f64> {
         self.force_stamps()
     }

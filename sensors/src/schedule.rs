@@ -71,7 +71,8 @@ struct Phase {
 }
 
 impl Phases {
-    /// Step that marks a quarantined (diverged) environment for [`due_in`](Self::due_in): no measurement is due there.
+    /// Value for a quarantined (diverged) environment in the steps of [`due_in`](Self::due_in), which skips this
+    /// environment.
     pub const QUARANTINED: u64 = u64::MAX;
 
     /// The schedule.

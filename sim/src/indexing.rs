@@ -23,7 +23,7 @@ pub(crate) struct GeomIndexing {
     pub geom: usize,
     /// Index of the link that owns the geom.
     pub link: usize,
-    /// Index of the visual that the geom represents; `None` for a collision geom.
+    /// Index of the visual that the geom represents; `None` for a collision geom, and for every geom of an MJCF robot.
     pub visual: Option<usize>,
 }
 

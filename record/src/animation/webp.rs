@@ -39,7 +39,8 @@ fn low_24_bits(number: u32) -> [u8; 3] {
 }
 
 impl Webp {
-    /// Writes a chunk, if the file has room for it.
+    /// Writes a RIFF chunk of type `kind` with the concatenated `parts`, padded to an even length. A file of more than
+    /// 4 GiB is an error.
     fn chunk(&mut self, out: &mut Output, kind: &[u8; 4], parts: &[&[u8]]) -> WriteResult {
         let length: usize = parts.iter().map(|part| part.len()).sum();
         // Chunks begin at even offsets.

@@ -28,7 +28,8 @@ pub(super) enum McapItem<'r> {
     Attachment(Attachment<'r>),
 }
 
-/// Reads a whole file and calls `visit` with its messages and attachments.
+/// Reads a whole MCAP file and calls `visit` for each message and attachment, in file order. The first error ends the
+/// reading.
 pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Result<()>) -> Result<()> {
     let failed = |error: std::io::Error| RecordError::file(path, error);
     let file = File::open(path).map_err(failed)?;

@@ -156,7 +156,7 @@ macro_rules! channels {
             }
 
             /// Copies view `from` of `others`, which has `other_count` views, to view `to` of these images, which have
-            /// `count` views. Channels that either side lacks are skipped.
+            /// `count` views. Channels that are not stored on both sides are skipped.
             ///
             /// # Panics
             ///

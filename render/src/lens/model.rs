@@ -19,7 +19,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Domain of a lens without poles.
+    /// Creates the domain of a lens whose mapping has no poles.
     pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
         Self { angle, radius, folds, poles: Poles::NONE }
     }

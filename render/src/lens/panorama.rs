@@ -33,7 +33,7 @@ impl LensModel for Panorama {
         Ok(())
     }
 
-    /// The domain of all directions.
+    /// Returns the domain of all directions: angles up to pi.
     fn domain(&self) -> Domain {
         Domain::new(PI, PI, false)
     }

@@ -112,9 +112,10 @@ impl NullSpacePosture {
 pub struct IkCfg {
     /// Part of the target pose to reach.
     pub task: IkTask,
-    /// Tolerated distance from the target \[m\].
+    /// Largest position error at which the target counts as reached \[m\], above 0.
     pub position_tolerance: f64,
-    /// Tolerated angle to the target \[rad\]; unused with [`IkTask::Position`].
+    /// Largest angle to the target at which the target counts as reached \[rad\], above 0; unused with
+    /// [`IkTask::Position`].
     pub rotation_tolerance: f64,
     /// Maximum number of steps from each start, at least 1. The refinement of the result takes further steps.
     pub max_iterations: u32,

@@ -22,17 +22,18 @@ pub struct UrdfCfg {
     /// URDF files of the robot; a parent may follow its children. A component with a custom
     /// [`name`](ComponentCfg::name) and without `parent` must be the first.
     pub components: Vec<ComponentCfg>,
-    /// Letter case of the names of the merged robot.
+    /// Letter case of the link and joint names of the merged robot.
     pub name_case: NameCaseCfg,
     /// Folders of `package://` and `model://` packages by name. A package that is listed here is searched in its folder
-    /// only, and in `meshdir` of the file.
+    /// only, and in `meshdir` of the file. Relative paths start as that of [`asset_root`](Self::asset_root).
     pub packages: BTreeMap<String, PathBuf>,
     /// Folder to search for packages, meshes and textures that are not found from the URDF, like Isaac Gym's
-    /// `asset_root`. A relative path starts at the working directory.
+    /// `asset_root`. A relative path starts at the working directory or, in a scene file, at the folder of that file.
     pub asset_root: Option<PathBuf>,
     /// Handling of deviations from URDF whose meaning is clear.
     pub strictness: Strictness,
-    /// Mass properties of moving bodies without any `<inertial>`, and density for an `<inertial>` without a mass.
+    /// Mass properties of moving bodies without any `<inertial>`, and density for an `<inertial>` without mass and
+    /// density. With [`MissingInertia::Minimal`], such an `<inertial>` is ignored.
     pub missing_inertia: MissingInertia,
     /// Name of the robot in its description; by default the robot names of the files, joined by `_`.
     pub name: Option<String>,
@@ -179,16 +180,18 @@ impl NameCase {
 #[serde(deny_unknown_fields)]
 pub struct ComponentCfg {
     /// Name of the component, unique in the robot. `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`,
-    /// `left_hand`, `right_hand`, `arm` and `hand` have a default place; any other name is allowed.
+    /// `left_hand`, `right_hand`, `arm` and `hand` have a default [`parent`](Self::parent), or are roots. Any other
+    /// name is allowed; unless it is the first component, it needs a `parent`.
     pub name: String,
-    /// Path of the URDF file.
+    /// Path of the URDF file. A relative path starts at the working directory or, in a scene file, at the folder of
+    /// that file.
     pub urdf: PathBuf,
     /// Pose of the component's root link in the frame of the parent link or, without a parent, of the added base link.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub transform: Pose,
     /// Parent component. The default is the first one present of: `chassis` for `legs`; `legs`, `chassis` for `torso`
-    /// (only with a `chassis`); `torso`, `chassis` for `head` and arms; the arm of the same side for hands. Otherwise
-    /// the component has no parent.
+    /// (only with a `chassis`); `torso`, `chassis` for `head` and arms; the arm of the same side for hands. Without any
+    /// of these, the component is a root. A component with a custom name must be the first or have a `parent`.
     pub parent: Option<String>,
     /// Link of the parent component to attach to, as named in its file or after merging. The default is the root of a
     /// `chassis`, else the leaf with the most joints above it; several such leaves are an error.

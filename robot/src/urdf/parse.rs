@@ -266,7 +266,7 @@ fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfErr
     Ok(())
 }
 
-/// Reads `meshdir` of `<mujoco><compiler>`.
+/// Returns the first `meshdir` of the `<compiler>` elements in a `<mujoco>` element; `None` if it is missing or empty.
 fn meshdir(reader: &Reader<'_>, node: Node<'_, '_>) -> Result<Option<String>, UrdfError> {
     for compiler in reader.named(node, "compiler") {
         if let Some(folder) = reader.text(compiler, "meshdir")? {

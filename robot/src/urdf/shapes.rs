@@ -92,7 +92,7 @@ impl<'f> ShapeConverter<'f> {
         Ok(Visual { source: notes.source.clone(), link_from_shape: pose_of(&model.origin), geometry, material })
     }
 
-    /// Converts a collision. Its mesh must exist: without the mesh the robot would fall through things.
+    /// Converts a collision. A missing mesh is an error, because the robot would fall through other bodies without it.
     pub(super) fn collision(
         &mut self,
         model: &urdf_rs::Collision,

@@ -35,8 +35,8 @@ pub struct HullCfg {
     /// At least 0, which acts as 1e-8 (less than `f32` resolves). The default 1e-4 is 0.03 mm on a link of 0.3 m: below
     /// the tolerances of robot parts, above the noise of a tessellated cylinder.
     pub tolerance: f64,
-    /// Thickness of the hull of a flat point set \[m\], half on each side of its plane. Flat means thinner than the
-    /// tolerance. With `None`, a flat point set is an error.
+    /// Thickness of the hull of a flat point set \[m\], half on each side of its plane (in a convex decomposition: all
+    /// of it behind the front). Flat means thinner than the tolerance. With `None`, a flat point set is an error.
     #[serde(with = "crate::file_format::or_false")]
     pub min_thickness: Option<f64>,
 }

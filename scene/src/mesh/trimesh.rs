@@ -82,8 +82,8 @@ impl TriMesh {
         }))
     }
 
-    /// Enclosed volume \[m³\]: positive for a closed surface with its front outside, negative for one that is inside
-    /// out, meaningless for an open one.
+    /// Enclosed volume \[m³\]: positive if the front of a closed surface is outside, negative if its front is inside,
+    /// meaningless for an open surface.
     pub fn signed_volume(&self) -> f64 {
         // Relative to the middle of the bounds, so that a small part far from the origin loses no digits.
         let Some((lo, hi)) = self.bounds() else { return 0.0 };

@@ -16,7 +16,7 @@ impl Philox {
         Self([(); 2].map(|()| (random.uniform() * 2f64.powi(32)) as u32))
     }
 
-    /// 128 random bits at the counter `at`.
+    /// 128 random bits for the counter `at`. The same key and counter give the same bits.
     #[inline]
     pub fn bits(self, at: [u32; 4]) -> [u32; 4] {
         let multiply = |a: u32, b: u32| {

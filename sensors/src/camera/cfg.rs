@@ -64,7 +64,7 @@ pub struct CameraCfg {
     /// Aperture of the lens, for depth of field; `None` is a point. Needs [`Renderer::RayTraced`].
     pub aperture: Option<Aperture>,
     /// Exposure and readout times, for motion blur and rolling shutters; by default an image shows one instant. Needs
-    /// [`Renderer::RayTraced`]. The image that a reset or a write to the state shows at once is of one instant.
+    /// [`Renderer::RayTraced`]. The image of a reset or of a write to the state shows one instant.
     pub shutter: Shutter,
     /// Near limit: smallest depth along the optical axis \[m\], above 0. If rays of the lens do not all go forward
     /// ([`Lens::is_forward`](lens::Lens::is_forward)), smallest distance along the ray.

@@ -126,7 +126,7 @@ impl ContactSensor {
         matching(pattern, &self.names, "watched body")
     }
 
-    /// The filters, in the order of the axis M.
+    /// Name patterns of the filters, as configured, in the order of the axis M.
     pub fn filters(&self) -> &[String] {
         &self.filters
     }
@@ -214,7 +214,8 @@ impl ContactSensor {
         self.sampler.has("contact_points_w").then(|| self.vectors("contact_points_w"))
     }
 
-    /// Number of contact points of each body, shape (N, B), whole numbers; `None` unless points are tracked.
+    /// Number of contact points of each body, shape (N, B), whole numbers without noise; `None` unless points are
+    /// tracked.
     pub fn contact_counts(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional_values("contact_counts")
     }
@@ -283,8 +284,9 @@ impl ContactSensor {
         self.optional_values("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
     }
 
-    /// True where contact of a body ended since the previous measurement, however short the air phase was, shape
-    /// (N, B); `None` unless air times are tracked.
+    /// True where contact of a body ended since the previous measurement, however short the air phase was, shape (N,
+    /// B); `None` unless air times are tracked. With dropout, a lost measurement also loses the contacts that ended
+    /// since the measurement before it.
     pub fn first_air(&self) -> Option<Array2<bool>> {
         self.optional_values("first_air").map(|flags| flags.mapv(|flag| flag > 0.0))
     }

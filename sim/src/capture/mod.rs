@@ -46,8 +46,8 @@ pub(crate) struct CapturedStep {
     /// Acceleration of the frame, then angular acceleration \[m/s², rad/s²\] in world axes, 6 numbers per body; 0 at
     /// rest, gravity in free fall.
     pub(crate) accelerations: Vec<f64>,
-    /// Force, then torque \[N, N m\] about the link origin that each link receives from its parent, in link axes, 6
-    /// numbers per body; NaN for a fused link.
+    /// Force, then torque \[N, N m\] that each body receives from its parent, about the origin of the body, in body
+    /// axes, 6 numbers per body; NaN for a body fused to another.
     pub(crate) wrenches: Vec<f64>,
     /// Scratch memory for velocities of the engine.
     scratch: Vec<f64>,

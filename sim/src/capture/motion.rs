@@ -28,7 +28,7 @@ pub(crate) fn body_velocity(data: &Data, body: usize, point: &Vector3<f64>) -> [
     [vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body))), angular]
 }
 
-/// Writes poses, velocities and accelerations of all bodies to `solved`.
+/// Replaces the poses, velocities and accelerations in `solved` by those of all `bodies`.
 pub(super) fn capture(bodies: &[BodyFrame], data: &Data, solved: &mut CapturedStep) {
     let CapturedStep { poses, velocities, accelerations, .. } = solved;
     for values in [&mut *poses, &mut *velocities, &mut *accelerations] {
@@ -48,8 +48,9 @@ pub(super) fn capture(bodies: &[BodyFrame], data: &Data, solved: &mut CapturedSt
     }
 }
 
-/// Writes the wrench that each link receives from its parent through the joint: force and torque about the origin of
-/// the link, in link axes. NaN for a link fused to another.
+/// Replaces `wrenches` by the wrench that each body of the body axis receives from its parent through the joint: force
+/// \[N\], then torque \[N m\] about the origin of the body, in body axes, 6 numbers each. NaN for a body fused to
+/// another.
 pub(super) fn capture_wrenches(plan: &BodyAxis, data: &Data, wrenches: &mut Vec<f64>) {
     wrenches.clear();
     for (link, &carries) in plan.bodies.iter().zip(&plan.is_moving_body) {

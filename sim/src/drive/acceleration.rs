@@ -10,7 +10,8 @@ impl DriveMode for Acceleration {
         "acceleration"
     }
 
-    /// Effective inertia I at the initial joint positions: tau = I (k (q* - q) + d (v* - v)).
+    /// Returns the effective inertia I of the joint at the initial joint positions \[kg m² or kg\], never `None`: tau =
+    /// I (k (q* - q) + d (v* - v)).
     fn gain_scale(&self, joint: &JointInfo) -> Option<f64> {
         Some(joint.effective_inertia)
     }

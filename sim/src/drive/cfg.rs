@@ -56,8 +56,8 @@ pub struct DriveCfg {
     pub damping: PerJoint,
     /// Effort limit \[N m or N\]; infinite for no limit. If unset, that of the file, where 0 means no limit.
     pub max_effort: Option<PerJoint>,
-    /// Velocity limit \[rad/s or m/s\]; infinite for no limit. If unset, that of the URDF, where 0 means no limit. It
-    /// is reported only; [`DcMotor`] is the only drive law that uses it.
+    /// Velocity limit \[rad/s or m/s\]; infinite for no limit. If unset, that of the URDF, where 0 means no limit.
+    /// [`DcMotor`] uses it as the no-load speed; no other drive enforces it.
     ///
     /// [`DcMotor`]: super::DcMotor
     pub max_velocity: Option<PerJoint>,

@@ -50,6 +50,6 @@ pub struct Target {
     pub position: f64,
     /// Velocity target \[rad/s or m/s\].
     pub velocity: f64,
-    /// Feed-forward effort \[N m or N\].
+    /// Feedforward effort, added to the PD effort before the clamp \[N m or N\].
     pub feedforward: f64,
 }

@@ -27,7 +27,7 @@ const UNLIMITED: f64 = 1e15;
 /// Value of `D` for a drive without gains; its row carries no force.
 const IDLE_STIFFNESS: f64 = 1e-6;
 
-/// True if the row applies the drive. Without gains, only the feed-forward effort acts, which needs no row.
+/// True if the row applies the drive. Without gains, only the feedforward effort acts, which needs no row.
 fn has_gains(gains: &Gains) -> bool {
     gains.kp > 0.0 || gains.kd > 0.0
 }
@@ -54,7 +54,7 @@ pub(super) fn apply(drive: &Drive, row: usize, gains: &Gains, target: &Target, d
     data.efc_frictionloss_mut()[efc] = limit;
 }
 
-/// Effort of the drive in the last `mj_step2` \[N m or N\]: the force of its row, or the clamped feed-forward effort of
+/// Effort of the drive in the last `mj_step2` \[N m or N\]: the force of its row, or the clamped feedforward effort of
 /// a drive without gains.
 pub(super) fn effort(row: usize, gains: &Gains, feedforward: f64, data: &mj::Data) -> f64 {
     if has_gains(gains) {

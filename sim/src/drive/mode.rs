@@ -3,7 +3,8 @@
 /// Properties of a joint that a drive mode uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointInfo {
-    /// Inertia that the joint feels at the initial joint positions, `1 / (M⁻¹)_ii` \[kg m² or kg\].
+    /// Inertia that the joint feels at the initial joint positions, `1 / (M⁻¹)_ii` \[kg m² or kg\]. May be NaN unless
+    /// [`DriveMode::needs_inertia`] is true.
     pub effective_inertia: f64,
 }
 
@@ -25,7 +26,8 @@ pub trait DriveMode: std::fmt::Debug + Sync {
     /// without a drive.
     fn gain_scale(&self, joint: &JointInfo) -> Option<f64>;
 
-    /// True if the unit depends on [`JointInfo::effective_inertia`], which is NaN for other modes.
+    /// True if [`gain_scale`](Self::gain_scale) uses [`JointInfo::effective_inertia`]. For other modes, this inertia
+    /// may be NaN.
     fn needs_inertia(&self) -> bool {
         false
     }

@@ -161,7 +161,7 @@ pub struct DriveState {
     pub position: Box<[f64]>,
     /// Velocity targets \[rad/s or m/s\], one per drive.
     pub velocity: CowArray<f64>,
-    /// Feed-forward efforts \[N m or N\], one per drive; they stay until changed or reset.
+    /// Feedforward efforts \[N m or N\], one per drive; they stay until changed or reset.
     pub feedforward: CowArray<f64>,
     /// Effort of each drive in the last successful MuJoCo step, after its limit \[N m or N\]; 0 after a reset.
     pub effort: Box<[f64]>,
@@ -305,7 +305,7 @@ impl DriveState {
     }
 
     /// Flat array of the state, for [`set_from_flat`](Self::set_from_flat). It has ten numbers per drive (gains and
-    /// limits, their user values, target range; without overrides), then targets (position, velocity, feed-forward),
+    /// limits, their user values, target range; without overrides), then targets (position, velocity, feedforward),
     /// efforts, applied forces, and the memory of explicit models.
     pub(crate) fn to_flat(&self) -> Vec<f64> {
         let settings = self.ranges.iter().enumerate().flat_map(|(drive, range)| {

@@ -6,7 +6,8 @@ use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// Fills the rows of environment `i`.
+/// Fills `force_poses`, `force_velocities` and `body_accelerations` of environment `i`. If nothing was solved for this
+/// state, poses and velocities are the current ones, and accelerations are 0.
 pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
     let solved = env.captured();
     if solved.poses.is_empty() {

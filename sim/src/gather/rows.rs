@@ -4,7 +4,7 @@ use crate::indexing::JointIndexing;
 use crate::simulation::Simulation;
 use ndarray::{Array2, Array3, Axis};
 
-/// Movable joints of all robots, then the joints of attached MJCF files with one degree of freedom.
+/// Drivable joints of all robots and articulations, then the hinge and slide joints of attached MJCF files.
 pub(super) fn all_joints(simulation: &Simulation) -> impl Iterator<Item = &JointIndexing> {
     let of_robots = simulation.robots.iter().flat_map(|robot| &robot.joints);
     of_robots.chain(simulation.mjcf_models.iter().flat_map(|part| &part.joints))

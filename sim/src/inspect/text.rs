@@ -293,13 +293,15 @@ fn elide(text: &str, width: usize) -> String {
     text.chars().take(head).chain(['…']).chain(text.chars().skip(count - tail)).collect()
 }
 
-/// Formats with `decimals`, so that columns line up. Numbers that would lose all but one digit get an exponent.
+/// Formats with `decimals`, so that columns line up. Numbers that would lose all but one digit, and numbers from 1e9
+/// on, get an exponent.
 fn format_fixed(value: f64, decimals: usize) -> String {
     let vanishes = value != 0.0 && value.abs() < 10f64.powi(1 - decimals as i32);
     if vanishes || value.abs() >= 1e9 { format!("{value:.3e}") } else { format!("{value:.decimals$}") }
 }
 
-/// Formats with at most `decimals`, without trailing zeros.
+/// Formats with at most `decimals` decimals, without trailing zeros. Numbers from 1e9 on, and numbers that would round
+/// to 0, get an exponent, such as `1.00e30`.
 fn format_number(value: f64, decimals: usize) -> String {
     if value != 0.0 && (value.abs() >= 1e9 || value.abs() < 0.5 * 10f64.powi(-(decimals as i32))) {
         return format!("{value:.2e}");
@@ -309,7 +311,7 @@ fn format_number(value: f64, decimals: usize) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Formats the components in aligned columns.
+/// Formats the components with four decimals, each at least seven characters wide.
 fn format_vector(v: &[f64; 3]) -> String {
     v.map(|x| format!("{:7.4}", if x.abs() < 5e-5 { 0.0 } else { x })).join(" ").trim_end().to_owned()
 }

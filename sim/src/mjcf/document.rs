@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub struct Mjcf {
     /// Name of the model.
     pub model: String,
-    /// Lines of a comment at the top of the document.
+    /// Comments at the top of the document; each entry is an XML comment on one line.
     pub comments: Vec<String>,
     /// Physics options.
     pub option: PhysicsOption,
@@ -138,7 +138,7 @@ pub enum MeshContent {
 pub struct HeightFieldAsset {
     /// Name of the height field, unique in the document.
     pub name: String,
-    /// File next to the document, in MuJoCo's binary format.
+    /// Name of the file of heights, in MuJoCo's binary format: beside the document, or an asset in memory.
     pub file: String,
     /// Half length along x, half length along y, height of elevation 1, depth of the floor below elevation 0 \[m\].
     pub size: [f64; 4],
@@ -207,7 +207,7 @@ pub struct Inertial {
 pub struct Joint {
     /// Name of the joint, unique in the document.
     pub name: String,
-    /// Type of the joint.
+    /// Free, ball, hinge or slide.
     pub kind: JointType,
     /// Axis in the body frame (hinge, slide).
     pub axis: Vector3<f64>,
@@ -355,7 +355,7 @@ pub struct Light {
     pub kind: LightKindCfg,
     /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation.
     pub attenuation: [f64; 3],
-    /// Radius of the light \[m\]; not supported by MuJoCo 2.2.2.
+    /// Radius of the light \[m\], `bulbradius` of MuJoCo 4.x. Omitted for MuJoCo 2.2.2 and for directional lights.
     pub radius: f64,
     /// True if the light casts shadows.
     pub cast_shadow: bool,

@@ -77,7 +77,8 @@ pub(crate) struct RobotLayout {
     pub free_joint: Option<String>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_contact_exclusions: Vec<(String, String)>,
-    /// Link and visual of every named geom.
+    /// Link and visual of every geom of the robot, those of fused links included. Geoms of the world of an MJCF file
+    /// are not included.
     pub geoms: Vec<GeomOwner>,
     /// Joints whose damping is integrated with the drives; see [`crate::drive::implicit`].
     pub damped: Vec<DampedJoint>,
@@ -90,7 +91,7 @@ pub(crate) struct GeomOwner {
     pub geom: String,
     /// Link of the geom, fused or not.
     pub link: LinkId,
-    /// Index of the visual of the link; `None` for a collision shape.
+    /// Index of the visual of the link; `None` for a collision shape, and for every geom of an MJCF robot.
     pub visual: Option<usize>,
 }
 

@@ -52,7 +52,7 @@ pub struct ArticulationCfg {
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// True if the links collide with each other. Links connected by a joint, and links that overlap in the initial
-    /// pose, never collide.
+    /// pose, do not collide, unless the MJCF file has a `<pair>` of their geoms.
     pub self_collision: bool,
     /// Settings for the convex hulls of collision meshes.
     pub hull: HullCfg,

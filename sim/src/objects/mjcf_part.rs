@@ -369,7 +369,7 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// First columns of the quaternions of `qpos`.
+    /// First column of each quaternion in `qpos` (free and ball joints).
     fn quaternions(&self) -> Vec<usize> {
         let model = &self.data.model;
         let first = |joint: usize| {

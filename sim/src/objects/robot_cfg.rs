@@ -107,7 +107,7 @@ pub struct RobotCfg {
     /// [`Robot::soft_qpos_limits`](crate::Robot::soft_qpos_limits).
     pub soft_limit_factor: f64,
     /// True if the links of this robot collide with each other. Links connected by a joint, and links that overlap in
-    /// the initial pose, never collide.
+    /// the initial pose, do not collide, unless the MJCF file has a `<pair>` of their geoms.
     pub self_collision: bool,
     /// Settings for the convex hulls of collision meshes.
     pub hull: HullCfg,

@@ -184,7 +184,7 @@ impl RobotData {
         self.file.as_ref()
     }
 
-    /// Wraps an error of its MJCF file.
+    /// Wraps an error of the robot's MJCF file, with the robot's label and the path of the file.
     pub(crate) fn file_error(&self, error: RobotFileError) -> Error {
         file_error(&self.cfg, self.label(), error)
     }

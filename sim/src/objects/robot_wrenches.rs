@@ -31,7 +31,7 @@ impl Robot<'_> {
     }
 
     /// True for links with gravity compensation by [`set_gravity_compensation`](RobotMut::set_gravity_compensation),
-    /// shape (N, links). `gravcomp` of an MJCF file is not included.
+    /// shape (N, links). Links fused into one body have the same value. `gravcomp` of an MJCF file is not included.
     #[doc(alias = "get_gravity_compensation")]
     pub fn gravity_compensation(&self) -> Array2<bool> {
         let links = &self.indexing().links;

@@ -126,7 +126,7 @@ impl Property {
         }
     }
 
-    /// Number of values of the property.
+    /// Number of values of the property for one element: 1, 3 or 4.
     pub fn width(self) -> usize {
         match self {
             Self::CenterOfMass | Self::Inertia | Self::Gravity | Self::Size | Self::Position => 3,

@@ -21,10 +21,11 @@ use std::sync::Arc;
 ///
 /// A snapshot holds everything that determines how an environment continues: time, positions with quaternions before
 /// normalization, velocities, activations, and the solver's warm start. It holds user inputs: controls, applied forces,
-/// poses of mocap bodies, welds that hold with their relative poses, active equalities, targets, gains, limits, efforts
-/// and delays of drives as they were set, and wrenches on links. It also holds the count of steps, and the divergence
-/// with its reason. An environment with the same properties continues from it bit-identically, in any manager that was
-/// built by the same program with the same MuJoCo version, for any number of threads.
+/// poses of mocap bodies, active welds with their relative poses, active flags of equalities (MuJoCo 4), and wrenches
+/// and gravity compensation of links. Of drives it holds targets, gains and limits as set, the last efforts, and the
+/// memory of explicit models, such as delayed targets. It also holds the count of steps, and the divergence with its
+/// reason. An environment with the same properties continues from it bit-identically, in any manager that was built by
+/// the same program with the same MuJoCo version, for any number of threads.
 ///
 /// It also holds the [properties](crate::EnvProperties) of each environment, by name: masses, friction, sizes,
 /// randomized gains, and the number of randomizations. They belong to the environment, not to its state:
@@ -37,9 +38,9 @@ use std::sync::Arc;
 /// * Sensors. Those of restored environments restart as after a reset: they show the restored state at once, histories
 ///   are empty, and their periods count from there. A sensor may have a user's own type with unknown memory, and
 ///   measurements of one run would not belong to the other.
-/// * The model that all environments share. A snapshot of a scene with other steps, another integrator or other
-///   friction cones is rejected, as one of another scene.
-/// * Events on the way: counts of warnings and of buffers that grew.
+/// * The model that all environments share. A snapshot of a scene with another time step, number of substeps,
+///   integrator or friction cone is rejected.
+/// * Statistics: counts of warnings and of grown buffers.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     layout: Arc<StateLayout>,

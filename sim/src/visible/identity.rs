@@ -21,10 +21,11 @@ pub struct MaskId {
     /// Semantic class: the configured one, else `ground`, `terrain`, `robot`, `articulation`, `object` or `mjcf`. In a
     /// model without a simulation: `world`, `body`, `tendon`, `skin` or `flex`.
     pub class: String,
-    /// Name of the body in MuJoCo, or `body` with its index without a name; the world body for tendons, skins and
+    /// Name of the body in MuJoCo, such as `body 3` for a body without a name; the world body for tendons, skins and
     /// flexes.
     pub body: String,
-    /// Names of the geoms in MuJoCo; a geom without a name is called `geom` with its index.
+    /// Names of the geoms in MuJoCo, such as `geom 12` for a geom without a name. Empty for tendons, skins, flexes, and
+    /// bodies that have sites only.
     pub geoms: Vec<String>,
 }
 

@@ -86,7 +86,7 @@ impl OffscreenScene {
         Ok(Self { view_direction: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
     }
 
-    /// Creates the offscreen scene of one environment of a simulation in its current state.
+    /// Creates the offscreen scene of one environment in its current state. Poses are in the frame of the environment.
     ///
     /// # Errors
     /// The environment does not exist.

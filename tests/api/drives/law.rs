@@ -116,7 +116,7 @@ const CASES: &[Law] = &[
     Law { m: 1e-5, kp: 1e3, kd: 1e2, q: 0.1, v: 0.3, aim: [0.6, 0.0, 0.0], ..LAW },
     Law { m: 0.5, kp: 1e4, kd: 1e3, q: -0.2, v: -1.0, aim: [0.3, 0.0, 0.0], ..LAW },
     Law { kp: 40.0, kd: 5.0, q: 0.5, v: 2.0, aim: [-0.1, 0.0, 0.0], ..LAW },
-    // Velocity target and feed-forward, alone and together.
+    // Velocity target and feedforward effort, alone and together.
     Law { kd: 30.0, q: 0.5, v: -2.0, aim: [9.0, 1.5, 0.0], ..LAW },
     Law { q: 0.5, v: 1.0, aim: [9.0, 9.0, 0.7], ..LAW },
     Law { h: 0.002, kp: 300.0, kd: 3.0, q: 0.5, v: 1.0, aim: [0.4, -0.6, 2.5], ..LAW },
@@ -205,8 +205,8 @@ fn substeps() {
 }
 
 /// Saturated, the effort is the limit to the last bit and the motion is that of the limit. A demand of 99.9 % of the
-/// limit is not clamped, one of 100.1 % is. The clamp applies to the whole sum: a feed-forward cannot exceed the limit,
-/// and can cancel the other terms.
+/// limit is not clamped, one of 100.1 % is. The clamp applies to the whole sum: a feedforward effort cannot exceed the
+/// limit, and can cancel the other terms.
 #[test]
 fn effort_limit() {
     let law = Law { m: 0.02, kp: 1e3, kd: 1e2, limit: 2.0, ..LAW };

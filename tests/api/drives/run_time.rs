@@ -66,7 +66,7 @@ fn gains_per_joint_and_environment() {
     other.step(1);
     assert_eq!(v.row(0), other.view().qvel().row(0), "not named");
     assert!((v[(1, 1)] - other.view().qvel()[(1, 1)]).abs() > 0.1, "the control: gains matter");
-    // With zero stiffness and damping only the feed-forward effort acts: M a = tau.
+    // With zero stiffness and damping only the feedforward effort acts: M a = tau.
     world.sim.reset(None).unwrap();
     let mut robot = world.robot();
     robot.set_stiffness(&array![[0.0, 0.0]], None, None).unwrap();

@@ -263,7 +263,7 @@ fn warnings() {
     assert!(file.diagnostics[0].message.contains("<colision> is not read and was ignored (<collision>?)"));
 }
 
-/// Lenient reading of departures from URDF with a clear meaning. Pinocchio, pybullet and MuJoCo read them: Unitree's
+/// Lenient reading of deviations from URDF with a clear meaning. Pinocchio, pybullet and MuJoCo read them: Unitree's
 /// Go2 has two materials in a visual, Upkie a box of size 0, and so on. Each gives one warning with its place. In
 /// strict reading (the control), each gives an error with the same message.
 #[test]
@@ -454,7 +454,7 @@ fn lenient_reading() {
     let expected =
         [(DeclarationMisplaced, 2), (DeclarationMisplaced, 3), (DeclarationMisplaced, 4), (NamespaceUnbound, 4)];
     assert_eq!(file.diagnostics.iter().map(places).collect::<Vec<_>>(), expected);
-    // Controls: departures without a clear meaning.
+    // Controls: deviations without a clear meaning.
     let rows = [
         ("negative size", shape("<box size=\"0 -1 1\"/>"), "Value", "positive"),
         ("four scales", shape("<mesh filename=\"a\" scale=\"1 1 1 1\"/>"), "Number", "there are four"),

@@ -66,8 +66,8 @@ pub struct RunState {
     pub paused: bool,
     /// Requested speed.
     pub speed: Speed,
-    /// Simulated seconds per wall-clock second, measured over half a second. `None` before the first measurement, again
-    /// after each speed change or resume, and during playback.
+    /// Simulated seconds per wall-clock second, measured over at least half a second. `None` before the first
+    /// measurement, again after each speed change, resume or single-step command, and during playback.
     pub measured_speed: Option<f64>,
     /// Reason of the last refused command, failed recording or failed mouse spring. A later successful command clears
     /// it; a successful `Drag` or `Release` clears only reasons of the mouse spring.

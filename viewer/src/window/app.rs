@@ -342,7 +342,8 @@ impl App {
         }
     }
 
-    /// Shows a single environment and moves the camera along.
+    /// Shows a single environment. If a single environment was shown before, the camera moves from its origin to the
+    /// new one. After the view of all environments, the camera shows an overview of the new one.
     fn show_env(&mut self, env: usize) {
         let Some(snapshot) = &self.snapshot else { return };
         let from = self.env_selection.env().and_then(|EnvId(k)| snapshot.envs.get(k)).map(|env| env.origin);

@@ -137,7 +137,7 @@ impl Window {
         self.shared.window_id.load(Ordering::Acquire)
     }
 
-    /// Returns the number of frames that were sent to the display.
+    /// Returns the number of frames sent to the display since the window was opened, redraws included.
     pub fn frame_count(&self) -> u64 {
         self.shared.frames.load(Ordering::Acquire)
     }

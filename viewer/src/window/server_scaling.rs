@@ -69,7 +69,8 @@ impl ScaledImage {
         self.pixmap
     }
 
-    /// Shows the image enlarged over the whole window.
+    /// Shows the image in the window of size \[width, height\], enlarged by `factor`. Its last pixels fill the
+    /// remainder.
     pub(super) fn show(&self, connection: &RustConnection, window: [usize; 2]) -> Result<(), DisplayError> {
         let [width, height] = window.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let (op, mask) = (PictOp::SRC, x11rb::NONE);

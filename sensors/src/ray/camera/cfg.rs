@@ -43,13 +43,13 @@ pub struct RayCasterCameraCfg {
     pub targets: HitTargets,
     /// Geom groups of the targets: bit k is group k; by default groups 0, 1 and 2.
     pub groups: u32,
-    /// Rate, history, latency, dropout and noise. Only the channel `distances` can have noise: the distance along the
-    /// ray of each pixel \[m\], from which depth and points follow. Noisy distances are clamped to the range from 0 to
-    /// `max_distance`.
+    /// Rate, history, latency, dropout and noise. Only the channel `distances` can have noise. It is the distance along
+    /// the ray of each pixel \[m\]; depth and points are computed from it. Noisy distances are clamped to the range
+    /// from 0 to `max_distance`.
     ///
-    /// Normals, masks and misses are exact: hits stay hits and misses stay misses. The mask distinguishes a hit at
-    /// `max_distance` from a [`DepthMiss::Far`]. The history and images in flight are in double precision: 40 bytes for
-    /// each pixel and image.
+    /// Normals, masks and misses are exact: hits stay hits and misses stay misses. With [`DepthMiss::Far`], the mask
+    /// distinguishes a hit at `max_distance` from a miss. The history and images in flight are in double precision: 40
+    /// bytes for each pixel and image.
     pub sampling: SamplingCfg,
     /// Shows the camera's frame and an arrow along each edge of its view frustum
     /// ([`Sensor::markers`](crate::Sensor::markers)).

@@ -57,7 +57,8 @@ pub struct RayCasterCfg {
     pub alignment: RayAlignment,
     /// Pattern of the rays, x forward, y left, z up in its own frame.
     pub pattern: RayPattern,
-    /// Maximum distance of a hit from the start of its ray \[m\], above 0; may be infinite.
+    /// Maximum distance of a hit from the start of its ray \[m\], above 0; may be infinite. Surfaces farther away are
+    /// misses.
     pub max_distance: f64,
     /// Smallest and largest position drift \[m\]: an offset along each axis of the environment frame, sampled uniformly
     /// and independently at every reset.

@@ -78,7 +78,7 @@ impl fmt::Display for OmittedElement {
     }
 }
 
-/// Element of a file that cannot be attached to a scene.
+/// Error: an element of an MJCF file cannot be imported into a scene.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{element} {name:?} cannot be imported into a scene: {what}")]
 pub struct PartError {

@@ -36,9 +36,9 @@ pub enum PlayError {
 
 /// Playback of a recording in a simulation.
 pub trait Play {
-    /// Shows a recording to the viewers of this simulation (windows and browsers) instead of stepping, for as long as
-    /// `go_on` returns true. `go_on` is called at least ten times a second. Afterwards, the simulation has the state of
-    /// the last shown frame.
+    /// Shows a recording to the viewers of this simulation (windows and browsers) without stepping, until `go_on`
+    /// returns false. `go_on` is called before each frame, and about ten times a second while nothing changes.
+    /// Afterwards, the simulation has the state of the last shown frame.
     ///
     /// Playback starts at the first frame in real time and pauses at the last. Viewers can pause, show single frames,
     /// change the speed, and seek ([`Command::Seek`]); a reset returns to the first frame. Frames are not interpolated:
