@@ -29,17 +29,30 @@ fn check() {
     assert_eq!(numbers, [0.05, 0.08, 0.12], "{row}");
 }
 
-/// Ignored settings are warnings, with exit code 1.
+/// Ignored settings are warnings, with exit code 1. The time step and the friction cone of an MJCF file apply.
+///
+/// Regression: an MJCF file was stepped with the time step of simulations, 0.01 s, with a warning.
 #[test]
 fn check_warnings() {
     let shell = CommandFolder::with(&[
         ("unlimited.urdf", &ARM.replace("effort=\"50\"", "effort=\"0\"")),
-        // The file has a time step, which does not apply to a robot.
         ("pendulum.xml", PENDULUM),
+        // Robots are not stepped with RK4.
+        (
+            "rk4.xml",
+            &PENDULUM.replacen(
+                "<mujoco>",
+                "<mujoco><option integrator=\"RK4\" timestep=\"0.0005\" cone=\"elliptic\" gravity=\"0 0 -1\"/>",
+                1,
+            ),
+        ),
     ]);
+    shell.run_ok("check pendulum.xml");
+    let (_, err, _) = shell.run("check rk4.xml");
+    assert!(!["timestep", "cone", "gravity"].iter().any(|setting| err.contains(&format!("option {setting}"))), "{err}");
     for (file, listed, warned) in [
         ("unlimited.urdf", ["hinge", ""], ["warning[effort-unlimited]", "9 |"]),
-        ("pendulum.xml", ["pin", "-1.5708"], ["warning[setting-ignored]", "timestep"]),
+        ("rk4.xml", ["pin", "-1.5708"], ["warning[setting-ignored]", "integrator"]),
     ] {
         let (out, err, code) = shell.run(&format!("check {file}"));
         assert!(code == 1 && listed.iter().all(|words| out.contains(words)), "{file}: {code} {out}");
