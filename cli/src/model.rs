@@ -36,8 +36,8 @@ pub(crate) struct ModelArgs {
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct SpawnArgs {
     /// Initial height of the robot's lowest collision point above the ground [default: the root link starts at height
-    /// 0, or at the pose of an MJCF file; with --floating-base, a URDF robot starts on the ground, and an MJCF robot is
-    /// raised if it would start below the ground]
+    /// 0, or at the pose of an MJCF file; with --floating-base, or with a floating joint at its root, a URDF robot
+    /// starts on the ground; with --floating-base, an MJCF robot is raised if it would start below the ground]
     #[arg(long, alias = "spawn_height", value_name = "METERS", allow_negative_numbers = true)]
     pub(crate) spawn_height: Option<f64>,
     /// Omit the ground below a robot; the ground of a scene stays
