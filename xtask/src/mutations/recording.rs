@@ -6,7 +6,7 @@ pub(super) const RECORDING: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-record",
         "shape of an array of one axis a number",
-        "record/src/npy.rs",
+        "scene/src/npy.rs",
         ["if shape.len() == 1 {", "if shape.len() == 2 {"],
         &["npy::tests::"],
     ),
