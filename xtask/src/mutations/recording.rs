@@ -4,7 +4,7 @@ use super::Mutation;
 
 pub(super) const RECORDING: &[Mutation] = &[
     Mutation::of(
-        "kinetoscope-record",
+        "kinetoscope-scene",
         "shape of an array of one axis a number",
         "scene/src/npy.rs",
         ["if shape.len() == 1 {", "if shape.len() == 2 {"],
