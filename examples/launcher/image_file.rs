@@ -1,8 +1,9 @@
 //! Camera channels as image and array files.
 
-use super::{Result, npy};
+use super::Result;
 use image::{Rgb, RgbImage};
 use kinetoscope::ndarray::{ArrayBase, Data, Dimension};
+use kinetoscope::scene::npy;
 use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -15,7 +16,7 @@ const GAP: u32 = 8;
 pub(crate) fn write_npy<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result
 where
     S: Data,
-    S::Elem: npy::Element,
+    S::Elem: npy::NpyElement,
     D: Dimension,
 {
     let write = || {

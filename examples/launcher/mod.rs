@@ -8,7 +8,6 @@ pub(crate) mod grip;
 pub(crate) mod image_file;
 pub(crate) mod live_view;
 pub(crate) mod motion;
-pub(crate) mod npy;
 pub(crate) mod panel;
 mod recording;
 pub(crate) mod render_progress;

@@ -14,7 +14,7 @@
 //! | `recorder`, `cfg`, `topic`, `source`, `stream`, `overview`, `clock` | the observer: what is recorded, and when |
 //! | `packet`, `writer`, `file`, `folder` | packets, the writer thread, atomic files and folders |
 //! | `mcap_writer`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
-//! | `npz`, [`npy`], `zip` | NumPy archives |
+//! | `npz`, `zip` | NumPy archives |
 //! | `image_folder`, `png`, `animation` | PNG files and animations |
 //! | `episodes`, `lerobot`, `robomimic` | datasets of episodes for learning |
 //! | `read`, `recorded_arrays`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
@@ -43,7 +43,6 @@ mod format;
 mod image_folder;
 mod lerobot;
 mod mcap_writer;
-pub mod npy;
 mod npz;
 mod overview;
 mod packet;
@@ -76,5 +75,5 @@ pub use playback::Playback;
 pub use read::{FieldSelector, RecordedTopic, Recording, TimeSeries};
 pub use recorder::{Record, Recorder, RecorderId, RecordingSummary};
 pub use recover::{Recovered, recover, recover_to};
-pub use stream::{Distortion, ElementType, StreamField, StreamKind, StreamSchema};
+pub use stream::{Distortion, StreamField, StreamKind, StreamSchema};
 pub use topic::Topic;

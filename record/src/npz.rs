@@ -23,12 +23,12 @@
 //! Until the end, rows are in unnamed files in the same folder. A killed process leaves only an empty `NAME.part`.
 
 use crate::file::{PartialFile, Storage, parent_dir};
-use crate::npy;
 use crate::packet::{Event, Packet, StreamRows};
 use crate::scene_file::SCENE_ARCHIVE;
 use crate::stream::{ElementType, StreamField, StreamKind, StreamSchema};
 use crate::writer::{FormatWriter, WriteError, WriteResult};
 use crate::zip::ZipWriter;
+use kinetoscope_scene::npy;
 use kinetoscope_sim::{MaskId, Snapshot};
 use serde_json::{Value, json};
 use std::fs::File;
@@ -225,16 +225,6 @@ impl Read for ColumnReader<'_> {
         out[..count].copy_from_slice(&self.record[self.at..self.at + count]);
         self.at += count;
         Ok(count)
-    }
-}
-
-impl ElementType {
-    pub(crate) fn bytes(self) -> usize {
-        match self {
-            Self::U8 => 1,
-            Self::I32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
     }
 }
 

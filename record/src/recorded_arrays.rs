@@ -2,11 +2,11 @@
 
 use crate::error::{RecordError, Result};
 use crate::format::Format;
-use crate::npy;
 use crate::npz::{INITIAL_STATE, METADATA};
 use crate::read::{McapArrays, read_arrays};
 use crate::source::StreamSource;
 use crate::zip::{ReadSeek as From, ZipReader};
+use kinetoscope_scene::npy;
 use kinetoscope_sim::{EnvId, Snapshot};
 use ndarray::{ArrayView2, ArrayView3};
 use serde_json::Value;

@@ -1,5 +1,6 @@
 //! Metadata of recorded streams: names, shapes and meaning.
 
+pub(crate) use kinetoscope_scene::npy::ElementType;
 use kinetoscope_sensors::{SampleChannel, Stamp};
 
 /// Metadata of values that are recorded together.
@@ -69,19 +70,6 @@ impl StreamField {
     pub fn width(&self) -> usize {
         self.shape.iter().product()
     }
-}
-
-/// Type of the values of a stream.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ElementType {
-    /// Unsigned 8-bit integers: color and albedo.
-    U8,
-    /// Signed 32-bit integers: mask ids.
-    I32,
-    /// Single precision: images such as depth.
-    F32,
-    /// Double precision: states and sensors.
-    F64,
 }
 
 /// Lens distortion in ROS's terms.

@@ -10,6 +10,7 @@
 //! | [`SceneState`], [`VisibleState`], [`Contacts`], [`StateFields`] | state of all environments at one time |
 //! | [`KeyedRng`], [`Philox`], [`sampling`] | random numbers and sample warping |
 //! | [`Ray`], [`camera_fit`] | rays, and camera placement around a scene |
+//! | [`npy`] | NumPy array files |
 //! | [`file_format`], [`yaml`], [`pattern`], [`source_location`], [`AtomicFile`] | configuration files, name patterns, files |
 //!
 //! ```
@@ -31,6 +32,7 @@ mod light;
 mod marker;
 mod material;
 pub mod mesh;
+pub mod npy;
 pub mod pattern;
 pub mod pose;
 mod pose_f32;

@@ -14,14 +14,15 @@ mod readers;
 mod scenes;
 mod task_results;
 
+pub(crate) use crate::zip;
 pub(crate) use crate::{
     FieldSelector, Format, OverviewCfg, Record, RecordError, RecorderCfg, Recording, RecordingSummary, Topic, recover,
     recover_to,
 };
-pub(crate) use crate::{npy, zip};
 pub(crate) use kinetoscope_render::frame::Channels;
 pub(crate) use kinetoscope_render::{Intrinsics, RasterCfg, Renderer};
 pub(crate) use kinetoscope_scene::Pose;
+pub(crate) use kinetoscope_scene::npy;
 pub(crate) use kinetoscope_sensors::camera::{Camera, CameraCfg, CameraConvention, StereoCameraCfg};
 pub(crate) use kinetoscope_sensors::ray::RayCasterCfg;
 pub(crate) use kinetoscope_sensors::ray::pattern::Grid;

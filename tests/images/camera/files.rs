@@ -1,7 +1,7 @@
 //! Files that the examples write, checked byte by byte against their formats.
 
 use kinetoscope::ndarray::{Array, Dimension, arr1, arr2, arr3};
-use kinetoscope::record::npy;
+use kinetoscope::scene::npy;
 use kinetoscope_testkit::urdf::TempFiles;
 
 #[path = "../../../examples/launcher/cloud.rs"]

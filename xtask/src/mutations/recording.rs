@@ -4,9 +4,9 @@ use super::Mutation;
 
 pub(super) const RECORDING: &[Mutation] = &[
     Mutation::of(
-        "kinetoscope-record",
+        "kinetoscope-scene",
         "shape of an array of one axis a number",
-        "record/src/npy.rs",
+        "scene/src/npy.rs",
         ["if shape.len() == 1 {", "if shape.len() == 2 {"],
         &["npy::tests::"],
     ),

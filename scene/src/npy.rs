@@ -1,6 +1,5 @@
 //! NumPy's `.npy` array format, version 1.0, as described in `numpy.lib.format`.
 
-use crate::stream::ElementType;
 use ndarray::{ArrayBase, Data, Dimension};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -11,9 +10,31 @@ const ALIGN: usize = 64;
 const PREAMBLE_LEN: usize = 10;
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
 
+/// Type of the numbers of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ElementType {
+    /// Unsigned 8-bit integers: color and albedo.
+    U8,
+    /// Signed 32-bit integers: mask ids.
+    I32,
+    /// Single precision: images such as depth.
+    F32,
+    /// Double precision: states and sensors.
+    F64,
+}
+
 impl ElementType {
+    /// Size of a number \[bytes\].
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::I32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
     /// NumPy's type descriptor: byte order, kind and size.
-    pub(crate) fn descr(self) -> &'static str {
+    pub fn descr(self) -> &'static str {
         match self {
             Self::U8 => "|u1",
             Self::I32 => "<i4",
@@ -66,7 +87,7 @@ where
 }
 
 /// Returns the file header of an array in C order; `None` for more axes than the format supports.
-pub(crate) fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
+pub fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
     let mut axes = String::new();
     for (k, length) in shape.iter().enumerate() {
         // Writing to a `String` does not fail. Python writes (2,) and (2, 3).
@@ -88,7 +109,7 @@ pub(crate) fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
 }
 
 /// Parses a file with such a header: type descriptor, shape, bytes of the values.
-pub(crate) fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
+pub fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (length, rest) = rest.split_first_chunk::<2>()?;
     let (text, data) = rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))?;
