@@ -30,7 +30,7 @@ pub struct Overlays {
     pub centers_of_mass: bool,
     /// Names of links and objects, without the uid of the robot.
     pub names: bool,
-    /// Trails of past positions of bodies, if [`ViewOptions::trails`](super::ViewOptions::trails) has them.
+    /// Trails of past positions of bodies, in windows that record them.
     pub trails: bool,
     /// Visual shapes: geom groups 0 to 2.
     pub visuals: bool,
