@@ -40,7 +40,7 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let view = scene.view(SIZE)?;
     let pixels = (SIZE[0] * SIZE[1]) as f64;
     let row = |case: &str, unit: &str, ours: f64| Row::new("trace", format!("{name}, {case}"), unit, 1, ours);
-    let at_least = |row: Row, aim: f64, ratio: f64| row.against("aim", aim, ratio).with_target_ratio(1.0);
+    let at_least = |row: Row, aim: f64, ratio: f64| row.against("target", aim, ratio).with_target_ratio(1.0);
     let percent = |times: &Times, part: usize| 100.0 * times.median_of(|t| t[part] / t[0]);
 
     let geometry = Channels { depth: true, mask: true, ..Channels::default() };
@@ -52,11 +52,11 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let hits = seen.frame.mask.iter().flatten().filter(|&&id| id != 0).count() as f64;
     let covered = 100.0 * hits / pixels;
     let mut rows = vec![
-        at_least(row("what is seen, 640x480", "rays/s", per_second), TARGET_RAYS, per_second / TARGET_RAYS),
-        row("what is seen, 640x480, covered by it", "%", covered),
+        at_least(row("primary rays, 640x480", "rays/s", per_second), TARGET_RAYS, per_second / TARGET_RAYS),
+        row("primary rays, 640x480, pixels covered by the robot", "%", covered),
         // Rays that miss the robot cost little.
-        row("what is seen, 640x480, rays that meet it", "rays/s", hits / rays.per_step(0)),
-        row("what is seen, 640x480, time without it", "%", percent(&rays, 1)),
+        row("primary rays, 640x480, rays that hit the robot", "rays/s", hits / rays.per_step(0)),
+        row("primary rays, 640x480, time without the robot", "%", percent(&rays, 1)),
         ray_casting(settings, &scene)?,
     ];
 
@@ -73,8 +73,8 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let (per_second, cast) = (pixels / paths.per_step(0), whole.rasterizer.progress().rays() as f64);
     rows.extend([
         at_least(row("in a lit box, 4 bounces", "paths/s", per_second), TARGET_PATHS, per_second / TARGET_PATHS),
-        row("in a lit box, rays of a path", "rays/path", cast / pixels),
-        row("in a lit box, rays of paths", "rays/s", cast / paths.per_step(0)),
+        row("in a lit box, rays per path", "rays/path", cast / pixels),
+        row("in a lit box, all rays of the paths", "rays/s", cast / paths.per_step(0)),
         row("in a lit box, time without shadow rays", "%", percent(&paths, 1)),
         row("in a lit box, time up to the first surface and its light", "%", percent(&paths, 2)),
     ]);
@@ -84,9 +84,9 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let trees = times(settings, &mut [&mut warm, &mut cold])?;
     let [warm, cold] = [0, 1].map(|side| 1e9 * trees.per_step(side) / triangles);
     rows.extend([
-        at_least(row("trees", "ns/triangle", warm), TARGET_BUILD_NS, TARGET_BUILD_NS / warm),
+        at_least(row("BVH build", "ns/triangle", warm), TARGET_BUILD_NS, TARGET_BUILD_NS / warm),
         // The system clears pages on first use.
-        row("trees in memory that is new", "ns/triangle", cold),
+        row("BVH build, memory used for the first time", "ns/triangle", cold),
     ]);
     Ok(rows)
 }

@@ -212,11 +212,11 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     if let Some([images, factor]) = window {
         let row = Row::new("view", case(&format!("window of {width} x {height}")), "images/s", cores(), images);
-        rows.push(row.against("wanted", TARGET_FPS, images / TARGET_FPS).with_target_ratio(1.0));
-        let row = Row::new("view", case("physics meanwhile"), "x real time", cores(), factor);
+        rows.push(row.against("target", TARGET_FPS, images / TARGET_FPS).with_target_ratio(1.0));
+        let row = Row::new("view", case("physics during rendering"), "x real time", cores(), factor);
         rows.push(row.against("real time", 1.0, factor).with_target_ratio(TARGET_REAL_TIME_FACTOR));
     }
-    let row = Row::new("view", case("drawn in 0.25 s each"), "env-steps/s", cores(), times.rate(0, ENVS));
+    let row = Row::new("view", case("0.25 s per image"), "env-steps/s", cores(), times.rate(0, ENVS));
     rows.push(
         row.against("no view", times.rate(1, ENVS), times.ratio(0, 1)).with_target_ratio(TARGET_SPEED_WITH_SLOW_VIEWER),
     );

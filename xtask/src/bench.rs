@@ -191,16 +191,25 @@ fn machine() -> String {
 fn heading(machine: &str) -> String {
     let baselines: Vec<&str> = CAMERA_BASELINES.iter().flat_map(|module| module.packages).copied().collect();
     format!(
-        "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}. `cargo xtask bench` measures \
-         everything again; `cargo xtask bench NAME --update` one table, on the same machine.\n\nOurs and the baseline ran in one run, \
-         in turns. Numbers are medians of the turns; so is the ratio, which is taken turn by turn and need not be that of the \
-         medians. `ratio > 1`: ours is faster. `-`: there is no baseline, it was not on the machine, or it has another MuJoCo. \
-         The baselines `aim`, `wanted` and `limit` are our own targets, not programs. Rows of `trace` in \
-         percent show where the time goes: the time of the same work without one part, in turns with the whole work.\n\n`plain` images have one sample per pixel and no shadows, `full` images four and shadows; `MuJoCo on OSMesa` is \
-         `mujoco.Renderer` at its best settings, `by hand` is the same library with as few passes as possible. `scans` are \
-         height scans with parallel rays; `fans` are rays from one point.\n\nPython baselines: {}, and \
-         the `mujoco` of the row.\n",
-        baselines.join(", ")
+        "# Benchmark results\n\nWritten by `cargo xtask bench`; do not edit. Machine: {machine}. `cargo xtask bench` \
+         measures everything again; `cargo xtask bench NAME --update` measures one benchmark again and replaces its \
+         tables, on the same machine.\n\nBoth sides run in turns in one run. Numbers are medians over the turns. The \
+         ratio is computed for each turn; its median can differ from the ratio of the two numbers. `step`, `scaling`, \
+         `drive`, `mujoco-batch`, `rays`, `record` (without real time), `view` (without the window) and `contacts` \
+         run twice, so that each side is created first once: their numbers are means of the two medians, their ratios \
+         geometric means. `startup` has medians of several starts, `memory` a single measurement.\n\n`ratio > 1`: \
+         Kinetoscope is better, that is faster, smaller (`memory`) or more often successful (`solved`). `-`: there is \
+         no baseline, it was not on the machine, or it needs another MuJoCo version. `bare loop` calls MuJoCo's \
+         functions on the same number of threads; `copy loop` and `compute loop` measure limits of the machine. The \
+         baselines `target`, `limit` and `real time` are targets, not programs.\n\nRows of `trace` with `time` in \
+         their name are the time of the same work without one part, in percent of the time of the whole \
+         work.\n\n`plain` images have one sample per pixel and no shadows, `full` images have four samples and \
+         shadows. `MuJoCo on OSMesa` is `mujoco.Renderer` with the settings of the row, or with its default settings \
+         if the row says so. `OSMesa by hand` is the same library with two passes per image instead of three. `scans` \
+         are height scans with parallel rays; `mj_multiRay` casts rays from the middle of each scanner to the same \
+         points. `fans` are rays from one point.\n\nPython baselines: {}, mujoco=={}.\n",
+        baselines.join(", "),
+        wheel::PYTHON_VERSION
     )
 }
 
