@@ -28,10 +28,10 @@ impl ThreadPool {
         Self { workers: None, hook: None }
     }
 
-    /// Returns a pool on the same threads that runs the work of each slot inside `hook(slot, slots, work)`, slot 0
-    /// included. Replaces an earlier hook.
+    /// Returns a pool on the same threads that calls `hook(slot, slots, work)` instead of `work(slot)` for each slot,
+    /// slot 0 included. Replaces an earlier hook.
     ///
-    /// The hook must call `work(slot)` once. It is meant for measurements per thread, such as allocation counts.
+    /// The hook must call `work(slot)` once. Hooks are meant for measurements per thread, such as allocation counts.
     pub fn with_hook(mut self, hook: impl Fn(usize, usize, &(dyn Fn(usize) + Sync)) + Send + Sync + 'static) -> Self {
         self.hook = Some(Arc::new(hook));
         self

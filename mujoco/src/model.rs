@@ -83,7 +83,7 @@ pub(super) struct OwnArray {
 }
 
 impl OwnArray {
-    /// Creates an array from `field.bytes` bytes.
+    /// Copies the `field.bytes` bytes of `values` into an aligned array.
     pub(super) fn from_bytes(field: ModelArray, values: &[u8]) -> Self {
         let mut memory = vec![0_u64; field.bytes.div_ceil(8)];
         for (word, chunk) in memory.iter_mut().zip(values.chunks(8)) {

@@ -72,8 +72,8 @@ const ENABLED: &[(u32, &str)] = &[
 ];
 
 impl Model {
-    /// Names and values (as text) of the `<option>` settings that affect a step. Not included are the flags `autoreset`
-    /// and `island` and, on 4.x, `sdf_iterations`, `sdf_initpoints` and `sleep_tolerance`.
+    /// Names and values (as text) of the `<option>` settings that affect a step; names of flags begin with `flag `. On
+    /// 4.x, the flags `autoreset` and `island` are not included.
     pub fn options(&self) -> Vec<(&'static str, String)> {
         let opt = &self.header().opt;
         let integrators = [

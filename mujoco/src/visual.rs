@@ -24,7 +24,7 @@ pub struct MeshArrays<'a> {
     pub face_texcoords: &'a [[i32; 3]],
 }
 
-/// A height field.
+/// Size and elevations of a height field.
 #[derive(Clone, Copy, Debug)]
 pub struct HeightFieldArrays<'a> {
     /// Half length along x, half length along y, height of elevation 1, depth of the base below zero \[m\].

@@ -10,7 +10,7 @@ use mujoco_sys as mj;
 use mujoco_sys::fields::model::{ModelArray, each};
 use std::sync::Arc;
 
-/// Weld to activate with [`Model::with_welds`].
+/// Weld equality of a model, and the relative pose of its two bodies with which [`Model::with_welds`] activates it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weld {
     /// Index of the equality constraint in the model (MuJoCo's eq id).

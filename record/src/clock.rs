@@ -21,7 +21,7 @@ impl RecordingClock {
         Self { dt, first_step: steps, start_times: times.to_vec(), offsets: vec![0.0; times.len()] }
     }
 
-    /// Number of steps since the recording began.
+    /// Converts a step count of the simulation to the number of steps since the recording began.
     pub(crate) fn step(&self, steps: u64) -> u64 {
         steps - self.first_step
     }

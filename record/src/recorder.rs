@@ -272,10 +272,10 @@ impl Recorder {
         }
     }
 
-    /// Ends the recording, as [`Record::finish_recording`].
+    /// Ends the recording. When this method returns, the file is complete and has its name.
     ///
     /// # Errors
-    /// The same as [`Record::finish_recording`].
+    /// Those of [`Record::finish_recording`], except for a recorder that was removed.
     pub fn finish(mut self) -> Result<RecordingSummary> {
         self.stop()
     }

@@ -2,9 +2,9 @@
 
 use kinetoscope_scene::Philox;
 
-/// Key of the random numbers of one image, among all images of a camera in an environment. Every random number of the
-/// image is a function of this key and the position in the image. So threads, lazy rendering and the order of reads
-/// change no number.
+/// Key of the random numbers of one image of a camera in one environment. Every random number of the image is a
+/// function of this key and the position in the image. Threads, lazy rendering and the order of reads therefore do not
+/// change the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RngKey {
     philox: Philox,

@@ -149,7 +149,7 @@ impl DiagnosticKind {
 pub struct Diagnostic {
     /// Kind of the warning.
     pub kind: DiagnosticKind,
-    /// Location, if the input is a file.
+    /// Location in the file; `None` if the warning has no single location, or if its input is not a file.
     pub source: Option<SourceLocation>,
     /// Full sentence that names the element: `link "LF_HIP": ...`.
     pub message: String,

@@ -289,8 +289,8 @@ fn replace_implausible_inertias(
     }
 }
 
-/// Mass properties of a solid ball at the origin of a link, with a mass \[kg\] and a density \[kg/m³\] that gives its
-/// radius.
+/// Mass properties of a solid ball at the origin of a link. Its radius follows from `mass` \[kg\] and `density`
+/// \[kg/m³\]; its source location is that of `link`.
 pub fn solid_ball_inertial(link: &Link, mass: f64, density: f64) -> Inertial {
     let radius = (mass / density * 0.75 / PI).cbrt();
     let inertia = Matrix3::from_diagonal_element(0.4 * mass * radius * radius);

@@ -191,12 +191,12 @@ impl MipLevel {
         Self { width, height, bytes: bytes.collect() }
     }
 
-    /// Width \[pixels\].
+    /// Width of this mip level \[pixels\].
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Height \[pixels\].
+    /// Height of this mip level \[pixels\].
     pub fn height(&self) -> u32 {
         self.height
     }

@@ -63,7 +63,8 @@ macro_rules! quantities {
             $($(#[$doc:meta])* $field:ident: $Type:ty $([$axis:ident $(, $width:literal)?])?,)+
         }
     )+) => {
-        /// State of all environments after a physics step (or after a reset).
+        /// State of all environments after a physics step, a reset or a write to the state. Only requested quantities
+        /// are present; the others are `None`.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct SceneState {
             /// Physics steps (of `physics_dt`) since the last reset of each environment, shape \[num_envs\].

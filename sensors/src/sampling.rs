@@ -36,8 +36,9 @@ pub struct SamplingCfg {
     /// stamp of its capture. All sensors see a write to the state of an environment at once: outdated values are never
     /// read.
     pub latency_steps: u32,
-    /// Probability that a measurement is lost on its way, 0 to 1: the previous measurement stays, and the lost one is
-    /// neither counted nor in the history. The values of a reset or a write to the state are never lost.
+    /// Probability that a measurement of an environment is lost, 0 to 1. A lost measurement is skipped: the previous
+    /// value stays, and count and history do not change. The values after a reset or a write to the state are never
+    /// lost.
     pub dropout: f64,
     /// Noise by channel name. The random numbers of an environment are one sequence, keyed by the seed of the
     /// simulation, the index of the environment and the name of the sensor. They do not depend on other sensors or on
@@ -51,9 +52,9 @@ impl SamplingCfg {
         Self { update_period: period, ..Self::default() }
     }
 
-    /// Returns the schedule of a lazy sensor with this sampling, with physics steps of `dt` \[s\]: for
-    /// [`SensorCfg::lazy`](crate::SensorCfg::lazy). `None` for an eager sensor: [`lazy`](Self::lazy) is off, or its
-    /// values depend on more than one instant.
+    /// Returns the schedule of a lazy sensor with this sampling, with physics steps of `dt` \[s\];
+    /// [`SensorCfg::lazy`](crate::SensorCfg::lazy) returns it. `None` if [`lazy`](Self::lazy) is off, if there is a
+    /// history, a latency, dropout or noise, or if the period is invalid.
     pub fn lazy_schedule(&self, dt: f64) -> Option<Schedule> {
         let single_instant =
             self.history_length == 0 && self.latency_steps == 0 && self.dropout == 0.0 && self.noise.is_empty();

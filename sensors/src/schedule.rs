@@ -49,7 +49,7 @@ impl Schedule {
         self.period_steps
     }
 
-    /// Creates counters for `num_envs` environments, all at step 0.
+    /// Creates the step counters of this schedule for `num_envs` environments, all at step 0.
     pub fn phases(self, num_envs: usize) -> Phases {
         Phases { schedule: self, envs: vec![Phase { start: 0, last_query: 0 }; num_envs] }
     }

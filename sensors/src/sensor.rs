@@ -18,7 +18,8 @@ pub trait SensorCfg {
     /// The sensor built from this configuration.
     type Sensor: Sensor;
 
-    /// Fields of the state that the sensor needs. The simulation gathers the union over all sensors, and nothing else.
+    /// Fields of the state that the sensor needs. After a step, the simulation gathers only the fields of the sensors
+    /// that are due; after a write or a reset, the fields of all sensors.
     fn requires(&self) -> StateFields;
 
     /// True if the sensor's [`markers`](Sensor::markers) are shown initially. Built-in sensors have a field `debug_vis`
@@ -52,7 +53,7 @@ pub trait SensorCfg {
     fn build(&self, context: &SensorContext) -> Result<Self::Sensor, SensorError>;
 }
 
-/// A sensor of all environments.
+/// A sensor that measures in all environments.
 ///
 /// The owner calls [`update`](Self::update) after a physics step, at the latest when [`due_in`](Self::due_in) has
 /// elapsed (later for a [lazy](SensorCfg::lazy) sensor). The sensor determines which environments are due. Measurements
@@ -97,9 +98,9 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Physics steps until the next measurement of any environment is captured or delivered, at least 1, with the
-    /// environments at `step`. The owner may skip the updates until then. The step of a quarantined (diverged)
-    /// environment is [`Phases::QUARANTINED`](crate::Phases::QUARANTINED).
+    /// Physics steps until the next measurement of any environment is captured or delivered, or the shutter of a camera
+    /// opens; at least 1. `step` contains the steps of the environments. The owner may skip the updates until then. The
+    /// step of a quarantined (diverged) environment is [`Phases::QUARANTINED`](crate::Phases::QUARANTINED).
     fn due_in(&self, step: &[u64]) -> u64 {
         let _ = step;
         1

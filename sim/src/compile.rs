@@ -280,7 +280,8 @@ fn index_mjcf(model: &mj::Model, part: &MjcfData) -> Result<MjcfIndexing> {
     })
 }
 
-/// Returns the mask ids and labels of all geoms and tendons.
+/// Returns mask id, name and sensor body of each geom and each visible tendon. Geoms without an owner belong to the
+/// ground.
 fn assign_geom_owners(
     model: &mj::Model,
     contents: &EntitySet,

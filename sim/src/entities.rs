@@ -116,8 +116,8 @@ impl<'a> Entities<'a> {
         self.sim.sensors.by_uid(uid)
     }
 
-    /// Physics steps until the sensor `uid` measures next in any environment, at least 1; [`u64::MAX`] if it never
-    /// does.
+    /// Physics steps until the sensor `uid` next measures, delivers a delayed measurement or opens its shutter in any
+    /// environment, at least 1; [`u64::MAX`] for a failed sensor.
     ///
     /// # Errors
     /// The uid is unknown.

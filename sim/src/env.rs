@@ -339,7 +339,8 @@ impl SimEnv {
         }
     }
 
-    /// Status of the environment.
+    /// `Running`, or `Diverged` with the failed step and the reason. A diverged environment keeps its last valid state
+    /// until it is reset.
     pub fn status(&self) -> &EnvStatus {
         self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
     }

@@ -376,7 +376,7 @@ pub enum Error {
         /// The joint.
         joint: String,
     },
-    /// The gains of the drive are part of MuJoCo's model and cannot be changed.
+    /// Gains and effort limits of the drive are part of MuJoCo's model and cannot be changed.
     #[error(
         "{argument}: joint {joint:?} of {robot} is driven by DriveModel::Actuator, whose gains and limits are in the \
          model that all environments share; use DriveModel::Implicit or an explicit actuator model to change them"

@@ -6,7 +6,8 @@ use kinetoscope_mujoco as mj;
 /// Indices of one robot in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotIndexing {
-    /// Addresses of each drivable joint, in the order of `joint_names`.
+    /// Addresses of each joint with one degree of freedom, mimic joints and joints without a drive included, in the
+    /// order of `joint_names`.
     pub joints: Vec<JointIndexing>,
     /// Frame of each link, in the order of `link_names`.
     pub links: Vec<BodyFrame>,

@@ -24,7 +24,8 @@ pub struct Rollout {
     pub states: Array3<f64>,
     /// Final states; [`restore`](SimulationManager::restore) copies them to the environments.
     pub final_states: Snapshot,
-    /// Index of each diverged row, with the step and the reason.
+    /// Index and error text of each diverged row. The step in the text counts MuJoCo steps since the last reset, not
+    /// since the start of the rollout.
     pub diverged: Vec<(usize, String)>,
 }
 

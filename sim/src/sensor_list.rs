@@ -326,7 +326,8 @@ impl SensorList {
         entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault_error(fault))
     }
 
-    /// Physics steps until the sensor `uid` measures next, at least 1; `u64::MAX` for a failed sensor.
+    /// Physics steps until the sensor `uid` next measures, delivers a delayed measurement or opens its shutter in any
+    /// environment, at least 1; `u64::MAX` for a failed sensor.
     pub(crate) fn due_in(&self, uid: &str, simulation: &Simulation) -> Result<u64> {
         let entry = self.entry_by_uid(uid)?;
         let mut clocks = Vec::with_capacity(simulation.batch.num_envs());

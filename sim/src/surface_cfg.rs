@@ -33,7 +33,8 @@ pub struct SurfaceCfg {
     pub reflectance: Option<f64>,
     /// Metalness, 0..=1. A metal has no diffuse reflection, and its color tints the specular reflection.
     pub metallic: Option<f64>,
-    /// Roughness, 0..=1, instead of `shininess`. The alpha of the GGX distribution is the square of the roughness.
+    /// Roughness, 0..=1; 0 is polished. If both are set, it replaces `shininess`. The alpha of the GGX distribution is
+    /// the square of the roughness.
     pub roughness: Option<f64>,
     /// Fraction of light that is refracted through the surface, as by glass, 0..=1. Only path-traced frames apply it,
     /// and only to closed shapes; other renderers draw an opaque surface.

@@ -25,7 +25,7 @@ pub struct Step<I = StepInfo> {
     pub info: I,
 }
 
-/// Additional results of a step of an [`Env`](crate::Env).
+/// Weighted reward terms and ended episodes of a step of an [`Env`](crate::Env). Final observations are in [`Step`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepInfo {
     /// Weighted rewards of each term, shape (N, reward terms), in the order of

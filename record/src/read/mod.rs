@@ -48,7 +48,8 @@ pub struct RecordedTopic {
     pub kind: String,
     /// Number of messages, or of rows of an archive. A row may repeat the last value of an environment.
     pub count: u64,
-    /// Names of its numbers, such as `position[J1]`; empty for images, texts, and messages that cannot be read.
+    /// Names of the numbers in its messages, such as `position[J1]`; empty for images, texts, and messages that cannot
+    /// be read.
     pub fields: Vec<String>,
 }
 

@@ -108,8 +108,8 @@ pub(super) fn samples(archive: &RecordedArrays, wanted: &[FieldSelector]) -> Res
     Ok(samples)
 }
 
-/// Recorded times of the rows of a stream in an environment \[s\], continuing over resets; `None` for a row without a
-/// new value.
+/// Recorded times \[s\] of the rows of a stream in the environment `stream.env_ids[row]`, continuing over resets;
+/// `None` for a row without a new value. `of_forces` selects `force_time`, if the archive contains it.
 fn times(
     archive: &RecordedArrays,
     stream: &RecordedStream<'_>,

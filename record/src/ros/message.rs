@@ -203,7 +203,7 @@ pub(crate) fn float64_multi_array(to: &mut CdrWriter, label: &str, shape: &[usiz
     to.f64_sequence(values);
 }
 
-/// `rcl_interfaces/msg/Log`, as a warning if `bad`.
+/// Writes `rcl_interfaces/msg/Log` with the level WARN if `bad`, else INFO.
 pub(crate) fn log(to: &mut CdrWriter, nanos: u64, bad: bool, name: &str, message: &str) {
     time(to, nanos);
     to.u8(if bad { WARN } else { INFO });

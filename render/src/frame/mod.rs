@@ -72,8 +72,8 @@ macro_rules! channels {
 
             /// Creates the set of channels with these names or aliases (`rgb`, `distance_to_image_plane`,
             /// `normals`...). Isaac's names `semantic_segmentation`, `instance_segmentation`,
-            /// `instance_segmentation_fast` and `instance_id_segmentation_fast` select the mask, which contains ids of
-            /// links. [`Mask`] describes images of instances and classes.
+            /// `instance_segmentation_fast` and `instance_id_segmentation_fast` select the mask, which contains one id
+            /// for each link or object. [`Mask`] describes images of instances and classes.
             ///
             /// # Errors
             ///

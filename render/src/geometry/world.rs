@@ -78,7 +78,8 @@ struct PlacedTarget {
     radius: f64,
 }
 
-/// Fixed targets at their poses. All environments with the same poses of fixed targets share one instance.
+/// Fixed targets placed at their poses: pose and bounding sphere of each, and a BVH over them. The geometry stays in
+/// [`RayTargets`]. One instance can serve all environments with the same [`RayTargets`] and the same fixed poses.
 #[derive(Clone, Debug, Default)]
 pub struct FixedTargets {
     placed: Vec<PlacedTarget>,

@@ -24,8 +24,9 @@ const ISAAC_SLOPE: f64 = 0.00245;
 pub struct FTheta {
     /// Coefficients a to f; a is 0, because the optical axis is at r = 0.
     pub polynomial: [f64; 6],
-    /// Focal length of the calibration image \[pixels\]: pixels of that image per unit of the normalized image. With
-    /// the value 1 / b, fx is the scale at the image center, in pixels per radian.
+    /// Focal length of the calibration image \[pixels\]: a radius in pixels of that image, divided by it, is the radius
+    /// in the normalized image. If it is 1 / b, with b of [`polynomial`](Self::polynomial), fx is the scale at the
+    /// image center \[pixels/rad\].
     pub focal_length: f64,
     /// Largest visible angle from the optical axis \[rad\]: half of Isaac's `fisheye_max_fov`.
     pub max_angle: f64,

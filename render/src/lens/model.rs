@@ -6,13 +6,13 @@ use crate::optics_error::OpticsError;
 /// Domain of a lens: the range of visible directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
-    /// Largest angle between a ray and the optical axis \[rad\]. For a distortion that folds back at different angles
-    /// in different directions, the smallest of these angles.
+    /// Angle from the optical axis up to which every direction is visible \[rad\]. If the distortion folds back at an
+    /// angle that depends on the direction, directions beyond this angle may be visible too.
     pub angle: f64,
-    /// Distance of such a ray from the principal point in the normalized image (times fx: in pixels); +inf for a
-    /// pinhole.
+    /// Distance of a ray at this angle from the principal point in the normalized image (times fx: in pixels); +inf for
+    /// a pinhole.
     pub radius: f64,
-    /// True if rays end there because the mapping folds back or has a pole, not at a requested angle.
+    /// True if the domain ends at this angle because the mapping folds back or has a pole, not at a requested angle.
     pub folds: bool,
     /// Poles of the radial factor of [`OpenCv`]; empty for other lenses.
     pub(super) poles: Poles,
@@ -37,7 +37,7 @@ pub trait LensModel: Copy + Default {
     /// True if there is an aperture with an optical axis; a panorama is composed of many images.
     const HAS_AXIS: bool = true;
 
-    /// True if the lens with these numbers is a pinhole.
+    /// True if the lens is a pinhole without distortion and without a `max_angle`. The default is false.
     fn is_pinhole(&self) -> bool {
         false
     }

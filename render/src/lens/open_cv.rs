@@ -23,9 +23,9 @@ const CONTINUATION_STEPS: usize = 32;
 /// Source: OpenCV, module calib3d, "Camera Calibration and 3D Reconstruction". ROS's `plumb_bob` uses k1, k2, p1, p2,
 /// k3; its `rational_polynomial` adds k4 to k6. OpenCV's tilted sensor (tau) is not supported.
 ///
-/// Newton's method inverts the mapping, in each direction from the optical axis to the angle where the mapping folds
-/// back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's formula has several directions for a
-/// pixel, the one within that range is used; `cv::undistortPoints` may find another.
+/// Newton's method inverts the mapping. In each direction, the inverse reaches from the optical axis to the angle where
+/// the mapping folds back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's formula has
+/// several directions for a pixel, the one within that range is used; `cv::undistortPoints` may find another.
 ///
 /// **Poles.** The fraction g may have a pole that a nearby zero nearly cancels. Calibrations with k4 to k6 often have
 /// such a pole in the image. Within a ring of directions around it, OpenCV's formula runs to infinity and back, and
@@ -34,8 +34,9 @@ const CONTINUATION_STEPS: usize = 32;
 /// each pixel has one direction, and each direction one pixel; everywhere else OpenCV's formula is used to the last
 /// digit.
 ///
-/// Any other pole ends the lens. If directions behind the pole would be seen in the same pixels, the lens ends at the
-/// radius that the formula without pole and zero has at the pole. Otherwise the image is unbounded before the pole.
+/// Any other pole ends the lens. If a zero follows the pole, directions behind the pole map to pixels before it. The
+/// lens then ends before the pole, at the direction whose image radius equals that of the formula without pole and
+/// zero. Otherwise the lens ends at the pole, and the image radius grows to it without bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OpenCv {

@@ -5,8 +5,10 @@ use super::{Domain, LensModel, OpticsError, check_finite, check_max_angle, radia
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// OpenCV's fisheye: r = theta (1 + k1 theta² + k2 theta⁴ + k3 theta⁶ + k4 theta⁸). ROS calls it `equidistant`. Skew is
-/// not supported.
+/// Coefficients of OpenCV's fisheye lens: r = theta (1 + k1 theta² + k2 theta⁴ + k3 theta⁶ + k4 theta⁸), with r in the
+/// normalized image. Focal lengths and principal point are in [`Intrinsics`](crate::Intrinsics). Calibration files of
+/// ROS call this lens `equidistant`; in scene files, `equidistant` is [`Equidistant`](super::Equidistant), which has no
+/// coefficients. Skew is not supported.
 ///
 /// Source: OpenCV, module calib3d, `cv::fisheye`; Kannala and Brandt, A generic camera model and calibration method for
 /// conventional, wide-angle, and fish-eye lenses, PAMI 2006.

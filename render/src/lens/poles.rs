@@ -45,7 +45,7 @@ impl Fraction {
         (g, ((k1 + s * (2.0 * k2 + s * 3.0 * k3)) - g * (k4 + s * (2.0 * k5 + s * 3.0 * k6))) / below)
     }
 
-    /// Image radius at a tangent r, and its derivative by r.
+    /// Image radius R = r g(r²) and its derivative dR/dr, with r the tangent of the angle to the optical axis.
     fn radius(&self, r: f64) -> (f64, f64) {
         let (g, slope) = self.at(r * r);
         (r * g, g + 2.0 * r * r * slope)

@@ -15,8 +15,8 @@ pub(super) fn project([x, y, z]: [f64; 3], most: f64, radius: impl Fn(f64) -> f6
     Some([x * by, y * by])
 }
 
-/// Unit direction through a point, where `angle` maps an image radius to the angle \[rad\]; angles up to `most` are
-/// valid.
+/// Unit direction (z forward) of a point of the normalized image. `angle` maps an image radius to the angle from the
+/// optical axis \[rad\]. `None` for an angle beyond `most`, or if `angle` returns `None`.
 pub(super) fn unproject([x, y]: [f64; 2], most: f64, angle: impl Fn(f64) -> Option<f64>) -> Option<[f64; 3]> {
     let radius = x.hypot(y);
     if radius == 0.0 {

@@ -351,7 +351,8 @@ impl<'a> Dynamics<'a> {
         m
     }
 
-    /// Generalized force g(q) that holds the robot still under `gravity` \[m/s²\] (z = -9.81 on earth): the gradient of
+    /// Generalized force g(q) \[N m or N\], one number for each degree of freedom, that holds the robot still under
+    /// `gravity`, in world axes \[m/s²\] (z = -9.81 on earth): the gradient of
     /// [`potential_energy`](Self::potential_energy). Gravity itself exerts the negative of it.
     pub fn gravity_torque(&self, gravity: &Vector3<f64>) -> DVector<f64> {
         let zero = DVector::zeros(self.dof_count());

@@ -22,7 +22,7 @@ pub struct UrdfCfg {
     /// URDF files of the robot; a parent may follow its children. A component with a custom
     /// [`name`](ComponentCfg::name) and without `parent` must be the first.
     pub components: Vec<ComponentCfg>,
-    /// Letter case of the link and joint names of the merged robot.
+    /// Letter case of the link and joint names of the merged robot, set separately; unchanged by default.
     pub name_case: NameCaseCfg,
     /// Folders of `package://` and `model://` packages by name. A package that is listed here is searched in its folder
     /// only, and in `meshdir` of the file. Relative paths start as that of [`asset_root`](Self::asset_root).
@@ -37,8 +37,8 @@ pub struct UrdfCfg {
     pub missing_inertia: MissingInertia,
     /// Name of the robot in its description; by default the robot names of the files, joined by `_`.
     pub name: Option<String>,
-    /// Name of the massless root link that is added if several components have no parent, or if the first of them has a
-    /// [`transform`](ComponentCfg::transform).
+    /// Name of the massless root link that is added if several components have no parent, or if the first component
+    /// without a parent has a [`transform`](ComponentCfg::transform).
     pub base_link_name: String,
 }
 

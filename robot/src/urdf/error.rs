@@ -5,7 +5,8 @@ use kinetoscope_scene::source_location::SourceLocation;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Error of reading or merging URDF files. Messages give the location and the remedy.
+/// Error of reading or merging URDF files, or of their collision meshes. Messages name the file and line, or the
+/// component, and the remedy if there is one.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum UrdfError {

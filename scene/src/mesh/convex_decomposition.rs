@@ -335,7 +335,7 @@ pub(super) fn unit_normal(&[a, b, c]: &Triangle) -> Option<V3> {
     (length > 1e-10 * (dot(u, u) + dot(v, v))).then(|| normal.map(|x| x / length))
 }
 
-/// The area of a triangle \[m²\].
+/// Area of a triangle \[m²\].
 pub(super) fn area(&[a, b, c]: &Triangle) -> f64 {
     let normal = cross(sub(b, a), sub(c, a));
     dot(normal, normal).sqrt() / 2.0

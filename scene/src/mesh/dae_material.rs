@@ -82,7 +82,8 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok((handle, uv_set))
     }
 
-    /// `<color>`, or the `<float4>` or `<float3>` that `<param ref>` names.
+    /// Finds the color of a `<diffuse>`: its `<color>`, or the `<float4>` or `<float3>` of the effect parameter that
+    /// its `<param ref>` names.
     fn color(&self, effect: Node<'a, 'i>, diffuse: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
         child(diffuse, "color").or_else(|| {
             let name = child(diffuse, "param")?.attribute("ref")?;

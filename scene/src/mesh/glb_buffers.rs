@@ -168,7 +168,8 @@ impl<'a> Gltf<'a> {
         }
     }
 
-    /// Reads an accessor of vectors. Integers that are marked normalized are fractions of their largest value.
+    /// Reads an accessor of `VEC2` or `VEC3`. Integers that are marked normalized are divided by their largest value,
+    /// so they are 0..=1 or -1..=1.
     pub(super) fn vectors<const N: usize>(&mut self, index: usize, at: &str) -> Result<Vec<[f64; N]>, MeshError> {
         let layout = self.layout(index, if N == 3 { "VEC3" } else { "VEC2" }, at)?;
         let bytes = self.bytes(layout.buffer);

@@ -7,7 +7,7 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, to_f64};
 
-/// A box.
+/// A box centered at the origin, with faces normal to the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Box {
     /// Half lengths along x, y and z \[m\].

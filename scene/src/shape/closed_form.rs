@@ -14,14 +14,14 @@ pub struct Intersection {
     pub normal: V3,
 }
 
-/// A part of a shape. The shape is the convex hull of its parts.
+/// A part of a shape, in the frame of the shape. The shape is the convex hull of its parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HullPart {
-    /// A point.
+    /// A point \[m\].
     Point(V3),
     /// An ellipsoid with axes along x, y and z; a disc if one of its radii is 0.
     Ellipsoid {
-        /// The center \[m\].
+        /// Center \[m\].
         center: V3,
         /// Half lengths \[m\].
         radii: V3,

@@ -171,7 +171,8 @@ impl Shape {
         }
     }
 
-    /// Calls `add` for parts whose convex hull is that of the shape.
+    /// Calls `add` for points and ellipsoids, in the frame of the shape. Their common convex hull is the convex hull of
+    /// the shape; it is infinite for an infinite plane.
     pub fn hull(&self, add: &mut dyn FnMut(HullPart)) {
         match self.geometry() {
             ShapeKind::ClosedForm(shape) => shape.hull(add),

@@ -54,7 +54,7 @@ impl Viewpoints {
         &self.rows[row]
     }
 
-    /// The lens of all rows.
+    /// Lens shared by all rows.
     pub(crate) fn lens(&self) -> Lens {
         self.rays.lens()
     }

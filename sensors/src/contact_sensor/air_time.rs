@@ -89,7 +89,7 @@ impl ContactTimers {
     }
 }
 
-/// Returns true if a force exceeds the contact threshold \[N\].
+/// Returns true if the magnitude of a force exceeds the contact threshold \[N\].
 fn is_contact(force: &[f64], threshold: f64) -> bool {
     force.iter().map(|f| f * f).sum::<f64>() > threshold * threshold
 }

@@ -109,7 +109,9 @@ pub fn stable_timestep_of(
     Some(stable_timestep(scheme, &mass_matrix, &kp.select_rows(&free), &kd.select_rows(&free), &damping))
 }
 
-/// Returns a warning if the drives, evaluated explicitly, are unstable at the MuJoCo time step `dt` \[s\].
+/// Returns a warning if drives that are evaluated at the start of a step (MuJoCo's actuators and explicit models) are
+/// unstable at the MuJoCo time step `dt` \[s\], at the start positions. In `plans`, only such drives may have gains.
+/// `None` also if the dynamics cannot be computed.
 pub fn warn_if_unstable(
     description: &RobotDescription,
     plans: &[JointPlan],

@@ -163,7 +163,8 @@ impl DriveState {
         self.overrides.set_if_changed(drive, drawn);
     }
 
-    /// Override values of stiffness, damping (in torque units) and effort limit of a drive; `None` without override.
+    /// Overrides of stiffness, damping and effort limit of a drive; `None` without an override. Stiffness and damping
+    /// are in torque units, not in the unit of the drive type.
     pub(crate) fn override_values(&self, drive: usize) -> [Option<f64>; 3] {
         GainKind::ALL.map(|kind| self.gain_override(drive, kind).map(|drawn| drawn.value))
     }

@@ -29,7 +29,7 @@ impl DriveSetting {
     }
 }
 
-/// Gains and limits of one drive.
+/// Gains in torque units, and limits, of one drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Proportional gain \[N m/rad or N/m\].

@@ -84,7 +84,7 @@ impl DriveTable {
         self.drives.iter().map(row).collect()
     }
 
-    /// Explicit model of a drive.
+    /// Explicit model of a drive; `None` if MuJoCo computes the drive, as a constraint row or an actuator.
     pub(crate) fn model_of(&self, drive: usize) -> Option<&ExplicitDrive> {
         match self.drives[drive].realization {
             Realization::Explicit { model } => Some(&self.models[model]),
@@ -383,8 +383,8 @@ impl DriveState {
         }
     }
 
-    /// Reads the effort of every drive \[N m or N\] after `mj_step2` and before `mj_step1`, and replaces the content of
-    /// `efforts`.
+    /// Replaces the content of `efforts` with the efforts of all drives \[N m or N\], in the order of the drives. Must
+    /// run after `mj_step2` and before the next `mj_step1`.
     pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {

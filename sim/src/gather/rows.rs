@@ -4,13 +4,14 @@ use crate::indexing::JointIndexing;
 use crate::simulation::Simulation;
 use ndarray::{Array2, Array3, Axis};
 
-/// Drivable joints of all robots and articulations, then the hinge and slide joints of attached MJCF files.
+/// Joints with one degree of freedom of all robots and articulations, then the hinge and slide joints of attached MJCF
+/// files.
 pub(super) fn all_joints(simulation: &Simulation) -> impl Iterator<Item = &JointIndexing> {
     let of_robots = simulation.robots.iter().flat_map(|robot| &robot.joints);
     of_robots.chain(simulation.mjcf_models.iter().flat_map(|part| &part.joints))
 }
 
-/// Fills the row of an environment with one number per joint.
+/// Fills row `env` with one number for each joint of [`all_joints`], if the array exists.
 pub(super) fn fill_joints(
     array: &mut Option<Array2<f64>>,
     env: usize,

@@ -11,7 +11,7 @@ use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Report on a robot in one position.
+/// Masses, links, joints, mass matrix and gravity torque of a robot at one joint configuration, with warnings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobotReport {
     /// Name of the robot in its merged URDF; `robot` for an MJCF file.

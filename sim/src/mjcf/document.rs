@@ -353,7 +353,8 @@ pub struct Light {
     pub diffuse: [f64; 3],
     /// Type of the light.
     pub kind: LightKindCfg,
-    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation.
+    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation c, l, q: the intensity at distance d is divided by c
+    /// + l d + q d².
     pub attenuation: [f64; 3],
     /// Radius of the light \[m\], `bulbradius` of MuJoCo 4.x. Omitted for MuJoCo 2.2.2 and for directional lights.
     pub radius: f64,

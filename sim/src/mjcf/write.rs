@@ -35,7 +35,8 @@ impl MjcfText {
     }
 }
 
-/// Writes the document as MJCF for the MuJoCo version `target`.
+/// Writes the document as MJCF text for the MuJoCo version `target`, with the location in the user's file that caused
+/// each line.
 pub fn write(mjcf: &Mjcf, target: SupportedVersion) -> MjcfText {
     let mut out = MjcfWriter {
         xml: String::new(),
@@ -242,7 +243,7 @@ impl MjcfWriter {
         self.close(section);
     }
 
-    /// Writes the lines of all parts into a section that is open.
+    /// Writes the lines that `lines` selects, of all embedded MJCF files, into the open section.
     fn part_lines(&mut self, mjcf: &Mjcf, lines: impl Fn(&PartLines) -> &Vec<String>) {
         let target = self.target;
         for part in &mjcf.parts {

@@ -24,36 +24,37 @@ pub struct RobotCfg {
     /// the only child body of the file's world, with everything below it.
     ///
     /// - **Links** are its bodies, then its named sites. If hinges or slides attach the root body to the world, the
-    ///   root link is the file's `world`. **Joints** are its hinges and slides. An element without a name is called by
-    ///   its kind and its index in MuJoCo's order: `joint3`.
+    ///   root link is the file's `world`. **Joints** are its hinges and slides. An element without a name gets its kind
+    ///   and its index in MuJoCo's order as its name: `joint3`.
     /// - **Drives** replace its actuators. For joints that [`drive`](Self::drive) does not configure, position and
     ///   velocity actuators of the file give stiffness and damping. Force ranges (and control ranges of motors) give
     ///   the largest effort, and joints without an actuator stay passive. In a file without any actuator all joints are
     ///   driven, as in a URDF. One number for all joints (`stiffness: 100.0.into()`) configures the passive joints too,
     ///   and drives them.
     /// - An actuator on a joint that **follows** another, or on a **tendon** over joints, becomes part of the drive of
-    ///   the followed joint. With J, the effort there per force of the actuator, gains are multiplied by J² and efforts
-    ///   by |J|. A tendon over joints that do not follow each other becomes one drive for each joint, with independent
-    ///   targets. Effort limits are symmetric, activations (filters, integrators, muscles) are dropped, and control
-    ///   ranges do not limit targets. [`diagnostics`](crate::SimulationManager::diagnostics) names each actuator that
-    ///   its drive does not fully reproduce.
+    ///   the followed joint. J is the effort on the followed joint per unit of actuator force: gains are multiplied by
+    ///   J², effort limits by |J|. A tendon over joints that do not follow each other becomes one drive for each joint,
+    ///   with independent targets. Effort limits are symmetric, activations (filters, integrators, muscles) are
+    ///   dropped, and control ranges do not limit targets. [`diagnostics`](crate::SimulationManager::diagnostics) names
+    ///   each actuator that its drive does not fully reproduce.
     /// - **Equalities** that couple two joints linearly are mimics. A joint with any other joint equality has no drive.
-    ///   It starts where that polynomial is for the initial position of the followed joint, and
+    ///   Its initial position is the value of the equality's polynomial at the initial position of the followed joint;
     ///   [`init_qpos`](Self::init_qpos) does not apply to it. Kinematics treat it as an independent joint, and
     ///   [`compute_ik`](crate::Robot::compute_ik) refuses to move it or the joint that it follows. A joint with several
     ///   equalities, or in a cycle of equalities, starts at its own `ref`.
     /// - **The base** is fixed or free according to [`fix_base`](Self::fix_base): the file's free joint is left out, or
     ///   a free joint is added.
-    /// - **Contacts**: geoms that collide in the file collide like those of all robots, whatever their bits. This
-    ///   includes geoms that collide only in pairs with geoms of the file's world; friction and softness of such pairs
-    ///   are dropped. Other pairs of geoms apply if [`self_collision`](Self::self_collision) is on. Bodies that the
-    ///   file excludes from collisions with its own world collide with the scene.
-    /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
-    ///   `solimpfriction` apply to the other joints.
+    /// - **Contacts**: geoms that collide in the file collide like the geoms of every robot; their `contype` and
+    ///   `conaffinity` are replaced. This includes geoms that collide only in pairs with geoms of the file's world;
+    ///   friction and softness of such pairs are dropped. Other pairs of geoms apply if
+    ///   [`self_collision`](Self::self_collision) is on. Bodies that the file excludes from collisions with its own
+    ///   world collide with the scene.
+    /// - The file's `solreffriction` and `solimpfriction` apply only to joints without an implicit drive; the dry
+    ///   friction of joints with implicit drives has the softness of the drives.
     /// - Named sites are links on fixed joints. The end of a control part
     ///   ([`TipFrame::of_part`](kinetoscope_robot::kinematics::TipFrame::of_part)) follows such a joint if there is
-    ///   exactly one. So a site that is added to the last body, for a touch sensor say, moves that end. Name the link
-    ///   ([`TipFrame::at`](kinetoscope_robot::kinematics::TipFrame::at)) where this matters.
+    ///   exactly one. A site that is added to the last body, for example for a touch sensor, therefore moves that end.
+    ///   Name the link ([`TipFrame::at`](kinetoscope_robot::kinematics::TipFrame::at)) where this matters.
     /// - Elements of the file's world (a floor, lights), global settings and keyframes are not part of the robot.
     ///   [`diagnostics`](crate::SimulationManager::diagnostics) names everything that is left out.
     ///

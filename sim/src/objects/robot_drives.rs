@@ -230,8 +230,8 @@ impl RobotMut<'_> {
         }
     }
 
-    /// Returns `(column, joint, drive)` of `joints` without the mimic joints. The gains of all these drives must be
-    /// changeable.
+    /// Returns `(column, joint, drive)` for each of `joints` that is not a mimic joint: position in `joints`, index of
+    /// the joint, index of its drive. The gains of all these drives must be changeable.
     pub(super) fn changeable_drives(
         &self,
         argument: &'static str,
@@ -250,7 +250,11 @@ impl RobotMut<'_> {
         }
     }
 
-    /// Returns `(column, joint, drive)` of `joints` without the mimic joints.
+    /// Returns `(column, joint, drive)` for each of `joints` that is not a mimic joint: position in `joints`, index of
+    /// the joint, index of its drive.
+    ///
+    /// # Errors
+    /// A joint without a drive.
     pub(super) fn drives_of_joints(
         &self,
         argument: &'static str,

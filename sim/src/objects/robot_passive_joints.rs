@@ -105,10 +105,10 @@ impl RobotMut<'_> {
         self.set_property("set_joint_damping", Property::JointDamping, values.into(), joint_ids, env_ids)
     }
 
-    /// Sets the rotor inertia of joints \[kg m² or kg\], also of joints that were added without one
-    /// ([`DriveCfg::armature`](crate::DriveCfg::armature)). It is a property with the rules of
-    /// [`set_friction`](Self::set_friction). Values that were derived from it when the robot was added stay: gains of
-    /// drive type `acceleration`, and warnings about instability.
+    /// Sets the armature (rotor inertia) of joints \[kg m² or kg\], also of joints that were added without one
+    /// ([`DriveCfg::armature`](crate::DriveCfg::armature)). Rows, columns, resets and snapshots are those of
+    /// [`set_friction`](Self::set_friction). Drive gains of type `acceleration` and warnings about instability, which
+    /// were computed from the armature when the robot was added, do not change.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, or a value that is negative or not finite. Then

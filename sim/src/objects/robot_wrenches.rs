@@ -112,11 +112,11 @@ impl RobotMut<'_> {
     }
 
     /// Switches gravity compensation of links on or off, for `link_ids` (`None` for all links) in `env_ids` (`None` for
-    /// all environments); off at first. The setting survives resets.
+    /// all environments); off by default. The setting survives resets.
     ///
-    /// The force `-m g` at its center of mass holds a compensated link: the drives do not carry its weight, while its
-    /// inertia stays. For a link that is fused with others, the setting applies to their whole body. Gravity still acts
-    /// on objects and on loads that the robot holds.
+    /// The force `-m g` at its center of mass holds a compensated link. Drives do not carry its weight; its inertia
+    /// stays. For a link that is fused with others, the setting applies to their whole body. Gravity still acts on
+    /// objects and on loads that the robot holds.
     ///
     /// # Errors
     /// An unknown or repeated link or environment; then nothing is changed.

@@ -44,7 +44,7 @@ impl<'a> Weld<'a> {
     }
 }
 
-/// Write access to a weld, to attach and release it.
+/// Write access to a weld: attaches and releases it in each environment.
 #[derive(Debug)]
 pub struct WeldMut<'a> {
     cfg: &'a Arc<WeldCfg>,
@@ -163,7 +163,7 @@ impl SimulationManager {
         Weld::new(&self.entities.welds[index].cfg, &self.simulation, index)
     }
 
-    /// Write access to a weld, to attach and release it.
+    /// Write access to a weld: attaches and releases it in each environment.
     ///
     /// # Panics
     /// The handle belongs to another manager.

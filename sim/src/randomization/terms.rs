@@ -129,7 +129,8 @@ struct ResolvedOp {
 }
 
 impl ResolvedRandomization {
-    /// Randomizes an environment. `random` creates the generator of a property and a name.
+    /// Samples all terms and writes them to the properties of an environment. `random` returns the generator of a
+    /// property and an element name; elements with the same name share one sample.
     pub(super) fn apply(&self, properties: &mut Properties, mut random: impl FnMut(Property, &str) -> KeyedRng) {
         let tables = std::sync::Arc::clone(&properties.tables);
         for (property, draws) in &self.0 {

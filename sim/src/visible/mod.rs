@@ -291,7 +291,7 @@ impl VisualScene {
         }
     }
 
-    /// Mask ids, and the elements that they identify.
+    /// One entry for each mask id: the id, and the element that it identifies.
     pub fn mask_ids(&self) -> &Arc<[MaskId]> {
         &self.ids
     }

@@ -160,7 +160,7 @@ impl OffscreenScene {
         &self.visual_scene
     }
 
-    /// Mask ids, and the elements that they identify.
+    /// One entry for each mask id: the id, and the element that it identifies.
     pub fn mask_ids(&self) -> &[MaskId] {
         self.visual_scene.mask_ids()
     }

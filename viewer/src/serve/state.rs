@@ -113,7 +113,8 @@ fn selection_json(picked: &Selection, snapshot: &Snapshot) -> Value {
     })
 }
 
-/// Finds a driven joint by the name of its robot and the name of the joint.
+/// Finds a joint with a target by the name of its robot and the name of the joint. The error is a text for an unknown
+/// robot or joint, with the known names, or for a joint that accepts no target.
 pub(super) fn find_joint<'a>(names: &'a Names, robot: &str, joint: &str) -> Result<&'a JointEntry, String> {
     let of_robot: Vec<&JointEntry> = names.joints.iter().filter(|name| split_name(name).0 == robot).collect();
     if of_robot.is_empty() {

@@ -6,8 +6,8 @@ use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use ndarray::Axis;
 
-/// Occlusion of a segment in an image. Both counts refer to the same instants: with a shutter of nonzero span, each row
-/// of pixels has its own instant, as in the mask.
+/// Numbers of pixels of a segment with and without other objects. Both are counted at the same instants: with a shutter
+/// of nonzero span, each row of pixels has its own instant, as in the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Occlusion {
     /// Segment id, see [`Segmentation::segments`].

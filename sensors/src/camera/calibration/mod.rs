@@ -350,7 +350,8 @@ impl Reader<'_> {
             .ok_or_else(|| self.field_error(node.line, field, format!("has {text:?}; it must be a finite number")))
     }
 
-    /// Reads `rows`, `cols` and `data` of a matrix.
+    /// Returns `[rows, cols]` and the `data` of a matrix, row by row; an error if the number of values differs from
+    /// rows x cols. `field` names the matrix in errors.
     fn numbers(&self, field: &str, node: &Node) -> Result<([usize; 2], Vec<f64>), CalibrationError> {
         let Value::Table(parts) = &node.value else {
             let problem = format!("is {}, not a table of rows, cols and data", node.value.describe());
@@ -461,7 +462,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Rejects a region that is only a part of the calibrated image.
+    /// Rejects a region that is only a part of the calibrated image. A width or height of 0 reaches to the edge of the
+    /// image. A `roi` that is not a table is an error too.
     fn reject_partial_roi(&self, roi: &Node, [width, height]: [usize; 2]) -> Result<(), CalibrationError> {
         let Value::Table(parts) = &roi.value else {
             let problem =

@@ -34,7 +34,7 @@ macro_rules! imperfections {
         $(mod $light; pub use $light::$Light;)*
         $(mod $depth; pub use $depth::$Depth;)*
 
-        /// Imperfections of a camera; `None`, the default, for those that are absent.
+        /// Imperfections of a camera. A field that is `None`, the default, has no effect.
         ///
         /// The random numbers depend only on the seed of the simulation, the environment, the camera name, the image
         /// index and the pixel.

@@ -196,7 +196,8 @@ impl Camera {
         self.motion.shutter_seconds().is_some()
     }
 
-    /// Calls `act` with the render request of the shown frame of a row, for results other than the camera's images.
+    /// Calls `act` with the renderer, and with the render request and the frame sample of the shown frame of a row.
+    /// Bounding boxes and isolated entities are rendered this way.
     pub(in crate::camera) fn with_render_request<T>(
         &self,
         row: usize,
