@@ -102,7 +102,7 @@ impl WarningCounts {
     }
 
     /// Returns a warning that indicates divergence: a bad acceleration, position or velocity, the first one in this
-    /// order.
+    /// order; `None` without any of them.
     ///
     /// [`step2`](Data::step2) and then [`step1`](Data::step1) check them in this order, so the first one is the cause.
     pub fn diverged(&self) -> Option<Warning> {
@@ -148,7 +148,7 @@ impl Data {
         Ok(Self { raw, model: model.clone(), prefetch_addresses })
     }
 
-    /// The model of this data.
+    /// Model of this data: the one that it was created for, or the last one of [`set_model`](Self::set_model).
     pub fn model(&self) -> &Model {
         &self.model
     }

@@ -2,7 +2,7 @@
 
 use mujoco_sys as mj;
 
-/// Keyword of a code in a list of codes and keywords.
+/// Keyword of a code in a list of codes and keywords; `None` if the list does not contain the code.
 fn keyword(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
     list.iter().find(|(known, _)| *known as i32 == code).map(|(_, word)| *word)
 }
@@ -215,7 +215,7 @@ pub fn sensor(code: i32) -> Option<SensorKeyword> {
     })
 }
 
-/// MJCF keyword of a sensor type that [`sensor`] does not support.
+/// MJCF keyword of a sensor type that [`sensor`] does not support; `None` for other codes.
 pub fn unsupported_sensor(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjSENS_USER, "user"),

@@ -19,7 +19,8 @@ pub(super) fn load() {
     }
 }
 
-/// Folder of the MuJoCo library that this process has loaded, from the kernel's list.
+/// Folder of the MuJoCo library that this process has loaded, from the kernel's list; `None` if the library is not in
+/// the list.
 #[cfg(mj4)]
 fn library_folder() -> Option<std::path::PathBuf> {
     let maps = std::fs::read_to_string("/proc/self/maps").ok()?;

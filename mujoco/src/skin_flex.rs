@@ -198,14 +198,14 @@ impl Model {
 }
 
 impl super::Data {
-    /// Vertex positions of all flexes \[m\], shape (nflexvert, 3); empty on 2.2.2.
+    /// Vertex positions of all flexes in the world \[m\], shape (nflexvert, 3); empty on 2.2.2.
     #[cfg(mj4)]
     pub fn flex_vertices(&self) -> &[[f64; 3]] {
         // SAFETY: model and data are alive as long as `self`; only `&mut self` writes.
         as_rows(unsafe { mujoco_sys::fields::data::flexvert_xpos(self.model().raw(), self.raw()) })
     }
 
-    /// Vertex positions of all flexes \[m\], shape (nflexvert, 3); empty on 2.2.2.
+    /// Vertex positions of all flexes in the world \[m\], shape (nflexvert, 3); empty on 2.2.2.
     #[cfg(not(mj4))]
     pub fn flex_vertices(&self) -> &[[f64; 3]] {
         &[]

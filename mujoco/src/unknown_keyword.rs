@@ -10,7 +10,7 @@ pub(super) struct UnknownKeyword<'m> {
     pub(super) element: &'m str,
     /// Attribute of the element, or the value of an attribute; `None` if the element itself is unknown.
     pub(super) keyword: Option<&'m str>,
-    /// True if `keyword` is a value.
+    /// True if `keyword` is the value of an attribute, false if it is the name of an attribute.
     is_value: bool,
 }
 
@@ -93,7 +93,7 @@ const INTRODUCED_IN: &[(&str, &str, &str)] = &[
 ];
 
 impl<'m> UnknownKeyword<'m> {
-    /// Parses the unknown name in a message of MuJoCo's XML reader.
+    /// Parses the unknown name in a message of MuJoCo's XML reader; `None` for a message about something else.
     pub(super) fn from_message(message: &'m str) -> Option<Self> {
         let quoted = |text: &'m str| text.split('\'').nth(1);
         let element = quoted(&message[message.find("Element '")?..])?;
@@ -116,7 +116,7 @@ impl<'m> UnknownKeyword<'m> {
         INTRODUCED_IN.iter().find(is_it).map(|(.., since)| *since)
     }
 
-    /// First position of this name in a file and the files that it includes.
+    /// First position of this name in a file and the files that it includes; `None` if no readable file contains it.
     pub(super) fn find_in(&self, file: &Path) -> Option<SourceLocation> {
         self.search(file, file.parent().unwrap_or(Path::new("")), &mut Vec::new())
     }

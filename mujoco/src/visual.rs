@@ -110,7 +110,8 @@ pub struct LightValues {
     pub active: bool,
     /// True if the light casts shadows.
     pub cast_shadow: bool,
-    /// Constant, linear and quadratic attenuation.
+    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation c, l, q: the intensity at distance d is divided by c
+    /// + l d + q d².
     pub attenuation: [f32; 3],
     /// Half angle of a spot's cone \[deg\].
     pub cutoff_deg: f32,
@@ -212,7 +213,7 @@ impl Model {
         [global.fovy, global.azimuth, global.elevation].map(f64::from)
     }
 
-    /// The headlight.
+    /// State and colors of the headlight, a light at the position of every camera.
     pub fn headlight(&self) -> HeadlightValues {
         let light = &self.header().vis.headlight;
         // 4.x has 2 for "auto". MuJoCo's OpenGL renderer treats it as on, also in models with lights.

@@ -33,7 +33,7 @@ pub enum Intrinsics {
     /// sensor: cx = W / 2 + fx horizontal_offset / f, cy = H / 2 + fy vertical_offset / f. (Isaac leaves out the
     /// division by f, which is the same only for f = 1.)
     Aperture {
-        /// Focal length f.
+        /// Focal length f, in the same unit as the apertures.
         focal_length: f64,
         /// Width of the sensor.
         horizontal_aperture: f64,

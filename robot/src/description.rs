@@ -342,12 +342,12 @@ impl RobotDescription {
         &self.links[..named]
     }
 
-    /// Finds the link called `name` among the [`named_links`](Self::named_links).
+    /// Finds the link called `name` among the [`named_links`](Self::named_links); `None` if there is no such link.
     pub fn link_id(&self, name: &str) -> Option<LinkId> {
         self.named_links().iter().position(|l| l.name == name).map(LinkId)
     }
 
-    /// Finds the joint called `name`, fixed joints included.
+    /// Finds the joint called `name`, fixed joints included; `None` if there is no such joint.
     pub fn joint_id(&self, name: &str) -> Option<JointId> {
         self.joints.iter().position(|j| j.name == name).map(JointId)
     }

@@ -18,7 +18,7 @@ impl MeshKey {
         Self { path: path.to_path_buf(), scale: [scale.x.to_bits(), scale.y.to_bits(), scale.z.to_bits()] }
     }
 
-    /// Scale factor per axis.
+    /// Scale factors along x, y and z of the mesh file.
     pub fn scale(&self) -> [f64; 3] {
         self.scale.map(f64::from_bits)
     }

@@ -20,7 +20,7 @@ pub struct PosedScene<'a> {
 /// View direction and image that the scene must fit.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraFit {
-    /// Viewing direction of the camera, of any length; not vertical.
+    /// Viewing direction of the camera in world axes, of any length; not vertical.
     pub forward: [f64; 3],
     /// Vertical field of view \[rad\].
     pub fovy: f64,
@@ -30,7 +30,7 @@ pub struct CameraFit {
     pub fill: f64,
 }
 
-/// A camera placement.
+/// A camera placement, in the frame of the fitted scenes with their offsets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedView {
     /// Position of the camera \[m\].

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 pub struct Material {
     /// Color and opacity in 0..=1. The color is a display color (sRGB) and multiplies the texture.
     pub rgba: [f32; 4],
-    /// Texture on the surface.
+    /// Texture on the surface; `None` for a uniform color.
     pub texture: Option<Arc<Texture>>,
     /// Repetitions of a 2D texture over the shape, or over 2 m with `tex_uniform` and on infinite planes, as in
     /// MuJoCo's renderer. Unused for meshes with texture coordinates; 0 and negative numbers act as 1.

@@ -229,6 +229,7 @@ pub fn closest_names<'c>(name: &str, candidates: impl IntoIterator<Item = &'c st
 }
 
 /// The candidate that `name` may be a misspelling of: at most a third of its characters, and at most three, differ.
+/// `None` without such a candidate.
 pub fn similar_name<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     let nearest = candidates.into_iter().map(|c| (edit_distance(name, c), c)).min_by_key(|&(distance, _)| distance);
     let most = 2 * (name.chars().count() / 3).min(3) + 1;

@@ -27,13 +27,14 @@ pub fn from_xyz_rpy(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
     Pose::from_parts(Translation3::from(Vector3::from(xyz)), UnitQuaternion::from_euler_angles(rpy[0], rpy[1], rpy[2]))
 }
 
-/// Row `[x, y, z, qw, qx, qy, qz]` of a pose.
+/// Row `[x, y, z, qw, qx, qy, qz]` of a pose; x, y, z in meters.
 pub fn to_row(pose: &Pose) -> [f64; 7] {
     let (t, q) = (pose.translation.vector, pose.rotation);
     [t.x, t.y, t.z, q.w, q.i, q.j, q.k]
 }
 
-/// Pose from a row `[x, y, z, qw, qx, qy, qz]`. The quaternion is normalized; a zero quaternion gives NaN.
+/// Pose from a row `[x, y, z, qw, qx, qy, qz]`; x, y, z in meters. The quaternion is normalized; a zero quaternion
+/// gives NaN.
 pub fn from_row(row: &[f64; 7]) -> Pose {
     Pose::from_parts(Translation3::new(row[0], row[1], row[2]), from_wxyz([row[3], row[4], row[5], row[6]]))
 }

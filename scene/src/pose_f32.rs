@@ -50,24 +50,24 @@ impl PoseF32 {
         Self { translation, ..Self::IDENTITY }
     }
 
-    /// Rotates a direction.
+    /// Rotates a direction from the source frame into the target frame: `rotation * v`.
     pub fn rotate(&self, v: [f32; 3]) -> [f32; 3] {
         self.rotation.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
     }
 
-    /// Rotates a direction by the inverse.
+    /// Rotates a direction from the target frame into the source frame.
     pub fn rotate_inverse(&self, v: [f32; 3]) -> [f32; 3] {
         let r = &self.rotation;
         [0, 1, 2].map(|j| r[0][j] * v[0] + r[1][j] * v[1] + r[2][j] * v[2])
     }
 
-    /// Maps a point.
+    /// Maps a point \[m\] from the source frame into the target frame: `rotation * p + translation`.
     pub fn apply(&self, p: [f32; 3]) -> [f32; 3] {
         let (q, t) = (self.rotate(p), self.translation);
         [q[0] + t[0], q[1] + t[1], q[2] + t[2]]
     }
 
-    /// Maps a point by the inverse.
+    /// Maps a point \[m\] from the target frame into the source frame.
     pub fn apply_inverse(&self, p: [f32; 3]) -> [f32; 3] {
         let t = self.translation;
         self.rotate_inverse([p[0] - t[0], p[1] - t[1], p[2] - t[2]])

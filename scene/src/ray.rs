@@ -3,7 +3,7 @@
 use crate::PoseF64;
 use crate::vector::add_scaled;
 
-/// A half-line with a unit direction.
+/// A half-line with a unit direction. Origin and direction are in the same frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Origin \[m\].
@@ -13,7 +13,7 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// Point at a distance \[m\] along the ray.
+    /// Point at a distance along the ray, in the frame of the ray \[m\].
     #[inline]
     pub fn at(&self, distance: f64) -> [f64; 3] {
         add_scaled(self.origin, distance, self.direction)

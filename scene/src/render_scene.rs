@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// An instance of a shape, with a material and an identity.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// Shape.
+    /// Geometry of the instance, in the frame of the instance.
     pub shape: Shape,
     /// Material. An instance with alpha 0 is not drawn, but ray casters hit it if `visible` is true.
     pub material: Material,
@@ -51,7 +51,7 @@ impl Instance {
         }
     }
 
-    /// Returns the instance with a name.
+    /// Returns the instance with the name `name` of its owner, by which ray casters select targets.
     #[must_use]
     pub fn with_name(self, name: &str) -> Self {
         Self { name: Arc::from(name), ..self }
@@ -113,7 +113,7 @@ pub struct RenderScene {
     linear_colors: Vec<[f32; 3]>,
     texture_scales: Vec<[f32; 3]>,
     texture_offsets: Vec<[f32; 2]>,
-    /// Lights.
+    /// Lights of the scene, used if the renderer is given no others.
     pub lights: Vec<Light>,
     /// Headlight of every camera.
     pub headlight: Headlight,
@@ -123,12 +123,12 @@ pub struct RenderScene {
     pub lighting_space: LightingSpace,
     /// Background.
     pub sky: Sky,
-    /// Background image instead of `sky`: a [cube](TextureKind::Cube) around the camera. Its six squares face +x, -x,
-    /// +z, -z, -y, +y of the world, because the y axis of MuJoCo's skyboxes points up.
+    /// Background image instead of `sky`, `None` for `sky`: a [cube](TextureKind::Cube) around the camera. Its six
+    /// squares face +x, -x, +z, -z, -y, +y of the world, because the y axis of MuJoCo's skyboxes points up.
     pub skybox: Option<Arc<Texture>>,
     /// Haze over distant surfaces; `None` for clear air.
     pub haze: Option<Haze>,
-    /// Haze at the end of an infinite ground.
+    /// Haze at the end of an infinite ground; `None` for a ground without it.
     pub horizon: Option<HorizonHaze>,
 }
 

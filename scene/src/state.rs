@@ -184,7 +184,7 @@ pub struct VisibleState {
 pub struct Contacts {
     /// Offsets in the list, shape \[num_envs + 1\]: environment `e` owns the contacts `first[e]..first[e + 1]`.
     pub first: Vec<usize>,
-    /// The contacts.
+    /// The contacts, ordered by environment.
     pub list: Vec<Contact>,
 }
 

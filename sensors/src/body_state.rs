@@ -6,7 +6,7 @@ use kinetoscope_scene::pose::from_row;
 use nalgebra::Vector3;
 use ndarray::Array3;
 
-/// Returns the pose of a body.
+/// Returns the pose of body `body` in environment `env`, in the frame of the environment.
 pub(crate) fn pose(poses: &Array3<f64>, env: usize, body: usize) -> Pose {
     from_row(&std::array::from_fn(|k| poses[(env, body, k)]))
 }

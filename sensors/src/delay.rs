@@ -63,7 +63,7 @@ impl<T: Clone> DelayLine<T> {
         Some((value, *captured > self.last_refresh[env]))
     }
 
-    /// Returns the step at which the next value of environment `env` is delivered.
+    /// Returns the step of environment `env` at which its next value is delivered; `None` if no value is in flight.
     fn next_delivery(&self, env: usize) -> Option<u64> {
         let queue = self.queues[env];
         (queue.len > 0).then(|| self.slots[env * self.capacity + queue.first].0 + self.steps)

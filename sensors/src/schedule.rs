@@ -75,7 +75,7 @@ impl Phases {
     /// environment.
     pub const QUARANTINED: u64 = u64::MAX;
 
-    /// The schedule.
+    /// Schedule that the environments are counted by.
     pub fn schedule(&self) -> Schedule {
         self.schedule
     }

@@ -15,9 +15,10 @@ use kinetoscope_scene::StateFields;
 #[derive(Debug)]
 pub struct SensorSlot {
     requires: StateFields,
-    /// Step counters of a lazy sensor.
+    /// Step counters of a lazy sensor; `None` for an eager sensor.
     phases: Option<Phases>,
-    /// Stored state of a lazy sensor: each environment as of its last due step, reset or write.
+    /// Stored state of a lazy sensor: each environment as of its last due step, reset or write. `None` for an eager
+    /// sensor, or before the first state.
     stored_state: Option<SceneState>,
     /// Environments that are due. Only used within an update, kept for its memory.
     due: Vec<bool>,
@@ -182,7 +183,7 @@ impl SensorSlot {
         }
     }
 
-    /// Returns the sensor after measuring the stored state.
+    /// Returns the sensor and its error after measuring the stored state; `None` if a measurement panicked.
     fn up_to_date(&mut self) -> Option<&mut SensorAndError> {
         // An error is returned by the next read.
         let _ = self.sensor();

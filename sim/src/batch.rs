@@ -28,7 +28,7 @@ struct LockedChunk<'a> {
     /// Index of the first environment of the chunk.
     first: usize,
     chunk: MutexGuard<'a, Chunk>,
-    /// The chunk that the thread will probably take next, for prefetching.
+    /// The chunk that the thread will probably take next, for prefetching; `None` for the last chunk.
     next: Option<&'a Mutex<Chunk>>,
     /// True if environments leave the cache between their steps.
     exceeds_cache: bool,

@@ -7,7 +7,7 @@ use std::fmt;
 /// reset. `Display` gives `step 12: bad acceleration`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DivergedEnv {
-    /// The environment.
+    /// Environment that diverged.
     pub env: EnvId,
     /// Number of completed MuJoCo steps since the last reset.
     pub step: u64,

@@ -19,7 +19,7 @@ pub struct SimulationManagerCfg {
     pub physics_dt: f64,
     /// MuJoCo steps per `physics_dt`.
     pub substeps: u32,
-    /// Gravity \[m/s²\].
+    /// Gravity in world axes \[m/s²\].
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub gravity: Vector3<f64>,
     /// Integrator of MuJoCo.
@@ -30,7 +30,7 @@ pub struct SimulationManagerCfg {
     pub impratio: f64,
     /// Largest number of solver iterations in a step.
     pub solver_iterations: u32,
-    /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three) of shapes that set none.
     pub friction: [f64; 3],
     /// Seed of random numbers. The physics uses no random numbers. Sensor noise and randomized properties use random
     /// streams keyed by this seed, the global index of the environment, and their purpose.

@@ -64,7 +64,7 @@ struct Target {
     /// True if rays can hit the target. Invisible targets keep their place: they may be visible in another environment.
     visible: bool,
     geometry: RayGeometry,
-    /// Center and radius of the bounding sphere \[m\]; `None` for an unbounded shape.
+    /// Center and radius of the bounding sphere in the frame of the instance \[m\]; `None` for an unbounded shape.
     sphere: Option<(V3, f64)>,
 }
 
@@ -83,7 +83,7 @@ struct PlacedTarget {
 #[derive(Clone, Debug, Default)]
 pub struct FixedTargets {
     placed: Vec<PlacedTarget>,
-    /// BVH over some of `placed`, and the indices of those; the others are tested one by one.
+    /// BVH over some of `placed`, and the indices of those; the others, all of them for `None`, are tested one by one.
     bvh: Option<(Bvh, Vec<u32>)>,
     unindexed: Vec<u32>,
 }

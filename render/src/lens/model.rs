@@ -55,11 +55,12 @@ pub trait LensModel: Copy + Default {
     /// Computes the domain; the numbers are valid.
     fn domain(&self) -> Domain;
 
-    /// Projects a direction of any length to a point of the normalized image; `None` outside of the domain.
+    /// Projects a direction of any length, in the optical frame (x right, y down, z forward), to a point of the
+    /// normalized image; `None` outside of the domain.
     fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]>;
 
-    /// Direction of the ray through a point of the normalized image: with z = 1 if all rays go
-    /// [forward](Self::FORWARD), else of length 1. `None` outside of the domain.
+    /// Direction, in the optical frame (x right, y down, z forward), of the ray through a point of the normalized
+    /// image: with z = 1 if all rays go [forward](Self::FORWARD), else of length 1. `None` outside of the domain.
     fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]>;
 }
 

@@ -160,7 +160,8 @@ impl OpenCv {
             && self.fold_angle(&domain.poles, [x / r, y / r], angle).is_none()
     }
 
-    /// Finds the point that is distorted to `target` by Newton's method from a nearby start.
+    /// Finds the point that is distorted to `target` by Newton's method from a nearby start; `None` if the method
+    /// leaves the regular range or does not converge.
     fn undistort_from(&self, poles: &Poles, target: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
         let mut p = start;
         let mut now = self.distort(poles, p);
@@ -200,9 +201,9 @@ impl OpenCv {
         None
     }
 
-    /// Finds the point within the lens that is distorted to `target`. Newton's method starts at the target. If it
-    /// fails, or finds a point beyond a fold (another direction for the same pixel), continuation from the optical axis
-    /// is used.
+    /// Finds the point within the lens that is distorted to `target`; `None` without such a point. Newton's method
+    /// starts at the target. If it fails, or finds a point beyond a fold (another direction for the same pixel),
+    /// continuation from the optical axis is used.
     fn undistort(&self, domain: &Domain, target: [f64; 2]) -> Option<[f64; 2]> {
         let from = |target: [f64; 2], start: [f64; 2]| {
             self.undistort_from(&domain.poles, target, start).filter(|point| self.contains(domain, *point))

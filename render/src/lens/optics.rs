@@ -72,8 +72,8 @@ impl Optics {
         Some([x * by, y * by, z * by])
     }
 
-    /// As [`unproject`](Self::unproject), but scaled to z = 1 if all rays go [forward](Lens::is_forward): near and far
-    /// are multiples of this vector.
+    /// Same as [`unproject`](Self::unproject), but scaled to z = 1 if all rays go [forward](Lens::is_forward): near and
+    /// far are multiples of this vector.
     pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])
@@ -126,7 +126,8 @@ impl Optics {
         Some(slope(0)?.cross(&slope(1)?).norm())
     }
 
-    /// Unit direction of the ray through a point of the normalized image.
+    /// Unit direction in the optical frame of the ray through a point of the normalized image; `None` outside of the
+    /// domain.
     fn unit(&self, point: [f64; 2]) -> Option<Vector3<f64>> {
         Some(Vector3::from(self.lens.unproject(&self.domain, point)?).normalize())
     }

@@ -32,7 +32,7 @@ pub(super) fn sign_changes(coefficients: &[f64], from: f64, to: f64) -> Vec<f64>
     ends.windows(2).filter_map(change).collect()
 }
 
-/// The first sign change from 0 to `limit` of a polynomial that is positive at 0.
+/// The first sign change from 0 to `limit` of a polynomial that is positive at 0; `None` without a sign change.
 pub(super) fn first_sign_change(coefficients: &[f64], limit: f64) -> Option<f64> {
     sign_changes(coefficients, 0.0, limit).first().copied()
 }

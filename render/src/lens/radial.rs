@@ -1,6 +1,7 @@
 //! Rotationally symmetric lenses, which map angles to radii.
 
-/// Projects a direction, where `radius` maps an angle \[rad\] up to `most` to the image radius.
+/// Projects a direction in the optical frame to a point of the normalized image. `radius` maps an angle \[rad\] to the
+/// image radius. `None` for angles beyond `most`, and for the direction straight back.
 pub(super) fn project([x, y, z]: [f64; 3], most: f64, radius: impl Fn(f64) -> f64) -> Option<[f64; 2]> {
     let across = x.hypot(y);
     let angle = across.atan2(z);

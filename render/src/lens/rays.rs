@@ -186,14 +186,15 @@ impl LensRays {
         f64::from(all[y * self.size[0] + x])
     }
 
-    /// Rays through the centers of 8 x 2 pixels, the first of which is given.
+    /// Directions, in the optical frame, of the rays through the centers of 8 x 2 pixels, the first of which is at
+    /// `at`.
     #[inline(always)]
     pub(crate) fn at_pixels<S: Simd>(&self, s: S, at: [usize; 2]) -> V3<S> {
         let group = &self.directions[self.group_index(0, at).0..];
         V3 { x: load(s, group), y: load(s, &group[LANES..]), z: load(s, &group[2 * LANES..]) }
     }
 
-    /// Rays of sixteen points, each of which is a sample of a pixel.
+    /// Directions, in the optical frame, of the rays through sixteen points, each of which is a sample of a pixel.
     #[inline(always)]
     pub(crate) fn at_points<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
         let (u, v): ([f32; LANES], [f32; LANES]) = (u.array(), v.array());

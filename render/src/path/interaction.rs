@@ -9,7 +9,7 @@ use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{V3, add_scaled, dot, normalize, scale, sub};
 use kinetoscope_scene::{Instance, RenderScene, TextureKind};
 
-/// A point of a surface, with its material.
+/// A point of a surface, with its material. Positions are in the world \[m\], directions in world axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceInteraction {
     pub(super) position: V3,
@@ -29,7 +29,8 @@ pub(super) struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
-    /// The point of a hit. `footprint` is the width of the pixel at the surface, if seen straight on \[m\].
+    /// Creates the point of a hit. `footprint` is the width of the pixel at the surface, if seen straight on \[m\].
+    /// `None` if the scene does not contain the instance of the hit.
     pub(super) fn new(scene: &RenderScene, ray: &Ray, hit: &Hit, footprint: f64) -> Option<Self> {
         let index = hit.instance as usize;
         let (instance, pose) = (scene.instances().get(index)?, &hit.world_from_instance);

@@ -49,7 +49,7 @@ impl SurfacePoints {
         self.normals.map(|axis| f64::from(axis[k]))
     }
 
-    /// A point slightly above the surface.
+    /// Origin of a ray: the point, moved slightly above the surface, in the world frame \[m\].
     pub(super) fn offset_origin(&self, k: usize) -> [f64; 3] {
         let at = self.positions.map(|axis| axis[k]);
         let far = RAY_OFFSET * (self.depths[k] + at.iter().map(|x| x.abs()).sum::<f32>());

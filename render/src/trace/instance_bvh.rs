@@ -63,7 +63,7 @@ impl InstanceBvh {
         self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
     }
 
-    /// Bounding box of all instances, after building; `None` without instances.
+    /// Bounding box of all instances in the world \[m\], after building; `None` without instances.
     pub(super) fn bounds(&self) -> Option<[V3; 2]> {
         self.nodes.first().map(|node| node.bounds)
     }

@@ -110,7 +110,8 @@ impl InstanceGeometry {
         }
     }
 
-    /// Bounding box: smallest and largest coordinates; `None` for an unbounded shape.
+    /// Bounding box in the frame of the instance: smallest and largest coordinates \[m\]; `None` for an unbounded
+    /// shape.
     fn bounds(&self) -> Option<[V3; 2]> {
         match self {
             Self::Mesh(_, tree) => Some(tree.bounds()),
@@ -120,7 +121,7 @@ impl InstanceGeometry {
 }
 
 impl TracedInstance {
-    /// Pose at a time.
+    /// Pose in the world at a time from 0 to [`END_TIME`](motion::END_TIME).
     #[inline(always)]
     fn at(&self, time: f64) -> PoseF64 {
         self.motion.as_ref().map_or(self.world_from_instance, |motion| motion.at(time))
@@ -179,19 +180,22 @@ impl RayTracer {
         bvh.build();
     }
 
-    /// Bounding box of all instances but the unbounded `instance`; `None` if another instance is unbounded.
+    /// Bounding box in the world \[m\] of all instances but the unbounded `instance`; `None` if another instance is
+    /// unbounded.
     pub(crate) fn bounds_without(&self, instance: u32) -> Option<[V3; 2]> {
         let alone = self.unbounded.iter().all(|&thing| self.instances[thing as usize].instance == instance);
         alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
     }
 
-    /// Pose of an instance at a time from 0 to [`END_TIME`](motion::END_TIME); `None` for hidden instances.
+    /// Pose of an instance in the world at a time from 0 to [`END_TIME`](motion::END_TIME); `None` for hidden
+    /// instances.
     pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
         let thing = self.instances.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
         Some(self.instances[thing].at(time))
     }
 
-    /// Finds the nearest surface at a distance from 0 to `limit` \[m\], at a time. One copy per instruction set.
+    /// Finds the nearest surface at a distance from 0 to `limit` \[m\], at a time; `None` without one. One copy per
+    /// instruction set.
     #[inline(never)]
     pub(crate) fn closest_hit<S: Simd>(
         &self,

@@ -54,7 +54,7 @@ impl Motion {
         Some(Self { to: b, origins: [a.translation, b.translation], rotation: turn })
     }
 
-    /// Pose at a time from 0 to [`END_TIME`].
+    /// Pose in the world at a time from 0 to [`END_TIME`].
     pub(crate) fn at(&self, time: f64) -> PoseF64 {
         let [from, to] = self.origins;
         let translation = add_scaled(from, time, sub(to, from));

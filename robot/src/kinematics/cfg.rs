@@ -127,7 +127,8 @@ pub struct IkCfg {
     pub num_seeds: u32,
     /// Seed of the random starts. The same target and initial positions give bit-identical results in any batch.
     pub seed: u64,
-    /// Preferred posture of joints that the target leaves free, approached after the target is reached.
+    /// Preferred posture of joints that the target leaves free, approached after the target is reached. `None` keeps
+    /// them where the solver finds them.
     pub posture: Option<NullSpacePosture>,
 }
 

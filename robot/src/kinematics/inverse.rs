@@ -86,7 +86,7 @@ impl IkSolver {
         })
     }
 
-    /// Chain of the solver.
+    /// Chain that the solver moves: its variables, base and tip.
     pub fn chain(&self) -> &Chain {
         &self.chain
     }

@@ -10,7 +10,7 @@ use nalgebra::{Matrix6, Vector6};
 pub(super) struct Problem<'p> {
     pub(super) chain: &'p Chain,
     pub(super) limits: &'p [[f64; 2]],
-    /// The target in the base of the chain.
+    /// Target pose of the tip in the base frame of the chain.
     pub(super) target: Pose,
     pub(super) task: IkTask,
     /// Radians that count as much as one meter.

@@ -29,6 +29,7 @@ pub struct UrdfCfg {
     pub packages: BTreeMap<String, PathBuf>,
     /// Folder to search for packages, meshes and textures that are not found from the URDF, like Isaac Gym's
     /// `asset_root`. A relative path starts at the working directory or, in a scene file, at the folder of that file.
+    /// `None`, the default, adds no folder.
     pub asset_root: Option<PathBuf>,
     /// Handling of deviations from URDF whose meaning is clear.
     pub strictness: Strictness,

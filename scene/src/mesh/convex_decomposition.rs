@@ -63,9 +63,9 @@ struct Piece {
     hull: TriMesh,
     /// Largest distance between the hull and the surface \[m\].
     depth: f64,
-    /// Position of the largest distance.
+    /// Position of the largest distance \[m\].
     at: V3,
-    /// Normal of the surface or of the hull at that position.
+    /// Unit normal of the surface or of the hull at that position.
     normal: V3,
 }
 

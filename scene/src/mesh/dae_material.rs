@@ -83,7 +83,7 @@ impl<'a, 'i> Dae<'a, 'i> {
     }
 
     /// Finds the color of a `<diffuse>`: its `<color>`, or the `<float4>` or `<float3>` of the effect parameter that
-    /// its `<param ref>` names.
+    /// its `<param ref>` names; `None` without either.
     fn color(&self, effect: Node<'a, 'i>, diffuse: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
         child(diffuse, "color").or_else(|| {
             let name = child(diffuse, "param")?.attribute("ref")?;
@@ -93,7 +93,7 @@ impl<'a, 'i> Dae<'a, 'i> {
     }
 
     /// Image file of a texture. The texture names a sampler, which names a surface, which names an image; or the
-    /// texture names the image directly.
+    /// texture names the image directly. `None` if a name is missing or unknown.
     fn image(&self, effect: Node<'a, 'i>, texture: Node<'a, 'i>) -> Option<std::path::PathBuf> {
         let name = texture.attribute("texture")?;
         let mut image = name;
@@ -118,7 +118,7 @@ fn parameter<'a, 'i>(effect: Node<'a, 'i>, sid: &str) -> Option<Node<'a, 'i>> {
     effect.descendants().find(|n| n.tag_name().name() == "newparam" && n.attribute("sid") == Some(sid))
 }
 
-/// Element with the base color: `<diffuse>` of the shading model, or `<emission>` of a constant one.
+/// Element with the base color: `<diffuse>` of the shading model, or `<emission>` of a constant one; `None` without it.
 fn diffuse<'a, 'i>(effect: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
     let profile = child(effect, "profile_COMMON")?;
     let technique = child(profile, "technique")?;

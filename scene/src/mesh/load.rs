@@ -9,7 +9,8 @@ use super::{MeshError, MeshOptions, TriMesh, dae, glb, obj, stl};
 /// All formats.
 const FORMATS: [&Format; 5] = [&stl::FORMAT, &obj::FORMAT, &dae::FORMAT, &glb::GLB, &glb::GLTF];
 
-/// Format of a file: by content that proves it, then by extension, then by content that suggests it.
+/// Format of a file: by content that proves it, then by extension, then by content that suggests it; `None` for an
+/// unknown format.
 pub(super) fn format_of(path: &Path, bytes: &[u8]) -> Option<&'static Format> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let certain = FORMATS.into_iter().find(|format| (format.is_certain)(bytes));

@@ -73,7 +73,7 @@ impl TriMesh {
         Self { positions, triangles, submeshes, ..Self::default() }
     }
 
-    /// Bounding box: smallest and largest coordinates \[m\]; `None` without vertices.
+    /// Bounding box in the frame of the mesh: smallest and largest coordinates \[m\]; `None` without vertices.
     pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
         let first = *self.positions.first()?;
         Some(self.positions.iter().fold((first, first), |(lo, hi), p| {

@@ -35,7 +35,7 @@ pub trait ClosedForm {
     /// Sizes \[m\] that must be positive and finite.
     fn sizes(&self) -> Vec<f32>;
 
-    /// Smallest and largest coordinates \[m\]; infinite for an infinite shape.
+    /// Smallest and largest coordinates in the frame of the shape \[m\]; infinite for an infinite shape.
     fn bounds(&self) -> [V3; 2];
 
     /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.

@@ -30,7 +30,8 @@ impl Interval {
         Self { enter: self.enter.min(other.enter), leave: self.leave.max(other.leave) }
     }
 
-    /// First end at a distance from 0 to `limit`: the entry, or the exit of a ray that begins inside.
+    /// First end at a distance from 0 to `limit`: the entry, or the exit of a ray that begins inside; `None` if neither
+    /// is in this range.
     #[inline(always)]
     pub(super) fn first(self, limit: f64) -> Option<f64> {
         let t = if self.enter >= 0.0 { self.enter } else { self.leave };

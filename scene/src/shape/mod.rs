@@ -133,7 +133,7 @@ impl Shape {
         }
     }
 
-    /// Smallest and largest coordinates \[m\]; infinite for an infinite shape.
+    /// Smallest and largest coordinates in the frame of the shape \[m\]; infinite for an infinite shape.
     pub fn aabb(&self) -> [[f32; 3]; 2] {
         match self.geometry() {
             // A sum of two single-precision numbers is the same, whether it is rounded once or through double
@@ -143,7 +143,7 @@ impl Shape {
         }
     }
 
-    /// Smallest and largest coordinates \[m\]; `None` for an infinite shape.
+    /// Smallest and largest coordinates in the frame of the shape \[m\]; `None` for an infinite shape.
     pub fn bounds(&self) -> Option<[V3; 2]> {
         let bounds = match self.geometry() {
             ShapeKind::ClosedForm(shape) => shape.bounds(),

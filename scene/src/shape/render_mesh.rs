@@ -23,7 +23,7 @@ pub struct RenderMesh {
     corners: Vec<[u8; 3]>,
     bounds: [[f32; 3]; 2],
     levels: OnceLock<Vec<LodLevel>>,
-    /// Vertex maps of a deformable mesh.
+    /// Vertex maps of a deformable mesh; `None` for a rigid mesh.
     deformation: Option<Arc<Deformation>>,
 }
 
@@ -38,14 +38,14 @@ pub struct Cluster {
     pub first_vertex: u32,
     /// Number of vertices, padded to a multiple of 16 by repeating the last one.
     pub vertex_count: u32,
-    /// Center of the bounding sphere \[m\].
+    /// Center of the bounding sphere in the frame of the mesh \[m\].
     pub center: [f32; 3],
     /// Radius of the bounding sphere \[m\].
     pub radius: f32,
     /// True if every triangle belongs to a closed surface with its front outside, so that no back face is visible from
     /// outside. False for deformable meshes.
     pub closed: bool,
-    /// Axis of the cone that contains the normals of all triangles.
+    /// Axis of the cone that contains the normals of all triangles; unit vector in the frame of the mesh.
     pub cone_axis: [f32; 3],
     /// Cosine of the half angle of that cone; -1 if there is no useful cone.
     pub cone_cos: f32,
@@ -297,7 +297,7 @@ impl RenderMesh {
         });
     }
 
-    /// Vertex positions \[m\]. A vertex of the input occurs once for each of its normals.
+    /// Vertex positions in the frame of the mesh \[m\]. A vertex of the input occurs once for each of its normals.
     pub fn positions(&self) -> &[[f32; 3]] {
         &self.positions
     }
@@ -322,7 +322,7 @@ impl RenderMesh {
         &self.clusters
     }
 
-    /// Positions of the clusters' vertices, one array per axis.
+    /// Positions of the clusters' vertices in the frame of the mesh \[m\], one array per axis.
     pub fn cluster_positions(&self) -> &[Vec<f32>; 3] {
         &self.cluster_positions
     }
@@ -332,7 +332,7 @@ impl RenderMesh {
         &self.corners
     }
 
-    /// Smallest and largest coordinates \[m\]; zero without triangles.
+    /// Smallest and largest coordinates in the frame of the mesh \[m\]; zero without triangles.
     pub fn bounds(&self) -> [[f32; 3]; 2] {
         self.bounds
     }

@@ -39,7 +39,7 @@ impl TriangleSampling {
         Self { mesh: Arc::clone(mesh), sums: areas.collect() }
     }
 
-    /// The mesh.
+    /// Triangles of the shape, prepared for rendering.
     pub fn mesh(&self) -> &Arc<RenderMesh> {
         &self.mesh
     }

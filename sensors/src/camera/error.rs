@@ -28,7 +28,7 @@ pub enum CameraError {
     Pose {
         /// Index of the pose among the given ones.
         row: usize,
-        /// The pose \[x, y, z, qw, qx, qy, qz\].
+        /// The pose \[x, y, z, qw, qx, qy, qz\], with x, y, z in meters.
         pose: [f64; 7],
     },
     /// Rows of poses do not have seven numbers.
@@ -40,9 +40,9 @@ pub enum CameraError {
     /// The position of the camera and its target coincide, or a number is not finite (or too large for the renderer).
     #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite, and they must differ")]
     LookAt {
-        /// Position of the camera \[m\].
+        /// Position of the camera, in the frame of its parent or of the environment \[m\].
         eye: [f64; 3],
-        /// Position of the target \[m\].
+        /// Position of the target, in the same frame \[m\].
         target: [f64; 3],
     },
     /// The number of values does not match the number of environments.

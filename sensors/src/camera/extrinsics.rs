@@ -80,13 +80,13 @@ pub enum Placement {
         /// Point that the optical axis passes through \[m\]. It is in the middle of the image if the principal point
         /// is.
         target: [f64; 3],
-        /// Upward direction of the image.
+        /// Upward direction of the image, in the frame of `eye` and `target`, of any length.
         #[serde(default = "z_axis")]
         up: [f64; 3],
     },
 }
 
-/// Default upward direction.
+/// Default upward direction: +z of the parent or of the environment.
 fn z_axis() -> [f64; 3] {
     [0.0, 0.0, 1.0]
 }

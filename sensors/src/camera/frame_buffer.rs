@@ -23,7 +23,8 @@ pub(super) struct Observation<'a> {
 }
 
 impl Observation<'_> {
-    /// Returns the pose of the body that the camera is attached to; the identity for a free camera.
+    /// Returns the pose, in the environment, of the body that the camera is attached to; the identity for a free
+    /// camera.
     pub(super) fn parent_pose(&self) -> Pose {
         let parent = self.parent.zip(self.state.body_poses.as_ref());
         let pose = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(self.env, body, k)])));
@@ -39,7 +40,7 @@ pub(super) struct CapturedFrame {
     pub(super) lights: Vec<Light>,
     /// The environment's own scene, if it differs from the shared scene.
     pub(super) scene: EnvScene,
-    /// Pose of the parent; the identity for a free camera, `None` before the first capture.
+    /// Pose of the parent in the environment; the identity for a free camera, `None` before the first capture.
     pub(super) world_from_parent: Option<Pose>,
     /// Time of the capture \[s\].
     pub(super) stamp: f64,
@@ -47,7 +48,7 @@ pub(super) struct CapturedFrame {
     pub(super) rng_key: RngKey,
     /// Markers of other sensors; empty for a camera that does not render markers.
     pub(super) markers: Vec<Marker>,
-    /// Poses at shutter opening, for a shutter of nonzero span.
+    /// Poses at shutter opening; `None` for a shutter that opens and closes at one instant.
     shutter_open: Option<ShutterOpenPoses>,
 }
 
@@ -298,7 +299,8 @@ impl FrameBuffer {
         Some(latest.source(row))
     }
 
-    /// Returns the frame of the history of a row that is `age` frames old; 0 is the newest.
+    /// Returns the frame of the history of a row that is `age` delivered frames old; 0 is the newest. `None` if the
+    /// history does not contain so many frames.
     pub(super) fn history_frame(&self, row: usize, age: usize) -> Option<FrameSource<'_>> {
         let [past] = self.delivered.history.slice(row, age)? else { return None };
         Some(past.source(row))

@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-6;
 pub(super) struct ShutterOpenPoses {
     /// World from instance.
     poses: Vec<PoseF32>,
-    /// Pose of the parent, the identity for a free camera; `None` while there are no poses.
+    /// Pose of the parent in the environment, the identity for a free camera; `None` while there are no poses.
     parent: Option<Pose>,
 }
 
@@ -27,7 +27,7 @@ impl ShutterOpenPoses {
         Self { poses: vec![PoseF32::IDENTITY; instances], parent: None }
     }
 
-    /// Returns the poses of instances and parent.
+    /// Returns the poses of instances and parent in the environment; `None` while the shutter is closed.
     pub(super) fn get(&self) -> Option<(&[PoseF32], Pose)> {
         Some((&self.poses, self.parent?))
     }
@@ -67,7 +67,8 @@ struct PreviousFrame {
     poses: Vec<PoseF32>,
     /// View of the previous frame; `None` if the shown frame is the first.
     view: Option<View>,
-    /// View at the capture of the shown frame. Later setters move the shown frame, but not the start of the next flow.
+    /// View at the capture of the shown frame; `None` before the first one. Later setters move the shown frame, but not
+    /// the start of the next flow.
     shown_view: Option<View>,
 }
 
@@ -121,7 +122,7 @@ impl Motion {
         self.shutter.as_ref().filter(|shutter| due > shutter.steps).map_or(due, |shutter| due - shutter.steps)
     }
 
-    /// Returns the poses at the opening of the shutter of a row.
+    /// Returns the poses at the opening of the shutter of a row; `None` for a camera whose frames show one instant.
     pub(super) fn shutter_open_poses(&self, row: usize) -> Option<&ShutterOpenPoses> {
         self.shutter.as_ref().map(|shutter| &shutter.open_poses[row])
     }
@@ -175,7 +176,7 @@ impl Motion {
         self.close_shutter(row);
     }
 
-    /// Returns the previous frame of a row.
+    /// Returns the frame before the shown one; `None` for a camera without flow, or if the shown frame is the first.
     pub(super) fn previous_frame(&self, row: usize) -> Option<PreviousState<'_>> {
         let PreviousFrame { poses, view, .. } = self.previous.get(row)?;
         Some(PreviousState { poses, view: view.as_ref()? })

@@ -388,7 +388,8 @@ impl Camera {
         self.viewpoints.rays(row).map(|rays| &**rays)
     }
 
-    /// Returns the pose of the optical frame at the captured instant.
+    /// Returns the pose of the optical frame in the environment at the captured instant; `None` for an attached camera
+    /// before the first capture.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
         self.viewpoints.world_from(self.viewpoints.row(row), self.frames.shown(row).world_from_parent)
     }

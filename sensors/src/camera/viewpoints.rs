@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Pose and intrinsics of one camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Viewpoint {
-    /// Pose of the optical frame.
+    /// Pose of the optical frame in the frame of the parent, or of the environment for a free camera.
     pub(crate) parent_from_camera: Pose,
     pub(crate) pixels: PixelIntrinsics,
 }
@@ -24,7 +24,7 @@ pub(crate) struct Viewpoint {
 #[derive(Clone, Debug)]
 pub(crate) struct Viewpoints {
     pub(crate) envs: EnvRows,
-    /// Index of the body that the cameras are attached to.
+    /// Index, on the body axis of the state, of the body that the cameras are attached to; `None` for free cameras.
     pub(crate) parent: Option<usize>,
     /// Width and height \[pixels\].
     size: [usize; 2],

@@ -46,9 +46,9 @@ pub enum RayError {
         pattern: &'static str,
         /// Index of the ray.
         ray: usize,
-        /// Origin \[m\].
+        /// Origin in the frame of the sensor \[m\].
         start: [f64; 3],
-        /// Direction of the ray.
+        /// Direction in the axes of the sensor.
         direction: [f64; 3],
     },
     /// The rays of all environments do not fit into memory, or their number of bytes exceeds the limit.

@@ -40,7 +40,8 @@ pub(crate) struct RaySamplerCfg<'a, R> {
     pub(crate) sampling: &'a SamplingCfg,
     pub(crate) targets: &'a HitTargets,
     pub(crate) groups: u32,
-    /// Index of the body that the sensor is attached to.
+    /// Index, on the body axis of the state, of the body that the sensor is attached to; `None` for a sensor that is
+    /// fixed in the environment.
     pub(crate) parent: Option<usize>,
     pub(crate) rays: R,
     pub(crate) max_distance: f64,

@@ -62,7 +62,7 @@ pub(crate) struct Scan<R: Rays> {
     /// BVHs of meshes, for the targets of environments with their own scene.
     assets: RayAssetCache,
     rays: R,
-    /// Cast order.
+    /// Order in which the rays of a view are cast, as indices of rays; `None` for the order of the pattern.
     order: Option<Vec<u32>>,
     /// Targets of the rays in each environment; mostly the same for all.
     env_targets: Vec<EnvTargets>,
@@ -83,7 +83,7 @@ struct CastInput<V> {
     views: Vec<(usize, V)>,
     /// Index of each environment in `views`.
     slots: Vec<usize>,
-    /// Poses of the moving targets, view by view.
+    /// Poses of the moving targets in their environments, view by view.
     poses: Vec<PoseF64>,
 }
 

@@ -80,7 +80,7 @@ impl GainKind {
 }
 
 impl DriveState {
-    /// Override of a gain. It exists even while a passive joint has no gains.
+    /// Override of a gain; `None` without one. It exists even while a passive joint has no gains.
     fn gain_override(&self, drive: usize, kind: GainKind) -> Option<GainOverride> {
         self.overrides[drive][kind as usize]
     }

@@ -42,8 +42,8 @@ pub struct JointPlan {
     /// Range of position targets \[rad or m\]: the joint's own limits, narrowed by those of joints that mimic it;
     /// infinite without limits.
     pub target_range: [f64; 2],
-    /// Mimic relation (driver, multiplier, offset) with chains resolved:
-    /// `position = multiplier * position(driver) + offset`.
+    /// Mimic relation (driver, multiplier, offset) with chains resolved: `position = multiplier * position(driver) +
+    /// offset`. `None` for a joint that is not a mimic joint.
     pub mimic: Option<(JointId, f64, f64)>,
     /// Start position \[rad or m\].
     pub initial: f64,
@@ -284,7 +284,8 @@ fn set_initial_positions(
     Ok(())
 }
 
-/// Coupling curve of a joint that follows another one.
+/// Coupling curve of a joint that follows another one in an MJCF file; `None` for any other joint, and for a coupling
+/// without a curve.
 pub(crate) fn coupling_curve(joint: &Joint) -> Option<CouplingPolynomial> {
     match joint.defaults?.drive {
         FileActuation::Coupled(curve) => curve,

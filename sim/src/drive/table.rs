@@ -61,7 +61,7 @@ pub struct DriveTable {
 pub struct ExplicitDrive {
     /// Index of the drive in [`DriveTable::drives`].
     pub drive: usize,
-    /// The model.
+    /// Model that computes the effort of the drive.
     pub model: ActuatorModel,
     /// Range of the model's values in the memory of an environment.
     pub memory: Range<usize>,
@@ -216,7 +216,7 @@ impl DriveState {
         self.for_each_model(|law, target, memory| law.reset_memory(target, memory));
     }
 
-    /// Targets of a drive.
+    /// Position target, velocity target and feedforward effort of drive `drive` in this environment.
     fn target(&self, drive: usize) -> Target {
         let (position, velocity, feedforward) = (self.position[drive], self.velocity[drive], self.feedforward[drive]);
         Target { position, velocity, feedforward }

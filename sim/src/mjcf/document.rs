@@ -53,7 +53,7 @@ pub struct Mjcf {
 pub struct PhysicsOption {
     /// Time step of MuJoCo \[s\]: the physics step divided by the number of substeps.
     pub timestep: f64,
-    /// Gravity \[m/s²\].
+    /// Gravity in world axes \[m/s²\].
     pub gravity: Vector3<f64>,
     /// Integrator.
     pub integrator: Integrator,
@@ -63,7 +63,7 @@ pub struct PhysicsOption {
     pub impratio: f64,
     /// Largest number of solver iterations.
     pub iterations: u32,
-    /// Sliding, torsional and rolling friction of geoms without friction of their own.
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\], of geoms without friction of their own.
     pub friction: [f64; 3],
 }
 
@@ -115,7 +115,7 @@ pub struct MeshAsset {
     pub content: MeshContent,
     /// True for a mesh of visual geoms only, which may be flat or open.
     pub visual: bool,
-    /// Location of the element that names the mesh.
+    /// Location of the element that names the mesh; `None` if no file does.
     pub source: Option<SourceLocation>,
 }
 
@@ -124,7 +124,7 @@ pub struct MeshAsset {
 pub enum MeshContent {
     /// Inline, in the document.
     Inline {
-        /// Vertices \[m\].
+        /// Vertices in the frame of the mesh \[m\].
         vertices: Vec<[f32; 3]>,
         /// Triangles as indices of vertices.
         triangles: Vec<[u32; 3]>,
@@ -173,7 +173,7 @@ pub struct Body {
     pub parent: usize,
     /// Pose in the parent's frame.
     pub pose: Pose,
-    /// Mass properties.
+    /// Mass properties; `None` for a massless link, and for an object that does not move.
     pub inertial: Option<Inertial>,
     /// Joints to the parent, in order.
     pub joints: Vec<Joint>,
@@ -183,7 +183,7 @@ pub struct Body {
     pub geoms: Vec<Geom>,
     /// Named frames.
     pub sites: Vec<Site>,
-    /// Location of the link that the body comes from.
+    /// Location of the link that the body comes from; `None` for a body without a file.
     pub source: Option<SourceLocation>,
 }
 
@@ -198,7 +198,7 @@ pub struct Inertial {
     pub axes: UnitQuaternion<f64>,
     /// Principal moments about the center of mass \[kg m²\].
     pub moments: Vector3<f64>,
-    /// Location of the declaration.
+    /// Location of the declaration; `None` for an element without a file.
     pub source: Option<SourceLocation>,
 }
 
@@ -219,7 +219,7 @@ pub struct Joint {
     pub frictionloss: f64,
     /// Rotor inertia \[kg m² or kg\]; may include the implicit damping of [`drive::implicit`](crate::drive::implicit).
     pub armature: f64,
-    /// Location of the declaration.
+    /// Location of the declaration; `None` for an element without a file.
     pub source: Option<SourceLocation>,
 }
 
@@ -263,15 +263,15 @@ pub struct Geom {
     pub pose: Pose,
     /// Role of the geom: collision or visual.
     pub role: GeomRole,
-    /// Sliding, torsional and rolling friction; `None` for the document's default.
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\]; `None` for the document's default.
     pub friction: Option<[f64; 3]>,
     /// Contact compliance; `None` for MuJoCo's defaults.
     pub surface: Option<ContactParams>,
     /// RGBA color; `None` for the color of `material`, or MuJoCo's gray without a material.
     pub rgba: Option<[f64; 4]>,
-    /// Name of the material.
+    /// Name of the material; `None` without one.
     pub material: Option<String>,
-    /// Location of the declaration.
+    /// Location of the declaration; `None` for an element without a file.
     pub source: Option<SourceLocation>,
 }
 
@@ -375,7 +375,7 @@ pub struct JointEquality {
     pub multiplier: f64,
     /// Offset \[rad or m\].
     pub offset: f64,
-    /// Location of the declaration.
+    /// Location of the declaration; `None` for an element without a file.
     pub source: Option<SourceLocation>,
 }
 
@@ -418,7 +418,7 @@ pub struct Actuator {
     pub force_limit: Option<f64>,
     /// Range of the control, in its unit; `None` without a limit.
     pub ctrl_range: Option<[f64; 2]>,
-    /// Location of the joint.
+    /// Location of the joint; `None` for a joint without a file.
     pub source: Option<SourceLocation>,
 }
 

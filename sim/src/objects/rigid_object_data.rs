@@ -213,7 +213,7 @@ impl RigidObjectData {
         self.mesh.as_ref()
     }
 
-    /// Key of the mesh file that the object is rendered with.
+    /// Key of the mesh file that the object is rendered with; `None` for a shape without a mesh file.
     pub(crate) fn mesh_key(&self) -> Option<MeshKey> {
         match &self.cfg.shape {
             ObjectShape::Mesh { path, scale, .. } => Some(MeshKey::new(path, &(*scale).into())),

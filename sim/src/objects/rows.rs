@@ -54,7 +54,7 @@ impl NumberKind {
     }
 }
 
-/// Positions of the first repeated index in a list: first occurrence and repetition.
+/// Positions of the first repeated index in a list: first occurrence and repetition; `None` without a repetition.
 fn first_repeat(chosen: &[usize]) -> Option<(usize, usize)> {
     let mut places = vec![None; chosen.iter().max().map_or(0, |most| most + 1)];
     chosen.iter().enumerate().find_map(|(second, &index)| places[index].replace(second).map(|first| (first, second)))

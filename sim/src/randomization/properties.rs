@@ -186,8 +186,8 @@ impl Properties {
         self.values[property as usize][element * width..(element + 1) * width].copy_from_slice(value);
     }
 
-    /// Nominal moments of a body, scaled by the ratio of its mass to the nominal mass. Bodies have the same order in
-    /// the tables of masses and of moments.
+    /// Nominal principal moments of inertia of a body \[kg m²\], scaled by the ratio of its mass to the nominal mass.
+    /// Bodies have the same order in the tables of masses and of moments.
     pub(super) fn proportional_moments(&self, element: usize) -> [f64; 3] {
         let nominal: &PropertyTable = self.tables.get(Property::Mass);
         let (mass, before) = (self.values[Property::Mass as usize][element], nominal.nominal[element]);

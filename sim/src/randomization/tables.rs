@@ -174,7 +174,8 @@ fn no_size_reason(kind: i32) -> Option<&'static str> {
     }
 }
 
-/// Name of the element that a geom belongs to: its body or, in the world, the geom itself.
+/// Name of the element that a geom belongs to: its body or, in the world, the geom itself. `None` if that element has
+/// no name.
 fn geom_name(model: &Model, geom: usize) -> Option<String> {
     match usize::try_from(model.geom_bodyid()[geom]) {
         Ok(body) if body > 0 => model.name(ObjectKind::Body, body),

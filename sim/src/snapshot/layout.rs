@@ -66,7 +66,8 @@ impl StateLayout {
         Self(lines)
     }
 
-    /// First difference of a snapshot's layout (`self`) from the layout of a scene.
+    /// Text on the first difference of a snapshot's layout (`self`) from the layout of a scene; `None` if they are
+    /// equal.
     pub(super) fn difference(&self, scene: &Self) -> Option<String> {
         if self == scene {
             return None;

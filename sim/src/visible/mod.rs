@@ -97,7 +97,7 @@ pub(crate) fn ground(cfg: &GroundCfg) -> VisualPart {
     VisualPart { shape, material: cfg.surface.apply_to(material) }
 }
 
-/// Positions \[m\] and rotation matrices of elements in `data`.
+/// Positions in the environment \[m\] and rotation matrices of elements in `data`.
 fn element_poses(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
     let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
     let sites = (data.site_xpos().as_chunks::<3>().0, data.site_xmat().as_chunks::<9>().0);

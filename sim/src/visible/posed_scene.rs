@@ -23,7 +23,7 @@ pub struct OffscreenScene {
     lights: Vec<Light>,
     cameras: Vec<ModelCamera>,
     free_camera: FreeCamera,
-    /// Viewing direction of [`first_view`](Self::first_view).
+    /// Viewing direction of [`first_view`](Self::first_view), in world axes.
     view_direction: [f64; 3],
 }
 
@@ -41,9 +41,9 @@ pub struct ModelCamera {
 /// Viewpoint onto a model, such as the free camera of MuJoCo's viewers; +z is up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeCamera {
-    /// Position of the camera \[m\].
+    /// Position of the camera in the world \[m\].
     pub eye: [f64; 3],
-    /// Point that the camera looks at \[m\].
+    /// Point in the world that the camera looks at \[m\].
     pub target: [f64; 3],
     /// Vertical field of view \[rad\].
     pub fovy: f64,
@@ -51,7 +51,7 @@ pub struct FreeCamera {
     pub clip: [f64; 2],
 }
 
-/// Viewing direction of first views of simulations, as in windows: from the front, the side and above.
+/// Viewing direction of first views of simulations, in world axes, as in windows: from the front, the side and above.
 const DEFAULT_VIEW_DIRECTION: [f64; 3] = [-0.664, 0.608, -0.435];
 
 impl OffscreenScene {

@@ -44,7 +44,8 @@ impl<'a> ModelMaterials<'a> {
         Self { model, materials, left_out }
     }
 
-    /// Material of a geom.
+    /// Render material of a geom: its color, and the properties of its MuJoCo material, if any. Only planes and boxes
+    /// reflect.
     pub(super) fn of_geom(&self, geom: usize) -> Material {
         let rgba = color_of(self.model, geom);
         match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
@@ -58,7 +59,7 @@ impl<'a> ModelMaterials<'a> {
         }
     }
 
-    /// Material of a site.
+    /// Render material of a site: its color, and the properties of its MuJoCo material, if any.
     pub(super) fn of_site(&self, site: usize) -> Material {
         self.material(&self.model.site_rgba()[4 * site..4 * site + 4], self.model.site_matid()[site])
     }

@@ -20,7 +20,7 @@ const BVH_WIDTH: usize = 8;
 /// difference, the inverse of the rounded direction and the product: 9 u R, and terms of u².
 const PAD: f64 = 16.0 / (1u32 << 24) as f64;
 
-/// Smallest and largest coordinates.
+/// Bounding box: smallest and largest coordinates \[m\].
 pub(crate) type Aabb = [[f32; 3]; 2];
 
 /// A bounding volume hierarchy.

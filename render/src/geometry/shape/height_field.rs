@@ -137,7 +137,7 @@ impl HeightGrid {
         if right { [a, b - a, e - b] } else { [a, e - d, d - a] }
     }
 
-    /// The hit with the surface in a cell between distances `from` and `to`.
+    /// The hit with the surface in a cell between distances `from` and `to`; `None` if the ray misses it there.
     #[inline(always)]
     fn intersect_cell(&self, walk: &GridRay, cell: [usize; 2], from: f64, to: f64) -> Option<Intersection> {
         let corners = self.corners(cell);
@@ -165,7 +165,7 @@ impl HeightGrid {
         None
     }
 
-    /// Walks from distance `from` to distance `to`.
+    /// Walks from distance `from` to distance `to` and returns the first hit; `None` without a hit.
     #[inline(always)]
     fn walk_cells(&self, walk: &GridRay, mut from: f64, to: f64) -> Option<Intersection> {
         let position = |t: f64, k: usize| walk.origin[k] + t * walk.direction[k];
@@ -319,7 +319,7 @@ impl HeightField {
         Self { grid: assets.height_field(shape) }
     }
 
-    /// Bounding box: smallest and largest coordinates.
+    /// Bounding box in the frame of the height field: smallest and largest coordinates \[m\].
     pub(super) fn bounds(&self) -> [V3; 2] {
         let HeightGrid { half, floor, top, .. } = &*self.grid;
         [[-half[0], -half[1], *floor], [half[0], half[1], *top]]

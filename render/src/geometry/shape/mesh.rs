@@ -92,7 +92,7 @@ impl Mesh {
         Self { bvh: assets.mesh(mesh) }
     }
 
-    /// Bounding box: smallest and largest coordinates.
+    /// Bounding box in the frame of the mesh: smallest and largest coordinates \[m\].
     pub(crate) fn bounds(&self) -> [V3; 2] {
         self.bvh.bounds()
     }
@@ -131,12 +131,13 @@ impl MeshBvh {
     }
 
     /// Unit normal of a triangle given by its position in the BVH; its corners are counter-clockwise seen from the tip.
+    /// `None` for a triangle without an area.
     #[inline(always)]
     pub(crate) fn normal(&self, index: usize) -> Option<V3> {
         normal(&self.triangles[index])
     }
 
-    /// Bounding box: smallest and largest coordinates.
+    /// Bounding box in the frame of the mesh: smallest and largest coordinates \[m\].
     pub(crate) fn bounds(&self) -> [V3; 2] {
         self.bvh.bounds().map(to_f64)
     }

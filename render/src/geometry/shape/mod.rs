@@ -39,7 +39,7 @@ impl RayGeometry {
         }
     }
 
-    /// Bounding box: smallest and largest coordinates; `None` for an unbounded shape.
+    /// Bounding box in the frame of the shape: smallest and largest coordinates \[m\]; `None` for an unbounded shape.
     pub(crate) fn bounds(&self) -> Option<[V3; 2]> {
         match self {
             Self::ClosedForm(shape) => shape.bounds(),
@@ -48,7 +48,8 @@ impl RayGeometry {
         }
     }
 
-    /// The nearest surface at a distance from 0 to `limit`, both included, for a single ray.
+    /// The nearest surface at a distance from 0 to `limit` \[m\], both included, for a single ray; `None` if the ray
+    /// hits nothing there.
     #[cfg(test)]
     pub(crate) fn intersect(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<Intersection> {
         match self {

@@ -11,7 +11,7 @@ pub(crate) type Intersections = [Option<Intersection>; WIDTH];
 
 /// Ray intersection of a shape.
 pub(crate) trait RayShape {
-    /// The nearest surface at a distance from 0 to `limit`, both included.
+    /// The nearest surface at a distance from 0 to `limit` \[m\], both included; `None` if the ray hits nothing there.
     fn intersect(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<Intersection>;
 
     /// Packet version of `intersect`: the same bits for every ray, up to its limit. Overwrites `touches` in all lanes with

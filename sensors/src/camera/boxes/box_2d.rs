@@ -100,7 +100,7 @@ struct SegmentExtent {
     id: i32,
     pixels: usize,
     visible_extent: [[usize; 2]; 2],
-    /// Smallest and largest u, then v, of the loose box.
+    /// Smallest and largest u, then v, of the loose box \[pixels\]; `None` if no part is in the image yet.
     full_extent: Option<[[f64; 2]; 2]>,
 }
 

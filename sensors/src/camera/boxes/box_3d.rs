@@ -32,7 +32,7 @@ impl Box3d {
         })
     }
 
-    /// Side lengths \[m\].
+    /// Side lengths along the axes of the segment's frame \[m\].
     pub fn size(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| self.max[k] - self.min[k])
     }

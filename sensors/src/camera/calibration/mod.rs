@@ -65,7 +65,8 @@ impl DistortionModel {
         if count > 5 { Self::RationalPolynomial } else { Self::PlumbBob }
     }
 
-    /// Finds the model by its name in a file with `count` coefficients.
+    /// Finds the model by its name in a file with `count` coefficients; `None` for an unknown name, and for a lens that
+    /// calibration files do not describe.
     fn from_name(name: &str, count: usize) -> Option<Self> {
         let own = Self::ALL.into_iter().find(|model| model.name() == name);
         own.or_else(|| match Lens::from_name(name).ok()? {

@@ -33,7 +33,7 @@ impl StereoCamera {
         Self { left, right, rig, disparities: Cached::outdated(DisparityMap::default()) }
     }
 
-    /// The left camera.
+    /// The left camera, whose optical frame is the reference of the stereo pair.
     pub fn left(&self) -> &Camera {
         &self.left
     }

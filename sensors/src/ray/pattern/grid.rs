@@ -26,7 +26,7 @@ pub struct Grid {
     pub resolution: f64,
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],
-    /// Direction of the rays, of any length except zero.
+    /// Direction of the rays in the axes of the sensor, of any length except zero.
     pub direction: [f64; 3],
     /// Order of the rays.
     pub order: GridOrder,

@@ -2,7 +2,7 @@
 
 use crate::ray::RayError;
 
-/// Origin and direction of a ray; the direction has any length.
+/// Origin \[m\] and direction of a ray in the frame of the sensor; the direction has any length.
 pub(super) type UnnormalizedRay = ([f64; 3], [f64; 3]);
 
 /// Operations of a ray pattern.

@@ -48,7 +48,8 @@ pub struct MjcfRobotFile {
     model: Model,
     names: PartNames,
     root: Root,
-    /// For each named link (body or site): index of its body in the file, and pose of the link in that body.
+    /// For each named link (body or site): index of its body in the file's model (0 is the world), and pose of the link
+    /// in the frame of that body.
     links: Vec<(usize, Pose)>,
     /// Joint of the description for each joint of the file; `None` for a free joint.
     joints: Vec<Option<JointId>>,

@@ -101,7 +101,8 @@ fn translation(by: Vector3<f64>) -> Pose {
 #[derive(Debug)]
 pub(super) struct FileDescription {
     pub(super) description: RobotDescription,
-    /// For each named link (body or site): index of its body in the file, and pose of the link in that body.
+    /// For each named link (body or site): index of its body in the file's model (0 is the world), and pose of the link
+    /// in the frame of that body.
     pub(super) links: Vec<(usize, Pose)>,
     /// Joint of the description for each joint of the file; `None` for a free joint.
     pub(super) joints: Vec<Option<JointId>>,

@@ -31,7 +31,7 @@ impl Cable {
     }
 }
 
-/// Positions of the vertices of a flex \[m\].
+/// Positions of the vertices of a flex in the environment \[m\]; empty if the data contains no such vertices.
 fn points(data: &Data, first: usize, count: usize) -> &[[f64; 3]] {
     data.flex_vertices().get(first..first + count).unwrap_or(&[])
 }
