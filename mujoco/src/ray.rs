@@ -10,7 +10,7 @@ use mujoco_sys as mj;
 pub struct RayHit {
     /// Distance along the ray, in multiples of the length of its direction.
     pub distance: f64,
-    /// Index of the geom.
+    /// Index of the geom in the model (MuJoCo's geom id).
     pub geom: usize,
 }
 

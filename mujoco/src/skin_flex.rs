@@ -34,7 +34,7 @@ pub struct SkinArrays<'a> {
 /// A body that moves vertices of a skin.
 #[derive(Clone, Copy, Debug)]
 pub struct Bone<'a> {
-    /// Index of the body.
+    /// Index of the body in the model (MuJoCo's body id).
     pub body: usize,
     /// Position of the body in the bind pose, in the world frame \[m\].
     pub position: [f32; 3],

@@ -14,7 +14,7 @@ impl Model {
         count as usize
     }
 
-    /// Index of the first control of an actuator. Actuators of 2.2.2 have one control each.
+    /// Index, in `ctrl`, of the first control of an actuator. Actuators of 2.2.2 have one control each.
     ///
     /// # Panics
     /// There is no such actuator.

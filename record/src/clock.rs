@@ -8,7 +8,7 @@
 #[derive(Clone, Debug)]
 pub(crate) struct RecordingClock {
     dt: f64,
-    /// Number of simulation steps when the recording began.
+    /// Number of physics steps of the simulation when the recording began.
     first_step: u64,
     /// Simulation time of each environment when the recording began \[s\].
     start_times: Vec<f64>,
@@ -21,7 +21,7 @@ impl RecordingClock {
         Self { dt, first_step: steps, start_times: times.to_vec(), offsets: vec![0.0; times.len()] }
     }
 
-    /// Converts a step count of the simulation to the number of steps since the recording began.
+    /// Converts the physics steps of the simulation to physics steps since the recording began.
     pub(crate) fn step(&self, steps: u64) -> u64 {
         steps - self.first_step
     }

@@ -192,7 +192,7 @@ pub enum RecordError {
     /// An environment does not exist, or is listed twice.
     #[error("environment {env} does not exist or is named twice; there are {count} environments")]
     Env {
-        /// Index of the environment.
+        /// Index of the environment in the simulation.
         env: usize,
         /// Number of environments.
         count: usize,

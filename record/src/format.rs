@@ -107,7 +107,7 @@ impl Format {
         self.missing_feature().is_none()
     }
 
-    /// Cargo feature that this build lacks for the format.
+    /// Cargo feature that this build lacks for the format; `None` if the build can write the format.
     pub(crate) fn missing_feature(self) -> Option<&'static str> {
         (self == Self::Hdf5 && !cfg!(feature = "hdf5")).then_some("hdf5")
     }

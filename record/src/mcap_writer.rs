@@ -335,7 +335,8 @@ fn channel_metadata(stream: &StreamSchema, part: usize) -> BTreeMap<String, Stri
     all.into_iter().filter(|(_, text)| !text.is_empty()).map(|(what, text)| (what.to_string(), text)).collect()
 }
 
-/// Finds a topic that streams with different message types would share. With `scenes`, includes the scene topic.
+/// Finds a topic that streams with different message types would share; `None` without a conflict. With `scenes`,
+/// includes the scene topic.
 pub(crate) fn topic_conflict(streams: &[&StreamSchema], scenes: bool) -> Option<String> {
     let scene = scenes.then(|| (SCENE_TOPIC.to_string(), Schema::SceneUpdate));
     let mut known: BTreeMap<String, Schema> = scene.into_iter().collect();

@@ -178,7 +178,8 @@ impl RecordedArrays {
             .ok_or_else(|| self.malformed(format!("{name} has no row {row}")))
     }
 
-    /// Resets and writes of an environment, in order: their steps, and the simulation times afterwards \[s\].
+    /// Resets and writes of an environment, in order: their physics steps since the beginning of the recording, and the
+    /// simulation times afterwards \[s\].
     pub(crate) fn state_changes(&self, env: usize) -> Result<Vec<(f64, f64)>> {
         let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, times) = (of("step")?, of("env")?, of("time")?);

@@ -233,7 +233,7 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Recorded streams.
+    /// Streams that are recorded, with their names, shapes and environments.
     pub fn streams(&self) -> impl Iterator<Item = &StreamSchema> {
         self.sources.iter().map(|source| &source.stream)
     }
@@ -454,7 +454,7 @@ impl Recorder {
         self.diverged = diverged.into_iter().map(|(env, _)| env).collect();
     }
 
-    /// Records a note.
+    /// Records a text about an environment, or about all recorded ones for `None`.
     fn note(&mut self, steps: u64, times: &[f64], env: Option<EnvId>, text: &str) -> Result<()> {
         if !self.format.supports_events() {
             let (path, topic) = (self.cfg.path.clone(), format!("{:?}", Topic::Events));

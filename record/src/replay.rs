@@ -37,7 +37,7 @@ pub struct ReplayResult {
 pub struct Difference {
     /// Physics steps since the beginning of the recording.
     pub step: u64,
-    /// The environment.
+    /// Index of the environment in the recorded simulation.
     pub env: usize,
     /// Name of the array, such as `arm/joint_states/positions`.
     pub array: String,
@@ -172,7 +172,7 @@ struct Replay {
     archive: RecordedArrays,
     states: Vec<StreamSource>,
     targets: Vec<StreamSource>,
-    /// Step of each row.
+    /// Physics steps of each row since the beginning of the recording.
     steps: Vec<f64>,
 }
 

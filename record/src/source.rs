@@ -27,11 +27,11 @@ pub(crate) struct StreamSource {
     counts: Vec<u64>,
     /// Simulation time at the last read of each row \[s\], for states.
     last_times: Vec<f64>,
-    /// Simulation step at which the next row is due.
+    /// Physics step of the simulation at which the next row is due.
     pub(crate) next_step: u64,
-    /// Steps between two rows; `None` for a sensor that is recorded whenever it measures.
+    /// Physics steps between two rows; `None` for a sensor that is recorded whenever it measures.
     pub(crate) period_steps: Option<u64>,
-    /// Renderer of the overview image.
+    /// Renderer of the overview image; `None` for other streams.
     overview_renderer: Option<OverviewRenderer>,
 }
 

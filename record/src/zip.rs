@@ -41,7 +41,7 @@ struct Entry {
     offset: u64,
     /// Size in the archive \[bytes\].
     size: u64,
-    /// Uncompressed size of a deflated file \[bytes\].
+    /// Uncompressed size of a deflated file \[bytes\]; `None` for a stored file.
     uncompressed_size: Option<u64>,
     crc: u32,
 }
@@ -309,7 +309,7 @@ fn crc_of(data: &[u8]) -> u64 {
     crc.finalize().into()
 }
 
-/// Parses the directory of an archive of `length` bytes.
+/// Parses the directory of an archive of `length` bytes; `None` for an invalid directory.
 fn parse_directory(directory: &[u8], count: u64, length: u64) -> Option<Vec<DirectoryEntry>> {
     let (mut files, mut sum, mut at) = (Vec::new(), 0_u64, 0_usize);
     for _ in 0..count {

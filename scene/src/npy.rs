@@ -108,7 +108,8 @@ pub fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Parses a file with such a header: type descriptor, shape, bytes of the values.
+/// Parses a file with such a header: type descriptor, shape, bytes of the values. `None` for an invalid or truncated
+/// file.
 pub fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (length, rest) = rest.split_first_chunk::<2>()?;

@@ -139,13 +139,13 @@ pub enum RenderSceneError {
     /// A mask id is 0.
     #[error("instance {instance} has mask id 0, which is reserved for the background")]
     ZeroMaskId {
-        /// Index of the instance.
+        /// Index of the instance in the scene.
         instance: usize,
     },
     /// A size is not positive and finite.
     #[error("instance {instance}, a {shape}, has a size of {size}; sizes must be positive and finite")]
     Size {
-        /// Index of the instance.
+        /// Index of the instance in the scene.
         instance: usize,
         /// Name of the shape.
         shape: &'static str,
@@ -157,7 +157,7 @@ pub enum RenderSceneError {
         "the material of instance {instance} has a number that is not finite, or a refractive index outside 1..=10"
     )]
     Material {
-        /// Index of the instance.
+        /// Index of the instance in the scene.
         instance: usize,
     },
     /// The triangles of all meshes, with 8 ids for each shape without triangles, exceed the number of ids.

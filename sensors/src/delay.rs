@@ -2,17 +2,17 @@
 
 use crate::schedule::Phases;
 
-/// Values that are delivered a fixed number of steps after their capture, in one queue per environment. All memory is
-/// allocated at construction.
+/// Values that are delivered a fixed number of physics steps after their capture, in one queue per environment. All
+/// memory is allocated at construction.
 #[derive(Clone, Debug)]
 pub(crate) struct DelayLine<T> {
     steps: u64,
     /// Slots per environment.
     capacity: usize,
     queues: Vec<Queue>,
-    /// Values with the steps of their capture, environment by environment.
+    /// Values with the physics steps of their capture, environment by environment.
     slots: Vec<(u64, T)>,
-    /// Step of the last refresh of each environment.
+    /// Physics step of the last refresh of each environment.
     last_refresh: Vec<u64>,
 }
 
@@ -30,8 +30,8 @@ pub(crate) fn capacity(steps: u64, period: u64) -> usize {
 }
 
 impl<T: Clone> DelayLine<T> {
-    /// Creates queues of values that are captured at most every `period` steps and delivered `steps` later; slots start
-    /// with `value`.
+    /// Creates queues of values that are captured at most every `period` physics steps and delivered `steps` physics
+    /// steps later; slots start with `value`.
     pub(crate) fn new(num_envs: usize, steps: u64, period: u64, value: T) -> Self {
         let capacity = capacity(steps, period);
         let slots = vec![(0, value); num_envs * capacity];

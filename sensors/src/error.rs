@@ -33,7 +33,7 @@ pub enum SensorError {
         update_period: f64,
         /// The physics step \[s\].
         dt: f64,
-        /// The period in steps.
+        /// The period in physics steps.
         steps: f64,
         /// Nearest valid period \[s\].
         nearest: f64,

@@ -5,7 +5,7 @@ use crate::error::SensorError;
 /// Relative tolerance of `update_period / dt` from a whole number. Decimal seconds are not exact in binary, and 1/30 s
 /// written with ten digits is still accepted.
 const TOLERANCE: f64 = 1e-8;
-/// Absolute tolerance in steps: over 1e5 steps, the relative tolerance would accept fractions.
+/// Absolute tolerance in physics steps: over 1e5 steps, the relative tolerance would accept fractions.
 const TOLERANCE_STEPS: f64 = 1e-3;
 /// Whole numbers above this are not exact in f64.
 const MAX_STEPS: f64 = 9_007_199_254_740_992.0;
@@ -64,9 +64,9 @@ pub struct Phases {
 
 #[derive(Clone, Copy, Debug)]
 struct Phase {
-    /// Step of the environment at which the sensor was reset.
+    /// Physics step of the environment at which the sensor was reset.
     start: u64,
-    /// Step of the environment at the last query.
+    /// Physics step of the environment at the last query.
     last_query: u64,
 }
 

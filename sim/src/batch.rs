@@ -25,7 +25,7 @@ struct Chunk {
 
 /// A chunk that a thread has locked.
 struct LockedChunk<'a> {
-    /// Index of the first environment of the chunk.
+    /// Index, in the batch, of the first environment of the chunk.
     first: usize,
     chunk: MutexGuard<'a, Chunk>,
     /// The chunk that the thread will probably take next, for prefetching; `None` for the last chunk.
@@ -61,7 +61,7 @@ struct Chunks {
 /// A range of chunks. The alignment gives each counter its own cache lines, which avoids false sharing between threads.
 #[repr(align(128))]
 struct Share {
-    /// Index of the next chunk to take.
+    /// Index, in the list of all chunks, of the next chunk of the share to take.
     next: AtomicUsize,
     chunks: Range<usize>,
 }

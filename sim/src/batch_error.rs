@@ -16,7 +16,7 @@ pub enum BatchError {
     /// An environment could not be allocated.
     #[error("environment {index}: {error}")]
     Environment {
-        /// Index of the environment.
+        /// Index of the environment in the batch.
         index: usize,
         /// Error of the engine.
         #[source]

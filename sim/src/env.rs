@@ -78,7 +78,7 @@ pub struct SimEnv {
     /// before a pass.
     dirty: bool,
     cold: Box<ColdState>,
-    /// External wrenches of the user; `None` in most environments.
+    /// External wrenches of the user; `None` without any.
     wrenches: Option<Box<Wrenches>>,
 }
 
@@ -89,7 +89,7 @@ struct ColdState {
     buffer_growths: u32,
     /// User inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
     inputs: UserInputs,
-    /// Quantities captured in the last step that sensors needed.
+    /// Quantities captured in the last step for which sensors needed them.
     captured: CapturedStep,
     /// Attached welds; their relative poses are in the model.
     welds: Vec<Weld>,
@@ -339,8 +339,8 @@ impl SimEnv {
         }
     }
 
-    /// `Running`, or `Diverged` with the failed step and the reason. A diverged environment keeps its last valid state
-    /// until it is reset.
+    /// `Running`, or `Diverged` with the number of completed steps and the reason. A diverged environment keeps its
+    /// last valid state until it is reset.
     pub fn status(&self) -> &EnvStatus {
         self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
     }

@@ -22,7 +22,7 @@ pub(crate) struct RobotIndexing {
 pub(crate) struct GeomIndexing {
     /// Index in MuJoCo's geom arrays.
     pub geom: usize,
-    /// Index of the link that owns the geom.
+    /// Index, in the robot's list of links, of the link that owns the geom.
     pub link: usize,
     /// Index of the visual that the geom represents; `None` for a collision geom, and for every geom of an MJCF robot.
     pub visual: Option<usize>,

@@ -88,9 +88,10 @@ pub(crate) struct SensorList {
     manager: u64,
     entries: Vec<SensorEntry>,
     state: SceneState,
-    /// Flags of the sensors that are due after the current steps.
+    /// Flags of the sensors that are due after the current block of physics steps.
     due: Vec<bool>,
-    /// Step count of every environment; [`kinetoscope_sensors::Phases::QUARANTINED`] for a diverged environment.
+    /// Physics steps of every environment since its last reset; [`kinetoscope_sensors::Phases::QUARANTINED`] for a
+    /// diverged environment.
     step_counts: Vec<u64>,
     /// Environments with a written state since the last [`take_written`](Self::take_written).
     written: BTreeSet<usize>,

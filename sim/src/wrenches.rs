@@ -22,16 +22,16 @@ pub enum WrenchFrame {
 /// External wrench on a body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wrench {
-    /// Owner of the wrench: indices of the robot and its link. For user forces, [`USER_FORCE_OWNER`] and the index of
-    /// the body.
+    /// Owner of the wrench: index of the robot among robots and articulations, and index of the link in the robot. For
+    /// user forces, [`USER_FORCE_OWNER`] and the index of the body.
     pub(crate) owner: (usize, usize),
-    /// Index of the MuJoCo body.
+    /// Index of the body in the model (MuJoCo's body id).
     pub(crate) body: usize,
     /// Rotation of the link axes in the body frame; `None` for a wrench in world axes.
     pub(crate) axes: Option<UnitQuaternion<f64>>,
-    /// Force at the center of mass of the body \[N\].
+    /// Force at the center of mass of the body \[N\], in link axes or world axes as given by `axes`.
     pub(crate) force: Vector3<f64>,
-    /// Torque \[N m\].
+    /// Torque \[N m\], in the same axes.
     pub(crate) torque: Vector3<f64>,
 }
 

@@ -7,7 +7,7 @@ use kinetoscope_scene::KeyedRng;
 use ndarray::{Array1, Array2};
 use std::fmt;
 
-/// Number of steps of a run. Only episode ends within them are checked.
+/// Number of task steps of a run. Only episode ends within them are checked.
 const STEPS: usize = 100;
 
 /// A violation of the [`VectorEnv`] contract.
@@ -329,9 +329,9 @@ fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Ve
 /// Detects an environment that does not begin a new episode after an end.
 #[derive(Clone, Copy, Debug, Default)]
 struct AutoResetMonitor {
-    /// Number of steps of the longest episode.
+    /// Number of task steps of the longest episode.
     longest: usize,
-    /// Number of steps of the present episode.
+    /// Number of task steps of the present episode.
     steps: usize,
     /// Consecutive ends with an unchanged observation.
     repeated_ends: usize,

@@ -18,7 +18,7 @@ pub(crate) struct TaskState {
     pub(crate) actions: Array2<f64>,
     /// Actions of the step before that of `actions`, shape (N, action columns).
     pub(crate) previous_actions: Array2<f64>,
-    /// Number of steps of each episode so far.
+    /// Number of task steps of each episode so far.
     pub(crate) episode_steps: Vec<u64>,
     /// Name and values of each command term.
     pub(crate) commands: Vec<(String, Array2<f64>)>,

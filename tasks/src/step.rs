@@ -38,11 +38,11 @@ pub struct StepInfo {
 /// An episode that ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EndedEpisode {
-    /// The environment.
+    /// Environment whose episode ended.
     pub env: EnvId,
-    /// The reason.
+    /// Reason for the end.
     pub reason: EndReason,
-    /// Number of steps of the episode.
+    /// Number of task steps of the episode.
     pub steps: u64,
     /// Sum of the weighted rewards of each term over the episode, in the order of
     /// [`Env::reward_names`](crate::Env::reward_names).

@@ -74,7 +74,7 @@ pub enum ScreenshotError {
     /// The environment does not exist.
     #[error("environment {env} does not exist; the simulation has {count}, numbered from 0")]
     Environment {
-        /// Index of the requested environment.
+        /// Index of the requested environment in the simulation.
         env: usize,
         /// Number of environments.
         count: usize,

@@ -52,7 +52,7 @@ pub(crate) struct Animation {
     encoder: Box<dyn Encoder>,
     /// The last frame, whose duration is not known yet, and its time \[s\].
     pending: Option<(Vec<u8>, f64)>,
-    /// Time of the first frame \[s\].
+    /// Time of the first frame \[s\]; `None` before it.
     first: Option<f64>,
     /// Duration of the previous frame \[s\].
     last_duration: f64,

@@ -63,7 +63,7 @@ pub(crate) struct EpisodeFrame<P> {
 pub(crate) struct EpisodeSplitter<D: DatasetWriter> {
     dataset: D,
     features: Arc<Features>,
-    /// Steps between two rows.
+    /// Physics steps between two rows.
     period_steps: u64,
     envs: Vec<EnvFrames<D::Image>>,
 }
@@ -73,11 +73,11 @@ struct EnvFrames<P> {
     /// Last measured values of each stream.
     numbers: Vec<Option<Vec<f64>>>,
     images: Vec<Option<Arc<P>>>,
-    /// The frame that waits for its action.
+    /// The frame that waits for its action; `None` before the first frame of an episode.
     pending: Option<EpisodeFrame<P>>,
-    /// Step of its row.
+    /// Physics step of the row of `pending`, since the beginning of the recording.
     pending_step: u64,
-    /// The frame before it, which waits for the result of its action.
+    /// The frame before `pending`, which waits for the result of its action; `None` without such a frame.
     awaiting_result: Option<EpisodeFrame<P>>,
 }
 
@@ -98,7 +98,7 @@ pub(crate) fn environments(path: &Path, streams: &[StreamSchema]) -> Result<Vec<
 }
 
 impl<D: DatasetWriter> EpisodeSplitter<D> {
-    /// Creates the splitter for environments `envs`, with `period_steps` steps between two rows.
+    /// Creates the splitter for environments `envs`, with `period_steps` physics steps between two rows.
     pub(crate) fn new(
         dataset: D,
         features: Arc<Features>,

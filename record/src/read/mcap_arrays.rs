@@ -27,7 +27,7 @@ struct StreamAssembler {
     parts: Vec<(String, Vec<usize>, usize)>,
     /// Frames of poses.
     frames: Vec<String>,
-    /// Steps of the complete rows.
+    /// Physics steps of the complete rows since the beginning of the recording.
     steps: Vec<f64>,
     /// Rows of each array.
     rows: Vec<Vec<f64>>,
@@ -131,7 +131,7 @@ fn of_env(name: &str) -> Option<(usize, &str)> {
     Some((env.parse().ok()?, rest))
 }
 
-/// Parses the text of an event message: kind and step.
+/// Parses the text of an event message: kind and physics step. `None` for other text.
 fn parse_event(text: &str) -> Option<(EventKind, f64)> {
     let (kind, rest) = text.split_once(" at step ")?;
     let kinds = [EventKind::Reset, EventKind::Written, EventKind::Diverged, EventKind::Note];

@@ -203,7 +203,7 @@ impl Recording {
     }
 }
 
-/// Environment of a topic.
+/// Environment of a topic from its prefix `/env_K`; `None` without this prefix.
 fn env_of(topic: &str) -> Option<usize> {
     topic.strip_prefix("/env_")?.split('/').next()?.parse().ok()
 }

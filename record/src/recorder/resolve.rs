@@ -114,7 +114,7 @@ pub(super) fn resolve(
     Ok((sources, left_out))
 }
 
-/// Sets the number of steps between two rows of each stream.
+/// Sets the number of physics steps between two rows of each stream.
 fn set_periods(sources: &mut [StreamSource], cfg: &RecorderCfg, format: Format) -> Result<()> {
     // The overview has its own rate; results of task steps are recorded when they are published.
     let at_steps =
@@ -265,7 +265,7 @@ pub(super) fn create_writer(
     sink
 }
 
-/// Width and height of an image stream \[pixels\].
+/// Width and height of an image stream \[pixels\]; `None` for other streams.
 fn image_size(stream: &StreamSchema) -> Option<[usize; 2]> {
     match stream.kind {
         StreamKind::Image { height, width, .. } => Some([width, height]),

@@ -41,7 +41,7 @@ impl BlockFile {
         Ok(Self { file: BufWriter::with_capacity(1 << 16, tempfile::tempfile_in(folder)?), at: 0 })
     }
 
-    /// Appends a block.
+    /// Appends `piece` as a block and returns its position in the file.
     pub(super) fn append(&mut self, piece: &[u8]) -> io::Result<BlockPosition> {
         self.file.write_all(piece)?;
         let place = BlockPosition { at: self.at, bytes: piece.len() as u64 };

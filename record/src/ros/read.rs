@@ -166,7 +166,7 @@ impl MessageType {
         }
     }
 
-    /// Fields of a type, whose name may lack its package.
+    /// Fields of a type, whose name may lack its package; `None` for an unknown type.
     fn fields_of(&self, name: &str) -> Option<&[Field]> {
         let name = short_type_name(name);
         let own = self.types.get(&name).or_else(|| {
@@ -227,7 +227,7 @@ impl CdrReader<'_> {
         Some(())
     }
 
-    /// Reads bytes at the next multiple of their count.
+    /// Reads bytes at the next multiple of their count; `None` at the end of the data.
     fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
         let at = self.at.checked_next_multiple_of(N)?;
         let array = *self.all.get(at..)?.first_chunk::<N>()?;
@@ -254,7 +254,7 @@ impl CdrReader<'_> {
         usize::try_from(u32::from_le_bytes(self.array()?)).ok()
     }
 
-    /// Reads a string. Its count includes the terminating zero.
+    /// Reads a string; `None` for invalid data. Its count includes the terminating zero.
     fn text(&mut self) -> Option<String> {
         let count = self.count()?;
         let bytes = self.all.get(self.at..self.at.checked_add(count)?)?;
@@ -269,7 +269,7 @@ impl Value {
         fields.iter().find(|(known, _)| **known == *name).map(|(_, value)| value)
     }
 
-    /// Name of an element in a list of structures: its `child_frame_id` or `name`.
+    /// Name of an element in a list of structures: its `child_frame_id` or `name`; `None` without one.
     fn element_name(&self) -> Option<&str> {
         let named = self.field("child_frame_id").or_else(|| self.field("name"))?;
         if let Self::Text(name) = named { Some(name) } else { None }
@@ -345,7 +345,7 @@ impl Value {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PathSegment {
     name: String,
-    /// Content of the brackets after the name.
+    /// Content of the brackets after the name; `None` without brackets.
     key: Option<String>,
 }
 

@@ -83,7 +83,8 @@ impl StereoSide {
         camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
     }
 
-    /// Lens distortion, which is the same in all environments.
+    /// Lens distortion, which is the same in all environments; `None` if ROS has no model for the lens. A ray-caster
+    /// camera has no distortion.
     pub(super) fn distortion(self, sensor: &dyn Any) -> Option<Distortion> {
         let Some(camera) = self.camera(sensor) else {
             // Ray-caster cameras are pinhole cameras.
@@ -107,7 +108,8 @@ impl StereoSide {
         Some(Array2::from(rows.collect::<Vec<_>>()))
     }
 
-    /// Intrinsic matrices and poses, with ROS camera axes, of the last arrived images.
+    /// Intrinsic matrices and poses, with ROS camera axes, of the last arrived images; `None` if the sensor is not a
+    /// camera.
     pub(super) fn intrinsics_and_poses(self, sensor: &dyn Any) -> Option<(Array3<f64>, Array2<f64>)> {
         if let Some(camera) = self.camera(sensor) {
             return Some((
@@ -137,7 +139,8 @@ fn rectifications(sensor: &dyn Any) -> Option<std::result::Result<Vec<Rectificat
     Some(rows.map(of).collect())
 }
 
-/// The camera whose timing applies to a camera sensor. Both cameras of a stereo pair capture together.
+/// The camera whose timing applies to a camera sensor. Both cameras of a stereo pair capture together. `None` for other
+/// sensors, ray-caster cameras included.
 pub(super) fn timing_camera(sensor: &dyn Any) -> Option<&Camera> {
     StereoSide::of(sensor).first().and_then(|eye| eye.camera(sensor))
 }
@@ -176,7 +179,8 @@ const RAY_CASTER_CAMERA_CHANNELS: [(&str, ElementType, usize); 4] = [
 ];
 
 impl StreamSource {
-    /// Describes what ROS's `CameraInfo` message cannot express for this camera, and the reason.
+    /// Describes what ROS's `CameraInfo` message cannot express for this camera, and the reason; `None` if nothing is
+    /// missing.
     pub(crate) fn camera_info_gap(&self, sim: &SimulationManager) -> Option<String> {
         let (StreamKind::CameraInfo { camera, distortion, .. }, SourceKind::CameraInfo(uid, _)) =
             (&self.stream.kind, &self.kind)

@@ -14,7 +14,7 @@ use kinetoscope_scene::vector::{add_scaled, dot, scale, sub};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraRayGenerator<'a> {
     pub(crate) projection: &'a Projection,
-    /// Rays of the lens, used instead of the projection's.
+    /// Rays of the lens, used instead of the projection's; `None` for a pinhole.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) thin_lens: Option<ThinLens>,
 }

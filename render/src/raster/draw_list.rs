@@ -37,7 +37,7 @@ pub(crate) struct PlacedInstance {
 }
 
 impl PlacedInstance {
-    /// The triangles of the instance at the selected level.
+    /// The triangles of the instance at the selected level; `None` for a shape without triangles.
     #[inline(always)]
     pub(crate) fn mesh<'a>(&self, instance: &'a Instance) -> Option<&'a RenderMesh> {
         let mesh = instance.mesh()?;

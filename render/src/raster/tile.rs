@@ -133,7 +133,8 @@ impl Tile {
         (block * self.planes + plane) * BLOCK_AREA
     }
 
-    /// The part of a rectangle of blocks that is in this tile: x0, y0, x1, y1, the last included.
+    /// The part of a rectangle of blocks that is in this tile: x0, y0, x1, y1, the last included. `None` if they do not
+    /// overlap.
     #[inline(always)]
     pub(crate) fn overlap(&self, rect: [u16; 4]) -> Option<[usize; 4]> {
         let [x, y] = [self.x0 / BLOCK, self.y0 / BLOCK];

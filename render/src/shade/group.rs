@@ -19,7 +19,7 @@ use kinetoscope_scene::PoseF32;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadingContext<'a> {
     pub(crate) projection: &'a Projection,
-    /// Rays of a lens that bends them.
+    /// Rays of a lens that bends them; `None` for a pinhole.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) poses: &'a [PoseF32],
     pub(crate) placed: &'a [PlacedInstance],

@@ -44,7 +44,7 @@ pub(crate) struct ShadeContext<'a> {
     pub(crate) scene: &'a RenderScene,
     pub(crate) lighting: &'a Lighting,
     pub(crate) shadows: &'a [ShadowMap],
-    /// Shadow rays, used instead of shadow maps.
+    /// Shadow rays, used instead of shadow maps; `None` for shadow maps.
     pub(crate) shadow_rays: Option<ShadowRays<'a>>,
     /// Width of a pixel at depth 1 (for lenses whose rays do not all go forward, at distance 1).
     pub(crate) pixel: f32,

@@ -51,7 +51,7 @@ pub(crate) struct PreparedFrame {
     shadow_rays: bool,
     /// Rays per sample for ambient occlusion.
     occlusion_rays: u16,
-    /// The first instance that mirrors, for rasterized color.
+    /// Index of the first instance that mirrors, for rasterized color; `None` if no instance does.
     first_mirror: Option<usize>,
     pub(crate) tone: ToneCurve,
     /// Factor of light before the tone curve.

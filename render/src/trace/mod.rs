@@ -427,7 +427,7 @@ struct TileSamples<'a> {
     nearness: &'a mut [f32],
     /// Ids of all samples of the tile.
     ids: &'a mut [u32],
-    /// Indices of the eight samples.
+    /// Indices of the eight samples in `nearness` and `ids`.
     at: [usize; WIDTH],
 }
 

@@ -55,7 +55,7 @@ pub enum RenderError {
     /// An instance's pose is not finite, or its matrix is not a rotation.
     #[error("the pose of instance {instance} is not a rigid transform: {pose:?}")]
     InstancePose {
-        /// Index of the instance.
+        /// Index of the instance in the scene.
         instance: usize,
         /// The pose.
         pose: kinetoscope_scene::PoseF32,

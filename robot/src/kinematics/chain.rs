@@ -27,7 +27,7 @@ pub(super) struct ChainJoint {
     pub(super) axis: Unit<Vector3<f64>>,
     /// True for a translation along the axis, false for a rotation about it.
     pub(super) is_prismatic: bool,
-    /// Index of the variable.
+    /// Index of the variable among those of the chain.
     pub(super) variable: usize,
     /// Position of the joint = ratio * variable + offset.
     pub(super) ratio: f64,

@@ -7,7 +7,7 @@ pub enum KinematicsError {
     /// A link does not exist.
     #[error("link {index} does not exist; there are {count}")]
     NoSuchLink {
-        /// Index of the link.
+        /// Index of the link in [`RobotDescription::links`](crate::description::RobotDescription::links).
         index: usize,
         /// Number of links of the robot.
         count: usize,

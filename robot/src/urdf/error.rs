@@ -329,7 +329,7 @@ pub enum UrdfError {
         uri: String,
         /// Every path that was tried.
         tried: Vec<String>,
-        /// Additional hint.
+        /// Additional hint; `None` without one.
         hint: Option<String>,
     },
     /// The package of a collision mesh was not found.

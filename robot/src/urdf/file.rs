@@ -23,7 +23,8 @@ pub struct UrdfFile {
     pub joints: Vec<JointMetadata>,
     /// Tree of links.
     pub tree: Tree,
-    /// `meshdir` of `<mujoco><compiler>` as written, the folder in which meshes are searched last.
+    /// `meshdir` of `<mujoco><compiler>` as written, the folder in which meshes are searched last; `None` if the file
+    /// does not set it.
     pub meshdir: Option<String>,
     /// Warnings about repaired or ignored elements.
     pub diagnostics: Vec<Diagnostic>,

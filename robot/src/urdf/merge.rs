@@ -92,7 +92,7 @@ struct Merge<'c> {
     joints: Vec<Joint>,
     link_names: NameRegistry,
     joint_names: NameRegistry,
-    /// Index of the first link of each component.
+    /// Index, in `links`, of the first link of each component.
     first_link: Vec<usize>,
     diagnostics: Vec<Diagnostic>,
 }

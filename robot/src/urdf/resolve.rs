@@ -39,7 +39,7 @@ pub(super) enum Resolved {
         most_likely: PathBuf,
         /// Every path that was tried.
         tried: Vec<String>,
-        /// Additional hint, such as a file whose name differs only in case.
+        /// Additional hint, such as a file whose name differs only in case; `None` without one.
         hint: Option<String>,
     },
     /// The package was not found.
@@ -300,7 +300,7 @@ impl PackageSearch {
     }
 }
 
-/// Reads the `<name>` of the `package.xml` in a folder.
+/// Reads the `<name>` of the `package.xml` in a folder; `None` without a readable one.
 fn declared_name(folder: &Path) -> Option<String> {
     let path = folder.join("package.xml");
     let metadata = std::fs::metadata(&path).ok()?;

@@ -64,7 +64,7 @@ pub enum HullError {
     /// A coordinate is infinite or not a number.
     #[error("point {index} is {value:?}; expected finite coordinates")]
     NonFinite {
-        /// Index of the point.
+        /// Index of the point among the given ones.
         index: usize,
         /// Coordinates of the point \[m\].
         value: [f32; 3],

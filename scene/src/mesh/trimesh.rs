@@ -24,15 +24,15 @@ pub enum InvalidMesh {
     NonFinite {
         /// "position", "normal" or "texture coordinate".
         what: &'static str,
-        /// Index of the element.
+        /// Index of the element in the list that `what` names.
         index: usize,
     },
     /// A triangle refers to a missing vertex.
     #[error("triangle {triangle} refers to vertex {index}, but the mesh has {positions} vertices")]
     Index {
-        /// Index of the triangle.
+        /// Index of the triangle in the mesh.
         triangle: usize,
-        /// Index of the vertex.
+        /// Index of the vertex, which is not below `positions`.
         index: u32,
         /// Number of positions.
         positions: usize,
@@ -59,7 +59,7 @@ pub enum InvalidMesh {
     Material {
         /// Index of the submesh.
         part: usize,
-        /// Index of the material.
+        /// Index of the material in the mesh, which is not below `materials`.
         material: usize,
         /// Number of materials.
         materials: usize,

@@ -6,7 +6,7 @@ pub(super) struct ContactTimers {
     bodies: usize,
     dt: f64,
     threshold: f64,
-    /// Step of the last update of each environment.
+    /// Physics step of the last update of each environment.
     last_step: Vec<u64>,
     /// Phases, environment by environment, body by body.
     phases: Vec<ContactPhase>,
@@ -43,7 +43,7 @@ impl ContactTimers {
         Self { bodies, dt, threshold, last_step, phases, net: vec![0.0; 3 * bodies] }
     }
 
-    /// Updates environment `env` at `step`; `net_forces` adds the net forces on its bodies \[N\].
+    /// Updates environment `env` at the physics step `step`; `net_forces` adds the net forces on its bodies \[N\].
     pub(super) fn update(&mut self, env: usize, step: u64, net_forces: impl FnOnce(&mut [f64])) {
         let steps = step.saturating_sub(self.last_step[env]);
         if steps == 0 {
@@ -58,7 +58,8 @@ impl ContactTimers {
         }
     }
 
-    /// Resets environment `env` at `step`. All times restart at 0, and bodies in contact report no first contact.
+    /// Resets environment `env` at the physics step `step`. All times restart at 0, and bodies in contact report no
+    /// first contact.
     pub(super) fn reset(&mut self, env: usize, step: u64, net_forces: impl FnOnce(&mut [f64])) {
         self.last_step[env] = step;
         self.net.fill(0.0);
@@ -95,7 +96,7 @@ fn is_contact(force: &[f64], threshold: f64) -> bool {
 }
 
 impl ContactPhase {
-    /// Updates the phase with the contact state of the last `steps` steps.
+    /// Updates the phase with the contact state of the last `steps` physics steps.
     fn update(&mut self, touches: bool, steps: u64) {
         if touches && !self.in_contact {
             (self.began, self.last_air, self.contact) = (true, self.air, 0);

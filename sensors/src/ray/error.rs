@@ -44,7 +44,7 @@ pub enum RayError {
     Ray {
         /// Name of the pattern.
         pattern: &'static str,
-        /// Index of the ray.
+        /// Index of the ray in the pattern.
         ray: usize,
         /// Origin in the frame of the sensor \[m\].
         start: [f64; 3],

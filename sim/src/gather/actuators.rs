@@ -4,7 +4,7 @@ use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// Indices of the drives of all robots.
+/// Indices, in the drive table, of the drives of all robots, in the order of their joints.
 fn drives(simulation: &Simulation) -> impl Iterator<Item = usize> {
     simulation.robots.iter().flat_map(|robot| &robot.joints).filter_map(|joint| joint.drive)
 }

@@ -44,8 +44,8 @@ impl Robot<'_> {
         self.active_joints().map(|joint| self.joint_names()[joint.0].as_str()).collect()
     }
 
-    /// Indices of the mimic joints. [`mimic_drivers`](Self::mimic_drivers) has the driver, multiplier and offset of
-    /// every joint.
+    /// Indices of the mimic joints in [`joint_names`](Self::joint_names). [`mimic_drivers`](Self::mimic_drivers) has
+    /// the driver, multiplier and offset of every joint.
     #[doc(alias = "mimic_ids")]
     pub fn mimic_joint_ids(&self) -> Vec<JointIndex> {
         (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_some()).collect()

@@ -31,7 +31,7 @@ pub enum RandomizationError {
     /// A value is invalid for the property.
     #[error("environment {env}: {property} of {name:?} would be {value:?}; {expected}")]
     Value {
-        /// Index of the environment.
+        /// Index of the environment in the simulation.
         env: usize,
         /// Name of the property.
         property: &'static str,
@@ -45,7 +45,7 @@ pub enum RandomizationError {
     /// Gains or limits of a drive are invalid for its explicit model.
     #[error("environment {env}: the drive model of {name:?} does not accept the new gains or limits: {expected}")]
     Model {
-        /// Index of the environment.
+        /// Index of the environment in the simulation.
         env: usize,
         /// Name of the joint.
         name: String,
@@ -75,7 +75,7 @@ pub enum RandomizationError {
     /// The scene of an environment cannot be rendered.
     #[error("environment {env}: its scene cannot be rendered: {error}")]
     EnvScene {
-        /// Index of the environment.
+        /// Index of the environment in the simulation.
         env: usize,
         /// Error of the scene.
         #[source]
@@ -89,7 +89,7 @@ pub enum RandomizationError {
          mass that differs from its origin"
     )]
     DiagonalInertia {
-        /// Index of the environment.
+        /// Index of the environment in the simulation.
         env: usize,
         /// Name of the body.
         name: String,

@@ -15,11 +15,11 @@ pub struct RobotOverrides {
     pub base: RootAttachment,
     /// MuJoCo's `contype` and `conaffinity` for every geom that collides in the file or is in `colliding`.
     pub contact: [i32; 2],
-    /// Indices of the geom pairs that are omitted.
+    /// Indices, in the file's model, of the geom pairs that are omitted.
     pub pairs: BTreeSet<usize>,
-    /// Indices of geoms that collide although the bits in the file disable their collisions.
+    /// Indices, in the file's model, of geoms that collide although the bits in the file disable their collisions.
     pub colliding: BTreeSet<usize>,
-    /// Mass properties that replace those of the file, by body.
+    /// Mass properties that replace those of the file, by index of the body in the file's model.
     pub inertials: BTreeMap<usize, Inertial>,
 }
 
@@ -43,7 +43,7 @@ pub enum RootAttachment {
     Fixed(usize),
     /// Free joint that the file does not have.
     Free {
-        /// Index of the body.
+        /// Index of the body in the file's model.
         body: usize,
         /// Full name of the joint.
         name: String,

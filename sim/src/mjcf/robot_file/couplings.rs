@@ -17,7 +17,7 @@ pub(super) enum Coupling {
     Mimic {
         /// Location of the equality.
         source: SourceLocation,
-        /// Index of the followed joint.
+        /// Index of the followed joint in the file's model.
         driver: usize,
         /// Factor of the position of the followed joint.
         multiplier: f64,

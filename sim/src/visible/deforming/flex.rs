@@ -51,7 +51,7 @@ pub(super) struct Cloth {
 /// Vertex of the rendered mesh.
 #[derive(Clone, Copy, Debug)]
 struct FlexVertex {
-    /// Index of the flex vertex.
+    /// Index of the vertex in the flex.
     vertex: u32,
     /// Distance along the smooth normal \[m\].
     offset: f32,
