@@ -199,7 +199,7 @@ impl ModelEditor {
         self.geom_rbound_mut()[geom] = radius;
     }
 
-    /// Sets gravity \[m/s²\]; [`set_constants`](Self::set_constants) is not needed.
+    /// Sets gravity in world axes \[m/s²\]; [`set_constants`](Self::set_constants) is not needed.
     pub fn set_gravity(&mut self, gravity: [f64; 3]) {
         self.copy.header_mut().opt.gravity = gravity;
     }

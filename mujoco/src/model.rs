@@ -372,7 +372,7 @@ impl Model {
         self.header().opt.timestep
     }
 
-    /// Gravity \[m/s²\] (`opt.gravity`), also if it is disabled.
+    /// Gravity in world axes \[m/s²\] (`opt.gravity`), also if it is disabled.
     pub fn gravity(&self) -> [f64; 3] {
         self.header().opt.gravity
     }

@@ -41,6 +41,7 @@ impl Data {
     }
 
     /// Computes the nearest intersections of rays from one point (`mj_multiRay`), by the rules of [`ray`](Self::ray).
+    /// `origin` and `directions` are in the world frame \[m\].
     ///
     /// `distances` receives distances in multiples of the lengths of the directions, -1 for a ray without a hit. MuJoCo
     /// culls geoms for all rays at once.

@@ -9,7 +9,7 @@ use kinetoscope_scene::camera_fit::CameraFit;
 use kinetoscope_sensors::camera::look_at_pose;
 use kinetoscope_sim::{OffscreenScene, SimulationManager};
 
-/// Settings of the overview image.
+/// Size, rate and viewpoint of the overview image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OverviewCfg {
     /// Width and height \[pixels\].

@@ -20,7 +20,7 @@ pub struct Event {
     pub text: String,
 }
 
-/// Kind of an event.
+/// Reset, write, divergence or note.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EventKind {
     /// Environments were reset.

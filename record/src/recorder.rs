@@ -82,7 +82,7 @@ impl Record for SimulationManager {
     }
 }
 
-/// Summary of a recording.
+/// Path, size, counts and omitted content of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingSummary {
     /// Output file or folder.

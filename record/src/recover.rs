@@ -13,7 +13,7 @@ use std::path::Path;
 /// Upper limit of the uncompressed size of a chunk \[bytes\].
 const LARGEST_CHUNK: usize = 1 << 30;
 
-/// Result of a recovery.
+/// Number of recovered messages, and damage of the partial file, from [`recover`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recovered {
     /// Number of messages in the recovered file.

@@ -21,7 +21,7 @@ use serde_json::Value;
 use std::fmt;
 use std::path::Path;
 
-/// Result of a replay.
+/// Numbers of repeated steps and of reproduced values, and the first difference, of a replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplayResult {
     /// Number of repeated physics steps, until the end or the first difference.

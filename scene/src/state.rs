@@ -17,7 +17,7 @@ use std::sync::Arc;
 quantities! {
     /// Flag of [`SceneState::body_poses`].
     POSES = "poses" {
-        /// Poses of bodies `[x, y, z, qw, qx, qy, qz]` \[m\], shape \[num_envs, bodies, 7\].
+        /// Poses of body frames in the environment, `[x, y, z, qw, qx, qy, qz]` \[m\], shape \[num_envs, bodies, 7\].
         body_poses: Array3<f64> [bodies, 7],
     }
 

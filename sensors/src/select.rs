@@ -58,10 +58,10 @@ pub(crate) fn read_columns(fields: [&Option<Array2<f64>>; 3], columns: &[usize],
 /// A configuration field that selects items by name, for errors.
 #[derive(Clone, Copy)]
 pub(crate) struct Selection {
-    /// Kind of sensor.
+    /// Kind of sensor in the error text, such as `joint wrench`.
     pub(crate) sensor: &'static str,
     pub(crate) field: &'static str,
-    /// Kind of item.
+    /// Kind of the selected items in the error text, such as `joint`.
     pub(crate) what: &'static str,
 }
 

@@ -40,8 +40,8 @@ pub struct LightCfg {
     /// Position in the environment \[m\]; unused by directional lights and domes.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub position: Vector3<f64>,
-    /// Direction of the emitted light, from the light to the scene; its length does not matter. Unused by point lights
-    /// and domes, but never zero.
+    /// Direction of the emitted light in world axes, from the light to the scene; its length does not matter. Unused by
+    /// point lights and domes, but never zero.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub direction: Vector3<f64>,
     /// Color, 0..=1.

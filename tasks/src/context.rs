@@ -31,7 +31,7 @@ impl TaskState {
 }
 
 impl<'e> TermContext<'e> {
-    /// The simulation.
+    /// Read access to the simulation, in the state at which the term is evaluated.
     pub fn sim(&self) -> &'e SimulationManager {
         &self.state.sim
     }

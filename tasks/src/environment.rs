@@ -65,7 +65,8 @@ impl std::fmt::Debug for Env {
 
 /// Accessors.
 impl Env {
-    /// The simulation.
+    /// Read access to the simulation in its current state: after the last step, including the resets of episodes that
+    /// ended in it.
     pub fn sim(&self) -> &SimulationManager {
         &self.state.sim
     }
@@ -95,7 +96,7 @@ impl Env {
         self.state.context()
     }
 
-    /// Lengths of steps and episodes.
+    /// Configuration of the task: lengths of steps and episodes.
     pub fn cfg(&self) -> &EnvCfg {
         &self.cfg
     }

@@ -48,7 +48,7 @@ pub(crate) trait DatasetWriter: Send {
     fn partial_path(&self) -> Option<PathBuf>;
 }
 
-/// Content of a frame.
+/// Features, images, reward and end flag of one environment at one row of a dataset.
 pub(crate) struct EpisodeFrame<P> {
     /// Values of each feature.
     pub(crate) numbers: Vec<Vec<f64>>,

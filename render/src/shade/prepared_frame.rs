@@ -60,7 +60,7 @@ pub(crate) struct PreparedFrame {
     pub(crate) only_row: Option<usize>,
 }
 
-/// Settings of a renderer.
+/// Renderer, its configuration and the camera's optics, for one frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RenderSettings<'a> {
     pub(crate) cfg: RasterCfg,

@@ -11,14 +11,14 @@ use std::ops::{Add, AddAssign, Mul};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SpatialMotion {
     pub(super) angular: Vector3<f64>,
-    /// Velocity of the body point that coincides with the origin.
+    /// Velocity of the body point that coincides with the origin, in world axes \[m/s\].
     pub(super) linear: Vector3<f64>,
 }
 
 /// Force vector: a force or a momentum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SpatialForce {
-    /// Moment about the origin.
+    /// Moment about the origin, in world axes \[N m\].
     pub(super) moment: Vector3<f64>,
     pub(super) force: Vector3<f64>,
 }
@@ -27,9 +27,9 @@ pub(super) struct SpatialForce {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SpatialInertia {
     pub(super) mass: f64,
-    /// Mass times center of mass \[kg m\].
+    /// Mass times center of mass, in world axes \[kg m\].
     pub(super) first_moment: Vector3<f64>,
-    /// Rotational inertia about the origin.
+    /// Rotational inertia about the origin, in world axes \[kg m²\].
     pub(super) inertia: Matrix3<f64>,
 }
 

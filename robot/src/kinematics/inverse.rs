@@ -42,7 +42,7 @@ pub struct IkSolution<'s> {
     pub position_error: f64,
     /// Angle between the frame and the target \[rad\]; also given where only the position had to be reached.
     pub rotation_error: f64,
-    /// Number of steps of all starts and of the refinement together.
+    /// Number of solver iterations of all starts and of the refinement together.
     pub iterations: u32,
     /// Index of the start that led to the result; 0 is the start from the initial positions.
     pub seed: u32,

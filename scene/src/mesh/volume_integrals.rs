@@ -15,7 +15,7 @@ use std::collections::HashMap;
 pub struct VolumeIntegrals {
     /// Volume \[m³\], positive.
     pub volume: f64,
-    /// Center of volume \[m\].
+    /// Center of volume in the frame of the mesh \[m\].
     pub center: Vector3<f64>,
     /// Integral of `r rᵀ` over the volume \[m⁵\], with `r` from the center.
     pub second_moment: Matrix3<f64>,

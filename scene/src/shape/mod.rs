@@ -152,7 +152,8 @@ impl Shape {
         bounds.as_flattened().iter().all(|x| x.is_finite()).then_some(bounds)
     }
 
-    /// Support function: the largest coordinate along a direction, times the length of the direction \[m\].
+    /// Support function: the largest coordinate along a direction in the frame of the shape, times the length of the
+    /// direction \[m\].
     ///
     /// Infinite along an infinite axis of a plane.
     pub fn support(&self, direction: V3) -> f64 {
@@ -162,8 +163,8 @@ impl Shape {
         }
     }
 
-    /// Smallest and largest coordinates along a direction, times the length of the direction \[m\]; infinite along an
-    /// infinite axis of a plane.
+    /// Smallest and largest coordinates along a direction in the frame of the shape, times the length of the direction
+    /// \[m\]; infinite along an infinite axis of a plane.
     pub fn extent(&self, direction: V3) -> [f64; 2] {
         match self.geometry() {
             ShapeKind::ClosedForm(shape) => [-shape.support(direction.map(|x| -x)), shape.support(direction)],

@@ -95,7 +95,7 @@ fn unproject_along(
     }
 }
 
-/// Returns the finite points of a map, shape (points, 3).
+/// Returns the finite points of a map, in the frame of the map \[m\], shape (points, 3).
 pub(crate) fn hits_of(map: ArrayView3<'_, f32>) -> Array2<f32> {
     let points = map.rows().into_iter().map(|p| [p[0], p[1], p[2]]).filter(|p| p[0].is_finite());
     Array2::from(points.collect::<Vec<[f32; 3]>>())

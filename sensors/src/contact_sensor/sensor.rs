@@ -145,7 +145,8 @@ impl ContactSensor {
         self.sampler.history_as(channel, (n, t, self.names.len(), 3))
     }
 
-    /// Sum of the normal forces on each body \[N\], shape (N, B, 3), over all counterparts, without friction.
+    /// Sum of the normal forces on each body, in world axes \[N\], shape (N, B, 3), over all counterparts, without
+    /// friction.
     pub fn net_forces_w(&self) -> ArrayView3<'_, f64> {
         self.vectors("net_forces_w")
     }
@@ -155,7 +156,8 @@ impl ContactSensor {
         self.past_vectors("net_forces_w")
     }
 
-    /// Sum of the friction forces on each body \[N\], shape (N, B, 3): the tangential parts of the contact forces.
+    /// Sum of the friction forces on each body, in world axes \[N\], shape (N, B, 3): the tangential parts of the
+    /// contact forces.
     pub fn friction_forces_w(&self) -> ArrayView3<'_, f64> {
         self.vectors("friction_forces_w")
     }
@@ -165,7 +167,7 @@ impl ContactSensor {
         self.past_vectors("friction_forces_w")
     }
 
-    /// Sum of the contact forces on each body, including friction \[N\], shape (N, B, 3).
+    /// Sum of the contact forces on each body, including friction, in world axes \[N\], shape (N, B, 3).
     pub fn total_forces_w(&self) -> ArrayView3<'_, f64> {
         self.vectors("total_forces_w")
     }

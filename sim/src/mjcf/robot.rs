@@ -41,7 +41,7 @@ pub(crate) struct VisualAssets {
 /// Part of a visual mesh with one material.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct VisualSubmesh {
-    /// Name of the mesh asset.
+    /// Name of the mesh asset in the document.
     pub mesh: String,
     /// Name of the material asset; `None` if the mesh file gives no material.
     pub material: Option<String>,
@@ -87,7 +87,7 @@ pub(crate) struct RobotLayout {
 /// Link and visual that a geom belongs to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GeomOwner {
-    /// Name of the geom.
+    /// Name of the geom in the document.
     pub geom: String,
     /// Link of the geom, fused or not.
     pub link: LinkId,
@@ -98,7 +98,7 @@ pub(crate) struct GeomOwner {
 /// Joint whose viscous damping is left out of the document; its armature there includes the implicit part.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct DampedJoint {
-    /// Name of the joint.
+    /// Name of the joint in the document.
     pub joint: String,
     /// Number of its degrees of freedom.
     pub dofs: usize,
@@ -111,7 +111,7 @@ pub(crate) struct DampedJoint {
 /// Frame of a link in its body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LinkFrame {
-    /// Name of the body.
+    /// Name of the body in the document.
     pub body: String,
     /// Pose of the link in the body.
     pub body_from_link: Pose,

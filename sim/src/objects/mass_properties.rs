@@ -10,11 +10,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 pub(crate) struct MassProperties {
     /// Mass \[kg\].
     pub(crate) mass: f64,
-    /// Center of mass \[m\].
+    /// Center of mass in the frame of the object \[m\].
     pub(crate) com: Vector3<f64>,
     /// Principal axes, `object_from_principal`.
     pub(crate) axes: UnitQuaternion<f64>,
-    /// Principal moments about the center of mass \[kg m²\].
+    /// Principal moments of inertia about the center of mass \[kg m²\].
     pub(crate) moments: Vector3<f64>,
 }
 

@@ -35,9 +35,10 @@ use serde::{Deserialize, Serialize};
 pub struct TerrainCfg {
     /// Name of the terrain, unique in the simulation.
     pub uid: String,
-    /// Heights \[m\] over a regular grid, rows along y, columns along x, starting at -y and -x. Between the points the
-    /// surface consists of two triangles per cell, which meet in the diagonal from (-x, -y) to (+x, +y). MuJoCo stores
-    /// heights in single precision, as fractions of the range from the lowest to the highest.
+    /// Heights above the origin of the terrain frame \[m\], over a regular grid, rows along y, columns along x,
+    /// starting at -y and -x. Between the points the surface consists of two triangles per cell, which meet in the
+    /// diagonal from (-x, -y) to (+x, +y). MuJoCo stores heights in single precision, as fractions of the range from
+    /// the lowest to the highest.
     #[serde(serialize_with = "rows")]
     pub heights: Array2<f64>,
     /// Lengths along x and y, from the first point to the last \[m\].

@@ -28,7 +28,7 @@ pub(crate) struct SceneContext<'a> {
     pub(crate) static_bodies: &'a [usize],
 }
 
-/// Properties of a compiled scene.
+/// Elements and nominal values of each randomizable property of a compiled scene.
 #[derive(Clone, Debug)]
 pub(crate) struct PropertyTables {
     /// Tables in the order of [`Property::ALL`].

@@ -47,7 +47,7 @@ pub struct Snapshot {
     entries: Arc<[EnvEntry]>,
 }
 
-/// State of one environment.
+/// Saved state and properties of one environment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct EnvEntry {
     /// Index of the environment that the state was taken from.

@@ -19,7 +19,7 @@ pub trait RecordControl: Send {
     fn state(&self, sim: &SimulationManager) -> RecordingState;
 }
 
-/// State of a recording.
+/// State of a recording for the record button: on or off, and a text.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingState {
     /// True while recording.

@@ -51,7 +51,7 @@ pub struct Snapshot {
     /// Point of view of the last [`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view), in the frame of
     /// the overview; `None` before the first call.
     pub viewpoint: Option<Viewpoint>,
-    /// State of each environment.
+    /// Visible state of each environment, in the order of the simulation.
     pub envs: Vec<SnapshotEnv>,
     /// Environments whose contacts are included; `None` if no viewer requested contacts.
     pub contacts_included: Option<EnvSelection>,
@@ -120,7 +120,7 @@ pub struct JointEntry {
     pub is_prismatic: bool,
 }
 
-/// State of one environment.
+/// Poses, contacts, joints, markers and camera views of one environment, for viewers.
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotEnv {
     /// Position of the environment's origin in the overview \[m\].

@@ -166,7 +166,7 @@ impl RayCaster {
         self.rays.rays().len()
     }
 
-    /// Hit points, shape (N, B, 3) \[m\]; (+inf, +inf, +inf) for a miss.
+    /// Hit points in the frame of the environment \[m\], shape (N, B, 3); (+inf, +inf, +inf) for a miss.
     pub fn hits(&self) -> ArrayView3<'_, f64> {
         self.hits.points.view()
     }
@@ -203,12 +203,13 @@ impl RayCaster {
         self.hits.ids.view()
     }
 
-    /// Unit normals of the hit surfaces, facing the origin of the ray, shape (N, B, 3); 0 for a miss.
+    /// Unit normals of the hit surfaces in world axes, facing the origin of the ray, shape (N, B, 3); 0 for a miss.
     pub fn normals(&self) -> ArrayView3<'_, f64> {
         self.sampler().values_as("normals", (self.sampler().num_envs(), self.num_rays(), 3))
     }
 
-    /// Origins of the rays at the current measurement, shape (N, B, 3) \[m\]; computed at every call.
+    /// Origins of the rays at the current measurement, in the frame of the environment \[m\], shape (N, B, 3); computed
+    /// at every call.
     pub fn ray_starts(&self) -> Array3<f64> {
         self.map_rays(|ray| ray.origin)
     }
