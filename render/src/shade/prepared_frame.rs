@@ -51,7 +51,8 @@ pub(crate) struct PreparedFrame {
     shadow_rays: bool,
     /// Rays per sample for ambient occlusion.
     occlusion_rays: u16,
-    /// Index of the first instance that mirrors, for rasterized color; `None` if no instance does.
+    /// Index of the first instance that mirrors, for rasterized color; `None` if no instance does, without color, or if
+    /// reflections are off.
     first_mirror: Option<usize>,
     pub(crate) tone: ToneCurve,
     /// Factor of light before the tone curve.

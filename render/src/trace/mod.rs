@@ -83,7 +83,7 @@ pub(crate) struct Hit {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraView<'a> {
     pub(crate) projection: &'a Projection,
-    /// Rays of a lens that bends them.
+    /// Rays of a lens that bends them; `None` for a pinhole.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) placed: &'a [PlacedInstance],
     /// First id of each instance in the visibility buffer.

@@ -27,7 +27,7 @@ impl ShutterOpenPoses {
         Self { poses: vec![PoseF32::IDENTITY; instances], parent: None }
     }
 
-    /// Returns the poses of instances and parent in the environment; `None` while the shutter is closed.
+    /// Returns the poses of instances and parent in the environment; `None` while there are no poses.
     pub(super) fn get(&self) -> Option<(&[PoseF32], Pose)> {
         Some((&self.poses, self.parent?))
     }
