@@ -1,7 +1,7 @@
 //! `kinetoscope check`: report on the contents of robot files, with warnings.
 
 use crate::command_status::{CommandStatus, Result};
-use crate::model::{Files, ModelArgs, Setup, may_be_scene};
+use crate::model::{Files, ModelArgs, Setup, has_floating_root, may_be_scene};
 use crate::scene_report::{MjcfReport, SceneReport};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Error;
@@ -36,7 +36,10 @@ Exit codes: 0 no warnings; 1 with warnings; 2 refused.";
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let mut cfg = InspectCfg { floating_base: args.model.floating_base, qpos: args.qpos.clone(), ..Default::default() };
     match args.model.files()? {
-        Files::Urdf(urdf) => cfg.urdf = urdf,
+        Files::Urdf(urdf) => {
+            cfg.floating_base &= !has_floating_root(&urdf);
+            cfg.urdf = urdf;
+        }
         Files::Mjcf(path) => cfg.mjcf = Some(MjcfFile::new(path)),
         Files::Scene(path) => return scene(args, &path),
     }

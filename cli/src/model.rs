@@ -71,7 +71,8 @@ pub(crate) struct Setup {
     pub(crate) options: Option<FileOptions>,
 }
 
-/// Options of an MJCF file that a simulation has as well.
+/// Options of an MJCF file that apply to its simulation. Values that no simulation accepts, and the integrator, which
+/// must fit the drives, are those of simulations, with a warning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FileOptions {
     /// Time step \[s\].
@@ -89,12 +90,15 @@ impl FileOptions {
         let model = mujoco::compile_file(path).ok()?.into_model();
         let options = model.options();
         let text = |name: &str| options.iter().find(|(known, _)| *known == name).map(|(_, value)| value.as_str());
+        let defaults = SimulationManagerCfg::default();
+        let number = |name: &str| text(name).and_then(|value| value.parse::<f64>().ok()).filter(|value| *value > 0.0);
+        let timestep = Some(model.timestep()).filter(|timestep| (1e-9..=1.0).contains(timestep));
         Some(Self {
-            timestep: model.timestep(),
+            timestep: timestep.unwrap_or(defaults.physics_dt),
             gravity: model.gravity(),
             cone: if text("cone") == Some("elliptic") { FrictionCone::Elliptic } else { FrictionCone::Pyramidal },
-            impratio: text("impratio")?.parse().ok()?,
-            iterations: text("iterations")?.parse().ok()?,
+            impratio: number("impratio").unwrap_or(defaults.impratio),
+            iterations: number("iterations").map_or(defaults.solver_iterations, |count| count.min(1e6) as u32),
         })
     }
 }
@@ -257,10 +261,11 @@ impl ModelArgs {
         }
         match self.files()? {
             Files::Urdf(urdf) => {
-                // The link that a floating joint of the file hangs on stays fixed to the world.
+                // The empty link that the floating joint of the file hangs on stays fixed to the world.
                 let floats = has_floating_root(&urdf);
                 let args = Self { floating_base: self.floating_base && !floats, ..self.clone() };
-                let clearance = setup.spawn_height.or((self.floating_base || floats).then_some(0.0));
+                let on_ground = self.floating_base || floats && setup.ground;
+                let clearance = setup.spawn_height.or(on_ground.then_some(0.0));
                 args.robot(setup, RobotCfg { urdf, ..Default::default() }, clearance)
             }
             Files::Mjcf(path) => self.mjcf(setup, &path),
@@ -376,12 +381,18 @@ fn parse_folder(text: &str) -> std::result::Result<PathBuf, String> {
     if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is not a folder")) }
 }
 
-/// True if the root of the first component has a floating joint, so that the robot moves freely.
-fn has_floating_root(urdf: &UrdfCfg) -> bool {
+/// True if the robot of a URDF floats by itself: the root of its first component is an empty link, and its only joint is
+/// floating.
+pub(crate) fn has_floating_root(urdf: &UrdfCfg) -> bool {
     let file = urdf.components.first().and_then(|first| urdf::parse_file(&first.urdf).ok());
     file.is_some_and(|file| {
-        let joints = &file.robot.joints;
-        let is_root = |link: &str| joints.iter().all(|joint| joint.child.link != link);
-        joints.iter().any(|joint| joint.joint_type == urdf::urdf_rs::JointType::Floating && is_root(&joint.parent.link))
+        let (joints, links) = (&file.robot.joints, file.robot.links.iter().zip(&file.links));
+        let mut root = links.filter(|(link, _)| joints.iter().all(|joint| joint.child.link != link.name));
+        root.next().is_some_and(|(root, metadata)| {
+            let has_mass = metadata.inertial.is_some() || metadata.partial_inertial.is_some();
+            let mut below = joints.iter().filter(|joint| joint.parent.link == root.name);
+            let floats = below.next().is_some_and(|joint| joint.joint_type == urdf::urdf_rs::JointType::Floating);
+            floats && below.next().is_none() && !has_mass && root.visual.is_empty() && root.collision.is_empty()
+        })
     })
 }

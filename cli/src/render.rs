@@ -109,10 +109,6 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
         eprintln!("warning: {left_out}");
         warned = true;
     }
-    if !still.visible().scene().instances().iter().any(|instance| instance.visible) {
-        eprintln!("warning: the model has no visible shape: the image shows only the background");
-        warned = true;
-    }
     let view = args.look.view(&still)?;
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);
@@ -123,6 +119,10 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     progress::with_progress("paths", || progress.fraction(), || rasterizer.render(&mut job))
         .map_err(|(_, error)| error)?;
     let seconds = start.elapsed().as_secs_f64();
+    if !warned && frame.mask.iter().flatten().all(|id| *id == 0) {
+        eprintln!("warning: the image shows only the background: no visible shape is in view");
+        warned = true;
+    }
     channel_image::write(&frame, args.channel, [view.width, view.height], &args.out)?;
     println!("{}: {} x {} pixels in {:.1} ms", args.out.display(), view.width, view.height, 1e3 * seconds);
     Ok(if warned { CommandStatus::Warned } else { CommandStatus::Done })

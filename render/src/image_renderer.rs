@@ -156,8 +156,12 @@ impl ImageRenderer {
     ///
     /// For an invalid request or buffer, for invalid settings, and for canceled path tracing; the frame is unchanged
     /// then.
-    pub fn render_request(&mut self, shot: &RenderRequest<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
-        self.render_sample(shot, &FrameSample::default(), frame)
+    pub fn render_request(
+        &mut self,
+        render_request: &RenderRequest<'_>,
+        frame: &mut FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        self.render_sample(render_request, &FrameSample::default(), frame)
     }
 
     /// As [`render_request`](Self::render_request), with the noise number and the poses at shutter opening of `take`.
@@ -168,14 +172,14 @@ impl ImageRenderer {
     /// As [`render_request`](Self::render_request), and for invalid or too recent poses at shutter opening.
     pub fn render_sample(
         &mut self,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         take: &FrameSample<'_>,
         frame: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let paths = self.renderer.path_count(shot, frame);
+        let paths = self.renderer.path_count(render_request, frame);
         self.progress.begin(paths);
         if self.renderer.is_path_tracing() {
-            let result = path_trace(&ThreadPool::serial(), std::slice::from_mut(self), shot, take, frame);
+            let result = path_trace(&ThreadPool::serial(), std::slice::from_mut(self), render_request, take, frame);
             if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Canceled { .. })) {
                 self.progress.subtract(paths.saturating_sub(self.progress.samples()));
             }
@@ -192,20 +196,20 @@ impl ImageRenderer {
                 exposure_compensation: *exposure_compensation,
                 assets,
             },
-            shot,
+            render_request,
             frame,
         )?;
         for band in prepared.shadow_bands() {
-            scratch.render_shadow_band(shot.scene, band);
+            scratch.render_shadow_band(render_request.scene, band);
         }
-        scratch.render_band(prepared, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
+        scratch.render_band(prepared, render_request, frame, 0..render_request.view.height.div_ceil(BLOCK));
         Ok(())
     }
 
     /// Renders one row of an image, at its own instant, into a frame of that row.
     pub(super) fn render_row(
         &mut self,
-        shot: &RenderRequest<'_>,
+        render_request: &RenderRequest<'_>,
         interval: &ShutterInterval<'_>,
         y: usize,
         row: &mut FrameMut<'_>,
@@ -221,6 +225,6 @@ impl ImageRenderer {
             exposure_compensation: *exposure_compensation,
             assets,
         };
-        rolling_shutter.render_row(scratch, style, shot, interval, y, row)
+        rolling_shutter.render_row(scratch, style, render_request, interval, y, row)
     }
 }

@@ -172,12 +172,15 @@ impl ParallelRenderer {
         let threads = worthwhile_threads(cfg, renderer, jobs).min(*active);
         let rasterizers = &mut renderers[..threads];
         let failure = FirstError::default();
-        progress.begin(jobs.iter().fold(0, |sum, (shot, frame)| sum.saturating_add(renderer.path_count(shot, frame))));
+        progress
+            .begin(jobs.iter().fold(0, |sum, (render_request, frame)| {
+                sum.saturating_add(renderer.path_count(render_request, frame))
+            }));
         if renderer.is_path_tracing() {
-            for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
+            for (index, (render_request, frame)) in jobs.iter_mut().enumerate() {
                 let take = takes.get(index).copied().unwrap_or_default();
-                let (before, paths) = (progress.samples(), renderer.path_count(shot, frame));
-                let result = path_trace(pool, rasterizers, shot, &take, frame);
+                let (before, paths) = (progress.samples(), renderer.path_count(render_request, frame));
+                let result = path_trace(pool, rasterizers, render_request, &take, frame);
                 if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Canceled { .. })) {
                     progress.subtract(paths.saturating_sub(progress.samples().saturating_sub(before)));
                 }
@@ -195,8 +198,8 @@ impl ParallelRenderer {
         };
         let (alone, together) = jobs.split_at_mut(count - together);
         let first = alone.len();
-        pool.for_each(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
-            failure.record(index, rasterizer.render_request(shot, frame));
+        pool.for_each(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (render_request, frame))| {
+            failure.record(index, rasterizer.render_request(render_request, frame));
         });
         if !together.is_empty() {
             prepared.resize_with(prepared.len().max(together.len()), PreparedFrame::default);
@@ -210,7 +213,9 @@ impl ParallelRenderer {
 
 /// Number of threads that pay off for these frames; at least 1.
 fn worthwhile_threads(cfg: RasterCfg, renderer: Renderer, jobs: &[RenderJob<'_>]) -> usize {
-    let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate_cost_ns(cfg, shot, frame)));
+    let cost = jobs
+        .iter()
+        .fold(0usize, |sum, (render_request, frame)| sum.saturating_add(estimate_cost_ns(cfg, render_request, frame)));
     (cost.saturating_mul(renderer.relative_cost(cfg)) / (MIN_THREAD_WORK_NS / 2)).max(1)
 }
 
@@ -245,24 +250,25 @@ fn render_jointly(
     pool.for_each(
         rasterizers,
         plans.iter_mut().zip(&*jobs).enumerate(),
-        |rasterizer, (index, (plan, (shot, frame)))| {
-            note(index, plan.prepare(rasterizer.settings(), shot, frame));
+        |rasterizer, (index, (plan, (render_request, frame)))| {
+            note(index, plan.prepare(rasterizer.settings(), render_request, frame));
         },
     );
     if plans.iter().any(PreparedFrame::has_shadows) {
         let maps = plans.iter_mut().zip(&*jobs);
-        let bands = maps.flat_map(|(plan, (shot, _))| plan.shadow_bands().map(move |band| (shot.scene, band)));
+        let bands = maps
+            .flat_map(|(plan, (render_request, _))| plan.shadow_bands().map(move |band| (render_request.scene, band)));
         pool.for_each(rasterizers, bands, |rasterizer, (scene, band)| {
             rasterizer.scratch.render_shadow_band(scene, band);
         });
     }
     let bands = plans.iter().zip(jobs).flat_map(|(plan, job)| {
-        let (shot, frame) = (job.0, &mut job.1);
-        let bands = bands(plan, &shot, frame, parts);
-        bands.map(move |band| (plan, shot, band))
+        let (render_request, frame) = (job.0, &mut job.1);
+        let bands = bands(plan, &render_request, frame, parts);
+        bands.map(move |band| (plan, render_request, band))
     });
-    pool.for_each(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
-        rasterizer.scratch.render_band(plan, &shot, &mut frame, first..first + rows);
+    pool.for_each(rasterizers, bands, |rasterizer, (plan, render_request, (first, rows, mut frame))| {
+        rasterizer.scratch.render_band(plan, &render_request, &mut frame, first..first + rows);
     });
 }
 
@@ -270,11 +276,11 @@ fn render_jointly(
 /// Empty if the frame cannot be rendered.
 fn bands<'a>(
     plan: &PreparedFrame,
-    shot: &RenderRequest<'_>,
+    render_request: &RenderRequest<'_>,
     frame: &'a mut FrameMut<'_>,
     parts: usize,
 ) -> impl Iterator<Item = (usize, usize, FrameMut<'a>)> + use<'a> {
-    let (width, height) = (shot.view.width, shot.view.height);
+    let (width, height) = (render_request.view.width, render_request.view.height);
     let blocks = if plan.projection.is_some() { height.div_ceil(BLOCK) } else { 0 };
     let rows = blocks.div_ceil(parts).clamp(1, plan.band_rows());
     let mut rest = frame.reborrow();
@@ -299,8 +305,9 @@ mod tests {
         let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
         let view = &View::look_at([32, 32], 0.7, [2.0, 0.0, 0.0], [0.0; 3], [0., 0., 1.]).unwrap();
         let mut frame = Frame::new(32, 32, Channels::ALL);
-        let shot = RenderRequest { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None, previous: None };
-        let jobs = [(shot, frame.as_mut())];
+        let render_request =
+            RenderRequest { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None, previous: None };
+        let jobs = [(render_request, frame.as_mut())];
         // Without shadow maps, which cost as much as many more pixels.
         let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };
         let paths = |samples, max_bounces| Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };

@@ -108,14 +108,15 @@ pub fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Parses a file with such a header: type descriptor, shape, bytes of the values. `None` for an invalid or truncated
-/// file.
+/// Parses a file with such a header: type descriptor, shape, and the bytes of the values in C order; `None` for other
+/// files, such as those in Fortran order.
 pub fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (length, rest) = rest.split_first_chunk::<2>()?;
     let (text, data) = rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))?;
     let text = std::str::from_utf8(text).ok()?;
     let after = |key: &str| text.split_once(key).map(|(_, rest)| rest);
+    after("'fortran_order': False")?;
     let descr = after("'descr': '")?.split('\'').next()?;
     let axes = after("'shape': (")?.split(')').next()?;
     let shape = axes.split(',').map(str::trim).filter(|axis| !axis.is_empty()).map(|axis| axis.parse().ok());
@@ -139,5 +140,7 @@ mod tests {
         assert_eq!(parse(&three), Some(("<f4", vec![2, 3, 4], &[][..])));
         assert_eq!(parse(&header_of_one).unwrap().1, [2]);
         assert_eq!(parse(&one[..20]), None);
+        let fortran = String::from_utf8_lossy(&three[10..]).replace("False", "True ");
+        assert_eq!(parse(&[&three[..10], fortran.as_bytes()].concat()), None);
     }
 }

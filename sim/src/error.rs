@@ -198,7 +198,7 @@ pub enum Error {
     },
     /// A uid is already in use, or reserved (`world`, `ground`).
     #[error(
-        "the uid {0:?} is taken; give each robot, object, terrain and sensor a uid of its own (\"world\" and \"ground\" are always taken)"
+        "the uid {0:?} is taken; give each robot, object, terrain and sensor a uid of its own (\"world\" and \"ground\" belong to the scene)"
     )]
     DuplicateUid(String),
     /// A uid is unusable as a part of MJCF or file names.

@@ -70,6 +70,6 @@ impl EventTerm {
 
 impl fmt::Debug for EventTerm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("EventTerm").field("name", &self.name).field("when", &self.mode).finish_non_exhaustive()
+        f.debug_struct("EventTerm").field("name", &self.name).field("mode", &self.mode).finish_non_exhaustive()
     }
 }

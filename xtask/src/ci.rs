@@ -238,7 +238,8 @@ fn fmt(context: &Context<'_>) -> XtaskResult {
     let files = files_below(root).into_iter().filter(|path| path.ends_with(".rs"));
     let check = Cmd::new("rustfmt").args(["--edition", "2024", "--check"]).args(files).current_dir(root);
     // The message of a failed command would name every file.
-    check.run().map_err(|_| Failure::new("files are not formatted; CONTRIBUTING.md has the command that formats all"))
+    let hint = "rustfmt failed, or files are not formatted; CONTRIBUTING.md has the command that formats all";
+    check.run().map_err(|_| Failure::new(hint))
 }
 
 fn clippy(ready: &Prepared, packages: &[&str]) -> XtaskResult {
@@ -257,7 +258,10 @@ fn unit_tests(context: &Context<'_>) -> XtaskResult {
 
 fn rustdoc(context: &Context<'_>) -> XtaskResult {
     let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
-    cargo.args(["doc", "--no-deps"]).args(site::PUBLISHED).args(test::features(&["--workspace"])).run()
+    cargo.args(["doc", "--no-deps"]).args(site::PUBLISHED).args(test::features(&["--workspace"])).run()?;
+    // The packages without published documentation have internals in their links.
+    let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
+    cargo.args(["doc", "--no-deps", "-p", "kinetoscope-benches", "-p", "kinetoscope-testkit", "-p", "xtask"]).run()
 }
 
 fn demo(context: &Context<'_>) -> XtaskResult {

@@ -49,6 +49,12 @@ fn check_warnings() {
     ]);
     shell.run_ok("check pendulum.xml");
     let (_, err, _) = shell.run("check rk4.xml");
+    let (out, ..) = shell.run("bench rk4.xml --num-envs 1 --seconds 0.05 --width 32");
+    assert!(out.contains("0.0005 s") || out.contains("0.5 ms"), "{out}");
+    // Values that a simulation does not accept are not used, with a warning.
+    shell.write("odd.xml", &PENDULUM.replacen("<mujoco>", "<mujoco><option iterations=\"0\"/>", 1));
+    let (_, odd, code) = shell.run("check odd.xml");
+    assert!(code == 1 && odd.contains("option iterations is 0"), "{code} {odd}");
     assert!(!["timestep", "cone", "gravity"].iter().any(|setting| err.contains(&format!("option {setting}"))), "{err}");
     for (file, listed, warned) in [
         ("unlimited.urdf", ["hinge", ""], ["warning[effort-unlimited]", "9 |"]),
@@ -272,6 +278,49 @@ fn starts_on_the_ground() {
     for flag in ["--spawn-height 0", "--no-ground", "--floating-base"] {
         shell.run_ok(&format!("{bench} {flag}"));
     }
+}
+
+/// A robot below an empty root link with a floating joint stands on the ground, with and without `--floating-base`. A
+/// real base with a floating payload (the control) stays fixed.
+///
+/// Regression: it started in the ground with the advice to use `--floating-base`, which added a second free joint to
+/// the empty link, and the simulation diverged.
+#[test]
+fn floating_joint_of_the_file() {
+    let empty = BOX.replacen("<link name=\"body\">", "<link name=\"root\"/><link name=\"body\">", 1);
+    let joint = |parent: &str, child: &str| {
+        format!(
+            "<joint name=\"free\" type=\"floating\"><parent link=\"{parent}\"/><child link=\"{child}\"/></joint></robot>"
+        )
+    };
+    let floating = empty.replace("</robot>", &joint("root", "body"));
+    let inertial = "<inertial><mass value=\"1\"/><inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\"/></inertial>";
+    let payload = BOX.replace("</robot>", &format!("<link name=\"load\">{inertial}</link>{}", joint("body", "load")));
+    let shell = CommandFolder::with(&[("floating.urdf", &floating), ("payload.urdf", &payload)]);
+    for flag in ["", "--floating-base"] {
+        let (_, err, _) = shell.run(&format!("bench floating.urdf {flag} --num-envs 1 --seconds 0.05 --width 64"));
+        assert!(!err.contains("below the ground") && !err.contains("diverged"), "{flag}: {err}");
+        let (_, err, code) = shell.run(&format!("check floating.urdf {flag}"));
+        assert!(code < 2, "{flag}: {err}");
+    }
+    let (_, err, _) = shell.run("bench payload.urdf --num-envs 1 --seconds 0.05 --width 64");
+    assert!(err.contains("\"leg\" starts 0.500 m below the ground"), "{err}");
+}
+
+/// An image without a shape in view is reported; an MJCF file is rendered as it is, so `--floating-base` is refused.
+#[test]
+fn empty_images() {
+    let nothing = "<mujoco><worldbody><body><site name='s'/></body></worldbody></mujoco>";
+    let shell = CommandFolder::with(&[("nothing.xml", nothing), ("pendulum.xml", PENDULUM)]);
+    let (_, err, code) = shell.run("render nothing.xml -o a.png --width 32 --height 32");
+    assert!(code == 1 && err.contains("the image shows only the background"), "{code} {err}");
+    shell.run_ok("render pendulum.xml -o b.png --width 32 --height 32");
+    let (_, err, code) = shell.run("render pendulum.xml -o b.png --width 32 --height 32 --eye 5,5,5 --target 9,9,9");
+    assert!(code == 1 && err.contains("no visible shape is in view"), "{code} {err}");
+    shell.assert_refused(&[(
+        "render pendulum.xml -o b.png --floating-base",
+        "--floating-base: pendulum.xml is rendered",
+    )]);
 }
 
 /// A simulation that diverges in all environments reports no rate.

@@ -219,17 +219,17 @@ impl Mirrors<'_> {
                 let r = reflectance(source.instance);
                 let tint = if display { r } else { 1.0 };
                 let mut sum: Colors = [[0.0; LANES]; 3];
-                let found_hit = self.trace_reflections(s, context, &mut rays, tint, length, &mut sum);
+                let hit_lanes = self.trace_reflections(s, context, &mut rays, tint, length, &mut sum);
                 let mut left = [0.0f32; LANES];
                 for (left, ray) in left.iter_mut().zip(&rays) {
                     *left = ray.map_or(1.0, |ray| ray.throughput);
                 }
                 let sum = V3 { x: load(s, &sum[0]), y: load(s, &sum[1]), z: load(s, &sum[2]) };
                 if display {
-                    if found_hit == 0 {
+                    if hit_lanes == 0 {
                         return color;
                     }
-                    let hit = lanes & mask(s, found_hit);
+                    let hit = lanes & mask(s, hit_lanes);
                     // Written out: a closure that is called three times is compiled without the instruction set.
                     let lit = V3 { x: add(s, color.x, sum.x), y: add(s, color.y, sum.y), z: add(s, color.z, sum.z) };
                     return V3::select(hit, lit, color);
@@ -255,7 +255,7 @@ impl Mirrors<'_> {
     ) -> u64 {
         let (scene, mut at) = (context.shade.scene, SurfaceLanes::EMPTY);
         let display = scene.lighting_space == LightingSpace::Display;
-        let mut found_hit = 0;
+        let mut hit_lanes = 0;
         for _ in 0..MAX_PASSES {
             let mut hits = [None; LANES];
             let mut left = 0u64;
@@ -272,7 +272,7 @@ impl Mirrors<'_> {
             if left == 0 {
                 break;
             }
-            found_hit |= left;
+            hit_lanes |= left;
             while left != 0 {
                 let Some(instance) = hits[left.trailing_zeros() as usize].map(|hit| hit.instance) else { break };
                 let mut bits = 0u64;
@@ -312,7 +312,7 @@ impl Mirrors<'_> {
                 }
             }
         }
-        found_hit
+        hit_lanes
     }
 
     /// The next surface along a mirrored ray, without backs of transparent surfaces.

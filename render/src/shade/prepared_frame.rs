@@ -186,8 +186,8 @@ impl PreparedFrame {
     fn prepare_lights(&mut self, cfg: RasterCfg, render_request: &RenderRequest<'_>) {
         let RenderRequest { scene, poses, view, lights, lens, .. } = *render_request;
         let lights = lights.unwrap_or(&scene.lights);
-        // Indices of lights with shadow maps, and those of their maps.
-        let mut maps: [Option<(usize, usize)>; MAX_SHADOWS] = [None; MAX_SHADOWS];
+        // Index of the light of each shadow map.
+        let mut maps: [Option<usize>; MAX_SHADOWS] = [None; MAX_SHADOWS];
         if cfg.shadows {
             let side = shadow_side(cfg, view);
             let light_sources = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
@@ -213,15 +213,13 @@ impl PreparedFrame {
                     self.shadows.push(ShadowMap::empty());
                 }
                 if self.shadows[self.map_count].prepare(light_view, receivers, scene, poses, cfg, side) {
-                    maps[self.map_count] = Some((k, self.map_count));
+                    maps[self.map_count] = Some(k);
                     self.map_count += 1;
                 }
             }
         }
         let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
-        self.lighting.prepare(scene, lights, forward, |k| {
-            maps.iter().flatten().find(|(light, _)| *light == k).map(|(_, map)| *map)
-        });
+        self.lighting.prepare(scene, lights, forward, |k| maps.iter().position(|light| *light == Some(k)));
         let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden;
         self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
     }

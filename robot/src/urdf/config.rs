@@ -103,7 +103,7 @@ impl UrdfCfg {
 /// | an XML declaration that is not at the beginning | it is ignored |
 /// | an `<inertial>` without `<mass>` or without `<inertia>` | the rest is computed from the shapes of the link |
 /// | an `<inertia>` without `ixy`, `ixz` or `iyz` | they are 0 |
-/// | commas with white space behind them between numbers | they are ignored |
+/// | commas between numbers (not decimal commas) | they are ignored |
 /// | NUL characters at the end of the file | they are ignored |
 /// | `<axis/>` without `xyz` on a fixed or floating joint | it is ignored |
 /// | one number in the `scale` of a mesh | it applies to all three axes |

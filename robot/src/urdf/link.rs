@@ -276,13 +276,19 @@ fn read_geometry(
     };
     let mut shapes = reader.elements(geometry);
     let Some(shape) = shapes.next() else {
-        return Err(UrdfError::ElementMissing {
+        let error = UrdfError::ElementMissing {
             at: reader.source(geometry),
             owner: owner.to_owned(),
             element: "geometry".to_owned(),
-            child: "shape",
+            child: "box",
             fix: "it needs one of <box>, <cylinder>, <capsule>, <sphere>, <mesh>",
-        });
+        };
+        if node.tag_name().name() != "visual" {
+            return Err(error);
+        }
+        let at = reader.source(geometry);
+        reader.warn_or_fail(DiagnosticKind::ShapeEmpty, at, error, "the visual is left out")?;
+        return Ok(false);
     };
     if let Some(second) = shapes.next() {
         let at = reader.source(second);

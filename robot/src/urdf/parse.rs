@@ -11,7 +11,7 @@ use super::joint::read_joint;
 use super::link::{Materials, read_link};
 use super::reader::{Reader, format_element, write_attribute};
 use super::tree::{JointEdge, NamedElement, Tree};
-use super::xml::{blank_commas_and_nuls, repair};
+use super::xml::{repair, trim_nuls};
 use crate::diagnostic::DiagnosticKind;
 use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::{Document, Node};
@@ -95,15 +95,12 @@ pub fn parse_str(text: &str, path: impl AsRef<Path>) -> Result<UrdfFile, UrdfErr
 /// Same errors as [`parse_file_with`].
 pub fn parse_str_with(text: &str, path: impl AsRef<Path>, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let path = path.as_ref();
+    let mut diagnostics = Vec::new();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = if strictness == Strictness::Lenient { trim_nuls(text, path, &mut diagnostics) } else { text };
     if text.trim().is_empty() {
         return Err(UrdfError::FileEmpty { path: path.to_path_buf() });
     }
-    let mut diagnostics = Vec::new();
-    let text = &*match strictness {
-        Strictness::Lenient => blank_commas_and_nuls(text, path, &mut diagnostics),
-        Strictness::Strict => text.into(),
-    };
     let repaired;
     let document = match Document::parse(text) {
         Err(error) if strictness == Strictness::Lenient => {
@@ -139,6 +136,7 @@ pub fn parse_str_with(text: &str, path: impl AsRef<Path>, strictness: Strictness
     let tree = Tree::build(&reader.source(root), &pass.link_names, &pass.edges)?;
     check_transmissions(&mut reader, root, &pass.edges)?;
     materials.check(&mut reader);
+    reader.report_commas();
 
     let name = reader.text(root, "name")?.unwrap_or_default();
     let mut normalized = String::with_capacity(pass.xml.len() + materials.xml.len() + 64);

@@ -5,6 +5,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::urdf::config::Strictness;
 use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::Node;
+use std::cell::RefCell;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,6 +20,8 @@ pub(super) struct Reader<'i> {
     namespace: Option<&'i str>,
     strictness: Strictness,
     pub(super) diagnostics: Vec<Diagnostic>,
+    /// The first list of numbers with commas, and the number of such lists.
+    commas: RefCell<Option<(SourceLocation, String, usize)>>,
 }
 
 /// Counts as words, for messages.
@@ -28,7 +31,7 @@ impl<'i> Reader<'i> {
     pub(super) fn new(file: Arc<PathBuf>, text: &str, namespace: Option<&'i str>, strictness: Strictness) -> Self {
         let ends = text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);
         let line_starts = std::iter::once(0).chain(ends).collect();
-        Self { file, line_starts, namespace, strictness, diagnostics: Vec::new() }
+        Self { file, line_starts, namespace, strictness, diagnostics: Vec::new(), commas: RefCell::new(None) }
     }
 
     /// Location of a byte of the text.
@@ -49,6 +52,38 @@ impl<'i> Reader<'i> {
 
     pub(super) fn warn(&mut self, kind: DiagnosticKind, at: SourceLocation, message: String) {
         self.diagnostics.push(Diagnostic::new(kind, at, message));
+    }
+
+    /// Reports lists of numbers with commas, with one warning for the file.
+    pub(super) fn report_commas(&mut self) {
+        if let Some((at, text, count)) = self.commas.take() {
+            let others = if count == 1 { String::new() } else { format!(", and in {} other lists", count - 1) };
+            let message = format!("the commas in \"{text}\"{others} were ignored; separate numbers by spaces");
+            self.warn(DiagnosticKind::CommasIgnored, at, message);
+        }
+    }
+
+    /// The text with commas replaced by spaces if that gives `count` numbers. Commas must stand beside spaces, or the
+    /// text must have no spaces: `0,5 0 0` has a decimal comma.
+    fn without_commas(&self, node: Node<'_, '_>, attribute: &str, text: &str, count: usize) -> Option<String> {
+        let beside_space = |word: &str| word.trim_matches(',').contains(',');
+        if self.strictness == Strictness::Strict || !text.contains(',') {
+            return None;
+        }
+        if text.trim().contains(char::is_whitespace) && text.split_whitespace().any(beside_space) {
+            return None;
+        }
+        let spaced = text.replace(',', " ");
+        let numbers = spaced.split_whitespace().map(str::parse::<f64>).filter(Result::is_ok).count();
+        if numbers != count || count < 2 || spaced.split_whitespace().count() != count {
+            return None;
+        }
+        let mut commas = self.commas.borrow_mut();
+        match &mut *commas {
+            Some((.., lists)) => *lists += 1,
+            None => *commas = Some((self.attribute_source(node, attribute), truncate(text).to_string(), 1)),
+        }
+        Some(spaced)
     }
 
     /// Handles a deviation from URDF with a clear meaning. Lenient reading adds a warning with the text of `error` and
@@ -200,6 +235,8 @@ impl<'i> Reader<'i> {
             element: format_element(node, Some((attribute, text))),
             problem,
         };
+        let spaced = self.without_commas(node, attribute, text, N);
+        let text = spaced.as_deref().unwrap_or(text);
         let mut numbers = [0.0; N];
         let mut count = 0;
         for word in text.split_whitespace() {

@@ -186,6 +186,7 @@ impl<'c> Resolver<'c> {
             // `package://part.stl` is a file beside the URDF or in the asset root.
             if self.strictness == Strictness::Lenient
                 && !package.is_empty()
+                && !rest.contains('/')
                 && let found @ Resolved::Found(_) = self.resolve_path(package)
             {
                 return found;
@@ -436,6 +437,9 @@ mod tests {
             // One slash too many, with a package and with an absolute path.
             ("package:///rospkg/c.stl", "c.stl"),
             (&format!("package://{absolute}"), "c.stl"),
+            // A file without a package, beside the URDF and in the asset root.
+            ("package://local.stl", "urdf/local.stl"),
+            ("package://only_here.stl", "only_here.stl"),
         ] {
             match resolve(dir.folder(), uri) {
                 Resolved::Found(path) => assert!(path.is_file() && path.ends_with(file), "{uri}: {path:?}"),
@@ -484,6 +488,9 @@ mod tests {
         assert!(matches!(&unknown, Resolved::PackageUnknown { tried, .. } if tried[0] == "/none/a.stl"), "{unknown:?}");
         let strict = Resolver::with_paths(&urdf, &packages, None, vec![dir.folder().join("ws/ros")], vec![]);
         let strict = strict.with_strictness(Strictness::Strict).resolve("package:///rospkg/c.stl");
+        assert!(matches!(strict, Resolved::Unsupported { .. }), "{strict:?}");
+        let strict = Resolver::with_paths(&urdf, &packages, None, vec![], vec![]);
+        let strict = strict.with_strictness(Strictness::Strict).resolve("package://local.stl");
         assert!(matches!(strict, Resolved::Unsupported { .. }), "{strict:?}");
         for uri in ["http://example.com/a.stl", "package://", "package://pkg", "package://pkg/", "package:///a.stl"] {
             assert!(matches!(resolve(dir.folder(), uri), Resolved::Unsupported { .. }), "{uri}");

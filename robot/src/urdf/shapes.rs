@@ -43,7 +43,7 @@ impl<'f> ShapeConverter<'f> {
     fn resolve(&mut self, uri: &str, at: &SourceLocation, diagnostics: &mut Vec<Diagnostic>) -> Resolved {
         let resolved = self.resolver.resolve(uri);
         if let Resolved::Found(path) = &resolved
-            && ["package:", "model:"].iter().any(|start| uri.trim().starts_with(start))
+            && ["package:", "model:"].iter().any(|start| uri.trim().to_ascii_lowercase().starts_with(start))
             && has_no_package(uri.trim())
             && !std::mem::replace(&mut self.warned_about_empty_package, true)
         {

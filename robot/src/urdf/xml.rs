@@ -3,8 +3,6 @@
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::{Document, Error};
-use std::borrow::Cow;
-use std::ops::Range;
 use std::path::Path;
 
 /// Maximum number of prefixes that are declared for a file; more are not extensions of URDF.
@@ -60,60 +58,16 @@ pub(super) fn repair(
     Err(if is_shifted { check(text).unwrap_or(error) } else { error })
 }
 
-/// Replaces commas between the numbers of attributes by blanks, such as in `rgba="1, 0, 0, 1"`, and removes NUL
-/// characters at the end of the text. All positions stay.
-pub(super) fn blank_commas_and_nuls<'t>(text: &'t str, path: &Path, diagnostics: &mut Vec<Diagnostic>) -> Cow<'t, str> {
-    let mut text = text;
-    let without_nuls = text.trim_end_matches(|c: char| c == '\0' || c.is_whitespace());
-    if text[without_nuls.len()..].contains('\0') {
-        let at = SourceLocation::new(path, line_of(text, without_nuls.len()));
-        let message = "the file ends with NUL characters; they were ignored";
-        diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
-        text = without_nuls;
+/// Removes NUL characters at the end of the text.
+pub(super) fn trim_nuls<'t>(text: &'t str, path: &Path, diagnostics: &mut Vec<Diagnostic>) -> &'t str {
+    let without = text.trim_end_matches(|c: char| c == '\0' || c.is_whitespace());
+    if !text[without.len()..].contains('\0') {
+        return text;
     }
-    let mut blanked = Cow::Borrowed(text);
-    for value in numbers_with_commas(text) {
-        let number_list = &text[value.clone()];
-        let message = format!("the commas in \"{number_list}\" were ignored; separate numbers by blanks");
-        let at = SourceLocation::new(path, line_of(text, value.start));
-        diagnostics.push(Diagnostic::new(DiagnosticKind::CommasIgnored, at, message));
-        blanked.to_mut().replace_range(value, &number_list.replace(',', " "));
-    }
-    blanked
-}
-
-/// Byte ranges of attribute values outside of comments that are two or more numbers, some with a comma and white space
-/// behind them. A comma without white space behind it may be a decimal comma.
-fn numbers_with_commas(text: &str) -> Vec<Range<usize>> {
-    let is_number = |word: &str| word.strip_suffix(',').unwrap_or(word).parse::<f64>().is_ok();
-    let is_list = |value: &str| {
-        value.contains(',') && value.split_whitespace().count() > 1 && value.split_whitespace().all(is_number)
-    };
-    let mut found = Vec::new();
-    let mut at = 0;
-    while let Some(start) = text[at..].find('<') {
-        at += start;
-        if text[at..].starts_with("<!--") {
-            let Some(end) = text[at..].find("-->") else { break };
-            at += end;
-            continue;
-        }
-        // The quoted values of a tag; the parser reports a tag without an end.
-        at += 1;
-        while let Some(next) = text[at..].find(['"', '\'', '>']) {
-            let quote = char::from(text.as_bytes()[at + next]);
-            at += next + 1;
-            if quote == '>' {
-                break;
-            }
-            let Some(length) = text[at..].find(quote) else { return found };
-            if is_list(&text[at..at + length]) {
-                found.push(at..at + length);
-            }
-            at += length + 1;
-        }
-    }
-    found
+    let at = SourceLocation::new(path, line_of(text, without.len()));
+    let message = "the file ends with NUL characters; they were ignored";
+    diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, at, message));
+    without
 }
 
 /// Text before the root element.

@@ -98,8 +98,8 @@ impl OffscreenScene {
 
     /// Creates the offscreen scene of several environments side by side (`None` for all environments), at
     /// [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins). Each marker is shown in its
-    /// environment. The ground is rendered once. Lights and cameras are those of environment 0, moved to its
-    /// origin. Everything else is rendered in every environment, so a terrain that is
+    /// environment. The ground is rendered once. Lights and cameras are those of the first of the
+    /// environments, moved to its origin. Everything else is rendered in every environment, so a terrain that is
     /// larger than the space between environments overlaps.
     ///
     /// # Errors
@@ -126,8 +126,9 @@ impl OffscreenScene {
             overview::OverviewEnv { origin, scene: still.visual_scene.scene(), poses: &still.poses, markers }
         });
         let (visible, poses) = overview::side_by_side(&visible, &places.collect::<Vec<_>>())?;
-        let mut first = Self::of_env(sim, EnvId(0))?;
-        let origin: [f64; 3] = [0, 1, 2].map(|k| origins[(0, k)]);
+        let nearest = envs.first().copied().unwrap_or(0);
+        let mut first = Self::of_env(sim, EnvId(nearest))?;
+        let origin: [f64; 3] = [0, 1, 2].map(|k| origins[(nearest, k)]);
         for light in &mut first.lights {
             light.position = std::array::from_fn(|k| light.position[k] + origin[k] as f32);
         }

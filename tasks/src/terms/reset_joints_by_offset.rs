@@ -25,12 +25,12 @@ pub fn reset_joints_by_offset(
     velocities: [f64; 2],
 ) -> Result<EventTerm> {
     let (_, joints) = find_joints(sim, robot, patterns)?;
-    Ok(EventTerm::on_reset(name, move |sim, rng| {
+    Ok(EventTerm::on_reset(name, move |sim, rngs| {
         let starts = sim.robot(robot).default_qpos();
-        for die in rng {
-            let env = die.env();
+        for rng in rngs {
+            let env = rng.env();
             let mut drawn =
-                |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.uniform_range(low, high));
+                |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| rng.uniform_range(low, high));
             let (mut at, moving) = (drawn(positions), drawn(velocities));
             at.indexed_iter_mut().for_each(|((_, k), x)| *x += starts[(env.0, joints[k].0)]);
             // Written positions are clamped to the limits.

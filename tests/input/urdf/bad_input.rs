@@ -305,6 +305,12 @@ fn lenient_reading() {
             &[":2: link \"l\": <visual> has no <geometry>", "the visual is left out"],
         ),
         (
+            "a visual without a shape",
+            link("<visual><geometry/></visual>"),
+            ShapeEmpty,
+            &[":2: link \"l\": <geometry> has no <box>", "the visual is left out"],
+        ),
+        (
             "no products of inertia",
             inertial("<mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/>"),
             InertialIncomplete,
@@ -418,6 +424,12 @@ fn lenient_reading() {
     let file = read(format!("{}\n\0\0", link("<!-- <a b=\"1, 2\"/> -->")));
     assert!(file.diagnostics.len() == 1 && file.diagnostics[0].to_string().contains("NUL"), "{:?}", file.diagnostics);
     assert!(parse_strictly(&format!("{}\0", link(""))).is_err());
+    for scale in ["1,2,3", "1 ,2 , 3", "1, 2, 3,"] {
+        let mesh = format!("<visual><geometry><mesh filename=\"a\" scale=\"{scale}\"/></geometry></visual>");
+        let file = read(link(&format!("{mesh}{mesh}")));
+        assert_eq!(file.diagnostics.len(), 1, "{scale}: one warning for the file: {:?}", file.diagnostics);
+        assert!(file.diagnostics[0].message.contains("and in 1 other lists"), "{scale}: {:?}", file.diagnostics);
+    }
     let decimal = parse(&link("<visual><origin xyz=\"0,5 0 0\"/></visual>")).unwrap_err().to_string();
     assert!(decimal.contains("use a decimal point and spaces"), "{decimal}");
     let file = read(inertial("<mass value=\"1\"/><inertia ixx=\"1\" iyy=\"2\" izz=\"3\"/>"));

@@ -176,6 +176,19 @@ fn refusals() {
         );
     }
     assert!(sim.diverged().is_empty());
+    // A refused spring on another body leaves the spring in place.
+    let cube = sim.entities().rigid_object_id("cube").unwrap();
+    let height = |sim: &SimulationManager| sim.rigid_object(cube).pose()[(0, 2)];
+    let (rest, mut count) = (height(&sim), nonsense.len() as u64);
+    let index = sim.entities().body_names().iter().position(|name| name == "cube").unwrap();
+    viewer.send(Command::Drag { env: EnvId(0), body: index, anchor: [0.0; 3], target: [0.0, 0.0, 5.0] });
+    step_until(&mut sim, |sim| height(sim) > rest + 0.1);
+    viewer.send(drag(0, 99, 0.0));
+    count += 1;
+    step_until(&mut sim, |_| run(&viewer).refusal_count == count);
+    step_until(&mut sim, |sim| height(sim) > rest + 0.5);
+    viewer.send(Command::Release);
+    step_until(&mut sim, |sim| height(sim) < rest + 0.5);
     // A successful spring command does not clear the refusal; another successful command does.
     viewer.send(drag(0, 0, 0.0));
     viewer.send(Command::Release);
@@ -183,7 +196,10 @@ fn refusals() {
     assert!(run(&viewer).last_refusal.is_some());
     viewer.send(Command::SetSpeed(Speed::Unlimited));
     step_until(&mut sim, |_| run(&viewer).last_refusal.is_none());
-    assert_eq!(run(&viewer).refusal_count, nonsense.len() as u64);
+    assert_eq!(run(&viewer).refusal_count, count);
+    drop(sim);
+    // The longest timeout; the simulation has ended.
+    assert!(viewer.wait(u64::MAX, std::time::Duration::MAX).is_none());
 }
 
 /// With steps of 10 ms, step s ends (s - s0) 10 ms after the step s0 at which the speed was set; lost time is caught up

@@ -10,7 +10,7 @@ use super::trail::Trails;
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest};
 use kinetoscope_render::{RenderError, View};
-use kinetoscope_scene::Marker;
+use kinetoscope_scene::{Light, Marker};
 
 /// Radius of the marker at a selected point \[pixels\].
 const SELECTION_RADIUS: f32 = 4.0;
@@ -21,6 +21,8 @@ pub(crate) struct SceneRenderer {
     rasterizer: ParallelRenderer,
     cfg: RasterCfg,
     assembly: MergedScene,
+    /// Lights of the last image, in the overview.
+    lights: Vec<Light>,
 }
 
 /// Environments and overlays to draw: geom groups, markers, the selected point, trails, the mouse spring.
@@ -42,7 +44,12 @@ impl SceneRenderer {
     /// Creates a renderer with `threads` threads and four samples per pixel.
     pub(crate) fn new(threads: usize) -> Self {
         let cfg = RasterCfg::default();
-        Self { rasterizer: ParallelRenderer::new(cfg, threads), cfg, assembly: MergedScene::default() }
+        Self {
+            rasterizer: ParallelRenderer::new(cfg, threads),
+            cfg,
+            assembly: MergedScene::default(),
+            lights: Vec::new(),
+        }
     }
 
     /// Limits the number of threads for the next images, from one to the number of [`new`](Self::new).
@@ -90,7 +97,15 @@ impl SceneRenderer {
             markers.extend(Marker::arrow(from, way, color::SELECTION).map(|marker| (env, marker)));
         }
         self.assembly.update(snapshot, look.envs, &markers);
-        let lights = shown_envs(snapshot, look.envs).next().map(|(_, env)| env.snapshot.lights.as_slice());
+        // The lights of the first environment, where its bodies are.
+        let lights = shown_envs(snapshot, look.envs).next().map(|(_, env)| {
+            self.lights.clear();
+            self.lights.extend(env.snapshot.lights.iter().map(|light| Light {
+                position: std::array::from_fn(|k| light.position[k] + env.origin[k] as f32),
+                ..*light
+            }));
+            self.lights.as_slice()
+        });
         if let Some(scene) = &self.assembly.scene {
             let groups = look.overlays.geom_groups() | 1 << MARKER_GROUP;
             self.rasterizer.set_cfg(RasterCfg { groups, ..self.cfg });

@@ -137,6 +137,41 @@ fn environments() {
     }
 }
 
+/// The lights of an environment are where its bodies are: environments 0 and 3, each seen alone from the same side, give
+/// the same image.
+///
+/// Regression: lights stayed at their places in the environment, without its origin.
+#[test]
+fn lights_at_the_origin() {
+    let cfg = kinetoscope_sim::SimulationManagerCfg {
+        num_envs: 4,
+        arena_space: 8.0,
+        lights: vec![kinetoscope_sim::LightCfg {
+            kind: kinetoscope_sim::LightKindCfg::Point,
+            position: Vector3::new(0.5, 0.2, 1.5),
+            attenuation: [1.0, 0.0, 0.2],
+            ..Default::default()
+        }],
+        ..Default::default()
+    };
+    let mut sim = kinetoscope_sim::SimulationManager::new(cfg).unwrap();
+    sim.add_rigid_object(kinetoscope_sim::RigidObjectCfg::default()).unwrap();
+    let snapshot = sim.viewer(SnapshotRequest::default()).newest().unwrap();
+    let mut scene_renderer = SceneRenderer::new(1);
+    let mut image = |env: usize| {
+        let target = Point3::from(snapshot.envs[env].origin);
+        let view =
+            OrbitCamera::look_at((target + Vector3::new(2.0, -1.5, 2.0)).into(), target.into()).unwrap().view(160, 120);
+        let alone = ViewOptions { envs: EnvSelection::One(env), ..ViewOptions::default() };
+        painted(&mut scene_renderer, &snapshot, &view, &alone)
+    };
+    let (first, last) = (image(0), image(3));
+    // Positions are rounded to single precision, which moves edges.
+    let differs = |(a, b): (&u8, &u8)| a.abs_diff(*b) > 8;
+    let count = first.bytes().iter().zip(last.bytes()).filter(|pair| differs(*pair)).count();
+    assert!(count < first.bytes().len() / 100, "{count} of {} bytes", first.bytes().len());
+}
+
 /// Every overlay changes the image, and disabling it restores the image.
 #[test]
 fn overlays() {

@@ -254,7 +254,7 @@ impl ViewerSession {
         let pixel = [(x, width), (y, height)].map(|(part, side)| (part * side as f64).min(side as f64 - 0.5));
         let look = ViewOptions { envs: self.env_selection, overlays: self.overlays, ..ViewOptions::default() };
         let shared = Arc::clone(&self.shared);
-        let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
+        let _guard = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
         find(&mut self.renderer, &snapshot, &view, &look, pixel)
     }
 
@@ -322,7 +322,7 @@ impl ViewerSession {
         let (overlays, selection, trails) = (self.overlays, self.selection.as_ref(), Some(&self.trails));
         let look = ViewOptions { envs: self.env_selection, overlays, selection, trails, spring };
         let shared = Arc::clone(&self.shared);
-        let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
+        let _guard = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
         self.renderer.draw(snapshot, &view, &look, &mut self.canvas).ok()?;
         let file = self.encode_jpeg()?;
         let description = json!({"shows": "stage", "type": "image/jpeg", "snapshot": snapshot.number});
@@ -340,7 +340,7 @@ impl ViewerSession {
         let camera = snapshot.names.cameras.iter().position(|known| *known == name)?;
         let env = self.env().map_or(0, |env| env.0);
         let shared = Arc::clone(&self.shared);
-        let _brush = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
+        let _guard = shared.render_lock.lock().unwrap_or_else(PoisonError::into_inner);
         let drawn = self.panel.draw(snapshot, camera, env, PANEL_WIDTH, &mut self.canvas);
         let description = json!({"shows": "camera", "type": "image/jpeg", "camera": name, "environment": env});
         Some(EncodedImage { description, file: drawn.then(|| self.encode_jpeg()).flatten()? })

@@ -182,18 +182,18 @@ fn beams() {
         at_level!(level, s => {
             let shear = ShearedPacket::new(s, &packet).unwrap();
             let beam = Beam::enclosing(s, &packet, &shear, tree.bvh()).unwrap();
-            let mut found_hit = 0;
+            let mut triangle_count = 0;
             let mut walk = |budget| {
                 let limits = packet.limits(s);
                 tree.bvh().traverse_beam(&beam, limits, budget, &mut TraversalStack::default(), |leaf| {
-                    found_hit += leaf.len();
+                    triangle_count += leaf.len();
                     None
                 })
             };
             // Five by three cells are below the rays, with thirty of 8192 triangles, but not in leaves of their own.
             assert_eq!(walk(128), Traversal::Complete);
             assert_eq!(walk(8), Traversal::OverBudget, "the control");
-            assert!(found_hit >= 30, "{found_hit}");
+            assert!(triangle_count >= 30, "{triangle_count}");
         });
     }
 }
