@@ -310,7 +310,7 @@ fn floating_joint_of_the_file() {
 /// An image without a shape in view is reported; an MJCF file is rendered as it is, so `--floating-base` is refused.
 #[test]
 fn empty_images() {
-    let nothing = "<mujoco><worldbody><body><site name='s'/></body></worldbody></mujoco>";
+    let nothing = "<mujoco><worldbody><light pos='0 0 1'/></worldbody></mujoco>";
     let shell = CommandFolder::with(&[("nothing.xml", nothing), ("pendulum.xml", PENDULUM)]);
     let (_, err, code) = shell.run("render nothing.xml -o a.png --width 32 --height 32");
     assert!(code == 1 && err.contains("the image shows only the background"), "{code} {err}");
