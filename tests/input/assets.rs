@@ -75,3 +75,25 @@ fn round_edges_of_the_hand() {
     }
     assert_eq!(edges, 4);
 }
+
+/// The ready configurations: their joints, control parts and drive gains, which are those of EmbodiChain's tutorial for
+/// the arm and the hand.
+#[test]
+fn ready_configurations() {
+    let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+    // Joints without mimic joints: six of the arm, six of the hand, three of each leg.
+    let rows = [
+        (assets::sr5().unwrap(), 6, &["arm"][..], 1e4),
+        (assets::revo1_left().unwrap(), 6, &["hand"], 1e3),
+        (assets::sr5_with_hand().unwrap(), 12, &["arm", "hand"], 1e4),
+        (assets::quadruped().unwrap(), 12, &[], 80.0),
+    ];
+    for (cfg, joints, parts, stiffness) in rows {
+        let uid = cfg.uid.clone();
+        let id = sim.add_robot(cfg).unwrap_or_else(|error| panic!("{uid}: {error}"));
+        let robot = sim.robot(id);
+        let driven = (0..robot.dof()).filter(|&joint| !robot.is_mimic(JointIndex(joint)).unwrap()).count();
+        assert_eq!((driven, robot.control_parts()), (joints, parts.to_vec()), "{uid}");
+        assert_eq!(robot.stiffness()[(0, 0)], stiffness, "{uid}");
+    }
+}
