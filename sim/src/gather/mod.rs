@@ -1,17 +1,6 @@
 //! Copies quantities of a batch to the arrays that sensors read; only requested quantities are gathered.
 
-mod accelerations;
-mod actuators;
-mod contacts;
-mod instances;
-mod joint_efforts;
-mod joint_state;
-mod joint_wrenches;
-mod poses;
 mod rows;
-mod sensordata;
-mod velocities;
-mod visual_scene;
 
 use crate::env::{EnvStatus, SimEnv};
 use crate::simulation::Simulation;
@@ -22,20 +11,30 @@ use kinetoscope_sensors::Phases;
 /// Fills the rows of one environment, given by index, in the arrays of a quantity.
 type Fill = fn(&Simulation, &SimEnv, usize, &mut SceneState);
 
-/// All gathered quantities, each in a file of its own. [`kinetoscope_scene::state`] lists their arrays.
-const QUANTITIES: [(StateFields, Fill); 11] = [
-    (StateFields::POSES, poses::fill),
-    (StateFields::VELOCITIES, velocities::fill),
-    (StateFields::JOINT_STATE, joint_state::fill),
-    (StateFields::JOINT_EFFORTS, joint_efforts::fill),
-    (StateFields::ACTUATORS, actuators::fill),
-    (StateFields::SENSORDATA, sensordata::fill),
-    (StateFields::CONTACTS, contacts::fill),
-    (StateFields::ACCELERATIONS, accelerations::fill),
-    (StateFields::JOINT_WRENCHES, joint_wrenches::fill),
-    (StateFields::VISIBLE, visual_scene::fill),
-    (StateFields::INSTANCES, instances::fill),
-];
+/// Takes the flags of all gathered quantities, each with the file that fills its arrays.
+macro_rules! gathered {
+    ($($FLAG:ident => $file:ident,)*) => {
+        $(mod $file;)*
+
+        /// All gathered quantities, in the order in which they are filled.
+        const QUANTITIES: &[(StateFields, Fill)] = &[$((StateFields::$FLAG, $file::fill),)*];
+    };
+}
+
+// A quantity is one line here, one file, and its arrays in `kinetoscope_scene::state`.
+gathered! {
+    POSES => poses,
+    VELOCITIES => velocities,
+    JOINT_STATE => joint_state,
+    JOINT_EFFORTS => joint_efforts,
+    ACTUATORS => actuators,
+    SENSORDATA => sensordata,
+    CONTACTS => contacts,
+    ACCELERATIONS => accelerations,
+    JOINT_WRENCHES => joint_wrenches,
+    VISIBLE => visual_scene,
+    INSTANCES => instances,
+}
 
 /// Quantities that a sensor may require: the gathered ones, and the markers of other sensors.
 pub(crate) const AVAILABLE: StateFields = {
