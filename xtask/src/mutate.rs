@@ -6,7 +6,7 @@ use crate::mutations::{self, Mutation};
 use crate::progress::Progress;
 use crate::run::{Failure, Repo, XtaskResult, no_findings};
 use crate::setup::{self, MujocoVersion, Requirements};
-use crate::source_check::files_below;
+use crate::source_check::{TextFile, files_below, text_files};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -131,10 +131,29 @@ fn check_search_texts(root: &Path) -> XtaskResult {
     no_findings("mutations that do not fit the code (xtask/src/mutations)", &findings)
 }
 
-/// Checks that every mutation applies, and that the page matches the list.
+/// Names of tests in the last column of the page that are in no source file: neither as a function nor, for a law of
+/// physics, as a file of the law. Compares only the last parts of a path.
+fn missing_tests(page: &str, sources: &[TextFile]) -> Vec<String> {
+    let exists = |path: &str| {
+        let name = path.rsplit("::").next().unwrap_or(path);
+        let law = format!("/{}.rs", path.replace("::", "/"));
+        let function = [format!("fn {name}("), format!("fn {name}<")];
+        sources.iter().any(|file| file.path.ends_with(&law) || function.iter().any(|start| file.text.contains(start)))
+    };
+    let column = |row: &str| row.split(" | ").nth(2).map(str::to_string);
+    let names = page
+        .lines()
+        .filter_map(column)
+        .flat_map(|tests| tests.split('`').skip(1).step_by(2).map(str::to_string).collect::<Vec<String>>());
+    names.filter(|name| !exists(name)).collect()
+}
+
+/// Checks that every mutation applies, that the page matches the list, and that the tests it names exist.
 pub(crate) fn check(root: &Path) -> XtaskResult {
     check_search_texts(root)?;
     let page = read(&root.join(PAGE))?;
+    let sources: Vec<TextFile> = text_files(root).into_iter().filter(|file| file.path.ends_with(".rs")).collect();
+    no_findings("tests of docs/mutations.md that do not exist: cargo xtask mutate", &missing_tests(&page, &sources))?;
     let mut findings: Vec<String> =
         mutations::all().filter(|mutation| !page.contains(&beginning(mutation))).map(|m| m.name.to_string()).collect();
     let rows = page.lines().filter(|line| line.starts_with("| ")).count() - 1;
@@ -267,6 +286,15 @@ mod tests {
         assert!(old.contains("in 2 places") && old.ends_with("| `old` |\n"), "{old}");
         let new = page(&old, &row(second, &["new::holds".into()]));
         assert!(new.ends_with(&(row(first, &[]) + &row(second, &["new".into()]))), "{new}");
+    }
+
+    #[test]
+    fn tests_that_do_not_exist() {
+        let file = |path: &str, text: &str| TextFile { path: path.into(), text: text.into() };
+        let sources = [file("tests/api/a.rs", "#[test]\nfn holds() {}"), file("tests/physics/drives/law.rs", "")];
+        let page =
+            "| what | file | caught by |\n|---|---|---|\n| x | [f](../f) | `a::holds`, `drives::law`, `a::hold` |\n";
+        assert_eq!(missing_tests(page, &sources), ["a::hold"]);
     }
 
     #[test]
