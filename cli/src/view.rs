@@ -41,7 +41,7 @@ pub(crate) struct Args {
     #[arg(long)]
     steps: Option<u64>,
     /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset;
-    /// .mp4, .gif, .webp or .apng for the first camera, or for all environments side by side if there is no camera; a
+    /// .mp4 or .gif for the first camera, or for all environments side by side if there is no camera; a
     /// folder for PNG files of all cameras. Without this flag, the record button records to recording.mcap
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,

@@ -74,7 +74,7 @@ pub(crate) struct Launcher {
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
     /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset,
-    /// .hdf5 for robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera, or for all
+    /// .hdf5 for robomimic (build with --features hdf5); .mp4 or .gif for the first camera, or for all
     /// environments side by side if the scene has no camera; a folder for PNG files of all cameras. Recording starts at
     /// once; without the flag, the record button of window and browser records to recording.mcap in the folder of --out
     #[arg(long, value_name = "FILE")]

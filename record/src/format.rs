@@ -23,12 +23,8 @@ pub enum Format {
     LeRobot,
     /// HDF5 file for robomimic, with the same episodes and frames, at any rate. Requires the feature `hdf5`.
     Hdf5,
-    /// Animated PNG of the color of one camera in one environment, lossless.
-    Apng,
-    /// Animated GIF of the same: 256 colors per frame, times in 1/100 s.
+    /// Animated GIF of the color of one camera in one environment: 256 colors per frame, times in 1/100 s.
     Gif,
-    /// Animated WebP of the same, lossless.
-    Webp,
     /// MP4 video of the same: H.264 with 4:2:0 chroma subsampling. Width and height must be even.
     Mp4,
 }
@@ -45,7 +41,7 @@ struct FormatInfo {
 }
 
 /// All formats.
-const ALL: [FormatInfo; 9] = [
+const ALL: [FormatInfo; 7] = [
     FormatInfo { format: Format::Mcap, extension: "mcap", name: "an MCAP file", supports: |_| true },
     FormatInfo { format: Format::Npz, extension: "npz", name: "a NumPy archive", supports: |_| true },
     FormatInfo { format: Format::Images, extension: "", name: "a folder of images", supports: is_png_image },
@@ -56,9 +52,7 @@ const ALL: [FormatInfo; 9] = [
         name: "an HDF5 file (robomimic)",
         supports: is_robomimic_stream,
     },
-    FormatInfo { format: Format::Apng, extension: "apng", name: "an animated PNG", supports: is_color },
     FormatInfo { format: Format::Gif, extension: "gif", name: "an animated GIF", supports: is_color },
-    FormatInfo { format: Format::Webp, extension: "webp", name: "an animated WebP", supports: is_color },
     FormatInfo { format: Format::Mp4, extension: "mp4", name: "an MP4 file", supports: is_color },
 ];
 
@@ -124,7 +118,7 @@ impl Format {
 
     /// True if the format shows one camera in one environment.
     pub fn is_animation(self) -> bool {
-        matches!(self, Self::Apng | Self::Gif | Self::Webp | Self::Mp4)
+        matches!(self, Self::Gif | Self::Mp4)
     }
 }
 
@@ -140,13 +134,13 @@ mod tests {
 
     #[test]
     fn list() {
-        use Format::{Apng, Gif, Hdf5, Images, LeRobot, Mcap, Mp4, Npz, Webp};
-        let wanted = [Mcap, Npz, Images, LeRobot, Hdf5, Apng, Gif, Webp, Mp4];
+        use Format::{Gif, Hdf5, Images, LeRobot, Mcap, Mp4, Npz};
+        let wanted = [Mcap, Npz, Images, LeRobot, Hdf5, Gif, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));
         for (format, end) in Format::all() {
             // A missing variant is a compile error here.
             match format {
-                Mcap | Npz | Images | LeRobot | Hdf5 | Apng | Gif | Webp | Mp4 => {}
+                Mcap | Npz | Images | LeRobot | Hdf5 | Gif | Mp4 => {}
             }
             assert_eq!(format.info().extension, end);
             assert_eq!(Format::of_path(Path::new("a.b/run").with_extension(end)).ok(), Some(format));

@@ -1,12 +1,10 @@
 //! Animations: the images of one camera in one environment as a video file. Each format has one file here, and one
 //! entry in the list of [`Format`].
 
-mod apng;
 mod gif;
 mod h264;
 mod level;
 mod mp4;
-mod webp;
 
 use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, Storage};
@@ -34,9 +32,7 @@ type CreateEncoder = fn([usize; 2]) -> std::result::Result<Box<dyn Encoder>, Str
 
 fn encoder(format: Format) -> Option<CreateEncoder> {
     match format {
-        Format::Apng => Some(apng::begin),
         Format::Gif => Some(gif::begin),
-        Format::Webp => Some(webp::begin),
         Format::Mp4 => Some(mp4::begin),
         _ => None,
     }

@@ -76,7 +76,7 @@ fn configurations() {
     let new = |name: &str| RecorderCfg::new(folder.path().join(name));
     let with = |topic| new("run.mcap").with_topics([topic]);
     let run = || RecorderCfg::new(&path);
-    let ends = [".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4", ".lerobot"];
+    let ends = [".avi", ".mcap", ".npz", ".gif", ".mp4", ".lerobot"];
     let rows: [(RecorderCfg, &[&str]); 16] = [
         (with(Topic::JointStates("amr".into())), &["amr", "arm"]),
         (with(Topic::Sensor("camra".into())), &["camra", "camera"]),
@@ -99,7 +99,7 @@ fn configurations() {
         (RecorderCfg { topics: vec![], ..run() }, &["nothing to record"]),
         (RecorderCfg { envs: Some(vec![]), ..run() }, &["number of envs is 0", "at least 1"]),
         (new("run.avi"), &ends),
-        (new("run.apng").with_topics([Topic::JointStates("arm".into())]), &["does not support", "JointStates"]),
+        (new("run.gif").with_topics([Topic::JointStates("arm".into())]), &["does not support", "JointStates"]),
     ];
     let mut world = World::new(1, 1);
     for (cfg, parts) in rows {
