@@ -40,9 +40,10 @@ pub(crate) struct Args {
     /// End after this number of steps; otherwise run until the window is closed, or until Ctrl+C
     #[arg(long)]
     steps: Option<u64>,
-    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset;
-    /// .mp4 or .gif for the first camera, or for all environments side by side if there is no camera; a
-    /// folder for PNG files of all cameras. Without this flag, the record button records to recording.mcap
+    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset
+    /// (build with --features lerobot); .mp4 or .gif for the first camera, or for all environments side by side if
+    /// there is no camera; a folder for PNG files of all cameras. Without this flag, the record button records to
+    /// recording.mcap
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replace the file of --record and the partial file of an interrupted recording

@@ -73,10 +73,10 @@ pub(crate) struct Launcher {
     /// File for the report, as JSON
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
-    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset,
-    /// .hdf5 for robomimic (build with --features hdf5); .mp4 or .gif for the first camera, or for all
-    /// environments side by side if the scene has no camera; a folder for PNG files of all cameras. Recording starts at
-    /// once; without the flag, the record button of window and browser records to recording.mcap in the folder of --out
+    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset
+    /// (build with --features lerobot); .mp4 or .gif for the first camera, or for all environments side by side if the
+    /// scene has no camera; a folder for PNG files of all cameras. Recording starts at once; without the flag, the
+    /// record button of window and browser records to recording.mcap in the folder of --out
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Image source of an animation of --record: `stage` for all environments side by side, or the name of a camera (of

@@ -25,8 +25,8 @@ pub struct RecorderCfg {
     ///
     /// A name is that of the file, such as `arm/link_poses`, or a prefix such as `camera` for all its streams. A name
     /// without a recorded stream is an error. The last entry that matches a stream applies. A sensor with a period is
-    /// recorded at these steps, with its last measurement, if that is new. Results of tasks have no period. Datasets of
-    /// episodes (LeRobot, HDF5) have a single frame rate: any entry is an error.
+    /// recorded at these steps, with its last measurement, if that is new. Results of tasks have no period. LeRobot
+    /// datasets have a single frame rate: any entry is an error.
     pub stream_periods: Vec<(String, u64)>,
     /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. When all of them
     /// wait to be written, the simulation waits. The pool may take up to 16 GiB.
@@ -43,8 +43,7 @@ pub struct RecorderCfg {
     pub scene: bool,
     /// Settings of the overview image, if it is recorded ([`Topic::Overview`]).
     pub overview: OverviewCfg,
-    /// Description of the task in words, for all episodes of a LeRobot dataset or an HDF5 file. Other formats ignore
-    /// it.
+    /// Description of the task in words, for all episodes of a LeRobot dataset. Other formats ignore it.
     pub task: String,
     /// True to replace an existing file when the new one is complete, and to replace the partial file of a killed
     /// recording. Without this, an existing file is an error. Folders that are not empty are replaced only if a

@@ -112,12 +112,6 @@ impl PartialFile {
         self.file.path()
     }
 
-    /// Path of the partial file.
-    #[cfg(feature = "hdf5")]
-    pub(crate) fn partial_path(&self) -> &Path {
-        self.file.temp_path()
-    }
-
     /// Path of the partial file, if it remains.
     pub(crate) fn kept_path(&self) -> Option<PathBuf> {
         self.file.is_kept().then(|| self.file.temp_path().into())

@@ -19,10 +19,8 @@ pub enum Format {
     Images,
     /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode. An episode lasts from one reset
     /// of an environment to the next. Frames are the rows of the recording, from the first complete one on. Their rate
-    /// must be a whole number per second.
+    /// must be a whole number per second. Requires the feature `lerobot`.
     LeRobot,
-    /// HDF5 file for robomimic, with the same episodes and frames, at any rate. Requires the feature `hdf5`.
-    Hdf5,
     /// Animated GIF of the color of one camera in one environment: 256 colors per frame, times in 1/100 s.
     Gif,
     /// MP4 video of the same: H.264 with 4:2:0 chroma subsampling. Width and height must be even.
@@ -41,24 +39,14 @@ struct FormatInfo {
 }
 
 /// All formats.
-const ALL: [FormatInfo; 7] = [
+const ALL: [FormatInfo; 6] = [
     FormatInfo { format: Format::Mcap, extension: "mcap", name: "an MCAP file", supports: |_| true },
     FormatInfo { format: Format::Npz, extension: "npz", name: "a NumPy archive", supports: |_| true },
     FormatInfo { format: Format::Images, extension: "", name: "a folder of images", supports: is_png_image },
     FormatInfo { format: Format::LeRobot, extension: "lerobot", name: "a LeRobot dataset", supports },
-    FormatInfo {
-        format: Format::Hdf5,
-        extension: "hdf5",
-        name: "an HDF5 file (robomimic)",
-        supports: is_robomimic_stream,
-    },
     FormatInfo { format: Format::Gif, extension: "gif", name: "an animated GIF", supports: is_color },
     FormatInfo { format: Format::Mp4, extension: "mp4", name: "an MP4 file", supports: is_color },
 ];
-
-fn is_robomimic_stream(stream: &StreamSchema) -> bool {
-    stream.kind == StreamKind::EngineState || supports(stream)
-}
 
 fn is_color(stream: &StreamSchema) -> bool {
     matches!(&stream.kind, StreamKind::Image { channel, .. } if channel == "color")
@@ -96,14 +84,14 @@ impl Format {
         self.info().name
     }
 
-    /// True if this build supports the format: HDF5 requires a feature.
+    /// True if this build supports the format: LeRobot datasets require a feature.
     pub fn is_built(self) -> bool {
         self.missing_feature().is_none()
     }
 
     /// Cargo feature that this build lacks for the format; `None` if the build can write the format.
     pub(crate) fn missing_feature(self) -> Option<&'static str> {
-        (self == Self::Hdf5 && !cfg!(feature = "hdf5")).then_some("hdf5")
+        (self == Self::LeRobot && !cfg!(feature = "lerobot")).then_some("lerobot")
     }
 
     /// True if the format supports a stream.
@@ -134,13 +122,13 @@ mod tests {
 
     #[test]
     fn list() {
-        use Format::{Gif, Hdf5, Images, LeRobot, Mcap, Mp4, Npz};
-        let wanted = [Mcap, Npz, Images, LeRobot, Hdf5, Gif, Mp4];
+        use Format::{Gif, Images, LeRobot, Mcap, Mp4, Npz};
+        let wanted = [Mcap, Npz, Images, LeRobot, Gif, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));
         for (format, end) in Format::all() {
             // A missing variant is a compile error here.
             match format {
-                Mcap | Npz | Images | LeRobot | Hdf5 | Gif | Mp4 => {}
+                Mcap | Npz | Images | LeRobot | Gif | Mp4 => {}
             }
             assert_eq!(format.info().extension, end);
             assert_eq!(Format::of_path(Path::new("a.b/run").with_extension(end)).ok(), Some(format));

@@ -16,7 +16,7 @@
 //! | `mcap_writer`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
 //! | `npz`, `zip` | NumPy archives |
 //! | `image_folder`, `png`, `animation` | PNG files and animations |
-//! | `episodes`, `lerobot`, `robomimic` | datasets of episodes for learning |
+//! | `episodes`, `lerobot` | datasets of episodes for learning, behind the feature `lerobot` |
 //! | `read`, `recorded_arrays`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
 //! | [`replay`], `playback`, `scene_file` | simulation of recorded actions, and display of recorded motion ([`Playback`]) |
 //!
@@ -41,6 +41,7 @@ mod file;
 mod folder;
 mod format;
 mod image_folder;
+#[cfg(feature = "lerobot")]
 mod lerobot;
 mod mcap_writer;
 mod npz;
@@ -53,8 +54,6 @@ mod recorded_arrays;
 mod recorder;
 mod recover;
 pub mod replay;
-#[cfg(feature = "hdf5")]
-mod robomimic;
 mod ros;
 mod scene_file;
 mod scene_update;

@@ -24,7 +24,7 @@ pub enum Topic {
     /// Simulation time, positions and velocities of all joints of the scene in MuJoCo's order, named `clock`, `qpos`
     /// and `qvel` ([`kinetoscope_sim::Entities::engine_states`](kinetoscope_sim::Entities::engine_states)).
     ///
-    /// [`Everything`](Self::Everything) includes them in HDF5 files only.
+    /// [`Everything`](Self::Everything) leaves them out. Datasets and formats of images do not support them.
     EngineStates,
     /// Rewards and episode ends of the task in the simulation. A task such as an `Env` publishes them after each of its
     /// steps ([`StepResult`](kinetoscope_sim::StepResult)).

@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// Environment variable with the folder of real robots.
 pub const ROBOTS_VARIABLE: &str = "KINETOSCOPE_ROBOTS";
-/// Environment variable with a Python that has readers of recordings (`mcap`, NumPy, Pillow, PyAV, h5py).
+/// Environment variable with a Python that has readers of recordings (`mcap`, NumPy, Pillow, PyAV, pyarrow).
 pub const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 /// Environment variable with a Python that has MuJoCo 4 and OpenGL.
 pub const RENDERER_VARIABLE: &str = "KINETOSCOPE_PYTHON4";

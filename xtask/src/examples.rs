@@ -65,6 +65,7 @@ const TABLE: &[ExampleRun] = &[
     row("create_robot", &[2], "--headless --steps 1 --robot quadruped/quadruped.xml --arm-urdf sr5/SR5.urdf"),
     row("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
     row("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
+    // Examples are built with the feature `lerobot`, as the tests are.
     row("create_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/create_robot.lerobot"),
     row(
         "run_camera",
@@ -76,8 +77,6 @@ const TABLE: &[ExampleRun] = &[
     row("create_robot", &[2], "--headless --steps 1 --record {out}/none.npz --record-every 0"),
     row("create_robot", &[0], "--headless --num-envs 2 --steps 50 --out {out}/create_robot"),
     row("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.avi"),
-    // Examples are built with the feature `hdf5`, as the tests are.
-    row("create_robot", &[0], "--headless --steps 20 --record {out}/create_robot.hdf5"),
     // Recordings of an example without a camera: the stage works, and a camera that does not exist is an error.
     row("create_robot", &[0], "--headless --num-envs 2 --steps 50 --record {out}/create_robot.gif"),
     row("create_robot", &[2], "--headless --steps 1 --record {out}/none.mp4 --record-view missing"),

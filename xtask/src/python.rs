@@ -15,15 +15,8 @@ pub(crate) const VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 pub(crate) const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 
 /// Python packages that read our recordings.
-const READERS: &[&str] = &[
-    "numpy==2.4.6",
-    "mcap==1.6.0",
-    "mcap-ros2-support==0.6.0",
-    "pillow==13.0.0",
-    "av==18.1.0",
-    "pyarrow==26.0.1",
-    "h5py==3.16.0",
-];
+const READERS: &[&str] =
+    &["numpy==2.4.6", "mcap==1.6.0", "mcap-ros2-support==0.6.0", "pillow==13.0.0", "av==18.1.0", "pyarrow==26.0.1"];
 
 /// The version of the spelling checker. Other versions have other word lists.
 const TYPOS_VERSION: &str = "1.52.0";
@@ -84,7 +77,7 @@ pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
     let venv = repo.target.join("readers-venv");
     let python = venv.join("bin/python");
     let is_ready =
-        || Cmd::new(&python).args(["-c", "import numpy, mcap, mcap_ros2, PIL, av, pyarrow, h5py"]).quiet().succeeds();
+        || Cmd::new(&python).args(["-c", "import numpy, mcap, mcap_ros2, PIL, av, pyarrow"]).quiet().succeeds();
     if is_ready() {
         return Some(python);
     }

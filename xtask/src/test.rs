@@ -109,15 +109,15 @@ fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[SkippedTests]) -> 
     words
 }
 
-/// Crates with the feature `hdf5`, which is off by default.
-const WITH_HDF5: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
+/// Crates with the feature `lerobot`, which is off by default.
+const WITH_LEROBOT: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
 
 /// The features to test besides the default ones, for these packages.
 pub(crate) fn features(packages: &[&str]) -> Vec<String> {
     let feature = match packages {
-        ["--workspace"] => "kinetoscope-cli/hdf5".to_string(),
-        _ => match WITH_HDF5.iter().find(|name| packages.contains(name)) {
-            Some(package) => format!("{package}/hdf5"),
+        ["--workspace"] => "kinetoscope-cli/lerobot".to_string(),
+        _ => match WITH_LEROBOT.iter().find(|name| packages.contains(name)) {
+            Some(package) => format!("{package}/lerobot"),
             None => return Vec::new(),
         },
     };
@@ -131,17 +131,18 @@ mod tests {
     #[test]
     fn whole_workspace() {
         let words = cargo_args(&TestArgs::default(), &["--workspace"], &[NEEDS_MUJOCO_4]);
-        let expected = "test --workspace --features kinetoscope-cli/hdf5 -- --include-ignored --skip mujoco_renderer";
+        let expected =
+            "test --workspace --features kinetoscope-cli/lerobot -- --include-ignored --skip mujoco_renderer";
         assert_eq!(words.join(" "), expected);
     }
 
     #[test]
     fn features_of_packages() {
-        for package in WITH_HDF5 {
-            assert_eq!(features(&["--package", package]), ["--features".to_string(), format!("{package}/hdf5")]);
+        for package in WITH_LEROBOT {
+            assert_eq!(features(&["--package", package]), ["--features".to_string(), format!("{package}/lerobot")]);
         }
         assert!(features(&["--package", "kinetoscope-sim"]).is_empty());
-        assert_eq!(features(&version_dependent_packages()), ["--features", "kinetoscope/hdf5"]);
+        assert_eq!(features(&version_dependent_packages()), ["--features", "kinetoscope/lerobot"]);
     }
 
     #[test]

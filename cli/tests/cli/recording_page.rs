@@ -77,8 +77,7 @@ fn programs() {
     let python = kinetoscope_testkit::test_resources::python_readers();
     let folder = folder();
     // LeRobot needs some gigabytes: read_lerobot.py reads the data set where LeRobot is installed.
-    let absent =
-        |block: &str| block.contains("arm.hdf5") && !Format::Hdf5.is_built() || block.contains("import LeRobotDataset");
+    let absent = |block: &str| block.contains("import LeRobotDataset");
     let blocks: Vec<_> = blocks("python").into_iter().filter(|block| !absent(block)).collect();
     for block in &blocks {
         let output = Command::new(&python).args(["-c", block]).current_dir(&folder).output().unwrap();

@@ -56,8 +56,6 @@ pub(crate) enum Role {
     TargetEfforts,
     /// Object poses.
     Objects,
-    /// Simulation time, positions and velocities in MuJoCo's order.
-    EngineState,
     /// Channel of a sensor.
     Sensor {
         stream: String,
@@ -75,12 +73,6 @@ impl Role {
     /// True for targets and controls: the value of a frame is that of the next row.
     pub(crate) fn is_action(&self) -> bool {
         matches!(self, Self::Action | Self::TargetVelocities | Self::TargetEfforts)
-    }
-
-    /// True if the feature is an observation, which robomimic also stores as `next_obs`.
-    #[cfg(feature = "hdf5")]
-    pub(crate) fn is_observed(&self) -> bool {
-        !self.is_action() && *self != Self::EngineState
     }
 }
 
@@ -142,15 +134,11 @@ impl Features {
                     StreamKind::Poses { frames } => ["x", "y", "z", "qw", "qx", "qy", "qz"]
                         .map(|number| format!("{}.{number}", frames.join("/")))
                         .into(),
-                    StreamKind::EngineState => {
-                        (0..part.width()).map(|number| format!("{}[{number}]", part.name)).collect()
-                    }
                     _ => (0..part.width()).map(|number| format!("{}/{}[{number}]", stream.name, part.name)).collect(),
                 };
                 let role = match &roles {
                     Some(roles) => roles[k].clone(),
                     None if is_object(stream) => Role::Objects,
-                    None if stream.kind == StreamKind::EngineState => Role::EngineState,
                     None => Role::Sensor { stream: stream.name.clone(), channel: part.name.clone() },
                 };
                 all.append(role, name, names, StreamRange { stream: s, range });

@@ -30,15 +30,13 @@ pub(crate) trait DatasetWriter: Send {
     /// Encodes RGBA pixels without their alpha channel; `size` is width and height.
     fn encode_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<Self::Image>;
 
-    /// Begins an episode in an environment, unless one is in progress. A frame follows. Episodes are numbered in the
-    /// order in which they begin.
+    /// Begins an episode in an environment, unless one is in progress. A frame follows.
     fn begin(&mut self, env: usize);
 
-    /// Adds a frame to the present episode of an environment. `next` contains the observations after the action; its
-    /// own actions are outdated.
-    fn add(&mut self, env: usize, frame: &EpisodeFrame<Self::Image>, next: &EpisodeFrame<Self::Image>) -> WriteResult;
+    /// Adds a frame to the present episode of an environment.
+    fn add(&mut self, env: usize, frame: &EpisodeFrame<Self::Image>) -> WriteResult;
 
-    /// Ends the present episode of an environment, if there is one.
+    /// Ends the present episode of an environment, if there is one. Episodes are numbered in the order of their ends.
     fn end(&mut self, env: usize) -> WriteResult;
 
     /// Completes the dataset after the last episode and gives it its name; returns its size \[bytes\].
@@ -165,8 +163,8 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
     /// Adds the frame that waits for results, because no further ones follow.
     fn add_complete_frame(&mut self, k: usize) -> WriteResult {
         let EnvFrames { pending, awaiting_result, .. } = &mut self.envs[k];
-        match (awaiting_result.take(), pending) {
-            (Some(frame), Some(next)) => self.dataset.add(k, &frame, next),
+        match awaiting_result.take() {
+            Some(frame) if pending.is_some() => self.dataset.add(k, &frame),
             _ => Ok(()),
         }
     }

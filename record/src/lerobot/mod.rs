@@ -1,7 +1,8 @@
 //! LeRobot datasets, version 3.0: a folder with a Parquet file for each episode, and metadata.
 
-mod parquet;
+mod spool;
 mod statistics;
+mod table;
 
 use crate::cfg::RecorderCfg;
 use crate::episodes::{self, DatasetWriter, EpisodeFrame, EpisodeSplitter, Features, Role};
@@ -12,25 +13,28 @@ use crate::format::Format;
 use crate::png::PngWriter;
 use crate::stream::StreamSchema;
 use crate::writer::{FormatWriter, WriteError, WriteResult};
-use parquet::{ColumnType, ParquetWriter, put_bytes};
 use serde_json::{Map, Value, json};
+use spool::{FrameSpool, SpooledFrame};
 use statistics::{ImageStatistics, Statistics};
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use table::{Column, ColumnType, TableWriter};
 
 /// The metadata file that makes a folder a dataset. It is written last.
 const INFO: &str = "meta/info.json";
+/// Folder of the frames of episodes in progress; it does not exist in a complete dataset.
+const SPOOL: &str = "spool";
 /// The file that marks a folder as that of a recorder, which may be replaced. It is locked while the recorder exists.
 const MARKER: &str = "meta/.kinetoscope";
 
 /// Number of files in a folder.
 const FILES_PER_CHUNK: u64 = 1000;
 
-/// Rows are written at this number of rows or bytes.
-const FLUSH_ROWS: usize = 256;
-const FLUSH_BYTES: usize = 1 << 20;
+/// A row group of a Parquet file is written at this number of rows or bytes of images.
+const GROUP_ROWS: usize = 256;
+const GROUP_BYTES: usize = 1 << 20;
 
 /// Columns of every dataset, after its features.
 const COMMON: [(&str, &str); 5] = [
@@ -54,10 +58,10 @@ struct LeRobotWriter {
     fps: u64,
     task: String,
     features: Arc<Features>,
-    /// Present episode of each environment.
-    open_episodes: Vec<Option<OpenEpisode>>,
-    /// Length of each episode, and the positions of its `index` column.
-    episodes: Vec<Episode>,
+    /// Frames of the present episode of each environment.
+    open_episodes: Vec<Option<FrameSpool>>,
+    /// Number of frames of each complete episode, in the order of their ends.
+    episodes: Vec<u64>,
     statistics: Vec<Statistics>,
     png: PngWriter,
 }
@@ -66,24 +70,6 @@ struct LeRobotWriter {
 struct EncodedImage {
     file: Vec<u8>,
     statistics: ImageStatistics,
-}
-
-/// An episode in progress.
-struct OpenEpisode {
-    episode: usize,
-    table: ParquetWriter,
-    file: PathBuf,
-    rows: usize,
-    frames: u64,
-    values: Vec<Vec<u8>>,
-}
-
-#[derive(Default)]
-struct Episode {
-    frames: u64,
-    file: PathBuf,
-    /// File offset and number of rows of each part of the `index` column.
-    index: Vec<(u64, u64)>,
 }
 
 /// Frames per second, which must be a whole number.
@@ -118,7 +104,6 @@ fn name_of(role: &Role) -> String {
         Role::TargetVelocities => "target.velocity".into(),
         Role::TargetEfforts => "target.effort".into(),
         Role::Objects => "observation.environment_state".into(),
-        Role::EngineState => "observation.engine_state".into(),
         Role::Sensor { stream, channel } => format!("sensors.{}.{}", dotted(stream), dotted(channel)),
         Role::Image(camera) => format!("observation.images.{}", dotted(camera)),
     }
@@ -194,73 +179,44 @@ impl DatasetWriter for LeRobotWriter {
 
     fn begin(&mut self, env: usize) {
         if self.open_episodes[env].is_none() {
-            let episode = self.episodes.len();
-            let file = self.folder.partial_path().join(data_file(episode as u64));
-            let table = ParquetWriter::new(columns(&self.features));
-            let values = vec![Vec::new(); table.width()];
-            self.episodes.push(Episode { file: file.clone(), ..Episode::default() });
-            self.open_episodes[env] = Some(OpenEpisode { episode, table, file, rows: 0, frames: 0, values });
+            let path = self.folder.partial_path().join(format!("{SPOOL}/env_{env}"));
+            self.open_episodes[env] = Some(FrameSpool::new(path));
         }
     }
 
-    fn add(
-        &mut self,
-        env: usize,
-        frame: &EpisodeFrame<EncodedImage>,
-        _next: &EpisodeFrame<EncodedImage>,
-    ) -> WriteResult {
+    fn add(&mut self, env: usize, frame: &EpisodeFrame<EncodedImage>) -> WriteResult {
         let EpisodeFrame { numbers, images, reward, done } = frame;
-        let judged = self.features.result_stream.is_some();
         let numbers: Vec<Vec<f32>> = numbers.iter().map(|of| of.iter().map(|x| *x as f32).collect()).collect();
-        let Some(running) = &mut self.open_episodes[env] else { return Ok(()) };
-        let mut leaves = running.values.iter_mut();
-        for values in &numbers {
-            let Some(to) = leaves.next() else { break };
-            values.iter().for_each(|value| to.extend_from_slice(&value.to_le_bytes()));
-        }
-        for image in images {
-            let (Some(bytes), Some(path)) = (leaves.next(), leaves.next()) else { break };
-            put_bytes(&image.file, bytes)?;
-            put_bytes(format!("frame-{:06}.png", running.frames).as_bytes(), path)?;
-        }
-        if judged && let (Some(rewards), Some(ends)) = (leaves.next(), leaves.next()) {
-            rewards.extend_from_slice(&(*reward as f32).to_le_bytes());
-            ends.push(u8::from(*done));
-        }
-        let time = (running.frames as f64 / self.fps as f64) as f32;
-        // The index in the dataset is known at the end only.
-        let whole = [running.frames, running.episode as u64, 0, 0];
-        if let Some(to) = leaves.next() {
-            to.extend_from_slice(&time.to_le_bytes());
-        }
-        for (to, number) in leaves.zip(whole) {
-            to.extend_from_slice(&number.to_le_bytes());
-        }
-        running.rows += 1;
-        running.frames += 1;
-        let all = numbers.len();
-        self.statistics.iter_mut().zip(&numbers).for_each(|(statistics, values)| statistics.add(values));
-        let of_pictures = self.statistics.iter_mut().skip(all).zip(images);
-        of_pictures.for_each(|(statistics, image)| statistics.add_image(&image.statistics));
-        let of_outcome = self.statistics.iter_mut().skip(all + images.len());
-        let outcome = [*reward as f32, f32::from(u8::from(*done))];
-        of_outcome.zip(outcome).for_each(|(statistics, value)| statistics.add(&[value]));
-        if running.rows >= FLUSH_ROWS || running.values.iter().map(Vec::len).sum::<usize>() >= FLUSH_BYTES {
-            running.write(&self.disk)?;
-        }
-        Ok(())
+        let mut statistics = self.statistics.iter_mut();
+        numbers.iter().zip(&mut statistics).for_each(|(values, statistics)| statistics.add(values));
+        images.iter().zip(&mut statistics).for_each(|(image, statistics)| statistics.add_image(&image.statistics));
+        let results = [*reward as f32, f32::from(u8::from(*done))];
+        statistics.zip(results).for_each(|(statistics, value)| statistics.add(&[value]));
+        let Some(spool) = &mut self.open_episodes[env] else { return Ok(()) };
+        let images = images.iter().map(|image| image.file.clone()).collect();
+        let frame = SpooledFrame { numbers: numbers.concat(), images, reward: *reward as f32, done: *done };
+        Ok(spool.push(&frame, &self.disk)?)
     }
 
-    /// Completes the Parquet file of the open episode of `env`, if any.
+    /// Writes the Parquet file of the open episode of `env`, if any.
     fn end(&mut self, env: usize) -> WriteResult {
-        let Some(mut running) = self.open_episodes[env].take() else { return Ok(()) };
-        running.write(&self.disk)?;
-        let mut out = BufWriter::new(running.open(&self.disk)?);
-        running.table.finish(&mut out, &[])?;
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
-        let index = running.table.value_offsets("index");
-        let episode = &mut self.episodes[running.episode];
-        (episode.frames, episode.index) = (running.frames, index);
+        let Some(spool) = self.open_episodes[env].take() else { return Ok(()) };
+        let (episode, first) = (self.episodes.len() as u64, self.episodes.iter().sum());
+        let frames = spool.frames();
+        let file = self.file(&data_file(episode))?;
+        let mut table = TableWriter::create(file, &columns(&self.features), &[])?;
+        let values = self.features.numbers.iter().map(|feature| feature.names.len()).sum();
+        let images = self.features.images.len();
+        let mut group = RowGroup::new(&self.features, self.fps, episode, first);
+        spool.drain(values, images, &self.disk, |frame| {
+            group.push(frame);
+            if group.is_full() { table.write(&group.take_columns()) } else { Ok(()) }
+        })?;
+        if group.rows > 0 {
+            table.write(&group.take_columns())?;
+        }
+        table.finish()?;
+        self.episodes.push(frames);
         Ok(())
     }
 
@@ -268,19 +224,24 @@ impl DatasetWriter for LeRobotWriter {
         if self.episodes.is_empty() {
             return Err(WriteError::NoFrame(episodes::NO_FRAME));
         }
-        self.write_frame_indices()?;
+        // A folder of spools is empty now. It does not exist if all episodes were short.
+        match fs::remove_dir(self.folder.partial_path().join(SPOOL)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
+            _ => {}
+        }
         self.write_tasks()?;
         self.write_episodes()?;
-        let mut out = self.file("meta/stats.json")?;
+        let mut out = BufWriter::new(self.file("meta/stats.json")?);
         let names = self.features.names().chain([REWARD, DONE]);
         let of_all = names.zip(&self.statistics).map(|(name, one)| (name.to_string(), one.to_json()));
         out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
-        // Written last, because it makes the folder a dataset.
-        let info = format!("{:#}\n", self.info());
-        let mut out = self.file(INFO)?;
-        out.write_all(info.as_bytes())?;
+        // Written last, and renamed when complete, because it makes the folder a dataset.
+        let unfinished = format!("{INFO}.part");
+        let mut out = BufWriter::new(self.file(&unfinished)?);
+        out.write_all(format!("{:#}\n", self.info()).as_bytes())?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
+        fs::rename(self.folder.partial_path().join(unfinished), self.folder.partial_path().join(INFO))?;
         let bytes = folder_size(self.folder.partial_path())?;
         self.folder.commit()?;
         Ok(bytes)
@@ -292,10 +253,10 @@ impl DatasetWriter for LeRobotWriter {
 }
 
 impl LeRobotWriter {
-    fn file(&self, name: &str) -> io::Result<BufWriter<Box<dyn Storage>>> {
+    fn file(&self, name: &str) -> io::Result<Box<dyn Storage>> {
         let path = self.folder.partial_path().join(name);
         path.parent().map_or(Ok(()), fs::create_dir_all)?;
-        Ok(BufWriter::new(self.disk.storage(File::create(path)?)))
+        Ok(self.disk.storage(File::create(path)?))
     }
 
     /// Writes the only task, which is the index of its table in pandas.
@@ -311,14 +272,11 @@ impl LeRobotWriter {
             ],
             "pandas_version": "2.0.0",
         });
-        let mut table =
-            ParquetWriter::new(vec![("task_index".into(), ColumnType::Int64), (index.into(), ColumnType::String)]);
-        let mut task = Vec::new();
-        put_bytes(self.task.as_bytes(), &mut task)?;
-        let mut out = self.file("meta/tasks.parquet")?;
-        table.write(&mut out, 1, &[0_i64.to_le_bytes().to_vec(), task])?;
-        table.finish(&mut out, &[("pandas", &about.to_string())])?;
-        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?)
+        let columns = [("task_index".into(), ColumnType::Int64), (index.into(), ColumnType::String)];
+        let file = self.file("meta/tasks.parquet")?;
+        let mut table = TableWriter::create(file, &columns, &[("pandas", about.to_string())])?;
+        table.write(&[Column::Int64(vec![0]), Column::String(vec![self.task.as_str().into()])])?;
+        table.finish()
     }
 
     fn write_episodes(&self) -> WriteResult {
@@ -335,28 +293,23 @@ impl LeRobotWriter {
         let mut columns: Vec<(String, ColumnType)> =
             numbers.iter().map(|name| (name.to_string(), ColumnType::Int64)).collect();
         columns.push(("tasks".into(), ColumnType::StringList));
-        let mut table = ParquetWriter::new(columns);
-        let mut values = vec![Vec::new(); table.width()];
+        let mut values = vec![Vec::new(); numbers.len()];
         let mut first = 0;
-        for (number, episode) in (0_u64..).zip(&self.episodes) {
-            let last = first + episode.frames;
-            let row = [number, episode.frames, number / FILES_PER_CHUNK, number % FILES_PER_CHUNK, first, last, 0, 0];
-            for (to, number) in values.iter_mut().zip(row) {
-                to.extend_from_slice(&number.to_le_bytes());
-            }
-            if let Some(tasks) = values.last_mut() {
-                put_bytes(self.task.as_bytes(), tasks)?;
-            }
+        for (number, frames) in (0_u64..).zip(&self.episodes) {
+            let last = first + frames;
+            let row = [number, *frames, number / FILES_PER_CHUNK, number % FILES_PER_CHUNK, first, last, 0, 0];
+            values.iter_mut().zip(row).for_each(|(to, number)| to.push(number as i64));
             first = last;
         }
-        let mut out = self.file("meta/episodes/chunk-000/file-000.parquet")?;
-        table.write(&mut out, self.episodes.len(), &values)?;
-        table.finish(&mut out, &[])?;
-        Ok(out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?)
+        let mut values: Vec<Column> = values.into_iter().map(Column::Int64).collect();
+        values.push(Column::String(vec![self.task.as_str().into(); self.episodes.len()]));
+        let mut table = TableWriter::create(self.file("meta/episodes/chunk-000/file-000.parquet")?, &columns, &[])?;
+        table.write(&values)?;
+        table.finish()
     }
 
     fn info(&self) -> Value {
-        let (episodes, frames) = (self.episodes.len(), self.episodes.iter().map(|episode| episode.frames).sum::<u64>());
+        let (episodes, frames) = (self.episodes.len(), self.episodes.iter().sum::<u64>());
         let mut features = feature_info(&self.features);
         for (name, kind) in COMMON {
             features.insert(name.into(), json!({ "dtype": kind, "shape": [1], "names": null }));
@@ -377,45 +330,86 @@ impl LeRobotWriter {
             "features": features,
         })
     }
-
-    /// Writes the indices of all frames in the dataset, which are known only now.
-    fn write_frame_indices(&self) -> io::Result<()> {
-        let mut next = 0_u64;
-        for episode in &self.episodes {
-            let mut file = self.disk.storage(OpenOptions::new().write(true).open(&episode.file)?);
-            for (at, rows) in &episode.index {
-                file.seek(SeekFrom::Start(*at))?;
-                let numbers: Vec<u8> = (next..next + rows).flat_map(u64::to_le_bytes).collect();
-                file.write_all(&numbers)?;
-                next += rows;
-            }
-            file.sync()?;
-        }
-        Ok(())
-    }
 }
 
 fn data_file(episode: u64) -> String {
     format!("data/chunk-{:03}/file-{:03}.parquet", episode / FILES_PER_CHUNK, episode % FILES_PER_CHUNK)
 }
 
-impl OpenEpisode {
-    /// Opens the file for appending. Files are open only during writes, because there may be thousands.
-    fn open(&self, disk: &StorageFactory) -> io::Result<Box<dyn Storage>> {
-        self.file.parent().map_or(Ok(()), fs::create_dir_all)?;
-        Ok(disk.storage(OpenOptions::new().create(true).append(true).open(&self.file)?))
+/// Columns of the frames of an episode that are written next.
+struct RowGroup<'a> {
+    features: &'a Features,
+    fps: u64,
+    episode: u64,
+    /// Index of the next frame in the episode.
+    frame: u64,
+    /// Index of the next frame in the dataset.
+    index: u64,
+    rows: usize,
+    image_bytes: usize,
+    columns: Vec<Column>,
+}
+
+impl<'a> RowGroup<'a> {
+    /// Begins an episode of this number, whose first frame has the index `first` in the dataset.
+    fn new(features: &'a Features, fps: u64, episode: u64, first: u64) -> Self {
+        let columns = empty_columns(features);
+        Self { features, fps, episode, frame: 0, index: first, rows: 0, image_bytes: 0, columns }
     }
 
-    fn write(&mut self, disk: &StorageFactory) -> WriteResult {
-        if self.rows > 0 {
-            let mut out = BufWriter::new(self.open(disk)?);
-            self.table.write(&mut out, self.rows, &self.values)?;
-            out.flush()?;
-            self.values.iter_mut().for_each(Vec::clear);
-            self.rows = 0;
+    fn push(&mut self, frame: SpooledFrame) {
+        let mut numbers = self.features.numbers.iter().scan(0, |first, feature| {
+            let range = *first..*first + feature.names.len();
+            *first = range.end;
+            frame.numbers.get(range)
+        });
+        let time = (self.frame as f64 / self.fps as f64) as f32;
+        // Timestamp after reward; task 0 last.
+        let mut floats = self.features.result_stream.map(|_| frame.reward).into_iter().chain([time]);
+        let mut integers = [self.frame, self.episode, self.index, 0].into_iter();
+        let name = format!("frame-{:06}.png", self.frame);
+        let mut images = frame.images.into_iter();
+        for column in &mut self.columns {
+            match column {
+                Column::Float32(values) => match numbers.next() {
+                    Some(feature) => values.extend_from_slice(feature),
+                    None => values.extend(floats.next()),
+                },
+                Column::Image(files, names) => {
+                    let file = images.next().unwrap_or_default();
+                    self.image_bytes += file.len();
+                    files.push(file.into());
+                    names.push(name.as_str().into());
+                }
+                Column::Bool(values) => values.push(frame.done),
+                Column::Int64(values) => values.extend(integers.next().map(|number| number as i64)),
+                Column::String(_) => {}
+            }
         }
-        Ok(())
+        self.frame += 1;
+        self.index += 1;
+        self.rows += 1;
     }
+
+    fn is_full(&self) -> bool {
+        self.rows >= GROUP_ROWS || self.image_bytes >= GROUP_BYTES
+    }
+
+    fn take_columns(&mut self) -> Vec<Column> {
+        (self.rows, self.image_bytes) = (0, 0);
+        std::mem::replace(&mut self.columns, empty_columns(self.features))
+    }
+}
+
+fn empty_columns(features: &Features) -> Vec<Column> {
+    let empty = |(_, kind): (String, ColumnType)| match kind {
+        ColumnType::Int64 => Column::Int64(Vec::new()),
+        ColumnType::Bool => Column::Bool(Vec::new()),
+        ColumnType::Float32(_) => Column::Float32(Vec::new()),
+        ColumnType::String | ColumnType::StringList => Column::String(Vec::new()),
+        ColumnType::Image => Column::Image(Vec::new(), Vec::new()),
+    };
+    columns(features).into_iter().map(empty).collect()
 }
 
 /// Size of all files of a folder \[bytes\].

@@ -6,7 +6,6 @@ use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, StorageFactory, parent_dir};
 use crate::format::Format;
 use crate::image_folder::ImageFolderWriter;
-use crate::lerobot;
 use crate::mcap_writer::{self, McapWriter};
 use crate::npz::{self, NpzWriter};
 use crate::scene_file::{self, SCENE_ARCHIVE};
@@ -126,7 +125,7 @@ fn set_periods(sources: &mut [StreamSource], cfg: &RecorderCfg, format: Format) 
         if *every == 0 {
             return Err(RecordError::OutOfRange { field: "a number of steps in stream_periods", value: 0, min: 1 });
         }
-        if matches!(format, Format::LeRobot | Format::Hdf5) {
+        if format == Format::LeRobot {
             let topic = format!("a separate period for {name:?}; all frames have the period of `period_steps`");
             return Err(RecordError::UnsupportedTopic { path: cfg.path.clone(), format, topic });
         }
@@ -180,9 +179,6 @@ fn all_streams(
     if sim.observers().is_published::<StepResult>() {
         sources.push(StreamSource::task_results(envs));
     }
-    if format == Format::Hdf5 {
-        sources.push(StreamSource::engine_states(sim, envs));
-    }
     sources.retain(|source| format.supports(&source.stream) && source.stream.width() > 0);
     if sources.is_empty() && (format.is_animation() || format == Format::Images) {
         // Without a camera, the overview image is recorded.
@@ -216,12 +212,9 @@ pub(super) fn create_writer(
     if format == Format::Images {
         return Ok(Box::new(ImageFolderWriter::create(&cfg.path, cfg.overwrite, disk)?));
     }
+    #[cfg(feature = "lerobot")]
     if format == Format::LeRobot {
-        return lerobot::create(cfg, streams, sim.cfg().physics_dt, disk);
-    }
-    #[cfg(feature = "hdf5")]
-    if format == Format::Hdf5 {
-        return crate::robomimic::create(cfg, streams, sim.cfg().physics_dt);
+        return crate::lerobot::create(cfg, streams, sim.cfg().physics_dt, disk);
     }
     let (part, file) = PartialFile::create(&cfg.path, cfg.overwrite, format == Format::Mcap)?;
     let storage = disk.storage(file);

@@ -146,6 +146,7 @@ fn full_disk_images() {
 
 /// On a full disk, a dataset has neither its final name nor the file that makes it a dataset.
 #[test]
+#[cfg_attr(not(feature = "lerobot"), ignore = "needs the feature lerobot")]
 fn full_disk_dataset() {
     let folder = tempfile::tempdir().unwrap();
     let actuated = || {
@@ -158,7 +159,7 @@ fn full_disk_dataset() {
     let whole = folder.path().join("whole.lerobot");
     let bytes = record_to_a_full_disk(&mut actuated(), &whole, usize::MAX).unwrap().bytes as usize;
     assert!(whole.join("meta/info.json").is_file() && bytes > 10_000, "{bytes}");
-    // No room; full in the rows; in the tables at the end; in the last file. Offsets of frames are written twice.
+    // No room; full in the rows; in the tables at the end; in the last file.
     for left in [0, 1000, bytes / 2, bytes - 100] {
         let path = folder.path().join(format!("left_{left}.lerobot"));
         let part = partial_path_of(&path);

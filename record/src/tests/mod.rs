@@ -5,7 +5,6 @@ mod archives;
 mod contents;
 mod episodes;
 mod errors;
-mod hdf5;
 mod images;
 mod kill;
 mod lerobot;

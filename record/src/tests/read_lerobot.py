@@ -56,9 +56,12 @@ for number, episode in enumerate(episodes):
         continue
     output.append([{
         "state": frame["observation.state"],
-        "action": frame["action"],
-        "cube": frame["observation.environment_state"],
-        "picture": pixels(frame["observation.images.camera"]).tobytes().hex(),
+        "velocity": frame["observation.velocity"],
+        "effort": frame.get("observation.effort"),
+        "actions": [frame.get(name) for name in ("action", "target.velocity", "target.effort")],
+        "acceleration": frame.get("sensors.imu.lin_acc_b"),
+        "cube": frame.get("observation.environment_state"),
+        "picture": pixels(frame["observation.images.camera"]).tobytes().hex() if images else None,
     } for frame in frames])
 assert info["total_frames"] == len(rows)
 
