@@ -24,11 +24,11 @@ const BANDS_PER_THREAD: usize = 8;
 /// A render request and the buffers of its images.
 pub type RenderJob<'a> = (RenderRequest<'a>, FrameMut<'a>);
 
-/// Renders batches of frames on several threads; keeps the scratch memory of each thread. The bits do not depend on the
-/// number of threads.
+/// Renders batches of frames on several threads; keeps the scratch memory of each thread. Images are bit-identical for
+/// any number of threads.
 ///
-/// Of many frames, each is rendered by one thread. Batches of fewer than two frames per thread, and the last frames of
-/// a batch, which would leave threads without work, are rendered by all threads together: first their visibility is
+/// In a large batch, one thread renders each frame. All threads together render the frames of a small batch (fewer than
+/// two frames per thread) and the last frames of a larger batch, so that no thread is idle: first their visibility is
 /// prepared, then their shadow maps in parts, then bands of the images. Path tracing renders one frame after the other,
 /// each by all threads.
 #[derive(Debug)]
