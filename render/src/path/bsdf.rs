@@ -204,13 +204,13 @@ impl Bsdf {
     pub(super) fn pdf(&self, o: V3, i: V3) -> f64 {
         let share = self.layer_probability(o);
         // The sum of both strategies' pdfs.
-        let mut likely = (1.0 - share) * i[2] / PI;
+        let mut pdf = (1.0 - share) * i[2] / PI;
         if share > 0.0 {
             let half = [0, 1, 2].map(|k| o[k] + i[k]);
             let tilt = half[2] / dot(half, half).sqrt();
-            likely += share * self.masking(o[2]) * self.ndf(tilt) / (4.0 * o[2]);
+            pdf += share * self.masking(o[2]) * self.ndf(tilt) / (4.0 * o[2]);
         }
-        likely * self.scattered_fraction()
+        pdf * self.scattered_fraction()
     }
 
     /// Samples a visible microfacet and mirrors `o` by it.

@@ -11,7 +11,7 @@ pub(super) trait RadianceEffect {
     fn check(&self) -> Result<(), SensorError>;
 
     /// Modifies the linear RGB radiance of a pixel.
-    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>);
+    fn apply(&self, light: &mut [f64; 3], context: &PixelContext<'_>);
 }
 
 /// An imperfection of measured depth, applied to an image.

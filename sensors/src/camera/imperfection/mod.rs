@@ -71,9 +71,9 @@ macro_rules! imperfections {
                 Ok(())
             }
 
-            fn spoil_light(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
+            fn spoil_light(&self, light: &mut [f64; 3], context: &PixelContext<'_>) {
                 $(if let Some(imperfection) = &self.$light {
-                    imperfection.apply(light, place);
+                    imperfection.apply(light, context);
                 })*
             }
 

@@ -177,7 +177,7 @@ impl SensorCfg for StereoCameraCfg {
         let name = format!("{}/right", context.name).into();
         let other = SensorContext { name, ..context.clone() };
         let [left, right] = [("left", left.build(context)), ("right", right.build(&other))]
-            .map(|(eye, camera)| camera.map_err(SensorError::of_stereo_camera(eye)));
+            .map(|(side, camera)| camera.map_err(SensorError::of_stereo_camera(side)));
         Ok(StereoCamera::new(left?, right?, self.rig()?))
     }
 }
