@@ -249,12 +249,12 @@ impl ModelArgs {
         Ok(())
     }
 
-    /// Builds the simulation. URDF files form one robot. An MJCF file is a robot if possible; otherwise (several root
-    /// bodies, ball joints, or no hinge or slide joint; see [`may_be_scene`]) it is a scene with its own world geoms
-    /// and no additional ground. `setup.ground` applies to robots only.
+    /// Builds the simulation. URDF files form one robot. An MJCF file forms a robot. If a robot cannot be made of it,
+    /// for a reason in [`may_be_scene`] (such as several root bodies or ball joints), it forms a scene with its own
+    /// world geoms and no additional ground. A scene file forms its scene. `setup.ground` applies to robots only.
     ///
     /// # Errors
-    /// Errors of the files, or flags that do not apply to a scene.
+    /// A file cannot be loaded, the spawn height is not finite, or a flag does not apply to files of this kind.
     pub(crate) fn build(&self, setup: &Setup) -> Result<Model> {
         if let Some(height) = setup.spawn_height.filter(|height| !height.is_finite()) {
             return Err(format!("--spawn-height {height}: must be a height in meters, such as 0.1").into());

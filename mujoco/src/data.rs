@@ -291,8 +291,9 @@ impl Data {
         Ok(dense)
     }
 
-    /// Force of contact `index` from the last solve, in the contact frame: normal, two tangents, three torques \[N and
-    /// N m\]. A positive normal force pushes the geoms apart.
+    /// Force \[N\] and torque \[N m\] of contact `index` on its second geom (`geom2`), from the last solve, in the
+    /// contact frame: along the normal (from `geom1` to `geom2`) and two tangents, then about these three axes at the
+    /// contact point. A positive normal force pushes the geoms apart.
     ///
     /// # Panics
     /// `index` is not smaller than the number of contacts.

@@ -1,4 +1,4 @@
-//! MJCF keywords of MuJoCo's codes; `None` for codes that are not written back as MJCF.
+//! MJCF keywords of MuJoCo's enum values; `None` for values that the MJCF writer does not support.
 
 use mujoco_sys as mj;
 

@@ -284,7 +284,7 @@ impl Model {
         self.header().nv as usize
     }
 
-    /// Number of control inputs.
+    /// Number of control inputs, the length of `ctrl`.
     pub fn nu(&self) -> usize {
         self.header().nu as usize
     }
@@ -319,7 +319,7 @@ impl Model {
         self.header().ntendon as usize
     }
 
-    /// Number of activations.
+    /// Number of activations, the length of `act`.
     pub fn na(&self) -> usize {
         self.header().na as usize
     }
@@ -352,7 +352,7 @@ impl Model {
         self.header().nsensor as usize
     }
 
-    /// Number of values of MuJoCo's own sensors.
+    /// Number of values of MuJoCo's own sensors, the length of `sensordata`.
     pub fn nsensordata(&self) -> usize {
         self.header().nsensordata as usize
     }

@@ -30,8 +30,9 @@
 //! The channel metadata of other sensors has `rows` and `filters` (names of bodies) and `unit`.
 //!
 //! Messages have the time of capture, on the clock of the recording (`clock.rs`). Forces, efforts and accelerations of
-//! sensors have the time of the beginning of the step. A robot's joint state message has a single time, that of its
-//! positions; its efforts are those of the step that led there.
+//! sensors, all values of IMUs, and those of contact sensors except poses, have the time of the beginning of the last
+//! MuJoCo step. A robot's joint state message has a single time, that of its positions; its efforts are those of the
+//! step that led there.
 
 use crate::file::{PartialFile, Storage};
 use crate::packet::{Event, Packet, StreamRows, ValueBuffer};

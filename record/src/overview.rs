@@ -87,7 +87,7 @@ impl OverviewRenderer {
         Ok(Self { view, rasterizer: ParallelRenderer::new(raster, sim.threads()) })
     }
 
-    /// Draws the present state and appends it to `pixels`: RGBA, row by row from the top left.
+    /// Draws the current state and appends it to `pixels`: RGBA, row by row from the top left.
     ///
     /// # Errors
     /// The scene has more triangles than the rasterizer supports.

@@ -27,9 +27,9 @@ use std::time::{Duration, Instant};
 /// Handle of a recorder; valid for the manager that made it.
 pub type RecorderId = ObserverId<Recorder>;
 
-/// Extension trait of a simulation for recordings.
+/// Extension trait of [`SimulationManager`] that starts, annotates and ends recordings.
 pub trait Record {
-    /// Begins a recording with the present states.
+    /// Starts a recording. The first row is the current state.
     ///
     /// Observers are notified of a step in the order in which they were added. If an earlier observer resets an
     /// environment in a step, the recorder records the state after that reset for this step.

@@ -45,9 +45,9 @@ pub struct StreamField {
     pub name: String,
     /// Shape in one environment.
     pub shape: Vec<usize>,
-    /// True if a sensor measures the field at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and
-    /// accelerations. The engine solves for them at the beginning of the step that leads to positions and velocities.
-    /// False for the efforts of [`Topic::JointStates`](crate::Topic::JointStates), which have the stamp of the
+    /// True if a sensor measures the field at [`kinetoscope_scene::SceneState::force_time`], the beginning of the last
+    /// MuJoCo step: forces, efforts and accelerations, all channels of IMUs, and all channels of contact sensors except
+    /// poses. False for the efforts of [`Topic::JointStates`](crate::Topic::JointStates), which have the stamp of the
     /// positions.
     pub at_force_time: bool,
     /// Unit that a sensor reports ([`SampleChannel::unit`](kinetoscope_sensors::SampleChannel::unit)); empty without a

@@ -54,7 +54,7 @@ pub(crate) trait FormatWriter: Send {
     /// Writes buffered data to the file, so that it survives a kill of the process.
     fn flush(&mut self) -> WriteResult;
 
-    /// Completes the file and gives it its name; returns its size \[bytes\].
+    /// Completes the file, renames it to its final name, and returns its size \[bytes\]. Called once.
     fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64>;
 
     /// Path of the partial file after an error, if it can be read. Otherwise it is deleted when the writer is dropped.

@@ -24,11 +24,11 @@ const BANDS_PER_THREAD: usize = 8;
 /// A render request and the buffers of its images.
 pub type RenderJob<'a> = (RenderRequest<'a>, FrameMut<'a>);
 
-/// Renders batches of frames on several threads; keeps the scratch memory of each thread. The bits do not depend on the
-/// number of threads.
+/// Renders batches of frames on several threads; keeps the scratch memory of each thread. Images are bit-identical for
+/// any number of threads.
 ///
-/// Of many frames, each is rendered by one thread. Batches of fewer than two frames per thread, and the last frames of
-/// a batch, which would leave threads without work, are rendered by all threads together: first their visibility is
+/// In a large batch, one thread renders each frame. All threads together render the frames of a small batch (fewer than
+/// two frames per thread) and the last frames of a larger batch, so that no thread is idle: first their visibility is
 /// prepared, then their shadow maps in parts, then bands of the images. Path tracing renders one frame after the other,
 /// each by all threads.
 #[derive(Debug)]
@@ -70,8 +70,8 @@ impl ParallelRenderer {
 
     /// Lets all threads count their progress together.
     fn share_progress(&mut self) {
-        for rasterizer in &mut self.renderers {
-            rasterizer.progress = self.progress.clone();
+        for image_renderer in &mut self.renderers {
+            image_renderer.progress = self.progress.clone();
         }
     }
 
@@ -96,30 +96,30 @@ impl ParallelRenderer {
 
     /// Sets the options of the next batches, see [`ImageRenderer::cfg`].
     pub fn set_cfg(&mut self, cfg: RasterCfg) {
-        for rasterizer in &mut self.renderers {
-            rasterizer.cfg = cfg;
+        for image_renderer in &mut self.renderers {
+            image_renderer.cfg = cfg;
         }
     }
 
     /// Sets the renderer.
     pub fn set_renderer(&mut self, renderer: Renderer) {
-        for rasterizer in &mut self.renderers {
-            rasterizer.renderer = renderer;
+        for image_renderer in &mut self.renderers {
+            image_renderer.renderer = renderer;
         }
     }
 
     /// Sets depth of field and exposure time: with `None`, everything is sharp; with [`Shutter::default`], an image
     /// shows one instant. Other values need path tracing.
     pub fn set_exposure_optics(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
-        for rasterizer in &mut self.renderers {
-            (rasterizer.aperture, rasterizer.shutter) = (aperture, shutter);
+        for image_renderer in &mut self.renderers {
+            (image_renderer.aperture, image_renderer.shutter) = (aperture, shutter);
         }
     }
 
     /// Sets the exposure compensation in stops, -20 to 20, see [`ImageRenderer::exposure_compensation`].
     pub fn set_exposure_compensation(&mut self, stops: f64) {
-        for rasterizer in &mut self.renderers {
-            rasterizer.exposure_compensation = stops;
+        for image_renderer in &mut self.renderers {
+            image_renderer.exposure_compensation = stops;
         }
     }
 
@@ -130,13 +130,13 @@ impl ParallelRenderer {
 
     /// Geom groups that are rendered: bit k is group k.
     pub fn groups(&self) -> u32 {
-        self.renderers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
+        self.renderers.first().map_or(0, |image_renderer| image_renderer.cfg.groups)
     }
 
     /// Uses `assets`, which other renderers may share, as the cache of BVHs over meshes.
     pub fn share_assets(&mut self, assets: &RayAssetCache) {
-        for rasterizer in &mut self.renderers {
-            rasterizer.assets = assets.clone();
+        for image_renderer in &mut self.renderers {
+            image_renderer.assets = assets.clone();
         }
     }
 
@@ -170,7 +170,7 @@ impl ParallelRenderer {
         let Self { renderers, active, prepared, pool, progress } = self;
         let Some((cfg, renderer)) = renderers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
         let threads = worthwhile_threads(cfg, renderer, jobs).min(*active);
-        let rasterizers = &mut renderers[..threads];
+        let image_renderers = &mut renderers[..threads];
         let failure = FirstError::default();
         progress
             .begin(jobs.iter().fold(0, |sum, (render_request, frame)| {
@@ -180,7 +180,7 @@ impl ParallelRenderer {
             for (index, (render_request, frame)) in jobs.iter_mut().enumerate() {
                 let take = takes.get(index).copied().unwrap_or_default();
                 let (before, paths) = (progress.samples(), renderer.path_count(render_request, frame));
-                let result = path_trace(pool, rasterizers, render_request, &take, frame);
+                let result = path_trace(pool, image_renderers, render_request, &take, frame);
                 if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Canceled { .. })) {
                     progress.subtract(paths.saturating_sub(progress.samples().saturating_sub(before)));
                 }
@@ -198,12 +198,16 @@ impl ParallelRenderer {
         };
         let (alone, together) = jobs.split_at_mut(count - together);
         let first = alone.len();
-        pool.for_each(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (render_request, frame))| {
-            failure.record(index, rasterizer.render_request(render_request, frame));
-        });
+        pool.for_each(
+            image_renderers,
+            alone.iter_mut().enumerate(),
+            |image_renderer, (index, (render_request, frame))| {
+                failure.record(index, image_renderer.render_request(render_request, frame));
+            },
+        );
         if !together.is_empty() {
             prepared.resize_with(prepared.len().max(together.len()), PreparedFrame::default);
-            render_jointly(pool, rasterizers, &mut prepared[..together.len()], together, |index, result| {
+            render_jointly(pool, image_renderers, &mut prepared[..together.len()], together, |index, result| {
                 failure.record(first + index, result);
             });
         }
@@ -241,25 +245,25 @@ impl FirstError {
 /// Renders a few frames, each by all threads.
 fn render_jointly(
     pool: &ThreadPool,
-    rasterizers: &mut [ImageRenderer],
+    image_renderers: &mut [ImageRenderer],
     plans: &mut [PreparedFrame],
     jobs: &mut [RenderJob<'_>],
     note: impl Fn(usize, Result<(), RenderError>) + Sync,
 ) {
-    let parts = (BANDS_PER_THREAD * rasterizers.len()).div_ceil(jobs.len());
+    let parts = (BANDS_PER_THREAD * image_renderers.len()).div_ceil(jobs.len());
     pool.for_each(
-        rasterizers,
+        image_renderers,
         plans.iter_mut().zip(&*jobs).enumerate(),
-        |rasterizer, (index, (plan, (render_request, frame)))| {
-            note(index, plan.prepare(rasterizer.settings(), render_request, frame));
+        |image_renderer, (index, (plan, (render_request, frame)))| {
+            note(index, plan.prepare(image_renderer.settings(), render_request, frame));
         },
     );
     if plans.iter().any(PreparedFrame::has_shadows) {
         let maps = plans.iter_mut().zip(&*jobs);
         let bands = maps
             .flat_map(|(plan, (render_request, _))| plan.shadow_bands().map(move |band| (render_request.scene, band)));
-        pool.for_each(rasterizers, bands, |rasterizer, (scene, band)| {
-            rasterizer.scratch.render_shadow_band(scene, band);
+        pool.for_each(image_renderers, bands, |image_renderer, (scene, band)| {
+            image_renderer.scratch.render_shadow_band(scene, band);
         });
     }
     let bands = plans.iter().zip(jobs).flat_map(|(plan, job)| {
@@ -267,8 +271,8 @@ fn render_jointly(
         let bands = bands(plan, &render_request, frame, parts);
         bands.map(move |band| (plan, render_request, band))
     });
-    pool.for_each(rasterizers, bands, |rasterizer, (plan, render_request, (first, rows, mut frame))| {
-        rasterizer.scratch.render_band(plan, &render_request, &mut frame, first..first + rows);
+    pool.for_each(image_renderers, bands, |image_renderer, (plan, render_request, (first, rows, mut frame))| {
+        image_renderer.scratch.render_band(plan, &render_request, &mut frame, first..first + rows);
     });
 }
 

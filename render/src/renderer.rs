@@ -36,13 +36,13 @@ pub enum Renderer {
     /// Path-traced color: indirect light, soft shadows of lights with a size, and mirrors that show the scene. All
     /// other channels are those of [`FastRayTraced`](Self::FastRayTraced).
     ///
-    /// - **Lights** are as bright as in the rasterizer: a white matt surface that faces a light of color L has the
+    /// - **Lights** are as bright as in the rasterizer: a white matte surface that faces a light of color L has the
     ///   radiance L. A light with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces the lit point:
     ///   keep it at least the radius below a ceiling, or half of it is behind the ceiling. Ambient light of lights and
     ///   of the headlight reaches every surface, as in the rasterizer. Objects between the camera and the near plane
     ///   cast no shadow in the headlight. The first 16 active lights count, and the headlight.
     /// - **Environment light** is [`RenderScene::ambient`](kinetoscope_scene::RenderScene::ambient): its sky's radiance
-    ///   from above the horizon, its ground's from below. An unoccluded matt surface (specular 0) receives the same
+    ///   from above the horizon, its ground's from below. An unoccluded matte surface (specular 0) receives the same
     ///   light as in the rasterizer; below a glossy layer it receives the rest. Cameras and mirrors see
     ///   [`RenderScene::sky`](kinetoscope_scene::RenderScene::sky) instead.
     /// - **Emission** of a material lights other objects, with `max_bounces` 0 too. Emissive finite planes (area

@@ -16,16 +16,17 @@ pub struct RngKey {
     due_images: u32,
 }
 
-/// Purpose of random numbers: the numbers differ for every purpose.
+/// Random stream, one for each purpose. The random numbers of different streams are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RngStream(u8);
 
 impl RngStream {
     /// Dropout of an image.
     pub const DROPOUT: Self = Self(0);
-    /// Shot noise.
+    /// Shot noise of color channels with a mean of 50 electrons or more: normal numbers.
     pub const SHOT: Self = Self(1);
-    /// Position of a pixel with few electrons in the distribution of its count.
+    /// Shot noise of dark color channels (a mean below 50 electrons): uniform numbers that select quantiles of Poisson
+    /// distributions.
     pub const SHOT_LOW_LIGHT: Self = Self(4);
     /// Read noise.
     pub const READ: Self = Self(2);

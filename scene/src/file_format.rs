@@ -55,7 +55,7 @@ pub mod pose {
     /// are normalized.
     ///
     /// # Errors
-    /// The value has another form, two rotations, or an invalid rotation.
+    /// The value has another form or two rotations, or the quaternion is zero or not finite.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Pose, D::Error> {
         deserializer.deserialize_any(Row)
     }
@@ -114,10 +114,11 @@ pub mod rotation {
         to_wxyz(rotation).serialize(serializer)
     }
 
-    /// Reads `[w, x, y, z]`, which is normalized, or `{ rpy_deg = [r, p, y] }` \[deg\].
+    /// Reads a quaternion `[w, x, y, z]` and normalizes it, or `{ rpy_deg = [r, p, y] }`: angles about fixed axes, as
+    /// in URDF \[deg\].
     ///
     /// # Errors
-    /// The value has another form, or is not a rotation.
+    /// The value has another form, or the quaternion is zero or not finite.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<UnitQuaternion<f64>, D::Error> {
         deserializer.deserialize_any(Wxyz)
     }

@@ -134,12 +134,12 @@ impl ActuatorState {
         self.sampler.values("activations")
     }
 
-    /// Past controls, newest first, shape \[num_envs, history_length, actuators\]; 0 where not filled yet.
+    /// History of the controls, newest first, shape \[num_envs, history_length, actuators\]; 0 where not filled yet.
     pub fn control_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("controls")
     }
 
-    /// Past forces, newest first, shape \[num_envs, history_length, actuators\]; 0 where not filled yet.
+    /// History of the forces, newest first, shape \[num_envs, history_length, actuators\]; 0 where not filled yet.
     pub fn force_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("forces")
     }

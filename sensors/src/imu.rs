@@ -44,7 +44,7 @@ impl ImuCfg {
 }
 
 impl Default for ImuCfg {
-    /// No offset; the body is still to be set.
+    /// No offset and an empty body name, which must be set.
     fn default() -> Self {
         let sampling = SamplingCfg::default();
         Self { body: String::new(), offset: Pose::identity(), gravity_bias: None, sampling, debug_vis: false }

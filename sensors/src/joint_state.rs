@@ -148,18 +148,20 @@ impl JointState {
         self.force_stamps()
     }
 
-    /// Past positions \[rad or m\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled yet.
+    /// History of the positions \[rad or m\], newest first, shape \[num_envs, history_length, joints\]; 0 where not
+    /// filled yet.
     pub fn position_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("positions")
     }
 
-    /// Past velocities \[rad/s or m/s\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled
-    /// yet.
+    /// History of the velocities \[rad/s or m/s\], newest first, shape \[num_envs, history_length, joints\]; 0 where
+    /// not filled yet.
     pub fn velocity_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("velocities")
     }
 
-    /// Past efforts \[N m or N\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled yet.
+    /// History of the efforts \[N m or N\], newest first, shape \[num_envs, history_length, joints\]; 0 where not
+    /// filled yet.
     pub fn effort_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("efforts")
     }

@@ -18,9 +18,9 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct JointWrenchCfg {
-    /// Name patterns of the links whose joints are measured (`uid/link`, or `link` alone), in the order they are
-    /// reported. A link that fixed joints fuse to another link has no joint to measure, which is an error: see
-    /// `frames`.
+    /// Name patterns of the links whose joints are measured (`uid/link`, or `link` alone). Results have the order of
+    /// the patterns. A link that fixed joints fuse to another link has no measurable joint and is an error; list it in
+    /// `frames` instead.
     pub links: Vec<String>,
     /// Name patterns of links in whose frames to measure, reported after `links`. Each gives the wrench of the joint
     /// that moves the named link, about the origin and in the axes of the named link. If the link is fused to another

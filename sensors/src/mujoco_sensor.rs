@@ -210,7 +210,7 @@ impl MujocoSensor {
         Ok(values)
     }
 
-    /// Past values, newest first, shape \[num_envs, history_length, D\]; 0 where not filled yet.
+    /// History of the values, newest first, shape \[num_envs, history_length, D\]; 0 where not filled yet.
     pub fn value_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("values")
     }

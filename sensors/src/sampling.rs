@@ -122,7 +122,7 @@ impl SampleChannel {
     }
 }
 
-/// The measurements of a sensor in all environments: current, past and in flight.
+/// The measurements of a sensor in all environments: current, in the history and in flight.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     name: Arc<str>,
@@ -132,7 +132,7 @@ pub struct Sampler {
     quantities: Vec<ChannelBuffer>,
     stamps: Array1<f64>,
     force_stamps: Array1<f64>,
-    /// Both stamps of past measurements.
+    /// Both stamps of the measurements in the history.
     stamp_history: History<f64>,
     /// Both stamps of the latest delivered measurement; empty without a latency.
     latest_delivered: History<f64>,
@@ -143,7 +143,7 @@ pub struct Sampler {
     row: Vec<f64>,
 }
 
-/// Current values of a channel, shape \[num_envs, width\], and those of past measurements.
+/// Current values of a channel, shape \[num_envs, width\], and its history.
 #[derive(Clone, Debug)]
 struct ChannelBuffer {
     channel: SampleChannel,
@@ -502,7 +502,8 @@ impl Sampler {
         shaped(self.quantity(channel).current.as_slice(), shape.into_dimension())
     }
 
-    /// Past values of a channel, newest first, shape \[num_envs, history_length, width\]; 0 where not filled yet.
+    /// History of a channel, newest first, shape \[num_envs, history_length, width\]; 0 where not filled yet. The
+    /// newest values are those of the latest delivered measurement.
     ///
     /// # Panics
     ///
@@ -512,7 +513,7 @@ impl Sampler {
         self.quantity(channel).history.view()
     }
 
-    /// Past values of a channel in a shape with more axes, such as \[num_envs, history_length, bodies, 3\].
+    /// History of a channel in a shape with more axes, such as \[num_envs, history_length, bodies, 3\].
     ///
     /// # Panics
     ///
@@ -579,14 +580,14 @@ pub trait Sampled {
         self.sampler().delivered_stamps(1)
     }
 
-    /// Times of past positions and velocities \[s\], newest first, shape \[num_envs, history_length\]; 0 where not
-    /// filled yet.
+    /// Times of the positions and velocities in the history \[s\], newest first, shape \[num_envs, history_length\]; 0
+    /// where not filled yet.
     fn stamp_history(&self) -> ArrayView2<'_, f64> {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 0)
     }
 
-    /// Times of past forces, efforts and accelerations \[s\], newest first, shape \[num_envs, history_length\]; 0 where
-    /// not filled yet.
+    /// Times of the forces, efforts and accelerations in the history \[s\], newest first, shape \[num_envs,
+    /// history_length\]; 0 where not filled yet.
     fn force_stamp_history(&self) -> ArrayView2<'_, f64> {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 1)
     }

@@ -118,7 +118,7 @@ impl SimulationManager {
     /// ([`DriveModel::Implicit`](crate::DriveModel::Implicit)), friction, limits and contacts are rows, which MuJoCo
     /// solves for the whole scene at once. The solver stops at a residual below 1e-8 of the mean inertia times the
     /// number of degrees of freedom, and a larger scene leaves another residual. For an arm with a hand the difference
-    /// is 1e-6 rad after 1 s.
+    /// is below 1e-6 rad after 1 s.
     ///
     /// # Errors
     /// The name is taken, the simulation has 30 robots and articulations already, or the files, names, drives or meshes
@@ -437,9 +437,10 @@ impl SimulationManager {
         }
     }
 
-    /// Resets environments to their initial state and time 0, all of them for `env_ids = None`. Targets and controls
-    /// return to their initial values, external wrenches end, and welds are released. Properties, gains, limits and
-    /// gravity compensation stay. Diverged environments run again. Ids may repeat.
+    /// Resets environments to their initial state and time 0 (`None` for all environments). Targets and controls return
+    /// to their initial values, external wrenches end, welds are released, and actuator models lose their memory.
+    /// Sensors are reset too: they show the initial state at once, and their histories are empty. Properties, gains,
+    /// limits and gravity compensation stay. Diverged environments run again. Ids may repeat.
     ///
     /// # Errors
     /// An environment does not exist; then no environment is reset.

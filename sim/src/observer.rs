@@ -19,7 +19,7 @@ pub trait Observer: Any + Send {
     fn due_in(&self, sim: &SimulationManager) -> u64;
 
     /// Handles an event. Changes made here, including steps, are reported to the other observers but not to this one.
-    fn on_event(&mut self, sim: &mut SimulationManager, moment: &SimEvent);
+    fn on_event(&mut self, sim: &mut SimulationManager, event: &SimEvent);
 
     /// Handles an event that another crate publishes ([`ObserversMut::publish`](crate::ObserversMut::publish)), such as
     /// a [`StepResult`](crate::StepResult). Events of unknown types must be ignored.
@@ -282,8 +282,8 @@ impl SimulationManager {
     }
 
     /// Notifies all observers of an event.
-    pub(crate) fn notify_all(&mut self, moment: &SimEvent) {
-        self.notify_each_with(|observer, sim| observer.on_event(sim, moment));
+    pub(crate) fn notify_all(&mut self, event: &SimEvent) {
+        self.notify_each_with(|observer, sim| observer.on_event(sim, event));
     }
 
     fn notify_each_with(&mut self, tell: impl Fn(&mut dyn Observer, &mut Self)) {

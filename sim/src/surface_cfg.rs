@@ -33,8 +33,8 @@ pub struct SurfaceCfg {
     pub reflectance: Option<f64>,
     /// Metalness, 0..=1. A metal has no diffuse reflection, and its color tints the specular reflection.
     pub metallic: Option<f64>,
-    /// Roughness, 0..=1; 0 is polished. If both are set, it replaces `shininess`. The alpha of the GGX distribution is
-    /// the square of the roughness.
+    /// Roughness, 0..=1; 0 is polished. If `roughness` and `shininess` are both set, `roughness` is used. The alpha of
+    /// the GGX distribution is the square of the roughness.
     pub roughness: Option<f64>,
     /// Fraction of light that is refracted through the surface, as by glass, 0..=1. Only path-traced frames apply it,
     /// and only to closed shapes; other renderers draw an opaque surface.
@@ -49,7 +49,7 @@ impl SurfaceCfg {
         Self { transmission: Some(1.0), refractive_index: Some(1.5), roughness: Some(0.0), ..Self::default() }
     }
 
-    /// Metal in the color of the surface: roughness 0 is polished, 1 is matt.
+    /// Metal in the color of the surface: roughness 0 is polished, 1 is matte.
     pub fn metal(roughness: f64) -> Self {
         Self { metallic: Some(1.0), roughness: Some(roughness), ..Self::default() }
     }

@@ -106,7 +106,7 @@ impl Env {
         self.episodes.len()
     }
 
-    /// Duration of a step of the task \[s\].
+    /// Duration of a task step \[s\]: `decimation` times the physics time step.
     pub fn step_dt(&self) -> f64 {
         f64::from(self.cfg.decimation) * self.state.sim.cfg().physics_dt
     }

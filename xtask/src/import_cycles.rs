@@ -15,8 +15,8 @@ type Path = Vec<String>;
 pub(crate) fn run(repo: &Repo) -> XtaskResult {
     let findings: Vec<String> = import_cycles(&text_files(&repo.root))
         .into_iter()
-        .filter(|circle| circle.len() > MAX_CYCLE_FILES)
-        .map(|circle| format!("{} files import each other: {}", circle.len(), circle.join(", ")))
+        .filter(|cycle| cycle.len() > MAX_CYCLE_FILES)
+        .map(|cycle| format!("{} files import each other: {}", cycle.len(), cycle.join(", ")))
         .collect();
     no_findings("import cycles of more than 5 files; move the shared items into a separate file", &findings)
 }
@@ -31,7 +31,7 @@ fn import_cycles(files: &[TextFile]) -> Vec<Vec<String>> {
         }
     }
     let mut found: Vec<Vec<String>> = crates.values().flat_map(|files| Crate::new(files).import_cycles()).collect();
-    found.sort_by_key(|circle| std::cmp::Reverse(circle.len()));
+    found.sort_by_key(|cycle| std::cmp::Reverse(cycle.len()));
     found
 }
 
@@ -125,10 +125,10 @@ impl Crate {
             edges.keys().map(|file| (*file, reached(file, &edges))).collect();
         let mut found: BTreeSet<Vec<String>> = BTreeSet::new();
         for (file, ahead) in &reach {
-            let circle: Vec<String> =
+            let cycle: Vec<String> =
                 ahead.iter().filter(|other| reach[**other].contains(file)).map(|s| (*s).clone()).collect();
-            if circle.len() > 1 {
-                found.insert(circle);
+            if cycle.len() > 1 {
+                found.insert(cycle);
             }
         }
         found.into_iter().collect()

@@ -89,8 +89,12 @@ impl LensRayTables {
         Ok(made)
     }
 
-    /// Assigns rays to the views `rows`. `pixels` returns the intrinsics of a view, and `made` holds their rays from
-    /// [`compute`](Self::compute).
+    /// Assigns rays to the views `rows`. `pixels(row)` returns the intrinsics of a view. `made` must be the result of
+    /// [`compute`](Self::compute) for these intrinsics. Does nothing for a lens without distortion.
+    ///
+    /// # Panics
+    ///
+    /// If a row is out of range.
     pub fn set(&mut self, made: Vec<Arc<LensRays>>, rows: &[usize], pixels: impl Fn(usize) -> PixelIntrinsics) {
         if self.lens.is_pinhole() {
             return;

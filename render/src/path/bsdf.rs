@@ -110,8 +110,9 @@ impl Bsdf {
         (mirrored, Some([-self.ratio * o[0], -self.ratio * o[1], -there]))
     }
 
-    /// Approximate fraction of the light towards `o` that is mirrored rather than scattered below the layer, with light
-    /// from everywhere. The mean of Schlick's term over all directions is 1/21.
+    /// Approximate fraction of the outgoing light in direction `o` (local frame) that is not diffuse, under uniform
+    /// illumination. Perfect mirror reflection and refraction through glass count as not diffuse. 1/21 is the
+    /// cosine-weighted mean of Schlick's (1 - cos)^5 over the hemisphere.
     pub(super) fn gloss(&self, o: V3) -> f64 {
         let (rest, layer) = (self.scattered_fraction(), self.fresnel(o[2]));
         let out = self.f0.map(|f0| 1.0 - f0 - (self.f90 - f0) / 21.0);
@@ -203,13 +204,13 @@ impl Bsdf {
     pub(super) fn pdf(&self, o: V3, i: V3) -> f64 {
         let share = self.layer_probability(o);
         // The sum of both strategies' pdfs.
-        let mut likely = (1.0 - share) * i[2] / PI;
+        let mut pdf = (1.0 - share) * i[2] / PI;
         if share > 0.0 {
             let half = [0, 1, 2].map(|k| o[k] + i[k]);
             let tilt = half[2] / dot(half, half).sqrt();
-            likely += share * self.masking(o[2]) * self.ndf(tilt) / (4.0 * o[2]);
+            pdf += share * self.masking(o[2]) * self.ndf(tilt) / (4.0 * o[2]);
         }
-        likely * self.scattered_fraction()
+        pdf * self.scattered_fraction()
     }
 
     /// Samples a visible microfacet and mirrors `o` by it.

@@ -27,13 +27,13 @@ impl PathTracer<'_> {
     ) -> V3 {
         let basis = OrthonormalBasis::from_normal(point.shading_normal);
         let local = basis.to_local(o);
-        let matt = point.bsdf.scattered_fraction();
+        let matte = point.bsdf.scattered_fraction();
         let mut out = [0.0; 3];
         let mut origin = None;
         for (source, k) in self.lights.lights.iter().zip(4..) {
             let choice = if source.has_size() { path.sample.sample_2d(dims + k) } else { [0.0; 2] };
             let Some(light) = source.sample(point.position, choice) else { continue };
-            out = add_scaled(out, light.strength * matt, times(point.bsdf.diffuse_albedo, source.ambient));
+            out = add_scaled(out, light.strength * matte, times(point.bsdf.diffuse_albedo, source.ambient));
             let scatter = point.bsdf.evaluate(local, basis.to_local(light.direction));
             let sent = [0, 1, 2]
                 .map(|c| PI * (scatter.diffuse[c] * source.diffuse[c] + scatter.specular[c] * source.specular[c]));
@@ -109,21 +109,21 @@ impl PathTracer<'_> {
         if there.alpha < 1.0 && !there.front {
             return none;
         }
-        let likely = density * emitter.probability();
-        let share = self.strategy.light_weight(likely, point.bsdf.pdf(local, i));
+        let pdf = density * emitter.probability();
+        let share = self.strategy.light_weight(pdf, point.bsdf.pdf(local, i));
         let scatter = point.bsdf.evaluate(local, i);
-        let by = share * passes * there.alpha * (1.0 - there.bsdf.mirror) / likely;
+        let by = share * passes * there.alpha * (1.0 - there.bsdf.mirror) / pdf;
         [0, 1, 2].map(|c| by * there.emission[c] * (scatter.diffuse[c] + scatter.specular[c]))
     }
 
-    /// MIS weight of emission that a path hit. The direction of the path was sampled at `from` with the pdf `likely`
-    /// \[1/sr\].
-    pub(super) fn bsdf_mis_weight(&self, from: V3, likely: f64, hit: &Hit, at: V3) -> f64 {
+    /// Returns the MIS weight, 0 to 1, of the emission at the hit point `at`. The BSDF sampled the direction from
+    /// `from` with the pdf `pdf` \[1/sr\]. The weight is 1 for an emitter that is never sampled directly.
+    pub(super) fn bsdf_mis_weight(&self, from: V3, pdf: f64, hit: &Hit, at: V3) -> f64 {
         let Some(emitter) = self.lights.emitters.for_instance(hit.instance) else { return 1.0 };
         let pose = &hit.world_from_instance;
         let (from, at) = (pose.apply_inverse(from), pose.apply_inverse(at));
         let Some(density) = emitter.pdf(from, at, pose.rotate_inverse(hit.normal)) else { return 1.0 };
-        self.strategy.bsdf_weight(likely, density * emitter.probability())
+        self.strategy.bsdf_weight(pdf, density * emitter.probability())
     }
 
     /// Origin of a point's shadow rays: on the smooth surface that the normals describe, unless another surface is

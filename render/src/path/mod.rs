@@ -314,11 +314,11 @@ impl PathTracer<'_> {
             }
             let o = scale(ray.direction, -1.0);
             if bounce == 0 {
-                let (matt, gloss) = (
+                let (matte, gloss) = (
                     point.bsdf.scattered_fraction(),
                     point.bsdf.gloss(OrthonormalBasis::from_normal(point.shading_normal).to_local(o)),
                 );
-                let albedo = point.bsdf.albedo.map(|x| matt * x + (1.0 - matt));
+                let albedo = point.bsdf.albedo.map(|x| matte * x + (1.0 - matte));
                 first = FirstHit { albedo, gloss, normal: point.shading_normal, distance: traveled };
                 if let Some((color, start, end)) = self.lights.haze {
                     let k = ((traveled - start) / (end - start).max(1e-6)).clamp(0.0, 1.0);
@@ -328,7 +328,7 @@ impl PathTracer<'_> {
                     throughput = scale(throughput, 1.0 - k);
                 }
             }
-            let share = chosen.map_or(1.0, |(from, likely)| self.bsdf_mis_weight(from, likely, &hit, point.position));
+            let share = chosen.map_or(1.0, |(from, pdf)| self.bsdf_mis_weight(from, pdf, &hit, point.position));
             light = add(light, times(throughput, scale(point.emission, share * (1.0 - point.bsdf.mirror))));
             if bounce > self.max_bounces {
                 break;

@@ -27,7 +27,7 @@ fn dark(instances: Vec<Instance>) -> RenderScene {
     scene
 }
 
-/// A matt color, the same in all channels, given in linear light.
+/// A matte color, the same in all channels, given in linear light.
 fn matt(linear: f32) -> Material {
     let srgb = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     Material { specular: 0.0, ..Material::from_rgba([srgb, srgb, srgb, 1.0]) }
@@ -209,7 +209,7 @@ fn sun() -> Light {
     light(LightKind::Directional, [0.; 3], [0., 0., -1.])
 }
 
-/// A matt floor reflects albedo, color, cosine, and 1 / r² of a near light. Invalid lights are left out.
+/// A matte floor reflects albedo, color, cosine, and 1 / r² of a near light. Invalid lights are left out.
 #[test]
 fn lights() {
     let mut scene = on_floor(matt(0.6), []);

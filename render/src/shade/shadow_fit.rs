@@ -71,7 +71,8 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A frame with its z axis along a direction. Source: Duff et al., Building an Orthonormal Basis, Revisited, JCGT 2017.
+/// Returns a rotation matrix, as rows, whose third column is the unit vector `z`. Source: Duff et al., Building an
+/// Orthonormal Basis, Revisited, JCGT 2017.
 fn frame_along(z: [f32; 3]) -> [[f32; 3]; 3] {
     let sign = if z[2] < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + z[2]);

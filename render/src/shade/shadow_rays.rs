@@ -31,7 +31,7 @@ pub(crate) struct ShadowRays<'a> {
     pub(crate) occlusion_rays: u16,
 }
 
-/// Points in lanes that are read one by one.
+/// Surface points of all lanes, readable lane by lane.
 pub(super) struct SurfacePoints {
     positions: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
@@ -49,7 +49,8 @@ impl SurfacePoints {
         self.normals.map(|axis| f64::from(axis[k]))
     }
 
-    /// Origin of a ray: the point, moved slightly above the surface, in the world frame \[m\].
+    /// Origin of a ray from the point of lane `k`: the point, moved slightly above the surface, in the world frame
+    /// \[m\].
     pub(super) fn offset_origin(&self, k: usize) -> [f64; 3] {
         let at = self.positions.map(|axis| axis[k]);
         let far = RAY_OFFSET * (self.depths[k] + at.iter().map(|x| x.abs()).sum::<f32>());
@@ -103,7 +104,7 @@ impl ShadowRays<'_> {
         if out == [1.0; LANES] { splat(s, 1.0) } else { load(s, &out) }
     }
 
-    /// Occluded fractions of the ambient light from above and from below the horizon, for a matt surface; 0 in lanes
+    /// Occluded fractions of the ambient light from above and from below the horizon, for a matte surface; 0 in lanes
     /// that are not selected. `smooth` is the shading normal.
     #[inline(never)]
     pub(crate) fn occlusion<S: Simd>(

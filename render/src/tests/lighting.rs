@@ -397,7 +397,7 @@ fn stops() {
     }
 }
 
-/// Light summed as in MuJoCo's renderer: the byte of a matt plane is 255 times its sRGB color times the sum of the
+/// Light summed as in MuJoCo's renderer: the byte of a matte plane is 255 times its sRGB color times the sum of the
 /// lights, each times its cosine; the sum is clamped at white. Root causes: lights were added in linear light, and four
 /// of them were darker than in MuJoCo; then the soft tone curve turned MuJoCo's white into a gray of 237.
 #[test]

@@ -94,7 +94,7 @@ fn texture_albedo() {
 }
 
 /// Path tracing reads the same textures as the rasterizer: on a plane, by rotated, scaled and unbounded texture
-/// coordinates of a mesh, and by the six images of a cube. In uniform light, matt and convex objects are as bright as
+/// coordinates of a mesh, and by the six images of a cube. In uniform light, matte and convex objects are as bright as
 /// their albedo times that light, so path-traced color shows the albedo.
 #[test]
 fn textures_of_paths() {

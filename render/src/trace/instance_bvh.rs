@@ -1,5 +1,5 @@
-//! BVH over the instances of a frame: split by the surface area heuristic; large or deep nodes are split into halves of
-//! equal number along the longest side.
+//! BVH over the instances of a frame: split by the surface area heuristic; large or deep nodes are split in half at the
+//! median, along the axis with the widest spread of box centers.
 //!
 //! Source: Goldsmith and Salmon, Automatic creation of object hierarchies for ray tracing, 1987.
 
@@ -189,7 +189,8 @@ fn split(boxes: &mut [InstanceItem], nodes: &mut Vec<Node>, depth: usize) {
     split(high, nodes, depth + 1);
 }
 
-/// Splits boxes into halves of equal number, along the longest side.
+/// Partitions boxes at their median center, along the axis with the widest spread of centers. Returns the index of the
+/// first box of the second half.
 fn median_split(boxes: &mut [InstanceItem]) -> usize {
     let spread = |axis: usize| {
         let ends = boxes

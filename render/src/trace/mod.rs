@@ -180,8 +180,8 @@ impl RayTracer {
         bvh.build();
     }
 
-    /// Bounding box in the world \[m\] of all instances but the unbounded `instance`; `None` if another instance is
-    /// unbounded.
+    /// Bounding box of all bounded instances that are not hidden, over the whole shutter time, in the world \[m\];
+    /// (+inf, -inf) without a bounded instance. `None` if an instance other than `instance` is unbounded.
     pub(crate) fn bounds_without(&self, instance: u32) -> Option<[V3; 2]> {
         let alone = self.unbounded.iter().all(|&thing| self.instances[thing as usize].instance == instance);
         alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))

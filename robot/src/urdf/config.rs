@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UrdfCfg {
-    /// URDF files of the robot; a parent may follow its children. A component with a custom
-    /// [`name`](ComponentCfg::name) and without `parent` must be the first.
+    /// Components of the robot, one URDF file each, in any order of parents and children. A component with a name
+    /// outside the list at [`ComponentCfg::name`] needs a `parent`, unless it is the first.
     pub components: Vec<ComponentCfg>,
     /// Letter case of the link and joint names of the merged robot, set separately; unchanged by default.
     pub name_case: NameCaseCfg,
@@ -192,7 +192,7 @@ pub struct ComponentCfg {
     pub transform: Pose,
     /// Parent component. The default is the first one present of: `chassis` for `legs`; `legs`, `chassis` for `torso`
     /// (only with a `chassis`); `torso`, `chassis` for `head` and arms; the arm of the same side for hands. Without any
-    /// of these, the component is a root. A component with a custom name must be the first or have a `parent`.
+    /// of these, the component is a root. A component with any other name must be the first or have a `parent`.
     pub parent: Option<String>,
     /// Link of the parent component to attach to, as named in its file or after merging. The default is the root of a
     /// `chassis`, else the leaf with the most joints above it; several such leaves are an error.

@@ -53,8 +53,8 @@ pub fn load_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<TriMes
     load_bytes(path, &read(path)?, options)
 }
 
-/// Reads a mesh from the content of a file. `path` gives the extension, the name in errors and the folder of other
-/// files.
+/// Reads a mesh from the content of a file. `path` need not exist: its extension helps to detect the format, its name
+/// appears in errors, and its folder is searched for referenced files (MTL, textures, glTF buffers).
 ///
 /// # Errors
 /// As [`load`].

@@ -63,7 +63,7 @@ pub trait ClosedForm {
     /// With `None`, only paths that hit the shape by chance find its light, which is unbiased but noisy.
     fn area_sampling(&self) -> Option<&dyn AreaSampling>;
 
-    /// True if the surface is visible from +z only.
+    /// True for a surface that is visible only from the +z side of its own frame, such as a plane.
     fn is_one_sided(&self) -> bool {
         false
     }

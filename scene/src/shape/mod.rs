@@ -199,7 +199,7 @@ impl Shape {
         }
     }
 
-    /// True if the surface is visible from +z only.
+    /// True for a surface that is visible only from the +z side of its own frame, such as a plane.
     pub fn is_one_sided(&self) -> bool {
         matches!(self.geometry(), ShapeKind::ClosedForm(shape) if shape.is_one_sided())
     }

@@ -69,8 +69,8 @@ pub struct CameraCfg {
     /// Near limit: smallest depth along the optical axis \[m\], above 0. If rays of the lens do not all go forward
     /// ([`Lens::is_forward`](lens::Lens::is_forward)), smallest distance along the ray.
     pub near: f64,
-    /// Far limit: largest depth along the optical axis \[m\], or largest distance along the ray, as
-    /// [`near`](Self::near).
+    /// Far limit: largest depth along the optical axis \[m\], above [`near`](Self::near) and finite. For lenses whose
+    /// rays do not all go forward, largest distance along the ray, as for `near`.
     pub far: f64,
     /// Pose of the camera, and the body that it is attached to.
     pub extrinsics: Extrinsics,

@@ -18,7 +18,8 @@ use kinetoscope_scene::pose::to_row;
 use ndarray::{Array1, Array2, Array3, ArrayView, ArrayView2, Axis, Dimension};
 use std::ops::Range;
 
-/// Past images of one channel, shape (views, history, height, width) or (views, history, height, width, components).
+/// Images of one channel in the frame history, shape (views, history, height, width) or (views, history, height, width,
+/// components).
 pub type HistoryView<'a, C> = ArrayView<'a, <C as Channel>::Element, <<C as Channel>::Layout as Dimension>::Larger>;
 
 /// Images of the frame history, row by row, newest first within a row.
@@ -128,14 +129,15 @@ impl Camera {
         Ok(self.frames.stamp_history().filled(self.row(env)?))
     }
 
-    /// Capture times of past frames \[s\], newest first, shape (N, history_length); 0 for entries not filled yet.
+    /// Capture times of the frames in the history \[s\], newest first, shape (N, history_length); 0 for entries not
+    /// filled yet.
     pub fn stamp_history(&self) -> ArrayView2<'_, f64> {
         self.frames.stamp_history().view().index_axis_move(Axis(2), 0)
     }
 
-    /// Past images of one channel, newest first: `camera.history::<Depth>()?`. The shape is (N, history_length, H, W)
-    /// or (N, history_length, H, W, components); entries not filled yet are zero. Renders the images that were not read
-    /// before.
+    /// Images of one channel in the history, newest first: `camera.history::<Depth>()?`. The shape is (N,
+    /// history_length, H, W) or (N, history_length, H, W, components); entries not filled yet are zero. Renders the
+    /// images that were not read before.
     ///
     /// The newest image equals that of [`channel`](Self::channel) until the state is written to or the camera moves.
     ///

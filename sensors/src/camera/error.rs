@@ -12,7 +12,7 @@ pub enum CameraError {
     #[error("invalid camera view: {0}")]
     View(RenderError),
     /// The image of an environment cannot be rendered. It is rendered again after the next capture, or at the next read
-    /// if rendering was cancelled.
+    /// if rendering was canceled.
     #[error("environment {env} cannot be rendered: {error}")]
     Render {
         /// The environment.

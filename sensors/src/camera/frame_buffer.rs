@@ -316,7 +316,7 @@ impl FrameBuffer {
         self.delivered.counts.view()
     }
 
-    /// Times of past frames \[s\], newest first.
+    /// Times of the frames in the history \[s\], newest first.
     pub(super) fn stamp_history(&self) -> &History<f64> {
         &self.delivered.stamps
     }

@@ -14,7 +14,8 @@ use std::fmt;
 /// Contact forces on bodies in all environments, world axes; [`Sampled`] gives their stamps and counts.
 ///
 /// Forces act **on** the body: a foot that stands on the ground reads +z. Shapes: N environments, B bodies, M filters,
-/// T measurements of history, newest first.
+/// T measurements of history, newest first. The newest is the current measurement, except after a reset or a write to
+/// the state.
 #[derive(Clone, Debug)]
 pub struct ContactSensor {
     pub(super) names: Vec<String>,
@@ -151,7 +152,7 @@ impl ContactSensor {
         self.vectors("net_forces_w")
     }
 
-    /// Past [`net_forces_w`](Self::net_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
+    /// History of [`net_forces_w`](Self::net_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
     pub fn net_forces_w_history(&self) -> ArrayView4<'_, f64> {
         self.past_vectors("net_forces_w")
     }
@@ -162,7 +163,7 @@ impl ContactSensor {
         self.vectors("friction_forces_w")
     }
 
-    /// Past [`friction_forces_w`](Self::friction_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
+    /// History of [`friction_forces_w`](Self::friction_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
     pub fn friction_forces_w_history(&self) -> ArrayView4<'_, f64> {
         self.past_vectors("friction_forces_w")
     }
@@ -172,7 +173,7 @@ impl ContactSensor {
         self.vectors("total_forces_w")
     }
 
-    /// Past [`total_forces_w`](Self::total_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
+    /// History of [`total_forces_w`](Self::total_forces_w) \[N\], shape (N, T, B, 3); 0 where not filled yet.
     pub fn total_forces_w_history(&self) -> ArrayView4<'_, f64> {
         self.past_vectors("total_forces_w")
     }
@@ -191,7 +192,7 @@ impl ContactSensor {
         self.pairs("force_matrix_w")
     }
 
-    /// Past [`force_matrix_w`](Self::force_matrix_w) \[N\], shape (N, T, B, M, 3); 0 where not filled yet.
+    /// History of [`force_matrix_w`](Self::force_matrix_w) \[N\], shape (N, T, B, M, 3); 0 where not filled yet.
     pub fn force_matrix_w_history(&self) -> ArrayView5<'_, f64> {
         self.past_pairs("force_matrix_w")
     }
@@ -203,8 +204,8 @@ impl ContactSensor {
         self.sampler.has("friction_matrix_w").then(|| self.pairs("friction_matrix_w"))
     }
 
-    /// Past [`friction_matrix_w`](Self::friction_matrix_w) \[N\], shape (N, T, B, M, 3), 0 where not filled yet; `None`
-    /// unless tracked.
+    /// History of [`friction_matrix_w`](Self::friction_matrix_w) \[N\], shape (N, T, B, M, 3); 0 where not filled yet.
+    /// `None` unless [`track_friction_forces`](crate::ContactSensorCfg::track_friction_forces) is set.
     pub fn friction_matrix_w_history(&self) -> Option<ArrayView5<'_, f64>> {
         self.sampler.has("friction_matrix_w").then(|| self.past_pairs("friction_matrix_w"))
     }

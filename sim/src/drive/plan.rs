@@ -293,8 +293,8 @@ pub(crate) fn coupling_curve(joint: &Joint) -> Option<CouplingPolynomial> {
     }
 }
 
-/// Position of a joint that may follow others by mimics and curves, both of which are acyclic. `free_position` gives
-/// the positions of joints that follow no other.
+/// Position of a joint \[rad or m\], with mimic couplings and coupling curves resolved. Couplings must be acyclic.
+/// `free_position` gives the positions of joints that follow no other.
 pub(crate) fn followed_position(
     description: &RobotDescription,
     free_position: &dyn Fn(JointId) -> f64,

@@ -27,7 +27,7 @@ pub struct RobotReport {
     pub links: Vec<LinkReport>,
     /// All joints in the order of the merged files, including fixed joints.
     pub joints: Vec<JointReport>,
-    /// Joints with one degree of freedom in the order of the merged files, including mimic joints.
+    /// Names of the joints with one degree of freedom, mimic joints included, in the order of the merged files.
     pub joint_names: Vec<String>,
     /// Position of each of `joint_names` \[rad or m\]; mimic joints have the implied one.
     pub qpos: Vec<f64>,
@@ -50,7 +50,7 @@ pub struct RobotReport {
 pub struct LinkReport {
     /// Name.
     pub name: String,
-    /// The parent link; `None` for the root.
+    /// Name of the parent link; `None` for the root.
     pub parent: Option<String>,
     /// Mass \[kg\], from the file or completed from shapes; 0 without one.
     pub mass: f64,
@@ -70,9 +70,9 @@ pub struct JointReport {
     /// Joint type, as in URDF.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Parent link.
+    /// Name of the parent link.
     pub parent: String,
-    /// Child link.
+    /// Name of the child link.
     pub child: String,
     /// Axis in the joint frame.
     pub axis: [f64; 3],
@@ -93,7 +93,7 @@ pub struct JointReport {
 /// Mimic relation of a joint: `position = multiplier * position(joint) + offset`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MimicReport {
-    /// The driving joint, as in the file.
+    /// Name of the driving joint, as in the file.
     pub joint: String,
     /// Factor of the driving joint's position.
     pub multiplier: f64,

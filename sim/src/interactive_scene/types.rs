@@ -1,4 +1,5 @@
-//! Entity types of scene files, one line each; the list of built-in sensors is that of `kinetoscope-sensors`.
+//! Entity types of scene files. `EntityTypes::default` lists the built-in types; the built-in sensors are listed in
+//! `kinetoscope-sensors`.
 
 use super::entity::{AnySensorCfg, EntityCfg};
 use super::value::{Value, ValueError};
@@ -93,7 +94,7 @@ impl EntityTypes {
         self.entries.iter().find(|entry| entry.name == name)
     }
 
-    /// Type name and table of an entity; `None` for an unknown type.
+    /// Returns the type name and the TOML table of an entity, or `None` for an unknown type.
     pub(super) fn write(&self, entity: &EntityCfg) -> Option<(&str, Result<toml::Table, toml::ser::Error>)> {
         self.entries.iter().find_map(|entry| Some((entry.name.as_str(), (entry.write)(entity)?)))
     }

@@ -287,9 +287,9 @@ pub struct ContactParams {
 /// Contact solver parameters of MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSolver {
-    /// Reference: MuJoCo's `solref`.
+    /// MuJoCo's `solref`: time constant \[s\] and damping ratio, or, if negative, -stiffness and -damping.
     pub solref: [f64; 2],
-    /// Impedance: MuJoCo's `solimp`.
+    /// MuJoCo's `solimp`: smallest and largest impedance, width \[m\], midpoint and power of the transition.
     pub solimp: [f64; 5],
     /// Weight in a contact with another geom: MuJoCo's `solmix`.
     pub solmix: f64,
@@ -351,7 +351,7 @@ pub struct Light {
     pub direction: Vector3<f64>,
     /// Diffuse color, RGB in 0..=1.
     pub diffuse: [f64; 3],
-    /// Type of the light.
+    /// Type of the light. Never `Dome`: MuJoCo has no dome lights.
     pub kind: LightKindCfg,
     /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation c, l, q: the intensity at distance d is divided by c
     /// + l d + q d².

@@ -2,8 +2,8 @@
 
 use kinetoscope_scene::source_location::SourceLocation;
 
-/// Maximum number of moving bodies one below the other. MuJoCo's XML reader rejects documents that are nested deeper
-/// than 100 elements on 2.2.2 and 500 on 4.x.
+/// Maximum number of bodies of a robot in a chain from the root to a leaf, both included. MuJoCo's XML reader rejects
+/// documents that are nested deeper than 100 elements on 2.2.2 and 500 on 4.x.
 pub const MAX_BODY_DEPTH: usize = match kinetoscope_mujoco::BUILD_VERSION {
     kinetoscope_mujoco::SupportedVersion::V2 => 96,
     kinetoscope_mujoco::SupportedVersion::V4 => 480,

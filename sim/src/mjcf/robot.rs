@@ -117,10 +117,10 @@ pub(crate) struct LinkFrame {
     pub body_from_link: Pose,
 }
 
-/// Adds a robot to `mjcf`.
+/// Adds the bodies, joints and actuators of a robot to `mjcf`, and returns their names.
 ///
 /// # Errors
-/// The tree has more than [`MAX_BODY_DEPTH`] bodies one below the other.
+/// A chain of the tree has more than [`MAX_BODY_DEPTH`] bodies, the root included.
 pub(crate) fn add(
     description: &RobotDescription,
     cfg: &RobotMjcfCfg<'_>,

@@ -48,9 +48,9 @@ pub struct MjcfPartCfg {
     /// Pose of the file's world in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Surface properties for rendering, by pattern of body names. They replace those of the file; a property that is
-    /// `None` keeps the value of the file. `world` selects the geoms of the file's world. A body may match only one
-    /// pattern.
+    /// Surface properties for rendering, by pattern of body names in the file (without `uid/`). They replace those of
+    /// the file; a property that is `None` keeps the value of the file. `world` selects the geoms of the file's world.
+    /// A body may match only one pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Semantic class in the table of mask ids; `None` for `mjcf`.

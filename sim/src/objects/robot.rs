@@ -276,9 +276,9 @@ impl<'a> RobotMut<'a> {
         })
     }
 
-    /// Sets velocity targets \[rad/s or m/s\] of the drives. They stay until changed or reset, and are 0 at first. Rows
-    /// and columns as in [`set_qpos_target`](Self::set_qpos_target); columns of joints without a drive are accepted and
-    /// ignored.
+    /// Sets velocity targets \[rad/s or m/s\] of the drives. Targets are initially 0 and stay until they are changed or
+    /// reset. They are not clamped. Rows and columns are as in [`set_qpos_target`](Self::set_qpos_target); columns of
+    /// joints without a drive are accepted and ignored.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.
@@ -297,9 +297,9 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Sets efforts \[N m or N\] that are added to the efforts of the drives, before the sum is clamped to their
-    /// limits. They stay until changed or reset, and are 0 at first. A passive joint gets the effort itself, clamped to
-    /// its limit ([`qf_limits`](Robot::qf_limits)). Rows and columns as in [`set_qpos_target`](Self::set_qpos_target);
-    /// columns of mimic joints are accepted and ignored.
+    /// limits. Efforts are initially 0 and stay until they are changed or reset. A passive joint gets the effort
+    /// itself, clamped to its limit ([`qf_limits`](Robot::qf_limits)). Rows and columns as in
+    /// [`set_qpos_target`](Self::set_qpos_target); columns of mimic joints are accepted and ignored.
     ///
     /// # Errors
     /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.

@@ -110,7 +110,8 @@ pub struct RobotCfg {
     /// True if the links of this robot collide with each other. Links connected by a joint, and links that overlap in
     /// the initial pose, do not collide, unless the MJCF file has a `<pair>` of their geoms.
     pub self_collision: bool,
-    /// Settings for the convex hulls of collision meshes.
+    /// Settings for the convex hulls of collision meshes of URDF files. No effect on an MJCF file: MuJoCo computes its
+    /// hulls.
     pub hull: HullCfg,
 }
 

@@ -214,15 +214,15 @@ impl Robot<'_> {
         self.of_links(|env, link| to_row(&link.pose(env.data())))
     }
 
-    /// Velocities of the frames of all links, fused links included, then their angular velocities, in world axes \[m/s,
-    /// rad/s\], shape (N, links, 6).
+    /// Linear velocities of the origins of all link frames, then angular velocities, in world axes \[m/s, rad/s\],
+    /// shape (N, links, 6). Fused links are included.
     #[doc(alias = "get_link_velocities")]
     pub fn link_velocities(&self) -> Array3<f64> {
         self.of_links(link_velocity)
     }
 
-    /// Velocity of the frame of a link, fused links included, then its angular velocity, in world axes \[m/s, rad/s\],
-    /// shape (N, 6).
+    /// Linear velocity of the origin of a link frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N,
+    /// 6). Fused links are supported.
     ///
     /// # Errors
     /// The link does not exist; the error lists the nearest names.

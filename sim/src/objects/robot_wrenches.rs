@@ -46,10 +46,10 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Applies forces \[N\] and torques \[N m\] to links in every step until the next call or a reset of the
-    /// environment. Zeros remove them. Both have the shape (environments, links, 3): rows for `env_ids` (`None` for all
-    /// environments; a single row applies to all of them), links as `link_ids` (`None` for all links). Other links keep
-    /// their wrenches.
+    /// Applies forces \[N\] and torques \[N m\] to links in every step until the next call for the same link or a reset
+    /// of the environment. Zeros remove them. Both have the shape (environments, links, 3): rows for `env_ids` (`None`
+    /// for all environments; a single row applies to all of them), links as `link_ids` (`None` for all links). Other
+    /// links keep their wrenches.
     ///
     /// A force acts at the center of mass of the link's body: of the link and of all links fixed to it. Wrenches on
     /// links that are fused into one body add up. To push at a point at the offset `r` from there, add `r x F` to the

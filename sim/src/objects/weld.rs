@@ -69,14 +69,15 @@ impl<'a> WeldMut<'a> {
     }
 
     /// Attaches the two bodies at their current relative pose, in `env_ids` (`None` for all environments). Each
-    /// environment has its own pose. A weld that already holds gets the current relative pose. A forward pass follows.
+    /// environment has its own pose. If the weld already holds, its relative pose is replaced by the current one. A
+    /// forward pass follows.
     ///
     /// The weld holds until it is released, the environment is reset, or a snapshot is restored in which it does not
     /// hold: a snapshot records the welds that hold and their relative poses.
     ///
-    /// It is MuJoCo's weld with its stiffest parameters: it yields by about 1e-4 of the acceleration that its load
-    /// would cause. The bodies still collide; use [`exclude_collision`](crate::SimulationManager::exclude_collision)
-    /// for bodies that are in each other's way.
+    /// The weld is a MuJoCo weld constraint with the largest impedance, 0.9999: about 1e-4 of the relative acceleration
+    /// that the load would cause without the weld remains. The bodies still collide; use
+    /// [`exclude_collision`](crate::SimulationManager::exclude_collision) if they overlap.
     ///
     /// # Errors
     /// An unknown or repeated environment; then nothing is changed.

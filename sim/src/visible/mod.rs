@@ -291,7 +291,7 @@ impl VisualScene {
         }
     }
 
-    /// One entry for each mask id: the id, and the element that it identifies.
+    /// Elements that the values of the mask channel identify, one entry for each value.
     pub fn mask_ids(&self) -> &Arc<[MaskId]> {
         &self.ids
     }

@@ -161,7 +161,7 @@ impl OffscreenScene {
         &self.visual_scene
     }
 
-    /// One entry for each mask id: the id, and the element that it identifies.
+    /// Elements that the values of the mask channel identify, one entry for each value.
     pub fn mask_ids(&self) -> &[MaskId] {
         self.visual_scene.mask_ids()
     }

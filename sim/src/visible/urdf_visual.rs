@@ -138,7 +138,8 @@ impl VisualCache {
         with_default_material(&parts, &Material::from_rgba(object.cfg().rgba.map(|c| c as f32)))
     }
 
-    /// Reads the parts of a mesh file, one for each material.
+    /// Reads a mesh file, scaled, as one part per material. An unreadable mesh gives no parts and a diagnostic. A
+    /// missing file gives no parts; the URDF reader has already reported it.
     fn load(&mut self, of: &VisualOwner, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
         match kinetoscope_scene::mesh::load(path) {
             Ok(mesh) => self.mesh_parts(of, &mesh.scaled(scale)),

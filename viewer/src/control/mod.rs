@@ -165,7 +165,8 @@ pub trait ViewerExt {
     /// the last viewer is dropped, the simulation runs freely and as fast as it can.
     fn viewer(&mut self, wants: SnapshotRequest) -> Viewer;
 
-    /// Sets the record button that all viewers show. A recording that the previous button was running is stopped.
+    /// Sets the record button that all viewers show. The recording of the previous button is stopped, unless both
+    /// buttons are equal.
     fn set_record_button(&mut self, button: RecordButton);
 }
 

@@ -86,7 +86,8 @@ impl ViewController {
         viewer
     }
 
-    /// Replaces the record button and stops the recording of the previous button.
+    /// Replaces the record button and stops the recording of the previous one. An equal button has no effect, and its
+    /// recording continues.
     pub(super) fn set_button(&mut self, sim: &mut SimulationManager, button: RecordButton) {
         if self.button.as_ref() == Some(&button) {
             return;

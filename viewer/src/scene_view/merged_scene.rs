@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// Geom group of markers. MuJoCo uses the groups 0 to 5.
 pub(super) const MARKER_GROUP: u8 = 31;
 
-/// The merged render scene, with the environment and the index there of each instance.
+/// The merged render scene, and for each instance its environment and its index in that environment's scene.
 #[derive(Debug, Default)]
 pub(super) struct MergedScene {
     /// Render scene; `None` if it would have too many triangles. The mask id of an instance is its index in
@@ -44,8 +44,8 @@ pub(super) fn shown_envs(snapshot: &Snapshot, shown: EnvSelection) -> impl Itera
 }
 
 impl MergedScene {
-    /// Updates the merged scene from a snapshot. The ground is included once. `markers` have the index of their
-    /// environment and are in its frame.
+    /// Updates the merged scene from a snapshot. The ground is included once. Each marker is paired with the index of
+    /// its environment, and its pose is in the frame of that environment.
     pub(super) fn update(&mut self, snapshot: &Snapshot, shown: EnvSelection, markers: &[(usize, Marker)]) {
         let scenes: Vec<Arc<RenderScene>> =
             shown_envs(snapshot, shown).filter_map(|(_, env)| snapshot.env_scene(env)).collect();

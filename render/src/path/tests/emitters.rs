@@ -39,7 +39,7 @@ fn same((a, da): (f64, f64), (b, db): (f64, f64)) -> bool {
     (a - b).abs() < 5.0 * da.hypot(db) + 1e-6
 }
 
-/// Each strategy alone and both together give the same mean, for every shape with sampling, on matt and on shiny
+/// Each strategy alone and both together give the same mean, for every shape with sampling, on matte and on shiny
 /// floors.
 #[test]
 fn both_strategies() {
@@ -69,7 +69,7 @@ fn both_strategies() {
     }
 }
 
-/// A large emitter over a sharp highlight is easy to hit and hard to sample; a small one over a matt floor is easy to
+/// A large emitter over a sharp highlight is easy to hit and hard to sample; a small one over a matte floor is easy to
 /// sample and hard to hit. Both strategies together have less variance than either over both scenes, as in Veach and
 /// Guibas 1995, figure 8.
 #[test]

@@ -24,7 +24,7 @@ pub struct PixelBox {
 pub struct Box2d {
     /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
-    /// Box around the pixels that see the segment; `None` if no pixel does. With a
+    /// Box around the pixels in which the segment is visible; `None` without such pixels. With a
     /// [shutter](crate::camera::CameraCfg::shutter) of nonzero span, each row of pixels shows the middle of its own
     /// exposure.
     pub tight: Option<PixelBox>,
@@ -39,7 +39,7 @@ pub struct Box2d {
     /// rendered in isolation, each row at its own instant. The box then surrounds the pixels that
     /// [`Occlusion::unoccluded_pixels`](super::Occlusion::unoccluded_pixels) counts.
     pub loose: Option<PixelBox>,
-    /// Number of pixels that see the segment.
+    /// Number of pixels in which the segment is visible.
     pub visible_pixels: usize,
 }
 

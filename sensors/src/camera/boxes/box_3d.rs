@@ -8,9 +8,8 @@ use kinetoscope_render::Layer;
 use kinetoscope_scene::{Instance, Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// A box around a segment, aligned with the axes of the segment's frame. For a link, this is the frame of the link; for
-/// an object with several links, that of its first link; for a class, that of its first object. First is the rendered
-/// part with the smallest mask id.
+/// A box around a segment, aligned with the axes of the segment's frame. A link has its own frame. An object with
+/// several links, and a class, have the frame of the rendered link or object with the smallest mask id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Box3d {
     /// Segment id, see [`Segmentation::segments`].

@@ -6,15 +6,15 @@ use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use ndarray::Axis;
 
-/// Numbers of pixels of a segment with and without other objects. Both are counted at the same instants: with a shutter
+/// Pixel counts of a segment with and without the other objects. Both are counted at the same instants: with a shutter
 /// of nonzero span, each row of pixels has its own instant, as in the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Occlusion {
     /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
-    /// Number of pixels that see the segment.
+    /// Number of pixels in which the segment is visible.
     pub visible_pixels: usize,
-    /// Number of pixels that would see the segment if it were alone; at least 1.
+    /// Number of pixels that the segment would cover without other objects; at least 1.
     pub unoccluded_pixels: usize,
 }
 

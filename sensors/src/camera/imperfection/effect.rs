@@ -11,7 +11,7 @@ pub(super) trait RadianceEffect {
     fn check(&self) -> Result<(), SensorError>;
 
     /// Modifies the linear RGB radiance of a pixel.
-    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>);
+    fn apply(&self, light: &mut [f64; 3], context: &PixelContext<'_>);
 }
 
 /// An imperfection of measured depth, applied to an image.
@@ -19,8 +19,8 @@ pub(super) trait DepthEffect {
     /// Checks the parameters.
     fn check(&self) -> Result<(), SensorError>;
 
-    /// Modifies an image of reaches \[m\], row by row; misses are infinite. The reach is the depth, or the distance
-    /// along the ray if rays of the lens do not all go forward.
+    /// Modifies an image of clip depths \[m\], row by row; misses are infinite. The clip depth is the depth along the
+    /// optical axis, or the distance along the ray if not all rays of the lens go forward.
     fn apply(&self, depths: &mut [f32], image: &ImageContext<'_>);
 }
 
@@ -53,7 +53,7 @@ impl ImageContext<'_> {
         [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy), 1.0]
     }
 
-    /// Returns true if rays do not all go forward: the reach is then the distance, not the depth.
+    /// Returns true if not all rays go forward: the clip depth is then the distance, not the depth.
     pub(super) fn clips_by_distance(&self) -> bool {
         self.rays.is_some_and(|rays| !rays.is_forward())
     }

@@ -22,5 +22,5 @@ impl RadianceEffect for Exposure {
     }
 
     /// Does nothing: the renderer has applied the exposure.
-    fn apply(&self, _light: &mut [f64; 3], _place: &PixelContext<'_>) {}
+    fn apply(&self, _light: &mut [f64; 3], _context: &PixelContext<'_>) {}
 }

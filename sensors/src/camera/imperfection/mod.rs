@@ -1,13 +1,13 @@
 //! Imperfections of real cameras, applied to rendered images; one file per imperfection.
 //!
 //! Imperfections of light work on linear radiance, where 1 is a fully lit white surface. The color bytes are converted
-//! back through sRGB and the tone curve, modified, and encoded again. The radiance therefore has 256 levels, and a
-//! white pixel counts as the smallest radiance that is white. Only the exposure is applied by the renderers, before the
-//! tone curve.
+//! back through sRGB and the tone curve, modified, and encoded again. The radiance therefore has 256 levels. A white
+//! pixel (byte 255) is decoded to the smallest radiance that is encoded as white. Only the exposure is applied by the
+//! renderers, before the tone curve.
 //!
-//! Imperfections of depth work on the *reach*, the quantity that near and far limit: depth along the optical axis, or
-//! distance along the ray if rays of the lens do not all go forward. The other of the two is recomputed from it. All
-//! other channels keep the ground truth.
+//! Imperfections of depth change the quantity that near and far limit, here called the clip depth: depth along the
+//! optical axis, or distance along the ray if not all rays of the lens go forward. The other of the two is recomputed
+//! from the clip depth. All other channels keep the ground truth.
 //!
 //! Motion blur is not an imperfection, because it needs several instants that a finished image does not contain. See
 //! [`CameraCfg::shutter`](super::CameraCfg::shutter).
@@ -71,9 +71,9 @@ macro_rules! imperfections {
                 Ok(())
             }
 
-            fn spoil_light(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
+            fn spoil_light(&self, light: &mut [f64; 3], context: &PixelContext<'_>) {
                 $(if let Some(imperfection) = &self.$light {
-                    imperfection.apply(light, place);
+                    imperfection.apply(light, context);
                 })*
             }
 
@@ -152,7 +152,7 @@ impl Imperfections {
             }
             (None, Some(other)) => {
                 for (pixel, number) in other.iter_mut().enumerate() {
-                    // At a right angle depth is 0 for any reach, so the reach is unknown and has no effect.
+                    // At a right angle, depth is 0 for any clip depth, so the clip depth is unknown and has no effect.
                     let factor = image.clip_depth_conversion(pixel).recip();
                     *number = match factor.is_finite() || number.is_infinite() {
                         true => times(*number, factor),

@@ -27,8 +27,8 @@ impl RadianceEffect for ReadNoise {
         within("std of the read noise", self.std, [0.0, 100.0], "it must be 0 to 100")
     }
 
-    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let normals = place.image.rng_key.normals(RngStream::READ, place.pixel as u32);
+    fn apply(&self, light: &mut [f64; 3], context: &PixelContext<'_>) {
+        let normals = context.image.rng_key.normals(RngStream::READ, context.pixel as u32);
         for (light, normal) in light.iter_mut().zip(normals) {
             *light += self.std * normal;
         }

@@ -33,8 +33,8 @@ impl RadianceEffect for ShotNoise {
         within("electrons of the shot noise", self.electrons, [1.0, 1e9], "it must be 1 to 1e9")
     }
 
-    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let (key, block) = (place.image.rng_key, place.pixel as u32);
+    fn apply(&self, light: &mut [f64; 3], context: &PixelContext<'_>) {
+        let (key, block) = (context.image.rng_key, context.pixel as u32);
         let mean = light.map(|light| light * self.electrons);
         // Random numbers are only computed if a channel needs them.
         let normals =

@@ -192,7 +192,8 @@ fn zero_imperfections() {
     }
 }
 
-/// Depths and distances of reaches: the reaches are distances if rays of the lens do not all go forward, else depths.
+/// Depths and distances of clip depths (`reaches`), which are distances if not all rays of the lens go forward, else
+/// depths.
 fn depths_and_distances(reaches: &[f32], image: ImageContext<'_>) -> [Vec<f32>; 2] {
     let of_pixel = |(pixel, reach): (usize, &f32)| {
         let [x, y, z] = image.ray(pixel);

@@ -38,8 +38,8 @@ impl RadianceEffect for Vignetting {
         within("strength of the vignetting", self.strength, [0.0, 1.0], "it must be 0 to 1")
     }
 
-    fn apply(&self, light: &mut [f64; 3], place: &PixelContext<'_>) {
-        let factor = 1.0 + self.strength * (place.image.falloff(place.pixel) - 1.0);
+    fn apply(&self, light: &mut [f64; 3], context: &PixelContext<'_>) {
+        let factor = 1.0 + self.strength * (context.image.falloff(context.pixel) - 1.0);
         *light = light.map(|light| factor * light);
     }
 }

@@ -46,7 +46,7 @@ impl RenderedImages {
         self.stale[image] = stale;
     }
 
-    /// Copies image `from` of the `count` images of `others`.
+    /// Copies image `from` of `others`, which has `count` images, to image `image`, and marks it as up to date.
     pub(in crate::camera) fn copy(&mut self, image: usize, others: &Images, count: usize, from: usize) {
         self.images.copy_view(self.stale.len(), image, others, count, from);
         self.stale[image] = false;
@@ -91,7 +91,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Render`] if rendering was cancelled.
+    /// [`CameraError::Render`] if rendering was canceled.
     pub(in crate::camera) fn render_stale<'a>(
         &'a self,
         images: &mut RenderedImages,

@@ -124,7 +124,8 @@ impl StereoCameraCfg {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`] or [`CameraError::LookAt`] for an invalid pose.
+    /// [`CameraError::Pose`] for an invalid pose of the rig or of the right camera; [`CameraError::LookAt`] if eye and
+    /// target of the rig coincide or are not finite.
     pub fn camera_cfgs(&self) -> Result<[CameraCfg; 2], CameraError> {
         let Rig { left_from_right, origin_from_left } = self.rig()?;
         let left = self.camera.extrinsics.parent_from_camera()? * origin_from_left;
@@ -167,8 +168,8 @@ impl SensorCfg for StereoCameraCfg {
 
     /// # Errors
     ///
-    /// An invalid pose of the right camera, and [`SensorError::StereoCamera`] with the error of either camera as a
-    /// [`CameraCfg`].
+    /// An invalid pose of the stereo rig (`camera.extrinsics`), or of the right camera relative to the left.
+    /// [`SensorError::StereoCamera`] for any other error in the configuration of one camera; it names the camera.
     fn build(&self, context: &SensorContext) -> Result<StereoCamera, SensorError> {
         let [left, right] = self.camera_cfgs()?;
         // Noise and dropout are keyed by the name of the sensor, so the cameras need different names. Path tracing
@@ -176,7 +177,7 @@ impl SensorCfg for StereoCameraCfg {
         let name = format!("{}/right", context.name).into();
         let other = SensorContext { name, ..context.clone() };
         let [left, right] = [("left", left.build(context)), ("right", right.build(&other))]
-            .map(|(eye, camera)| camera.map_err(SensorError::of_stereo_camera(eye)));
+            .map(|(side, camera)| camera.map_err(SensorError::of_stereo_camera(side)));
         Ok(StereoCamera::new(left?, right?, self.rig()?))
     }
 }

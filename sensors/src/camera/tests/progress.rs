@@ -24,7 +24,7 @@ fn cameras() {
     let expected = CameraError::Render { env: 0, error: RenderError::Canceled { samples: 0, total } };
     assert_eq!(camera.color().unwrap_err(), expected.into());
     progress.resume();
-    // A cancelled image is rendered by the next reader.
+    // A canceled image is rendered by the next reader.
     let fresh = built(&CameraCfg { renderer: paths(2), ..cfg() }, &context(1));
     assert_eq!((camera.color().unwrap(), progress.samples()), (fresh.color().unwrap(), total));
     // Control: an image that cannot be rendered is tried once.
@@ -36,7 +36,7 @@ fn cameras() {
     assert_eq!(camera.render_count(), draws + 1);
 }
 
-/// Cancelled images in flight and images of the history are rendered at the next read.
+/// Canceled images in flight and images of the history are rendered at the next read.
 #[test]
 fn late_and_past() {
     let cfg = CameraCfg { renderer: paths(2), latency_steps: 2, history_length: 2, ..cfg() };

@@ -168,13 +168,13 @@ impl RayCasterCamera {
         self.model.images.distance.view()
     }
 
-    /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where
-    /// not filled yet.
+    /// History of the distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss,
+    /// 0 where not filled yet.
     pub fn distance_history(&self) -> ArrayView3<'_, f64> {
         self.sampler().history("distances")
     }
 
-    /// Unit normals of faces, turned to the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
+    /// Unit normals of the hit surfaces, facing the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
     pub fn normal(&self) -> ArrayView4<'_, f32> {
         self.model.images.normal.view()
     }

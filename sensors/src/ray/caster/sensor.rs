@@ -244,7 +244,8 @@ impl RayCaster {
         self.sampler().values("quat_w")
     }
 
-    /// Past distances, newest first, shape (N, history_length, B) \[m\]: +inf for a miss, 0 where not filled yet.
+    /// History of the distances, newest first, shape (N, history_length, B) \[m\]: +inf for a miss, 0 where not filled
+    /// yet.
     pub fn distance_history(&self) -> ArrayView3<'_, f64> {
         self.sampler().history("distances")
     }

@@ -3,38 +3,27 @@
 use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeSet;
 
-/// Names of a file's elements in MuJoCo's order, without the part's uid; unique within each kind.
+/// Names of a file's elements, without the part's uid: one entry per element, in MuJoCo's order. Names are unique
+/// within each kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartNames {
-    /// Names of the bodies; the first body is the world.
+    /// The first body is the world.
     pub bodies: Vec<String>,
-    /// Names of the joints.
     pub joints: Vec<String>,
-    /// Names of the geoms.
     pub geoms: Vec<String>,
-    /// Names of the sites.
     pub sites: Vec<String>,
     /// True for each site that has a name in the file.
     pub named_sites: Vec<bool>,
-    /// Names of the cameras.
     pub cameras: Vec<String>,
-    /// Names of the lights.
     pub lights: Vec<String>,
-    /// Names of the meshes.
     pub meshes: Vec<String>,
-    /// Names of the height fields.
     pub height_fields: Vec<String>,
-    /// Names of the textures.
     pub textures: Vec<String>,
-    /// Names of the materials.
     pub materials: Vec<String>,
-    /// Names of the equalities.
     pub equalities: Vec<String>,
-    /// Names of the tendons.
     pub tendons: Vec<String>,
-    /// Names of the actuators.
     pub actuators: Vec<String>,
-    /// Names of MuJoCo's own sensors.
+    /// MuJoCo's own sensors.
     pub sensors: Vec<String>,
 }
 

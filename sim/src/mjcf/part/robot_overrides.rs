@@ -1,4 +1,4 @@
-//! Changes to the MJCF file of a robot in the part that is written from it.
+//! Changes to the elements of an MJCF robot file when it is written as a part of the scene's document.
 
 use super::super::document::Inertial;
 use std::collections::{BTreeMap, BTreeSet};
