@@ -137,13 +137,11 @@ impl Encoder for Mp4 {
             self.length_at = brands.len() as u64 + 8;
             self.offset = self.length_at + 8;
         }
-        let coded = self.stream.encode(rgba);
-        let too_large = || WriteError::limit("a frame of an MP4 file has less than 4 GiB; use smaller images");
-        let length = u32::try_from(coded.unit.len()).map_err(|_| too_large())?;
-        out.write_all(&length.to_be_bytes())?;
-        out.write_all(coded.unit)?;
+        let coded = self.stream.encode(rgba).map_err(WriteError::limit)?;
+        let too_large = |_| WriteError::limit("a frame of an MP4 file has less than 4 GiB; use smaller images");
+        let bytes = u32::try_from(coded.units.len()).map_err(too_large)?;
+        out.write_all(coded.units)?;
         let duration = duration(shown, PER_SECOND.into(), u32::MAX.into())?;
-        let bytes = length.checked_add(4).ok_or_else(too_large)?;
         self.frames.push(Sample { offset: self.offset, bytes, duration, is_sync: coded.is_idr });
         self.offset += u64::from(bytes);
         Ok(())

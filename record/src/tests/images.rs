@@ -95,6 +95,33 @@ fn animations() -> impl Iterator<Item = (Format, &'static str)> {
     Format::all().filter(|(format, _)| format.is_animation())
 }
 
+/// Bound of the mean square error of a plane. H.264 quantizes coefficients of an orthonormal transform, each with an
+/// error below the quantization step of 4 (Parseval: as is the mean square error of the pixels); rounding to 8 bits
+/// adds 0.5.
+const MP4_ERROR: f64 = 4.5 * 4.5;
+
+/// Planes of a frame in Y'CbCr by ITU-R BT.709, 8 bits, limited range, without rounding.
+fn bt709(pixels: &[[u8; 3]], frame: &Value) -> [Vec<f64>; 3] {
+    let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    let scaled = |p: &[u8; 3]| [p[0], p[1], p[2]].map(|x| f64::from(x) / 255.0);
+    let width = usize::try_from(frame["size"][0].as_u64().unwrap()).unwrap();
+    let mut planes = [pixels.iter().map(|pixel| 16.0 + 219.0 * luma(scaled(pixel))).collect(), Vec::new(), Vec::new()];
+    for k in 0..pixels.len() / 4 {
+        let (x, y) = (2 * (k % (width / 2)), 2 * (k / (width / 2)));
+        let four = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dy, dx)| scaled(&pixels[(y + dy) * width + x + dx]));
+        let mean = [0, 1, 2].map(|c| four.iter().map(|p| p[c]).sum::<f64>() / 4.0);
+        planes[1].push(128.0 + 224.0 * (mean[2] - luma(mean)) / 1.8556);
+        planes[2].push(128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
+    }
+    planes
+}
+
+fn mean_square_error(found: &[u8], wanted: &[f64]) -> f64 {
+    assert_eq!(found.len(), wanted.len());
+    found.iter().zip(wanted).map(|(found, wanted)| (f64::from(*found) - wanted).powi(2)).sum::<f64>()
+        / wanted.len() as f64
+}
+
 /// Checks the pixels of a frame.
 fn check_frame(end: &str, frame: &Value, color: &[u8]) {
     let bytes = |plane: &str| -> Vec<u8> {
@@ -109,22 +136,11 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
             assert_eq!(bytes("rgb"), color, "as many colors as fit into a palette are exact");
         }
         "mp4" => {
-            // ITU-R BT.709, 8 bits, limited range: half of rounding, and the error of constants with 16 bits.
-            let close = |found: u8, wanted: f64| assert!((f64::from(found) - wanted).abs() < 0.52, "{found} {wanted}");
-            let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
-            let scaled = |p: &[u8; 3]| [p[0], p[1], p[2]].map(|x| f64::from(x) / 255.0);
-            for (found, pixel) in bytes("y").into_iter().zip(pixels) {
-                close(found, 16.0 + 219.0 * luma(scaled(pixel)));
+            let (found, wanted) = (["y", "u", "v"].map(bytes), bt709(pixels, frame));
+            for (plane, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
+                let error = mean_square_error(found, wanted);
+                assert!(error < MP4_ERROR, "plane {plane}: {error}");
             }
-            let width = usize::try_from(frame["size"][0].as_u64().unwrap()).unwrap();
-            for (k, (blue, red)) in bytes("u").into_iter().zip(bytes("v")).enumerate() {
-                let (x, y) = (2 * (k % (width / 2)), 2 * (k / (width / 2)));
-                let four = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dy, dx)| scaled(&pixels[(y + dy) * width + x + dx]));
-                let mean = [0, 1, 2].map(|c| four.iter().map(|p| p[c]).sum::<f64>() / 4.0);
-                close(blue, 128.0 + 224.0 * (mean[2] - luma(mean)) / 1.8556);
-                close(red, 128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
-            }
-            assert_eq!((bytes("y").len(), bytes("u").len()), (pixels.len(), pixels.len() / 4));
             assert_eq!(frame["color"], json!([1, 13, 1, "tv"]));
         }
         _ => panic!("{end}: its frames are not checked"),
@@ -147,6 +163,14 @@ fn animation_frames() {
             check_frame(end, frame, color);
         }
         assert_ne!(colors[0], colors[3], "something moves");
+        if end == "mp4" {
+            // Control: another frame is not within the bound.
+            let wanted = bt709(colors[3].as_chunks::<3>().0, &frames[0]);
+            let hex = frames[0]["y"].as_str().unwrap();
+            let found: Vec<u8> =
+                (0..hex.len()).step_by(2).map(|k| u8::from_str_radix(&hex[k..k + 2], 16).unwrap()).collect();
+            assert!(mean_square_error(&found, &wanted[0]) > MP4_ERROR);
+        }
     }
 }
 

@@ -46,8 +46,7 @@ def ffmpeg(path):
                 "color": color,
             })
         assert milliseconds(stream.duration, stream.time_base) == frames[-1]["until"], stream.duration
-        # As FFmpeg finds it in the stream, and as the file says it. Of 20 pictures in a second, each of four squares of 3072 bits and
-        # some more: a quarter of a million bits, for which level 1.2 has room.
+        # As FFmpeg finds it in the stream, and as the file says it. 20 images of 32 x 24 pixels per second fit into the lowest levels.
         about = stream.codec_context
         assert (frames[0]["size"], about.level) == ([32, 24], about.extradata[3]) and 10 <= about.level <= 12, about.level
     # A player that jumps to the end finds the last frame.
