@@ -14,7 +14,7 @@
 //! | `recorder`, `cfg`, `topic`, `source`, `stream`, `overview`, `clock` | the observer: what is recorded, and when |
 //! | `packet`, `writer`, `file`, `folder` | packets, the writer thread, atomic files and folders |
 //! | `mcap_writer`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
-//! | `npz`, `zip` | NumPy archives |
+//! | `npz`, `archive` | NumPy archives |
 //! | `image_folder`, `png`, `animation` | PNG files and animations |
 //! | `episodes`, `lerobot` | datasets of episodes for learning, behind the feature `lerobot` |
 //! | `read`, `recorded_arrays`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
@@ -33,6 +33,7 @@
 #![forbid(unsafe_code)]
 
 mod animation;
+mod archive;
 mod cfg;
 mod clock;
 mod episodes;
@@ -63,7 +64,6 @@ mod stream;
 mod tests;
 mod topic;
 mod writer;
-mod zip;
 
 pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};

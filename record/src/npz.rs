@@ -22,12 +22,12 @@
 //!
 //! Until the end, rows are in unnamed files in the same folder. A killed process leaves only an empty `NAME.part`.
 
+use crate::archive::ArchiveWriter;
 use crate::file::{PartialFile, Storage, parent_dir};
 use crate::packet::{Event, Packet, StreamRows};
 use crate::scene_file::SCENE_ARCHIVE;
 use crate::stream::{ElementType, StreamField, StreamKind, StreamSchema};
 use crate::writer::{FormatWriter, WriteError, WriteResult};
-use crate::zip::ZipWriter;
 use kinetoscope_scene::npy;
 use kinetoscope_sim::{MaskId, Snapshot};
 use serde_json::{Value, json};
@@ -252,7 +252,7 @@ impl FormatWriter for NpzWriter {
 
     fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64> {
         let storage = self.storage.take().ok_or_else(|| io::Error::other("the archive was finished twice"))?;
-        let mut archive = ZipWriter::new(BufWriter::with_capacity(1 << 16, storage));
+        let mut archive = ArchiveWriter::new(BufWriter::with_capacity(1 << 16, storage));
         let header = |element, shape: &[usize]| {
             npy::header(element, shape).ok_or_else(|| WriteError::limit("an array has more axes than NumPy supports"))
         };

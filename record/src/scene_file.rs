@@ -5,8 +5,8 @@
 //! meshes, textures and terrains. The file `stage.json` has the settings that MJCF does not support. Any program that
 //! reads ZIP archives can extract them.
 
+use crate::archive;
 use crate::error::{RecordError, Result};
-use crate::zip;
 use kinetoscope_mujoco::{BUILD_VERSION, SupportedVersion};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_sim::{GroundCfg, MjcfId, MjcfPartCfg, SimulationManager, SimulationManagerCfg};
@@ -31,7 +31,7 @@ pub(crate) fn pack(sim: &SimulationManager) -> Result<(Vec<u8>, Vec<String>)> {
     // Drives do not matter for a scene that is only displayed.
     let shows = |diagnostic: &&Diagnostic| diagnostic.kind != DiagnosticKind::ExportHeavier;
     let left_out = sim.dump(folder.path())?.iter().filter(shows).map(|diagnostic| diagnostic.message.clone()).collect();
-    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let mut archive = archive::ArchiveWriter::new(Cursor::new(Vec::new()));
     let SimulationManagerCfg { arena_space, ground, .. } = sim.cfg();
     let stage = json!({ "num_envs": sim.num_envs(), "arena_space": arena_space, "ground": ground });
     archive.add(SETTINGS, b"", &mut stage.to_string().as_bytes()).map_err(failed)?;
@@ -67,7 +67,7 @@ fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
 pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, MjcfId)> {
     let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: format!("its scene: {what}") };
     let failed = |error: io::Error| RecordError::file(Path::new(SCENE_ARCHIVE), error);
-    let files = zip::read_all(bytes).ok_or_else(|| malformed("the archive is damaged"))?;
+    let files = archive::read_all(bytes).ok_or_else(|| malformed("the archive is damaged"))?;
     let folder = tempfile::tempdir().map_err(failed)?;
     let mut stage = Value::Null;
     for (name, data) in &files {

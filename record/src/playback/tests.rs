@@ -200,7 +200,7 @@ fn damaged_scenes() {
     }
     // Names that lead out of the folder.
     for name in ["../away.xml", "/away.xml", "a/../../away.xml"] {
-        let mut archive = crate::zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        let mut archive = crate::archive::ArchiveWriter::new(std::io::Cursor::new(Vec::new()));
         archive.add(name, b"", &mut &b"x"[..]).unwrap();
         let bytes = archive.finish().unwrap().into_inner();
         let error = scene_file::unpack(&bytes, path).unwrap_err().to_string();

@@ -122,8 +122,8 @@ fn other_actions() {
 
 /// Copies an archive with changed data of some arrays.
 fn changed(path: &Path, to: &Path, change: impl Fn(&str, &mut Vec<u8>)) {
-    let mut archive = zip::ZipWriter::new(File::create(to).unwrap());
-    for (name, mut data) in zip::read_stored(&std::fs::read(path).unwrap()).unwrap() {
+    let mut archive = archive::ArchiveWriter::new(File::create(to).unwrap());
+    for (name, mut data) in archive::read_all(&std::fs::read(path).unwrap()).unwrap() {
         change(&name, &mut data);
         archive.add(&name, b"", &mut &data[..]).unwrap();
     }

@@ -11,7 +11,7 @@ pub(crate) fn falling(num_envs: usize) -> SimulationManager {
 
 /// A member of an archive.
 pub(crate) fn member(path: &Path, name: &str) -> Vec<u8> {
-    let members = zip::read_stored(&std::fs::read(path).unwrap()).unwrap();
+    let members = archive::read_all(&std::fs::read(path).unwrap()).unwrap();
     members.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
 }
 

@@ -13,7 +13,7 @@ mod readers;
 mod scenes;
 mod task_results;
 
-pub(crate) use crate::zip;
+pub(crate) use crate::archive;
 pub(crate) use crate::{
     FieldSelector, Format, OverviewCfg, Record, RecordError, RecorderCfg, Recording, RecordingSummary, Topic, recover,
     recover_to,

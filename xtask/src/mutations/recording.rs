@@ -12,10 +12,10 @@ pub(super) const RECORDING: &[Mutation] = &[
     ),
     Mutation::of(
         "kinetoscope-record",
-        "sizes before and after packing exchanged",
-        "record/src/zip.rs",
-        ["(before, 8), (*size, 8), (*offset, 8)", "(*size, 8), (before, 8), (*offset, 8)"],
-        &["zip::tests::"],
+        "files that share bytes accepted in archives",
+        "record/src/archive.rs",
+        ["|| reader.0.has_overlapping_files().ok()?", ""],
+        &["archive::tests::"],
     ),
     Mutation::of(
         "kinetoscope-record",
