@@ -1,6 +1,5 @@
 //! File formats and their file name extensions.
 
-use crate::episodes::supports;
 use crate::error::{RecordError, Result};
 use crate::stream::{StreamKind, StreamSchema};
 use std::path::Path;
@@ -43,10 +42,24 @@ const ALL: [FormatInfo; 6] = [
     FormatInfo { format: Format::Mcap, extension: "mcap", name: "an MCAP file", supports: |_| true },
     FormatInfo { format: Format::Npz, extension: "npz", name: "a NumPy archive", supports: |_| true },
     FormatInfo { format: Format::Images, extension: "", name: "a folder of images", supports: is_png_image },
-    FormatInfo { format: Format::LeRobot, extension: "lerobot", name: "a LeRobot dataset", supports },
+    FormatInfo {
+        format: Format::LeRobot,
+        extension: "lerobot",
+        name: "a LeRobot dataset",
+        supports: is_dataset_stream,
+    },
     FormatInfo { format: Format::Gif, extension: "gif", name: "an animated GIF", supports: is_color },
     FormatInfo { format: Format::Mp4, extension: "mp4", name: "an MP4 file", supports: is_color },
 ];
+
+fn is_dataset_stream(stream: &StreamSchema) -> bool {
+    match &stream.kind {
+        StreamKind::Joints { .. } | StreamKind::Imu | StreamKind::SensorValues { .. } | StreamKind::TaskResult => true,
+        StreamKind::Poses { .. } => stream.is_object_pose(),
+        StreamKind::Image { channel, .. } => channel == "color",
+        StreamKind::CameraInfo { .. } | StreamKind::RayHits | StreamKind::EngineState => false,
+    }
+}
 
 fn is_color(stream: &StreamSchema) -> bool {
     matches!(&stream.kind, StreamKind::Image { channel, .. } if channel == "color")

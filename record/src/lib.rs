@@ -36,6 +36,7 @@ mod animation;
 mod archive;
 mod cfg;
 mod clock;
+#[cfg(feature = "lerobot")]
 mod episodes;
 mod error;
 mod file;

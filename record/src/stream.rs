@@ -20,6 +20,12 @@ pub struct StreamSchema {
 }
 
 impl StreamSchema {
+    /// True for the pose stream of a rigid object (`uid/pose`). Datasets leave out poses of links and bodies, because
+    /// joint positions determine them.
+    pub(crate) fn is_object_pose(&self) -> bool {
+        matches!(&self.kind, StreamKind::Poses { frames } if self.name == format!("{}/pose", frames.join("/")))
+    }
+
     /// Number of values in the row of one environment.
     pub fn width(&self) -> usize {
         self.fields.iter().map(StreamField::width).sum()

@@ -76,22 +76,6 @@ impl Role {
     }
 }
 
-/// True if datasets support a stream.
-pub(crate) fn supports(stream: &StreamSchema) -> bool {
-    match &stream.kind {
-        StreamKind::Joints { .. } | StreamKind::Imu | StreamKind::SensorValues { .. } | StreamKind::TaskResult => true,
-        StreamKind::Poses { .. } => is_object(stream),
-        StreamKind::Image { channel, .. } => channel == "color",
-        StreamKind::CameraInfo { .. } | StreamKind::RayHits | StreamKind::EngineState => false,
-    }
-}
-
-/// True for the pose stream of a rigid object (`uid/pose`). Datasets leave out poses of links and bodies, because joint
-/// positions determine them.
-fn is_object(stream: &StreamSchema) -> bool {
-    matches!(&stream.kind, StreamKind::Poses { frames } if stream.name == format!("{}/pose", frames.join("/")))
-}
-
 fn is_mjcf(stream: &StreamSchema) -> bool {
     stream.name.ends_with("/state")
         && stream.fields.iter().map(|part| &*part.name).eq(["positions", "velocities", "controls"])
@@ -122,7 +106,7 @@ impl Features {
                 all.result_stream = Some(s);
                 continue;
             }
-            if roles.is_some() || is_object(stream) {
+            if roles.is_some() || stream.is_object_pose() {
                 base.get_or_insert(s);
             }
             let mut first = 0;
@@ -138,7 +122,7 @@ impl Features {
                 };
                 let role = match &roles {
                     Some(roles) => roles[k].clone(),
-                    None if is_object(stream) => Role::Objects,
+                    None if stream.is_object_pose() => Role::Objects,
                     None => Role::Sensor { stream: stream.name.clone(), channel: part.name.clone() },
                 };
                 all.append(role, name, names, StreamRange { stream: s, range });

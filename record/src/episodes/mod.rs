@@ -17,7 +17,7 @@ use crate::writer::{FormatWriter, WriteResult};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub(crate) use features::{Features, Role, supports};
+pub(crate) use features::{Features, Role};
 
 /// Explanation of a recording without any frame.
 pub(crate) const NO_FRAME: &str = "every frame needs a value of each stream and the action that follows";
