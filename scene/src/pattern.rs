@@ -239,19 +239,8 @@ pub fn similar_name<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str
 /// Twice the edit distance (insertions, deletions, replacements) of the first 64 characters in lower case, plus one if
 /// the whole names differ in any way, case included. The limit bounds the cost of malicious names.
 fn edit_distance(a: &str, b: &str) -> usize {
-    let lower = |s: &str| s.chars().take(64).flat_map(char::to_lowercase).collect::<Vec<char>>();
-    let (left, right) = (lower(a), lower(b));
-    let mut row: Vec<usize> = (0..=right.len()).collect();
-    for (i, l) in left.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, r) in right.iter().enumerate() {
-            let replaced = diagonal + usize::from(l != r);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    2 * row[right.len()] + usize::from(a != b)
+    let lower = |s: &str| s.chars().take(64).flat_map(char::to_lowercase).collect::<String>();
+    2 * strsim::levenshtein(&lower(a), &lower(b)) + usize::from(a != b)
 }
 
 /// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if `total` is larger than the list.

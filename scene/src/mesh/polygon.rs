@@ -1,52 +1,26 @@
 //! Triangulation of the polygons of OBJ and COLLADA files.
 
-/// A concave polygon with more corners is cut as a fan: ear clipping is quadratic, and such polygons are flat convex
-/// caps.
-const MAX_EARS: usize = 512;
+use earcut::Earcut;
 
 /// Cuts a polygon into triangles (indices into `points`) with the winding of the polygon.
 ///
-/// A convex polygon becomes a fan from its first corner. A concave polygon is cut by ear clipping.
+/// A convex polygon becomes a fan from its first corner. A concave polygon is cut by ear clipping; corners on a straight
+/// edge may be left out. A polygon without area is cut as a fan.
 pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
     let n = points.len();
     if n < 3 {
         return Vec::new();
     }
     let fan = || (1..n - 1).map(|i| [0, i, i + 1]).collect();
-    if n == 3 || n > MAX_EARS {
-        return fan();
-    }
     let flat = project_to_plane(points);
-    let corner = |a: usize, b: usize, c: usize| signed_area_doubled(flat[a], flat[b], flat[c]);
-    let reflex = |ring: &[usize], i: usize| {
-        let k = ring.len();
-        corner(ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]) < 0.0
-    };
-    let mut ring: Vec<usize> = (0..n).collect();
-    if !(0..n).any(|i| reflex(&ring, i)) {
+    let is_reflex = |i: usize| signed_area_doubled(flat[(i + n - 1) % n], flat[i], flat[(i + 1) % n]) < 0.0;
+    if n == 3 || !(0..n).any(is_reflex) {
         return fan();
     }
-    let mut out = Vec::with_capacity(n - 2);
-    while ring.len() > 3 {
-        let k = ring.len();
-        let ear = (0..k).find(|&i| {
-            let (a, b, c) = (ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]);
-            corner(a, b, c) > 0.0
-                && ring.iter().all(|&q| {
-                    [a, b, c].contains(&q)
-                        || [a, b, c].iter().any(|&e| flat[e] == flat[q])
-                        || corner(a, b, q) < 0.0
-                        || corner(b, c, q) < 0.0
-                        || corner(c, a, q) < 0.0
-                })
-        });
-        // A self-intersecting polygon may have no ear. It is cut anywhere rather than rejected.
-        let i = ear.unwrap_or(0);
-        out.push([ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]]);
-        ring.remove(i);
-    }
-    out.push([ring[0], ring[1], ring[2]]);
-    out
+    let (no_holes, mut corners): ([usize; 0], Vec<usize>) = ([], Vec::new());
+    // The projection is counter-clockwise, as are the triangles.
+    Earcut::new().earcut(flat, &no_holes, &mut corners);
+    if corners.is_empty() { fan() } else { corners.as_chunks::<3>().0.to_vec() }
 }
 
 /// Projection of the polygon along the largest component of its normal (Newell's method), counter-clockwise.
@@ -103,5 +77,20 @@ mod tests {
             }
         }
         assert!(triangulate(&[[0.0; 3]; 2]).is_empty(), "less than a triangle");
+    }
+
+    /// A comb with 1000 teeth: concave at every second corner.
+    #[test]
+    fn many_corners() {
+        let teeth = 1000;
+        let mut comb = vec![[f64::from(teeth), -1.0, 0.0], [f64::from(teeth), 0.0, 0.0]];
+        comb.extend((0..teeth).rev().flat_map(|k| [[f64::from(k) + 0.5, 1.0, 0.0], [f64::from(k), 0.0, 0.0]]));
+        comb.push([0.0, -1.0, 0.0]);
+        let triangles = triangulate(&comb);
+        let expected = f64::from(teeth) * 1.5;
+        assert!((area(&comb, &triangles) - expected).abs() < 1e-9 * expected);
+        assert!(triangles.iter().all(|&t| area(&comb, &[t]) >= 0.0));
+        // Control: a fan covers the same area with triangles of both windings.
+        assert!((1..comb.len() - 1).any(|i| area(&comb, &[[0, i, i + 1]]) < 0.0));
     }
 }
