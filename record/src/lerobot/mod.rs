@@ -1,6 +1,6 @@
 //! LeRobot datasets, version 3.0: a folder with a Parquet file for each episode, and metadata.
 
-mod spool;
+mod episode_buffer;
 mod statistics;
 mod table;
 
@@ -13,8 +13,8 @@ use crate::format::Format;
 use crate::png::PngWriter;
 use crate::stream::StreamSchema;
 use crate::writer::{FormatWriter, WriteError, WriteResult};
+use episode_buffer::{BufferedFrame, EpisodeBuffer};
 use serde_json::{Map, Value, json};
-use spool::{FrameSpool, SpooledFrame};
 use statistics::{ImageStatistics, Statistics};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -25,7 +25,7 @@ use table::{Column, ColumnType, TableWriter};
 /// The metadata file that makes a folder a dataset. It is written last.
 const INFO: &str = "meta/info.json";
 /// Folder of the frames of episodes in progress; it does not exist in a complete dataset.
-const SPOOL: &str = "spool";
+const BUFFERS: &str = "buffers";
 /// The file that marks a folder as that of a recorder, which may be replaced. It is locked while the recorder exists.
 const MARKER: &str = "meta/.kinetoscope";
 
@@ -59,7 +59,7 @@ struct LeRobotWriter {
     task: String,
     features: Arc<Features>,
     /// Frames of the present episode of each environment.
-    open_episodes: Vec<Option<FrameSpool>>,
+    open_episodes: Vec<Option<EpisodeBuffer>>,
     /// Number of frames of each complete episode, in the order of their ends.
     episodes: Vec<u64>,
     statistics: Vec<Statistics>,
@@ -179,8 +179,8 @@ impl DatasetWriter for LeRobotWriter {
 
     fn begin(&mut self, env: usize) {
         if self.open_episodes[env].is_none() {
-            let path = self.folder.partial_path().join(format!("{SPOOL}/env_{env}"));
-            self.open_episodes[env] = Some(FrameSpool::new(path));
+            let path = self.folder.partial_path().join(format!("{BUFFERS}/env_{env}"));
+            self.open_episodes[env] = Some(EpisodeBuffer::new(path));
         }
     }
 
@@ -192,23 +192,23 @@ impl DatasetWriter for LeRobotWriter {
         images.iter().zip(&mut statistics).for_each(|(image, statistics)| statistics.add_image(&image.statistics));
         let results = [*reward as f32, f32::from(u8::from(*done))];
         statistics.zip(results).for_each(|(statistics, value)| statistics.add(&[value]));
-        let Some(spool) = &mut self.open_episodes[env] else { return Ok(()) };
+        let Some(buffer) = &mut self.open_episodes[env] else { return Ok(()) };
         let images = images.iter().map(|image| image.file.clone()).collect();
-        let frame = SpooledFrame { numbers: numbers.concat(), images, reward: *reward as f32, done: *done };
-        Ok(spool.push(&frame, &self.disk)?)
+        let frame = BufferedFrame { numbers: numbers.concat(), images, reward: *reward as f32, done: *done };
+        Ok(buffer.push(&frame, &self.disk)?)
     }
 
     /// Writes the Parquet file of the open episode of `env`, if any.
     fn end(&mut self, env: usize) -> WriteResult {
-        let Some(spool) = self.open_episodes[env].take() else { return Ok(()) };
+        let Some(buffer) = self.open_episodes[env].take() else { return Ok(()) };
         let (episode, first) = (self.episodes.len() as u64, self.episodes.iter().sum());
-        let frames = spool.frames();
+        let frames = buffer.frames();
         let file = self.file(&data_file(episode))?;
         let mut table = TableWriter::create(file, &columns(&self.features), &[])?;
         let values = self.features.numbers.iter().map(|feature| feature.names.len()).sum();
         let images = self.features.images.len();
         let mut group = RowGroup::new(&self.features, self.fps, episode, first);
-        spool.drain(values, images, &self.disk, |frame| {
+        buffer.drain(values, images, &self.disk, |frame| {
             group.push(frame);
             if group.is_full() { table.write(&group.take_columns()) } else { Ok(()) }
         })?;
@@ -224,8 +224,8 @@ impl DatasetWriter for LeRobotWriter {
         if self.episodes.is_empty() {
             return Err(WriteError::NoFrame(episodes::NO_FRAME));
         }
-        // A folder of spools is empty now. It does not exist if all episodes were short.
-        match fs::remove_dir(self.folder.partial_path().join(SPOOL)) {
+        // A folder of buffer files is empty now. It does not exist if all episodes were short.
+        match fs::remove_dir(self.folder.partial_path().join(BUFFERS)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
             _ => {}
         }
@@ -357,7 +357,7 @@ impl<'a> RowGroup<'a> {
         Self { features, fps, episode, frame: 0, index: first, rows: 0, image_bytes: 0, columns }
     }
 
-    fn push(&mut self, frame: SpooledFrame) {
+    fn push(&mut self, frame: BufferedFrame) {
         let mut numbers = self.features.numbers.iter().scan(0, |first, feature| {
             let range = *first..*first + feature.names.len();
             *first = range.end;

@@ -11,7 +11,7 @@ const FLUSH_BYTES: usize = 1 << 20;
 
 /// Values of a frame.
 #[derive(Debug, Default, PartialEq)]
-pub(super) struct SpooledFrame {
+pub(super) struct BufferedFrame {
     /// Values of all features of numbers.
     pub(super) numbers: Vec<f32>,
     /// Image files.
@@ -22,14 +22,14 @@ pub(super) struct SpooledFrame {
 
 /// The frames of an episode, in memory and in a file that is deleted at the end.
 #[derive(Debug)]
-pub(super) struct FrameSpool {
+pub(super) struct EpisodeBuffer {
     path: PathBuf,
     buffer: Vec<u8>,
     frames: u64,
 }
 
-impl FrameSpool {
-    /// Creates the spool; its file is created with the first write.
+impl EpisodeBuffer {
+    /// Creates the buffer; its file is created with the first write.
     pub(super) fn new(path: PathBuf) -> Self {
         Self { path, buffer: Vec::new(), frames: 0 }
     }
@@ -40,7 +40,7 @@ impl FrameSpool {
     }
 
     /// Appends a frame.
-    pub(super) fn push(&mut self, frame: &SpooledFrame, disk: &StorageFactory) -> io::Result<()> {
+    pub(super) fn push(&mut self, frame: &BufferedFrame, disk: &StorageFactory) -> io::Result<()> {
         frame.numbers.iter().for_each(|number| self.buffer.extend_from_slice(&number.to_le_bytes()));
         for image in &frame.images {
             self.buffer.extend_from_slice(&(image.len() as u64).to_le_bytes());
@@ -69,7 +69,7 @@ impl FrameSpool {
         values: usize,
         images: usize,
         disk: &StorageFactory,
-        mut take: impl FnMut(SpooledFrame) -> Result<(), E>,
+        mut take: impl FnMut(BufferedFrame) -> Result<(), E>,
     ) -> Result<(), E> {
         let in_memory = !self.path.exists();
         let mut bytes: Box<dyn Read> = if in_memory {
@@ -89,8 +89,8 @@ impl FrameSpool {
     }
 }
 
-fn read_frame(bytes: &mut impl Read, values: usize, images: usize) -> io::Result<SpooledFrame> {
-    let mut frame = SpooledFrame::default();
+fn read_frame(bytes: &mut impl Read, values: usize, images: usize) -> io::Result<BufferedFrame> {
+    let mut frame = BufferedFrame::default();
     for _ in 0..values {
         frame.numbers.push(f32::from_le_bytes(read_array(bytes)?));
     }
@@ -122,8 +122,8 @@ mod tests {
     #[test]
     fn in_memory_and_in_the_file() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("spool/env_0");
-        let frame = |k: u64| SpooledFrame {
+        let path = folder.path().join("buffers/env_0");
+        let frame = |k: u64| BufferedFrame {
             numbers: vec![k as f32, -0.5],
             images: vec![vec![k as u8; 1000], Vec::new()],
             reward: 0.25 * k as f32,
@@ -131,11 +131,11 @@ mod tests {
         };
         let disk = StorageFactory::default();
         for (count, is_file) in [(10, false), (3000, true)] {
-            let mut spool = FrameSpool::new(path.clone());
-            (0..count).for_each(|k| spool.push(&frame(k), &disk).unwrap());
-            assert_eq!((spool.frames(), path.exists()), (count, is_file));
+            let mut buffer = EpisodeBuffer::new(path.clone());
+            (0..count).for_each(|k| buffer.push(&frame(k), &disk).unwrap());
+            assert_eq!((buffer.frames(), path.exists()), (count, is_file));
             let mut next = 0;
-            let all = spool.drain(2, 2, &disk, |found| {
+            let all = buffer.drain(2, 2, &disk, |found| {
                 assert_eq!(found, frame(next));
                 next += 1;
                 Ok::<_, io::Error>(())
@@ -149,11 +149,11 @@ mod tests {
     fn cut_off() {
         let folder = tempfile::tempdir().unwrap();
         let (path, disk) = (folder.path().join("env_0"), StorageFactory::default());
-        let mut spool = FrameSpool::new(path.clone());
-        let frame = SpooledFrame { images: vec![vec![1; FLUSH_BYTES]], ..SpooledFrame::default() };
-        spool.push(&frame, &disk).unwrap();
+        let mut buffer = EpisodeBuffer::new(path.clone());
+        let frame = BufferedFrame { images: vec![vec![1; FLUSH_BYTES]], ..BufferedFrame::default() };
+        buffer.push(&frame, &disk).unwrap();
         OpenOptions::new().write(true).open(&path).unwrap().set_len(1000).unwrap();
-        let error = spool.drain(0, 1, &disk, |_| Ok::<_, io::Error>(())).unwrap_err();
+        let error = buffer.drain(0, 1, &disk, |_| Ok::<_, io::Error>(())).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::UnexpectedEof);
     }
 }
