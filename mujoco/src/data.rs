@@ -211,6 +211,47 @@ impl Data {
         guarded(|| unsafe { mj::mj_step1(m, d) })
     }
 
+    /// Computes the part of [`step1`](Self::step1) that poses and velocities need: kinematics, centers of mass, cameras,
+    /// lights, tendons and, on 4.x, flexes, then the velocities of bodies (`cvel`). All other quantities stay.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn poses_and_velocities(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_kinematics(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_comPos(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_camlight(m, d) })?;
+        #[cfg(mj4)]
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_flex(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_tendon(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_comVel(m, d) })
+    }
+
+    /// Normalizes the quaternions of free and ball joints in `qpos`, as the forward pass of 2.2.2 does. Has no effect
+    /// on 4.x, where positions stay as they are.
+    pub fn normalize_quaternions(&mut self) {
+        #[cfg(not(mj4))]
+        {
+            let (m, qpos) = (self.model.raw(), self.qpos_mut().as_mut_ptr());
+            // SAFETY: `qpos` has the length of the model's positions; the function cannot raise an engine error.
+            unsafe { mj::mj_normalizeQuat(m, qpos) };
+        }
+    }
+
+    /// True if the state contains a number that MuJoCo's step rejects: not finite, or above 1e10 in magnitude.
+    pub fn has_bad_state(&self) -> bool {
+        // MuJoCo's mjMAXVAL. The comparison is false for NaN.
+        const MAX: f64 = mj::mjMAXVAL;
+        let good = |values: &[f64]| values.iter().all(|x| (-MAX..=MAX).contains(x));
+        !(good(self.qpos()) && good(self.qvel()))
+    }
+
     /// Computes actuation, accelerations and constraint forces, and integrates one time step (`mj_step2`). Call
     /// [`step1`](Self::step1) first. A model with the integrator RK4 is integrated with Euler's method here.
     ///

@@ -198,6 +198,31 @@ impl Model {
         self.0.storage.header()
     }
 
+    /// Returns the same model with the buffer sizes of `like`, which must come from the same compilation. A model that
+    /// has these sizes already is only cloned.
+    ///
+    /// # Panics
+    /// `like` comes from another compilation.
+    #[must_use]
+    pub fn with_buffers_of(&self, like: &Self) -> Self {
+        if self.is_compatible_with(like) {
+            return self.clone();
+        }
+        assert!(Arc::ptr_eq(&self.0.storage, &like.0.storage), "the model was compiled from another scene");
+        let mut header = self.copy_header();
+        let sizes = like.header();
+        (header.nconmax, header.njmax) = (sizes.nconmax, sizes.njmax);
+        #[cfg(mj4)]
+        {
+            header.narena = sizes.narena;
+        }
+        #[cfg(not(mj4))]
+        {
+            header.nstack = sizes.nstack;
+        }
+        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
+    }
+
     /// True if data of one model can be used with the other: both come from one compiled model, with equal buffer
     /// sizes.
     pub(super) fn is_compatible_with(&self, other: &Self) -> bool {

@@ -4,7 +4,8 @@ use super::data::Data;
 use super::model::Model;
 use mujoco_sys::fields::data as arrays;
 
-/// State that a step changes: time, positions, velocities, activations and the solver's warm start.
+/// State that a step changes: time, positions, velocities, activations and the solver's warm start; on 4.x also the
+/// history of delayed actuators and sensors, plastic deformations, and the state of plugins.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct IntegrationState {
     values: Vec<f64>,
@@ -38,6 +39,13 @@ pub struct UserInputs {
     active: Vec<bool>,
 }
 
+/// Results of the last solve (`mj_step2`) that readers see until the next one, although `mj_step1` ran in between:
+/// accelerations, forces of actuators and constraints, and the values of MuJoCo's own sensors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SolvedState {
+    values: Vec<f64>,
+}
+
 /// Implements `save_arrays` and `restore_arrays` for a list of `mjData` arrays, in order.
 macro_rules! copied_arrays {
     ($owner:ident: $($array:ident / $array_mut:ident),* $(,)?) => {
@@ -48,6 +56,22 @@ macro_rules! copied_arrays {
                     // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
                     self.values.extend_from_slice(unsafe { arrays::$array(m, d) });
                 )*
+            }
+
+            #[allow(dead_code, reason = "not every state is compared")]
+            fn equals_arrays(&self, data: &Data) -> bool {
+                let (m, d) = (data.model().raw(), data.raw());
+                let mut values = &self.values[..];
+                $(
+                    // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+                    let array = unsafe { arrays::$array(m, d) };
+                    let Some((mine, rest)) = values.split_at_checked(array.len()) else { return false };
+                    if !same_bits(mine, array) {
+                        return false;
+                    }
+                    values = rest;
+                )*
+                values.is_empty()
             }
 
             fn restore_arrays(&self, data: &mut Data, mut values: &[f64]) {
@@ -65,7 +89,25 @@ macro_rules! copied_arrays {
     };
 }
 
+#[cfg(not(mj4))]
 copied_arrays!(IntegrationState: qpos / qpos_mut, qvel / qvel_mut, act / act_mut, qacc_warmstart / qacc_warmstart_mut);
+#[cfg(mj4)]
+copied_arrays!(
+    IntegrationState: qpos / qpos_mut,
+    qvel / qvel_mut,
+    act / act_mut,
+    qacc_warmstart / qacc_warmstart_mut,
+    history / history_mut,
+    plastic / plastic_mut,
+    plugin_state / plugin_state_mut,
+);
+copied_arrays!(
+    SolvedState: qacc / qacc_mut,
+    qfrc_actuator / qfrc_actuator_mut,
+    qfrc_constraint / qfrc_constraint_mut,
+    actuator_force / actuator_force_mut,
+    sensordata / sensordata_mut,
+);
 copied_arrays!(
     UserInputs: ctrl / ctrl_mut,
     qfrc_applied / qfrc_applied_mut,
@@ -74,6 +116,12 @@ copied_arrays!(
     mocap_quat / mocap_quat_mut,
     userdata / userdata_mut,
 );
+
+/// True if both arrays, of equal lengths, have the same bits.
+fn same_bits(one: &[f64], other: &[f64]) -> bool {
+    // Without an early exit, the comparison is vectorized.
+    one.iter().zip(other).fold(0, |differences, (a, b)| differences | (a.to_bits() ^ b.to_bits())) == 0
+}
 
 impl IntegrationState {
     /// Empty state, which restores nothing.
@@ -124,6 +172,22 @@ impl IntegrationState {
     }
 }
 
+impl SolvedState {
+    /// Copies the results of `data`, reusing memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+    }
+
+    /// Copies the results into `data`, whose model must have the same sizes; other sizes panic, and a state that was
+    /// never saved changes nothing. Its buffers may be larger.
+    pub fn restore(&self, data: &mut Data) {
+        if !self.values.is_empty() {
+            self.restore_arrays(data, &self.values);
+        }
+    }
+}
+
 impl UnnormalizedQuats {
     /// Allocates storage for the quaternions that a forward pass over `model` normalizes; nothing to store on 4.x.
     pub fn new(model: &Model) -> Self {
@@ -143,6 +207,11 @@ impl UnnormalizedQuats {
 
     fn iter(&self) -> impl Iterator<Item = &UnnormalizedQuat> {
         self.first.iter().chain(&self.others)
+    }
+
+    /// True if a forward pass normalizes no quaternion, so that there is nothing to store.
+    pub fn is_empty(&self) -> bool {
+        self.first.is_none()
     }
 
     /// Copies the quaternions of `data`. Call this before its forward pass.
@@ -173,6 +242,11 @@ impl UserInputs {
         (&self.values, active)
     }
 
+    /// Controls, shape (nu,), for writing. `model` is the model of the saved data.
+    pub fn ctrl_mut(&mut self, model: &Model) -> &mut [f64] {
+        &mut self.values[..model.nu()]
+    }
+
     /// Creates inputs from the result of [`values`](Self::values).
     pub fn from_values(values: Vec<f64>, active: Vec<bool>) -> Self {
         #[cfg(not(mj4))]
@@ -195,6 +269,19 @@ impl UserInputs {
             self.active.clear();
             self.active.extend_from_slice(active);
         }
+    }
+
+    /// True if `data` has the same inputs, bit for bit.
+    pub fn matches(&self, data: &Data) -> bool {
+        #[cfg(mj4)]
+        {
+            // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+            let active = unsafe { arrays::eq_active(data.model().raw(), data.raw()) };
+            if self.active != active {
+                return false;
+            }
+        }
+        self.equals_arrays(data)
     }
 
     /// Copies the inputs into `data`, whose model must have the same sizes. Its buffers may be larger. Inputs of other

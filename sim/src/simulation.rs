@@ -3,7 +3,6 @@
 use crate::batch::Batch;
 use crate::capture::BodyAxis;
 use crate::entity_set::EntitySet;
-use crate::env::SimEnv;
 use crate::indexing::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
 use crate::randomization::{ModelPatcher, PropertyOverrides, PropertyTables};
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -115,19 +114,17 @@ impl Simulation {
     /// Resets the chosen environments to the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
         let start = &self.initial_state;
-        (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.with_env(i, SimEnv::expect_reset));
-        self.batch.run(|i, env| {
-            if chosen[i] {
-                env.reset(|data, drives| {
-                    for &(address, position) in &start.qpos {
-                        data.qpos_mut()[address] = position;
-                    }
-                    for &(drive, target) in &start.targets {
-                        let [low, high] = drives.ranges[drive];
-                        drives.position[drive] = target.clamp(low, high);
-                    }
-                });
-            }
+        let chosen: Vec<usize> = (0..chosen.len()).filter(|&i| chosen[i]).collect();
+        self.batch.run_in(&chosen, |_, env| {
+            env.reset_state(|data, drives| {
+                for &(address, position) in &start.qpos {
+                    data.qpos_mut()[address] = position;
+                }
+                for &(drive, target) in &start.targets {
+                    let [low, high] = drives.ranges[drive];
+                    drives.position[drive] = target.clamp(low, high);
+                }
+            });
         });
     }
 
@@ -167,6 +164,7 @@ impl Simulation {
             self.welds.get(at).map(|weld| weld.equality)
         };
         let moved = |weld: &mj::Weld| Some(mj::Weld { equality: equality(weld.equality)?, ..*weld });
+        self.batch.add_growths_of(&old.batch);
         for i in 0..self.batch.num_envs() {
             let part_state = old.batch.read(i, |env| parts.read(env.data()));
             let (state, time, targets, history) =

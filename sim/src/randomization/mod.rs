@@ -21,7 +21,7 @@ pub(crate) use tables::PropertyTables;
 use tables::SceneContext;
 pub use terms::{Randomization, RandomizationOp, RandomizationTerm};
 
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::Result;
 use crate::simulation::Simulation;
 use kinetoscope_scene::{EnvScene, RenderSceneError};
@@ -81,7 +81,7 @@ impl Simulation {
         let made: Result<Vec<_>> = envs
             .iter()
             .map(|&index| {
-                self.batch.with_env(index, |env| {
+                self.batch.read_at(index, Stage::Raw, |env| {
                     let mut properties = self.properties_of(&tables, index, env);
                     change(index, &mut properties)?;
                     let own = properties.overrides();
@@ -103,7 +103,7 @@ impl Simulation {
         }
         for (index, own, made) in made {
             self.property_overrides[index] = own.iter().any(Option::is_some).then(|| own.into());
-            self.batch.with_env(index, |env| made.apply(env));
+            self.batch.write_at(index, Stage::Raw, |env| made.apply(env));
         }
         self.set_env_scenes(looks);
         Ok(())

@@ -131,7 +131,7 @@ impl SimulationManager {
     pub fn restore(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
         let sources = self.sources(snapshot, env_ids)?;
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
-        self.simulation.batch.run(|i, env| {
+        self.simulation.batch.run_in(&chosen, |i, env| {
             if let Some(source) = sources[i] {
                 env.load_state(&snapshot.entries()[source].state);
             }

@@ -1,0 +1,193 @@
+//! Rows: an environment outside of working memory.
+//!
+//! A batch holds one row per environment and one `mjData` per thread. A row has everything that determines future
+//! steps, and what readers see of the last step. Everything else is computed from it when it is needed. Quaternions are
+//! stored as they were before a forward pass, which may normalize them.
+
+use crate::capture::CapturedStep;
+use crate::drive::table::DriveState;
+use crate::env::{EnvStats, EnvStatus};
+use crate::wrenches::Wrenches;
+use kinetoscope_mujoco::{Data, IntegrationState, Model, SolvedState, UserInputs, WarningCounts, Weld};
+use std::sync::Arc;
+
+/// Row of one environment.
+#[derive(Clone, Debug)]
+pub struct EnvRow {
+    /// Targets, gains and efforts of the drives.
+    pub drives: DriveState,
+    /// State of the environment, unless it is in working memory: then the state before the current step.
+    pub(crate) motion: IntegrationState,
+    /// Results of the last solve.
+    pub(crate) solved: SolvedState,
+    /// Inputs as the last step used them, shared until an environment has its own.
+    pub(crate) inputs: Arc<UserInputs>,
+    /// Inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
+    pub(crate) written: Arc<UserInputs>,
+    /// Model with properties or welds of this environment alone; `None` for the shared model.
+    pub(crate) model: Option<Model>,
+    pub(crate) steps: u64,
+    /// Divergence status; `None` while the environment runs.
+    pub(crate) diverged: Option<Box<EnvStatus>>,
+    /// True if forces and accelerations were solved for the current state, false if for the state before the last step.
+    pub(crate) solved_current: bool,
+    /// True if the warnings of the forward pass of the current state are counted.
+    pub(crate) is_forward_counted: bool,
+    /// External wrenches of the user; `None` without any.
+    pub(crate) wrenches: Option<Box<Wrenches>>,
+    /// Number that identifies this content of the row. A thread whose `mjData` still belongs to it does not restore it.
+    pub(crate) version: u64,
+    /// True if `inputs` changed since the row was last in working memory.
+    pub(crate) inputs_are_edited: bool,
+    pub(crate) cold: Box<ColdState>,
+}
+
+/// Fields that a successful step does not touch.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ColdState {
+    pub(crate) warnings: WarningCounts,
+    /// Quantities captured in the last step for which sensors needed them.
+    pub(crate) captured: CapturedStep,
+    /// Attached welds; their relative poses are in the model.
+    pub(crate) welds: Vec<Weld>,
+}
+
+impl EnvRow {
+    /// Creates a row without a state.
+    pub(crate) fn new(drives: DriveState) -> Self {
+        let inputs = Arc::default();
+        Self {
+            drives,
+            motion: IntegrationState::EMPTY,
+            solved: SolvedState::default(),
+            written: Arc::clone(&inputs),
+            inputs,
+            model: None,
+            steps: 0,
+            diverged: None,
+            solved_current: true,
+            is_forward_counted: false,
+            wrenches: None,
+            version: 0,
+            inputs_are_edited: false,
+            cold: Box::default(),
+        }
+    }
+
+    /// Saves the inputs of `data` as those of the last write.
+    pub(crate) fn save_written(&mut self, data: &Data) {
+        save_inputs(&mut self.written, data);
+    }
+
+    /// Saves the inputs of `data` as those of the last step; shares those of the last write if they are equal.
+    pub(crate) fn save_inputs(&mut self, data: &Data) {
+        if self.inputs.matches(data) {
+            return;
+        }
+        if self.written.matches(data) {
+            self.inputs = Arc::clone(&self.written);
+        } else {
+            save_inputs(&mut self.inputs, data);
+        }
+    }
+
+    /// Sets controls of a row outside of working memory.
+    pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64]), model: &Model) {
+        // The inputs as of the last write become equal to the others; only then is there a single owner.
+        self.written = Arc::default();
+        change(Arc::make_mut(&mut self.inputs).ctrl_mut(model));
+        self.written = Arc::clone(&self.inputs);
+        self.inputs_are_edited = true;
+    }
+
+    /// Attached welds.
+    pub(crate) fn welds(&self) -> &[Weld] {
+        &self.cold.welds
+    }
+
+    /// External wrenches, and bodies with gravity compensation.
+    pub(crate) fn wrenches(&self) -> &Wrenches {
+        static NONE: Wrenches = Wrenches { list: Vec::new(), gravity_compensated: Vec::new() };
+        self.wrenches.as_deref().unwrap_or(&NONE)
+    }
+
+    /// Quantities of the last capture.
+    pub(crate) fn captured(&self) -> &CapturedStep {
+        &self.cold.captured
+    }
+
+    /// Adds steps, warnings and divergence of `other`, whose state was copied to this environment.
+    pub(crate) fn add_stats(&mut self, other: &EnvStats) {
+        self.steps = other.steps;
+        self.cold.warnings.add(&other.warnings);
+        if self.diverged.is_none() {
+            self.diverged.clone_from(&other.diverged);
+        }
+    }
+
+    /// Counters and divergence since the environment was created.
+    pub(crate) fn stats(&self) -> EnvStats {
+        EnvStats { diverged: self.diverged.clone(), steps: self.steps, warnings: self.cold.warnings }
+    }
+
+    /// `Running`, or `Diverged` with the number of completed steps and the reason. A diverged environment keeps its
+    /// last valid state until it is reset.
+    pub fn status(&self) -> &EnvStatus {
+        self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
+    }
+
+    /// Number of MuJoCo steps since the last reset.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Counts of MuJoCo's warnings since the environment was created, without overflows that a repeated step resolved.
+    pub fn warnings(&self) -> &WarningCounts {
+        &self.cold.warnings
+    }
+}
+
+/// Row outside of working memory, for reads that need no `mjData`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StoredRow<'a> {
+    pub(crate) row: &'a EnvRow,
+    pub(crate) model: &'a Model,
+}
+
+impl StoredRow<'_> {
+    /// Simulation time \[s\].
+    pub(crate) fn time(&self) -> f64 {
+        self.row.motion.values().first().copied().unwrap_or(0.0)
+    }
+
+    /// Time of the state for which forces and accelerations were last solved; see
+    /// [`SimEnv::solved_time`](crate::env::SimEnv::solved_time).
+    pub(crate) fn solved_time(&self) -> f64 {
+        if self.row.solved_current { self.time() } else { self.time() - self.model.timestep() }
+    }
+
+    /// Positions, with quaternions as they were before a forward pass.
+    pub(crate) fn raw_qpos(&self) -> &[f64] {
+        self.row.motion.qpos(self.model)
+    }
+
+    /// Velocities.
+    pub(crate) fn qvel(&self) -> &[f64] {
+        self.row.motion.qvel(self.model)
+    }
+}
+
+/// Copies the inputs of `data` unless they are equal, without writing to inputs that other environments share.
+fn save_inputs(inputs: &mut Arc<UserInputs>, data: &Data) {
+    if inputs.matches(data) {
+        return;
+    }
+    match Arc::get_mut(inputs) {
+        Some(own) => own.save(data),
+        None => {
+            let mut own = UserInputs::default();
+            own.save(data);
+            *inputs = Arc::new(own);
+        }
+    }
+}
