@@ -10,6 +10,7 @@ use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
 use kinetoscope::mujoco::Data;
 use kinetoscope::sim::batch::Batch;
+use kinetoscope::sim::env::Stage;
 use std::time::{Duration, Instant};
 
 const ENVS: [usize; 2] = [64, 1024];
@@ -40,7 +41,7 @@ impl Contender for Ours<'_> {
         let start = Instant::now();
         for _ in 0..steps {
             let outs = [&mut self.qpos[..], &mut self.qvel[..]];
-            self.batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], outs);
+            self.batch.step_and_read(1, Stage::State, |env| [env.data().qpos(), env.data().qvel()], outs);
         }
         Ok(start.elapsed())
     }

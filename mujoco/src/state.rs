@@ -152,6 +152,12 @@ impl IntegrationState {
         &self.values[1 + model.nq()..1 + model.nq() + model.nv()]
     }
 
+    /// Saved warm start of the solver, shape (nv,). `model` is the model of the saved data.
+    pub fn qacc_warmstart(&self, model: &Model) -> &[f64] {
+        let first = 1 + model.nq() + model.nv() + model.na();
+        &self.values[first..first + model.nv()]
+    }
+
     /// All numbers, time first.
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -240,6 +246,11 @@ impl UserInputs {
         #[cfg(not(mj4))]
         let active = &[];
         (&self.values, active)
+    }
+
+    /// Controls, shape (nu,). `model` is the model of the saved data.
+    pub fn ctrl(&self, model: &Model) -> &[f64] {
+        &self.values[..model.nu()]
     }
 
     /// Controls, shape (nu,), for writing. `model` is the model of the saved data.

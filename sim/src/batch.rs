@@ -386,20 +386,38 @@ impl Batch {
         self.with_row(index, |row| read(StoredRow { row, model: &self.model }))
     }
 
-    /// Reads K numbers of each environment, shape (N, K).
-    pub(crate) fn gather_rows<const K: usize>(&self, mut read: impl FnMut(&SimEnv) -> [f64; K]) -> Array2<f64> {
+    /// Reads K numbers that `stage` contains of each environment, shape (N, K).
+    pub(crate) fn gather_rows<const K: usize>(
+        &self,
+        stage: Stage,
+        mut read: impl FnMut(&SimEnv) -> [f64; K],
+    ) -> Array2<f64> {
         let mut rows = Vec::with_capacity(self.num_envs);
-        self.for_each(|_, env| rows.push(read(env)));
+        self.for_each_at(stage, |_, env| rows.push(read(env)));
         rows.into()
     }
 
-    /// Reads a value of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather<I, T>(&self, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
+    /// Reads a value of the row of each environment and each of `items`, shape (N, items).
+    pub(crate) fn gather_stored<I, T>(&self, items: &[I], read: impl Fn(&StoredRow<'_>, &I) -> T) -> Array2<T>
     where
         T: Copy + Default,
     {
         let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each(|env_id, env| {
+        self.for_each_row(|env_id, row| {
+            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
+                *value = read(&row, item);
+            }
+        });
+        values
+    }
+
+    /// Reads a value that `stage` contains of each environment and each of `items`, shape (N, items).
+    pub(crate) fn gather<I, T>(&self, stage: Stage, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
+    where
+        T: Copy + Default,
+    {
+        let mut values = Array2::default((self.num_envs, items.len()));
+        self.for_each_at(stage, |env_id, env| {
             for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
                 *value = read(env, item);
             }
@@ -407,14 +425,15 @@ impl Batch {
         values
     }
 
-    /// Reads K numbers of each environment and each of `items`, shape (N, items, K).
+    /// Reads K numbers that `stage` contains of each environment and each of `items`, shape (N, items, K).
     pub(crate) fn gather_rows_of<I, const K: usize>(
         &self,
+        stage: Stage,
         items: &[I],
         read: impl Fn(&SimEnv, &I) -> [f64; K],
     ) -> Array3<f64> {
         let mut values = Array3::zeros((self.num_envs, items.len(), K));
-        self.for_each(|env_id, env| {
+        self.for_each_at(stage, |env_id, env| {
             for (mut row, item) in values.index_axis_mut(Axis(0), env_id).rows_mut().into_iter().zip(items) {
                 row.assign(&aview1(&read(env, item)));
             }

@@ -154,6 +154,14 @@ pub(crate) struct StoredRow<'a> {
     pub(crate) model: &'a Model,
 }
 
+impl std::ops::Deref for StoredRow<'_> {
+    type Target = EnvRow;
+
+    fn deref(&self) -> &EnvRow {
+        self.row
+    }
+}
+
 impl StoredRow<'_> {
     /// Simulation time \[s\].
     pub(crate) fn time(&self) -> f64 {
@@ -174,6 +182,21 @@ impl StoredRow<'_> {
     /// Velocities.
     pub(crate) fn qvel(&self) -> &[f64] {
         self.row.motion.qvel(self.model)
+    }
+
+    /// Accelerations of the last step, from which the next solve starts.
+    pub(crate) fn qacc_warmstart(&self) -> &[f64] {
+        self.row.motion.qacc_warmstart(self.model)
+    }
+
+    /// Controls.
+    pub(crate) fn ctrl(&self) -> &[f64] {
+        self.row.inputs.ctrl(self.model)
+    }
+
+    /// Properties of the environment: its own model, or the shared one.
+    pub(crate) fn own_model(&self) -> &Model {
+        self.row.model.as_ref().unwrap_or(self.model)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::capture::CaptureRequest;
 use crate::entity_set::check_uid_syntax;
-use crate::env::EnvStatus;
+use crate::env::{EnvStatus, Stage};
 use crate::error::{Error, Result};
 use crate::gather;
 use crate::ids::EnvId;
@@ -249,7 +249,7 @@ impl SensorList {
             return;
         }
         // A diverged environment keeps its last measurements.
-        let runs = |env: &usize| simulation.batch.read(*env, |env| *env.status() == EnvStatus::Running);
+        let runs = |env: &usize| simulation.batch.read_row(*env, |row| *row.status() == EnvStatus::Running);
         let running: Vec<usize> = env_ids.iter().copied().filter(runs).collect();
         if running.is_empty() {
             return;
@@ -289,7 +289,7 @@ impl SensorList {
         if shown.is_empty() {
             return markers;
         }
-        simulation.batch.for_each(|i, env| {
+        simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
             let pose = |body: usize| {
                 let frame = simulation.body_axis.bodies().get(body);
                 frame.map_or_else(Pose::identity, |frame| frame.pose(env.data()))

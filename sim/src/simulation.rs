@@ -3,6 +3,7 @@
 use crate::batch::Batch;
 use crate::capture::BodyAxis;
 use crate::entity_set::EntitySet;
+use crate::env::Stage;
 use crate::indexing::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
 use crate::randomization::{ModelPatcher, PropertyOverrides, PropertyTables};
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -108,7 +109,7 @@ impl Simulation {
 
     /// Index in MuJoCo's `ctrl` of a drive.
     pub(crate) fn drive_ctrl_index(&self, drive: usize) -> usize {
-        self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
+        self.batch.read_row(0, |row| row.drives.table().drives[drive].ctrl)
     }
 
     /// Resets the chosen environments to the initial state.
@@ -166,19 +167,20 @@ impl Simulation {
         let moved = |weld: &mj::Weld| Some(mj::Weld { equality: equality(weld.equality)?, ..*weld });
         self.batch.add_growths_of(&old.batch);
         for i in 0..self.batch.num_envs() {
-            let part_state = old.batch.read(i, |env| parts.read(env.data()));
-            let (state, time, targets, history) =
-                old.batch.read(i, |env| (env.state_arrays(), env.data().time(), env.drives.clone(), env.stats()));
-            let wrenches = old.batch.read(i, |env| env.wrenches().remapped(|body| bodies[body]));
-            let held: Vec<mj::Weld> = old.batch.read(i, |env| env.welds().iter().filter_map(moved).collect());
-            self.batch.write(i, |env| {
+            let part_state = old.batch.read_at(i, Stage::Raw, |env| parts.read(env.data()));
+            let (state, time, targets, history) = old
+                .batch
+                .read_at(i, Stage::Raw, |env| (env.state_arrays(), env.data().time(), env.drives.clone(), env.stats()));
+            let wrenches = old.batch.read_row(i, |row| row.wrenches().remapped(|body| bodies[body]));
+            let held: Vec<mj::Weld> = old.batch.read_row(i, |row| row.welds().iter().filter_map(moved).collect());
+            self.batch.write_at(i, Stage::Raw, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
                 }
                 for &(from, to) in &dofs {
                     env.drives.copy_applied_from(&targets, from, to);
                 }
-                env.write(|data| {
+                env.write_state(|data| {
                     for &(from, to) in &qpos {
                         data.qpos_mut()[to] = state.qpos[from];
                     }
@@ -191,6 +193,7 @@ impl Simulation {
                 });
                 env.set_welds(held);
                 if wrenches != Wrenches::default() {
+                    env.reach(Stage::Kinematics);
                     env.set_wrenches(|mine| *mine = wrenches);
                 }
                 env.add_stats(&history);

@@ -13,8 +13,9 @@ mod sensordata;
 mod velocities;
 mod visual_scene;
 
-use crate::env::{EnvStatus, SimEnv};
+use crate::env::{EnvStatus, SimEnv, Stage};
 use crate::simulation::Simulation;
+use kinetoscope_mujoco as mj;
 use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{SceneState, StateDims};
 use kinetoscope_sensors::Phases;
@@ -72,10 +73,10 @@ pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneS
 
 /// Writes physics steps since the last reset and times of all environments to `state`.
 pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
-    simulation.batch.for_each(|i, env| {
-        state.step[i] = env.steps() / u64::from(substeps);
-        state.time[i] = env.data().time();
-        state.force_time[i] = env.solved_time();
+    simulation.batch.for_each_row(|i, row| {
+        state.step[i] = row.steps() / u64::from(substeps);
+        state.time[i] = row.time();
+        state.force_time[i] = row.solved_time();
     });
 }
 
@@ -83,10 +84,31 @@ pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut S
 /// diverged environment gets [`Phases::QUARANTINED`].
 pub(crate) fn gather_step_counts(simulation: &Simulation, substeps: u32, clocks: &mut Vec<u64>) {
     clocks.resize(simulation.batch.num_envs(), 0);
-    simulation.batch.for_each(|i, env| {
-        let runs = *env.status() == EnvStatus::Running;
-        clocks[i] = if runs { env.steps() / u64::from(substeps) } else { Phases::QUARANTINED };
+    simulation.batch.for_each_row(|i, row| {
+        let runs = *row.status() == EnvStatus::Running;
+        clocks[i] = if runs { row.steps() / u64::from(substeps) } else { Phases::QUARANTINED };
     });
+}
+
+/// Part of a step that the data needs for these quantities.
+fn stage_of(simulation: &Simulation, requires: StateFields) -> Stage {
+    // MuJoCo's own sensors of the last stage have their values from the last solve.
+    let stages = simulation.batch.model().sensor_needstage();
+    let is_solved = |&stage: &i32| stage as u32 == mj::sys::mjSTAGE_ACC;
+    let of_forward = if stages.iter().all(is_solved) { StateFields::NONE } else { StateFields::SENSORDATA };
+    let of_kinematics = StateFields::POSES
+        | StateFields::VELOCITIES
+        | StateFields::ACCELERATIONS
+        | StateFields::VISIBLE
+        | StateFields::INSTANCES;
+    let has = |of: StateFields| !requires.intersection(of).is_empty();
+    if has(of_forward) {
+        Stage::Forward
+    } else if has(of_kinematics) {
+        Stage::Kinematics
+    } else {
+        Stage::State
+    }
 }
 
 /// Fills the arrays that `requires` names, which must be allocated, and steps and times.
@@ -99,7 +121,7 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: StateFiel
     if sees && state.own_scenes != simulation.env_scenes {
         state.own_scenes.clone_from(&simulation.env_scenes);
     }
-    simulation.batch.for_each(|i, env| {
+    simulation.batch.for_each_at(stage_of(simulation, requires), |i, env| {
         for (_, fill) in QUANTITIES.iter().filter(|(quantity, _)| requires.contains(*quantity)) {
             fill(simulation, env, i, state);
         }

@@ -73,7 +73,7 @@ impl<'a> EnvProperties<'a> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let Some(own) = &self.sim.simulation.property_overrides[env.0] else { return Ok(0) };
         let values: usize = own.iter().flatten().map(|values| size_of_val(&**values)).sum();
-        let model = self.sim.simulation.batch.read(env.0, |env| env.data().model().own_bytes());
+        let model = self.sim.simulation.batch.read_row(env.0, |row| row.own_model().own_bytes());
         Ok(model + size_of::<PropertyOverrides>() + values)
     }
 }

@@ -31,7 +31,7 @@ impl Simulation {
     /// Tables of the properties of the scene, created on first use.
     pub(crate) fn tables(&self) -> &Arc<PropertyTables> {
         self.property_tables.get_or_init(|| {
-            let drives = self.batch.read(0, |env| Arc::clone(env.drives.table()));
+            let drives = self.batch.read_row(0, |row| Arc::clone(row.drives.table()));
             let standing: Vec<usize> =
                 self.objects.iter().filter(|object| object.is_static()).map(|o| o.body).collect();
             let beside = SceneContext { proxies: &self.visual_proxies, static_bodies: &standing };
