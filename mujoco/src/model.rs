@@ -402,6 +402,25 @@ impl Model {
         self.header().opt.gravity
     }
 
+    /// Feature of the model with which a step depends on more than the state, so that every environment needs a
+    /// [`Data`](super::Data) of its own: sleeping bodies, plugins, or flexes (4.x); `None` for all other models.
+    pub fn persistent_feature(&self) -> Option<&'static str> {
+        #[cfg(mj4)]
+        {
+            let m = self.header();
+            if m.opt.enableflags & mj::mjENBL_SLEEP as i32 != 0 {
+                return Some("the option flag sleep");
+            }
+            if m.nplugin > 0 {
+                return Some("a plugin");
+            }
+            if m.nflex > 0 {
+                return Some("a flex");
+            }
+        }
+        None
+    }
+
     /// Code of the integrator (`mjINT_EULER`, ...).
     pub fn integrator(&self) -> u32 {
         self.header().opt.integrator as u32

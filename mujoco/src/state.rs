@@ -179,6 +179,11 @@ impl IntegrationState {
 }
 
 impl SolvedState {
+    /// All numbers.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
     /// Copies the results of `data`, reusing memory.
     pub fn save(&mut self, data: &Data) {
         self.values.clear();

@@ -46,6 +46,8 @@ pub struct Batch {
     pool: ThreadPool,
     model: Model,
     num_envs: usize,
+    /// Locked while threads take chunks, because the counters of the shares serve one pass at a time.
+    running: Mutex<()>,
     /// Growths of buffers in the batches that this one replaces.
     earlier_growths: u64,
 }
@@ -127,9 +129,17 @@ impl Batch {
         if threads == 0 {
             return Err(BatchError::NoThreads);
         }
+        if let Some(feature) = model.persistent_feature() {
+            return Err(BatchError::PersistentFeature(feature));
+        }
         let failed = |error| BatchError::Environment { index: 0, error };
         let mut first = SimEnv::with_drives(model, DriveState::new(drives, model)).map_err(failed)?;
         let template = first.saved_row().clone();
+        let bytes = template.bytes().saturating_mul(num_envs);
+        // The operating system refuses a block that exceeds its memory, while it grants many small ones.
+        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+            return Err(BatchError::OutOfMemory { num_envs, bytes });
+        }
         // Several chunks per thread balance environments of unequal cost. More than 4 environments per chunk bring no
         // gain, and threads wait longer for the last chunk of a step.
         let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
@@ -148,7 +158,16 @@ impl Batch {
         let seats = seats.map_err(failed)?;
         let chunks = Chunks { chunks, chunk_size, shares };
         let spare_seats = Mutex::new(SpareSeats { seats: Vec::new(), created: 0, origin: first });
-        Ok(Self { chunks, seats, spare_seats, pool, model: model.clone(), num_envs, earlier_growths: 0 })
+        Ok(Self {
+            chunks,
+            seats,
+            spare_seats,
+            pool,
+            model: model.clone(),
+            num_envs,
+            running: Mutex::new(()),
+            earlier_growths: 0,
+        })
     }
 
     /// The model that all environments were created from. An environment may have a model of its own, with other
@@ -172,9 +191,34 @@ impl Batch {
         self.run_chunks(|seat, taken| taken.for_each_env(seat, |_, env, _| env.advance(count, None)));
     }
 
-    /// Steps as [`step`](Self::step) does, and captures quantities of the last step in all environments.
-    pub(crate) fn step_and_capture(&mut self, count: u32, capture: CaptureRequest) {
-        self.run_chunks(|seat, taken| taken.for_each_env(seat, |_, env, _| env.advance(count, Some(&capture))));
+    /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
+    /// every environment, in any order, as soon as its data has what `stage` contains.
+    pub(crate) fn step_and_visit(
+        &self,
+        count: u32,
+        capture: Option<&CaptureRequest>,
+        stage: Stage,
+        visit: impl Fn(usize, &SimEnv) + Sync,
+    ) {
+        self.run_chunks(|seat, taken| {
+            taken.for_each_env(seat, |i, env, _| {
+                env.advance(count, capture);
+                env.reach(stage);
+                visit(i, env);
+            });
+        });
+    }
+
+    /// Calls `visit` for every environment, in parallel and in any order, with the quantities that `stage` contains.
+    pub(crate) fn visit(&self, stage: Stage, visit: impl Fn(usize, &SimEnv) + Sync) {
+        self.run_chunks(|seat, taken| {
+            let first = taken.first;
+            taken.for_each_row(|k, row| {
+                let lease = Lease::new(seat, row, false);
+                lease.seat.reach(stage);
+                visit(first + k, lease.seat);
+            });
+        });
     }
 
     /// Captures the solution of the current state in the environments `chosen`.
@@ -276,17 +320,18 @@ impl Batch {
         });
     }
 
-    fn run_chunks(&mut self, job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync) {
+    fn run_chunks(&self, job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync) {
         self.run_chunks_then(job, |_| {});
     }
 
     /// Runs `job` once for every chunk, in parallel. Calls `then` after each chunk that the calling thread has
     /// processed.
     fn run_chunks_then(
-        &mut self,
+        &self,
         job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync,
         then: impl FnMut(&LockedChunk) + Send,
     ) {
+        let _running = lock(&self.running);
         let (chunks, seats) = (&self.chunks, &self.seats);
         for share in &chunks.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);

@@ -597,12 +597,6 @@ impl SimEnv {
         good
     }
 
-    /// Time of the state for which forces and accelerations were last solved \[s\]: the start of the last step, or the
-    /// current time after a write or reset.
-    pub(crate) fn solved_time(&self) -> f64 {
-        if self.row.solved_current { self.data.time() } else { self.data.time() - self.data.model().timestep() }
-    }
-
     /// Checks a state and inputs that were just written to `data`, without a forward pass. Restores `good` and marks the
     /// environment as diverged if a number is not finite or too large.
     fn accept(&mut self, good: &IntegrationState) {

@@ -74,6 +74,14 @@ impl EnvRow {
         }
     }
 
+    /// Memory of a copy of this row that shares all shared arrays \[bytes\].
+    pub(crate) fn bytes(&self) -> usize {
+        // Header and padding of a block of the allocator.
+        const BLOCK: usize = 16;
+        let numbers = self.motion.values().len() + self.solved.values().len() + self.drives.own_numbers();
+        size_of::<Self>() + size_of::<ColdState>() + size_of::<f64>() * numbers + 7 * BLOCK
+    }
+
     /// Saves the inputs of `data` as those of the last write.
     pub(crate) fn save_written(&mut self, data: &Data) {
         save_inputs(&mut self.written, data);
@@ -168,8 +176,8 @@ impl StoredRow<'_> {
         self.row.motion.values().first().copied().unwrap_or(0.0)
     }
 
-    /// Time of the state for which forces and accelerations were last solved; see
-    /// [`SimEnv::solved_time`](crate::env::SimEnv::solved_time).
+    /// Time of the state for which forces and accelerations were last solved \[s\]: the start of the last step, or the
+    /// current time after a write or reset.
     pub(crate) fn solved_time(&self) -> f64 {
         if self.row.solved_current { self.time() } else { self.time() - self.model.timestep() }
     }

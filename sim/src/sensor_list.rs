@@ -222,12 +222,12 @@ impl SensorList {
         self.due.extend(self.entries.iter().map(|e| wait(e).is_some_and(|wait| wait <= u64::from(block))));
         let due = self.entries.iter().zip(&self.due).filter(|(_, due)| **due);
         let requires = due.fold(StateFields::NONE, |all, (e, _)| all | e.requires);
-        match capture_request(simulation, requires) {
-            None => simulation.batch.step(block * self.substeps),
-            Some(capture) => simulation.batch.step_and_capture(block * self.substeps, capture),
-        }
         if self.due.contains(&true) {
-            gather::gather(simulation, self.substeps, requires, &mut self.state);
+            let capture = capture_request(simulation, requires);
+            let state = &mut self.state;
+            gather::step_and_gather(simulation, block, self.substeps, capture.as_ref(), requires, state);
+        } else {
+            simulation.batch.step(block * self.substeps);
         }
         let due = std::mem::take(&mut self.due);
         self.update_slots(simulation, |index| due[index], SensorSlot::update);

@@ -14,7 +14,7 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::ObjectKind;
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_scene::EnvScene;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// A compiled scene and its environments.
 #[derive(Debug)]
@@ -36,8 +36,9 @@ pub(crate) struct Simulation {
     pub(crate) layout: Arc<StateLayout>,
     /// Model elements whose properties can differ per environment; filled on first use.
     pub(crate) property_tables: OnceLock<Arc<PropertyTables>>,
-    /// Builds models with per-environment properties; `None` before the first randomization.
-    pub(crate) model_patcher: Option<ModelPatcher>,
+    /// Builds models with per-environment properties; `None` before the first randomization. The lock only lets threads
+    /// share the other fields.
+    pub(crate) model_patcher: Mutex<Option<ModelPatcher>>,
     /// Property overrides of each environment; `None` for an environment with the nominal model.
     pub(crate) property_overrides: Vec<Option<Box<PropertyOverrides>>>,
     /// Render scenes of environments with their own sizes or colors; empty without such environments, or before the

@@ -13,25 +13,26 @@ mod sensordata;
 mod velocities;
 mod visual_scene;
 
+use crate::capture::CaptureRequest;
 use crate::env::{EnvStatus, SimEnv, Stage};
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{SceneState, StateDims};
 use kinetoscope_sensors::Phases;
+use std::sync::{Mutex, PoisonError};
 
 /// Fills the rows of one environment, given by index, in the arrays of a quantity.
 type Fill = fn(&Simulation, &SimEnv, usize, &mut SceneState);
 
-/// All gathered quantities, each in a file of its own. [`kinetoscope_scene::state`] lists their arrays.
-const QUANTITIES: [(StateFields, Fill); 11] = [
+/// All gathered quantities except contacts, each in a file of its own. [`kinetoscope_scene::state`] lists their arrays.
+const QUANTITIES: [(StateFields, Fill); 10] = [
     (StateFields::POSES, poses::fill),
     (StateFields::VELOCITIES, velocities::fill),
     (StateFields::JOINT_STATE, joint_state::fill),
     (StateFields::JOINT_EFFORTS, joint_efforts::fill),
     (StateFields::ACTUATORS, actuators::fill),
     (StateFields::SENSORDATA, sensordata::fill),
-    (StateFields::CONTACTS, contacts::fill),
     (StateFields::ACCELERATIONS, accelerations::fill),
     (StateFields::JOINT_WRENCHES, joint_wrenches::fill),
     (StateFields::VISIBLE, visual_scene::fill),
@@ -40,7 +41,7 @@ const QUANTITIES: [(StateFields, Fill); 11] = [
 
 /// Quantities that a sensor may require: the gathered ones, and the markers of other sensors.
 pub(crate) const AVAILABLE: StateFields = {
-    let (mut all, mut k) = (StateFields::MARKERS, 0);
+    let (mut all, mut k) = (StateFields::MARKERS.union(StateFields::CONTACTS), 0);
     while k < QUANTITIES.len() {
         all = all.union(QUANTITIES[k].0);
         k += 1;
@@ -113,17 +114,67 @@ fn stage_of(simulation: &Simulation, requires: StateFields) -> Stage {
 
 /// Fills the arrays that `requires` names, which must be allocated, and steps and times.
 pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
+    let filler = Filler::new(simulation, requires, state);
+    if let Some(stage) = filler.stage() {
+        simulation.batch.visit(stage, |i, env| filler.fill(i, env));
+    }
+    gather_rows(simulation, substeps, requires, state);
+}
+
+/// Does `steps` physics steps and captures the quantities of `capture` in the last one. Then fills the arrays that
+/// `requires` names, which must be allocated, and steps and times. Each environment is gathered by the thread that
+/// stepped it, while its data is in that core's cache.
+pub(crate) fn step_and_gather(
+    simulation: &Simulation,
+    steps: u32,
+    substeps: u32,
+    capture: Option<&CaptureRequest>,
+    requires: StateFields,
+    state: &mut SceneState,
+) {
+    let filler = Filler::new(simulation, requires, state);
+    let stage = filler.stage().unwrap_or(Stage::Raw);
+    simulation.batch.step_and_visit(steps * substeps, capture, stage, |i, env| filler.fill(i, env));
+    gather_rows(simulation, substeps, requires, state);
+}
+
+/// Fills everything that needs no `mjData`: steps, times, and contacts in the order of the environments.
+fn gather_rows(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
     gather_steps(simulation, substeps, state);
-    if requires.is_empty() {
-        return;
+    if requires.contains(StateFields::CONTACTS) {
+        simulation.batch.for_each_row(|i, row| contacts::fill(row.row, i, state));
     }
-    let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
-    if sees && state.own_scenes != simulation.env_scenes {
-        state.own_scenes.clone_from(&simulation.env_scenes);
-    }
-    simulation.batch.for_each_at(stage_of(simulation, requires), |i, env| {
-        for (_, fill) in QUANTITIES.iter().filter(|(quantity, _)| requires.contains(*quantity)) {
-            fill(simulation, env, i, state);
+}
+
+/// Fills rows of the arrays from several threads.
+struct Filler<'a> {
+    simulation: &'a Simulation,
+    requires: StateFields,
+    /// Copying takes little time beside a step, so threads rarely wait for each other.
+    state: Mutex<&'a mut SceneState>,
+}
+
+impl<'a> Filler<'a> {
+    fn new(simulation: &'a Simulation, requires: StateFields, state: &'a mut SceneState) -> Self {
+        let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
+        if sees && state.own_scenes != simulation.env_scenes {
+            state.own_scenes.clone_from(&simulation.env_scenes);
         }
-    });
+        Self { simulation, requires, state: Mutex::new(state) }
+    }
+
+    /// Part of a step that the data needs; `None` if no quantity is filled from it.
+    fn stage(&self) -> Option<Stage> {
+        let fills = QUANTITIES.iter().any(|(quantity, _)| self.requires.contains(*quantity));
+        fills.then(|| stage_of(self.simulation, self.requires))
+    }
+
+    fn fill(&self, i: usize, env: &SimEnv) {
+        if QUANTITIES.iter().any(|(quantity, _)| self.requires.contains(*quantity)) {
+            let state = &mut **self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            for (_, fill) in QUANTITIES.iter().filter(|(quantity, _)| self.requires.contains(*quantity)) {
+                fill(self.simulation, env, i, state);
+            }
+        }
+    }
 }

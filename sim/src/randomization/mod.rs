@@ -25,7 +25,7 @@ use crate::env::{SimEnv, Stage};
 use crate::error::Result;
 use crate::simulation::Simulation;
 use kinetoscope_scene::{EnvScene, RenderSceneError};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 impl Simulation {
     /// Tables of the properties of the scene, created on first use.
@@ -72,7 +72,7 @@ impl Simulation {
         envs: &[usize],
         mut change: impl FnMut(usize, &mut Properties) -> Result<()>,
     ) -> Result<()> {
-        let mut maker = match self.model_patcher.take() {
+        let mut maker = match self.model_patcher.get_mut().unwrap_or_else(PoisonError::into_inner).take() {
             Some(maker) => maker,
             None => ModelPatcher::new(self.batch.model())?,
         };
@@ -90,7 +90,7 @@ impl Simulation {
                 })
             })
             .collect();
-        self.model_patcher = Some(maker);
+        *self.model_patcher.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(maker);
         let made = made?;
         let looks_other = |(index, own, _): &&(usize, PropertyOverrides, EnvPatch)| {
             let before = self.property_overrides[*index].as_deref().unwrap_or(&NO_OVERRIDES);
