@@ -3,7 +3,6 @@
 use super::error::EngineError;
 use super::guard::guarded;
 use super::model::Model;
-use super::prefetch::PrefetchAddresses;
 use mujoco_sys as mj;
 use std::ptr::NonNull;
 
@@ -12,7 +11,6 @@ use std::ptr::NonNull;
 pub struct Data {
     raw: NonNull<mj::mjData>,
     model: Model,
-    prefetch_addresses: PrefetchAddresses,
 }
 
 // SAFETY: an mjData is plain memory without thread affinity; `Data` is its only owner. It is not `Sync`: engine
@@ -143,18 +141,12 @@ impl Data {
         // SAFETY: the model is alive; mj_makeData is an engine function (guarded).
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
         let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
-        // SAFETY: just made; no other reference to it exists yet.
-        let prefetch_addresses = PrefetchAddresses::new(unsafe { raw.as_ref() });
-        Ok(Self { raw, model: model.clone(), prefetch_addresses })
+        Ok(Self { raw, model: model.clone() })
     }
 
     /// Model of this data: the one that it was created for, or the last one of [`set_model`](Self::set_model).
     pub fn model(&self) -> &Model {
         &self.model
-    }
-
-    pub(super) fn prefetch_addresses(&self) -> &PrefetchAddresses {
-        &self.prefetch_addresses
     }
 
     /// Replaces the model by another one of the same sizes: one [edited](super::ModelEditor) from the same compiled

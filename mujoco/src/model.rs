@@ -421,6 +421,14 @@ impl Model {
         None
     }
 
+    /// True if actuators or sensors have a delay or an interval (4.x).
+    pub fn has_history(&self) -> bool {
+        #[cfg(mj4)]
+        return self.header().nhistory > 0;
+        #[cfg(not(mj4))]
+        false
+    }
+
     /// Code of the integrator (`mjINT_EULER`, ...).
     pub fn integrator(&self) -> u32 {
         self.header().opt.integrator as u32

@@ -21,6 +21,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+/// Largest number of environments in a chunk. Within a chunk, the next row is prefetched.
+const MAX_CHUNK_SIZE: usize = 16;
+
 /// Consecutive environments that one thread processes together.
 struct Chunk {
     rows: Vec<Box<EnvRow>>,
@@ -93,8 +96,16 @@ struct Lease<'a> {
 
 impl<'a> Lease<'a> {
     fn new(seat: &'a mut SimEnv, row: &'a mut Box<EnvRow>, writes: bool) -> Self {
-        seat.load(row);
+        seat.load(row, true);
         Self { seat, row, writes }
+    }
+
+    /// Lease for at least one step.
+    fn for_step(seat: &'a mut SimEnv, row: &'a mut Box<EnvRow>) -> Self {
+        // A diverged environment does not step and keeps its results.
+        let with_results = row.diverged.is_some();
+        seat.load(row, with_results);
+        Self { seat, row, writes: true }
     }
 }
 
@@ -140,9 +151,8 @@ impl Batch {
         if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
             return Err(BatchError::OutOfMemory { num_envs, bytes });
         }
-        // Several chunks per thread balance environments of unequal cost. More than 4 environments per chunk bring no
-        // gain, and threads wait longer for the last chunk of a step.
-        let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
+        // Many chunks per thread balance environments of unequal cost.
+        let chunk_size = (num_envs / (64 * threads)).clamp(1, MAX_CHUNK_SIZE);
         let count = num_envs.div_ceil(chunk_size);
         let mut chunks = Vec::with_capacity(count);
         for first in (0..num_envs).step_by(chunk_size) {
@@ -188,7 +198,7 @@ impl Batch {
 
     /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
-        self.run_chunks(|seat, taken| taken.for_each_env(seat, |_, env, _| env.advance(count, None)));
+        self.run_chunks(|seat, taken| taken.for_each_env(seat, count, |_, env, _| env.advance(count, None)));
     }
 
     /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
@@ -201,7 +211,7 @@ impl Batch {
         visit: impl Fn(usize, &SimEnv) + Sync,
     ) {
         self.run_chunks(|seat, taken| {
-            taken.for_each_env(seat, |i, env, _| {
+            taken.for_each_env(seat, count, |i, env, _| {
                 env.advance(count, capture);
                 env.reach(stage);
                 visit(i, env);
@@ -258,7 +268,7 @@ impl Batch {
             // A single thread writes directly to the outputs.
             let seat = &mut *lock(&self.seats[0]);
             for c in 0..self.chunks.chunks.len() {
-                self.chunks.lock_chunk(c).for_each_env(seat, |index, env, _| {
+                self.chunks.lock_chunk(c).for_each_env(seat, count, |index, env, _| {
                     step(env, &mut |k, values| {
                         outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
                     });
@@ -268,7 +278,7 @@ impl Batch {
         }
         let job = |seat: &mut SimEnv, taken: &mut LockedChunk| {
             taken.chunk.read_values.clear();
-            taken.for_each_env(seat, |_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
+            taken.for_each_env(seat, count, |_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
         };
         let mut copied = vec![false; self.chunks.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
@@ -298,7 +308,7 @@ impl Batch {
     /// `job` panics.
     pub fn run(&mut self, job: impl Fn(usize, &mut SimEnv) + Sync) {
         self.run_chunks(|seat, taken| {
-            taken.for_each_env(seat, |i, env, _| {
+            taken.for_each_env(seat, 0, |i, env, _| {
                 env.reach(Stage::Forward);
                 job(i, env);
             });
@@ -548,11 +558,21 @@ impl LockedChunk<'_> {
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
-    /// Calls `act` for every environment of the chunk in `seat`, with its index and the read buffer of the chunk.
-    fn for_each_env(&mut self, seat: &mut SimEnv, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
+    /// Calls `act` for every environment of the chunk in `seat`, with its index and the read buffer of the chunk. `act`
+    /// does `steps` steps first.
+    fn for_each_env(&mut self, seat: &mut SimEnv, steps: u32, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
         let Chunk { rows, read_values } = &mut *self.chunk;
-        for (k, row) in rows.iter_mut().enumerate() {
-            act(self.first + k, Lease::new(seat, row, true).seat, read_values);
+        for k in 0..rows.len() {
+            // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
+            if let Some(next) = rows.get(k + 1) {
+                next.prefetch();
+            }
+            if let Some(after) = rows.get(k + 2) {
+                kinetoscope_mujoco::prefetch(std::slice::from_ref(&**after));
+            }
+            let row = &mut rows[k];
+            let lease = if steps > 0 { Lease::for_step(seat, row) } else { Lease::new(seat, row, true) };
+            act(self.first + k, lease.seat, read_values);
         }
     }
 }

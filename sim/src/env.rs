@@ -162,8 +162,9 @@ impl SimEnv {
     }
 
     /// Exchanges the row of this environment, which is not used, for `other`, and restores the latter into the data
-    /// unless the data still belongs to it.
-    pub(crate) fn load(&mut self, other: &mut Box<EnvRow>) {
+    /// unless the data still belongs to it. Results of the last solve are restored only if `with_results`: a step
+    /// replaces them.
+    pub(crate) fn load(&mut self, other: &mut Box<EnvRow>, with_results: bool) {
         std::mem::swap(&mut self.row, other);
         let row = &mut *self.row;
         let edited = std::mem::take(&mut row.inputs_are_edited);
@@ -187,7 +188,9 @@ impl SimEnv {
         }
         row.inputs.restore(&mut self.data);
         row.motion.restore(&mut self.data);
-        row.solved.restore(&mut self.data);
+        if with_results || self.data.model().has_history() {
+            row.solved.restore(&mut self.data);
+        }
         self.stage = Stage::Raw;
         if edited || row.version == 0 {
             self.renew_version();
@@ -491,7 +494,10 @@ impl SimEnv {
     }
 
     fn step_from_forward(&mut self, efforts: &mut Vec<f64>, capture: Option<&CaptureRequest>) {
-        self.save_motion();
+        // The row still has a state that it was restored from.
+        if self.held == 0 {
+            self.save_motion();
+        }
         self.held = 0;
         loop {
             let mut done = self.try_step(efforts, capture);

@@ -8,6 +8,7 @@ use crate::capture::CapturedStep;
 use crate::drive::table::DriveState;
 use crate::env::{EnvStats, EnvStatus};
 use crate::wrenches::Wrenches;
+use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{Data, IntegrationState, Model, SolvedState, UserInputs, WarningCounts, Weld};
 use std::sync::Arc;
 
@@ -72,6 +73,14 @@ impl EnvRow {
             inputs_are_edited: false,
             cold: Box::default(),
         }
+    }
+
+    /// Prefetches the arrays of this row, without waiting for them.
+    pub(crate) fn prefetch(&self) {
+        mj::prefetch(self.motion.values());
+        mj::prefetch(self.solved.values());
+        mj::prefetch(self.inputs.values().0);
+        self.drives.prefetch();
     }
 
     /// Memory of a copy of this row that shares all shared arrays \[bytes\].
