@@ -46,6 +46,21 @@ pub struct SolvedState {
     values: Vec<f64>,
 }
 
+/// The part of [`UserInputs`] that steps and users change often: controls and applied joint forces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointInputs {
+    values: Vec<f64>,
+}
+
+/// The rest of [`UserInputs`], which environments can share: forces on bodies, mocap poses, user data, and active flags
+/// of equalities (4.x).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyInputs {
+    values: Vec<f64>,
+    #[cfg(mj4)]
+    active: Vec<bool>,
+}
+
 /// Implements `save_arrays` and `restore_arrays` for a list of `mjData` arrays, in order.
 macro_rules! copied_arrays {
     ($owner:ident: $($array:ident / $array_mut:ident),* $(,)?) => {
@@ -107,6 +122,13 @@ copied_arrays!(
     qfrc_constraint / qfrc_constraint_mut,
     actuator_force / actuator_force_mut,
     sensordata / sensordata_mut,
+);
+copied_arrays!(JointInputs: ctrl / ctrl_mut, qfrc_applied / qfrc_applied_mut);
+copied_arrays!(
+    BodyInputs: xfrc_applied / xfrc_applied_mut,
+    mocap_pos / mocap_pos_mut,
+    mocap_quat / mocap_quat_mut,
+    userdata / userdata_mut,
 );
 copied_arrays!(
     UserInputs: ctrl / ctrl_mut,
@@ -175,6 +197,78 @@ impl IntegrationState {
             data.set_time(time);
             self.restore_arrays(data, values);
         }
+    }
+}
+
+/// Active flags of the equalities.
+#[cfg(mj4)]
+fn active_flags(data: &Data) -> &[bool] {
+    // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+    unsafe { arrays::eq_active(data.model().raw(), data.raw()) }
+}
+
+/// Active flags of the equalities, for writing.
+#[cfg(mj4)]
+fn active_flags_mut(data: &mut Data) -> &mut [bool] {
+    let (m, d) = (data.model().raw(), data.raw_mut());
+    // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
+    unsafe { arrays::eq_active_mut(m, d) }
+}
+
+impl JointInputs {
+    /// Copies the inputs of `data`, reusing memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+    }
+
+    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    pub fn restore(&self, data: &mut Data) {
+        self.restore_arrays(data, &self.values);
+    }
+
+    /// All numbers: controls, then applied joint forces.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Controls, shape (nu,). `model` is the model of the saved data.
+    pub fn ctrl(&self, model: &Model) -> &[f64] {
+        &self.values[..model.nu()]
+    }
+
+    /// Controls, shape (nu,), for writing. `model` is the model of the saved data.
+    pub fn ctrl_mut(&mut self, model: &Model) -> &mut [f64] {
+        &mut self.values[..model.nu()]
+    }
+}
+
+impl BodyInputs {
+    /// True if `data` has the same inputs, bit for bit.
+    pub fn matches(&self, data: &Data) -> bool {
+        #[cfg(mj4)]
+        if self.active != active_flags(data) {
+            return false;
+        }
+        self.equals_arrays(data)
+    }
+
+    /// Copies the inputs of `data`, reusing memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+        #[cfg(mj4)]
+        {
+            self.active.clear();
+            self.active.extend_from_slice(active_flags(data));
+        }
+    }
+
+    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    pub fn restore(&self, data: &mut Data) {
+        self.restore_arrays(data, &self.values);
+        #[cfg(mj4)]
+        active_flags_mut(data).copy_from_slice(&self.active);
     }
 }
 
@@ -253,14 +347,12 @@ impl UserInputs {
         (&self.values, active)
     }
 
-    /// Controls, shape (nu,). `model` is the model of the saved data.
-    pub fn ctrl(&self, model: &Model) -> &[f64] {
-        &self.values[..model.nu()]
-    }
-
-    /// Controls, shape (nu,), for writing. `model` is the model of the saved data.
-    pub fn ctrl_mut(&mut self, model: &Model) -> &mut [f64] {
-        &mut self.values[..model.nu()]
+    /// Copies inputs that are stored in two parts.
+    pub fn copy_parts(&mut self, joints: &JointInputs, bodies: &BodyInputs) {
+        self.values.clear();
+        self.values.extend(joints.values.iter().chain(&bodies.values));
+        #[cfg(mj4)]
+        self.active.clone_from(&bodies.active);
     }
 
     /// Creates inputs from the result of [`values`](Self::values).
@@ -280,22 +372,16 @@ impl UserInputs {
         self.save_arrays(data);
         #[cfg(mj4)]
         {
-            // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
-            let active = unsafe { arrays::eq_active(data.model().raw(), data.raw()) };
             self.active.clear();
-            self.active.extend_from_slice(active);
+            self.active.extend_from_slice(active_flags(data));
         }
     }
 
     /// True if `data` has the same inputs, bit for bit.
     pub fn matches(&self, data: &Data) -> bool {
         #[cfg(mj4)]
-        {
-            // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
-            let active = unsafe { arrays::eq_active(data.model().raw(), data.raw()) };
-            if self.active != active {
-                return false;
-            }
+        if self.active != active_flags(data) {
+            return false;
         }
         self.equals_arrays(data)
     }
@@ -305,11 +391,7 @@ impl UserInputs {
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
-        {
-            // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
-            let active = unsafe { arrays::eq_active_mut(data.model().raw(), data.raw_mut()) };
-            active.copy_from_slice(&self.active);
-        }
+        active_flags_mut(data).copy_from_slice(&self.active);
     }
 }
 

@@ -170,7 +170,7 @@ impl SimEnv {
         let edited = std::mem::take(&mut row.inputs_are_edited);
         if self.held != 0 && self.held == row.version {
             if edited {
-                row.inputs.restore(&mut self.data);
+                row.restore_inputs(&mut self.data);
                 self.renew_version();
             }
             return;
@@ -186,7 +186,7 @@ impl SimEnv {
         if !self.data.model().ptr_eq(model) {
             self.data.set_model(model.clone());
         }
-        row.inputs.restore(&mut self.data);
+        row.restore_inputs(&mut self.data);
         row.motion.restore(&mut self.data);
         if with_results || self.data.model().has_history() {
             row.solved.restore(&mut self.data);

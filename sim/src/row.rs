@@ -9,7 +9,9 @@ use crate::drive::table::DriveState;
 use crate::env::{EnvStats, EnvStatus};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco::{Data, IntegrationState, Model, SolvedState, UserInputs, WarningCounts, Weld};
+use kinetoscope_mujoco::{
+    BodyInputs, Data, IntegrationState, JointInputs, Model, SolvedState, UserInputs, WarningCounts, Weld,
+};
 use std::sync::Arc;
 
 /// Row of one environment.
@@ -21,8 +23,10 @@ pub struct EnvRow {
     pub(crate) motion: IntegrationState,
     /// Results of the last solve.
     pub(crate) solved: SolvedState,
-    /// Inputs as the last step used them, shared until an environment has its own.
-    pub(crate) inputs: Arc<UserInputs>,
+    /// Controls and applied joint forces as the last step used them.
+    pub(crate) joint_inputs: JointInputs,
+    /// Other inputs as the last step used them, shared until an environment has its own.
+    pub(crate) body_inputs: Arc<BodyInputs>,
     /// Inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
     pub(crate) written: Arc<UserInputs>,
     /// Model with properties or welds of this environment alone; `None` for the shared model.
@@ -38,7 +42,7 @@ pub struct EnvRow {
     pub(crate) wrenches: Option<Box<Wrenches>>,
     /// Number that identifies this content of the row. A thread whose `mjData` still belongs to it does not restore it.
     pub(crate) version: u64,
-    /// True if `inputs` changed since the row was last in working memory.
+    /// True if `joint_inputs` changed since the row was last in working memory.
     pub(crate) inputs_are_edited: bool,
     pub(crate) cold: Box<ColdState>,
 }
@@ -56,13 +60,13 @@ pub(crate) struct ColdState {
 impl EnvRow {
     /// Creates a row without a state.
     pub(crate) fn new(drives: DriveState) -> Self {
-        let inputs = Arc::default();
         Self {
             drives,
             motion: IntegrationState::EMPTY,
             solved: SolvedState::default(),
-            written: Arc::clone(&inputs),
-            inputs,
+            joint_inputs: JointInputs::default(),
+            body_inputs: Arc::default(),
+            written: Arc::default(),
             model: None,
             steps: 0,
             diverged: None,
@@ -79,7 +83,7 @@ impl EnvRow {
     pub(crate) fn prefetch(&self) {
         mj::prefetch(self.motion.values());
         mj::prefetch(self.solved.values());
-        mj::prefetch(self.inputs.values().0);
+        mj::prefetch(self.joint_inputs.values());
         self.drives.prefetch();
     }
 
@@ -87,33 +91,38 @@ impl EnvRow {
     pub(crate) fn bytes(&self) -> usize {
         // Header and padding of a block of the allocator.
         const BLOCK: usize = 16;
-        let numbers = self.motion.values().len() + self.solved.values().len() + self.drives.own_numbers();
+        let numbers = self.motion.values().len()
+            + self.solved.values().len()
+            + self.joint_inputs.values().len()
+            + self.drives.own_numbers();
         size_of::<Self>() + size_of::<ColdState>() + size_of::<f64>() * numbers + 7 * BLOCK
     }
 
     /// Saves the inputs of `data` as those of the last write.
     pub(crate) fn save_written(&mut self, data: &Data) {
-        save_inputs(&mut self.written, data);
+        if !self.written.matches(data) {
+            own(&mut self.written).save(data);
+        }
     }
 
-    /// Saves the inputs of `data` as those of the last step; shares those of the last write if they are equal.
+    /// Saves the inputs of `data` as those of the last step.
     pub(crate) fn save_inputs(&mut self, data: &Data) {
-        if self.inputs.matches(data) {
-            return;
+        self.joint_inputs.save(data);
+        if !self.body_inputs.matches(data) {
+            own(&mut self.body_inputs).save(data);
         }
-        if self.written.matches(data) {
-            self.inputs = Arc::clone(&self.written);
-        } else {
-            save_inputs(&mut self.inputs, data);
-        }
+    }
+
+    /// Restores the inputs of the last step.
+    pub(crate) fn restore_inputs(&self, data: &mut Data) {
+        self.joint_inputs.restore(data);
+        self.body_inputs.restore(data);
     }
 
     /// Sets controls of a row outside of working memory.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64]), model: &Model) {
-        // The inputs as of the last write become equal to the others; only then is there a single owner.
-        self.written = Arc::default();
-        change(Arc::make_mut(&mut self.inputs).ctrl_mut(model));
-        self.written = Arc::clone(&self.inputs);
+        change(self.joint_inputs.ctrl_mut(model));
+        own(&mut self.written).copy_parts(&self.joint_inputs, &self.body_inputs);
         self.inputs_are_edited = true;
     }
 
@@ -208,7 +217,7 @@ impl StoredRow<'_> {
 
     /// Controls.
     pub(crate) fn ctrl(&self) -> &[f64] {
-        self.row.inputs.ctrl(self.model)
+        self.row.joint_inputs.ctrl(self.model)
     }
 
     /// Properties of the environment: its own model, or the shared one.
@@ -217,17 +226,10 @@ impl StoredRow<'_> {
     }
 }
 
-/// Copies the inputs of `data` unless they are equal, without writing to inputs that other environments share.
-fn save_inputs(inputs: &mut Arc<UserInputs>, data: &Data) {
-    if inputs.matches(data) {
-        return;
+/// Inputs to write to: those of this environment alone, or new ones if other environments share them.
+fn own<T: Default>(inputs: &mut Arc<T>) -> &mut T {
+    if Arc::get_mut(inputs).is_none() {
+        *inputs = Arc::default();
     }
-    match Arc::get_mut(inputs) {
-        Some(own) => own.save(data),
-        None => {
-            let mut own = UserInputs::default();
-            own.save(data);
-            *inputs = Arc::new(own);
-        }
-    }
+    Arc::get_mut(inputs).expect("new inputs have one owner")
 }
