@@ -619,7 +619,7 @@ mod tests {
         <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
           <body pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01"/><site name="tip" pos="0.1 0 0"/>
             <geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
-        <body pos="1 0 0.2"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody>
+        <body pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody>
         <actuator><general joint="hinge" dyntype="filter" dynprm="0.2" gainprm="0.3"/></actuator>
         <sensor><framepos objtype="site" objname="tip"/><gyro site="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
 
