@@ -26,6 +26,7 @@ const MAX_CHUNK_SIZE: usize = 16;
 
 /// Consecutive environments that one thread processes together.
 struct Chunk {
+    #[expect(clippy::vec_box, reason = "a thread takes a row by exchanging pointers")]
     rows: Vec<Box<EnvRow>>,
     /// Values read by [`Batch::step_and_read`], environment by environment.
     read_values: Vec<f64>,
