@@ -12,7 +12,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::time::Duration;
 
-const ENVS: [usize; 2] = [64, 1024];
+const ENVS: [usize; 3] = [64, 1024, 4096];
 const THREADS: [usize; 2] = [1, 2];
 
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {

@@ -8,11 +8,12 @@ use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{Case, Loop, STEPS};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
-use kinetoscope::mujoco::Data;
+use kinetoscope::mujoco::{Data, IntegrationState, UserInputs};
 use kinetoscope::sim::batch::Batch;
+use kinetoscope::sim::env::Stage;
 use std::time::{Duration, Instant};
 
-const ENVS: [usize; 2] = [64, 1024];
+const ENVS: [usize; 3] = [64, 1024, 4096];
 const WANTED: f64 = 0.97;
 
 /// Our side: a batch, and copies of its state after every step.
@@ -40,7 +41,7 @@ impl Contender for Ours<'_> {
         let start = Instant::now();
         for _ in 0..steps {
             let outs = [&mut self.qpos[..], &mut self.qvel[..]];
-            self.batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], outs);
+            self.batch.step_and_read(1, Stage::State, |env| [env.data().qpos(), env.data().qvel()], outs);
         }
         Ok(start.elapsed())
     }
@@ -66,6 +67,88 @@ impl<'c> MujocoLoop<'c> {
             shares.push(datas?);
         }
         Ok(Self { case, shares })
+    }
+}
+
+/// The baseline with rows: every thread has one `mjData`, restores each of its environments into it, steps and saves.
+struct RowsLoop<'c> {
+    case: &'c Case,
+    shares: Vec<RowsShare>,
+}
+
+/// Environments of one thread.
+struct RowsShare {
+    data: Data,
+    first: usize,
+    rows: Vec<(IntegrationState, UserInputs)>,
+}
+
+impl<'c> RowsLoop<'c> {
+    fn new(case: &'c Case, envs: usize, threads: usize) -> BenchResult<Self> {
+        let share = envs.div_ceil(threads);
+        let mut shares = Vec::new();
+        for first in (0..envs).step_by(share) {
+            let rows = vec![Default::default(); share.min(envs - first)];
+            shares.push(RowsShare { data: Data::new(&case.model)?, first, rows });
+        }
+        let mut rows = Self { case, shares };
+        rows.restart()?;
+        Ok(rows)
+    }
+}
+
+impl RowsShare {
+    fn step(&mut self) -> bool {
+        let Self { data, rows, .. } = self;
+        rows.iter_mut().all(|(state, inputs)| {
+            state.restore(data);
+            inputs.restore(data);
+            let done = data.step1().and_then(|()| data.step2()).is_ok();
+            state.save(data);
+            done
+        })
+    }
+}
+
+impl Contender for RowsLoop<'_> {
+    fn restart(&mut self) -> BenchResult<()> {
+        for RowsShare { data, first, rows } in &mut self.shares {
+            for (k, (state, inputs)) in rows.iter_mut().enumerate() {
+                data.reset();
+                self.case.write(*first + k, data);
+                state.save(data);
+                inputs.save(data);
+            }
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, steps: u32) -> BenchResult<Duration> {
+        let start = Instant::now();
+        let run = move |share: &mut RowsShare| (0..steps).all(|_| share.step());
+        let ok = match &mut *self.shares {
+            [share] => run(share),
+            [share, others @ ..] => std::thread::scope(|scope| {
+                let others: Vec<_> = others.iter_mut().map(|share| scope.spawn(move || run(share))).collect();
+                let mine = run(share);
+                others.into_iter().all(|thread| thread.join().unwrap_or(false)) && mine
+            }),
+            [] => true,
+        };
+        let time = start.elapsed();
+        if ok { Ok(time) } else { Err("MuJoCo stopped in a loop over rows".into()) }
+    }
+
+    fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
+        let mut qpos = Vec::new();
+        for RowsShare { data, rows, .. } in &mut self.shares {
+            for (state, _) in rows {
+                state.restore(data);
+                data.normalize_quaternions();
+                qpos.extend_from_slice(data.qpos());
+            }
+        }
+        Ok(Some(qpos))
     }
 }
 
@@ -132,19 +215,22 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
             // order.
             let plan = MeasurementCfg { seconds: settings.seconds, restart_after: STEPS };
             let times = in_both_orders(|order| {
-                let pair = |threads| {
-                    order.create(|| Ours::new(&case, envs, threads), || MujocoLoop::new(&case, envs, threads))
+                let both = |threads| -> BenchResult<_> {
+                    Ok((MujocoLoop::new(&case, envs, threads)?, RowsLoop::new(&case, envs, threads)?))
                 };
-                let ((mut ours1, mut bare1), (mut ours2, mut bare2)) = (pair(1)?, pair(2)?);
-                measure(plan, &mut [&mut ours1, &mut bare1, &mut ours2, &mut bare2])
+                let pair = |threads| order.create(|| Ours::new(&case, envs, threads), || both(threads));
+                let ((mut ours1, (mut bare1, mut rows1)), (mut ours2, (mut bare2, mut rows2))) = (pair(1)?, pair(2)?);
+                measure(plan, &mut [&mut ours1, &mut bare1, &mut ours2, &mut bare2, &mut rows1, &mut rows2])
             })?;
-            for (threads, side) in [(1, 0), (2, 2)] {
+            for (threads, side, in_rows) in [(1, 0, 4), (2, 2, 5)] {
                 let rate = |side: usize| times.rate(side, envs);
-                rows.push(
-                    Row::new("step", &name, "env-steps/s", threads, rate(side))
-                        .against("bare loop", rate(side + 1), times.ratio(side, side + 1))
-                        .with_target_ratio(WANTED),
-                );
+                for (baseline, other) in [("bare loop", side + 1), ("rows loop", in_rows)] {
+                    rows.push(
+                        Row::new("step", &name, "env-steps/s", threads, rate(side))
+                            .against(baseline, rate(other), times.ratio(side, other))
+                            .with_target_ratio(WANTED),
+                    );
+                }
             }
             scaling.push(
                 Row::new("scaling", &name, "speed-up", 2, times.mean_of(|t| t[0] / t[2]))

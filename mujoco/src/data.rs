@@ -3,7 +3,6 @@
 use super::error::EngineError;
 use super::guard::guarded;
 use super::model::Model;
-use super::prefetch::PrefetchAddresses;
 use mujoco_sys as mj;
 use std::ptr::NonNull;
 
@@ -12,7 +11,6 @@ use std::ptr::NonNull;
 pub struct Data {
     raw: NonNull<mj::mjData>,
     model: Model,
-    prefetch_addresses: PrefetchAddresses,
 }
 
 // SAFETY: an mjData is plain memory without thread affinity; `Data` is its only owner. It is not `Sync`: engine
@@ -143,18 +141,12 @@ impl Data {
         // SAFETY: the model is alive; mj_makeData is an engine function (guarded).
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
         let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
-        // SAFETY: just made; no other reference to it exists yet.
-        let prefetch_addresses = PrefetchAddresses::new(unsafe { raw.as_ref() });
-        Ok(Self { raw, model: model.clone(), prefetch_addresses })
+        Ok(Self { raw, model: model.clone() })
     }
 
     /// Model of this data: the one that it was created for, or the last one of [`set_model`](Self::set_model).
     pub fn model(&self) -> &Model {
         &self.model
-    }
-
-    pub(super) fn prefetch_addresses(&self) -> &PrefetchAddresses {
-        &self.prefetch_addresses
     }
 
     /// Replaces the model by another one of the same sizes: one [edited](super::ModelEditor) from the same compiled
@@ -209,6 +201,47 @@ impl Data {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
         guarded(|| unsafe { mj::mj_step1(m, d) })
+    }
+
+    /// Computes the part of [`step1`](Self::step1) that poses and velocities need: kinematics, centers of mass, cameras,
+    /// lights, tendons and, on 4.x, flexes, then the velocities of bodies (`cvel`). All other quantities stay.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn poses_and_velocities(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_kinematics(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_comPos(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_camlight(m, d) })?;
+        #[cfg(mj4)]
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_flex(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_tendon(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_comVel(m, d) })
+    }
+
+    /// Normalizes the quaternions of free and ball joints in `qpos`, as the forward pass of 2.2.2 does. Has no effect
+    /// on 4.x, where positions stay as they are.
+    pub fn normalize_quaternions(&mut self) {
+        #[cfg(not(mj4))]
+        {
+            let (m, qpos) = (self.model.raw(), self.qpos_mut().as_mut_ptr());
+            // SAFETY: `qpos` has the length of the model's positions; the function cannot raise an engine error.
+            unsafe { mj::mj_normalizeQuat(m, qpos) };
+        }
+    }
+
+    /// True if the state contains a number that MuJoCo's step rejects: not finite, or above 1e10 in magnitude.
+    pub fn has_bad_state(&self) -> bool {
+        // MuJoCo's mjMAXVAL. The comparison is false for NaN.
+        const MAX: f64 = mj::mjMAXVAL;
+        let good = |values: &[f64]| values.iter().all(|x| (-MAX..=MAX).contains(x));
+        !(good(self.qpos()) && good(self.qvel()))
     }
 
     /// Computes actuation, accelerations and constraint forces, and integrates one time step (`mj_step2`). Call

@@ -71,7 +71,7 @@ pub use options::OptionDifference;
 pub use prefetch::prefetch;
 pub use ray::RayHit;
 pub use skin_flex::{Bone, FlexArrays, SkinArrays};
-pub use state::{IntegrationState, UnnormalizedQuats, UserInputs};
+pub use state::{BodyInputs, IntegrationState, JointInputs, SolvedState, UnnormalizedQuats, UserInputs};
 pub use unsupported::UnsupportedFeature;
 pub use version::{BUILD_VERSION, SupportedVersion, VersionError, check_version, version_string};
 pub use visual::{

@@ -198,6 +198,31 @@ impl Model {
         self.0.storage.header()
     }
 
+    /// Returns the same model with the buffer sizes of `like`, which must come from the same compilation. A model that
+    /// has these sizes already is only cloned.
+    ///
+    /// # Panics
+    /// `like` comes from another compilation.
+    #[must_use]
+    pub fn with_buffers_of(&self, like: &Self) -> Self {
+        if self.is_compatible_with(like) {
+            return self.clone();
+        }
+        assert!(Arc::ptr_eq(&self.0.storage, &like.0.storage), "the model was compiled from another scene");
+        let mut header = self.copy_header();
+        let sizes = like.header();
+        (header.nconmax, header.njmax) = (sizes.nconmax, sizes.njmax);
+        #[cfg(mj4)]
+        {
+            header.narena = sizes.narena;
+        }
+        #[cfg(not(mj4))]
+        {
+            header.nstack = sizes.nstack;
+        }
+        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
+    }
+
     /// True if data of one model can be used with the other: both come from one compiled model, with equal buffer
     /// sizes.
     pub(super) fn is_compatible_with(&self, other: &Self) -> bool {
@@ -375,6 +400,33 @@ impl Model {
     /// Gravity in world axes \[m/s²\] (`opt.gravity`), also if it is disabled.
     pub fn gravity(&self) -> [f64; 3] {
         self.header().opt.gravity
+    }
+
+    /// Feature of the model with which a step depends on more than the state, so that every environment needs a
+    /// [`Data`](super::Data) of its own: sleeping bodies, plugins, or flexes (4.x); `None` for all other models.
+    pub fn persistent_feature(&self) -> Option<&'static str> {
+        #[cfg(mj4)]
+        {
+            let m = self.header();
+            if m.opt.enableflags & mj::mjENBL_SLEEP as i32 != 0 {
+                return Some("the option flag sleep");
+            }
+            if m.nplugin > 0 {
+                return Some("a plugin");
+            }
+            if m.nflex > 0 {
+                return Some("a flex");
+            }
+        }
+        None
+    }
+
+    /// True if actuators or sensors have a delay or an interval (4.x).
+    pub fn has_history(&self) -> bool {
+        #[cfg(mj4)]
+        return self.header().nhistory > 0;
+        #[cfg(not(mj4))]
+        false
     }
 
     /// Code of the integrator (`mjINT_EULER`, ...).

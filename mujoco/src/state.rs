@@ -4,7 +4,8 @@ use super::data::Data;
 use super::model::Model;
 use mujoco_sys::fields::data as arrays;
 
-/// State that a step changes: time, positions, velocities, activations and the solver's warm start.
+/// State that a step changes: time, positions, velocities, activations and the solver's warm start; on 4.x also the
+/// history of delayed actuators and sensors, plastic deformations, and the state of plugins.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct IntegrationState {
     values: Vec<f64>,
@@ -38,6 +39,28 @@ pub struct UserInputs {
     active: Vec<bool>,
 }
 
+/// Results of the last solve (`mj_step2`) that readers see until the next one, although `mj_step1` ran in between:
+/// accelerations, forces of actuators and constraints, and the values of MuJoCo's own sensors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SolvedState {
+    values: Vec<f64>,
+}
+
+/// The part of [`UserInputs`] that steps and users change often: controls and applied joint forces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointInputs {
+    values: Vec<f64>,
+}
+
+/// The rest of [`UserInputs`], which environments can share: forces on bodies, mocap poses, user data, and active flags
+/// of equalities (4.x).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyInputs {
+    values: Vec<f64>,
+    #[cfg(mj4)]
+    active: Vec<bool>,
+}
+
 /// Implements `save_arrays` and `restore_arrays` for a list of `mjData` arrays, in order.
 macro_rules! copied_arrays {
     ($owner:ident: $($array:ident / $array_mut:ident),* $(,)?) => {
@@ -48,6 +71,22 @@ macro_rules! copied_arrays {
                     // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
                     self.values.extend_from_slice(unsafe { arrays::$array(m, d) });
                 )*
+            }
+
+            #[allow(dead_code, reason = "not every state is compared")]
+            fn equals_arrays(&self, data: &Data) -> bool {
+                let (m, d) = (data.model().raw(), data.raw());
+                let mut values = &self.values[..];
+                $(
+                    // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+                    let array = unsafe { arrays::$array(m, d) };
+                    let Some((mine, rest)) = values.split_at_checked(array.len()) else { return false };
+                    if !same_bits(mine, array) {
+                        return false;
+                    }
+                    values = rest;
+                )*
+                values.is_empty()
             }
 
             fn restore_arrays(&self, data: &mut Data, mut values: &[f64]) {
@@ -65,7 +104,32 @@ macro_rules! copied_arrays {
     };
 }
 
+#[cfg(not(mj4))]
 copied_arrays!(IntegrationState: qpos / qpos_mut, qvel / qvel_mut, act / act_mut, qacc_warmstart / qacc_warmstart_mut);
+#[cfg(mj4)]
+copied_arrays!(
+    IntegrationState: qpos / qpos_mut,
+    qvel / qvel_mut,
+    act / act_mut,
+    qacc_warmstart / qacc_warmstart_mut,
+    history / history_mut,
+    plastic / plastic_mut,
+    plugin_state / plugin_state_mut,
+);
+copied_arrays!(
+    SolvedState: qacc / qacc_mut,
+    qfrc_actuator / qfrc_actuator_mut,
+    qfrc_constraint / qfrc_constraint_mut,
+    actuator_force / actuator_force_mut,
+    sensordata / sensordata_mut,
+);
+copied_arrays!(JointInputs: ctrl / ctrl_mut, qfrc_applied / qfrc_applied_mut);
+copied_arrays!(
+    BodyInputs: xfrc_applied / xfrc_applied_mut,
+    mocap_pos / mocap_pos_mut,
+    mocap_quat / mocap_quat_mut,
+    userdata / userdata_mut,
+);
 copied_arrays!(
     UserInputs: ctrl / ctrl_mut,
     qfrc_applied / qfrc_applied_mut,
@@ -74,6 +138,12 @@ copied_arrays!(
     mocap_quat / mocap_quat_mut,
     userdata / userdata_mut,
 );
+
+/// True if both arrays, of equal lengths, have the same bits.
+fn same_bits(one: &[f64], other: &[f64]) -> bool {
+    // Without an early exit, the comparison is vectorized.
+    one.iter().zip(other).fold(0, |differences, (a, b)| differences | (a.to_bits() ^ b.to_bits())) == 0
+}
 
 impl IntegrationState {
     /// Empty state, which restores nothing.
@@ -104,6 +174,12 @@ impl IntegrationState {
         &self.values[1 + model.nq()..1 + model.nq() + model.nv()]
     }
 
+    /// Saved warm start of the solver, shape (nv,). `model` is the model of the saved data.
+    pub fn qacc_warmstart(&self, model: &Model) -> &[f64] {
+        let first = 1 + model.nq() + model.nv() + model.na();
+        &self.values[first..first + model.nv()]
+    }
+
     /// All numbers, time first.
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -120,6 +196,99 @@ impl IntegrationState {
         if let Some((&time, values)) = self.values.split_first() {
             data.set_time(time);
             self.restore_arrays(data, values);
+        }
+    }
+}
+
+/// Active flags of the equalities.
+#[cfg(mj4)]
+fn active_flags(data: &Data) -> &[bool] {
+    // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+    unsafe { arrays::eq_active(data.model().raw(), data.raw()) }
+}
+
+/// Active flags of the equalities, for writing.
+#[cfg(mj4)]
+fn active_flags_mut(data: &mut Data) -> &mut [bool] {
+    let (m, d) = (data.model().raw(), data.raw_mut());
+    // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
+    unsafe { arrays::eq_active_mut(m, d) }
+}
+
+impl JointInputs {
+    /// Copies the inputs of `data`, reusing memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+    }
+
+    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    pub fn restore(&self, data: &mut Data) {
+        self.restore_arrays(data, &self.values);
+    }
+
+    /// All numbers: controls, then applied joint forces.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Controls, shape (nu,). `model` is the model of the saved data.
+    pub fn ctrl(&self, model: &Model) -> &[f64] {
+        &self.values[..model.nu()]
+    }
+
+    /// Controls, shape (nu,), for writing. `model` is the model of the saved data.
+    pub fn ctrl_mut(&mut self, model: &Model) -> &mut [f64] {
+        &mut self.values[..model.nu()]
+    }
+}
+
+impl BodyInputs {
+    /// True if `data` has the same inputs, bit for bit.
+    pub fn matches(&self, data: &Data) -> bool {
+        #[cfg(mj4)]
+        if self.active != active_flags(data) {
+            return false;
+        }
+        self.equals_arrays(data)
+    }
+
+    /// Copies the inputs of `data`, reusing memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+        #[cfg(mj4)]
+        {
+            self.active.clear();
+            self.active.extend_from_slice(active_flags(data));
+        }
+    }
+
+    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    pub fn restore(&self, data: &mut Data) {
+        self.restore_arrays(data, &self.values);
+        #[cfg(mj4)]
+        active_flags_mut(data).copy_from_slice(&self.active);
+    }
+}
+
+impl SolvedState {
+    /// All numbers.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Copies the results of `data`, reusing memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+    }
+
+    /// Copies the results into `data`, whose model must have the same sizes; other sizes panic, and a state that was
+    /// never saved changes nothing. Its buffers may be larger.
+    pub fn restore(&self, data: &mut Data) {
+        if !self.values.is_empty() {
+            self.restore_arrays(data, &self.values);
         }
     }
 }
@@ -143,6 +312,11 @@ impl UnnormalizedQuats {
 
     fn iter(&self) -> impl Iterator<Item = &UnnormalizedQuat> {
         self.first.iter().chain(&self.others)
+    }
+
+    /// True if a forward pass normalizes no quaternion, so that there is nothing to store.
+    pub fn is_empty(&self) -> bool {
+        self.first.is_none()
     }
 
     /// Copies the quaternions of `data`. Call this before its forward pass.
@@ -173,6 +347,14 @@ impl UserInputs {
         (&self.values, active)
     }
 
+    /// Copies inputs that are stored in two parts.
+    pub fn copy_parts(&mut self, joints: &JointInputs, bodies: &BodyInputs) {
+        self.values.clear();
+        self.values.extend(joints.values.iter().chain(&bodies.values));
+        #[cfg(mj4)]
+        self.active.clone_from(&bodies.active);
+    }
+
     /// Creates inputs from the result of [`values`](Self::values).
     pub fn from_values(values: Vec<f64>, active: Vec<bool>) -> Self {
         #[cfg(not(mj4))]
@@ -190,11 +372,18 @@ impl UserInputs {
         self.save_arrays(data);
         #[cfg(mj4)]
         {
-            // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
-            let active = unsafe { arrays::eq_active(data.model().raw(), data.raw()) };
             self.active.clear();
-            self.active.extend_from_slice(active);
+            self.active.extend_from_slice(active_flags(data));
         }
+    }
+
+    /// True if `data` has the same inputs, bit for bit.
+    pub fn matches(&self, data: &Data) -> bool {
+        #[cfg(mj4)]
+        if self.active != active_flags(data) {
+            return false;
+        }
+        self.equals_arrays(data)
     }
 
     /// Copies the inputs into `data`, whose model must have the same sizes. Its buffers may be larger. Inputs of other
@@ -202,11 +391,7 @@ impl UserInputs {
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
-        {
-            // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
-            let active = unsafe { arrays::eq_active_mut(data.model().raw(), data.raw_mut()) };
-            active.copy_from_slice(&self.active);
-        }
+        active_flags_mut(data).copy_from_slice(&self.active);
     }
 }
 

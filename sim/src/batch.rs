@@ -1,14 +1,19 @@
 //! N environments on worker threads, bit-identical for any number of threads and environments.
 //!
-//! Environments are grouped in chunks, and every thread owns a share of the chunks. A thread first takes the chunks of
-//! its own share, so that an environment mostly stays in the cache of one core. The thread then helps with the
-//! remaining shares. The assignment of threads cannot change results, because environments share only the immutable
-//! model.
+//! The batch holds a [row](crate::row) per environment and an `mjData` per thread. A thread takes an environment:
+//! it restores the row, steps, gathers what is asked for while the data is in the core's cache, and saves the row.
+//! An `mjData` that still belongs to the environment is not restored, so a batch with no more environments than threads
+//! works like environments with an `mjData` each.
+//!
+//! Rows are grouped in chunks, and every thread owns a share of the chunks. A thread first takes the chunks of its own
+//! share, then helps with the remaining shares. The assignment of threads cannot change results, because a row contains
+//! everything that determines a step.
 
 use crate::batch_error::BatchError;
 use crate::capture::CaptureRequest;
 use crate::drive::table::{DriveState, DriveTable};
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
+use crate::row::{EnvRow, StoredRow};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco::Model;
 use ndarray::{Array2, Array3, Axis, aview1};
@@ -16,9 +21,13 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+/// Largest number of environments in a chunk. Within a chunk, the next row is prefetched.
+const MAX_CHUNK_SIZE: usize = 16;
+
 /// Consecutive environments that one thread processes together.
 struct Chunk {
-    envs: Vec<SimEnv>,
+    #[expect(clippy::vec_box, reason = "a thread takes a row by exchanging pointers")]
+    rows: Vec<Box<EnvRow>>,
     /// Values read by [`Batch::step_and_read`], environment by environment.
     read_values: Vec<f64>,
 }
@@ -28,32 +37,38 @@ struct LockedChunk<'a> {
     /// Index, in the batch, of the first environment of the chunk.
     first: usize,
     chunk: MutexGuard<'a, Chunk>,
-    /// The chunk that the thread will probably take next, for prefetching; `None` for the last chunk.
-    next: Option<&'a Mutex<Chunk>>,
-    /// True if environments leave the cache between their steps.
-    exceeds_cache: bool,
 }
-
-/// Batch size above which environments are assumed to leave the cache between their steps \[bytes\]. Measured with 64
-/// to 1024 humanoids and arms on 2 MiB of cache per core: prefetching all arrays of the next environment makes a step 5
-/// % slower at 3 MB and 7 % faster at 11 MB.
-const CACHE_BYTES: usize = 8 << 20;
 
 /// N environments of one model, stepped in parallel.
 #[derive(Debug)]
 pub struct Batch {
     chunks: Chunks,
+    /// Working memory of each thread.
+    seats: Vec<Mutex<SimEnv>>,
+    /// Further working memory, for reads while all others are in use.
+    spare_seats: Mutex<SpareSeats>,
     pool: ThreadPool,
     model: Model,
     num_envs: usize,
+    /// Locked while threads take chunks, because the counters of the shares serve one pass at a time.
+    running: Mutex<()>,
+    /// Growths of buffers in the batches that this one replaces.
+    earlier_growths: u64,
 }
 
-/// The environments in chunks, with one share of the chunks per thread.
+/// Working memory for reads while that of all threads is in use.
+#[derive(Debug)]
+struct SpareSeats {
+    seats: Vec<SimEnv>,
+    created: usize,
+    /// Environment that further working memory is created from.
+    origin: SimEnv,
+}
+
+/// The rows in chunks, with one share of the chunks per thread.
 struct Chunks {
     chunks: Vec<Mutex<Chunk>>,
     chunk_size: usize,
-    /// True if environments leave the cache between their steps.
-    exceeds_cache: bool,
     /// One share of the chunks for each thread.
     shares: Vec<Share>,
 }
@@ -69,6 +84,35 @@ struct Share {
 impl std::fmt::Debug for Chunks {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Chunks").field("chunks", &self.chunks.len()).finish_non_exhaustive()
+    }
+}
+
+/// An environment in working memory. The row returns to the batch when the lease ends, also after a panic.
+struct Lease<'a> {
+    seat: &'a mut SimEnv,
+    row: &'a mut Box<EnvRow>,
+    /// True if the environment may have changed.
+    writes: bool,
+}
+
+impl<'a> Lease<'a> {
+    fn new(seat: &'a mut SimEnv, row: &'a mut Box<EnvRow>, writes: bool) -> Self {
+        seat.load(row, true);
+        Self { seat, row, writes }
+    }
+
+    /// Lease for at least one step.
+    fn for_step(seat: &'a mut SimEnv, row: &'a mut Box<EnvRow>) -> Self {
+        // A diverged environment does not step and keeps its results.
+        let with_results = row.diverged.is_some();
+        seat.load(row, with_results);
+        Self { seat, row, writes: true }
+    }
+}
+
+impl Drop for Lease<'_> {
+    fn drop(&mut self) {
+        if self.writes { self.seat.store(self.row) } else { self.seat.put_back(self.row) }
     }
 }
 
@@ -97,29 +141,44 @@ impl Batch {
         if threads == 0 {
             return Err(BatchError::NoThreads);
         }
-        // Several chunks per thread balance environments of unequal cost. More than 4 environments per chunk bring no
-        // gain, and threads wait longer for the last chunk of a step.
-        let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
-        let drives = DriveState::new(drives, model);
-        let mut bytes = 0;
-        let mut chunks = Vec::with_capacity(num_envs.div_ceil(chunk_size));
-        for first in (0..num_envs).step_by(chunk_size) {
-            let chunk: Result<Vec<SimEnv>, BatchError> = (first..(first + chunk_size).min(num_envs))
-                .map(|index| {
-                    SimEnv::with_drives(model, drives.clone()).map_err(|error| BatchError::Environment { index, error })
-                })
-                .collect();
-            let envs = chunk?;
-            bytes += envs.iter().map(|env| env.data().prefetched_bytes()).sum::<usize>();
-            chunks.push(Mutex::new(Chunk { envs, read_values: Vec::new() }));
+        if let Some(feature) = model.persistent_feature() {
+            return Err(BatchError::PersistentFeature(feature));
         }
-        let count = chunks.len();
+        let failed = |error| BatchError::Environment { index: 0, error };
+        let mut first = SimEnv::with_drives(model, DriveState::new(drives, model)).map_err(failed)?;
+        let template = first.saved_row().clone();
+        let bytes = template.bytes().saturating_mul(num_envs);
+        // The operating system refuses a block that exceeds its memory, while it grants many small ones.
+        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+            return Err(BatchError::OutOfMemory { num_envs, bytes });
+        }
+        // Many chunks per thread balance environments of unequal cost.
+        let chunk_size = (num_envs / (64 * threads)).clamp(1, MAX_CHUNK_SIZE);
+        let count = num_envs.div_ceil(chunk_size);
+        let mut chunks = Vec::with_capacity(count);
+        for first in (0..num_envs).step_by(chunk_size) {
+            let size = chunk_size.min(num_envs - first);
+            let rows = (0..size).map(|_| Box::new(template.clone())).collect();
+            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new() }));
+        }
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
         pool.start(threads).map_err(|error| BatchError::Thread(error.to_string()))?;
         let shares = (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect();
-        let chunks = Chunks { chunks, chunk_size, exceeds_cache: bytes > CACHE_BYTES, shares };
-        Ok(Self { chunks, pool, model: model.clone(), num_envs })
+        let seats: Result<Vec<_>, _> = (0..threads).map(|slot| first.for_slot(slot + 1).map(Mutex::new)).collect();
+        let seats = seats.map_err(failed)?;
+        let chunks = Chunks { chunks, chunk_size, shares };
+        let spare_seats = Mutex::new(SpareSeats { seats: Vec::new(), created: 0, origin: first });
+        Ok(Self {
+            chunks,
+            seats,
+            spare_seats,
+            pool,
+            model: model.clone(),
+            num_envs,
+            running: Mutex::new(()),
+            earlier_growths: 0,
+        })
     }
 
     /// The model that all environments were created from. An environment may have a model of its own, with other
@@ -140,30 +199,49 @@ impl Batch {
 
     /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
-        self.run_chunks(|taken| taken.for_each_env(|_, env, _| env.step(count)));
+        self.run_chunks(|seat, taken| taken.for_each_env(seat, count, |_, env, _| env.advance(count, None)));
     }
 
-    /// Steps as [`step`](Self::step) does, and captures quantities of the last step in all environments.
-    pub(crate) fn step_and_capture(&mut self, count: u32, capture: CaptureRequest) {
-        self.run_chunks(|taken| taken.for_each_env(|_, env, _| env.step_and_capture(count, Some(&capture))));
+    /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
+    /// every environment, in any order, as soon as its data has what `stage` contains.
+    pub(crate) fn step_and_visit(
+        &self,
+        count: u32,
+        capture: Option<&CaptureRequest>,
+        stage: Stage,
+        visit: impl Fn(usize, &SimEnv) + Sync,
+    ) {
+        self.run_chunks(|seat, taken| {
+            taken.for_each_env(seat, count, |i, env, _| {
+                env.advance(count, capture);
+                env.reach(stage);
+                visit(i, env);
+            });
+        });
+    }
+
+    /// Calls `visit` for every environment, in parallel and in any order, with the quantities that `stage` contains.
+    pub(crate) fn visit(&self, stage: Stage, visit: impl Fn(usize, &SimEnv) + Sync) {
+        self.run_chunks(|seat, taken| {
+            let first = taken.first;
+            taken.for_each_row(|k, row| {
+                let lease = Lease::new(seat, row, false);
+                lease.seat.reach(stage);
+                visit(first + k, lease.seat);
+            });
+        });
     }
 
     /// Captures the solution of the current state in the environments `chosen`.
     pub(crate) fn capture_present(&mut self, chosen: &[usize], capture: CaptureRequest) {
-        let mut mask = vec![false; self.num_envs];
-        chosen.iter().for_each(|&env| mask[env] = true);
-        self.run(|i, env| {
-            if mask[i] {
-                env.capture_current(&capture);
-            }
-        });
+        self.run_in(chosen, |_, env| env.capture_current(&capture));
     }
 
     /// Does `count` MuJoCo steps in every environment and copies the slices that `read` returns to `outs`, one row per
-    /// environment: `batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel])`.
+    /// environment: `batch.step_and_read(1, Stage::State, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos,
+    /// &mut qvel])`. `stage` contains the quantities that `read` returns.
     ///
-    /// The thread that stepped an environment reads it immediately, while its data is in that core's cache. A separate
-    /// read of 1024 humanoids after the step takes 2 % of the step time.
+    /// The thread that stepped an environment reads it immediately, while its data is in that core's cache.
     ///
     /// # Panics
     /// The sizes of `outs` and of the slices differ, or `read` panics.
@@ -171,15 +249,17 @@ impl Batch {
     pub fn step_and_read<const K: usize>(
         &mut self,
         count: u32,
+        stage: Stage,
         read: impl for<'e> Fn(&'e SimEnv) -> [&'e [f64]; K] + Sync,
         mut outs: [&mut [f64]; K],
     ) {
-        let widths = self.read(0, |env| read(env).map(<[f64]>::len));
+        let widths = self.read_at(0, Stage::Raw, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
         }
         let step = |env: &mut SimEnv, take: &mut dyn FnMut(usize, &[f64])| {
-            env.step(count);
+            env.advance(count, None);
+            env.reach(stage);
             for (k, (values, width)) in read(env).into_iter().zip(widths).enumerate() {
                 assert!(values.len() == width, "{} numbers from one environment, {width} from another", values.len());
                 take(k, values);
@@ -187,8 +267,9 @@ impl Batch {
         };
         if self.threads() == 1 {
             // A single thread writes directly to the outputs.
+            let seat = &mut *lock(&self.seats[0]);
             for c in 0..self.chunks.chunks.len() {
-                self.chunks.lock_chunk(c).for_each_env(|index, env, _| {
+                self.chunks.lock_chunk(c).for_each_env(seat, count, |index, env, _| {
                     step(env, &mut |k, values| {
                         outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
                     });
@@ -196,14 +277,14 @@ impl Batch {
             }
             return;
         }
-        let job = |taken: &mut LockedChunk| {
+        let job = |seat: &mut SimEnv, taken: &mut LockedChunk| {
             taken.chunk.read_values.clear();
-            taken.for_each_env(|_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
+            taken.for_each_env(seat, count, |_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
         };
         let mut copied = vec![false; self.chunks.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
             let mut values = &chunk.read_values[..];
-            for index in first..first + chunk.envs.len() {
+            for index in first..first + chunk.rows.len() {
                 for (out, width) in outs.iter_mut().zip(widths) {
                     let (mine, rest) = values.split_at(width);
                     out[index * width..(index + 1) * width].copy_from_slice(mine);
@@ -222,76 +303,177 @@ impl Batch {
         }
     }
 
-    /// Runs `job` once for every environment, in parallel, with the index of the environment.
+    /// Runs `job` once for every environment, in parallel, with the index of the environment and a forward pass done.
     ///
     /// # Panics
     /// `job` panics.
     pub fn run(&mut self, job: impl Fn(usize, &mut SimEnv) + Sync) {
-        self.run_chunks(|taken| taken.for_each_env(|i, env, _| job(i, env)));
+        self.run_chunks(|seat, taken| {
+            taken.for_each_env(seat, 0, |i, env, _| {
+                env.reach(Stage::Forward);
+                job(i, env);
+            });
+        });
     }
 
-    fn run_chunks(&mut self, job: impl Fn(&mut LockedChunk) + Sync) {
+    /// Runs `job` once for each of the environments `chosen`, in parallel, with the index of the environment. The data
+    /// has the state alone.
+    pub(crate) fn run_in(&mut self, chosen: &[usize], job: impl Fn(usize, &mut SimEnv) + Sync) {
+        let mut mask = vec![false; self.num_envs];
+        chosen.iter().for_each(|&env| mask[env] = true);
+        self.run_chunks(|seat, taken| {
+            let first = taken.first;
+            taken.for_each_row(|k, row| {
+                if mask[first + k] {
+                    job(first + k, Lease::new(seat, row, true).seat);
+                }
+            });
+        });
+    }
+
+    fn run_chunks(&self, job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync) {
         self.run_chunks_then(job, |_| {});
     }
 
     /// Runs `job` once for every chunk, in parallel. Calls `then` after each chunk that the calling thread has
     /// processed.
-    fn run_chunks_then(&mut self, job: impl Fn(&mut LockedChunk) + Sync, then: impl FnMut(&LockedChunk) + Send) {
-        let chunks = &self.chunks;
+    fn run_chunks_then(
+        &self,
+        job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync,
+        then: impl FnMut(&LockedChunk) + Send,
+    ) {
+        let _running = lock(&self.running);
+        let (chunks, seats) = (&self.chunks, &self.seats);
         for share in &chunks.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
         }
-        // No contention: only slot 0, the calling thread, takes this lock.
+        // No contention: only slot 0, the calling thread, takes this lock, and every slot its own seat.
         let then = Mutex::new(then);
         self.pool.run(chunks.shares.len(), |slot| {
+            let seat = &mut *lock(&seats[slot]);
             if slot == 0 {
                 let then = &mut *lock(&then);
                 chunks.process_shares(slot, |taken| {
-                    job(taken);
+                    job(seat, taken);
                     then(taken);
                 });
             } else {
-                chunks.process_shares(slot, &job);
+                chunks.process_shares(slot, |taken| job(seat, taken));
             }
         });
     }
 
-    /// Reads environment `index`.
+    /// Runs `act` with working memory that no other thread uses; preferably that which holds version `version` of a row.
+    fn with_seat<T>(&self, version: u64, act: impl FnOnce(&mut SimEnv) -> T) -> T {
+        // The upper bits of a version name the seat that made it.
+        let last = SimEnv::slot_of(version).wrapping_sub(1);
+        let preferred = self.seats.get(last).into_iter().chain(&self.seats);
+        for seat in preferred {
+            match seat.try_lock() {
+                Ok(mut seat) => return act(&mut seat),
+                Err(std::sync::TryLockError::Poisoned(seat)) => return act(&mut seat.into_inner()),
+                Err(std::sync::TryLockError::WouldBlock) => {}
+            }
+        }
+        let spare = lock(&self.spare_seats).seats.pop();
+        let mut spare = spare.unwrap_or_else(|| self.new_spare_seat());
+        let result = act(&mut spare);
+        lock(&self.spare_seats).seats.push(spare);
+        result
+    }
+
+    /// Creates working memory for a read inside of other reads.
+    fn new_spare_seat(&self) -> SimEnv {
+        let mut spare = lock(&self.spare_seats);
+        spare.created += 1;
+        let slot = self.seats.len() + spare.created;
+        spare.origin.for_slot(slot).expect("MuJoCo allocated data of this model before")
+    }
+
+    /// Reads environment `index`, with a forward pass done.
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub fn read<T>(&self, index: usize, read: impl FnOnce(&SimEnv) -> T) -> T {
-        self.with_env(index, |env| {
-            env.forward_if_dirty();
-            read(env)
+        self.read_at(index, Stage::Forward, read)
+    }
+
+    /// Reads quantities that `stage` contains of environment `index`.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn read_at<T>(&self, index: usize, stage: Stage, read: impl FnOnce(&SimEnv) -> T) -> T {
+        self.with_row(index, |row| {
+            self.with_seat(row.version, |seat| {
+                let lease = Lease::new(seat, row, false);
+                lease.seat.reach(stage);
+                read(lease.seat)
+            })
         })
     }
 
-    /// Reads all environments in order, on the calling thread.
-    pub fn for_each(&self, mut read: impl FnMut(usize, &SimEnv)) {
+    /// Reads all environments in order, with a forward pass done, on the calling thread.
+    pub fn for_each(&self, read: impl FnMut(usize, &SimEnv)) {
+        self.for_each_at(Stage::Forward, read);
+    }
+
+    /// Reads quantities that `stage` contains of all environments in order, on the calling thread.
+    pub(crate) fn for_each_at(&self, stage: Stage, mut read: impl FnMut(usize, &SimEnv)) {
+        (0..self.num_envs).for_each(|index| self.read_at(index, stage, |env| read(index, env)));
+    }
+
+    /// Reads the rows of all environments in order, on the calling thread.
+    pub(crate) fn for_each_row(&self, mut read: impl FnMut(usize, StoredRow<'_>)) {
         for (c, chunk) in self.chunks.chunks.iter().enumerate() {
-            for (i, env) in lock(chunk).envs.iter_mut().enumerate() {
-                env.forward_if_dirty();
-                read(c * self.chunks.chunk_size + i, env);
+            for (i, row) in lock(chunk).rows.iter().enumerate() {
+                read(c * self.chunks.chunk_size + i, StoredRow { row, model: &self.model });
             }
         }
     }
 
-    /// Reads K numbers of each environment, shape (N, K).
-    pub(crate) fn gather_rows<const K: usize>(&self, mut read: impl FnMut(&SimEnv) -> [f64; K]) -> Array2<f64> {
+    /// Reads the row of environment `index`.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn read_row<T>(&self, index: usize, read: impl FnOnce(StoredRow<'_>) -> T) -> T {
+        self.with_row(index, |row| read(StoredRow { row, model: &self.model }))
+    }
+
+    /// Reads K numbers that `stage` contains of each environment, shape (N, K).
+    pub(crate) fn gather_rows<const K: usize>(
+        &self,
+        stage: Stage,
+        mut read: impl FnMut(&SimEnv) -> [f64; K],
+    ) -> Array2<f64> {
         let mut rows = Vec::with_capacity(self.num_envs);
-        self.for_each(|_, env| rows.push(read(env)));
+        self.for_each_at(stage, |_, env| rows.push(read(env)));
         rows.into()
     }
 
-    /// Reads a value of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather<I, T>(&self, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
+    /// Reads a value of the row of each environment and each of `items`, shape (N, items).
+    pub(crate) fn gather_stored<I, T>(&self, items: &[I], read: impl Fn(&StoredRow<'_>, &I) -> T) -> Array2<T>
     where
         T: Copy + Default,
     {
         let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each(|env_id, env| {
+        self.for_each_row(|env_id, row| {
+            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
+                *value = read(&row, item);
+            }
+        });
+        values
+    }
+
+    /// Reads a value that `stage` contains of each environment and each of `items`, shape (N, items).
+    pub(crate) fn gather<I, T>(&self, stage: Stage, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
+    where
+        T: Copy + Default,
+    {
+        let mut values = Array2::default((self.num_envs, items.len()));
+        self.for_each_at(stage, |env_id, env| {
             for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
                 *value = read(env, item);
             }
@@ -299,14 +481,15 @@ impl Batch {
         values
     }
 
-    /// Reads K numbers of each environment and each of `items`, shape (N, items, K).
+    /// Reads K numbers that `stage` contains of each environment and each of `items`, shape (N, items, K).
     pub(crate) fn gather_rows_of<I, const K: usize>(
         &self,
+        stage: Stage,
         items: &[I],
         read: impl Fn(&SimEnv, &I) -> [f64; K],
     ) -> Array3<f64> {
         let mut values = Array3::zeros((self.num_envs, items.len(), K));
-        self.for_each(|env_id, env| {
+        self.for_each_at(stage, |env_id, env| {
             for (mut row, item) in values.index_axis_mut(Axis(0), env_id).rows_mut().into_iter().zip(items) {
                 row.assign(&aview1(&read(env, item)));
             }
@@ -314,44 +497,83 @@ impl Batch {
         values
     }
 
-    /// Writes to environment `index`.
+    /// Writes to environment `index`, with a forward pass done before.
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub fn write<T>(&mut self, index: usize, write: impl FnOnce(&mut SimEnv) -> T) -> T {
-        self.with_env(index, |env| {
-            env.forward_if_dirty();
-            write(env)
-        })
+        self.write_at(index, Stage::Forward, write)
     }
 
-    /// Accesses environment `index` without its deferred forward pass: the data may be out of date
-    /// ([`SimEnv::forward_if_dirty`]).
+    /// Writes to environment `index`; the data has what `stage` contains.
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
-    pub(crate) fn with_env<T>(&self, index: usize, edit: impl FnOnce(&mut SimEnv) -> T) -> T {
+    pub(crate) fn write_at<T>(&mut self, index: usize, stage: Stage, write: impl FnOnce(&mut SimEnv) -> T) -> T {
+        self.with_row(index, |row| {
+            self.with_seat(row.version, |seat| {
+                let lease = Lease::new(seat, row, true);
+                lease.seat.reach(stage);
+                write(lease.seat)
+            })
+        })
+    }
+
+    /// Changes the drives of environment `index`, or other fields of its row that no `mjData` contains.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn edit_row<T>(&mut self, index: usize, edit: impl FnOnce(&mut EnvRow, &Model) -> T) -> T {
+        self.with_row(index, |row| edit(row, &self.model))
+    }
+
+    #[track_caller]
+    fn with_row<T>(&self, index: usize, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
-        edit(&mut chunk.envs[index % self.chunks.chunk_size])
+        act(&mut chunk.rows[index % self.chunks.chunk_size])
+    }
+
+    /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
+    /// and on which of them took an environment.
+    pub fn buffer_growths(&self) -> u64 {
+        let growths = |seat: &SimEnv| u64::from(seat.buffer_growths());
+        let spare = lock(&self.spare_seats);
+        let initial = growths(&spare.origin);
+        let seats = self.seats.iter().map(|seat| growths(&lock(seat))).sum::<u64>();
+        self.earlier_growths + initial + seats + spare.seats.iter().map(growths).sum::<u64>()
+    }
+
+    /// Counts the growths of `old`, which this batch replaces, as growths of this batch.
+    pub(crate) fn add_growths_of(&mut self, old: &Self) {
+        self.earlier_growths += old.buffer_growths();
     }
 }
 
 impl LockedChunk<'_> {
-    /// Calls `act` for every environment of the chunk, with its index and the read buffer of the chunk.
-    fn for_each_env(&mut self, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
-        let Chunk { envs, read_values } = &mut *self.chunk;
-        for i in 0..envs.len() {
-            // Prefetch the next environment while this one steps.
-            if let Some(next) = envs.get(i + 1) {
-                next.prefetch(self.exceeds_cache);
-            } else if let Some(next) = self.next.and_then(|next| next.try_lock().ok()) {
-                next.envs.iter().take(1).for_each(|env| env.prefetch(self.exceeds_cache));
+    /// Calls `act` for every row of the chunk, with its index in the chunk.
+    fn for_each_row(&mut self, mut act: impl FnMut(usize, &mut Box<EnvRow>)) {
+        self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
+    }
+
+    /// Calls `act` for every environment of the chunk in `seat`, with its index and the read buffer of the chunk. `act`
+    /// does `steps` steps first.
+    fn for_each_env(&mut self, seat: &mut SimEnv, steps: u32, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
+        let Chunk { rows, read_values } = &mut *self.chunk;
+        for k in 0..rows.len() {
+            // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
+            if let Some(next) = rows.get(k + 1) {
+                next.prefetch();
             }
-            envs[i].forward_if_dirty();
-            act(self.first + i, &mut envs[i], read_values);
+            if let Some(after) = rows.get(k + 2) {
+                kinetoscope_mujoco::prefetch(std::slice::from_ref(&**after));
+            }
+            let row = &mut rows[k];
+            let lease = if steps > 0 { Lease::for_step(seat, row) } else { Lease::new(seat, row, true) };
+            act(self.first + k, lease.seat, read_values);
         }
     }
 }
@@ -359,12 +581,7 @@ impl LockedChunk<'_> {
 impl Chunks {
     /// Locks the chunk with index `c`.
     fn lock_chunk(&self, c: usize) -> LockedChunk<'_> {
-        LockedChunk {
-            first: c * self.chunk_size,
-            chunk: lock(&self.chunks[c]),
-            next: self.chunks.get(c + 1),
-            exceeds_cache: self.exceeds_cache,
-        }
+        LockedChunk { first: c * self.chunk_size, chunk: lock(&self.chunks[c]) }
     }
 
     /// Processes the share of `thread`, then the remaining chunks of the following shares.
@@ -385,6 +602,7 @@ impl Chunks {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::env::EnvStatus;
     use kinetoscope_mujoco as mj;
 
     const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="j" type="hinge" axis="0 1 0"/>
@@ -397,6 +615,94 @@ mod tests {
         batch
     }
 
+    /// A ball joint and a hinge with an activation, a falling box, and sensors of all stages.
+    const MACHINE: &str = r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/>
+        <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
+          <body pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01"/><site name="tip" pos="0.1 0 0"/>
+            <geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
+        <body pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody>
+        <actuator><general joint="hinge" dyntype="filter" dynprm="0.2" gainprm="0.3"/></actuator>
+        <sensor><framepos objtype="site" objname="tip"/><gyro site="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
+
+    fn bits(env: &SimEnv) -> Vec<u64> {
+        let data = env.data();
+        let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart(), data.ctrl()];
+        let solved = [data.qacc(), data.actuator_force(), data.qfrc_actuator(), data.qfrc_constraint()];
+        let computed = [data.sensordata(), data.xpos(), data.xquat(), data.cvel(), data.qfrc_bias(), data.efc_pos()];
+        let all = state.into_iter().chain(solved).chain(computed).flatten().map(|x| x.to_bits());
+        all.chain([data.contact().len() as u64, env.steps()]).collect()
+    }
+
+    /// A row that one of few threads takes, with reads in between, continues as an environment with an `mjData` of its
+    /// own does.
+    #[test]
+    fn rows_and_persistent_data() {
+        const ENVS: usize = 7;
+        let model = mj::compile(MACHINE, &[]).expect("compiles").into_model();
+        let model = crate::env::with_small_buffers(&model);
+        let start = |i: usize, data: &mut mj::Data| {
+            data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
+            data.ctrl_mut()[0] = 0.3 * i as f64;
+        };
+        let mut alone: Vec<SimEnv> = (0..ENVS).map(|_| SimEnv::new(&model, &Arc::default()).expect("small")).collect();
+        alone.iter_mut().enumerate().for_each(|(i, env)| env.write(|data| start(i, data)));
+        let mut batch = Batch::new(&model, &Arc::default(), ENVS, 2, ThreadPool::new()).expect("small");
+        batch.run(|i, env| env.write(|data| start(i, data)));
+        for (block, count) in [1, 5, 1, 3, 20, 1, 40].into_iter().enumerate() {
+            for (i, env) in alone.iter_mut().enumerate() {
+                env.step(count);
+                if block == 3 && i % 2 == 0 {
+                    env.write(|data| data.xfrc_applied_mut()[8] = 0.5);
+                }
+                if block == 4 && i == 3 {
+                    env.write(|data| data.qvel_mut()[1] = f64::NAN);
+                }
+            }
+            batch.step(count);
+            if block == 3 {
+                (0..ENVS).step_by(2).for_each(|i| batch.write(i, |env| env.write(|d| d.xfrc_applied_mut()[8] = 0.5)));
+            }
+            if block == 4 {
+                batch.write(3, |env| env.write(|data| data.qvel_mut()[1] = f64::NAN));
+            }
+            for stage in [Stage::State, Stage::Kinematics, Stage::Forward] {
+                batch.for_each_at(stage, |_, _| ());
+            }
+            batch.for_each(|i, env| {
+                assert_eq!(bits(env), bits(&alone[i]), "environment {i} after block {block}");
+                assert_eq!((env.status(), env.warnings()), (alone[i].status(), alone[i].warnings()));
+            });
+        }
+        assert_eq!(alone.iter().filter(|env| *env.status() != EnvStatus::Running).count(), 1);
+        assert!(alone[0].data().contact().len() >= 4);
+        assert_ne!(bits(&alone[0]), bits(&alone[1]), "environments differ");
+        // Control: the last bit of an input is seen.
+        let mut other = SimEnv::new(&model, &Arc::default()).expect("small");
+        other.write(|data| start(0, data));
+        other.write(|data| data.ctrl_mut()[0] = f64::from_bits(1));
+        other.step(71);
+        assert_ne!(bits(&other), bits(&alone[0]));
+    }
+
+    #[test]
+    fn refused_numbers() {
+        let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
+        let batch = |envs, threads| Batch::new(&model, &Arc::default(), envs, threads, ThreadPool::new());
+        assert!(matches!(batch(0, 1), Err(BatchError::NoEnvironments)));
+        assert!(matches!(batch(1, 0), Err(BatchError::NoThreads)));
+        let most = usize::MAX / 1000;
+        assert!(matches!(batch(most, 1), Err(BatchError::OutOfMemory { num_envs, .. }) if num_envs == most));
+    }
+
+    /// A job that panics returns the environment to the batch.
+    #[test]
+    fn panic_in_a_read() {
+        let batch = pendulums(3, 1);
+        let read = || batch.read(1, |_| panic!("expected"));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).is_err());
+        batch.for_each(|i, env| assert_eq!(env.data().qvel()[0], i as f64));
+    }
+
     #[test]
     fn step_and_read() {
         // Slow down the calling thread, which would otherwise process all chunks alone.
@@ -406,6 +712,7 @@ mod tests {
             let (mut qpos, mut qvel) = (vec![f64::NAN; envs], vec![f64::NAN; envs]);
             batch.step_and_read(
                 7,
+                Stage::State,
                 move |env| {
                     if std::thread::current().id() == caller {
                         std::thread::sleep(std::time::Duration::from_millis(1));
@@ -423,24 +730,8 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_cache() {
-        let (mut many, mut few) = (pendulums(1000, 3), pendulums(10, 1));
-        assert!(many.chunks.exceeds_cache && !few.chunks.exceeds_cache);
-        many.step(7);
-        few.step(7);
-        let mut expected = Vec::new();
-        few.for_each(|_, env| expected.push(env.data().qpos()[0].to_bits()));
-        many.for_each(|i, env| {
-            if let Some(&bits) = expected.get(i) {
-                assert_eq!(env.data().qpos()[0].to_bits(), bits);
-            }
-            assert_eq!(env.steps(), 7);
-        });
-    }
-
-    #[test]
     #[should_panic(expected = "5 numbers for 3 x 1")]
     fn wrong_size() {
-        pendulums(3, 1).step_and_read(1, |env| [env.data().qpos()], [&mut [0.0; 5]]);
+        pendulums(3, 1).step_and_read(1, Stage::State, |env| [env.data().qpos()], [&mut [0.0; 5]]);
     }
 }

@@ -22,6 +22,17 @@ pub enum BatchError {
         #[source]
         error: EngineError,
     },
+    /// The model has a feature with which a step depends on more than the state that environments keep.
+    #[error("the model has {0}, which MuJoCo keeps in its working memory; environments of a batch share that memory")]
+    PersistentFeature(&'static str),
+    /// The memory for the states of all environments is not available.
+    #[error("{num_envs} environments need {} MiB of memory, which is not available; use fewer", bytes >> 20)]
+    OutOfMemory {
+        /// Number of environments.
+        num_envs: usize,
+        /// Needed memory \[bytes\].
+        bytes: usize,
+    },
     /// The operating system refuses to start a thread.
     #[error("cannot start a worker thread: {0}")]
     Thread(String),

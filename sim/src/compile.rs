@@ -28,7 +28,7 @@ use kinetoscope_mujoco::ObjectKind;
 use kinetoscope_robot::description::Geometry;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use std::collections::BTreeSet;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Compiles a scene, with all environments in their initial state. Self-collision pairs of robots that overlap in the
 /// initial pose are excluded and reported.
@@ -457,7 +457,7 @@ impl CompiledScene {
             initial_state: self.start,
             layout: Arc::new(StateLayout::of(&self.model, &self.table, cfg.substeps)),
             property_tables: OnceLock::new(),
-            model_patcher: None,
+            model_patcher: Mutex::new(None),
             property_overrides: vec![None; cfg.num_envs],
             env_scenes: Vec::new(),
             visual_proxies: self.proxies,

@@ -1,5 +1,6 @@
 //! Entities of a simulation by name, for code that did not create them: recorders, inspectors, viewers.
 
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::{MjcfId, RigidObjectId, RobotId, TerrainId};
 use crate::manager::SimulationManager;
@@ -152,7 +153,7 @@ impl<'a> Entities<'a> {
         let model = self.sim.simulation.batch.model();
         let mut states =
             [Array2::zeros((self.sim.num_envs(), model.nq())), Array2::zeros((self.sim.num_envs(), model.nv()))];
-        self.sim.simulation.batch.for_each(|index, env| {
+        self.sim.simulation.batch.for_each_at(Stage::State, |index, env| {
             let data = env.data();
             for (table, numbers) in states.iter_mut().zip([data.qpos(), data.qvel()]) {
                 table.row_mut(index).iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);

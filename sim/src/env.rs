@@ -1,24 +1,20 @@
-//! One environment: an `mjData`, its drives, and the recovery from failed steps.
+//! An environment in working memory: an `mjData`, a row, and the recovery from failed steps.
 //!
-//! A step is `drives -> mj_step2 -> mj_step1`, and `drives -> mj_step -> mj_step1` with RK4. After it, positions,
-//! velocities, contacts and constraints belong to the new state. A step that overflows a buffer is repeated from its
-//! start state with doubled buffers, so its result equals that of large buffers from the beginning. A step that ends in
-//! a non-finite state is undone, and the environment stays frozen until it is reset.
-//!
-//! A batch steps its environments in turn, so the memory of an environment has left the core's cache when its turn
-//! comes. Every cache line that a step touches beside MuJoCo's then costs a miss. Scratch memory of a step is therefore
-//! per thread, and rarely used fields are stored apart from the hot ones.
+//! A step is `mj_step1 -> drives -> mj_step2`, and `mj_step1 -> drives -> mj_step` with RK4. The forward pass `mj_step1`
+//! runs when a step or a read needs it: a state without reads between two steps gets one pass. A step that
+//! overflows a buffer is repeated from its start state with doubled buffers, so its result equals that of large buffers
+//! from the beginning. A step that ends in a non-finite state is undone, and the environment stays frozen until it is
+//! reset.
 
-use crate::capture::{CaptureRequest, CapturedStep};
+mod step;
+
 use crate::drive::table::{DriveState, DriveTable};
+use crate::row::EnvRow;
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    Buffers, Data, EngineError, IntegrationState, Model, Overflow, UnnormalizedQuats, UserInputs, Warning,
-    WarningCounts, Weld,
+    Buffers, Data, EngineError, IntegrationState, Model, UnnormalizedQuats, UserInputs, Warning, WarningCounts, Weld,
 };
-use kinetoscope_scene::Contact;
-use std::cell::Cell;
 use std::sync::Arc;
 
 /// Status of an environment: running or diverged.
@@ -57,42 +53,53 @@ impl std::fmt::Display for Divergence {
     }
 }
 
-/// Memory of one environment above which its buffers no longer grow \[bytes\].
-const MAX_ENV_BYTES: usize = 2 << 30;
+/// Position of the slot in a version of a row.
+const SLOT_SHIFT: u32 = 44;
 
-/// One environment of a batch.
+/// Part of a step that the data of an environment contains for the current state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// The state alone, with quaternions that are not normalized.
+    Raw,
+    /// The state, with quaternions as they are after a forward pass.
+    State,
+    /// Poses and velocities of bodies, geoms, sites, cameras, lights and tendons.
+    Kinematics,
+    /// All of `mj_step1`.
+    Forward,
+}
+
+/// An environment in working memory: an `mjData` and the row of the environment.
+///
+/// A batch has one per thread, which takes one row after the other. An environment of its own keeps its row.
 #[derive(Debug)]
 pub struct SimEnv {
     data: Data,
-    /// Targets, gains and efforts of the drives.
-    pub drives: DriveState,
-    steps: u64,
-    /// Divergence status; `None` while the environment runs.
-    diverged: Option<Box<EnvStatus>>,
-    /// Quaternions before the last forward pass; the rest of the state is in `data`.
+    /// The shared model with the buffer sizes of `data`.
+    base: Model,
+    row: Box<EnvRow>,
+    stage: Stage,
+    /// Quaternions before the last forward pass, above [`Stage::Raw`]; the rest of the state is in `data`.
     raw_quats: UnnormalizedQuats,
-    /// True if forces and accelerations were solved for the current state, false if for the state before the last step.
-    solved_current: bool,
-    /// True after the model was replaced and before the next forward pass. The pass is deferred to the next read or
-    /// step, so that several property changes and a reset share one pass. Until then, quaternions in `qpos` are those
-    /// before a pass.
-    dirty: bool,
-    cold: Box<ColdState>,
-    /// External wrenches of the user; `None` without any.
-    wrenches: Option<Box<Wrenches>>,
+    buffer_growths: u32,
+    /// Version of the row of which `data` still holds everything, or 0; see [`EnvRow::version`].
+    held: u64,
+    /// Last version that this environment gave to a row. The upper bits differ between the environments of a batch.
+    last_version: u64,
 }
 
-/// Fields that a successful step does not touch.
-#[derive(Debug, Default)]
-struct ColdState {
-    warnings: WarningCounts,
-    buffer_growths: u32,
-    /// User inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
-    inputs: UserInputs,
-    /// Quantities captured in the last step for which sensors needed them.
-    captured: CapturedStep,
-    /// Attached welds; their relative poses are in the model.
-    welds: Vec<Weld>,
+impl std::ops::Deref for SimEnv {
+    type Target = EnvRow;
+
+    fn deref(&self) -> &EnvRow {
+        &self.row
+    }
+}
+
+impl std::ops::DerefMut for SimEnv {
+    fn deref_mut(&mut self) -> &mut EnvRow {
+        &mut self.row
+    }
 }
 
 impl SimEnv {
@@ -109,18 +116,113 @@ impl SimEnv {
     pub(crate) fn with_drives(model: &Model, drives: DriveState) -> Result<Self, EngineError> {
         let mut env = Self {
             data: Data::new(model)?,
-            drives,
-            steps: 0,
-            diverged: None,
+            base: model.clone(),
+            row: Box::new(EnvRow::new(drives)),
+            stage: Stage::Raw,
             raw_quats: UnnormalizedQuats::new(model),
-            solved_current: true,
-            dirty: false,
-            cold: Box::default(),
-            wrenches: None,
+            buffer_growths: 0,
+            held: 0,
+            last_version: 0,
         };
         let initial = env.current_motion();
+        env.accept(&initial);
         env.forward(&initial);
         Ok(env)
+    }
+
+    /// Creates working memory for the rows of a batch, with the row and the buffer sizes of `self`. `slot` differs from
+    /// that of all others in the batch.
+    pub(crate) fn for_slot(&self, slot: usize) -> Result<Self, EngineError> {
+        Ok(Self {
+            data: Data::new(&self.base)?,
+            base: self.base.clone(),
+            row: self.row.clone(),
+            stage: Stage::Raw,
+            raw_quats: self.raw_quats.clone(),
+            buffer_growths: 0,
+            held: 0,
+            last_version: (slot as u64) << SLOT_SHIFT,
+        })
+    }
+
+    /// Slot of the working memory that gave `version` to a row; 0 for a row that was never in use.
+    pub(crate) fn slot_of(version: u64) -> usize {
+        (version >> SLOT_SHIFT) as usize
+    }
+
+    /// The row of this environment, with its current state. Further environments start as copies of it.
+    pub(crate) fn saved_row(&mut self) -> &EnvRow {
+        self.save_row();
+        &self.row
+    }
+
+    /// Exchanges the row of this environment, which is not used, for `other`, and restores the latter into the data
+    /// unless the data still belongs to it. Results of the last solve are restored only if `with_results`: a step
+    /// replaces them.
+    pub(crate) fn load(&mut self, other: &mut Box<EnvRow>, with_results: bool) {
+        std::mem::swap(&mut self.row, other);
+        let row = &mut *self.row;
+        let edited = std::mem::take(&mut row.inputs_are_edited);
+        if self.held != 0 && self.held == row.version {
+            if edited {
+                row.restore_inputs(&mut self.data);
+                self.renew_version();
+            }
+            return;
+        }
+        let model = match &mut row.model {
+            None => &self.base,
+            Some(own) => {
+                // Buffers that grew since the last time need a model with their sizes.
+                *own = own.with_buffers_of(&self.base);
+                &*own
+            }
+        };
+        if !self.data.model().ptr_eq(model) {
+            self.data.set_model(model.clone());
+        }
+        row.restore_inputs(&mut self.data);
+        row.motion.restore(&mut self.data);
+        if with_results || self.data.model().has_history() {
+            row.solved.restore(&mut self.data);
+        }
+        self.stage = Stage::Raw;
+        if edited || row.version == 0 {
+            self.renew_version();
+        } else {
+            self.held = row.version;
+        }
+    }
+
+    /// Gives the row a new version, which the data belongs to.
+    fn renew_version(&mut self) {
+        self.last_version += 1;
+        (self.row.version, self.held) = (self.last_version, self.last_version);
+    }
+
+    /// Ends a [`load`](Self::load) in which the environment may have changed: saves the row under a new version, and
+    /// returns it to `other`.
+    pub(crate) fn store(&mut self, other: &mut Box<EnvRow>) {
+        self.save_row();
+        self.renew_version();
+        std::mem::swap(&mut self.row, other);
+    }
+
+    /// Ends a [`load`](Self::load) in which only quantities were computed.
+    pub(crate) fn put_back(&mut self, other: &mut Box<EnvRow>) {
+        if self.held != self.row.version {
+            // The forward pass changed the data.
+            self.save_row();
+            self.renew_version();
+        }
+        std::mem::swap(&mut self.row, other);
+    }
+
+    /// Saves the state in the row.
+    fn save_row(&mut self) {
+        self.save_motion();
+        self.row.solved.save(&self.data);
+        self.row.save_inputs(&self.data);
     }
 
     /// MuJoCo data: the state after the last step or the last write.
@@ -133,205 +235,216 @@ impl SimEnv {
     /// before the write is restored, and the environment is marked as diverged. Every step overwrites `qfrc_applied`
     /// and the controls of drives from [`DriveState`].
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
+        let good = self.change(change);
+        self.forward(&good);
+    }
+
+    /// Writes state or inputs as [`write`](Self::write) does, without the forward pass: derived quantities are those
+    /// before the write until the next [`reach`](Self::reach).
+    pub(crate) fn write_state(&mut self, change: impl FnOnce(&mut Data)) {
+        self.change(change);
+    }
+
+    /// Writes and checks a state. Returns the state before.
+    fn change(&mut self, change: impl FnOnce(&mut Data)) -> IntegrationState {
         // Quaternions that `change` leaves alone must be normalized once, not twice.
-        self.raw_quats.restore(&mut self.data);
+        self.make_raw();
         let good = self.current_motion();
         change(&mut self.data);
-        self.solved_current = true;
-        self.forward(&good);
+        self.row.solved_current = true;
+        self.accept(&good);
+        good
     }
 
-    /// Replaces the model by one of the same sizes. The forward pass is deferred:
-    /// [`forward_if_dirty`](Self::forward_if_dirty) must follow before any other use except another replacement.
-    pub(crate) fn set_model(&mut self, model: Model) {
-        if !self.dirty {
+    /// Removes the normalization of quaternions. Derived quantities stay until the next forward pass.
+    fn make_raw(&mut self) {
+        if self.stage > Stage::Raw {
             self.raw_quats.restore(&mut self.data);
+            self.stage = Stage::Raw;
         }
-        let welds = &self.cold.welds;
-        self.data.set_model(if welds.is_empty() { model } else { model.with_welds(welds) });
-        self.solved_current = true;
-        self.dirty = true;
+        self.held = 0;
     }
 
-    /// Runs the forward pass that a replaced model needs.
-    pub(crate) fn forward_if_dirty(&mut self) {
-        if self.dirty {
-            self.dirty = false;
-            let good = self.current_motion();
-            self.forward(&good);
+    /// Replaces the model by one of the same sizes.
+    pub(crate) fn set_model(&mut self, model: Model) {
+        self.make_raw();
+        let welds = &self.row.cold.welds;
+        self.use_model(if welds.is_empty() { model } else { model.with_welds(welds) });
+        self.row.solved_current = true;
+        self.row.is_forward_counted = false;
+        self.row.save_written(&self.data);
+    }
+
+    /// Uses a model of this environment alone, or the shared model if the two are equal.
+    fn use_model(&mut self, model: Model) {
+        let has_none = |model: &Model| model.own_arrays().next().is_none();
+        let shared = has_none(&model) && has_none(&self.base) && model.gravity() == self.base.gravity();
+        if shared {
+            self.row.model = None;
+            self.data.set_model(self.base.clone());
+        } else {
+            let model = model.with_buffers_of(&self.base);
+            self.data.set_model(model.clone());
+            self.row.model = Some(model);
         }
     }
 
-    /// Attached welds.
-    pub(crate) fn welds(&self) -> &[Weld] {
-        &self.cold.welds
-    }
-
-    /// Attaches these welds, releases all others, and runs a forward pass.
+    /// Attaches these welds, and releases all others.
     pub(crate) fn set_welds(&mut self, welds: Vec<Weld>) {
-        if welds == self.cold.welds {
+        if welds == self.row.cold.welds {
             return;
         }
-        self.raw_quats.restore(&mut self.data);
+        self.make_raw();
         let good = self.current_motion();
         self.replace_welds(welds);
-        self.solved_current = true;
-        self.forward(&good);
+        self.row.solved_current = true;
+        self.accept(&good);
     }
 
     /// Attaches these welds and releases all others, without a forward pass.
     fn replace_welds(&mut self, welds: Vec<Weld>) {
-        if welds == self.cold.welds {
+        if welds == self.row.cold.welds {
             return;
         }
-        for weld in &self.cold.welds {
+        for weld in &self.row.cold.welds {
             self.data.set_equality_active(weld.equality, false);
         }
         let model = self.data.model().with_welds(&welds);
-        self.data.set_model(model);
+        self.use_model(model);
         for weld in &welds {
             self.data.set_equality_active(weld.equality, true);
         }
-        self.cold.welds = welds;
+        self.row.cold.welds = welds;
     }
 
     /// Sets controls. They are not part of the state, so no forward pass is needed.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
+        self.held = 0;
         change(self.data.ctrl_mut());
-        self.cold.inputs.save(&self.data);
+        self.row.save_written(&self.data);
     }
 
-    /// External wrenches, and bodies with gravity compensation.
-    pub(crate) fn wrenches(&self) -> &Wrenches {
-        static NONE: Wrenches = Wrenches { list: Vec::new(), gravity_compensated: Vec::new() };
-        self.wrenches.as_deref().unwrap_or(&NONE)
-    }
-
-    /// Changes external wrenches. They are not part of the state, so no forward pass is needed.
+    /// Changes external wrenches. They are not part of the state, so no forward pass is needed. A wrench in link axes
+    /// needs the poses of the current state.
     pub(crate) fn set_wrenches(&mut self, change: impl FnOnce(&mut Wrenches)) {
-        let wrenches = self.wrenches.get_or_insert_default();
-        wrenches.clear(&mut self.data);
+        self.held = 0;
+        let Self { data, row, .. } = self;
+        let wrenches = row.wrenches.get_or_insert_default();
+        wrenches.clear(data);
         change(wrenches);
-        wrenches.apply(&mut self.data);
+        wrenches.apply(data);
         if **wrenches == Wrenches::default() {
-            self.wrenches = None;
+            row.wrenches = None;
         }
-        self.cold.inputs.save(&self.data);
+        row.save_written(data);
     }
 
     /// Writes the efforts of drives and the wrenches to `data`, for the next `mj_step2`.
     fn apply_inputs(&mut self) {
-        self.drives.apply(&mut self.data);
-        if let Some(wrenches) = &self.wrenches {
-            wrenches.apply(&mut self.data);
+        let Self { data, row, .. } = self;
+        row.drives.apply(data);
+        if let Some(wrenches) = &row.wrenches {
+            wrenches.apply(data);
         }
-    }
-
-    /// Announces a [`reset`](Self::reset), which makes a deferred forward pass unnecessary.
-    pub(crate) fn expect_reset(&mut self) {
-        self.dirty = false;
     }
 
     /// Resets to the model's initial state, modified by `change`. Targets, controls, wrenches and welds are reset;
     /// gains, limits and gravity compensation stay. A diverged environment runs again.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
-        self.dirty = false;
+        let initial = self.reset_state(change);
+        self.forward(&initial);
+    }
+
+    /// Resets as [`reset`](Self::reset) does, without the forward pass. Returns the model's initial state.
+    pub(crate) fn reset_state(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) -> IntegrationState {
+        self.held = 0;
+        self.stage = Stage::Raw;
         self.data.reset();
         self.data.take_warnings();
-        self.drives.reset();
-        if let Some(wrenches) = &mut self.wrenches {
+        self.row.drives.reset();
+        if let Some(wrenches) = &mut self.row.wrenches {
             wrenches.list.clear();
         }
         self.replace_welds(Vec::new());
-        self.diverged = None;
-        self.steps = 0;
-        self.solved_current = true;
+        self.row.diverged = None;
+        self.row.steps = 0;
+        self.row.solved_current = true;
         let initial = self.current_motion();
-        change(&mut self.data, &mut self.drives);
-        self.drives.reset_memory();
-        self.forward(&initial);
+        change(&mut self.data, &mut self.row.drives);
+        self.row.drives.reset_memory();
+        self.accept(&initial);
+        initial
     }
 
     /// Ends external wrenches and clears the memory of actuator models (delays, motor states). The state stays.
     pub(crate) fn reset_buffers(&mut self) {
         self.set_wrenches(|wrenches| wrenches.list.clear());
-        self.drives.reset_memory();
+        self.row.drives.reset_memory();
     }
 
-    /// Copy of the current state in `data`.
+    /// Copy of the current state, with quaternions as they were before the forward pass.
     fn current_motion(&self) -> IntegrationState {
         let mut motion = IntegrationState::default();
-        motion.save(&self.data);
+        self.copy_motion(&mut motion);
         motion
     }
 
-    /// Saves the current state with its quaternions as they were before the forward pass.
-    fn save_raw_motion(&self, state: &mut IntegrationState) {
-        state.save(&self.data);
-        state.undo_normalization(&self.raw_quats);
-    }
-
-    /// Restores a state and the user inputs; the caller must run the forward pass.
-    fn restore_motion(&mut self, state: &IntegrationState) {
-        self.cold.inputs.restore(&mut self.data);
-        state.restore(&mut self.data);
-        self.raw_quats.save(&self.data);
-    }
-
-    /// Adds steps, warnings and divergence of `other`, whose state was copied to this environment.
-    pub(crate) fn add_stats(&mut self, other: &EnvStats) {
-        self.steps = other.steps;
-        self.cold.warnings.add(&other.warnings);
-        self.cold.buffer_growths += other.growths;
-        if self.diverged.is_none() {
-            self.diverged.clone_from(&other.diverged);
+    /// Saves the current state in `motion`, with quaternions as they were before the forward pass.
+    fn copy_motion(&self, motion: &mut IntegrationState) {
+        motion.save(&self.data);
+        if self.stage > Stage::Raw {
+            motion.undo_normalization(&self.raw_quats);
         }
     }
 
-    /// Counters and divergence since the environment was created.
-    pub(crate) fn stats(&self) -> EnvStats {
-        EnvStats {
-            diverged: self.diverged.clone(),
-            steps: self.steps,
-            warnings: self.cold.warnings,
-            growths: self.cold.buffer_growths,
-        }
+    /// Saves the current state in the row.
+    fn save_motion(&mut self) {
+        let mut motion = std::mem::take(&mut self.row.motion);
+        self.copy_motion(&mut motion);
+        self.row.motion = motion;
+    }
+
+    /// Restores `motion`, which is without a forward pass, and the inputs as of the last write.
+    fn restore_motion(&mut self, motion: &IntegrationState) {
+        self.held = 0;
+        self.row.written.restore(&mut self.data);
+        motion.restore(&mut self.data);
+        self.stage = Stage::Raw;
     }
 
     /// Saves everything that determines future steps.
     pub(crate) fn save_state(&self) -> EnvState {
-        let (mut motion, mut inputs) = (IntegrationState::default(), UserInputs::default());
-        self.save_raw_motion(&mut motion);
+        let (motion, mut inputs) = (self.current_motion(), UserInputs::default());
         inputs.save(&self.data);
         let (drives, diverged) = (self.drives.to_flat(), self.diverged.clone());
         let (wrenches, welds) = (self.wrenches().clone(), self.cold.welds.clone());
         EnvState { motion, inputs, drives, wrenches, welds, steps: self.steps, diverged }
     }
 
-    /// Restores `state`, which comes from a model of the same layout and [fits](EnvState::has_same_lengths).
+    /// Restores `state`, which comes from a model of the same layout and [fits](EnvState::has_same_lengths), without a
+    /// forward pass.
     pub(crate) fn load_state(&mut self, state: &EnvState) {
-        self.drives.set_from_flat(&state.drives);
+        self.row.drives.set_from_flat(&state.drives);
         // A hand-made file may name a body that does not exist.
         let bodies = self.data.model().nbody();
         let mut wrenches = state.wrenches.clone();
         wrenches.list.retain(|wrench| wrench.body < bodies);
         wrenches.gravity_compensated.retain(|body| *body < bodies);
-        self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
+        self.row.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
         let welds = state.welds.iter().filter(|weld| self.data.model().is_weld(weld.equality)).copied().collect();
         self.replace_welds(welds);
-        self.diverged.clone_from(&state.diverged);
-        self.steps = state.steps;
-        self.solved_current = true;
-        self.cold.captured.clear();
-        self.cold.inputs.clone_from(&state.inputs);
+        self.row.diverged.clone_from(&state.diverged);
+        self.row.steps = state.steps;
+        self.row.solved_current = true;
+        self.row.cold.captured.clear();
+        self.row.written = Arc::new(state.inputs.clone());
         self.restore_motion(&state.motion);
-        self.forward(&state.motion);
+        self.accept(&state.motion);
     }
 
     /// Positions, velocities and warm start, for a transfer to another model.
     pub(crate) fn state_arrays(&self) -> StateArrays {
-        let mut state = IntegrationState::default();
-        self.save_raw_motion(&mut state);
+        let state = self.current_motion();
         StateArrays {
             qpos: state.qpos(self.data.model()).to_vec(),
             qvel: self.data.qvel().to_vec(),
@@ -339,249 +452,9 @@ impl SimEnv {
         }
     }
 
-    /// `Running`, or `Diverged` with the number of completed steps and the reason. A diverged environment keeps its
-    /// last valid state until it is reset.
-    pub fn status(&self) -> &EnvStatus {
-        self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
-    }
-
-    /// Number of MuJoCo steps since the last reset.
-    pub fn steps(&self) -> u64 {
-        self.steps
-    }
-
-    /// Counts of MuJoCo's warnings since the environment was created, without overflows that a repeated step resolved.
-    pub fn warnings(&self) -> &WarningCounts {
-        &self.cold.warnings
-    }
-
-    /// Number of times a buffer was doubled since the environment was created.
+    /// Number of times a buffer of this `mjData` was doubled since it was created.
     pub fn buffer_growths(&self) -> u32 {
-        self.cold.buffer_growths
-    }
-
-    /// Prefetches memory for the next step without waiting; `arrays` includes the large arrays.
-    pub(crate) fn prefetch(&self, arrays: bool) {
-        if arrays {
-            self.data.prefetch_arrays()
-        } else {
-            self.data.prefetch()
-        }
-        self.drives.prefetch();
-    }
-
-    /// Does `count` MuJoCo steps. A diverged environment does not step.
-    pub fn step(&mut self, count: u32) {
-        self.step_and_capture(count, None);
-    }
-
-    /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step.
-    pub(crate) fn step_and_capture(&mut self, count: u32, capture: Option<&CaptureRequest>) {
-        for left in (0..count).rev() {
-            if self.diverged.is_some() {
-                return;
-            }
-            self.step_once(capture.filter(|_| left == 0));
-        }
-    }
-
-    fn step_once(&mut self, mut capture: Option<&CaptureRequest>) {
-        if let Some(wanted) = capture.take_if(|_| self.data.model().integrator() == mj::mjINT_RK4) {
-            // RK4 ends with the solution of an intermediate state, so the state before the step is captured.
-            self.capture_current(wanted);
-        }
-        let mut scratch = SCRATCH.take();
-        self.step_with(&mut scratch, capture);
-        SCRATCH.set(scratch);
-    }
-
-    fn step_with(&mut self, scratch: &mut Scratch, capture: Option<&CaptureRequest>) {
-        let Scratch { before, efforts } = scratch;
-        self.save_raw_motion(before);
-        loop {
-            let done = self.try_step(before, efforts, capture);
-            let raised = self.data.take_warnings();
-            match classify_step(done, &raised) {
-                StepOutcome::Succeeded => {
-                    if raised != WarningCounts::default() {
-                        self.cold.warnings.add(&raised);
-                    }
-                    self.drives.finish_step(efforts);
-                    self.steps = self.steps.saturating_add(1);
-                    self.solved_current = false;
-                    return;
-                }
-                StepOutcome::Overflowed(what) => {
-                    if let Err(reason) = self.grow_and_restore(what, before) {
-                        return self.mark_diverged(reason, before);
-                    }
-                }
-                StepOutcome::Diverged(reason) => {
-                    self.cold.warnings.add(&raised);
-                    return self.mark_diverged(reason, before);
-                }
-            }
-        }
-    }
-
-    /// Does one step from `before` and reads the efforts that the drives applied.
-    fn try_step(
-        &mut self,
-        before: &IntegrationState,
-        efforts: &mut Vec<f64>,
-        capture: Option<&CaptureRequest>,
-    ) -> Result<(), EngineError> {
-        self.apply_inputs();
-        if self.data.model().integrator() == mj::mjINT_RK4 {
-            // mj_step2 integrates with Euler even if the model says RK4.
-            self.data.step()?;
-        } else {
-            self.data.step2()?;
-        }
-        // Must precede mj_step1, which lays out the constraints of the new state: 4.x moves them within its arena.
-        self.drives.read_efforts(&self.data, efforts);
-        if let Some(capture) = capture {
-            self.capture(before, capture)?;
-        }
-        self.raw_quats.save(&self.data);
-        self.data.step1()
-    }
-
-    /// Captures quantities after `mj_step2` of a step from `before`.
-    fn capture(&mut self, before: &IntegrationState, capture: &CaptureRequest) -> Result<(), EngineError> {
-        let qvel = before.qvel(self.data.model());
-        capture.capture(&mut self.data, qvel, &mut self.cold.captured)
-    }
-
-    /// Captures the solution of the current state with the current drives; the state stays the same, bit for bit. The
-    /// capture is empty for a diverged environment and for one whose next step will fail.
-    pub(crate) fn capture_current(&mut self, capture: &CaptureRequest) {
-        self.cold.captured.clear();
-        self.solved_current = true;
-        if !self.with_solved_state(|env, before| env.capture(before, capture)) {
-            self.cold.captured.clear();
-        }
-    }
-
-    /// Writes the contacts of the current state with their solved forces to `contacts`; empty if the solve fails.
-    /// Earlier captures and later steps are not affected.
-    pub(crate) fn current_contacts(&mut self, capture: &CaptureRequest, contacts: &mut Vec<Contact>) {
-        let mut solved = CapturedStep::default();
-        let take = |env: &mut Self, before: &IntegrationState| {
-            let qvel = before.qvel(env.data.model());
-            capture.capture(&mut env.data, qvel, &mut solved)
-        };
-        let done = self.with_solved_state(take);
-        contacts.clear();
-        contacts.extend(solved.contacts.iter().filter(|_| done));
-    }
-
-    /// Solves the current state, passes the solution to `take`, and restores the state. Returns true if the solve
-    /// succeeded.
-    fn with_solved_state(
-        &mut self,
-        mut take: impl FnMut(&mut Self, &IntegrationState) -> Result<(), EngineError>,
-    ) -> bool {
-        if self.diverged.is_some() {
-            return false;
-        }
-        let mut scratch = SCRATCH.take();
-        let before = &mut scratch.before;
-        self.save_raw_motion(before);
-        let good = loop {
-            self.apply_inputs();
-            let done = self.data.step2().and_then(|()| take(self, before));
-            match classify_step(done, &self.data.take_warnings()) {
-                StepOutcome::Succeeded => break true,
-                StepOutcome::Overflowed(what) if self.grow_and_restore(what, before).is_ok() => {}
-                StepOutcome::Overflowed(_) | StepOutcome::Diverged(_) => {
-                    self.data.reset();
-                    break false;
-                }
-            }
-        };
-        self.restore_motion(before);
-        // Cannot fail: this state had a forward pass before, with these or smaller buffers.
-        let _ = self.data.step1();
-        self.data.take_warnings();
-        SCRATCH.set(scratch);
-        good
-    }
-
-    /// Quantities of the last capture.
-    pub(crate) fn captured(&self) -> &CapturedStep {
-        &self.cold.captured
-    }
-
-    /// Time of the state for which forces and accelerations were last solved \[s\]: the start of the last step, or the
-    /// current time after a write or reset.
-    pub(crate) fn solved_time(&self) -> f64 {
-        if self.solved_current { self.data.time() } else { self.data.time() - self.data.model().timestep() }
-    }
-
-    /// Runs one forward pass (`mj_step1`), growing the buffers as needed. On failure, restores `good` and marks the
-    /// environment as diverged.
-    fn forward(&mut self, good: &IntegrationState) {
-        let state = self.current_motion();
-        self.raw_quats.save(&self.data);
-        self.cold.inputs.save(&self.data);
-        loop {
-            let done = self.data.step1();
-            let raised = self.data.take_warnings();
-            match classify_step(done, &raised) {
-                StepOutcome::Succeeded => {
-                    self.cold.warnings.add(&raised);
-                    return;
-                }
-                StepOutcome::Overflowed(what) => {
-                    if let Err(reason) = self.grow_buffers(what, &state) {
-                        return self.mark_diverged(reason, good);
-                    }
-                }
-                StepOutcome::Diverged(reason) => {
-                    self.cold.warnings.add(&raised);
-                    return self.mark_diverged(reason, good);
-                }
-            }
-        }
-    }
-
-    /// Restores the state before the step, with larger buffers and a forward pass done.
-    fn grow_and_restore(&mut self, mut what: Overflow, before: &IntegrationState) -> Result<(), Divergence> {
-        loop {
-            self.grow_buffers(what, before)?;
-            let done = self.data.step1();
-            let raised = self.data.take_warnings();
-            match classify_step(done, &raised) {
-                StepOutcome::Succeeded => return Ok(()),
-                StepOutcome::Overflowed(next) => what = next,
-                StepOutcome::Diverged(reason) => return Err(reason),
-            }
-        }
-    }
-
-    /// Replaces the data by data with twice the buffer size of `what`, in `state`.
-    fn grow_buffers(&mut self, what: Overflow, state: &IntegrationState) -> Result<(), Divergence> {
-        let buffers = self.data.model().buffers().enlarged(what);
-        if self.data.bytes() > MAX_ENV_BYTES {
-            return Err(Divergence::BuffersExhausted(buffers));
-        }
-        let model = self.data.model().with_buffers(buffers);
-        self.data = Data::new(&model).map_err(Divergence::Engine)?;
-        self.restore_motion(state);
-        self.cold.buffer_growths += 1;
-        Ok(())
-    }
-
-    /// Marks the environment as diverged and restores `good`, the last valid state.
-    fn mark_diverged(&mut self, reason: Divergence, good: &IntegrationState) {
-        self.diverged = Some(Box::new(EnvStatus::Diverged { step: self.steps, reason }));
-        self.cold.captured.clear();
-        self.data.reset();
-        self.restore_motion(good);
-        // Cannot fail: the last valid state had a forward pass before, with these or smaller buffers.
-        let _ = self.data.step1();
-        self.data.take_warnings();
+        self.buffer_growths
     }
 }
 
@@ -620,42 +493,9 @@ pub(crate) struct StateArrays {
 /// Counters and divergence of an environment.
 #[derive(Clone, Debug)]
 pub(crate) struct EnvStats {
-    diverged: Option<Box<EnvStatus>>,
-    steps: u64,
-    warnings: WarningCounts,
-    growths: u32,
-}
-
-/// Scratch memory of a step.
-#[derive(Default)]
-struct Scratch {
-    /// The state before the step.
-    before: IntegrationState,
-    /// Efforts of the drives in the step; kept only if the step succeeds.
-    efforts: Vec<f64>,
-}
-
-thread_local! {
-    /// One per thread, not per environment: a thousand copies would not stay in the cache.
-    static SCRATCH: Cell<Scratch> = const { Cell::new(Scratch { before: IntegrationState::EMPTY, efforts: Vec::new() }) };
-}
-
-enum StepOutcome {
-    Succeeded,
-    Overflowed(Overflow),
-    Diverged(Divergence),
-}
-
-fn classify_step(done: Result<(), EngineError>, raised: &WarningCounts) -> StepOutcome {
-    match done {
-        Err(error) if error.is_out_of_memory() => StepOutcome::Overflowed(raised.overflow().unwrap_or(Overflow::Stack)),
-        Err(error) => StepOutcome::Diverged(Divergence::Engine(error)),
-        Ok(()) => match (raised.overflow(), raised.diverged()) {
-            (Some(what), _) => StepOutcome::Overflowed(what),
-            (None, Some(warning)) => StepOutcome::Diverged(Divergence::Warning(warning)),
-            (None, None) => StepOutcome::Succeeded,
-        },
-    }
+    pub(crate) diverged: Option<Box<EnvStatus>>,
+    pub(crate) steps: u64,
+    pub(crate) warnings: WarningCounts,
 }
 
 /// Returns the model with small initial buffers for [`SimEnv`], which grow on demand.

@@ -92,6 +92,7 @@ mod objects;
 mod observer;
 mod randomization;
 mod rollout;
+mod row;
 mod scene_view;
 mod sensor_list;
 mod shard;

@@ -4,7 +4,7 @@ use crate::batch::Batch;
 use crate::compile::compile;
 use crate::diverged::DivergedEnv;
 use crate::entity_set::EntitySet;
-use crate::env::{EnvStatus, SimEnv};
+use crate::env::{EnvStatus, SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, MjcfId, RigidObjectId, RobotId, TerrainId, env_mask};
 use crate::mjcf::document::Integrator;
@@ -465,7 +465,7 @@ impl SimulationManager {
     pub(crate) fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
-        envs.iter().for_each(|&env| self.simulation.batch.write(env, SimEnv::reset_buffers));
+        envs.iter().for_each(|&env| self.simulation.batch.write_at(env, Stage::Kinematics, SimEnv::reset_buffers));
         if !self.sensors.is_empty() {
             self.sensors.reset(&envs, &mut self.simulation);
         }
@@ -475,7 +475,7 @@ impl SimulationManager {
     /// Simulation time of each environment since its last reset \[s\].
     pub fn time(&self) -> Vec<f64> {
         let mut times = Vec::with_capacity(self.num_envs());
-        self.simulation.batch.for_each(|_, env| times.push(env.data().time()));
+        self.simulation.batch.for_each_row(|_, row| times.push(row.time()));
         times
     }
 
@@ -483,7 +483,7 @@ impl SimulationManager {
     /// last valid state until reset.
     pub fn diverged(&self) -> Vec<DivergedEnv> {
         let mut diverged = Vec::new();
-        self.simulation.batch.for_each(|i, env| {
+        self.simulation.batch.for_each_row(|i, env| {
             if let EnvStatus::Diverged { step, reason } = env.status() {
                 diverged.push(DivergedEnv { env: EnvId(i), step: *step, reason: reason.to_string() });
             }

@@ -6,7 +6,7 @@
 //! read.
 
 use crate::drive::table::DriveState;
-use crate::env::{EnvState, EnvStatus, SimEnv};
+use crate::env::{EnvState, EnvStatus, SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list};
 use crate::manager::SimulationManager;
@@ -96,7 +96,8 @@ fn step_row(
     env.load_state(&row.start);
     for (values, mut state) in controls.rows().into_iter().zip(states.rows_mut()) {
         apply_controls(env, columns, values.iter().copied());
-        env.step(substeps);
+        env.advance(substeps, None);
+        env.reach(Stage::State);
         let now = env.data().qpos().iter().chain(env.data().qvel());
         state.iter_mut().zip(now).for_each(|(to, from)| *to = *from);
     }
@@ -197,7 +198,7 @@ impl SimulationManager {
         // One model for all rows of an environment, so that they share a copy.
         let mut models: Vec<Option<mj::Model>> = vec![None; self.num_envs()];
         let row = |(k, &env): (usize, &usize)| {
-            self.simulation.batch.read(env, |here| {
+            self.simulation.batch.read_at(env, Stage::Raw, |here| {
                 let start = match (start, &states) {
                     (Some(start), Some(states)) => start.entries()[states[k]].state.clone(),
                     _ => here.save_state(),

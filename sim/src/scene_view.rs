@@ -2,7 +2,7 @@
 
 use crate::body_pose::BodyFrame;
 use crate::capture::{CaptureRequest, body_velocity};
-use crate::env::EnvStatus;
+use crate::env::{EnvStatus, Stage};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list, env_mask};
 use crate::manager::SimulationManager;
@@ -107,7 +107,7 @@ impl<'a> SceneView<'a> {
     pub fn body_motion(&self, env: EnvId, body: usize) -> Result<BodyMotion> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let frame = body_frame(self.sim, body)?;
-        Ok(self.sim.simulation.batch.read(env.0, |env| {
+        Ok(self.sim.simulation.batch.read_at(env.0, Stage::Kinematics, |env| {
             let (data, pose) = (env.data(), frame.pose(env.data()));
             let [linear, angular] = body_velocity(data, frame.body, &pose.translation.vector);
             BodyMotion {
@@ -145,7 +145,7 @@ impl<'a> SceneViewMut<'a> {
     pub fn with_mujoco<T>(&mut self, env: EnvId, write: impl FnOnce(&mut mj::Data) -> T) -> Result<T> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let mut result = None;
-        self.sim.simulation.batch.write(env.0, |env| env.write(|data| result = Some(write(data))));
+        self.sim.simulation.batch.write(env.0, |env| env.write_state(|data| result = Some(write(data))));
         self.sim.sensors.refresh(&[env.0], &mut self.sim.simulation);
         Ok(result.expect("the closure was called"))
     }
@@ -166,7 +166,7 @@ impl<'a> SceneViewMut<'a> {
         let own = self.sim.env_scene(env).clone();
         let plan = &self.sim.simulation.body_axis;
         let index = env.0;
-        self.sim.simulation.batch.read(index, |env| {
+        self.sim.simulation.batch.read_at(index, Stage::Kinematics, |env| {
             let data = env.data();
             look.time = data.time();
             look.diverged = match env.status() {
@@ -239,7 +239,7 @@ impl<'a> SceneViewMut<'a> {
                 return Err(Error::NotFinite { argument: "set_point_forces", row: env.0, column, item, value });
             }
         }
-        self.sim.simulation.batch.write(env.0, |env| {
+        self.sim.simulation.batch.write_at(env.0, Stage::Kinematics, |env| {
             let center = &env.data().xipos()[3 * mujoco_body..3 * mujoco_body + 3];
             let center = Vector3::new(center[0], center[1], center[2]);
             let of = |&(point, force): &([f64; 3], [f64; 3])| {

@@ -2,7 +2,7 @@
 
 use crate::capture::CaptureRequest;
 use crate::entity_set::check_uid_syntax;
-use crate::env::EnvStatus;
+use crate::env::{EnvStatus, Stage};
 use crate::error::{Error, Result};
 use crate::gather;
 use crate::ids::EnvId;
@@ -222,12 +222,12 @@ impl SensorList {
         self.due.extend(self.entries.iter().map(|e| wait(e).is_some_and(|wait| wait <= u64::from(block))));
         let due = self.entries.iter().zip(&self.due).filter(|(_, due)| **due);
         let requires = due.fold(StateFields::NONE, |all, (e, _)| all | e.requires);
-        match capture_request(simulation, requires) {
-            None => simulation.batch.step(block * self.substeps),
-            Some(capture) => simulation.batch.step_and_capture(block * self.substeps, capture),
-        }
         if self.due.contains(&true) {
-            gather::gather(simulation, self.substeps, requires, &mut self.state);
+            let capture = capture_request(simulation, requires);
+            let state = &mut self.state;
+            gather::step_and_gather(simulation, block, self.substeps, capture.as_ref(), requires, state);
+        } else {
+            simulation.batch.step(block * self.substeps);
         }
         let due = std::mem::take(&mut self.due);
         self.update_slots(simulation, |index| due[index], SensorSlot::update);
@@ -249,7 +249,7 @@ impl SensorList {
             return;
         }
         // A diverged environment keeps its last measurements.
-        let runs = |env: &usize| simulation.batch.read(*env, |env| *env.status() == EnvStatus::Running);
+        let runs = |env: &usize| simulation.batch.read_row(*env, |row| *row.status() == EnvStatus::Running);
         let running: Vec<usize> = env_ids.iter().copied().filter(runs).collect();
         if running.is_empty() {
             return;
@@ -289,7 +289,7 @@ impl SensorList {
         if shown.is_empty() {
             return markers;
         }
-        simulation.batch.for_each(|i, env| {
+        simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
             let pose = |body: usize| {
                 let frame = simulation.body_axis.bodies().get(body);
                 frame.map_or_else(Pose::identity, |frame| frame.pose(env.data()))

@@ -3,7 +3,7 @@
 use crate::batch::Batch;
 use crate::capture::BodyAxis;
 use crate::entity_set::EntitySet;
-use crate::env::SimEnv;
+use crate::env::Stage;
 use crate::indexing::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
 use crate::randomization::{ModelPatcher, PropertyOverrides, PropertyTables};
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -14,7 +14,7 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::ObjectKind;
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_scene::EnvScene;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// A compiled scene and its environments.
 #[derive(Debug)]
@@ -36,8 +36,9 @@ pub(crate) struct Simulation {
     pub(crate) layout: Arc<StateLayout>,
     /// Model elements whose properties can differ per environment; filled on first use.
     pub(crate) property_tables: OnceLock<Arc<PropertyTables>>,
-    /// Builds models with per-environment properties; `None` before the first randomization.
-    pub(crate) model_patcher: Option<ModelPatcher>,
+    /// Builds models with per-environment properties; `None` before the first randomization. The lock only lets threads
+    /// share the other fields.
+    pub(crate) model_patcher: Mutex<Option<ModelPatcher>>,
     /// Property overrides of each environment; `None` for an environment with the nominal model.
     pub(crate) property_overrides: Vec<Option<Box<PropertyOverrides>>>,
     /// Render scenes of environments with their own sizes or colors; empty without such environments, or before the
@@ -109,25 +110,23 @@ impl Simulation {
 
     /// Index in MuJoCo's `ctrl` of a drive.
     pub(crate) fn drive_ctrl_index(&self, drive: usize) -> usize {
-        self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
+        self.batch.read_row(0, |row| row.drives.table().drives[drive].ctrl)
     }
 
     /// Resets the chosen environments to the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
         let start = &self.initial_state;
-        (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.with_env(i, SimEnv::expect_reset));
-        self.batch.run(|i, env| {
-            if chosen[i] {
-                env.reset(|data, drives| {
-                    for &(address, position) in &start.qpos {
-                        data.qpos_mut()[address] = position;
-                    }
-                    for &(drive, target) in &start.targets {
-                        let [low, high] = drives.ranges[drive];
-                        drives.position[drive] = target.clamp(low, high);
-                    }
-                });
-            }
+        let chosen: Vec<usize> = (0..chosen.len()).filter(|&i| chosen[i]).collect();
+        self.batch.run_in(&chosen, |_, env| {
+            env.reset_state(|data, drives| {
+                for &(address, position) in &start.qpos {
+                    data.qpos_mut()[address] = position;
+                }
+                for &(drive, target) in &start.targets {
+                    let [low, high] = drives.ranges[drive];
+                    drives.position[drive] = target.clamp(low, high);
+                }
+            });
         });
     }
 
@@ -167,20 +166,22 @@ impl Simulation {
             self.welds.get(at).map(|weld| weld.equality)
         };
         let moved = |weld: &mj::Weld| Some(mj::Weld { equality: equality(weld.equality)?, ..*weld });
+        self.batch.add_growths_of(&old.batch);
         for i in 0..self.batch.num_envs() {
-            let part_state = old.batch.read(i, |env| parts.read(env.data()));
-            let (state, time, targets, history) =
-                old.batch.read(i, |env| (env.state_arrays(), env.data().time(), env.drives.clone(), env.stats()));
-            let wrenches = old.batch.read(i, |env| env.wrenches().remapped(|body| bodies[body]));
-            let held: Vec<mj::Weld> = old.batch.read(i, |env| env.welds().iter().filter_map(moved).collect());
-            self.batch.write(i, |env| {
+            let part_state = old.batch.read_at(i, Stage::Raw, |env| parts.read(env.data()));
+            let (state, time, targets, history) = old
+                .batch
+                .read_at(i, Stage::Raw, |env| (env.state_arrays(), env.data().time(), env.drives.clone(), env.stats()));
+            let wrenches = old.batch.read_row(i, |row| row.wrenches().remapped(|body| bodies[body]));
+            let held: Vec<mj::Weld> = old.batch.read_row(i, |row| row.welds().iter().filter_map(moved).collect());
+            self.batch.write_at(i, Stage::Raw, |env| {
                 for &(from, to) in &drives {
                     env.drives.copy_from(&targets, from, to);
                 }
                 for &(from, to) in &dofs {
                     env.drives.copy_applied_from(&targets, from, to);
                 }
-                env.write(|data| {
+                env.write_state(|data| {
                     for &(from, to) in &qpos {
                         data.qpos_mut()[to] = state.qpos[from];
                     }
@@ -193,6 +194,7 @@ impl Simulation {
                 });
                 env.set_welds(held);
                 if wrenches != Wrenches::default() {
+                    env.reach(Stage::Kinematics);
                     env.set_wrenches(|mine| *mine = wrenches);
                 }
                 env.add_stats(&history);

@@ -35,7 +35,7 @@ pub(crate) struct CaptureRequest {
 }
 
 /// Captured quantities of one environment; empty without a capture or after a failed step.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct CapturedStep {
     pub(crate) contacts: Vec<Contact>,
     /// Poses `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] at the start of the step, 7 numbers per body.

@@ -204,11 +204,16 @@ impl DriveState {
         state
     }
 
-    /// Prefetches the memory that this environment does not share, without waiting.
+    /// Prefetches the arrays that this environment does not share, without waiting for them.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(&self.position);
         mj::prefetch(&self.effort);
         mj::prefetch(&self.memory);
+    }
+
+    /// Number of values that every environment has for itself.
+    pub(crate) fn own_numbers(&self) -> usize {
+        self.position.len() + self.effort.len() + self.memory.len()
     }
 
     /// Resets the memory of explicit models, with the current targets as those at the start.

@@ -1,12 +1,16 @@
 //! Copies quantities of a batch to the arrays that sensors read; only requested quantities are gathered.
 
+mod contacts;
 mod rows;
 
-use crate::env::{EnvStatus, SimEnv};
+use crate::capture::CaptureRequest;
+use crate::env::{EnvStatus, SimEnv, Stage};
 use crate::simulation::Simulation;
+use kinetoscope_mujoco as mj;
 use kinetoscope_scene::StateFields;
 use kinetoscope_scene::{SceneState, StateDims};
 use kinetoscope_sensors::Phases;
+use std::sync::{Mutex, PoisonError};
 
 /// Fills the rows of one environment, given by index, in the arrays of a quantity.
 type Fill = fn(&Simulation, &SimEnv, usize, &mut SceneState);
@@ -16,7 +20,7 @@ macro_rules! gathered {
     ($($FLAG:ident => $file:ident,)*) => {
         $(mod $file;)*
 
-        /// All gathered quantities, in the order in which they are filled.
+        /// All gathered quantities except contacts, in the order in which they are filled.
         const QUANTITIES: &[(StateFields, Fill)] = &[$((StateFields::$FLAG, $file::fill),)*];
     };
 }
@@ -29,7 +33,6 @@ gathered! {
     JOINT_EFFORTS => joint_efforts,
     ACTUATORS => actuators,
     SENSORDATA => sensordata,
-    CONTACTS => contacts,
     ACCELERATIONS => accelerations,
     JOINT_WRENCHES => joint_wrenches,
     VISIBLE => visual_scene,
@@ -38,7 +41,7 @@ gathered! {
 
 /// Quantities that a sensor may require: the gathered ones, and the markers of other sensors.
 pub(crate) const AVAILABLE: StateFields = {
-    let (mut all, mut k) = (StateFields::MARKERS, 0);
+    let (mut all, mut k) = (StateFields::MARKERS.union(StateFields::CONTACTS), 0);
     while k < QUANTITIES.len() {
         all = all.union(QUANTITIES[k].0);
         k += 1;
@@ -71,10 +74,10 @@ pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneS
 
 /// Writes physics steps since the last reset and times of all environments to `state`.
 pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
-    simulation.batch.for_each(|i, env| {
-        state.step[i] = env.steps() / u64::from(substeps);
-        state.time[i] = env.data().time();
-        state.force_time[i] = env.solved_time();
+    simulation.batch.for_each_row(|i, row| {
+        state.step[i] = row.steps() / u64::from(substeps);
+        state.time[i] = row.time();
+        state.force_time[i] = row.solved_time();
     });
 }
 
@@ -82,25 +85,96 @@ pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut S
 /// diverged environment gets [`Phases::QUARANTINED`].
 pub(crate) fn gather_step_counts(simulation: &Simulation, substeps: u32, clocks: &mut Vec<u64>) {
     clocks.resize(simulation.batch.num_envs(), 0);
-    simulation.batch.for_each(|i, env| {
-        let runs = *env.status() == EnvStatus::Running;
-        clocks[i] = if runs { env.steps() / u64::from(substeps) } else { Phases::QUARANTINED };
+    simulation.batch.for_each_row(|i, row| {
+        let runs = *row.status() == EnvStatus::Running;
+        clocks[i] = if runs { row.steps() / u64::from(substeps) } else { Phases::QUARANTINED };
     });
+}
+
+/// Part of a step that the data needs for these quantities.
+fn stage_of(simulation: &Simulation, requires: StateFields) -> Stage {
+    // MuJoCo's own sensors of the last stage have their values from the last solve.
+    let stages = simulation.batch.model().sensor_needstage();
+    let is_solved = |&stage: &i32| stage as u32 == mj::sys::mjSTAGE_ACC;
+    let of_forward = if stages.iter().all(is_solved) { StateFields::NONE } else { StateFields::SENSORDATA };
+    let of_kinematics = StateFields::POSES
+        | StateFields::VELOCITIES
+        | StateFields::ACCELERATIONS
+        | StateFields::VISIBLE
+        | StateFields::INSTANCES;
+    let has = |of: StateFields| !requires.intersection(of).is_empty();
+    if has(of_forward) {
+        Stage::Forward
+    } else if has(of_kinematics) {
+        Stage::Kinematics
+    } else {
+        Stage::State
+    }
 }
 
 /// Fills the arrays that `requires` names, which must be allocated, and steps and times.
 pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
+    let filler = Filler::new(simulation, requires, state);
+    if let Some(stage) = filler.stage() {
+        simulation.batch.visit(stage, |i, env| filler.fill(i, env));
+    }
+    gather_rows(simulation, substeps, requires, state);
+}
+
+/// Does `steps` physics steps and captures the quantities of `capture` in the last one. Then fills the arrays that
+/// `requires` names, which must be allocated, and steps and times. Each environment is gathered by the thread that
+/// stepped it, while its data is in that core's cache.
+pub(crate) fn step_and_gather(
+    simulation: &Simulation,
+    steps: u32,
+    substeps: u32,
+    capture: Option<&CaptureRequest>,
+    requires: StateFields,
+    state: &mut SceneState,
+) {
+    let filler = Filler::new(simulation, requires, state);
+    let stage = filler.stage().unwrap_or(Stage::Raw);
+    simulation.batch.step_and_visit(steps * substeps, capture, stage, |i, env| filler.fill(i, env));
+    gather_rows(simulation, substeps, requires, state);
+}
+
+/// Fills everything that needs no `mjData`: steps, times, and contacts in the order of the environments.
+fn gather_rows(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
     gather_steps(simulation, substeps, state);
-    if requires.is_empty() {
-        return;
+    if requires.contains(StateFields::CONTACTS) {
+        simulation.batch.for_each_row(|i, row| contacts::fill(row.row, i, state));
     }
-    let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
-    if sees && state.own_scenes != simulation.env_scenes {
-        state.own_scenes.clone_from(&simulation.env_scenes);
-    }
-    simulation.batch.for_each(|i, env| {
-        for (_, fill) in QUANTITIES.iter().filter(|(quantity, _)| requires.contains(*quantity)) {
-            fill(simulation, env, i, state);
+}
+
+/// Fills rows of the arrays from several threads.
+struct Filler<'a> {
+    simulation: &'a Simulation,
+    requires: StateFields,
+    /// Copying takes little time beside a step, so threads rarely wait for each other.
+    state: Mutex<&'a mut SceneState>,
+}
+
+impl<'a> Filler<'a> {
+    fn new(simulation: &'a Simulation, requires: StateFields, state: &'a mut SceneState) -> Self {
+        let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
+        if sees && state.own_scenes != simulation.env_scenes {
+            state.own_scenes.clone_from(&simulation.env_scenes);
         }
-    });
+        Self { simulation, requires, state: Mutex::new(state) }
+    }
+
+    /// Part of a step that the data needs; `None` if no quantity is filled from it.
+    fn stage(&self) -> Option<Stage> {
+        let fills = QUANTITIES.iter().any(|(quantity, _)| self.requires.contains(*quantity));
+        fills.then(|| stage_of(self.simulation, self.requires))
+    }
+
+    fn fill(&self, i: usize, env: &SimEnv) {
+        if QUANTITIES.iter().any(|(quantity, _)| self.requires.contains(*quantity)) {
+            let state = &mut **self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            for (_, fill) in QUANTITIES.iter().filter(|(quantity, _)| self.requires.contains(*quantity)) {
+                fill(self.simulation, env, i, state);
+            }
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Poses and velocities of bodies that are placed in the world: objects and root links of robots.
 
 use crate::body_pose::body_pose;
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::BodyIndexing;
@@ -40,7 +40,7 @@ impl FreeBody<'_> {
     }
 
     fn rows<const K: usize>(&self, read: impl Fn(&SimEnv) -> [f64; K]) -> Array2<f64> {
-        self.simulation.batch.gather_rows(read)
+        self.simulation.batch.gather_rows(Stage::Kinematics, read)
     }
 }
 
@@ -132,8 +132,8 @@ impl FreeBodyMut<'_> {
             });
         }
         for &(env, row) in &poses.rows {
-            self.simulation.batch.write(env, |env| {
-                env.write(|data| match place {
+            self.simulation.batch.write_at(env, Stage::Kinematics, |env| {
+                env.write_state(|data| match place {
                     PoseStorage::Joint(qpos, dof) => {
                         // The angular velocity is preserved in world axes, as it is read; MuJoCo stores it in the axes
                         // of the body.
@@ -208,8 +208,8 @@ impl FreeBodyMut<'_> {
     ) {
         let (dof, body) = (velocities.dof, self.index.body);
         for &(env, v) in &velocities.rows {
-            self.simulation.batch.write(env, |env| {
-                env.write(|data| {
+            self.simulation.batch.write_at(env, Stage::Kinematics, |env| {
+                env.write_state(|data| {
                     let rotation = body_pose(data, body).rotation;
                     let turning = Vector3::new(v[3], v[4], v[5]);
                     let angular = rotation.inverse() * turning;

@@ -1,6 +1,6 @@
 //! Forward kinematics, Jacobians and inverse kinematics of robots in a simulation.
 
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list};
 use crate::objects::robot::Robot;
@@ -96,7 +96,7 @@ impl Robot<'_> {
         let mut positions = vec![0.0; self.dof()];
         for (i, (env, row)) in rows.iter().enumerate() {
             scatter(&columns, row, &mut positions);
-            let standing = |link| self.simulation.batch.read(env, |env| self.link_in(env, link));
+            let standing = |link| self.simulation.batch.read_at(env, Stage::Kinematics, |env| self.link_in(env, link));
             for (link, pose) in link_poses(description, &positions, standing).iter().take(links).enumerate() {
                 for (k, value) in to_row(pose).into_iter().enumerate() {
                     poses[(i, link, k)] = value;
@@ -392,7 +392,7 @@ impl Robot<'_> {
     /// Writes the current positions of all joints in environment `env`, in the order of `qpos`, to `positions` \[rad or
     /// m\]. Returns the pose of the link `base` in the environment.
     fn read_positions(&self, env: usize, base: LinkId, positions: &mut [f64]) -> Pose {
-        self.simulation.batch.read(env, |env| {
+        self.simulation.batch.read_at(env, Stage::Kinematics, |env| {
             for (position, joint) in positions.iter_mut().zip(&self.indexing().joints) {
                 *position = env.data().qpos()[joint.qpos];
             }

@@ -2,7 +2,7 @@
 
 use super::mjcf_part_data::{ActuatorIndex, MjcfData, MjcfPartCfg};
 use crate::body_pose::BodyFrame;
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::MjcfIndexing;
@@ -131,19 +131,19 @@ impl<'a> MjcfPart<'a> {
     /// Positions of its joints in MuJoCo's layout \[m, rad, quaternions w x y z\], in the environment, shape (N, nq).
     #[doc(alias = "get_qpos")]
     pub fn qpos(&self) -> Array2<f64> {
-        self.rows(&self.indices().qpos, |env, place| env.data().qpos()[place])
+        self.rows(Stage::State, &self.indices().qpos, |env, place| env.data().qpos()[place])
     }
 
     /// Velocities of its joints in MuJoCo's layout \[m/s, rad/s\], shape (N, nv).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
-        self.rows(&self.indices().dofs, |env, place| env.data().qvel()[place])
+        self.simulation.batch.gather_stored(&self.indices().dofs, |row, &place| row.qvel()[place])
     }
 
     /// Controls of its actuators as set, not clamped, in the units that the file gives them, shape (N, nu).
     #[doc(alias = "get_ctrl")]
     pub fn ctrl(&self) -> Array2<f64> {
-        self.rows(&self.indices().controls, |env, place| env.data().ctrl()[place])
+        self.simulation.batch.gather_stored(&self.indices().controls, |row, &place| row.ctrl()[place])
     }
 
     /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step, also
@@ -151,11 +151,11 @@ impl<'a> MjcfPart<'a> {
     /// by the forces in the new state.
     #[doc(alias = "get_actuator_force")]
     pub fn actuator_force(&self) -> Array2<f64> {
-        self.rows(&self.indices().actuators, |env, place| env.data().actuator_force()[place])
+        self.rows(Stage::Raw, &self.indices().actuators, |env, place| env.data().actuator_force()[place])
     }
 
-    fn rows(&self, places: &[usize], read: impl Fn(&SimEnv, usize) -> f64) -> Array2<f64> {
-        self.simulation.batch.gather(places, |env, &place| read(env, place))
+    fn rows(&self, stage: Stage, places: &[usize], read: impl Fn(&SimEnv, usize) -> f64) -> Array2<f64> {
+        self.simulation.batch.gather(stage, places, |env, &place| read(env, place))
     }
 
     /// Pose of a body in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
@@ -192,7 +192,7 @@ impl<'a> MjcfPart<'a> {
 
     fn poses(&self, frame: &BodyFrame) -> Array2<f64> {
         let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
-        self.simulation.batch.for_each(|i, env| {
+        self.simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
             for (k, value) in to_row(&frame.pose(env.data())).into_iter().enumerate() {
                 poses[(i, k)] = value;
             }
@@ -259,10 +259,11 @@ impl<'a> MjcfPartMut<'a> {
         };
         let rows = EnvRows::check(table, controls.into(), env_ids, self.simulation.batch.num_envs())?;
         for (env, row) in rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                env.set_controls(|controls| {
-                    places.iter().zip(row).for_each(|(&place, &value)| controls[place] = value)
-                });
+            self.simulation.batch.edit_row(env, |env, model| {
+                let set = |controls: &mut [f64]| {
+                    places.iter().zip(row).for_each(|(&place, &value)| controls[place] = value);
+                };
+                env.set_controls(set, model);
             });
         }
         Ok(())
@@ -289,8 +290,8 @@ impl<'a> MjcfPartMut<'a> {
             })
             .collect::<Result<_>>()?;
         for (env, row) in normalized {
-            self.simulation.batch.write(env, |env| {
-                env.write(|data| {
+            self.simulation.batch.write_at(env, Stage::Raw, |env| {
+                env.write_state(|data| {
                     let qpos = data.qpos_mut();
                     places.iter().zip(&row).for_each(|(&place, &value)| qpos[place] = value);
                 });
@@ -309,8 +310,8 @@ impl<'a> MjcfPartMut<'a> {
         let places = self.simulation.mjcf_models[self.index].dofs.clone();
         let rows = self.checked_rows("write_qvel", velocities.into(), &places, env_ids)?;
         for (env, row) in rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                env.write(|data| {
+            self.simulation.batch.write_at(env, Stage::Raw, |env| {
+                env.write_state(|data| {
                     let qvel = data.qvel_mut();
                     places.iter().zip(row).for_each(|(&place, &value)| qvel[place] = value);
                 });
@@ -358,8 +359,8 @@ impl<'a> MjcfPartMut<'a> {
         places.iter_mut().try_for_each(|(_, pose)| normalize_quaternion("write_mocap_pose", pose, 3))?;
         let mocap = usize::try_from(mocap).map_err(|_| Error::FixedBody(body.into()))?;
         for (env, [x, y, z, quaternion @ ..]) in places {
-            self.simulation.batch.write(env, |env| {
-                env.write(|data| {
+            self.simulation.batch.write_at(env, Stage::Raw, |env| {
+                env.write_state(|data| {
                     data.mocap_pos_mut()[3 * mocap..3 * mocap + 3].copy_from_slice(&[x, y, z]);
                     data.mocap_quat_mut()[4 * mocap..4 * mocap + 4].copy_from_slice(&quaternion);
                 });

@@ -3,7 +3,7 @@
 //! An environment whose object differs from the others gets a model of its own, which owns only the arrays that differ:
 //! see [`randomization`](crate::randomization), whose properties these are.
 
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
@@ -50,8 +50,8 @@ impl RigidObject<'_> {
     pub fn friction(&self) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 3));
         let body = self.simulation.objects[self.index].body;
-        self.simulation.batch.for_each(|i, env| {
-            let model = env.data().model();
+        self.simulation.batch.for_each_row(|i, row| {
+            let model = row.own_model();
             // The first geom is the collision shape.
             if let Ok(geom) = usize::try_from(model.body_geomadr()[body]) {
                 (0..3).for_each(|k| values[(i, k)] = model.geom_friction()[3 * geom + k]);
@@ -66,8 +66,8 @@ impl RigidObject<'_> {
     pub fn damping(&self) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
         if let Some((_, dof)) = self.simulation.objects[self.index].free_joint {
-            self.simulation.batch.for_each(|i, env| {
-                let damping = env.data().model().dof_damping();
+            self.simulation.batch.for_each_row(|i, row| {
+                let damping = row.own_model().dof_damping();
                 [damping[dof], damping[dof + 3]].into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
             });
         }
@@ -79,7 +79,7 @@ impl RigidObject<'_> {
     #[doc(alias = "get_external_wrench")]
     pub fn external_wrench(&self) -> Array2<f64> {
         let mut wrenches = Array2::zeros((self.simulation.batch.num_envs(), 6));
-        self.simulation.batch.for_each(|i, env: &SimEnv| {
+        self.simulation.batch.for_each_at(Stage::Kinematics, |i, env: &SimEnv| {
             for wrench in env.wrenches().list.iter().filter(|wrench| wrench.owner == (OBJECT_WRENCH_OWNER, self.index))
             {
                 let [force, torque] = wrench.in_world(env.data());
@@ -99,9 +99,9 @@ impl RigidObject<'_> {
         let body = self.simulation.objects[self.index].body;
         let moves = self.cfg().body_type == BodyType::Dynamic;
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), width));
-        self.simulation.batch.for_each(|i, env| {
-            let row = if moves { read(env.data().model(), body) } else { nominal.clone() };
-            row.into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
+        self.simulation.batch.for_each_row(|i, row| {
+            let numbers = if moves { read(row.own_model(), body) } else { nominal.clone() };
+            numbers.into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
         });
         values
     }
@@ -224,7 +224,7 @@ impl RigidObjectMut<'_> {
         for ((env, force), (_, torque)) in forces.arrays::<3>().zip(torques.arrays::<3>()) {
             let (force, torque) = (Vector3::from(force), Vector3::from(torque));
             let axes = (frame == WrenchFrame::Link).then(UnitQuaternion::identity);
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.write_at(env, Stage::Kinematics, |env| {
                 env.set_wrenches(|wrenches| {
                     wrenches.replace(Wrench { owner, body, axes, force, torque });
                 });

@@ -5,11 +5,13 @@ pub use super::robot_cfg::RobotCfg;
 use super::robot_data::{JointIndex, RobotData, unknown_name_error};
 use crate::drive::plan::JointPlan;
 use crate::drive::table::DriveState;
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::{JointIndexing, RobotIndexing};
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, check_unique_indices, unique_envs};
+use crate::row::StoredRow;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
@@ -132,13 +134,13 @@ impl<'a> Robot<'a> {
     /// Joint positions \[rad or m\], shape (N, dof).
     #[doc(alias = "get_qpos")]
     pub fn qpos(&self) -> Array2<f64> {
-        self.gather(|env, joint| env.data().qpos()[joint.qpos])
+        self.gather(|env, joint| env.raw_qpos()[joint.qpos])
     }
 
     /// Joint velocities \[rad/s or m/s\], shape (N, dof).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
-        self.gather(|env, joint| env.data().qvel()[joint.dof])
+        self.gather(|env, joint| env.qvel()[joint.dof])
     }
 
     /// Efforts of the drives in the last MuJoCo step, after the effort limit \[N m or N\], shape (N, dof). They include
@@ -154,7 +156,7 @@ impl<'a> Robot<'a> {
     pub fn qpos_target(&self) -> Array2<f64> {
         let mut targets = self.gather(|env, joint| match joint.drive {
             Some(d) => env.drives.position[d],
-            None => env.data().qpos()[joint.qpos],
+            None => env.raw_qpos()[joint.qpos],
         });
         for (i, (driver, multiplier, offset)) in self.mimic_drivers().into_iter().enumerate() {
             if driver.0 != i {
@@ -221,11 +223,12 @@ impl<'a> Robot<'a> {
     pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
         let frame = self.indexing().links[link.0];
-        Ok(self.simulation.batch.gather_rows(|env| to_row(&frame.pose(env.data()))))
+        Ok(self.simulation.batch.gather_rows(Stage::Kinematics, |env| to_row(&frame.pose(env.data()))))
     }
 
-    pub(super) fn gather(&self, read: impl Fn(&crate::env::SimEnv, &JointIndexing) -> f64) -> Array2<f64> {
-        self.simulation.batch.gather(&self.indexing().joints, read)
+    /// Reads a number of each joint, all with one degree of freedom, from the rows of all environments.
+    pub(super) fn gather(&self, read: impl Fn(&StoredRow<'_>, &JointIndexing) -> f64) -> Array2<f64> {
+        self.simulation.batch.gather_stored(&self.indexing().joints, read)
     }
 }
 
@@ -331,7 +334,7 @@ impl<'a> RobotMut<'a> {
         let write = self.checked_rows(argument, values, joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
         for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.edit_row(env, |env, _| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
                     change(&mut env.drives, &robot.joints[joint], &self.data.plans[joint], value);
                 }
@@ -419,8 +422,10 @@ impl<'a> RobotMut<'a> {
     /// Changes the state of each selected environment joint by joint, with one forward pass each.
     pub(super) fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
         for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
-                env.write(|data| write.joints.iter().zip(row).for_each(|(&joint, &value)| change(data, joint, value)));
+            self.simulation.batch.write_at(env, Stage::Raw, |env| {
+                env.write_state(|data| {
+                    write.joints.iter().zip(row).for_each(|(&joint, &value)| change(data, joint, value))
+                });
             });
         }
         self.sensors.refresh(write.rows.envs(), self.simulation);

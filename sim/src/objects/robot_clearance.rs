@@ -2,6 +2,7 @@
 
 use crate::compile::compile;
 use crate::entity_set::EntitySet;
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::indexing::GeomIndexing;
 use crate::objects::robot::Robot;
@@ -23,7 +24,7 @@ impl Robot<'_> {
     #[doc(alias = "get_link_lowest_heights")]
     pub fn link_lowest_heights(&self) -> Array2<f64> {
         let links: Vec<usize> = (0..self.link_names().len()).collect();
-        self.simulation.batch.gather(&links, |env, link| {
+        self.simulation.batch.gather(Stage::Kinematics, &links, |env, link| {
             let geoms = self.indexing().geoms.iter().filter(|geom| geom.link == *link);
             lowest_height(env.data(), geoms)
         })
@@ -34,7 +35,10 @@ impl Robot<'_> {
     /// negative height the penetration.
     #[doc(alias = "get_lowest_heights")]
     pub fn lowest_heights(&self) -> Array1<f64> {
-        let heights = self.simulation.batch.gather(&[()], |env, ()| lowest_height(env.data(), &self.indexing().geoms));
+        let heights = self
+            .simulation
+            .batch
+            .gather(Stage::Kinematics, &[()], |env, ()| lowest_height(env.data(), &self.indexing().geoms));
         heights.index_axis(Axis(1), 0).to_owned()
     }
 

@@ -33,7 +33,7 @@ impl Robot<'_> {
     /// Drive types, which give stiffness and damping their meaning, shape (N, dof); `None` for joints without a drive.
     #[doc(alias = "get_drive_types")]
     pub fn drive_types(&self) -> Array2<DriveType> {
-        self.simulation.batch.gather(&self.indexing().joints, |env, joint| {
+        self.simulation.batch.gather_stored(&self.indexing().joints, |env, joint| {
             joint.drive.map_or(DriveType::None, |drive| env.drives.settings[drive].drive_type)
         })
     }
@@ -136,7 +136,7 @@ impl RobotMut<'_> {
         let envs = unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         let inertias = if drive_type.mode().needs_inertia() { Some(self.initial_effective_inertias()?) } else { None };
         for env in envs {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.edit_row(env, |env, _| {
                 for &(_, joint, drive) in &drives {
                     let inertia = inertias.as_ref().map(|inertias| inertias[joint]);
                     env.drives.set_drive_type(drive, drive_type, inertia);
@@ -166,7 +166,7 @@ impl RobotMut<'_> {
         let steps = steps.mapv(f64::from);
         let write = self.checked_numbers(argument, NumberKind::Gain, steps.view(), joint_ids, env_ids)?;
         let drives = self.drives_of_joints(argument, &write.joints)?;
-        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        let table = self.simulation.batch.read_row(0, |env| Arc::clone(env.drives.table()));
         let name = |joint: usize| self.data.joint_names()[joint].clone();
         let mut memories = Vec::with_capacity(drives.len());
         for &(column, joint, drive) in &drives {
@@ -185,7 +185,7 @@ impl RobotMut<'_> {
             memories.push((column, memory.clone()));
         }
         for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.edit_row(env, |env, _| {
                 for (column, memory) in &memories {
                     DelayedPd::set_delay(&mut env.drives.memory[memory.clone()], row[*column] as u32);
                 }
@@ -224,7 +224,7 @@ impl RobotMut<'_> {
         change: impl Fn(&mut DriveState, usize, f64),
     ) {
         for (env, row) in write.rows.iter() {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.edit_row(env, |env, _| {
                 drives.iter().for_each(|&(column, _, drive)| change(&mut env.drives, drive, row[column]));
             });
         }
@@ -238,7 +238,9 @@ impl RobotMut<'_> {
         joints: &[usize],
     ) -> Result<Vec<(usize, usize, usize)>> {
         let native = |drive: usize| {
-            self.simulation.batch.read(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
+            self.simulation
+                .batch
+                .read_row(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
         };
         let drives = self.drives_of_joints(argument, joints)?;
         match drives.iter().find(|(_, _, drive)| native(*drive)) {

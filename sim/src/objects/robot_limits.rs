@@ -1,6 +1,7 @@
 //! Limits of a robot's joints: positions, speeds and efforts, per joint and per environment.
 
 use crate::drive::gains::Gains;
+use crate::env::Stage;
 
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
@@ -57,7 +58,7 @@ impl Robot<'_> {
     /// Computes two numbers from the range of each joint.
     fn range_limits(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
         let joints: Vec<_> = self.indexing().joints.iter().zip(self.data.plans()).collect();
-        self.simulation.batch.gather_rows_of(&joints, |env, (joint, plan)| {
+        self.simulation.batch.gather_rows_of(Stage::Raw, &joints, |env, (joint, plan)| {
             of(joint.drive.map_or(plan.target_range, |drive| env.drives.ranges[drive]))
         })
     }
@@ -131,7 +132,7 @@ impl RobotMut<'_> {
             }
         }
         for (env, ends) in rows.iter() {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.edit_row(env, |env, _| {
                 for &(k, _, drive) in &drives {
                     env.drives.set_range(drive, [ends[2 * k], ends[2 * k + 1]]);
                 }
@@ -198,7 +199,7 @@ impl RobotMut<'_> {
         drives: &[(usize, usize, usize)],
         change: impl Fn(Gains, f64) -> Gains,
     ) -> Result<()> {
-        let table = self.simulation.batch.read(0, |env| Arc::clone(env.drives.table()));
+        let table = self.simulation.batch.read_row(0, |env| Arc::clone(env.drives.table()));
         for (row, (_, values)) in write.rows.iter().enumerate() {
             for &(column, joint, drive) in drives {
                 let Some(explicit) = table.model_of(drive) else { continue };

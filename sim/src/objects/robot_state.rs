@@ -2,7 +2,7 @@
 
 use crate::body_pose::{BodyFrame, body_pose};
 use crate::capture::body_velocity;
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::RobotIndexing;
@@ -103,7 +103,7 @@ impl Robot<'_> {
     #[doc(alias = "get_qacc")]
     pub fn qacc(&self) -> Array2<f64> {
         // The warm start is the acceleration of the last step, and a new forward pass keeps it.
-        self.gather(|env, joint| env.data().qacc_warmstart()[joint.dof])
+        self.gather(|env, joint| env.qacc_warmstart()[joint.dof])
     }
 
     /// Velocity targets \[rad/s or m/s\], shape (N, dof); 0 for joints without a drive.
@@ -201,7 +201,7 @@ impl Robot<'_> {
     }
 
     fn rows<const K: usize>(&self, read: impl Fn(&SimEnv, &RobotIndexing) -> [f64; K]) -> Array2<f64> {
-        self.simulation.batch.gather_rows(|env| read(env, self.indexing()))
+        self.simulation.batch.gather_rows(Stage::Kinematics, |env| read(env, self.indexing()))
     }
 }
 
@@ -232,7 +232,7 @@ impl Robot<'_> {
     }
 
     fn of_links<const K: usize>(&self, read: impl Fn(&SimEnv, &BodyFrame) -> [f64; K]) -> Array3<f64> {
-        self.simulation.batch.gather_rows_of(&self.indexing().links, read)
+        self.simulation.batch.gather_rows_of(Stage::Kinematics, &self.indexing().links, read)
     }
 }
 

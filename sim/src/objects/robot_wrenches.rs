@@ -1,6 +1,7 @@
 //! External forces and torques on links of a robot, and gravity compensation, per environment.
 
 use crate::body_pose::BodyFrame;
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
@@ -17,7 +18,7 @@ impl Robot<'_> {
     pub fn external_wrenches(&self) -> Array3<f64> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
         let mut wrenches = Array3::zeros((n, links, 6));
-        self.simulation.batch.for_each(|i, env| {
+        self.simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
             for wrench in
                 env.wrenches().list.iter().filter(|wrench| wrench.owner.0 == self.index() && wrench.owner.1 < links)
             {
@@ -36,7 +37,7 @@ impl Robot<'_> {
     pub fn gravity_compensation(&self) -> Array2<bool> {
         let links = &self.indexing().links;
         let mut weightless = Array2::from_elem((self.simulation.batch.num_envs(), links.len()), false);
-        self.simulation.batch.for_each(|i, env| {
+        self.simulation.batch.for_each_row(|i, env| {
             for (l, link) in links.iter().enumerate() {
                 weightless[(i, l)] = env.wrenches().gravity_compensated.contains(&link.body);
             }
@@ -97,7 +98,7 @@ impl RobotMut<'_> {
         for (i, env) in envs.into_iter().enumerate() {
             // A single row applies to all environments.
             let [force_row, torque_row] = [&forces, &torques].map(|rows| &rows[i.min(rows.len() - 1)]);
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.write_at(env, Stage::Kinematics, |env| {
                 env.set_wrenches(|wrenches| {
                     for (k, &link) in links.iter().enumerate() {
                         let BodyFrame { body, body_from_frame } = frames[link];
@@ -133,7 +134,7 @@ impl RobotMut<'_> {
         bodies.sort_unstable();
         bodies.dedup();
         for env in unique_envs(argument, env_ids, self.simulation.batch.num_envs())? {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.write_at(env, Stage::Kinematics, |env| {
                 env.set_wrenches(|wrenches| wrenches.set_gravity_compensation(&bodies, on));
             });
         }

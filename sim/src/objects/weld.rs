@@ -2,6 +2,7 @@
 
 use super::weld_data::{WeldCfg, WeldData, WeldId};
 use crate::body_pose::body_pose;
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::WeldIndexing;
@@ -37,7 +38,7 @@ impl<'a> Weld<'a> {
     pub fn is_attached(&self) -> Array1<bool> {
         let WeldIndexing { equality, .. } = self.simulation.welds[self.index];
         let mut attached = Array1::from_elem(self.simulation.batch.num_envs(), false);
-        self.simulation.batch.for_each(|i, env| {
+        self.simulation.batch.for_each_row(|i, env| {
             attached[i] = env.welds().iter().any(|weld| weld.equality == equality);
         });
         attached
@@ -97,7 +98,7 @@ impl<'a> WeldMut<'a> {
         let envs = unique_envs(argument, env_ids, self.simulation.batch.num_envs())?;
         let WeldIndexing { equality, bodies } = self.simulation.welds[self.index];
         for &env in &envs {
-            self.simulation.batch.write(env, |env| {
+            self.simulation.batch.write_at(env, Stage::Kinematics, |env| {
                 let [first, second]: [Pose; 2] = bodies.map(|body| body_pose(env.data(), body));
                 let mut welds: Vec<mj::Weld> =
                     env.welds().iter().filter(|weld| weld.equality != equality).copied().collect();

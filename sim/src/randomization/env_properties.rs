@@ -1,6 +1,7 @@
 //! Access to properties of environments through the manager.
 
 use super::{Properties, Property, PropertyOverrides, Randomization};
+use crate::env::Stage;
 use crate::error::Result;
 use crate::ids::{EnvId, env_mask};
 use crate::manager::SimulationManager;
@@ -55,7 +56,11 @@ impl<'a> EnvProperties<'a> {
     pub fn of(&self, env: EnvId) -> Result<Properties> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let tables = self.sim.simulation.tables();
-        Ok(self.sim.simulation.batch.with_env(env.0, |here| self.sim.simulation.properties_of(tables, env.0, here)))
+        Ok(self
+            .sim
+            .simulation
+            .batch
+            .read_at(env.0, Stage::Raw, |here| self.sim.simulation.properties_of(tables, env.0, here)))
     }
 
     /// Memory of an environment's own properties \[bytes\]: the struct and the arrays of the model that it does not
@@ -68,7 +73,7 @@ impl<'a> EnvProperties<'a> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let Some(own) = &self.sim.simulation.property_overrides[env.0] else { return Ok(0) };
         let values: usize = own.iter().flatten().map(|values| size_of_val(&**values)).sum();
-        let model = self.sim.simulation.batch.read(env.0, |env| env.data().model().own_bytes());
+        let model = self.sim.simulation.batch.read_row(env.0, |row| row.own_model().own_bytes());
         Ok(model + size_of::<PropertyOverrides>() + values)
     }
 }

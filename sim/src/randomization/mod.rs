@@ -21,17 +21,17 @@ pub(crate) use tables::PropertyTables;
 use tables::SceneContext;
 pub use terms::{Randomization, RandomizationOp, RandomizationTerm};
 
-use crate::env::SimEnv;
+use crate::env::{SimEnv, Stage};
 use crate::error::Result;
 use crate::simulation::Simulation;
 use kinetoscope_scene::{EnvScene, RenderSceneError};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 impl Simulation {
     /// Tables of the properties of the scene, created on first use.
     pub(crate) fn tables(&self) -> &Arc<PropertyTables> {
         self.property_tables.get_or_init(|| {
-            let drives = self.batch.read(0, |env| Arc::clone(env.drives.table()));
+            let drives = self.batch.read_row(0, |row| Arc::clone(row.drives.table()));
             let standing: Vec<usize> =
                 self.objects.iter().filter(|object| object.is_static()).map(|o| o.body).collect();
             let beside = SceneContext { proxies: &self.visual_proxies, static_bodies: &standing };
@@ -72,7 +72,7 @@ impl Simulation {
         envs: &[usize],
         mut change: impl FnMut(usize, &mut Properties) -> Result<()>,
     ) -> Result<()> {
-        let mut maker = match self.model_patcher.take() {
+        let mut maker = match self.model_patcher.get_mut().unwrap_or_else(PoisonError::into_inner).take() {
             Some(maker) => maker,
             None => ModelPatcher::new(self.batch.model())?,
         };
@@ -81,7 +81,7 @@ impl Simulation {
         let made: Result<Vec<_>> = envs
             .iter()
             .map(|&index| {
-                self.batch.with_env(index, |env| {
+                self.batch.read_at(index, Stage::Raw, |env| {
                     let mut properties = self.properties_of(&tables, index, env);
                     change(index, &mut properties)?;
                     let own = properties.overrides();
@@ -90,7 +90,7 @@ impl Simulation {
                 })
             })
             .collect();
-        self.model_patcher = Some(maker);
+        *self.model_patcher.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(maker);
         let made = made?;
         let looks_other = |(index, own, _): &&(usize, PropertyOverrides, EnvPatch)| {
             let before = self.property_overrides[*index].as_deref().unwrap_or(&NO_OVERRIDES);
@@ -103,7 +103,7 @@ impl Simulation {
         }
         for (index, own, made) in made {
             self.property_overrides[index] = own.iter().any(Option::is_some).then(|| own.into());
-            self.batch.with_env(index, |env| made.apply(env));
+            self.batch.write_at(index, Stage::Raw, |env| made.apply(env));
         }
         self.set_env_scenes(looks);
         Ok(())

@@ -10,7 +10,7 @@ pub use error::SnapshotError;
 pub(crate) use layout::StateLayout;
 pub(crate) use properties::SavedProperties;
 
-use crate::env::EnvState;
+use crate::env::{EnvState, Stage};
 use crate::error::Result;
 use crate::ids::{EnvId, env_list};
 use crate::manager::SimulationManager;
@@ -88,7 +88,7 @@ impl Snapshot {
         if let Some(difference) = self.layout.difference(&simulation.layout) {
             return Err(SnapshotError::OtherScene { difference }.into());
         }
-        let like = simulation.batch.read(0, |env| env.save_state());
+        let like = simulation.batch.read_at(0, Stage::Raw, |env| env.save_state());
         if !self.entries.iter().all(|entry| entry.state.has_same_lengths(&like)) {
             let difference = "its states have different sizes".into();
             return Err(SnapshotError::OtherScene { difference }.into());
@@ -114,7 +114,7 @@ impl SimulationManager {
     pub fn snapshot(&self, env_ids: Option<&[EnvId]>) -> Result<Snapshot> {
         let envs = env_list(env_ids, self.num_envs())?;
         let entry = |env| {
-            let state = self.simulation.batch.read(env, |env| env.save_state());
+            let state = self.simulation.batch.read_at(env, Stage::Raw, |env| env.save_state());
             EnvEntry { env, state, overrides: self.simulation.own_properties(env, self.randomization_count[env]) }
         };
         Ok(Snapshot::new(&self.simulation, envs.into_iter().map(entry).collect()))
@@ -131,7 +131,7 @@ impl SimulationManager {
     pub fn restore(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
         let sources = self.sources(snapshot, env_ids)?;
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
-        self.simulation.batch.run(|i, env| {
+        self.simulation.batch.run_in(&chosen, |i, env| {
             if let Some(source) = sources[i] {
                 env.load_state(&snapshot.entries()[source].state);
             }

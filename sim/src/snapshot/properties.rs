@@ -1,6 +1,7 @@
 //! Properties of environments in snapshots.
 
 use super::{Snapshot, SnapshotError};
+use crate::env::Stage;
 use crate::error::Result;
 use crate::ids::EnvId;
 use crate::manager::SimulationManager;
@@ -49,7 +50,7 @@ impl Simulation {
     pub(crate) fn own_properties(&self, env: usize, randomizations: u64) -> Arc<SavedProperties> {
         // Created before an environment is locked: the creation reads an environment.
         self.tables();
-        let values = self.batch.read(env, |here| self.named_properties(env, here));
+        let values = self.batch.read_at(env, Stage::Raw, |here| self.named_properties(env, here));
         Arc::new(SavedProperties { values, randomizations })
     }
 }
@@ -79,7 +80,7 @@ impl SimulationManager {
         for (&env, values) in chosen.iter().zip(&found) {
             let Some(source) = sources[env] else { continue };
             self.randomization_count[env] = entries[source].overrides.randomizations;
-            self.simulation.batch.write(env, |here| {
+            self.simulation.batch.write_at(env, Stage::Raw, |here| {
                 here.drives.clear_overrides();
                 here.load_state(&entries[source].state);
                 for (property, element, value) in values {

@@ -1,6 +1,7 @@
 //! A model at one instant, which can be rendered without a simulation.
 
 use super::{MaskId, VisualScene, overview};
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list, env_mask};
 use crate::manager::SimulationManager;
@@ -93,7 +94,7 @@ impl OffscreenScene {
     pub fn of_env(sim: &mut SimulationManager, env: EnvId) -> Result<Self> {
         env_mask(Some(&[env]), sim.num_envs())?;
         let visible = sim.scene_mut().visual_scene().with_env_scene(sim.env_scene(env));
-        Ok(sim.simulation.batch.read(env.0, |env| Self::of_data(&visible, env.data())))
+        Ok(sim.simulation.batch.read_at(env.0, Stage::Kinematics, |env| Self::of_data(&visible, env.data())))
     }
 
     /// Creates the offscreen scene of several environments side by side (`None` for all environments), at
@@ -113,7 +114,7 @@ impl OffscreenScene {
             .map(|&env| {
                 (
                     env,
-                    sim.simulation.batch.read(env, |here| {
+                    sim.simulation.batch.read_at(env, Stage::Kinematics, |here| {
                         let visible = visible.with_env_scene(sim.env_scene(EnvId(env)));
                         Self::of_data(&visible, here.data())
                     }),

@@ -58,7 +58,7 @@ fn cycle([arm, hand]: [PathBuf; 2], arm_joints: &str, hand_joints: &str) {
     for error in [view.is_mimic(JointIndex(dof)), view.is_driven(JointIndex(dof))].map(Result::unwrap_err) {
         assert_eq!(error.to_string(), format!("joint {dof} does not exist; there are {dof} (0 to {})", dof - 1));
     }
-    let (effort_limits, gains) = (world.limits(), world.env().drives.gains);
+    let (effort_limits, gains) = (world.limits(), world.env().drives.gains.clone());
     let drivers = || (0..dof).filter(|&i| !followers[i]).zip(gains.iter());
     let (mut sag, mut law) = (0.0_f64, 0.0_f64);
     for (joints, aim) in phases {

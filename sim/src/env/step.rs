@@ -1,0 +1,372 @@
+//! Steps and forward passes of an environment, and the recovery from those that fail.
+
+use super::{Divergence, EnvStatus, SimEnv, Stage};
+use crate::capture::{CaptureRequest, CapturedStep};
+use crate::row::{ColdState, EnvRow};
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco::{
+    Data, EngineError, IntegrationState, Overflow, SolvedState, UserInputs, Warning, WarningCounts,
+};
+use kinetoscope_scene::Contact;
+use std::cell::Cell;
+
+/// Memory of one environment above which its buffers no longer grow \[bytes\].
+const MAX_ENV_BYTES: usize = 2 << 30;
+
+impl SimEnv {
+    /// Does `count` MuJoCo steps. A diverged environment does not step.
+    pub fn step(&mut self, count: u32) {
+        self.advance(count, None);
+        self.reach(Stage::Forward);
+    }
+
+    /// Does `count` MuJoCo steps, without a forward pass after the last one, and captures the quantities of `capture`
+    /// in the last step.
+    pub(crate) fn advance(&mut self, count: u32, capture: Option<&CaptureRequest>) {
+        for left in (0..count).rev() {
+            if self.row.diverged.is_some() {
+                return;
+            }
+            self.step_once(capture.filter(|_| left == 0));
+        }
+    }
+
+    fn step_once(&mut self, mut capture: Option<&CaptureRequest>) {
+        if let Some(wanted) = capture.take_if(|_| self.data.model().integrator() == mj::mjINT_RK4) {
+            // RK4 ends with the solution of an intermediate state, so the state before the step is captured.
+            self.capture_current(wanted);
+        }
+        self.reach(Stage::Forward);
+        if self.row.diverged.is_some() {
+            return;
+        }
+        let mut efforts = EFFORTS.take();
+        self.step_from_forward(&mut efforts, capture);
+        EFFORTS.set(efforts);
+    }
+
+    fn step_from_forward(&mut self, efforts: &mut Vec<f64>, capture: Option<&CaptureRequest>) {
+        // The row still has a state that it was restored from.
+        if self.held == 0 {
+            self.save_motion();
+        }
+        self.held = 0;
+        loop {
+            let mut done = self.try_step(efforts, capture);
+            let mut raised = self.data.take_warnings();
+            if done.is_ok() && self.data.has_bad_state() {
+                // MuJoCo itself names the fault.
+                done = self.data.step1();
+                raised.add(&self.data.take_warnings());
+            }
+            match classify_step(done, &raised) {
+                StepOutcome::Succeeded => {
+                    if raised != WarningCounts::default() {
+                        self.row.cold.warnings.add(&raised);
+                    }
+                    self.row.drives.finish_step(efforts);
+                    self.row.steps = self.row.steps.saturating_add(1);
+                    self.row.solved_current = false;
+                    self.row.is_forward_counted = false;
+                    self.stage = Stage::Raw;
+                    return;
+                }
+                StepOutcome::Overflowed(what) => {
+                    if let Err(reason) = self.grow_and_restore(what) {
+                        return self.undo_step(reason);
+                    }
+                }
+                StepOutcome::Diverged(reason) => {
+                    self.row.cold.warnings.add(&raised);
+                    return self.undo_step(reason);
+                }
+            }
+        }
+    }
+
+    /// Does one step after a forward pass, and reads the efforts that the drives applied.
+    fn try_step(&mut self, efforts: &mut Vec<f64>, capture: Option<&CaptureRequest>) -> Result<(), EngineError> {
+        self.apply_inputs();
+        if self.data.model().integrator() == mj::mjINT_RK4 {
+            // mj_step2 integrates with Euler even if the model says RK4.
+            self.data.step()?;
+        } else {
+            self.data.step2()?;
+        }
+        // Must precede mj_step1, which lays out the constraints of the new state: 4.x moves them within its arena.
+        self.row.drives.read_efforts(&self.data, efforts);
+        if let Some(capture) = capture {
+            let Self { data, row, .. } = self;
+            let EnvRow { motion, cold, .. } = &mut **row;
+            let qvel = motion.qvel(data.model());
+            capture.capture(data, qvel, &mut cold.captured)?;
+        }
+        Ok(())
+    }
+
+    /// Captures the solution of the current state with the current drives; the state stays the same, bit for bit. The
+    /// capture is empty for a diverged environment and for one whose next step will fail.
+    pub(crate) fn capture_current(&mut self, capture: &CaptureRequest) {
+        self.row.cold.captured.clear();
+        self.row.solved_current = true;
+        if !self.with_solved_state(|data, qvel, cold| capture.capture(data, qvel, &mut cold.captured)) {
+            self.row.cold.captured.clear();
+        }
+    }
+
+    /// Writes the contacts of the current state with their solved forces to `contacts`; empty if the solve fails.
+    /// Earlier captures and later steps are not affected.
+    pub(crate) fn current_contacts(&mut self, capture: &CaptureRequest, contacts: &mut Vec<Contact>) {
+        let mut solved = CapturedStep::default();
+        let done = self.with_solved_state(|data, qvel, _| capture.capture(data, qvel, &mut solved));
+        contacts.clear();
+        contacts.extend(solved.contacts.iter().filter(|_| done));
+    }
+
+    /// Solves the current state, passes the solution and the velocities to `take`, and restores the state. Returns true
+    /// if the solve succeeded.
+    fn with_solved_state(
+        &mut self,
+        mut take: impl FnMut(&mut Data, &[f64], &mut ColdState) -> Result<(), EngineError>,
+    ) -> bool {
+        if self.row.diverged.is_none() {
+            self.reach(Stage::Forward);
+        }
+        if self.row.diverged.is_some() {
+            return false;
+        }
+        self.save_motion();
+        let good = loop {
+            self.apply_inputs();
+            let Self { data, row, .. } = self;
+            let EnvRow { motion, cold, .. } = &mut **row;
+            let qvel = motion.qvel(data.model());
+            let done = data.step2().and_then(|()| take(data, qvel, cold));
+            match classify_step(done, &self.data.take_warnings()) {
+                StepOutcome::Succeeded => break true,
+                StepOutcome::Overflowed(what) if self.grow_and_restore(what).is_ok() => {}
+                StepOutcome::Overflowed(_) | StepOutcome::Diverged(_) => {
+                    self.data.reset();
+                    break false;
+                }
+            }
+        };
+        self.restore_saved();
+        good
+    }
+
+    /// Checks a state and inputs that were just written to `data`, without a forward pass. Restores `good` and marks the
+    /// environment as diverged if a number is not finite or too large.
+    pub(super) fn accept(&mut self, good: &IntegrationState) {
+        self.held = 0;
+        self.stage = Stage::Raw;
+        self.row.is_forward_counted = false;
+        self.row.save_written(&self.data);
+        if self.data.has_bad_state() {
+            // MuJoCo itself names the fault.
+            let done = self.data.step1();
+            let raised = self.data.take_warnings();
+            self.row.cold.warnings.add(&raised);
+            let reason = match (done, raised.diverged()) {
+                (_, Some(warning)) => Divergence::Warning(warning),
+                (Err(error), None) => Divergence::Engine(error),
+                (Ok(()), None) => Divergence::Warning(Warning::BadPosition),
+            };
+            self.mark_diverged(reason, good);
+        }
+    }
+
+    /// Computes what `stage` contains for the current state, unless it is there already.
+    pub(crate) fn reach(&mut self, stage: Stage) {
+        if self.stage >= stage {
+            return;
+        }
+        if stage == Stage::Forward {
+            return self.forward_or_freeze(None);
+        }
+        self.prepare_pass();
+        match stage {
+            Stage::Raw | Stage::Forward => {}
+            Stage::State => self.data.normalize_quaternions(),
+            Stage::Kinematics => {
+                if self.data.poses_and_velocities().is_err() {
+                    // The stack is too small. A whole forward pass grows it.
+                    return self.forward_or_freeze(None);
+                }
+            }
+        }
+        self.stage = stage;
+    }
+
+    /// Runs one forward pass (`mj_step1`), growing the buffers as needed. On failure, restores `good` and marks the
+    /// environment as diverged.
+    pub(super) fn forward(&mut self, good: &IntegrationState) {
+        if self.stage < Stage::Forward {
+            self.forward_or_freeze(Some(good));
+        }
+    }
+
+    /// Makes quaternions raw and keeps them, before a pass that may normalize them.
+    fn prepare_pass(&mut self) {
+        if self.raw_quats.is_empty() {
+            return;
+        }
+        if self.stage == Stage::Raw {
+            self.raw_quats.save(&self.data);
+        } else {
+            self.raw_quats.restore(&mut self.data);
+        }
+    }
+
+    /// Runs one forward pass as [`forward`](Self::forward) does. Without `good`, a failed environment keeps its state.
+    fn forward_or_freeze(&mut self, good: Option<&IntegrationState>) {
+        self.prepare_pass();
+        loop {
+            let done = self.data.step1();
+            let raised = self.data.take_warnings();
+            self.stage = Stage::Forward;
+            let reason = match classify_step(done, &raised) {
+                StepOutcome::Succeeded => {
+                    if !self.row.is_forward_counted {
+                        self.row.cold.warnings.add(&raised);
+                        self.row.is_forward_counted = true;
+                    }
+                    return;
+                }
+                StepOutcome::Overflowed(what) => {
+                    self.save_motion();
+                    match self.grow_buffers(what, Inputs::OfData) {
+                        Ok(()) => {
+                            self.raw_quats.save(&self.data);
+                            continue;
+                        }
+                        Err(reason) => reason,
+                    }
+                }
+                StepOutcome::Diverged(reason) => {
+                    self.row.cold.warnings.add(&raised);
+                    reason
+                }
+            };
+            let (current, before) = (self.current_motion(), self.row.diverged.take());
+            self.mark_diverged(reason, good.unwrap_or(&current));
+            if good.is_none() && before.is_some() {
+                self.row.diverged = before;
+            }
+            // Cannot fail for `good`: it had a forward pass before, with these or smaller buffers.
+            self.prepare_pass();
+            let _ = self.data.step1();
+            self.data.take_warnings();
+            self.stage = Stage::Forward;
+            return;
+        }
+    }
+
+    /// Restores the state before the step, which the row has, with larger buffers and a forward pass done.
+    fn grow_and_restore(&mut self, mut what: Overflow) -> Result<(), Divergence> {
+        loop {
+            self.grow_buffers(what, Inputs::Written)?;
+            self.prepare_pass();
+            let done = self.data.step1();
+            let raised = self.data.take_warnings();
+            match classify_step(done, &raised) {
+                StepOutcome::Succeeded => {
+                    self.stage = Stage::Forward;
+                    return Ok(());
+                }
+                StepOutcome::Overflowed(next) => what = next,
+                StepOutcome::Diverged(reason) => return Err(reason),
+            }
+        }
+    }
+
+    /// Replaces the data by data with twice the buffer size of `what`, in the state that the row has, and with the same
+    /// results.
+    fn grow_buffers(&mut self, what: Overflow, kept: Inputs) -> Result<(), Divergence> {
+        let buffers = self.data.model().buffers().enlarged(what);
+        if self.data.bytes() > MAX_ENV_BYTES {
+            return Err(Divergence::BuffersExhausted(buffers));
+        }
+        let model = self.data.model().with_buffers(buffers);
+        let mut data = Data::new(&model).map_err(Divergence::Engine)?;
+        let mut solved = SolvedState::default();
+        solved.save(&self.data);
+        solved.restore(&mut data);
+        match kept {
+            Inputs::Written => self.row.written.restore(&mut data),
+            Inputs::OfData => {
+                let mut inputs = UserInputs::default();
+                inputs.save(&self.data);
+                inputs.restore(&mut data);
+            }
+        }
+        self.row.motion.restore(&mut data);
+        self.data = data;
+        self.base = self.base.with_buffers_of(&model);
+        if self.row.model.is_some() {
+            self.row.model = Some(model);
+        } else {
+            self.data.set_model(self.base.clone());
+        }
+        self.stage = Stage::Raw;
+        self.held = 0;
+        self.buffer_growths += 1;
+        Ok(())
+    }
+
+    /// Restores the state that the row has.
+    fn restore_saved(&mut self) {
+        let motion = std::mem::take(&mut self.row.motion);
+        self.restore_motion(&motion);
+        self.row.motion = motion;
+    }
+
+    /// Marks the environment as diverged and restores the state before the step, which the row has.
+    fn undo_step(&mut self, reason: Divergence) {
+        let motion = std::mem::take(&mut self.row.motion);
+        self.mark_diverged(reason, &motion);
+        self.row.motion = motion;
+    }
+
+    /// Marks the environment as diverged and restores `good`, the last valid state, without a forward pass.
+    fn mark_diverged(&mut self, reason: Divergence, good: &IntegrationState) {
+        self.row.diverged = Some(Box::new(EnvStatus::Diverged { step: self.row.steps, reason }));
+        self.row.cold.captured.clear();
+        self.data.reset();
+        self.data.take_warnings();
+        self.restore_motion(good);
+        self.row.is_forward_counted = true;
+    }
+}
+
+thread_local! {
+    /// Efforts of the drives in a step, which are kept only if the step succeeds. One list per thread, not per
+    /// environment: a thousand copies would not stay in the cache.
+    static EFFORTS: Cell<Vec<f64>> = const { Cell::new(Vec::new()) };
+}
+
+/// Inputs with which an environment continues in larger buffers.
+enum Inputs {
+    /// Inputs as of the last write: a failed step may have cleared those of the data.
+    Written,
+    /// Inputs of the data.
+    OfData,
+}
+
+enum StepOutcome {
+    Succeeded,
+    Overflowed(Overflow),
+    Diverged(Divergence),
+}
+
+fn classify_step(done: Result<(), EngineError>, raised: &WarningCounts) -> StepOutcome {
+    match done {
+        Err(error) if error.is_out_of_memory() => StepOutcome::Overflowed(raised.overflow().unwrap_or(Overflow::Stack)),
+        Err(error) => StepOutcome::Diverged(Divergence::Engine(error)),
+        Ok(()) => match (raised.overflow(), raised.diverged()) {
+            (Some(what), _) => StepOutcome::Overflowed(what),
+            (None, Some(warning)) => StepOutcome::Diverged(Divergence::Warning(warning)),
+            (None, None) => StepOutcome::Succeeded,
+        },
+    }
+}
