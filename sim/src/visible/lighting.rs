@@ -5,7 +5,8 @@ use crate::entity_set::EntitySet;
 use crate::light_cfg::{LightCfg, LightKindCfg};
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;
-use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
+use kinetoscope_look::{LightType, TextureType};
+use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_scene::decode_srgb;
 use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightingSpace, RenderScene, Sky};
 

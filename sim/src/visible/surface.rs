@@ -1,7 +1,8 @@
 //! Materials and textures of MuJoCo models.
 
+use kinetoscope_look::TextureType;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco::{Model, TextureType};
+use kinetoscope_mujoco::Model;
 use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
