@@ -5,6 +5,7 @@ use super::arrays::is_set;
 use super::model::Model;
 use kinetoscope_look::{
     HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,
+    VisualModel,
 };
 use mujoco_sys as mj;
 use mujoco_sys::fields::model as fields;
@@ -243,5 +244,31 @@ impl Model {
             diffuse: as_rows(array!(self, light_diffuse))[light],
             specular: as_rows(array!(self, light_specular))[light],
         }
+    }
+}
+
+impl VisualModel for Model {
+    fn mesh(&self, mesh: usize) -> MeshArrays<'_> {
+        self.mesh(mesh)
+    }
+
+    fn height_field(&self, field: usize) -> HeightFieldArrays<'_> {
+        self.height_field(field)
+    }
+
+    fn ntex(&self) -> usize {
+        self.ntex()
+    }
+
+    fn texture(&self, texture: usize) -> Option<TextureArrays<'_>> {
+        self.texture(texture)
+    }
+
+    fn nmat(&self) -> usize {
+        self.nmat()
+    }
+
+    fn material(&self, material: usize) -> MaterialValues {
+        self.material(material)
     }
 }

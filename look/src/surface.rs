@@ -1,20 +1,20 @@
 //! Materials and textures of MuJoCo models.
 
-use kinetoscope_look::TextureType;
-use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco::Model;
+use crate::{GeomType, TextureType, VisualModel};
 use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
 /// Materials of a model, for rendering.
-pub(super) struct ModelMaterials<'a> {
-    model: &'a Model,
+#[derive(Clone, Debug)]
+pub struct ModelMaterials {
     materials: Vec<Material>,
+    textures: Vec<Option<Arc<Texture>>>,
     left_out: Vec<String>,
 }
 
-impl<'a> ModelMaterials<'a> {
-    pub(super) fn of(model: &'a Model) -> Self {
+impl ModelMaterials {
+    /// Converts the materials and the textures of a model.
+    pub fn new(model: &impl VisualModel) -> Self {
         let mut left_out = Vec::new();
         let textures: Vec<Option<Arc<Texture>>> = (0..model.ntex())
             .map(|index| {
@@ -42,68 +42,69 @@ impl<'a> ModelMaterials<'a> {
                 }
             })
             .collect();
-        Self { model, materials, left_out }
+        Self { materials, textures, left_out }
     }
 
-    /// Render material of a geom: its color, and the properties of its MuJoCo material, if any. Only planes and boxes
-    /// reflect.
-    pub(super) fn of_geom(&self, geom: usize) -> Material {
-        let rgba = color_of(self.model, geom);
-        match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
-            None => Material::from_rgba(rgba),
-            Some(material) => {
-                // MuJoCo reflects the scene in planes and in the upper face of boxes only.
-                let mirrors = matches!(self.model.geom_type()[geom] as u32, mj::mjGEOM_PLANE | mj::mjGEOM_BOX);
-                let reflectance = if mirrors { material.reflectance } else { 0.0 };
-                Material { rgba, reflectance, ..material.clone() }
+    /// Render material of a geom of MuJoCo's type number `kind`: its color, and the properties of its MuJoCo material,
+    /// if any. Only planes and boxes reflect.
+    pub fn of_geom(&self, kind: i32, rgba: &[f32], material: i32) -> Material {
+        let reflectance = match self.get(material) {
+            // MuJoCo reflects the scene in planes and in the upper face of boxes only.
+            Some(material) if matches!(GeomType::from_id(kind), Some(GeomType::Plane | GeomType::Box)) => {
+                material.reflectance
             }
-        }
+            _ => 0.0,
+        };
+        let material = self.of_element(rgba, material);
+        Material { reflectance, ..material }
     }
 
-    /// Render material of a site: its color, and the properties of its MuJoCo material, if any.
-    pub(super) fn of_site(&self, site: usize) -> Material {
-        self.material(&self.model.site_rgba()[4 * site..4 * site + 4], self.model.site_matid()[site])
-    }
-
-    /// Material of an element with this color and material.
-    pub(super) fn material(&self, rgba: &[f32], material: i32) -> Material {
-        let rgba = color(self.model, rgba, material);
-        match usize::try_from(material).ok().and_then(|m| self.materials.get(m)) {
+    /// Render material of an element other than a geom: its color, and the properties of its MuJoCo material, if any.
+    pub fn of_element(&self, rgba: &[f32], material: i32) -> Material {
+        let rgba = self.color(rgba, material);
+        match self.get(material) {
             None => Material::from_rgba(rgba),
             Some(material) => Material { rgba, reflectance: 0.0, ..material.clone() },
         }
     }
 
+    /// Material of an index of the model; `None` for -1.
+    pub fn get(&self, material: i32) -> Option<&Material> {
+        usize::try_from(material).ok().and_then(|m| self.materials.get(m))
+    }
+
+    /// Image of an index of the model; `None` for -1, for a skybox and for a texture that cannot be rendered.
+    pub fn texture(&self, texture: i32) -> Option<&Arc<Texture>> {
+        usize::try_from(texture).ok().and_then(|t| self.textures.get(t)?.as_ref())
+    }
+
     /// Messages about textures that cannot be rendered.
-    pub(super) fn left_out(&self) -> &[String] {
+    pub fn omitted(&self) -> &[String] {
         &self.left_out
+    }
+
+    fn color(&self, own: &[f32], material: i32) -> [f32; 4] {
+        element_color(own, self.get(material).map(|material| material.rgba))
     }
 }
 
-/// Color and opacity of a geom. A color of the geom's own overrides that of its material, as in MuJoCo's viewer.
-pub(crate) fn color_of(model: &Model, geom: usize) -> [f32; 4] {
-    color(model, &model.geom_rgba()[4 * geom..4 * geom + 4], model.geom_matid()[geom])
-}
-
-/// Color and opacity of a site, by the rule for geoms.
-pub(super) fn color_of_site(model: &Model, site: usize) -> [f32; 4] {
-    color(model, &model.site_rgba()[4 * site..4 * site + 4], model.site_matid()[site])
-}
-
-pub(super) fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
+/// Color and opacity of an element with the color `own`, and the color of its material. A color of its own overrides
+/// that of the material, as in MuJoCo's viewer.
+///
+/// # Panics
+/// `own` has fewer than four numbers.
+pub fn element_color(own: &[f32], material: Option<[f32; 4]>) -> [f32; 4] {
     /// MuJoCo's gray of geoms without a color.
     const DEFAULT_GEOM_RGBA: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
     let own = [own[0], own[1], own[2], own[3]].map(|c| c.clamp(0.0, 1.0));
-    match usize::try_from(material) {
-        Ok(material) if own == DEFAULT_GEOM_RGBA && material < model.nmat() => {
-            model.material(material).rgba.map(|c| c.clamp(0.0, 1.0))
-        }
+    match material {
+        Some(material) if own == DEFAULT_GEOM_RGBA => material.map(|c| c.clamp(0.0, 1.0)),
         _ => own,
     }
 }
 
 /// Texture of surfaces; `None` for a skybox.
-fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> {
+fn texture(model: &impl VisualModel, index: usize) -> Result<Option<Arc<Texture>>, String> {
     let kind = match model.texture(index).map(|arrays| arrays.kind) {
         Some(TextureType::Skybox) => return Ok(None),
         Some(TextureType::Cube) => TextureKind::Cube,
@@ -112,12 +113,23 @@ fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> 
     image(model, index, kind).map(Some)
 }
 
-/// Image of a skybox.
-pub(super) fn skybox(model: &Model, index: usize) -> Result<Arc<Texture>, String> {
+/// Index of the first texture that is a skybox, if any.
+pub fn first_skybox(model: &impl VisualModel) -> Option<usize> {
+    (0..model.ntex()).find(|&texture| model.texture(texture).is_some_and(|t| t.kind == TextureType::Skybox))
+}
+
+/// Image of a skybox, given by the index of its texture.
+///
+/// # Errors
+/// The reason why the texture cannot be rendered.
+///
+/// # Panics
+/// There is no such texture.
+pub fn skybox(model: &impl VisualModel, index: usize) -> Result<Arc<Texture>, String> {
     image(model, index, TextureKind::Cube)
 }
 
-fn image(model: &Model, index: usize, kind: TextureKind) -> Result<Arc<Texture>, String> {
+fn image(model: &impl VisualModel, index: usize, kind: TextureKind) -> Result<Arc<Texture>, String> {
     let Some(arrays) = model.texture(index) else { return Err("its pixels are not in the model".into()) };
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     // Gray images have one channel, or two with opacity.
