@@ -10,12 +10,14 @@
 //! | `geom_type`, `geom` | types and shapes of geoms |
 //! | `surface` | materials and textures |
 //! | `lighting` | lights, headlight, haze |
+//! | [`mjv`] | scenes of MuJoCo's visualizer, read from their memory |
 #![forbid(unsafe_code)]
 
 mod arrays;
 mod geom;
 mod geom_type;
 mod lighting;
+pub mod mjv;
 mod surface;
 mod visual_model;
 
