@@ -1,7 +1,7 @@
 //! Materials and textures of MuJoCo models.
 
 use crate::{GeomType, TextureType, VisualModel};
-use kinetoscope_scene::{Material, Texture, TextureKind};
+use kinetoscope_scene::{LightingSpace, Material, Texture, TextureKind, decode_srgb};
 use std::sync::Arc;
 
 /// Materials of a model, for rendering.
@@ -13,12 +13,12 @@ pub struct ModelMaterials {
 }
 
 impl ModelMaterials {
-    /// Converts the materials and the textures of a model.
-    pub fn new(model: &impl VisualModel) -> Self {
+    /// Converts the materials and the textures of a model, for scenes with this rule of lighting.
+    pub fn new(model: &impl VisualModel, space: LightingSpace) -> Self {
         let mut left_out = Vec::new();
         let textures: Vec<Option<Arc<Texture>>> = (0..model.ntex())
             .map(|index| {
-                texture(model, index).unwrap_or_else(|reason| {
+                texture(model, index, space).unwrap_or_else(|reason| {
                     left_out.push(format!("texture {index} is not rendered: {reason}"));
                     None
                 })
@@ -104,13 +104,13 @@ pub fn element_color(own: &[f32], material: Option<[f32; 4]>) -> [f32; 4] {
 }
 
 /// Texture of surfaces; `None` for a skybox.
-fn texture(model: &impl VisualModel, index: usize) -> Result<Option<Arc<Texture>>, String> {
+fn texture(model: &impl VisualModel, index: usize, space: LightingSpace) -> Result<Option<Arc<Texture>>, String> {
     let kind = match model.texture(index).map(|arrays| arrays.kind) {
         Some(TextureType::Skybox) => return Ok(None),
         Some(TextureType::Cube) => TextureKind::Cube,
         Some(TextureType::TwoD) | None => TextureKind::TwoD,
     };
-    image(model, index, kind).map(Some)
+    image(model, index, kind, space).map(Some)
 }
 
 /// Index of the first texture that is a skybox, if any.
@@ -118,18 +118,23 @@ pub fn first_skybox(model: &impl VisualModel) -> Option<usize> {
     (0..model.ntex()).find(|&texture| model.texture(texture).is_some_and(|t| t.kind == TextureType::Skybox))
 }
 
-/// Image of a skybox, given by the index of its texture.
+/// Image of a skybox, given by the index of its texture, for scenes with this rule of lighting.
 ///
 /// # Errors
 /// The reason why the texture cannot be rendered.
 ///
 /// # Panics
 /// There is no such texture.
-pub fn skybox(model: &impl VisualModel, index: usize) -> Result<Arc<Texture>, String> {
-    image(model, index, TextureKind::Cube)
+pub fn skybox(model: &impl VisualModel, index: usize, space: LightingSpace) -> Result<Arc<Texture>, String> {
+    image(model, index, TextureKind::Cube, space)
 }
 
-fn image(model: &impl VisualModel, index: usize, kind: TextureKind) -> Result<Arc<Texture>, String> {
+fn image(
+    model: &impl VisualModel,
+    index: usize,
+    kind: TextureKind,
+    space: LightingSpace,
+) -> Result<Arc<Texture>, String> {
     let Some(arrays) = model.texture(index) else { return Err("its pixels are not in the model".into()) };
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     // Gray images have one channel, or two with opacity.
@@ -138,11 +143,19 @@ fn image(model: &impl VisualModel, index: usize, kind: TextureKind) -> Result<Ar
         _ => Vec::new(),
     };
     let (channels, pixels) = if colors.is_empty() { (arrays.channels, arrays.pixels) } else { (3, &colors[..]) };
+    // MuJoCo's renderer decodes these bytes, and shows the result as a display color.
+    let decoded: Vec<u8> = if arrays.is_srgb && space == LightingSpace::Display {
+        let table: [u8; 256] = std::array::from_fn(|k| (255.0 * decode_srgb(k as f32 / 255.0)).round() as u8);
+        pixels.iter().map(|&byte| table[usize::from(byte)]).collect()
+    } else {
+        Vec::new()
+    };
+    let pixels = if decoded.is_empty() { pixels } else { &decoded[..] };
     // A square image is the same on all faces of the cube.
     let is_square = kind == TextureKind::Cube && arrays.height == arrays.width;
     let (faces, repeated) = if is_square { (6, pixels.repeat(6)) } else { (1, Vec::new()) };
     let pixels = if is_square { &repeated[..] } else { pixels };
-    Texture::new(kind, size(arrays.width), size(faces * arrays.height), size(channels), pixels)
+    Texture::averaged_in(space, kind, size(arrays.width), size(faces * arrays.height), size(channels), pixels)
         .map(Arc::new)
         .map_err(|error| error.to_string())
 }

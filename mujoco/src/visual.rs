@@ -167,6 +167,10 @@ impl Model {
             (i64::from(array!(self, tex_nchannel)[texture]), array!(self, tex_data), array!(self, tex_adr)[texture]);
         #[cfg(not(mj4))]
         let (channels, pixels, address) = (3, array!(self, tex_rgb), i64::from(array!(self, tex_adr)[texture]));
+        #[cfg(mj4)]
+        let is_srgb = array!(self, tex_colorspace)[texture] as u32 == mj::mjCOLORSPACE_SRGB;
+        #[cfg(not(mj4))]
+        let is_srgb = false;
         let [width, height] = [array!(self, tex_width)[texture], array!(self, tex_height)[texture]].map(i64::from);
         let pixels = checked_slice(pixels, address, width * height * channels);
         let size = |n: i64| usize::try_from(n).unwrap_or(0);
@@ -175,6 +179,7 @@ impl Model {
             width: size(width),
             height: size(height),
             channels: size(channels),
+            is_srgb,
             pixels,
         })
     }

@@ -1,5 +1,6 @@
 //! Surface materials and textures.
 
+use crate::light::LightingSpace;
 use std::sync::Arc;
 use std::sync::OnceLock;
 
@@ -85,7 +86,7 @@ pub enum TextureKind {
     Cube,
 }
 
-/// A texture with its mip chain, which is averaged in linear light.
+/// A texture with its mip chain, which is averaged in linear light or, for [`LightingSpace::Display`], as bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     kind: TextureKind,
@@ -127,12 +128,31 @@ pub enum TextureError {
 }
 
 impl Texture {
-    /// Creates a texture from sRGB pixels of `channels` (3 or 4) bytes, from the top left. Opacity is ignored.
+    /// Creates a texture from sRGB pixels of `channels` (3 or 4) bytes, from the top left. Opacity is ignored. The mip
+    /// levels are averaged in linear light.
     ///
     /// # Errors
     ///
     /// The sizes are zero, above 65536 or do not fit the number of bytes, or a cube texture is not six squares.
     pub fn new(kind: TextureKind, width: u32, height: u32, channels: u32, data: &[u8]) -> Result<Self, TextureError> {
+        Self::averaged_in(LightingSpace::Linear, kind, width, height, channels, data)
+    }
+
+    /// As [`new`](Self::new), with mip levels that are averaged in a lighting space. Those of
+    /// [`LightingSpace::Display`] are the levels of MuJoCo's renderer: means of bytes, down to one pixel for the faces
+    /// of every cube.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new).
+    pub fn averaged_in(
+        space: LightingSpace,
+        kind: TextureKind,
+        width: u32,
+        height: u32,
+        channels: u32,
+        data: &[u8],
+    ) -> Result<Self, TextureError> {
         let expected = u64::from(width) * u64::from(height) * u64::from(channels);
         if !(3..=4).contains(&channels) || expected == 0 || expected != data.len() as u64 || width.max(height) > 1 << 16
         {
@@ -143,13 +163,18 @@ impl Texture {
         }
         let pixels: Vec<_> = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
         let mut levels = vec![MipLevel::new(width, height, &pixels)];
-        // The faces of a cube must not mix, so only levels with an even side are halved.
+        let is_cube = kind == TextureKind::Cube;
+        // The faces of a cube must not mix, so only levels with an even side are halved as a whole.
         let shrinks = |l: &MipLevel| match kind {
             TextureKind::TwoD => l.width > 1 || l.height > 1,
+            TextureKind::Cube if space == LightingSpace::Display => l.width > 1,
             TextureKind::Cube => l.width.is_multiple_of(2),
         };
         while let Some(last) = levels.last().filter(|l| shrinks(l)) {
-            let next = last.half_size();
+            let next = match space {
+                LightingSpace::Linear => last.half_size(),
+                LightingSpace::Display => last.half_size_of_bytes(if is_cube { 6 } else { 1 }),
+            };
             levels.push(next);
         }
         Ok(Self { kind, levels })
@@ -221,6 +246,22 @@ impl MipLevel {
         [0, 1, 2, 3].map(|k| self.bytes[at + k])
     }
 
+    /// Level of half the size, for an image of `faces` parts, one below the other: each pixel is the mean of four bytes
+    /// of its part. The last column and row of a part with an odd size are left out.
+    fn half_size_of_bytes(&self, faces: u32) -> Self {
+        let side = self.height / faces;
+        let (width, height) = ((self.width / 2).max(1), (side / 2).max(1));
+        let pixel = |k: u32| {
+            let (face, in_face) = (k / (width * height), k % (width * height));
+            let (x, y) = (2 * (in_face % width), 2 * (in_face / width));
+            let at = |x: u32, y: u32| self.pixel(x.min(self.width - 1), face * side + y.min(side - 1));
+            let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            let mean = |c: usize| ((four.iter().map(|p| u32::from(p[c])).sum::<u32>() + 2) / 4) as u8;
+            [mean(0), mean(1), mean(2), 255]
+        };
+        Self::new(width, faces * height, &(0..faces * width * height).map(pixel).collect::<Vec<_>>())
+    }
+
     /// Level of half the size; each pixel is the mean of four in linear light.
     fn half_size(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
@@ -272,6 +313,26 @@ mod tests {
         // Round trip of every byte.
         assert!((0..=255).all(|byte: u8| linear_to_srgb8(table[byte as usize]) == byte));
         assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "the table must increase");
+    }
+
+    /// A column of white texels in each face of a cube whose side is odd. Means of bytes: (255 + 0) / 2 rounds to 128.
+    /// In linear light, such a cube has one level.
+    #[test]
+    fn mip_levels_of_bytes() {
+        let pixel = |k: usize| if k % 5 == 1 { [255; 3] } else { [0; 3] };
+        let data: Vec<u8> = (0..5 * 30).flat_map(pixel).collect();
+        let cube = |space| Texture::averaged_in(space, TextureKind::Cube, 5, 30, 3, &data).expect("six squares");
+        let levels = cube(LightingSpace::Display);
+        let sizes: Vec<_> = levels.mip_levels().iter().map(|level| [level.width(), level.height()]).collect();
+        assert_eq!(sizes, [[5, 30], [2, 12], [1, 6]]);
+        for row in 0..12 {
+            assert_eq!([0, 1].map(|x| levels.mip_levels()[1].pixel(x, row)[0]), [128, 0], "row {row}");
+        }
+        assert_eq!(cube(LightingSpace::Linear).mip_levels().len(), 1);
+        let even = &data[..3 * 4];
+        let plane = |space| Texture::averaged_in(space, TextureKind::TwoD, 2, 2, 3, even).expect("a texture");
+        assert_eq!(plane(LightingSpace::Display).mip_levels()[1].pixel(0, 0)[0], 64);
+        assert_eq!(plane(LightingSpace::Linear), Texture::new(TextureKind::TwoD, 2, 2, 3, even).expect("a texture"));
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 use super::frame::{Background, MjvFrame, MjvObject};
 use super::layout::{GeomLayout, LayoutError, LightLayout, floats, int};
+use super::soft::{MjvMemory, SkinFaces, SoftBody};
 use crate::{GeomShapes, GeomType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
-use kinetoscope_scene::shape::{Capsule, Shape};
+use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Shape};
 use kinetoscope_scene::{
     Headlight, Hemisphere, Instance, Light, LightingSpace, Material, PoseF32, RenderScene, Sky, Texture,
 };
@@ -15,6 +16,7 @@ pub struct MjvReader<M> {
     shapes: GeomShapes<M>,
     materials: ModelMaterials,
     sky: Option<Arc<Texture>>,
+    skins: Vec<SkinFaces>,
     omitted: Vec<String>,
     geoms: GeomLayout,
     lights: LightLayout,
@@ -29,8 +31,19 @@ struct LastScene {
     lights: usize,
     scene: Arc<RenderScene>,
     segment_scene: Option<Arc<RenderScene>>,
-    /// Index of the geom of each instance.
-    rows: Vec<u32>,
+    /// Geom of each instance.
+    rows: Vec<InstanceRow>,
+    /// Instances whose vertices move.
+    soft: Vec<(usize, SoftBody)>,
+}
+
+/// Geom that an instance shows.
+#[derive(Clone, Copy, Debug)]
+struct InstanceRow {
+    /// Index of the geom.
+    geom: u32,
+    /// True for the back of a plane, which is turned around x.
+    is_back: bool,
 }
 
 /// All fields of a geom but its pose and its ids. Numbers are compared by their bits.
@@ -47,10 +60,13 @@ struct GeomLook {
     /// Emission, specular, shininess, reflectance.
     shading: [u32; 4],
     has_segment: bool,
+    /// Skin or flex, and its number of triangles.
+    soft: Option<(SoftBody, usize)>,
 }
 
 impl GeomLook {
-    fn read(row: &[u8], layout: &GeomLayout) -> Self {
+    fn read(row: &[u8], layout: &GeomLayout, skins: &[SkinFaces], memory: &MjvMemory<'_>) -> Self {
+        let soft = SoftBody::of(int(row, layout.kind), int(row, layout.objid), &layout.decor);
         let number = |at: Option<usize>| at.map_or(-1, |at| int(row, at));
         let bits = |at: usize| int(row, at) as u32;
         Self {
@@ -64,6 +80,7 @@ impl GeomLook {
             rgba: [0, 4, 8, 12].map(|k| bits(layout.rgba + k)),
             shading: [layout.emission, layout.specular, layout.shininess, layout.reflectance].map(bits),
             has_segment: int(row, layout.segid) >= 0,
+            soft: soft.map(|body| (body, body.faces(skins, memory))),
         }
     }
 }
@@ -73,17 +90,17 @@ impl<M: VisualModel> MjvReader<M> {
     ///
     /// # Errors
     /// A field of a layout is not inside its structure.
-    pub fn new(model: M, geoms: GeomLayout, lights: LightLayout) -> Result<Self, LayoutError> {
+    pub fn new(model: M, skins: Vec<SkinFaces>, geoms: GeomLayout, lights: LightLayout) -> Result<Self, LayoutError> {
         geoms.validate()?;
         lights.validate()?;
-        let materials = ModelMaterials::new(&model);
+        let materials = ModelMaterials::new(&model, LightingSpace::Display);
         let mut omitted = materials.omitted().to_vec();
         let sky = first_skybox(&model).and_then(|texture| {
-            skybox(&model, texture)
+            skybox(&model, texture, LightingSpace::Display)
                 .map_err(|reason| omitted.push(format!("the skybox, texture {texture}, is not rendered: {reason}")))
                 .ok()
         });
-        Ok(Self { shapes: GeomShapes::new(model), materials, sky, omitted, geoms, lights, last: None })
+        Ok(Self { shapes: GeomShapes::new(model), materials, sky, skins, omitted, geoms, lights, last: None })
     }
 
     /// True if the model has a skybox.
@@ -100,7 +117,8 @@ impl<M: VisualModel> MjvReader<M> {
     ///
     /// # Errors
     /// The memory does not consist of whole structures.
-    pub fn read(&mut self, geoms: &[u8], lights: &[u8], background: Background) -> Result<MjvFrame, LayoutError> {
+    pub fn read(&mut self, memory: &MjvMemory<'_>, background: Background) -> Result<MjvFrame, LayoutError> {
+        let MjvMemory { geoms, lights, .. } = *memory;
         check_length(geoms, self.geoms.stride)?;
         check_length(lights, self.lights.stride)?;
         let layout = self.geoms;
@@ -113,19 +131,32 @@ impl<M: VisualModel> MjvReader<M> {
                 Light { position, direction, ..scene_light(&light.values, LightingSpace::Display) }
             })
             .collect();
-        let looks = rows().map(|row| GeomLook::read(row, &layout));
-        let last = match self.last.take() {
-            Some(last)
-                if last.background == background
-                    && last.lights == lights.len()
-                    && last.looks.len() == rows().len()
-                    && looks.clone().eq(last.looks.iter().copied()) =>
-            {
-                last
-            }
-            _ => self.build(looks.collect(), background, &lights),
+        let last = self.last.take();
+        let looks = rows().map(|row| GeomLook::read(row, &layout, &self.skins, memory));
+        let looks: Vec<GeomLook> = looks.collect();
+        let last = match last {
+            Some(last) if last.background == background && last.lights == lights.len() && last.looks == looks => last,
+            _ => self.build(looks, background, &lights, memory),
         };
-        let pose = |&row: &u32| read_pose(&geoms[row as usize * layout.stride..], &layout);
+        let mut poses: Vec<PoseF32> =
+            last.rows.iter().map(|row| row.pose(&geoms[row.geom as usize * layout.stride..], &layout)).collect();
+        for &(instance, _) in &last.soft {
+            // Vertices of skins and flexes are in the world.
+            poses[instance] = PoseF32::IDENTITY;
+        }
+        let deformed = |scene: &Arc<RenderScene>| {
+            if last.soft.is_empty() {
+                return Arc::clone(scene);
+            }
+            let mut scene = (**scene).clone();
+            for &(instance, body) in &last.soft {
+                let [positions, normals] = body.vertices(&self.skins, memory);
+                if positions.iter().flatten().all(|x| x.is_finite()) && !positions.is_empty() {
+                    scene.deform(instance, |mesh| mesh.deform(positions, normals));
+                }
+            }
+            Arc::new(scene)
+        };
         let object = |row: &[u8]| {
             let segment = int(row, layout.segid);
             if segment < 0 {
@@ -134,9 +165,9 @@ impl<M: VisualModel> MjvReader<M> {
             MjvObject { id: int(row, layout.objid), kind: int(row, layout.objtype), segment }
         };
         let frame = MjvFrame {
-            scene: Arc::clone(&last.scene),
-            segment_scene: last.segment_scene.clone(),
-            poses: last.rows.iter().map(pose).collect(),
+            scene: deformed(&last.scene),
+            segment_scene: last.segment_scene.as_ref().map(deformed),
+            poses,
             lights,
             objects: std::iter::once(MjvObject::NONE).chain(rows().map(object)).collect(),
         };
@@ -144,21 +175,37 @@ impl<M: VisualModel> MjvReader<M> {
         Ok(frame)
     }
 
-    fn build(&mut self, looks: Vec<GeomLook>, background: Background, lights: &[Light]) -> LastScene {
-        let (mut instances, mut rows) = (Vec::new(), Vec::new());
+    fn build(
+        &mut self,
+        looks: Vec<GeomLook>,
+        background: Background,
+        lights: &[Light],
+        memory: &MjvMemory<'_>,
+    ) -> LastScene {
+        let (mut instances, mut rows, mut soft) = (Vec::new(), Vec::new(), Vec::new());
         for (index, look) in looks.iter().enumerate() {
-            match self.instance(look, index as i32 + 1) {
-                Ok(Some(instance)) => {
+            match self.instance(look, index as i32 + 1, memory) {
+                Ok(instance) => {
+                    soft.extend(look.soft.map(|(body, _)| (instances.len(), body)));
+                    let geom = index as u32;
+                    // Finite planes are visible from behind in MuJoCo's renderer.
+                    if let Shape::Plane(Plane { half: [x, y] }) = instance.shape
+                        && x > 0.0
+                        && y > 0.0
+                    {
+                        let material = Material { reflectance: 0.0, ..instance.material.clone() };
+                        instances.push(Instance { material, ..instance.clone() });
+                        rows.push(InstanceRow { geom, is_back: true });
+                    }
                     instances.push(instance);
-                    rows.push(index as u32);
+                    rows.push(InstanceRow { geom, is_back: false });
                 }
-                Ok(None) => (),
                 Err(reason) => self.omit(format!("geoms of type {} are not rendered: {reason}", look.kind)),
             }
         }
-        let hidden = |&row: &u32| !looks[row as usize].has_segment;
+        let hidden = |row: &InstanceRow| !looks[row.geom as usize].has_segment;
         let segment_instances = rows.iter().any(hidden).then(|| {
-            let hide = |(instance, row): (&Instance, &u32)| {
+            let hide = |(instance, row): (&Instance, &InstanceRow)| {
                 let visible = instance.visible && !hidden(row);
                 Instance { visible, ..instance.clone() }
             };
@@ -166,6 +213,7 @@ impl<M: VisualModel> MjvReader<M> {
         });
         let scene = self.scene(instances, background, lights).unwrap_or_else(|| {
             rows.clear();
+            soft.clear();
             RenderScene::empty()
         });
         let segment_scene = segment_instances.and_then(|instances| self.scene(instances, background, lights));
@@ -176,6 +224,7 @@ impl<M: VisualModel> MjvReader<M> {
             scene: Arc::new(scene),
             segment_scene: segment_scene.map(Arc::new),
             rows,
+            soft,
         }
     }
 
@@ -199,9 +248,9 @@ impl<M: VisualModel> MjvReader<M> {
         Some(scene)
     }
 
-    /// Instance of a geom; `None` for types that are not drawn.
-    fn instance(&mut self, look: &GeomLook, mask_id: i32) -> Result<Option<Instance>, String> {
-        let Some(shape) = self.shape(look)? else { return Ok(None) };
+    /// Instance of a geom.
+    fn instance(&mut self, look: &GeomLook, mask_id: i32, memory: &MjvMemory<'_>) -> Result<Instance, String> {
+        let shape = self.shape(look, memory)?;
         let of_material = self.materials.get(look.matid);
         let texture = match self.geoms.texid {
             Some(_) => self.materials.texture(look.texid).cloned(),
@@ -231,28 +280,35 @@ impl<M: VisualModel> MjvReader<M> {
             reflectance: if mirrors { reflectance } else { 0.0 },
             ..Material::default()
         };
-        let instance = Instance { visible: rgba[3] > 0.0, ..Instance::new(shape, material, mask_id) };
+        let (visible, is_deformable) = (rgba[3] > 0.0, look.soft.is_some());
+        let instance = Instance { visible, is_deformable, ..Instance::new(shape, material, mask_id) };
         instance.validate().map_err(|error| error.to_string())?;
-        Ok(Some(instance))
+        Ok(instance)
     }
 
-    fn shape(&mut self, look: &GeomLook) -> Result<Option<Shape>, String> {
+    fn shape(&mut self, look: &GeomLook, memory: &MjvMemory<'_>) -> Result<Shape, String> {
+        if let Some((body, _)) = look.soft {
+            return match body.mesh(&self.skins, memory) {
+                Some(mesh) => Ok(Mesh { mesh: Arc::new(mesh) }.into()),
+                None => Err("a skin or flex has no triangles".into()),
+            };
+        }
         let size = look.size.map(f32::from_bits);
         let data = match GeomType::from_id(look.kind) {
             // Meshes have two ids each: 2 k for mesh k, and 2 k + 1 for its convex hull.
             Some(GeomType::Mesh) => look.dataid.div_euclid(2),
             Some(_) => look.dataid,
-            None => return Ok(None),
+            None => return Err("neither shapes nor skins nor flexes".into()),
         };
         // The visualizer has the half length of capsules and cylinders at the end.
         let size = match GeomType::from_id(look.kind) {
             Some(GeomType::Capsule) if size[2] <= 0.0 => {
-                return Ok(Some(Capsule { radius: size[0], half_length: 1e-6 * size[0] }.into()));
+                return Ok(Capsule { radius: size[0], half_length: 1e-6 * size[0] }.into());
             }
             Some(GeomType::Capsule | GeomType::Cylinder) => [size[0], size[2], 0.0],
             _ => size,
         };
-        self.shapes.get(look.kind, &size.map(f64::from), data).map(Some).map_err(str::to_string)
+        self.shapes.get(look.kind, &size.map(f64::from), data).map_err(str::to_string)
     }
 
     fn omit(&mut self, message: String) {
@@ -262,9 +318,14 @@ impl<M: VisualModel> MjvReader<M> {
     }
 }
 
-fn read_pose(row: &[u8], layout: &GeomLayout) -> PoseF32 {
-    let [a, b, c, d, e, f, g, h, i] = floats(row, layout.mat);
-    PoseF32 { rotation: [[a, b, c], [d, e, f], [g, h, i]], translation: floats(row, layout.pos) }
+impl InstanceRow {
+    /// Pose in the structure of the geom.
+    fn pose(self, row: &[u8], layout: &GeomLayout) -> PoseF32 {
+        let [a, b, c, d, e, f, g, h, i] = floats(row, layout.mat);
+        let side = if self.is_back { -1.0 } else { 1.0 };
+        let rotation = [[a, side * b, side * c], [d, side * e, side * f], [g, side * h, side * i]];
+        PoseF32 { rotation, translation: floats(row, layout.pos) }
+    }
 }
 
 fn check_length(memory: &[u8], stride: usize) -> Result<(), LayoutError> {

@@ -9,12 +9,13 @@ import numpy as np
 
 _FLOAT32 = (
     "mesh_vert", "mesh_texcoord", "hfield_data", "mat_rgba", "mat_texrepeat", "mat_emission", "mat_specular",
-    "mat_shininess", "mat_reflectance",
+    "mat_shininess", "mat_reflectance", "skin_texcoord",
 )
-_INT32 = ("mesh_face", "mesh_facetexcoord", "tex_type", "mat_texuniform")
+_INT32 = ("skin_face", "mesh_face", "mesh_facetexcoord", "tex_type", "mat_texuniform")
 _INT64 = (
     "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_texcoordadr", "hfield_nrow", "hfield_ncol",
-    "hfield_adr", "tex_width", "tex_height", "tex_adr",
+    "hfield_adr", "tex_width", "tex_height", "tex_adr", "skin_vertadr", "skin_vertnum", "skin_faceadr", "skin_facenum",
+    "skin_texcoordadr",
 )
 
 
@@ -53,4 +54,6 @@ def model_arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     has_channels = hasattr(model, "tex_data")
     arrays["tex_data"] = _flat(model.tex_data if has_channels else model.tex_rgb, np.uint8)
     arrays["tex_nchannel"] = _flat(model.tex_nchannel if has_channels else np.full(model.ntex, 3), np.int64)
+    # Since 3.3.3, textures have a color space.
+    arrays["tex_colorspace"] = _flat(getattr(model, "tex_colorspace", np.zeros(model.ntex)), np.int32)
     return arrays

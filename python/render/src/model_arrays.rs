@@ -1,5 +1,6 @@
 //! Arrays of the user's `mujoco.MjModel`.
 
+use kinetoscope_look::mjv::SkinFaces;
 use kinetoscope_look::{HeightFieldArrays, MaterialValues, MeshArrays, TextureArrays, TextureType, VisualModel};
 use numpy::{Element, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
@@ -45,6 +46,7 @@ arrays! {
     tex_height: i64,
     tex_nchannel: i64,
     tex_adr: i64,
+    tex_colorspace: i32,
     tex_data: u8,
     mat_rgba: f32,
     mat_texid: i32,
@@ -54,6 +56,13 @@ arrays! {
     mat_specular: f32,
     mat_shininess: f32,
     mat_reflectance: f32,
+    skin_face: i32,
+    skin_texcoord: f32,
+    skin_vertadr: i64,
+    skin_vertnum: i64,
+    skin_faceadr: i64,
+    skin_facenum: i64,
+    skin_texcoordadr: i64,
 }
 
 fn array<T: Element + Clone>(arrays: &Bound<'_, PyDict>, name: &str) -> PyResult<Vec<T>> {
@@ -96,6 +105,24 @@ impl ModelArrays {
             ))),
             None => Ok(()),
         }
+    }
+}
+
+impl ModelArrays {
+    /// Faces of all skins.
+    pub(crate) fn skins(&self) -> Vec<SkinFaces> {
+        let skin = |index: usize| {
+            let (vertex, vertices) = (at(&self.skin_vertadr, index), at(&self.skin_vertnum, index));
+            let (face, faces) = (at(&self.skin_faceadr, index), at(&self.skin_facenum, index));
+            let texcoord = self.skin_texcoordadr.get(index).copied().unwrap_or(-1);
+            SkinFaces {
+                first_vertex: usize::try_from(vertex).unwrap_or(0),
+                vertices: usize::try_from(vertices).unwrap_or(0),
+                faces: checked_slice(self.skin_face.as_chunks().0, face, faces).to_vec(),
+                texcoords: checked_slice(self.skin_texcoord.as_chunks().0, texcoord, vertices).to_vec(),
+            }
+        };
+        (0..self.skin_vertadr.len()).map(skin).collect()
     }
 }
 
@@ -145,7 +172,9 @@ impl VisualModel for ModelArrays {
         let pixels = checked_slice(&self.tex_data, at(&self.tex_adr, texture), bytes);
         let size = |n: i64| usize::try_from(n).unwrap_or(0);
         let [width, height, channels] = [size(width), size(height), size(channels)];
-        (!pixels.is_empty()).then_some(TextureArrays { kind, width, height, channels, pixels })
+        // mjCOLORSPACE_SRGB
+        let is_srgb = at(&self.tex_colorspace, texture) == 2;
+        (!pixels.is_empty()).then_some(TextureArrays { kind, width, height, channels, is_srgb, pixels })
     }
 
     fn nmat(&self) -> usize {

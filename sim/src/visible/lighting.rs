@@ -40,6 +40,11 @@ impl<'a> Lighting<'a> {
         }
     }
 
+    /// Rule by which light is added up.
+    pub(super) fn space(&self) -> LightingSpace {
+        if self.is_mujoco() { LightingSpace::Display } else { LightingSpace::Linear }
+    }
+
     fn is_mujoco(&self) -> bool {
         matches!(self, Self::Mujoco { .. })
     }
@@ -49,7 +54,7 @@ impl<'a> Lighting<'a> {
 /// image-based lights and skyboxes, which are not rendered.
 pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Vec<String> {
     let mut left_out = Vec::new();
-    let space = if look.is_mujoco() { LightingSpace::Display } else { LightingSpace::Linear };
+    let space = look.space();
     scene.lights = (0..model.nlight())
         .map(|index| {
             let light = model.light(index);
@@ -83,7 +88,7 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
     };
     let mut skyboxes = files.iter().filter_map(|file| Some((*file, first_skybox(*file)?)));
     let Some((file, texture)) = skyboxes.next() else { return left_out };
-    match skybox(file, texture) {
+    match skybox(file, texture, space) {
         Ok(image) => scene.skybox = Some(image),
         Err(reason) => {
             let name = file.name(ObjectKind::Texture, texture).unwrap_or_else(|| texture.to_string());

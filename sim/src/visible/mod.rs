@@ -152,7 +152,7 @@ impl VisualScene {
         painted: &SurfaceOverrides,
         look: &Lighting<'_>,
     ) -> Self {
-        let surfaces = ModelMaterials::new(model);
+        let surfaces = ModelMaterials::new(model, look.space());
         let mut shapes = GeomShapes::new(model);
         let mut left_out = surfaces.omitted().to_vec();
         let (geom_type, geom_data) = (model.geom_type(), model.geom_dataid());
