@@ -39,6 +39,8 @@ pub struct DecorTypes {
     pub line: Option<i32>,
     /// Skin.
     pub skin: Option<i32>,
+    /// Flex.
+    pub flex: Option<i32>,
 }
 
 /// Byte offsets of the fields of `mjvGeom`, and the size of the structure. Fields are 4 bytes wide, and arrays of such

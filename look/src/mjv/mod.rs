@@ -10,6 +10,7 @@ mod camera;
 mod frame;
 mod layout;
 mod reader;
+mod soft;
 #[cfg(test)]
 mod tests;
 
@@ -17,3 +18,4 @@ pub use camera::{MjvCamera, MjvCameraError};
 pub use frame::{Background, MjvFrame, MjvObject};
 pub use layout::{DecorTypes, GeomLayout, LayoutError, LightLayout};
 pub use reader::MjvReader;
+pub use soft::{MjvMemory, SkinFaces};

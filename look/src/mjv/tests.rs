@@ -63,7 +63,7 @@ const GEOM: GeomLayout = GeomLayout {
     specular: 124,
     shininess: 128,
     reflectance: 132,
-    decor: DecorTypes { arrow: None, arrow1: None, arrow2: None, line: None, skin: None },
+    decor: DecorTypes { arrow: None, arrow1: None, arrow2: None, line: None, skin: Some(106), flex: Some(105) },
 };
 
 const LIGHT: LightLayout = LightLayout {
@@ -110,7 +110,46 @@ fn geom(kind: i32, dataid: i32, size: [f32; 3], segid: i32) -> Vec<u8> {
 }
 
 fn reader() -> MjvReader<OneTriangle> {
-    MjvReader::new(OneTriangle, GEOM, LIGHT).expect("valid layouts")
+    MjvReader::new(OneTriangle, vec![skin()], GEOM, LIGHT).expect("valid layouts")
+}
+
+/// A skin of one triangle, after five vertices of other skins.
+fn skin() -> SkinFaces {
+    SkinFaces { first_vertex: 5, vertices: 3, faces: vec![[0, 1, 2]], texcoords: Vec::new() }
+}
+
+fn memory(geoms: &[u8]) -> MjvMemory<'_> {
+    MjvMemory { geoms, ..MjvMemory::default() }
+}
+
+/// Vertices of skins and flexes are in the world, whatever the pose of their geom, and move in a scene of their own.
+#[test]
+fn skins_and_flexes() {
+    let mut rows = [geom(106, -1, [0.0; 3], 0), geom(105, -1, [0.0; 3], 1)].concat();
+    for at in [GEOM.objid, GEOM.stride + GEOM.objid] {
+        put_int(&mut rows, at, 0);
+    }
+    let triangle = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]];
+    let up = [[0.0, 0.0, 1.0]; 8];
+    let mut reader = reader();
+    let mut bounds = |x: f32| {
+        let skins = [&[[0.0; 3]; 5][..], &triangle(x)].concat();
+        let flexes = [&[[0.0; 3]; 3][..], &triangle(-x)].concat();
+        let memory = MjvMemory {
+            skin_positions: &skins,
+            skin_normals: &up,
+            flex_positions: &flexes,
+            flex_normals: &up[..6],
+            flex_first_faces: &[1],
+            flex_faces: &[1],
+            ..memory(&rows)
+        };
+        let frame = reader.read(&memory, Background::default()).expect("whole structures");
+        assert_eq!(frame.poses, [kinetoscope_scene::PoseF32::IDENTITY; 2]);
+        [0, 1].map(|k| frame.scene.instances()[k].mesh().expect("a mesh").bounds()[0][0])
+    };
+    assert_eq!(bounds(3.0), [3.0, -3.0]);
+    assert_eq!(bounds(4.0), [4.0, -4.0], "the same meshes, moved");
 }
 
 /// The visualizer has the half length of a cylinder as its third size, and numbers meshes by pairs. Mask ids count all
@@ -118,7 +157,9 @@ fn reader() -> MjvReader<OneTriangle> {
 #[test]
 fn shapes_poses_and_ids() {
     let rows = [geom(5, -1, [0.1, 0.1, 0.7], 0), geom(1000, -1, [1.0; 3], 1), geom(7, 1, [0.0; 3], 2)].concat();
-    let frame = reader().read(&rows, &[], Background::default()).expect("whole structures");
+    let mut reader = reader();
+    let frame = reader.read(&memory(&rows), Background::default()).expect("whole structures");
+    assert_eq!(reader.omitted(), ["geoms of type 1000 are not rendered: neither shapes nor skins nor flexes"]);
     let [cylinder, mesh] = frame.scene.instances() else { panic!("two instances") };
     let Shape::Cylinder(shape) = &cylinder.shape else { panic!("a cylinder") };
     assert_eq!((shape.radius, shape.half_length), (0.1, 0.7));
@@ -138,7 +179,7 @@ fn shapes_poses_and_ids() {
 fn shared_scenes() {
     let mut reader = reader();
     let mut row = geom(2, -1, [0.5; 3], 0);
-    let mut read = |row: &[u8]| reader.read(row, &[], Background::default()).expect("whole structures");
+    let mut read = |row: &[u8]| reader.read(&memory(row), Background::default()).expect("whole structures");
     let first = read(&row);
     put(&mut row, GEOM.pos, &[9.0, 9.0, 9.0]);
     let moved = read(&row);
@@ -150,11 +191,23 @@ fn shared_scenes() {
     assert_eq!(green.scene.instances()[0].material.rgba, [0.0, 1.0, 0.0, 1.0]);
 }
 
+/// A finite plane has a back, turned around x; an infinite plane has none.
+#[test]
+fn backs_of_planes() {
+    let rows = [geom(0, -1, [2.0, 3.0, 0.1], 0), geom(0, -1, [0.0; 3], 1)].concat();
+    let frame = reader().read(&memory(&rows), Background::default()).expect("whole structures");
+    assert_eq!(frame.scene.instances().iter().map(|plane| plane.mask_id).collect::<Vec<_>>(), [1, 1, 2]);
+    assert_eq!(frame.poses[0].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
+    assert_eq!(frame.poses[1].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, 1.0]);
+    assert_eq!(frame.poses[0].rotate([1.0, 0.0, 0.0]), frame.poses[1].rotate([1.0, 0.0, 0.0]));
+    assert!(frame.poses.iter().all(kinetoscope_scene::PoseF32::is_rigid));
+}
+
 /// Geoms without a segmentation id are visible in color only.
 #[test]
 fn geom_without_segment() {
     let rows = [geom(2, -1, [0.5; 3], -1), geom(2, -1, [0.5; 3], 0)].concat();
-    let frame = reader().read(&rows, &[], Background::default()).expect("whole structures");
+    let frame = reader().read(&memory(&rows), Background::default()).expect("whole structures");
     let visible = |scene: &kinetoscope_scene::RenderScene| {
         scene.instances().iter().map(|instance| instance.visible).collect::<Vec<_>>()
     };
@@ -174,7 +227,9 @@ fn lights() {
     let mut headlight = row.clone();
     headlight[LIGHT.headlight] = 1;
     put_int(&mut headlight, 24, 0);
-    let frame = reader().read(&[], &[row, headlight].concat(), Background::default()).expect("whole structures");
+    let lights = [row, headlight].concat();
+    let memory = MjvMemory { lights: &lights, ..MjvMemory::default() };
+    let frame = reader().read(&memory, Background::default()).expect("whole structures");
     let [sun, head] = &frame.lights[..] else { panic!("two lights") };
     assert_eq!((sun.kind, sun.cast_shadow, sun.diffuse), (LightKind::Directional, true, [0.5, 0.6, 0.7]));
     assert_eq!((head.kind, head.cast_shadow), (LightKind::Spot { cutoff_deg: 60.0, exponent: 10.0 }, false));
@@ -188,7 +243,7 @@ fn invalid_layouts_and_memory() {
     assert_eq!(outside.validate(), Err(error));
     assert_eq!(GeomLayout { mat: GEOM.stride - 36, ..GEOM }.validate(), Ok(()));
     assert!(LightLayout { castshadow: usize::MAX, ..LIGHT }.validate().is_err());
-    let half = reader().read(&[0; 100], &[], Background::default());
+    let half = reader().read(&memory(&[0; 100]), Background::default());
     assert_eq!(half.err(), Some(LayoutError::Length { bytes: 100, stride: GEOM.stride }));
 }
 

@@ -25,6 +25,7 @@ class FrameList:
         options: list[float],
         effects: list[bool],
         size: list[int],
+        soft: tuple[list[npt.NDArray[np.float32]], list[npt.NDArray[np.int32]]] | None = None,
     ) -> None: ...
     def render(
         self,

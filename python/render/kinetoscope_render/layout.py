@@ -24,7 +24,7 @@ _GEOM_OPTIONAL = ("matid", "texid", "texuniform", "texrepeat")
 _LIGHT_NUMBERS = ("id", "type", "directional", "cutoff", "exponent", "headlight", "castshadow")
 _LIGHT_ARRAYS = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
 _LIGHT_OPTIONAL = ("id", "type", "directional")
-_DECOR = ("mjGEOM_ARROW", "mjGEOM_ARROW1", "mjGEOM_ARROW2", "mjGEOM_LINE", "mjGEOM_SKIN")
+_DECOR = ("mjGEOM_ARROW", "mjGEOM_ARROW1", "mjGEOM_ARROW2", "mjGEOM_LINE", "mjGEOM_SKIN", "mjGEOM_FLEX")
 # Values of which all bytes differ.
 _INTEGERS = (0x5A5B5C5D, 0x25242322)
 _FLOATS = struct.unpack("=ff", struct.pack("=II", *_INTEGERS))

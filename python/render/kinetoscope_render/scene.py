@@ -161,5 +161,20 @@ class SceneCapture:
         effects = [bool(flags[_FLAGS[name]]) for name in ("mjRND_SHADOW", "mjRND_REFLECTION")]
         self.frames.capture(
             self._geoms[: scene.ngeom], self._lights[: scene.nlight], camera, [*on, *self._haze, *self._fog, far],
-            effects, [width, height],
+            effects, [width, height], self._soft(),
         )
+
+    def _soft(self) -> Optional[tuple[list[np.ndarray], list[np.ndarray]]]:
+        """Vertices of skins and flexes."""
+        scene = self.scene
+        has_flexes = getattr(scene, "nflex", 0) > 0
+        if not has_flexes and scene.nskin == 0:
+            return None
+        def flat(name: str, dtype: Any) -> np.ndarray:
+            array = getattr(scene, name, None) if has_flexes or name.startswith("skin") else None
+            return np.zeros(0, dtype) if array is None else np.ascontiguousarray(np.ravel(array), dtype)
+
+        floats = ("skinvert", "skinnormal", "flexface", "flexnormal", "flextexcoord")
+        return [flat(name, np.float32) for name in floats], [
+            flat(name, np.int32) for name in ("flexfaceadr", "flexfaceused")
+        ]

@@ -4,11 +4,11 @@ use crate::layout::{geom_layout, light_layout};
 use crate::model_arrays::ModelArrays;
 use crate::panic::catch;
 use kinetoscope_look::horizon_haze;
-use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvObject, MjvReader};
+use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader};
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest, ToneCurve, View};
 use kinetoscope_scene::Haze;
-use numpy::{PyReadonlyArray2, PyReadwriteArray1};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -54,6 +54,15 @@ fn slice_of<'a, T: numpy::Element>(array: &'a mut Option<PyReadwriteArray1<'_, T
     array.as_mut().map(|array| array.as_slice_mut().map_err(invalid)).transpose()
 }
 
+/// Vertices of skins and flexes: positions and normals of skins, positions, normals and texture coordinates of flexes;
+/// then index of the first triangle and number of triangles of each flex. All arrays are flat.
+type SoftArrays<'py> = ([PyReadonlyArray1<'py, f32>; 5], [PyReadonlyArray1<'py, i32>; 2]);
+
+/// Rows of `N` numbers of a flat array.
+fn rows<'a, const N: usize>(array: &'a PyReadonlyArray1<'_, f32>) -> PyResult<&'a [[f32; N]]> {
+    Ok(array.as_slice().map_err(invalid)?.as_chunks().0)
+}
+
 /// Numbers of the visual options of a frame, in the order of Python's `scene.py`.
 fn background(numbers: [f64; 13], has_skybox: bool) -> Background {
     let [skybox, haze, fog, haze_r, haze_g, haze_b, haze_width, fog_r, fog_g, fog_b, fog_start, fog_end, far] = numbers;
@@ -83,8 +92,9 @@ impl FrameList {
         catch(|| {
             let model = ModelArrays::from_dict(arrays)?;
             model.validate()?;
+            let skins = model.skins();
             let (geoms, lights) = (geom_layout(geom_fields)?, light_layout(light_fields)?);
-            let reader = MjvReader::new(model, geoms, lights).map_err(invalid)?;
+            let reader = MjvReader::new(model, skins, geoms, lights).map_err(invalid)?;
             let cfg = RasterCfg { samples, tone: ToneCurve::Clip, groups: u32::MAX, ..RasterCfg::default() };
             let renderer = ParallelRenderer::new(cfg, threads);
             let process = std::process::id();
@@ -109,7 +119,9 @@ impl FrameList {
     }
 
     /// Captures a scene: the memory of its geoms (N, stride) and lights (L, stride), its camera (position, forward, up,
-    /// center, half width, bottom, top, near, far) and its visual options.
+    /// center, half width, bottom, top, near, far), its visual options, and the vertices of its skins and flexes.
+    #[pyo3(signature = (geoms, lights, camera, options, effects, size, soft=None))]
+    #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn capture(
         &mut self,
         geoms: PyReadonlyArray2<'_, u8>,
@@ -118,6 +130,7 @@ impl FrameList {
         options: [f64; 13],
         effects: [bool; 2],
         size: [usize; 2],
+        soft: Option<SoftArrays<'_>>,
     ) -> PyResult<()> {
         catch(|| {
             let [px, py, pz, fx, fy, fz, ux, uy, uz, center, half_width, bottom, top, near, far] = camera;
@@ -139,7 +152,22 @@ impl FrameList {
             view.validate().map_err(invalid)?;
             let background = background(options, self.reader.has_skybox());
             let (geoms, lights) = (geoms.as_slice().map_err(invalid)?, lights.as_slice().map_err(invalid)?);
-            let content = self.reader.read(geoms, lights, background).map_err(invalid)?;
+            let mut memory = MjvMemory { geoms, lights, ..MjvMemory::default() };
+            if let Some((floats, integers)) = &soft {
+                let [skin_positions, skin_normals, flex_positions, flex_normals, flex_texcoords] = floats;
+                let [first_faces, faces] = integers;
+                memory = MjvMemory {
+                    skin_positions: rows(skin_positions)?,
+                    skin_normals: rows(skin_normals)?,
+                    flex_positions: rows(flex_positions)?,
+                    flex_normals: rows(flex_normals)?,
+                    flex_texcoords: rows(flex_texcoords)?,
+                    flex_first_faces: first_faces.as_slice().map_err(invalid)?,
+                    flex_faces: faces.as_slice().map_err(invalid)?,
+                    ..memory
+                };
+            }
+            let content = self.reader.read(&memory, background).map_err(invalid)?;
             let [shadows, reflections] = effects;
             self.frames.push(CapturedFrame { content, view, effects: Effects { shadows, reflections } });
             Ok(())

@@ -34,6 +34,7 @@ pub(crate) fn geom_layout(fields: &Bound<'_, PyDict>) -> PyResult<GeomLayout> {
             arrow2: optional(fields, "mjGEOM_ARROW2")?,
             line: optional(fields, "mjGEOM_LINE")?,
             skin: optional(fields, "mjGEOM_SKIN")?,
+            flex: optional(fields, "mjGEOM_FLEX")?,
         },
     })
 }
