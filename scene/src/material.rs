@@ -246,17 +246,27 @@ impl MipLevel {
         [0, 1, 2, 3].map(|k| self.bytes[at + k])
     }
 
-    /// Level of half the size, for an image of `faces` parts, one below the other: each pixel is the mean of four bytes
-    /// of its part. The last column and row of a part with an odd size are left out.
+    /// Level of half the size, for an image of `faces` parts, one below the other: each pixel is interpolated at its
+    /// center between four bytes of its part, as Mesa's `glGenerateMipmap` does. For even sizes that is their mean.
     fn half_size_of_bytes(&self, faces: u32) -> Self {
         let side = self.height / faces;
         let (width, height) = ((self.width / 2).max(1), (side / 2).max(1));
         let pixel = |k: u32| {
             let (face, in_face) = (k / (width * height), k % (width * height));
-            let (x, y) = (2 * (in_face % width), 2 * (in_face / width));
+            // The first of two neighbors, and the weight of the second.
+            let place = |k: u32, from: u32, to: u32| {
+                let twice = (2 * k + 1) * from;
+                let (first, rest) = ((twice - to) / (2 * to), (twice - to) % (2 * to));
+                (first, f64::from(rest) / f64::from(2 * to))
+            };
+            let ((x, fx), (y, fy)) = (place(in_face % width, self.width, width), place(in_face / width, side, height));
             let at = |x: u32, y: u32| self.pixel(x.min(self.width - 1), face * side + y.min(side - 1));
-            let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
-            let mean = |c: usize| ((four.iter().map(|p| u32::from(p[c])).sum::<u32>() + 2) / 4) as u8;
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            let mean = |k: usize| {
+                let [a, b, c, d] = [a, b, c, d].map(|pixel| f64::from(pixel[k]));
+                let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
+                (top + (bottom - top) * fy + 0.5) as u8
+            };
             [mean(0), mean(1), mean(2), 255]
         };
         Self::new(width, faces * height, &(0..faces * width * height).map(pixel).collect::<Vec<_>>())
@@ -315,21 +325,33 @@ mod tests {
         assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "the table must increase");
     }
 
-    /// A column of white texels in each face of a cube whose side is odd. Means of bytes: (255 + 0) / 2 rounds to 128.
-    /// In linear light, such a cube has one level.
+    /// A white column, the second of each face of a cube with a side of 5. The centers of the two columns of the next
+    /// level are at 1.25 and 3.75 texels: the first is interpolated between columns 0 and 1 with weights of 1/4 and 3/4.
+    /// The last level is the mean of both. With a side of 3, the middle column stays as it is. In linear light, such
+    /// cubes have one level.
     #[test]
     fn mip_levels_of_bytes() {
-        let pixel = |k: usize| if k % 5 == 1 { [255; 3] } else { [0; 3] };
-        let data: Vec<u8> = (0..5 * 30).flat_map(pixel).collect();
-        let cube = |space| Texture::averaged_in(space, TextureKind::Cube, 5, 30, 3, &data).expect("six squares");
-        let levels = cube(LightingSpace::Display);
-        let sizes: Vec<_> = levels.mip_levels().iter().map(|level| [level.width(), level.height()]).collect();
+        let bytes = |side: usize, white: usize| -> Vec<u8> {
+            (0..6 * side * side).flat_map(|k| if k % side == white { [255; 3] } else { [0; 3] }).collect()
+        };
+        let cube = |space, side: u32, white: usize| {
+            let data = bytes(side as usize, white);
+            Texture::averaged_in(space, TextureKind::Cube, side, 6 * side, 3, &data).expect("six squares")
+        };
+        let row = |texture: &Texture, level: usize, y: u32| -> Vec<u8> {
+            let level = &texture.mip_levels()[level];
+            (0..level.width()).map(|x| level.pixel(x, y)[0]).collect()
+        };
+        let five = cube(LightingSpace::Display, 5, 1);
+        let sizes: Vec<_> = five.mip_levels().iter().map(|level| [level.width(), level.height()]).collect();
         assert_eq!(sizes, [[5, 30], [2, 12], [1, 6]]);
-        for row in 0..12 {
-            assert_eq!([0, 1].map(|x| levels.mip_levels()[1].pixel(x, row)[0]), [128, 0], "row {row}");
+        for y in 0..12 {
+            assert_eq!(row(&five, 1, y), [191, 0], "row {y}: three quarters of 255");
         }
-        assert_eq!(cube(LightingSpace::Linear).mip_levels().len(), 1);
-        let even = &data[..3 * 4];
+        assert_eq!(row(&five, 2, 3), [96], "half of 191");
+        assert_eq!(row(&cube(LightingSpace::Display, 3, 1), 1, 5), [255]);
+        assert_eq!(cube(LightingSpace::Linear, 5, 1).mip_levels().len(), 1);
+        let even = &bytes(4, 1)[..3 * 4];
         let plane = |space| Texture::averaged_in(space, TextureKind::TwoD, 2, 2, 3, even).expect("a texture");
         assert_eq!(plane(LightingSpace::Display).mip_levels()[1].pixel(0, 0)[0], 64);
         assert_eq!(plane(LightingSpace::Linear), Texture::new(TextureKind::TwoD, 2, 2, 3, even).expect("a texture"));

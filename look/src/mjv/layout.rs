@@ -160,6 +160,8 @@ pub(super) struct PosedLight {
     pub(super) values: LightValues,
     pub(super) position: [f32; 3],
     pub(super) direction: [f32; 3],
+    /// True for the headlight, whose direction some versions leave to the renderer.
+    pub(super) is_headlight: bool,
 }
 
 impl LightLayout {
@@ -209,7 +211,8 @@ impl LightLayout {
             specular: floats(row, self.specular),
             radius: 0.0,
         };
-        PosedLight { values, position: floats(row, self.pos), direction: floats(row, self.dir) }
+        let is_headlight = row[self.headlight] != 0;
+        PosedLight { values, position: floats(row, self.pos), direction: floats(row, self.dir), is_headlight }
     }
 }
 

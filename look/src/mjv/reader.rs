@@ -127,7 +127,8 @@ impl<M: VisualModel> MjvReader<M> {
             .chunks_exact(self.lights.stride)
             .map(|row| {
                 let light = self.lights.read(row);
-                let (position, direction) = (light.position, light.direction);
+                let position = light.position;
+                let direction = if light.is_headlight { memory.forward } else { light.direction };
                 Light { position, direction, ..scene_light(&light.values, LightingSpace::Display) }
             })
             .collect();
@@ -241,9 +242,10 @@ impl<M: VisualModel> MjvReader<M> {
         scene.headlight = Headlight { active: false, ..Headlight::default() };
         scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
         scene.lighting_space = LightingSpace::Display;
-        scene.sky = Sky::uniform([0.0; 3]);
-        scene.skybox = self.sky.clone().filter(|_| background.skybox);
-        scene.horizon = background.horizon;
+        // The background is behind all fog.
+        scene.sky = Sky::uniform(background.fog.and_then(|fog| fog.color).unwrap_or([0.0; 3]));
+        scene.skybox = self.sky.clone().filter(|_| background.skybox && background.fog.is_none());
+        scene.horizon = background.horizon.filter(|_| background.fog.is_none());
         scene.haze = background.fog;
         Some(scene)
     }

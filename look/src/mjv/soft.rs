@@ -24,6 +24,8 @@ pub struct MjvMemory<'a> {
     pub geoms: &'a [u8],
     /// Structures `mjvLight`.
     pub lights: &'a [u8],
+    /// Viewing direction of the camera, which is the direction of the headlight.
+    pub forward: [f32; 3],
     /// Positions of the vertices of all skins (`skinvert`).
     pub skin_positions: &'a [[f32; 3]],
     /// Normals of the vertices of all skins (`skinnormal`).

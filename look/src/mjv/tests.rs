@@ -226,14 +226,14 @@ fn lights() {
     row[LIGHT.castshadow] = 1;
     let mut headlight = row.clone();
     headlight[LIGHT.headlight] = 1;
-    put_int(&mut headlight, 24, 0);
+    put(&mut headlight, LIGHT.dir, &[0.0; 3]);
     let lights = [row, headlight].concat();
-    let memory = MjvMemory { lights: &lights, ..MjvMemory::default() };
+    let memory = MjvMemory { lights: &lights, forward: [0.6, 0.8, 0.0], ..MjvMemory::default() };
     let frame = reader().read(&memory, Background::default()).expect("whole structures");
     let [sun, head] = &frame.lights[..] else { panic!("two lights") };
     assert_eq!((sun.kind, sun.cast_shadow, sun.diffuse), (LightKind::Directional, true, [0.5, 0.6, 0.7]));
-    assert_eq!((head.kind, head.cast_shadow), (LightKind::Spot { cutoff_deg: 60.0, exponent: 10.0 }, false));
-    assert_eq!((head.position, head.direction), ([0.0, 0.0, 4.0], [0.0, 0.0, -1.0]));
+    assert_eq!((head.kind, head.cast_shadow), (LightKind::Directional, false));
+    assert_eq!((sun.direction, head.direction), ([0.0, 0.0, -1.0], [0.6, 0.8, 0.0]));
 }
 
 #[test]

@@ -152,7 +152,8 @@ impl FrameList {
             view.validate().map_err(invalid)?;
             let background = background(options, self.reader.has_skybox());
             let (geoms, lights) = (geoms.as_slice().map_err(invalid)?, lights.as_slice().map_err(invalid)?);
-            let mut memory = MjvMemory { geoms, lights, ..MjvMemory::default() };
+            let forward = camera.forward.map(|x| x as f32);
+            let mut memory = MjvMemory { geoms, lights, forward, ..MjvMemory::default() };
             if let Some((floats, integers)) = &soft {
                 let [skin_positions, skin_normals, flex_positions, flex_normals, flex_texcoords] = floats;
                 let [first_faces, faces] = integers;

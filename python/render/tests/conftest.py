@@ -8,7 +8,7 @@ import mujoco  # noqa: E402
 import pytest  # noqa: E402
 
 HEADER = """
-  <visual><headlight ambient=".2 .2 .2" diffuse=".4 .4 .4" specular=".1 .1 .1"/></visual>
+  <visual><map fogstart=".5" fogend="3"/><headlight ambient=".2 .2 .2" diffuse=".4 .4 .4" specular=".1 .1 .1"/></visual>
   <asset>
     <texture type="skybox" builtin="gradient" rgb1=".3 .5 .7" rgb2=".05 .05 .1" width="64" height="384"/>
     <texture name="grid" type="2d" builtin="checker" rgb1=".1 .2 .3" rgb2=".2 .3 .4" width="128" height="128"/>
@@ -25,6 +25,7 @@ SHAPES = f"""<mujoco>{HEADER}
     <light name="top" pos="0 -1 3" dir="0 .3 -1" diffuse=".6 .6 .6"/>
     <camera name="front" pos="0 -2.2 1.1" xyaxes="1 0 0 0 .4 .9"/>
     <camera name="side" pos="2.2 .4 .9" xyaxes="-.2 1 0 -.35 -.07 .93"/>
+    <camera name="level" pos="0 -4 .6" xyaxes="1 0 0 0 -.05 1"/>
     <geom name="floor" type="plane" size="0 0 .1" material="grid"/>
     <geom name="ball" size=".2" pos="-.8 0 .2" material="shiny"/>
     <geom name="capsule" type="capsule" size=".1 .2" pos="-.35 0 .3" material="cross"/>

@@ -58,8 +58,8 @@ def test_images(name, xml, camera, least):
     hit = same & inside(theirs[2]) & (theirs[1] < 0.9 * model.vis.map.zfar * model.stat.extent)
     assert hit.mean() > 0.05, "the scene is visible"
     error = np.abs(theirs[1] - ours[1])[hit] / theirs[1][hit]
-    # Before 3.0, their conversion of depth subtracts nearly equal numbers of single precision.
-    assert np.median(error) < (1e-6 if version() >= (3, 0) else 1e-3), name
+    # Before 3.0, their depth differs from closed forms by up to a percent; test_depth_of_a_plane checks ours.
+    assert np.median(error) < (1e-6 if version() >= (3, 0) else 1e-2), name
     assert psnr(theirs[0], ours[0]) >= least, name
     # The check can fail: another view differs.
     moved, other = load(xml)
@@ -75,7 +75,7 @@ def test_flags(flag, shapes):
     changes = []
     for cls in (mujoco.Renderer, kr.Renderer):
         renderer = cls(shapes[0], *SIZE)
-        renderer.update_scene(shapes[1], "front")
+        renderer.update_scene(shapes[1], "level")
         before = renderer.render().astype(int)
         index = int(getattr(mujoco.mjtRndFlag, flag))
         renderer.scene.flags[index] = 1 - renderer.scene.flags[index]

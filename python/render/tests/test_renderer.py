@@ -100,7 +100,7 @@ def test_invalid_arguments(shapes):
     del small
     for arguments, error, text in (
         ((data, "fornt"), ValueError, "\"fornt\" does not exist. Candidates: 'front'"),
-        ((data, 2), ValueError, r"The camera id 2 is out of range \[-1, 2\)"),
+        ((data, 3), ValueError, r"The camera id 3 is out of range \[-1, 3\)"),
         ((data, -2), ValueError, "The camera id -2"),
         ((data, 1.0), TypeError, "camera must be a name, an id"),
         ((other,), ValueError, "data belongs to another model: qpos has 0 rows"),
