@@ -26,17 +26,10 @@ pub enum LayoutError {
     },
 }
 
-/// Numbers of types of `mjvGeom` that differ between versions of MuJoCo; `None` for types that a version lacks.
+/// Numbers of the types of skins and flexes in `mjvGeom`, which differ between versions of MuJoCo; `None` for types that a
+/// version lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DecorTypes {
-    /// Arrow with a head at its end.
-    pub arrow: Option<i32>,
-    /// Arrow without the wide part of the head.
-    pub arrow1: Option<i32>,
-    /// Arrow with two heads.
-    pub arrow2: Option<i32>,
-    /// Line.
-    pub line: Option<i32>,
+pub struct SoftTypes {
     /// Skin.
     pub skin: Option<i32>,
     /// Flex.
@@ -85,8 +78,8 @@ pub struct GeomLayout {
     pub shininess: usize,
     /// `reflectance`.
     pub reflectance: usize,
-    /// Numbers of the types of decorations.
-    pub decor: DecorTypes,
+    /// Numbers of the types of skins and flexes.
+    pub soft: SoftTypes,
 }
 
 impl GeomLayout {

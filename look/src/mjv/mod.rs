@@ -16,6 +16,6 @@ mod tests;
 
 pub use camera::{MjvCamera, MjvCameraError};
 pub use frame::{Background, MjvFrame, MjvObject};
-pub use layout::{DecorTypes, GeomLayout, LayoutError, LightLayout};
+pub use layout::{GeomLayout, LayoutError, LightLayout, SoftTypes};
 pub use reader::MjvReader;
 pub use soft::{MjvMemory, SkinFaces};

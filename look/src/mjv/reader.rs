@@ -66,7 +66,7 @@ struct GeomLook {
 
 impl GeomLook {
     fn read(row: &[u8], layout: &GeomLayout, skins: &[SkinFaces], memory: &MjvMemory<'_>) -> Self {
-        let soft = SoftBody::of(int(row, layout.kind), int(row, layout.objid), &layout.decor);
+        let soft = SoftBody::of(int(row, layout.kind), int(row, layout.objid), &layout.soft);
         let number = |at: Option<usize>| at.map_or(-1, |at| int(row, at));
         let bits = |at: usize| int(row, at) as u32;
         Self {

@@ -1,6 +1,6 @@
 //! Skins and flexes: meshes whose vertices MuJoCo's visualizer computes.
 
-use super::layout::DecorTypes;
+use super::layout::SoftTypes;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::RenderMesh;
 
@@ -51,7 +51,7 @@ pub(super) enum SoftBody {
 
 impl SoftBody {
     /// The skin or flex of a geom of type `kind` with this object id; `None` for other types.
-    pub(super) fn of(kind: i32, object: i32, types: &DecorTypes) -> Option<Self> {
+    pub(super) fn of(kind: i32, object: i32, types: &SoftTypes) -> Option<Self> {
         let index = usize::try_from(object).ok()?;
         match Some(kind) {
             kind if kind == types.skin => Some(Self::Skin(index)),

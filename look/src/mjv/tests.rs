@@ -63,7 +63,7 @@ const GEOM: GeomLayout = GeomLayout {
     specular: 124,
     shininess: 128,
     reflectance: 132,
-    decor: DecorTypes { arrow: None, arrow1: None, arrow2: None, line: None, skin: Some(106), flex: Some(105) },
+    soft: SoftTypes { skin: Some(106), flex: Some(105) },
 };
 
 const LIGHT: LightLayout = LightLayout {

@@ -24,7 +24,7 @@ _GEOM_OPTIONAL = ("matid", "texid", "texuniform", "texrepeat")
 _LIGHT_NUMBERS = ("id", "type", "directional", "cutoff", "exponent", "headlight", "castshadow")
 _LIGHT_ARRAYS = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
 _LIGHT_OPTIONAL = ("id", "type", "directional")
-_DECOR = ("mjGEOM_ARROW", "mjGEOM_ARROW1", "mjGEOM_ARROW2", "mjGEOM_LINE", "mjGEOM_SKIN", "mjGEOM_FLEX")
+_SOFT = ("mjGEOM_SKIN", "mjGEOM_FLEX")
 # Values of which all bytes differ.
 _INTEGERS = (0x5A5B5C5D, 0x25242322)
 _FLOATS = struct.unpack("=ff", struct.pack("=II", *_INTEGERS))
@@ -113,7 +113,7 @@ def layouts() -> Layouts:
     light = _measure("mjvLight", scene.lights, _LIGHT_NUMBERS, _LIGHT_ARRAYS, _LIGHT_OPTIONAL)
     if "type" not in light and "directional" not in light:
         raise LayoutError(f"mjvLight of mujoco {mujoco.__version__} has neither 'type' nor 'directional'")
-    geom.update({name: int(getattr(mujoco.mjtGeom, name)) for name in _DECOR if hasattr(mujoco.mjtGeom, name)})
+    geom.update({name: int(getattr(mujoco.mjtGeom, name)) for name in _SOFT if hasattr(mujoco.mjtGeom, name)})
     return Layouts(geom=geom, light=light)
 
 

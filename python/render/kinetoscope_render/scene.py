@@ -150,7 +150,7 @@ class SceneCapture:
         left, right = scene.camera
         if getattr(left, "orthographic", 0):
             raise NotImplementedError("orthographic cameras are not supported")
-        # As for MuJoCo's images, the camera is midway between the two eyes.
+        # The cameras of a stereo pair are averaged, as in MuJoCo's images.
         position = (0.5 * (left.pos + right.pos)).tolist()
         near, far = float(left.frustum_near), float(left.frustum_far)
         camera = [

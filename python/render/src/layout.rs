@@ -1,11 +1,12 @@
 //! Layouts of MuJoCo's structures, from dictionaries of Python.
 
-use kinetoscope_look::mjv::{DecorTypes, GeomLayout, LightLayout};
+use kinetoscope_look::mjv::{GeomLayout, LightLayout, SoftTypes};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Layout of `mjvGeom`: `stride`, the byte offsets of fields by name, and the numbers of types of decorations.
+/// Layout of `mjvGeom`: `stride`, the byte offsets of fields by name, and the numbers of the types of skins and
+/// flexes.
 pub(crate) fn geom_layout(fields: &Bound<'_, PyDict>) -> PyResult<GeomLayout> {
     let get = |name| required(fields, name);
     Ok(GeomLayout {
@@ -28,14 +29,7 @@ pub(crate) fn geom_layout(fields: &Bound<'_, PyDict>) -> PyResult<GeomLayout> {
         specular: get("specular")?,
         shininess: get("shininess")?,
         reflectance: get("reflectance")?,
-        decor: DecorTypes {
-            arrow: optional(fields, "mjGEOM_ARROW")?,
-            arrow1: optional(fields, "mjGEOM_ARROW1")?,
-            arrow2: optional(fields, "mjGEOM_ARROW2")?,
-            line: optional(fields, "mjGEOM_LINE")?,
-            skin: optional(fields, "mjGEOM_SKIN")?,
-            flex: optional(fields, "mjGEOM_FLEX")?,
-        },
+        soft: SoftTypes { skin: optional(fields, "mjGEOM_SKIN")?, flex: optional(fields, "mjGEOM_FLEX")? },
     })
 }
 

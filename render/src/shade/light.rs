@@ -264,7 +264,15 @@ fn skybox<S: Simd>(s: S, image: &Texture, rule: MipRule, direction: V3<S>, pixel
         || {
             let all = direction.z.simd_eq(direction.z);
             let turned = V3 { x: direction.x, y: direction.z, z: -direction.y };
-            let [r, g, b] = texture::sample_cube(s, image, rule, turned, splat(s, pixel), all);
+            let footprint = match rule {
+                MipRule::Sharp => splat(s, pixel),
+                // Away from the middle of a face, a pixel is wider on it, by the square of the distance to the face.
+                MipRule::OpenGl => {
+                    let nearest = max(max(abs(turned.x), abs(turned.y)), abs(turned.z));
+                    splat(s, pixel) / max(nearest * nearest, splat(s, 1e-3))
+                }
+            };
+            let [r, g, b] = texture::sample_cube(s, image, rule, turned, footprint, all);
             V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
         },
     )
