@@ -15,8 +15,8 @@ import mujoco  # noqa: E402
 
 import kinetoscope_render as kr  # noqa: E402
 
-ROUNDS = 5
-SECONDS = 0.4
+ROUNDS = 3
+SECONDS = 0.25
 
 
 def measure(renderer, data, camera):

@@ -17,6 +17,9 @@ class Renderer:
     """
 
     _capture: Optional[SceneCapture] = None
+    # Attributes of mujoco.Renderer that some programs read: there are no such contexts here.
+    _gl_context = None
+    _mjr_context = None
 
     def __init__(
         self,
@@ -159,6 +162,9 @@ class Renderer:
         return self
 
     def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def __del__(self) -> None:
         self.close()
 
 

@@ -56,6 +56,15 @@ def resolve_camera(model: mujoco.MjModel, camera: Union[int, str, "mujoco.MjvCam
         ValueError: The model has no such camera.
     """
     if isinstance(camera, mujoco.MjvCamera):
+        # MuJoCo ends the process for ids that do not exist.
+        kinds = mujoco.mjtCamera
+        for kind, field, count, size in (
+            (kinds.mjCAMERA_FIXED, "fixedcamid", "ncam", model.ncam),
+            (kinds.mjCAMERA_TRACKING, "trackbodyid", "nbody", model.nbody),
+        ):
+            index = getattr(camera, field)
+            if int(camera.type) == int(kind) and not 0 <= index < size:
+                raise ValueError(f"camera.{field} = {index} is out of range: the model has {count} = {size}")
         return camera
     index = camera
     if isinstance(index, str):

@@ -108,6 +108,12 @@ def test_invalid_arguments(shapes):
     ):
         with pytest.raises(error, match=text):
             renderer.update_scene(*arguments)
+    for kind, field in (("mjCAMERA_FIXED", "fixedcamid"), ("mjCAMERA_TRACKING", "trackbodyid")):
+        camera = mujoco.MjvCamera()
+        camera.type = int(getattr(mujoco.mjtCamera, kind))
+        setattr(camera, field, 50)
+        with pytest.raises(ValueError, match=f"camera.{field} = 50 is out of range"):
+            renderer.update_scene(data, camera)
     renderer.update_scene(data)
     renderer.scene.flags[int(mujoco.mjtRndFlag.mjRND_WIREFRAME)] = 1
     with pytest.raises(NotImplementedError, match="mjRND_WIREFRAME"):
