@@ -467,9 +467,13 @@ fn texels<S: Simd>(
 ) -> Option<[F<S>; 3]> {
     let instance = source.instance;
     let image = instance.material.texture.as_deref()?;
-    // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces.
+    // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces; the wide side in
+    // OpenGL.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
-    let width = at.t * pixel / sqrt_or_zero(s, slant);
+    let width = match rule {
+        MipRule::Sharp => at.t * pixel / sqrt_or_zero(s, slant),
+        MipRule::OpenGl => at.t * pixel / slant,
+    };
     let scale = source.texture_scale;
     Some(if texture::is_cube(image) {
         let direction = V3 {
