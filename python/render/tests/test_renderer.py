@@ -99,7 +99,7 @@ def test_invalid_arguments(shapes):
     small, other = load("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     del small
     for arguments, error, text in (
-        ((data, "fornt"), ValueError, "\"fornt\" does not exist. Candidates: 'front'"),
+        ((data, "frnt"), ValueError, "\"frnt\" does not exist. Candidates: 'front'"),
         ((data, 3), ValueError, r"The camera id 3 is out of range \[-1, 3\)"),
         ((data, -2), ValueError, "The camera id -2"),
         ((data, 1.0), TypeError, "camera must be a name, an id"),
