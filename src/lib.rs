@@ -12,6 +12,7 @@ mod recording_playback;
 #[cfg(all(feature = "record", feature = "viewer"))]
 pub use file_recording::FileRecording;
 pub use kinetoscope_exec as exec;
+pub use kinetoscope_look as look;
 pub use kinetoscope_mujoco as mujoco;
 #[cfg(feature = "record")]
 pub use kinetoscope_record as record;

@@ -74,9 +74,6 @@ pub use skin_flex::{Bone, FlexArrays, SkinArrays};
 pub use state::{BodyInputs, IntegrationState, JointInputs, SolvedState, UnnormalizedQuats, UserInputs};
 pub use unsupported::UnsupportedFeature;
 pub use version::{BUILD_VERSION, SupportedVersion, VersionError, check_version, version_string};
-pub use visual::{
-    HeadlightValues, HeightFieldArrays, LightType, LightValues, MaterialValues, MeshArrays, TextureArrays, TextureType,
-};
 pub use weld::Weld;
 
 pub use mujoco_sys as sys;

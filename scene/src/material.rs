@@ -1,5 +1,6 @@
 //! Surface materials and textures.
 
+use crate::light::LightingSpace;
 use std::sync::Arc;
 use std::sync::OnceLock;
 
@@ -85,7 +86,7 @@ pub enum TextureKind {
     Cube,
 }
 
-/// A texture with its mip chain, which is averaged in linear light.
+/// A texture with its mip chain, which is averaged in linear light or, for [`LightingSpace::Display`], as bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     kind: TextureKind,
@@ -127,12 +128,31 @@ pub enum TextureError {
 }
 
 impl Texture {
-    /// Creates a texture from sRGB pixels of `channels` (3 or 4) bytes, from the top left. Opacity is ignored.
+    /// Creates a texture from sRGB pixels of `channels` (3 or 4) bytes, from the top left. Opacity is ignored. The mip
+    /// levels are averaged in linear light.
     ///
     /// # Errors
     ///
     /// The sizes are zero, above 65536 or do not fit the number of bytes, or a cube texture is not six squares.
     pub fn new(kind: TextureKind, width: u32, height: u32, channels: u32, data: &[u8]) -> Result<Self, TextureError> {
+        Self::averaged_in(LightingSpace::Linear, kind, width, height, channels, data)
+    }
+
+    /// As [`new`](Self::new), with mip levels that are averaged in a lighting space. Those of
+    /// [`LightingSpace::Display`] are the levels of MuJoCo's renderer: means of bytes, down to one pixel for the faces
+    /// of every cube.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new).
+    pub fn averaged_in(
+        space: LightingSpace,
+        kind: TextureKind,
+        width: u32,
+        height: u32,
+        channels: u32,
+        data: &[u8],
+    ) -> Result<Self, TextureError> {
         let expected = u64::from(width) * u64::from(height) * u64::from(channels);
         if !(3..=4).contains(&channels) || expected == 0 || expected != data.len() as u64 || width.max(height) > 1 << 16
         {
@@ -143,13 +163,18 @@ impl Texture {
         }
         let pixels: Vec<_> = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
         let mut levels = vec![MipLevel::new(width, height, &pixels)];
-        // The faces of a cube must not mix, so only levels with an even side are halved.
+        let is_cube = kind == TextureKind::Cube;
+        // The faces of a cube must not mix, so only levels with an even side are halved as a whole.
         let shrinks = |l: &MipLevel| match kind {
             TextureKind::TwoD => l.width > 1 || l.height > 1,
+            TextureKind::Cube if space == LightingSpace::Display => l.width > 1,
             TextureKind::Cube => l.width.is_multiple_of(2),
         };
         while let Some(last) = levels.last().filter(|l| shrinks(l)) {
-            let next = last.half_size();
+            let next = match space {
+                LightingSpace::Linear => last.half_size(),
+                LightingSpace::Display => last.half_size_of_bytes(if is_cube { 6 } else { 1 }),
+            };
             levels.push(next);
         }
         Ok(Self { kind, levels })
@@ -221,6 +246,32 @@ impl MipLevel {
         [0, 1, 2, 3].map(|k| self.bytes[at + k])
     }
 
+    /// Level of half the size, for an image of `faces` parts, one below the other: each pixel is interpolated at its
+    /// center between four bytes of its part, as Mesa's `glGenerateMipmap` does. For even sizes that is their mean.
+    fn half_size_of_bytes(&self, faces: u32) -> Self {
+        let side = self.height / faces;
+        let (width, height) = ((self.width / 2).max(1), (side / 2).max(1));
+        let pixel = |k: u32| {
+            let (face, in_face) = (k / (width * height), k % (width * height));
+            // The first of two neighbors, and the weight of the second.
+            let place = |k: u32, from: u32, to: u32| {
+                let twice = (2 * k + 1) * from;
+                let (first, rest) = ((twice - to) / (2 * to), (twice - to) % (2 * to));
+                (first, f64::from(rest) / f64::from(2 * to))
+            };
+            let ((x, fx), (y, fy)) = (place(in_face % width, self.width, width), place(in_face / width, side, height));
+            let at = |x: u32, y: u32| self.pixel(x.min(self.width - 1), face * side + y.min(side - 1));
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            let mean = |k: usize| {
+                let [a, b, c, d] = [a, b, c, d].map(|pixel| f64::from(pixel[k]));
+                let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
+                (top + (bottom - top) * fy + 0.5) as u8
+            };
+            [mean(0), mean(1), mean(2), 255]
+        };
+        Self::new(width, faces * height, &(0..faces * width * height).map(pixel).collect::<Vec<_>>())
+    }
+
     /// Level of half the size; each pixel is the mean of four in linear light.
     fn half_size(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
@@ -272,6 +323,38 @@ mod tests {
         // Round trip of every byte.
         assert!((0..=255).all(|byte: u8| linear_to_srgb8(table[byte as usize]) == byte));
         assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "the table must increase");
+    }
+
+    /// A white column, the second of each face of a cube with a side of 5. The centers of the two columns of the next
+    /// level are at 1.25 and 3.75 texels: the first is interpolated between columns 0 and 1 with weights of 1/4 and 3/4.
+    /// The last level is the mean of both. With a side of 3, the middle column stays as it is. In linear light, such
+    /// cubes have one level.
+    #[test]
+    fn mip_levels_of_bytes() {
+        let bytes = |side: usize, white: usize| -> Vec<u8> {
+            (0..6 * side * side).flat_map(|k| if k % side == white { [255; 3] } else { [0; 3] }).collect()
+        };
+        let cube = |space, side: u32, white: usize| {
+            let data = bytes(side as usize, white);
+            Texture::averaged_in(space, TextureKind::Cube, side, 6 * side, 3, &data).expect("six squares")
+        };
+        let row = |texture: &Texture, level: usize, y: u32| -> Vec<u8> {
+            let level = &texture.mip_levels()[level];
+            (0..level.width()).map(|x| level.pixel(x, y)[0]).collect()
+        };
+        let five = cube(LightingSpace::Display, 5, 1);
+        let sizes: Vec<_> = five.mip_levels().iter().map(|level| [level.width(), level.height()]).collect();
+        assert_eq!(sizes, [[5, 30], [2, 12], [1, 6]]);
+        for y in 0..12 {
+            assert_eq!(row(&five, 1, y), [191, 0], "row {y}: three quarters of 255");
+        }
+        assert_eq!(row(&five, 2, 3), [96], "half of 191");
+        assert_eq!(row(&cube(LightingSpace::Display, 3, 1), 1, 5), [255]);
+        assert_eq!(cube(LightingSpace::Linear, 5, 1).mip_levels().len(), 1);
+        let even = &bytes(4, 1)[..3 * 4];
+        let plane = |space| Texture::averaged_in(space, TextureKind::TwoD, 2, 2, 3, even).expect("a texture");
+        assert_eq!(plane(LightingSpace::Display).mip_levels()[1].pixel(0, 0)[0], 64);
+        assert_eq!(plane(LightingSpace::Linear), Texture::new(TextureKind::TwoD, 2, 2, 3, even).expect("a texture"));
     }
 
     #[test]

@@ -8,7 +8,8 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, site, source_check, spelling, wheel,
+    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, python_package, site, source_check,
+    spelling, wheel,
 };
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -115,6 +116,12 @@ const STAGES: &[Stage] = &[
         run: |c| {
             examples::run(c.repo, &c.wheel()?, &test::version_dependent_packages(), RowSelection::VersionDependent)
         },
+    },
+    Stage {
+        name: "python",
+        what: "the Python package with several versions of mujoco",
+        when: When::Wheel,
+        run: |c| python_package::test(c.repo),
     },
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];

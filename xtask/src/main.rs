@@ -1,11 +1,11 @@
-//! The project's commands: `cargo xtask demo | test | ci | docs | bench | physics-report | mutate | bless`.
+//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | bless`.
 //!
 //! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
 //! MuJoCo, so that it builds before MuJoCo is installed.
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `site` (`docs`), `bench`, `physics_report`, `mutate`, `bless` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package` (`wheel`), `bench`, `physics_report`, `mutate`, `bless` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
@@ -31,6 +31,7 @@ mod physics_page;
 mod physics_report;
 mod progress;
 mod python;
+mod python_package;
 mod robots;
 mod run;
 mod same_images;
@@ -67,6 +68,8 @@ enum Task {
     /// The first run compiles mdbook into target/tools, which takes some minutes. Links between pages, to the API and to
     /// source files are checked.
     Docs(site::DocsArgs),
+    /// Build the wheel of the Python package kinetoscope-render into target/wheels
+    Wheel(python_package::WheelArgs),
     /// Compare with the baselines; without a name also writes benches/RESULTS.md
     Bench(bench::BenchArgs),
     /// Check the laws of physics on both supported MuJoCo versions; writes docs/physics.md
@@ -84,6 +87,7 @@ impl Cli {
             Task::Test(args) => test::run(repo, args),
             Task::Ci(args) => ci::run(repo, args),
             Task::Docs(args) => site::run(repo, args),
+            Task::Wheel(args) => python_package::run(repo, args),
             Task::Bench(args) => bench::run(repo, args),
             Task::PhysicsReport(args) => physics_report::run(repo, args),
             Task::Mutate(args) => mutate::run(repo, args),

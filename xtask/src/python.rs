@@ -113,7 +113,7 @@ pub(crate) fn typos(repo: &Repo) -> Option<PathBuf> {
 }
 
 /// Installs wheels only: building PyBullet takes a compiler and half an hour.
-fn pip_install(python: &Path, packages: &[&str]) -> XtaskResult {
+pub(crate) fn pip_install(python: &Path, packages: &[&str]) -> XtaskResult {
     Cmd::new(python)
         .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--only-binary=:all:"])
         .args(packages)

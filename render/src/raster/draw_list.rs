@@ -7,7 +7,7 @@ use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::RenderMesh;
-use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
+use kinetoscope_scene::{Instance, LightingSpace, Marker, PoseF32, RenderScene};
 
 /// A primitive or a cluster that may be visible.
 #[derive(Clone, Copy, Debug)]
@@ -71,10 +71,11 @@ impl Layer {
     }
 
     /// True if an instance casts shadows into shadow maps: it is rendered, its alpha is at least 0.5, and it is not a
-    /// marker. Markers show measurements and are not part of the scene.
-    pub(crate) fn casts_shadows(instance: &Instance, groups: u32) -> bool {
+    /// marker. Markers show measurements and are not part of the scene. In MuJoCo's renderer, transparent objects cast
+    /// shadows whatever their alpha.
+    pub(crate) fn casts_shadows(instance: &Instance, groups: u32, space: LightingSpace) -> bool {
         Self::for_instance(instance, groups) != Self::Hidden
-            && instance.material.rgba[3] >= 0.5
+            && (instance.material.rgba[3] >= 0.5 || space == LightingSpace::Display)
             && instance.group != Marker::GROUP
     }
 }

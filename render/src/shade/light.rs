@@ -4,7 +4,8 @@ use super::horizon::Horizon;
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{InstanceSurface, Surface};
-use super::{texture, tone};
+use super::texture::{self, MipRule};
+use super::tone;
 use crate::simd::{F, M, Simd, V3, abs, max, min, select, splat, sqrt_or_zero};
 use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, RenderScene, Texture};
 use std::sync::Arc;
@@ -21,6 +22,9 @@ struct PreparedLight {
     cutoff_cos: f32,
     exponent: u32,
     shadow: Option<usize>,
+    /// True if the light is a drawing pass of its own, as lights with shadows are in MuJoCo's renderer: its light is
+    /// clamped before it is added to that of other passes.
+    own_pass: bool,
 }
 
 /// Inputs of shading besides the surface, prepared once per frame.
@@ -31,6 +35,8 @@ pub(crate) struct Lighting {
     horizon: [f32; 3],
     nadir: [f32; 3],
     skybox: Option<Arc<Texture>>,
+    /// Rule of texture sampling.
+    mip_rule: MipRule,
     haze: Option<[f32; 3]>,
     /// Haze at the end of the ground, if the scene has any.
     pub(crate) ground_haze: Option<Horizon>,
@@ -115,18 +121,21 @@ impl PreparedLight {
 }
 
 impl Lighting {
-    /// Prepares the lighting of a frame. `forward` is the camera's viewing direction, for cameras that have one.
+    /// Prepares the lighting of a frame. `forward` is the camera's viewing direction, for cameras that have one;
+    /// `shadows` is true if lights cast shadows, and `shadow` returns the shadow map of a light.
     pub(crate) fn prepare(
         &mut self,
         scene: &RenderScene,
         lights: &[Light],
         forward: Option<[f32; 3]>,
+        shadows: bool,
         shadow: impl Fn(usize) -> Option<usize>,
     ) {
         let sky = scene.sky;
         (self.zenith, self.horizon, self.nadir) =
             (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
         self.skybox.clone_from(&scene.skybox);
+        self.mip_rule = MipRule::of(scene.lighting_space);
         self.haze = scene.haze.and_then(|h| h.color).map(tone::decode);
         self.lights.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
@@ -140,6 +149,7 @@ impl Lighting {
                 cutoff_cos,
                 exponent,
                 shadow: shadow(k),
+                own_pass: shadows && light.cast_shadow && scene.lighting_space == LightingSpace::Display,
             });
         }
         let headlight = scene.headlight.to_directional(scene.lighting_space, forward);
@@ -150,6 +160,7 @@ impl Lighting {
             cutoff_cos: -2.0,
             exponent: 0,
             shadow: None,
+            own_pass: false,
         }));
     }
 }
@@ -231,7 +242,7 @@ fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
 #[inline(always)]
 pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f32) -> V3<S> {
     if let Some(image) = &lighting.skybox {
-        return skybox(s, image, direction, pixel);
+        return skybox(s, image, lighting.mip_rule, direction, pixel);
     }
     let k = sqrt_or_zero(s, min(abs(direction.z), splat(s, 1.0)));
     let up = direction.z.simd_gt(splat(s, 0.0));
@@ -247,13 +258,21 @@ pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f
 
 /// Skybox color in a direction: a cube map whose y is up.
 #[inline(never)]
-fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S> {
+fn skybox<S: Simd>(s: S, image: &Texture, rule: MipRule, direction: V3<S>, pixel: f32) -> V3<S> {
     s.vectorize(
         #[inline(always)]
         || {
             let all = direction.z.simd_eq(direction.z);
             let turned = V3 { x: direction.x, y: direction.z, z: -direction.y };
-            let [r, g, b] = texture::sample_cube(s, image, turned, splat(s, pixel), all);
+            let footprint = match rule {
+                MipRule::Sharp => splat(s, pixel),
+                // Away from the middle of a face, a pixel is wider on it, by the square of the distance to the face.
+                MipRule::OpenGl => {
+                    let nearest = max(max(abs(turned.x), abs(turned.y)), abs(turned.z));
+                    splat(s, pixel) / max(nearest * nearest, splat(s, 1e-3))
+                }
+            };
+            let [r, g, b] = texture::sample_cube(s, image, rule, turned, footprint, all);
             V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
         },
     )
@@ -275,7 +294,8 @@ pub(crate) fn shade<S: Simd>(
     let material = &source.instance.material;
     let display = scene.lighting_space == LightingSpace::Display;
     let base = if display {
-        display_albedo(s, source, at, view, pixel, lanes)
+        let [r, g, b, _] = material.rgba;
+        V3::splat(s, [r, g, b])
     } else {
         albedo(s, source, at, view, pixel, lanes)
     };
@@ -314,6 +334,8 @@ pub(crate) fn shade<S: Simd>(
             }
         }
     }
+    // The sum of all further passes, each clamped.
+    let mut passes = V3::splat(s, [0.0; 3]);
     for prepared in &lighting.lights {
         let light = &prepared.light;
         let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
@@ -331,8 +353,12 @@ pub(crate) fn shade<S: Simd>(
                 lit = lit * rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters);
             }
         }
-        for (k, diffuse) in diffuse.iter_mut().enumerate() {
-            *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+        let mut pass_gloss = [zero, zero, zero];
+        let gloss = if prepared.own_pass { &mut pass_gloss } else { &mut gloss };
+        if !prepared.own_pass {
+            for (k, diffuse) in diffuse.iter_mut().enumerate() {
+                *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+            }
         }
         if shiny.is_visible(light.specular) {
             // The cosine between the normal and the half vector, compared before its root is taken.
@@ -348,7 +374,18 @@ pub(crate) fn shade<S: Simd>(
                 }
             }
         }
+        if prepared.own_pass {
+            // Ambient light has no shadow, and belongs to the first pass.
+            for (k, diffuse) in diffuse.iter_mut().enumerate() {
+                *diffuse += strength * light.ambient[k];
+            }
+            let bright = facing * lit;
+            passes.x += min(base.x * bright * light.diffuse[0] + pass_gloss[0], splat(s, 1.0));
+            passes.y += min(base.y * bright * light.diffuse[1] + pass_gloss[1], splat(s, 1.0));
+            passes.z += min(base.z * bright * light.diffuse[2] + pass_gloss[2], splat(s, 1.0));
+        }
     }
+    let one = splat(s, 1.0);
     let plain = {
         #[inline(always)]
         |gloss: [F<S>; 3]| V3 {
@@ -358,9 +395,19 @@ pub(crate) fn shade<S: Simd>(
         }
     };
     let mut color = if display {
-        // OpenGL clamps the sum at 1.
+        // OpenGL clamps the sum at 1, highlights included, and multiplies the result by the texture.
         let sum = plain(gloss);
-        V3 { x: display_light(s, sum.x), y: display_light(s, sum.y), z: display_light(s, sum.z) }
+        let r = min(max(sum.x, zero), one) + passes.x;
+        let g = min(max(sum.y, zero), one) + passes.y;
+        let b = min(max(sum.z, zero), one) + passes.z;
+        let (r, g, b) = (r * 255.0, g * 255.0, b * 255.0);
+        let (r, g, b) = match texels(s, source, lighting.mip_rule, at, view, pixel, lanes) {
+            Some([x, y, z]) => (r * x * (1.0 / 255.0), g * y * (1.0 / 255.0), b * z * (1.0 / 255.0)),
+            None => (r, g, b),
+        };
+        let most = splat(s, 255.0);
+        let (r, g, b) = (min(r, most), min(g, most), min(b, most));
+        V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
     } else if material.metallic > 0.0 {
         // Mirrored light, tinted by the metal's color, and emission; without a traced mirror, the sky is mirrored.
         let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel);
@@ -387,12 +434,6 @@ pub(crate) fn shade<S: Simd>(
     color
 }
 
-/// Linear light of an sRGB value, clamped to 0..=1.
-#[inline(always)]
-fn display_light<S: Simd>(s: S, x: F<S>) -> F<S> {
-    tone::decode_bytes(min(max(x, splat(s, 0.0)), splat(s, 1.0)) * 255.0)
-}
-
 /// Linear base color of a surface.
 #[inline(always)]
 pub(crate) fn albedo<S: Simd>(
@@ -404,7 +445,7 @@ pub(crate) fn albedo<S: Simd>(
     lanes: M<S>,
 ) -> V3<S> {
     let flat = source.color;
-    let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, flat) };
+    let Some(bytes) = texels(s, source, MipRule::Sharp, at, view, pixel, lanes) else { return V3::splat(s, flat) };
     // Written out: a closure that is not inlined is compiled without the instruction set.
     V3 {
         x: tone::decode_bytes(bytes[0]) * flat[0],
@@ -413,26 +454,12 @@ pub(crate) fn albedo<S: Simd>(
     }
 }
 
-/// Base color of a surface in sRGB, 0..=1.
-#[inline(always)]
-fn display_albedo<S: Simd>(
-    s: S,
-    source: &InstanceSurface<'_>,
-    at: &Surface<S>,
-    view: V3<S>,
-    pixel: f32,
-    lanes: M<S>,
-) -> V3<S> {
-    let [r, g, b, _] = source.instance.material.rgba;
-    let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, [r, g, b]) };
-    V3 { x: bytes[0] * (r / 255.0), y: bytes[1] * (g / 255.0), z: bytes[2] * (b / 255.0) }
-}
-
 /// The texture's bytes (0..=255) at the surface; `None` without a texture.
 #[inline(always)]
 fn texels<S: Simd>(
     s: S,
     source: &InstanceSurface<'_>,
+    rule: MipRule,
     at: &Surface<S>,
     view: V3<S>,
     pixel: f32,
@@ -440,9 +467,13 @@ fn texels<S: Simd>(
 ) -> Option<[F<S>; 3]> {
     let instance = source.instance;
     let image = instance.material.texture.as_deref()?;
-    // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces.
+    // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces; the wide side in
+    // OpenGL.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
-    let width = at.t * pixel / sqrt_or_zero(s, slant);
+    let width = match rule {
+        MipRule::Sharp => at.t * pixel / sqrt_or_zero(s, slant),
+        MipRule::OpenGl => at.t * pixel / slant,
+    };
     let scale = source.texture_scale;
     Some(if texture::is_cube(image) {
         let direction = V3 {
@@ -451,7 +482,7 @@ fn texels<S: Simd>(
             z: at.local_position.z * scale[2],
         };
         let largest = scale.iter().copied().fold(0.0, f32::max);
-        texture::sample_cube(s, image, direction, width * largest, lanes)
+        texture::sample_cube(s, image, rule, direction, width * largest, lanes)
     } else {
         let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
         let (uv, density) = if has_uvs {
@@ -461,6 +492,6 @@ fn texels<S: Simd>(
             let uv = [at.local_position.x * scale[0] + offset[0], at.local_position.y * scale[1] + offset[1]];
             (uv, splat(s, scale[0].abs().max(scale[1].abs())))
         };
-        texture::sample(s, image, uv[0], uv[1], width * density, lanes)
+        texture::sample(s, image, rule, uv, width * density, lanes)
     })
 }

@@ -219,7 +219,8 @@ impl PreparedFrame {
             }
         }
         let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
-        self.lighting.prepare(scene, lights, forward, |k| maps.iter().position(|light| *light == Some(k)));
+        let shadow = |k| maps.iter().position(|light| *light == Some(k));
+        self.lighting.prepare(scene, lights, forward, cfg.shadows, shadow);
         let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden;
         self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
     }

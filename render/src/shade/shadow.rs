@@ -95,7 +95,8 @@ impl ShadowMap {
         side: usize,
     ) -> bool {
         let solid = |instance: &Instance| {
-            Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
+            Layer::casts_shadows(instance, cfg.groups, scene.lighting_space)
+                && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
         // Reserves the whole map and all casters at once: casters move, and memory must not grow with it.
         let parts = if cfg.lod { Granularity::LodClusters } else { Granularity::FullClusters };

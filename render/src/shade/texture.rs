@@ -1,14 +1,33 @@
 //! Texture sampling: bilinear within a mip level, and interpolated between two levels.
 //!
+//! There are two rules for the choice of levels. [`MipRule::Sharp`] uses one level for most pixels. [`MipRule::OpenGl`]
+//! always blends two levels, by the logarithm of the pixel's width in texels.
+//!
 //! Texels are blended as sRGB bytes, which is four times as fast as in linear light; the levels themselves were
 //! averaged in linear light.
 
 use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
-use kinetoscope_scene::MipLevel;
-use kinetoscope_scene::{Texture, TextureKind};
+use kinetoscope_scene::{LightingSpace, MipLevel, Texture, TextureKind};
 
 /// Adding and subtracting this rounds to an integer (below 2^22).
 const ROUND: f32 = 12_582_912.0;
+
+/// Rule by which the mip levels of a pixel are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum MipRule {
+    /// The sharper level alone for most pixels.
+    #[default]
+    Sharp,
+    /// Two levels, as OpenGL's `GL_LINEAR_MIPMAP_LINEAR`.
+    OpenGl,
+}
+
+impl MipRule {
+    /// Rule of a lighting space: MuJoCo's renderer has OpenGL's rule.
+    pub(crate) fn of(space: LightingSpace) -> Self {
+        if space == LightingSpace::Display { Self::OpenGl } else { Self::Sharp }
+    }
+}
 
 /// Rounds down to an integer.
 #[inline(always)]
@@ -19,7 +38,14 @@ fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
 
 /// Colors (bytes, 0..=255) at (u, v), v upward, where one pixel is `footprint` wide in texture coordinates.
 #[inline(always)]
-pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
+pub(crate) fn sample<S: Simd>(
+    s: S,
+    texture: &Texture,
+    rule: MipRule,
+    [u, v]: [F<S>; 2],
+    footprint: F<S>,
+    lanes: M<S>,
+) -> [F<S>; 3] {
     let first = &texture.mip_levels()[0];
     let (zero, one, limit) = (splat(s, 0.0), splat(s, 1.0), splat(s, 1e6));
     let lanes = lanes & abs(u).simd_lt(limit) & abs(v).simd_lt(limit);
@@ -29,6 +55,7 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
     sample_levels(
         s,
         texture,
+        rule,
         texels,
         lanes,
         #[inline(always)]
@@ -44,7 +71,14 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
 /// Colors (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half
 /// length 1.
 #[inline(always)]
-pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
+pub(crate) fn sample_cube<S: Simd>(
+    s: S,
+    texture: &Texture,
+    rule: MipRule,
+    d: V3<S>,
+    footprint: F<S>,
+    lanes: M<S>,
+) -> [F<S>; 3] {
     let zero = splat(s, 0.0);
     let (ax, ay, az) = (abs(d.x), abs(d.y), abs(d.z));
     let by_x = ax.simd_ge(ay) & ax.simd_ge(az);
@@ -68,6 +102,7 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
     sample_levels(
         s,
         texture,
+        rule,
         texels,
         lanes,
         #[inline(always)]
@@ -92,6 +127,7 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
 fn sample_levels<S: Simd>(
     s: S,
     texture: &Texture,
+    rule: MipRule,
     texels: F<S>,
     lanes: M<S>,
     at: impl Fn(&MipLevel, M<S>) -> [F<S>; 3],
@@ -110,7 +146,15 @@ fn sample_levels<S: Simd>(
             continue;
         }
         let here = if last { left } else { left & texels.simd_lt(splat(s, 2.0 * width)) };
-        let to_next = if last { zero } else { min(max(texels * (4.0 / width) - 7.0, zero), one) };
+        let to_next = match rule {
+            _ if last => zero,
+            MipRule::Sharp => min(max(texels * (4.0 / width) - 7.0, zero), one),
+            // The binary logarithm of 1..=2, with an error of 0.009.
+            MipRule::OpenGl => {
+                let x = min(max(texels * (1.0 / width) - 1.0, zero), one);
+                x * (x * -0.3465 + 1.3465)
+            }
+        };
         let to_next = select(here, to_next, zero);
         let weight = select(here, one - to_next, zero) + from_last;
         let wanted = weight.simd_gt(zero);

@@ -1,6 +1,7 @@
 //! Render scenes of environments with sizes or colors of their own.
 
-use super::{Anchor, VisualScene, geom};
+use super::{Anchor, VisualScene};
+use kinetoscope_look::shape_from_size;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::{EnvScene, Material, RenderSceneError};
 use std::collections::BTreeMap;
@@ -20,7 +21,7 @@ impl VisualScene {
         let mut instances = self.scene.instances().to_vec();
         for (instance, anchor) in instances.iter_mut().zip(&self.anchors) {
             let Anchor::Geom(geom) = anchor else { continue };
-            let size = sizes.get(geom).and_then(|size| geom::shape_from_size(model.geom_type()[*geom] as u32, size));
+            let size = sizes.get(geom).and_then(|size| shape_from_size(model.geom_type()[*geom], size));
             if let Some(shape) = size {
                 instance.shape = shape;
             }

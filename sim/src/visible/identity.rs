@@ -1,6 +1,6 @@
 //! Mask ids: the numbers in the mask channel of cameras, and the elements that they identify.
 
-use super::{deforming, surface, visibility};
+use super::{color, deforming, visibility};
 use crate::entity_set::EntitySet;
 use kinetoscope_mujoco::{Model, ObjectKind};
 use kinetoscope_sensors::camera::SegmentedEntity;
@@ -174,7 +174,7 @@ pub(super) fn by_body(model: &Model, sites: bool) -> MaskIdMap {
         })
         .collect();
     let shown = (0..if sites { model.nsite() } else { 0 })
-        .filter(|&site| visibility::is_visible(model.site_group()[site], &surface::color_of_site(model, site)));
+        .filter(|&site| visibility::is_visible(model.site_group()[site], &color::of_site(model, site)));
     let of_site = shown
         .map(|site| {
             let body = model.site_bodyid()[site] as usize;

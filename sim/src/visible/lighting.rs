@@ -1,13 +1,12 @@
 //! Lights, headlight and sky of MuJoCo models.
 
-use super::surface;
 use crate::entity_set::EntitySet;
 use crate::light_cfg::{LightCfg, LightKindCfg};
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;
-use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
-use kinetoscope_scene::decode_srgb;
-use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightingSpace, RenderScene, Sky};
+use kinetoscope_look::{LightType, first_skybox, horizon_haze, linear_light, scene_headlight, scene_light, skybox};
+use kinetoscope_mujoco::{Data, Model, ObjectKind};
+use kinetoscope_scene::{Headlight, Hemisphere, Light, LightingSpace, RenderScene, Sky};
 
 /// Lighting of a scene besides its lights.
 #[derive(Clone, Debug)]
@@ -41,20 +40,21 @@ impl<'a> Lighting<'a> {
         }
     }
 
+    /// Rule by which light is added up.
+    pub(super) fn space(&self) -> LightingSpace {
+        if self.is_mujoco() { LightingSpace::Display } else { LightingSpace::Linear }
+    }
+
     fn is_mujoco(&self) -> bool {
         matches!(self, Self::Mujoco { .. })
     }
 }
 
-/// Distance of a skybox in MuJoCo's renderer relative to that of the far clipping plane, measured in images of that
-/// renderer.
-const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
-
 /// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns messages about
 /// image-based lights and skyboxes, which are not rendered.
 pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Vec<String> {
     let mut left_out = Vec::new();
-    let linear = |color: [f32; 3]| if look.is_mujoco() { color } else { to_linear(color) };
+    let space = look.space();
     scene.lights = (0..model.nlight())
         .map(|index| {
             let light = model.light(index);
@@ -62,28 +62,7 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
                 let name = model.name(ObjectKind::Light, index).unwrap_or_else(|| index.to_string());
                 left_out.push(format!("the image-based light {name} is not rendered"));
             }
-            let spot = LightKind::Spot { cutoff_deg: light.cutoff_deg.min(90.0), exponent: light.exponent };
-            let kind = match light.kind {
-                LightType::Directional => LightKind::Directional,
-                // In OpenGL, spot lights of 180 degrees shine in all directions.
-                LightType::Spot if light.cutoff_deg > 90.0 => LightKind::Point,
-                LightType::Spot => spot,
-                LightType::Point | LightType::Image => LightKind::Point,
-            };
-            Light {
-                kind,
-                position: [0.0; 3],
-                direction: [0.0, 0.0, -1.0],
-                ambient: linear(light.ambient),
-                diffuse: linear(light.diffuse),
-                specular: linear(light.specular),
-                attenuation: light.attenuation,
-                // The radius of a directional light is an angle there, a length here.
-                radius: if kind == LightKind::Directional { 0.0 } else { light.radius.max(0.0) },
-                cast_shadow: light.cast_shadow,
-                // An image-based light is not a light of the scene.
-                active: light.active && light.kind != LightType::Image,
-            }
+            scene_light(&light, space)
         })
         .collect();
     let files = match look {
@@ -93,13 +72,7 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
             &files[..]
         }
         Lighting::Mujoco { file } => {
-            let headlight = file.headlight();
-            scene.headlight = Headlight {
-                ambient: headlight.ambient,
-                diffuse: headlight.diffuse,
-                specular: headlight.specular,
-                active: headlight.active,
-            };
+            scene.headlight = scene_headlight(&file.headlight());
             scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
             scene.sky = Sky::uniform([0.0; 3]);
             scene.lighting_space = LightingSpace::Display;
@@ -113,12 +86,9 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
             std::slice::from_ref(file)
         }
     };
-    let is_sky = |(file, texture): &(&Model, usize)| {
-        file.texture(*texture).is_some_and(|texture| texture.kind == TextureType::Skybox)
-    };
-    let textures = files.iter().flat_map(|file| (0..file.ntex()).map(|texture| (*file, texture)));
-    let Some((file, texture)) = textures.into_iter().find(is_sky) else { return left_out };
-    match surface::skybox(file, texture) {
+    let mut skyboxes = files.iter().filter_map(|file| Some((*file, first_skybox(*file)?)));
+    let Some((file, texture)) = skyboxes.next() else { return left_out };
+    match skybox(file, texture, space) {
         Ok(image) => scene.skybox = Some(image),
         Err(reason) => {
             let name = file.name(ObjectKind::Texture, texture).unwrap_or_else(|| texture.to_string());
@@ -128,25 +98,16 @@ pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut Rende
     }
     if look.is_mujoco() {
         let (color, width) = file.haze();
-        // With a skybox, infinite planes of MuJoCo's renderer end at it.
-        let radius = (SKYBOX_RADIUS * file.clip_distances()[1]) as f32;
-        scene.horizon = Some(HorizonHaze { color, radius, width });
+        scene.horizon = Some(horizon_haze(color, width, file.clip_distances()[1]));
     }
     left_out
-}
-
-/// Converts a light color to linear color space. MuJoCo multiplies colors in display space, the renderer here
-/// multiplies them in linear space. For one light the results agree up to the small linear part of sRGB: (c l)^2.2 =
-/// c^2.2 l^2.2.
-fn to_linear(color: [f32; 3]) -> [f32; 3] {
-    color.map(decode_srgb)
 }
 
 /// Sum of all dome lights, linear; `None` without a dome light.
 pub(super) fn dome_light_sum(lights: &[LightCfg]) -> Option<[f32; 3]> {
     let domes = lights.iter().filter_map(|light| match light.kind {
         LightKindCfg::Dome { intensity } => {
-            Some(to_linear(light.color.map(|c| c as f32)).map(|c| c * intensity as f32))
+            Some(linear_light(light.color.map(|c| c as f32)).map(|c| c * intensity as f32))
         }
         _ => None,
     });

@@ -5,32 +5,33 @@
 //! Proxy geoms of URDF visuals (see `mjcf::robot`) are replaced by the real shapes. Constant data is extracted once;
 //! [`VisualScene::read_poses`] copies the poses of one environment.
 
+mod color;
 mod deforming;
 mod env_scene;
-mod geom;
 mod identity;
 mod lighting;
 mod overview;
 mod posed_scene;
-mod surface;
+mod site;
 pub(crate) mod surface_overrides;
 mod urdf_visual;
 mod visibility;
 
 use self::surface_overrides::SurfaceOverrides;
+pub(crate) use color::of_geom as color_of;
 use deforming::{DeformingInstances, SceneBufferPool};
 use identity::ElementIdentity;
 pub use identity::MaskId;
 pub(crate) use identity::{ElementOwner, MaskIdMap, of_simulation, tendon_owners};
 pub(crate) use lighting::Lighting;
 pub use posed_scene::{FreeCamera, ModelCamera, OffscreenScene};
-pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
 use crate::body_pose::BodyFrame;
 use crate::light_cfg::LightCfg;
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::GroundCfg;
+use kinetoscope_look::{GeomShapes, ModelMaterials};
 use kinetoscope_mujoco::{Data, Model, ObjectKind, mjcf_keywords};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
@@ -151,21 +152,28 @@ impl VisualScene {
         painted: &SurfaceOverrides,
         look: &Lighting<'_>,
     ) -> Self {
-        let surfaces = surface::ModelMaterials::of(model);
-        let mut shapes = geom::GeomShapes::of(model);
-        let mut left_out = surfaces.left_out().to_vec();
+        let surfaces = ModelMaterials::new(model, look.space());
+        let mut shapes = GeomShapes::new(model);
+        let mut left_out = surfaces.omitted().to_vec();
+        let (geom_type, geom_data) = (model.geom_type(), model.geom_dataid());
         let (mut instances, mut anchors) = (Vec::new(), Vec::new());
         for geom in 0..model.ngeom() {
             let parts = match replacements.get(&geom) {
                 Some(parts) => parts.clone(),
-                None => match shapes.get(geom) {
-                    Ok(shape) => vec![VisualPart { shape, material: surfaces.of_geom(geom) }],
-                    Err(reason) => {
-                        let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| geom.to_string());
-                        left_out.push(format!("geom {name} is not rendered: {reason}"));
-                        Vec::new()
+                None => {
+                    match shapes.get(geom_type[geom], &model.geom_size()[3 * geom..3 * geom + 3], geom_data[geom]) {
+                        Ok(shape) => {
+                            let rgba = &model.geom_rgba()[4 * geom..4 * geom + 4];
+                            let material = surfaces.of_geom(geom_type[geom], rgba, model.geom_matid()[geom]);
+                            vec![VisualPart { shape, material }]
+                        }
+                        Err(reason) => {
+                            let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| geom.to_string());
+                            left_out.push(format!("geom {name} is not rendered: {reason}"));
+                            Vec::new()
+                        }
                     }
-                },
+                }
             };
             for VisualPart { shape, material } in parts {
                 let group = u8::try_from(model.geom_group()[geom].clamp(0, 31)).unwrap_or(0);
@@ -206,7 +214,9 @@ impl VisualScene {
             anchors.resize(instances.len(), Anchor::World);
         }
         for (site, identity) in identities.sites() {
-            let Some(instance) = geom::of_site(model, site, identity, surfaces.of_site(site)) else { continue };
+            let rgba = &model.site_rgba()[4 * site..4 * site + 4];
+            let material = surfaces.of_element(rgba, model.site_matid()[site]);
+            let Some(instance) = site::instance(model, site, identity, material) else { continue };
             if let Err(reason) = instance.validate() {
                 left_out.push(format!("site {site} is not rendered: {reason}"));
                 continue;

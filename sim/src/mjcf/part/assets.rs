@@ -3,7 +3,8 @@
 use super::super::write::Element;
 use super::{PartError, PartWriter, format_f32s, row};
 use image::{ExtendedColorType, ImageEncoder};
-use kinetoscope_mujoco::{Asset, MeshArrays, SupportedVersion, TextureType, mjcf_keywords};
+use kinetoscope_look::{MeshArrays, TextureType};
+use kinetoscope_mujoco::{Asset, SupportedVersion, mjcf_keywords};
 use std::collections::HashMap;
 
 /// Order in which MuJoCo stacks the faces of a cube texture.

@@ -2,7 +2,8 @@
 
 use super::super::write::{Element, number};
 use super::{PartError, PartWriter, PassiveJointProperties, RootAttachment, format_f32s, mj_index, row, row_of};
-use kinetoscope_mujoco::{LightType, SupportedVersion, mjcf_keywords};
+use kinetoscope_look::LightType;
+use kinetoscope_mujoco::{SupportedVersion, mjcf_keywords};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 

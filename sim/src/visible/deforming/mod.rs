@@ -14,9 +14,10 @@ mod tests;
 
 pub(super) use buffers::SceneBufferPool;
 
+use super::color::color;
 use super::identity::DeformingElement;
-use super::surface::{ModelMaterials, color};
 use super::visibility::is_visible;
+use kinetoscope_look::ModelMaterials;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh};
@@ -133,7 +134,7 @@ impl DeformingInstances {
     pub(super) fn add(
         &mut self,
         model: &Model,
-        surfaces: &ModelMaterials<'_>,
+        surfaces: &ModelMaterials,
         drawable: DeformingElement,
         like: &Instance,
         instances: &mut Vec<Instance>,
@@ -158,14 +159,14 @@ impl DeformingInstances {
         match drawable {
             DeformingElement::Tendon(t) => {
                 let tendon = tendon::Tendon::of(model, t);
-                let material = surfaces.material(&model.tendon_rgba()[4 * t..4 * t + 4], model.tendon_matid()[t]);
+                let material = surfaces.of_element(&model.tendon_rgba()[4 * t..4 * t + 4], model.tendon_matid()[t]);
                 let capsules = tendon.max_segments();
                 path(PathSource::Tendon(tendon), capsules, model.tendon_width()[t], material, model.tendon_group()[t])
             }
             DeformingElement::Skin(s) => {
                 let skin = model.skin(s);
                 let mesh = Arc::new(RenderMesh::deformable(&skin::bind_pose(&skin)));
-                let material = surfaces.material(skin.rgba, skin.material);
+                let material = surfaces.of_element(skin.rgba, skin.material);
                 let skinned = instance(Mesh { mesh }.into(), material, skin.group);
                 skinned.validate()?;
                 self.meshes.push(DeformingMesh { instance: instances.len(), surface: MeshSource::Skin(s) });
@@ -174,7 +175,7 @@ impl DeformingInstances {
             }
             DeformingElement::Flex(f) => {
                 let Some(flex) = model.flex(f) else { return Ok(()) };
-                let material = surfaces.material(flex.rgba, flex.material);
+                let material = surfaces.of_element(flex.rgba, flex.material);
                 if flex.dimensions == 1 {
                     let cable = flex::Cable::of(f);
                     return path(PathSource::Cable(cable), flex.edges.len(), flex.radius, material, flex.group);

@@ -1,50 +1,50 @@
 //! Shapes of MuJoCo's geoms for rendering.
 
-use super::identity::ElementIdentity;
-use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco::Model;
+use crate::{GeomType, VisualModel};
 use kinetoscope_scene::mesh::TriMesh;
-use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
-use kinetoscope_scene::{Instance, Material};
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Shapes of a model's geoms. Meshes and height fields are prepared once.
-pub(super) struct GeomShapes<'a> {
-    model: &'a Model,
+#[derive(Debug)]
+pub struct GeomShapes<M> {
+    model: M,
     meshes: HashMap<usize, Arc<RenderMesh>>,
     fields: HashMap<usize, Option<HeightField>>,
 }
 
-impl<'a> GeomShapes<'a> {
-    pub(super) fn of(model: &'a Model) -> Self {
+impl<M: VisualModel> GeomShapes<M> {
+    /// Prepares no shape yet.
+    pub fn new(model: M) -> Self {
         Self { model, meshes: HashMap::new(), fields: HashMap::new() }
     }
 
-    /// Shape of a geom.
+    /// Shape of a geom of MuJoCo's type number `kind`, with these sizes \[m\] and the index of its mesh or height field.
     ///
     /// # Errors
     /// The reason why it cannot be rendered: a signed distance field, a mesh without triangles, a height field with an
     /// elevation that is negative or not finite.
-    pub(super) fn get(&mut self, geom: usize) -> Result<Shape, &'static str> {
-        let size = &self.model.geom_size()[3 * geom..3 * geom + 3];
-        let data = usize::try_from(self.model.geom_dataid()[geom]).ok();
-        Ok(match self.model.geom_type()[geom] as u32 {
-            mj::mjGEOM_PLANE => Plane { half: [(size[0] as f32).max(0.0), (size[1] as f32).max(0.0)] }.into(),
-            mj::mjGEOM_MESH => {
+    ///
+    /// # Panics
+    /// There is no such mesh or height field, or fewer than three sizes.
+    pub fn get(&mut self, kind: i32, size: &[f64], data: i32) -> Result<Shape, &'static str> {
+        let data = usize::try_from(data).ok();
+        Ok(match GeomType::from_id(kind) {
+            Some(GeomType::Plane) => Plane { half: [(size[0] as f32).max(0.0), (size[1] as f32).max(0.0)] }.into(),
+            Some(GeomType::Mesh) => {
                 Mesh { mesh: data.and_then(|data| self.mesh(data)).ok_or("its mesh has no triangles")? }.into()
             }
-            mj::mjGEOM_HFIELD => {
+            Some(GeomType::HeightField) => {
                 data.and_then(|data| self.height_field(data)).ok_or("its height field cannot be rendered")?.into()
             }
-            kind => return shape_from_size(kind, size).ok_or("cameras do not render signed distance fields"),
+            _ => return shape_from_size(kind, size).ok_or("cameras do not render signed distance fields"),
         })
     }
 
     fn mesh(&mut self, mesh: usize) -> Option<Arc<RenderMesh>> {
-        let model = self.model;
+        let model = &self.model;
         let mesh = self.meshes.entry(mesh).or_insert_with(|| Arc::new(render_mesh(model, mesh)));
         (!mesh.triangles().is_empty()).then(|| Arc::clone(mesh))
     }
@@ -66,44 +66,24 @@ impl<'a> GeomShapes<'a> {
 }
 
 /// Shape of a geom type that its sizes \[m\] define; `None` for other types.
-pub(super) fn shape_from_size(kind: u32, size: &[f64]) -> Option<Shape> {
+///
+/// # Panics
+/// There are fewer than three sizes.
+pub fn shape_from_size(kind: i32, size: &[f64]) -> Option<Shape> {
     let [x, y, z] = [0, 1, 2].map(|k| size[k] as f32);
-    Some(match kind {
-        mj::mjGEOM_SPHERE => Sphere { radius: x }.into(),
-        mj::mjGEOM_CAPSULE => Capsule { radius: x, half_length: y }.into(),
-        mj::mjGEOM_ELLIPSOID => Ellipsoid { radii: [x, y, z] }.into(),
-        mj::mjGEOM_CYLINDER => Cylinder { radius: x, half_length: y }.into(),
-        mj::mjGEOM_BOX => Cuboid { half: [x, y, z] }.into(),
-        _ => return None,
-    })
-}
-
-/// Instance of a site; `None` for a type of shape that sites do not have.
-pub(super) fn of_site(model: &Model, site: usize, identity: &ElementIdentity, material: Material) -> Option<Instance> {
-    let shape = shape_from_size(model.site_type()[site] as u32, &model.site_size()[3 * site..3 * site + 3])?;
-    let body = model.site_bodyid()[site] as usize;
-    let [x, y, z] = [0, 1, 2].map(|k| model.site_pos()[3 * site + k]);
-    let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|k| model.site_quat()[4 * site + k]);
-    let frame_from_instance =
-        if body > 0 { from_row(&[x, y, z, qw, qx, qy, qz]) } else { kinetoscope_scene::Pose::identity() };
-    let ElementIdentity { mask_id, name, body: of } = identity.clone();
-    Some(Instance {
-        shape,
-        material,
-        mask_id,
-        group: u8::try_from(model.site_group()[site].clamp(0, 31)).unwrap_or(0),
-        visible: true,
-        name,
-        body: of,
-        fixed: model.is_fixed(body),
-        is_deformable: false,
-        frame_from_instance,
+    Some(match GeomType::from_id(kind)? {
+        GeomType::Sphere => Sphere { radius: x }.into(),
+        GeomType::Capsule => Capsule { radius: x, half_length: y }.into(),
+        GeomType::Ellipsoid => Ellipsoid { radii: [x, y, z] }.into(),
+        GeomType::Cylinder => Cylinder { radius: x, half_length: y }.into(),
+        GeomType::Box => Cuboid { half: [x, y, z] }.into(),
+        GeomType::Plane | GeomType::HeightField | GeomType::Mesh => return None,
     })
 }
 
 /// Triangles with a vertex for each combination of position and texture coordinates. Normals are recomputed, smooth up
 /// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated.
-fn render_mesh(model: &Model, mesh: usize) -> RenderMesh {
+fn render_mesh(model: &impl VisualModel, mesh: usize) -> RenderMesh {
     let arrays = model.mesh(mesh);
     let mut vertices: HashMap<(i32, i32), u32> = HashMap::new();
     let mut out = TriMesh { uvs: arrays.texcoords.map(|_| Vec::new()), ..TriMesh::default() };

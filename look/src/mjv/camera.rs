@@ -1,0 +1,70 @@
+//! The camera of a scene of MuJoCo's visualizer (`mjvGLCamera`).
+
+use kinetoscope_scene::PoseF32;
+
+/// Camera of MuJoCo's visualizer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MjvCamera {
+    /// Position in the world \[m\].
+    pub position: [f64; 3],
+    /// Viewing direction.
+    pub forward: [f64; 3],
+    /// Upward direction of the image.
+    pub up: [f64; 3],
+    /// Horizontal center of the frustum in the near plane \[m\].
+    pub center: f64,
+    /// Half width of the frustum in the near plane \[m\]; 0 for square pixels.
+    pub half_width: f64,
+    /// Lower end of the frustum in the near plane \[m\].
+    pub bottom: f64,
+    /// Upper end of the frustum in the near plane \[m\].
+    pub top: f64,
+    /// Depth of the near plane \[m\].
+    pub near: f64,
+    /// Depth of the far plane \[m\].
+    pub far: f64,
+}
+
+/// Error of a camera whose axes are parallel, or whose frustum is empty.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("the camera has no valid frustum or axes: {camera:?}")]
+pub struct MjvCameraError {
+    /// The camera.
+    pub camera: MjvCamera,
+}
+
+impl MjvCamera {
+    /// Focal lengths and principal point, fx, fy, cx, cy \[pixels\], for an image of this size.
+    ///
+    /// # Errors
+    /// The frustum is empty.
+    pub fn intrinsics(&self, width: usize, height: usize) -> Result<[f32; 4], MjvCameraError> {
+        let (width, height) = (width as f64, height as f64);
+        let side = self.top - self.bottom;
+        let half_width = if self.half_width > 0.0 { self.half_width } else { 0.5 * side * width / height };
+        let fx = 0.5 * width * self.near / half_width;
+        let fy = height * self.near / side;
+        let cx = 0.5 * width - self.center * fx / self.near;
+        let cy = self.top * fy / self.near;
+        let numbers = [fx, fy, cx, cy].map(|x| x as f32);
+        if side > 0.0 && self.near > 0.0 && numbers.iter().all(|x| x.is_finite()) {
+            Ok(numbers)
+        } else {
+            Err(MjvCameraError { camera: *self })
+        }
+    }
+
+    /// Pose of the optical frame: x to the right of the image, y down, z forward.
+    ///
+    /// # Errors
+    /// The viewing direction is 0 or parallel to the upward direction.
+    pub fn world_from_camera(&self) -> Result<PoseF32, MjvCameraError> {
+        let [z, up] = [self.forward, self.up].map(nalgebra::Vector3::from);
+        let error = MjvCameraError { camera: *self };
+        let z = z.try_normalize(1e-12).ok_or(error)?;
+        let x = z.cross(&up).try_normalize(1e-9).ok_or(error)?;
+        let y = z.cross(&x);
+        let rotation = [0, 1, 2].map(|k| [x[k] as f32, y[k] as f32, z[k] as f32]);
+        Ok(PoseF32 { rotation, translation: self.position.map(|x| x as f32) })
+    }
+}

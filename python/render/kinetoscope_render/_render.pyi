@@ -1,0 +1,37 @@
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__version__: str
+
+class FrameList:
+    def __init__(
+        self,
+        arrays: dict[str, npt.NDArray[Any]],
+        geom_fields: dict[str, int],
+        light_fields: dict[str, int],
+        threads: int,
+        samples: int,
+    ) -> None: ...
+    def omitted(self) -> list[str]: ...
+    def __len__(self) -> int: ...
+    def clear(self) -> None: ...
+    def capture(
+        self,
+        geoms: npt.NDArray[np.uint8],
+        lights: npt.NDArray[np.uint8],
+        camera: list[float],
+        options: list[float],
+        effects: list[bool],
+        size: list[int],
+        soft: tuple[list[npt.NDArray[np.float32]], list[npt.NDArray[np.int32]]] | None = None,
+    ) -> None: ...
+    def render(
+        self,
+        rgb: npt.NDArray[np.uint8] | None = None,
+        depth: npt.NDArray[np.float32] | None = None,
+        segmentation: npt.NDArray[np.int32] | None = None,
+        segments: npt.NDArray[np.int32] | None = None,
+        normal: npt.NDArray[np.float32] | None = None,
+    ) -> None: ...

@@ -1,0 +1,189 @@
+"""A scene of MuJoCo's visualizer, and its capture for rendering."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from typing import Any, Optional, Union
+
+import mujoco
+import numpy as np
+
+from kinetoscope_render import _render
+from kinetoscope_render.layout import layouts, scene_memory
+from kinetoscope_render.model import model_arrays
+
+# Flags of rendering that have no counterpart here.
+_UNSUPPORTED_FLAGS = ("mjRND_WIREFRAME", "mjRND_ADDITIVE")
+_FLAGS = {name: int(value) for name, value in mujoco.mjtRndFlag.__members__.items()}
+# Arrays of a state whose lengths are compared with those of the model.
+_SIZES = (("qpos", "nq"), ("xpos", "nbody"), ("geom_xpos", "ngeom"), ("site_xpos", "nsite"), ("cam_xpos", "ncam"))
+
+
+def default_threads() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_size(height: Any, width: Any) -> tuple[int, int]:
+    """Height and width of images as integers.
+
+    Raises:
+        TypeError: One of them is not an integer.
+        ValueError: One of them is not between 1 and 8192.
+    """
+    sizes = []
+    for name, value in (("height", height), ("width", width)):
+        try:
+            number = int(value.__index__())
+        except AttributeError:
+            raise TypeError(f"{name} must be an integer, not {type(value).__name__}") from None
+        if not 1 <= number <= 8192:
+            raise ValueError(f"{name} must be between 1 and 8192 pixels, not {number}")
+        sizes.append(number)
+    return sizes[0], sizes[1]
+
+
+def _names(model: mujoco.MjModel, kind: Any, count: int) -> list[str]:
+    names = (mujoco.mj_id2name(model, int(kind), index) for index in range(count))
+    return [name for name in names if name]
+
+
+def resolve_camera(model: mujoco.MjModel, camera: Union[int, str, "mujoco.MjvCamera"]) -> "mujoco.MjvCamera":
+    """Camera of the visualizer for a name, an id (-1 for the free camera) or a camera.
+
+    Raises:
+        ValueError: The model has no such camera.
+    """
+    if isinstance(camera, mujoco.MjvCamera):
+        # MuJoCo ends the process for ids that do not exist.
+        kinds = mujoco.mjtCamera
+        for kind, field, count, size in (
+            (kinds.mjCAMERA_FIXED, "fixedcamid", "ncam", model.ncam),
+            (kinds.mjCAMERA_TRACKING, "trackbodyid", "nbody", model.nbody),
+        ):
+            index = getattr(camera, field)
+            if int(camera.type) == int(kind) and not 0 <= index < size:
+                raise ValueError(f"camera.{field} = {index} is out of range: the model has {count} = {size}")
+        return camera
+    index = camera
+    if isinstance(index, str):
+        index = mujoco.mj_name2id(model, int(mujoco.mjtObj.mjOBJ_CAMERA), index)
+        if index == -1:
+            names = _names(model, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam)
+            similar = difflib.get_close_matches(str(camera), names, n=3, cutoff=0.3) or names[:8]
+            hint = f" Candidates: {', '.join(map(repr, similar))}." if similar else " The model has no named cameras."
+            raise ValueError(f'The camera "{camera}" does not exist.{hint}')
+    if not hasattr(index, "__index__"):
+        raise TypeError(f"camera must be a name, an id or a mujoco.MjvCamera, not {type(camera).__name__}")
+    index = int(index.__index__())
+    if not -1 <= index < model.ncam:
+        raise ValueError(f"The camera id {index} is out of range [-1, {model.ncam}).")
+    found = mujoco.MjvCamera()
+    found.fixedcamid = index
+    if index == -1:
+        found.type = int(mujoco.mjtCamera.mjCAMERA_FREE)
+        mujoco.mjv_defaultFreeCamera(model, found)
+    else:
+        found.type = int(mujoco.mjtCamera.mjCAMERA_FIXED)
+    return found
+
+
+class SceneCapture:
+    """A scene of one model, and the frames to render."""
+
+    def __init__(self, model: mujoco.MjModel, max_geom: Optional[int], threads: Optional[int], samples: Optional[int]):
+        if not isinstance(model, mujoco.MjModel):
+            raise TypeError(f"model must be a mujoco.MjModel, not {type(model).__name__}")
+        threads = default_threads() if threads is None else threads
+        if threads < 1:
+            raise ValueError(f"threads must be at least 1, not {threads}")
+        if samples is None:
+            samples = 4 if model.vis.quality.offsamples > 0 else 1
+        if samples not in (1, 4):
+            raise ValueError(f"samples must be 1 or 4, not {samples}")
+        if max_geom is None:
+            max_geom = 10000
+        if max_geom < 1:
+            raise ValueError(f"max_geom must be at least 1, not {max_geom}")
+        found = layouts()
+        self.model = model
+        self.scene = mujoco.MjvScene(model, max_geom)
+        self.option = mujoco.MjvOption()
+        self._geoms, self._lights = scene_memory(self.scene)
+        self._new_frames = lambda arrays: _render.FrameList(arrays, found.geom, found.light, threads, samples)
+        self.frames = self._new_frames(model_arrays(model))
+        visual, extent = model.vis, model.stat.extent
+        self._haze = [*map(float, visual.rgba.haze[:3]), float(visual.map.haze)]
+        self._fog = [*map(float, visual.rgba.fog[:3])]
+        self._fog += [float(visual.map.fogstart * extent), float(visual.map.fogend * extent)]
+
+    def use_scene(self, scene: "mujoco.MjvScene") -> None:
+        """Captures another scene of the model from now on."""
+        if scene is not self.scene:
+            self.scene = scene
+            self._geoms, self._lights = scene_memory(scene)
+
+    def reload(self, model: mujoco.MjModel) -> None:
+        """Copies meshes, textures and materials again."""
+        self.frames = self._new_frames(model_arrays(model))
+
+    def update(self, data: mujoco.MjData, camera: Any, option: Optional["mujoco.MjvOption"]) -> None:
+        """Updates the scene to a state."""
+        model = self.model
+        if not isinstance(data, mujoco.MjData):
+            raise TypeError(f"data must be a mujoco.MjData, not {type(data).__name__}")
+        for array, count in _SIZES:
+            found, expected = len(getattr(data, array)), getattr(model, count)
+            if found != expected:
+                raise ValueError(
+                    f"data belongs to another model: {array} has {found} rows, but the model of this renderer has "
+                    f"{count} = {expected}"
+                )
+        camera = resolve_camera(model, camera)
+        mujoco.mjv_updateScene(
+            model, data, option or self.option, None, camera, int(mujoco.mjtCatBit.mjCAT_ALL), self.scene
+        )
+
+    def capture(self, height: int, width: int) -> None:
+        """Adds the scene, as it is now, to the frames.
+
+        Raises:
+            NotImplementedError: The scene has a flag or a camera that is not supported.
+        """
+        scene = self.scene
+        flags = scene.flags
+        for name in _UNSUPPORTED_FLAGS:
+            if flags[_FLAGS[name]]:
+                raise NotImplementedError(f"scene.flags[mujoco.mjtRndFlag.{name}] is not supported")
+        left, right = scene.camera
+        if getattr(left, "orthographic", 0):
+            raise NotImplementedError("orthographic cameras are not supported")
+        # The cameras of a stereo pair are averaged, as in MuJoCo's images.
+        position = (0.5 * (left.pos + right.pos)).tolist()
+        near, far = float(left.frustum_near), float(left.frustum_far)
+        camera = [
+            *position, *left.forward.tolist(), *left.up.tolist(), float(left.frustum_center), 0.0,
+            float(left.frustum_bottom), float(left.frustum_top), near, far,
+        ]
+        on = [float(flags[_FLAGS[name]]) for name in ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")]
+        effects = [bool(flags[_FLAGS[name]]) for name in ("mjRND_SHADOW", "mjRND_REFLECTION")]
+        self.frames.capture(
+            self._geoms[: scene.ngeom], self._lights[: scene.nlight], camera, [*on, *self._haze, *self._fog, far],
+            effects, [width, height], self._soft(),
+        )
+
+    def _soft(self) -> Optional[tuple[list[np.ndarray], list[np.ndarray]]]:
+        """Vertices of skins and flexes."""
+        scene = self.scene
+        has_flexes = getattr(scene, "nflex", 0) > 0
+        if not has_flexes and scene.nskin == 0:
+            return None
+        def flat(name: str, dtype: Any) -> np.ndarray:
+            array = getattr(scene, name, None) if has_flexes or name.startswith("skin") else None
+            return np.zeros(0, dtype) if array is None else np.ascontiguousarray(np.ravel(array), dtype)
+
+        floats = ("skinvert", "skinnormal", "flexface", "flexnormal", "flextexcoord")
+        return [flat(name, np.float32) for name in floats], [
+            flat(name, np.int32) for name in ("flexfaceadr", "flexfaceused")
+        ]

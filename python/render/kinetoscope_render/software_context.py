@@ -1,0 +1,142 @@
+"""The rendering functions of `mujoco` (`MjrContext`, `mjr_render`, `mjr_readPixels`, ...) without OpenGL.
+
+`patch_mujoco` puts them in the place of the originals, which Gymnasium, dm_control and robosuite call.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Optional
+
+import mujoco
+import numpy as np
+
+from kinetoscope_render.scene import SceneCapture
+
+
+class GLContext:
+    """An OpenGL context that does nothing."""
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        pass
+
+    def make_current(self) -> None:
+        """Does nothing."""
+
+    def free(self) -> None:
+        """Does nothing."""
+
+
+class MjrContext:
+    """A rendering context: the renderer of one model, with the attributes of `mujoco.MjrContext` that programs read."""
+
+    def __init__(self, model: Any = None, font_scale: Any = None) -> None:
+        """Creates a context. Without a model it renders nothing."""
+        del font_scale
+        self._capture: Optional[SceneCapture] = None
+        self._size = (0, 0)
+        self._flags: tuple[bool, bool] = (False, False)
+        self.offWidth = self.offHeight = 0
+        self.offSamples = 0
+        self.currentBuffer = int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN)
+        self.readDepthMap = 0
+        if model is not None:
+            self._capture = SceneCapture(model, 1, None, None)
+            visual = model.vis
+            self.offWidth, self.offHeight = visual.global_.offwidth, visual.global_.offheight
+            self.offSamples = visual.quality.offsamples
+
+    def free(self) -> None:
+        """Frees the memory of the renderer."""
+        self._capture = None
+
+    def _open(self) -> SceneCapture:
+        if self._capture is None:
+            raise RuntimeError("the rendering context has no model, or was freed")
+        return self._capture
+
+
+def _extent(viewport: Any) -> tuple[int, int]:
+    if viewport.left or viewport.bottom:
+        raise NotImplementedError("viewports that do not begin at (0, 0) are not supported")
+    return int(viewport.height), int(viewport.width)
+
+
+def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
+    """Captures a scene; `mjr_readPixels` renders it."""
+    capture, (height, width) = con._open(), _extent(viewport)
+    capture.use_scene(scn)
+    capture.frames.clear()
+    segment, id_color = (bool(scn.flags[int(flag)]) for flag in (
+        mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR,
+    ))
+    if segment and not id_color:
+        raise NotImplementedError("scene.flags[mjRND_SEGMENT] without mjRND_IDCOLOR (random colors) is not supported")
+    capture.capture(height, width)
+    con._size, con._flags = (height, width), (segment, id_color)
+    camera = scn.camera[0]
+    con._range = float(camera.frustum_near), float(camera.frustum_far)
+
+
+def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None:
+    """Renders the captured scene, from the lowest row, into the given arrays: color, and OpenGL's depth in 0..=1."""
+    capture, (height, width) = con._open(), _extent(viewport)
+    if (height, width) != con._size:
+        raise ValueError(f"the viewport is {width} x {height}, but the scene was rendered to "
+                         f"{con._size[1]} x {con._size[0]}")
+    segment = con._flags[0]
+    wanted: dict[str, np.ndarray] = {}
+    if rgb is not None:
+        if segment:
+            wanted["segments"] = np.empty(height * width, np.int32)
+        else:
+            wanted["rgb"] = np.empty(height * width * 3, np.uint8)
+    if depth is not None:
+        wanted["depth"] = np.empty(height * width, np.float32)
+    if not wanted:
+        return
+    capture.frames.render(**wanted)
+    if rgb is not None:
+        if segment:
+            ids = (wanted["segments"] + 1).reshape(height, width)
+            image = np.stack([ids & 255, ids >> 8 & 255, ids >> 16 & 255], axis=-1).astype(np.uint8)
+        else:
+            image = wanted["rgb"].reshape(height, width, 3)
+        _store(rgb, image[::-1], "rgb")
+    if depth is not None:
+        near, far = con._range
+        metric = wanted["depth"].reshape(height, width).astype(np.float64)
+        from_far = near * (far - metric) / (metric * (far - near))
+        zero_far = getattr(mujoco, "mjtDepthMap", None) is not None and int(con.readDepthMap) == int(
+            mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        )
+        _store(depth, (from_far if zero_far else 1.0 - from_far)[::-1], "depth")
+
+
+def _store(array: np.ndarray, image: np.ndarray, name: str) -> None:
+    if array.size != image.size:
+        raise ValueError(f"{name} has {array.size} numbers, but the image has {image.size}")
+    array[...] = image.reshape(array.shape)
+
+
+def mjr_setBuffer(framebuffer: Any, con: MjrContext) -> None:
+    """Selects the framebuffer: only the offscreen one exists."""
+    con.currentBuffer = int(framebuffer)
+
+
+def mjr_resizeOffscreen(width: int, height: int, con: MjrContext) -> None:
+    """Sets the size of the offscreen framebuffer, which limits nothing."""
+    con.offWidth, con.offHeight = width, height
+
+
+def mjr_uploadTexture(model: Any, con: MjrContext, texid: int) -> None:
+    """Copies the textures of a model again."""
+    del texid
+    con._open().reload(model)
+
+
+mjr_uploadMesh = mjr_uploadTexture
+mjr_uploadHField = mjr_uploadTexture
+
+
+def mjr_overlay(*_: Any, **__: Any) -> None:
+    """Text over images is not rendered."""

@@ -1,0 +1,357 @@
+//! Frames to render: scenes that Python's `mujoco` updated, and the images of all of them.
+
+use crate::layout::{geom_layout, light_layout};
+use crate::model_arrays::ModelArrays;
+use crate::panic::catch;
+use kinetoscope_look::horizon_haze;
+use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader};
+use kinetoscope_render::frame::FrameMut;
+use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest, ToneCurve, View};
+use kinetoscope_scene::Haze;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::fmt::Display;
+
+/// Frames that are rendered at once: their color images in RGBA are in memory together.
+const BLOCK: usize = 64;
+
+/// Renderer of one model, and the frames that it renders next.
+#[pyclass(module = "kinetoscope_render._render")]
+pub(crate) struct FrameList {
+    reader: MjvReader<ModelArrays>,
+    renderer: ParallelRenderer,
+    /// Process that started the renderer's threads: a forked process has none of them.
+    process: u32,
+    cfg: RasterCfg,
+    threads: usize,
+    frames: Vec<CapturedFrame>,
+    rgba: Vec<u8>,
+    mask: Vec<i32>,
+}
+
+/// A captured frame.
+struct CapturedFrame {
+    content: MjvFrame,
+    view: View,
+    effects: Effects,
+}
+
+/// Effects that a frame may switch off.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Effects {
+    shadows: bool,
+    reflections: bool,
+}
+
+fn invalid(error: impl Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// Mutable slice of a contiguous array; `None` without an array.
+fn slice_of<'a, T: numpy::Element>(array: &'a mut Option<PyReadwriteArray1<'_, T>>) -> PyResult<Option<&'a mut [T]>> {
+    array.as_mut().map(|array| array.as_slice_mut().map_err(invalid)).transpose()
+}
+
+/// Vertices of skins and flexes: positions and normals of skins, positions, normals and texture coordinates of flexes;
+/// then index of the first triangle and number of triangles of each flex. All arrays are flat.
+type SoftArrays<'py> = ([PyReadonlyArray1<'py, f32>; 5], [PyReadonlyArray1<'py, i32>; 2]);
+
+/// Rows of `N` numbers of a flat array.
+fn rows<'a, const N: usize>(array: &'a PyReadonlyArray1<'_, f32>) -> PyResult<&'a [[f32; N]]> {
+    Ok(array.as_slice().map_err(invalid)?.as_chunks().0)
+}
+
+/// Numbers of the visual options of a frame, in the order of Python's `scene.py`.
+fn background(numbers: [f64; 13], has_skybox: bool) -> Background {
+    let [skybox, haze, fog, haze_r, haze_g, haze_b, haze_width, fog_r, fog_g, fog_b, fog_start, fog_end, far] = numbers;
+    let skybox = skybox != 0.0 && has_skybox;
+    let color = |rgb: [f64; 3]| rgb.map(|c| c as f32);
+    let horizon =
+        (skybox && haze != 0.0).then(|| horizon_haze(color([haze_r, haze_g, haze_b]), haze_width as f32, far));
+    let fog = (fog != 0.0).then(|| Haze {
+        color: Some(color([fog_r, fog_g, fog_b])),
+        start: fog_start as f32,
+        end: fog_end as f32,
+    });
+    Background { skybox, horizon, fog }
+}
+
+#[pymethods]
+impl FrameList {
+    /// Copies the arrays of a model. `arrays` has the names of `MjModel`; the layouts have the places of fields.
+    #[new]
+    fn new(
+        arrays: &Bound<'_, PyDict>,
+        geom_fields: &Bound<'_, PyDict>,
+        light_fields: &Bound<'_, PyDict>,
+        threads: usize,
+        samples: u8,
+    ) -> PyResult<Self> {
+        catch(|| {
+            let model = ModelArrays::from_dict(arrays)?;
+            model.validate()?;
+            let skins = model.skins();
+            let (geoms, lights) = (geom_layout(geom_fields)?, light_layout(light_fields)?);
+            let reader = MjvReader::new(model, skins, geoms, lights).map_err(invalid)?;
+            let cfg = RasterCfg { samples, tone: ToneCurve::Clip, groups: u32::MAX, ..RasterCfg::default() };
+            let renderer = ParallelRenderer::new(cfg, threads);
+            let process = std::process::id();
+            let (frames, rgba, mask) = (Vec::new(), Vec::new(), Vec::new());
+            Ok(Self { reader, renderer, process, cfg, threads, frames, rgba, mask })
+        })
+    }
+
+    /// Messages about elements that are not rendered.
+    fn omitted(&self) -> Vec<String> {
+        self.reader.omitted().to_vec()
+    }
+
+    /// Number of captured frames.
+    fn __len__(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Forgets the captured frames.
+    fn clear(&mut self) {
+        self.frames.clear();
+    }
+
+    /// Captures a scene: the memory of its geoms (N, stride) and lights (L, stride), its camera (position, forward, up,
+    /// center, half width, bottom, top, near, far), its visual options, and the vertices of its skins and flexes.
+    #[pyo3(signature = (geoms, lights, camera, options, effects, size, soft=None))]
+    #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
+    fn capture(
+        &mut self,
+        geoms: PyReadonlyArray2<'_, u8>,
+        lights: PyReadonlyArray2<'_, u8>,
+        camera: [f64; 15],
+        options: [f64; 13],
+        effects: [bool; 2],
+        size: [usize; 2],
+        soft: Option<SoftArrays<'_>>,
+    ) -> PyResult<()> {
+        catch(|| {
+            let [px, py, pz, fx, fy, fz, ux, uy, uz, center, half_width, bottom, top, near, far] = camera;
+            let camera = MjvCamera {
+                position: [px, py, pz],
+                forward: [fx, fy, fz],
+                up: [ux, uy, uz],
+                center,
+                half_width,
+                bottom,
+                top,
+                near,
+                far,
+            };
+            let [width, height] = size;
+            let [fx, fy, cx, cy] = camera.intrinsics(width, height).map_err(invalid)?;
+            let world_from_camera = camera.world_from_camera().map_err(invalid)?;
+            let view = View { width, height, fx, fy, cx, cy, near: near as f32, far: far as f32, world_from_camera };
+            view.validate().map_err(invalid)?;
+            let background = background(options, self.reader.has_skybox());
+            let (geoms, lights) = (geoms.as_slice().map_err(invalid)?, lights.as_slice().map_err(invalid)?);
+            let forward = camera.forward.map(|x| x as f32);
+            let mut memory = MjvMemory { geoms, lights, forward, ..MjvMemory::default() };
+            if let Some((floats, integers)) = &soft {
+                let [skin_positions, skin_normals, flex_positions, flex_normals, flex_texcoords] = floats;
+                let [first_faces, faces] = integers;
+                memory = MjvMemory {
+                    skin_positions: rows(skin_positions)?,
+                    skin_normals: rows(skin_normals)?,
+                    flex_positions: rows(flex_positions)?,
+                    flex_normals: rows(flex_normals)?,
+                    flex_texcoords: rows(flex_texcoords)?,
+                    flex_first_faces: first_faces.as_slice().map_err(invalid)?,
+                    flex_faces: faces.as_slice().map_err(invalid)?,
+                    ..memory
+                };
+            }
+            let content = self.reader.read(&memory, background).map_err(invalid)?;
+            let [shadows, reflections] = effects;
+            self.frames.push(CapturedFrame { content, view, effects: Effects { shadows, reflections } });
+            Ok(())
+        })
+    }
+
+    /// Renders all captured frames into flat arrays: RGB bytes, depth \[m\], pairs of object id and object type,
+    /// segmentation ids (-1 in the background), normals. The frames must have one size. The interpreter runs other threads meanwhile.
+    #[pyo3(signature = (rgb=None, depth=None, segmentation=None, segments=None, normal=None))]
+    fn render(
+        &mut self,
+        py: Python<'_>,
+        mut rgb: Option<PyReadwriteArray1<'_, u8>>,
+        mut depth: Option<PyReadwriteArray1<'_, f32>>,
+        mut segmentation: Option<PyReadwriteArray1<'_, i32>>,
+        mut segments: Option<PyReadwriteArray1<'_, i32>>,
+        mut normal: Option<PyReadwriteArray1<'_, f32>>,
+    ) -> PyResult<()> {
+        let mut images = Images {
+            rgb: slice_of(&mut rgb)?,
+            depth: slice_of(&mut depth)?,
+            segmentation: slice_of(&mut segmentation)?,
+            segments: slice_of(&mut segments)?,
+            normal: slice_of(&mut normal)?,
+        };
+        py.detach(|| catch(|| self.render_frames(&mut images)))
+    }
+}
+
+/// Images of all frames, one after the other; `None` for images that are not wanted.
+struct Images<'a> {
+    rgb: Option<&'a mut [u8]>,
+    depth: Option<&'a mut [f32]>,
+    segmentation: Option<&'a mut [i32]>,
+    segments: Option<&'a mut [i32]>,
+    normal: Option<&'a mut [f32]>,
+}
+
+impl Images<'_> {
+    /// True if the renderer's masks are needed.
+    fn need_masks(&self) -> bool {
+        self.segmentation.is_some() || self.segments.is_some()
+    }
+
+    /// Checks the lengths for `pixels` pixels.
+    fn validate(&self, pixels: usize) -> PyResult<()> {
+        let lengths = [
+            ("rgb", self.rgb.as_ref().map(|image| image.len()), 3),
+            ("depth", self.depth.as_ref().map(|image| image.len()), 1),
+            ("segmentation", self.segmentation.as_ref().map(|image| image.len()), 2),
+            ("segments", self.segments.as_ref().map(|image| image.len()), 1),
+            ("normal", self.normal.as_ref().map(|image| image.len()), 3),
+        ];
+        for (name, length, components) in lengths {
+            if let Some(length) = length.filter(|&length| length != components * pixels) {
+                let expected = components * pixels;
+                return Err(PyValueError::new_err(format!(
+                    "the array of {name} has {length} numbers; {pixels} pixels need {expected}"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Part of a slice of images, `components` numbers per pixel: those of frames `first..first + count`.
+fn part<'a, T>(
+    all: &'a mut Option<&mut [T]>,
+    [first, count]: [usize; 2],
+    each: usize,
+) -> Option<std::slice::ChunksExactMut<'a, T>> {
+    all.as_mut().map(|all| all[first * each..(first + count) * each].chunks_exact_mut(each))
+}
+
+impl FrameList {
+    fn render_frames(&mut self, images: &mut Images<'_>) -> PyResult<()> {
+        let Some(first) = self.frames.first() else {
+            return Err(PyRuntimeError::new_err("there is nothing to render: call update_scene first"));
+        };
+        let [width, height] = [first.view.width, first.view.height];
+        if self.frames.iter().any(|frame| [frame.view.width, frame.view.height] != [width, height]) {
+            return Err(PyValueError::new_err("all frames must have one size"));
+        }
+        images.validate(self.frames.len() * width * height)?;
+        if self.process != std::process::id() {
+            // The threads of the parent process do not exist here. Waiting for them would take forever.
+            let renderer = ParallelRenderer::new(self.cfg, self.threads);
+            std::mem::forget(std::mem::replace(&mut self.renderer, renderer));
+            self.process = std::process::id();
+        }
+        let mut start = 0;
+        while start < self.frames.len() {
+            // Effects are options of the renderer, so the frames of a block agree on them.
+            let effects = self.frames[start].effects;
+            let count = self.frames[start..].iter().take(BLOCK).take_while(|frame| frame.effects == effects).count();
+            self.render_block([start, count], effects, images)?;
+            start += count;
+        }
+        Ok(())
+    }
+
+    fn render_block(&mut self, range: [usize; 2], effects: Effects, images: &mut Images<'_>) -> PyResult<()> {
+        let Self { renderer, frames, rgba, mask, cfg, .. } = self;
+        let [start, count] = range;
+        let frames = &frames[start..start + count];
+        let pixels = frames.first().map_or(0, |frame| frame.view.width * frame.view.height);
+        renderer.set_cfg(RasterCfg { shadows: effects.shadows, reflections: effects.reflections, ..*cfg });
+        let failure = |(index, error): (usize, kinetoscope_render::RenderError)| {
+            PyValueError::new_err(format!("frame {}: {error}", start + index))
+        };
+        let geometry = images.depth.is_some() || images.need_masks() || images.normal.is_some();
+        // Geoms without a segmentation id are visible in color only.
+        let split = frames.iter().any(|frame| frame.content.segment_scene.is_some());
+        if images.rgb.is_some() {
+            rgba.resize(rgba.len().max(4 * pixels * count), 0);
+        }
+        if images.need_masks() {
+            mask.resize(mask.len().max(pixels * count), 0);
+        }
+        for pass in 0..if split { 2 } else { 1 } {
+            let (with_color, with_geometry) = if split { (pass == 0, pass == 1) } else { (true, true) };
+            let (with_color, with_geometry) = (with_color && images.rgb.is_some(), with_geometry && geometry);
+            if !with_color && !with_geometry {
+                continue;
+            }
+            let mut colors = with_color.then(|| rgba[..4 * pixels * count].chunks_exact_mut(4 * pixels));
+            let mut masks =
+                (with_geometry && images.need_masks()).then(|| mask[..pixels * count].chunks_exact_mut(pixels));
+            let mut depths = if with_geometry { part(&mut images.depth, range, pixels) } else { None };
+            let mut normals = if with_geometry { part(&mut images.normal, range, 3 * pixels) } else { None };
+            let mut jobs: Vec<_> = frames
+                .iter()
+                .map(|frame| {
+                    let scene = if split && pass == 1 { frame.content.segment_scene() } else { &*frame.content.scene };
+                    let request = RenderRequest {
+                        scene,
+                        poses: &frame.content.poses,
+                        view: &frame.view,
+                        lights: Some(&frame.content.lights),
+                        lens: None,
+                        previous: None,
+                    };
+                    let buffers = FrameMut {
+                        color: colors.as_mut().and_then(Iterator::next),
+                        mask: masks.as_mut().and_then(Iterator::next),
+                        depth: depths.as_mut().and_then(Iterator::next),
+                        normal: normals.as_mut().and_then(Iterator::next),
+                        ..FrameMut::default()
+                    };
+                    (request, buffers)
+                })
+                .collect();
+            renderer.render(&mut jobs).map_err(failure)?;
+            for (frame, (_, buffers)) in frames.iter().zip(&mut jobs) {
+                buffers.replace_misses(frame.view.far);
+            }
+        }
+        if let Some(rgb) = &mut images.rgb {
+            let to = rgb[3 * pixels * start..3 * pixels * (start + count)].as_chunks_mut::<3>().0;
+            for (to, &[r, g, b, _]) in to.iter_mut().zip(rgba.as_chunks::<4>().0) {
+                *to = [r, g, b];
+            }
+        }
+        if images.need_masks() {
+            let mut pairs = part(&mut images.segmentation, range, 2 * pixels);
+            let mut segments = part(&mut images.segments, range, pixels);
+            for (frame, mask) in frames.iter().zip(mask.chunks_exact(pixels)) {
+                let objects = &frame.content.objects;
+                let object = |&id: &i32| usize::try_from(id).ok().and_then(|id| objects.get(id).copied());
+                let objects = mask.iter().map(|id| object(id).unwrap_or(MjvObject::NONE));
+                if let Some(pairs) = pairs.as_mut().and_then(Iterator::next) {
+                    for (to, MjvObject { id, kind, .. }) in pairs.as_chunks_mut::<2>().0.iter_mut().zip(objects.clone())
+                    {
+                        *to = [id, kind];
+                    }
+                }
+                if let Some(segments) = segments.as_mut().and_then(Iterator::next) {
+                    for (to, object) in segments.iter_mut().zip(objects) {
+                        *to = object.segment;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,110 @@
+"""Replacement of the renderers of other libraries."""
+
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+import kinetoscope_render as kr
+
+
+@pytest.fixture(autouse=True)
+def patched():
+    original = mujoco.Renderer
+    names = kr.patch_mujoco()
+    assert kr.patch_mujoco() == names, "a second call changes nothing"
+    yield
+    kr.unpatch_mujoco()
+    assert mujoco.Renderer is original
+    assert mujoco.MjrContext.__module__ != "kinetoscope_render.software_context"
+
+
+def test_renderer_class():
+    assert mujoco.Renderer is kr.Renderer
+    assert mujoco.MjrContext.__module__ == "kinetoscope_render.software_context"
+
+
+def read_pixels(model, data, flags=()):
+    """Color and depth by MuJoCo's rendering functions, as libraries call them."""
+    context = mujoco.GLContext(80, 60)
+    context.make_current()
+    scene = mujoco.MjvScene(model, 100)
+    camera = mujoco.MjvCamera()
+    camera.type, camera.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), 0
+    con = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, con)
+    mujoco.mjv_updateScene(
+        model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), camera, int(mujoco.mjtCatBit.mjCAT_ALL), scene
+    )
+    for flag in flags:
+        scene.flags[int(flag)] = 1
+    rect = mujoco.MjrRect(0, 0, 80, 60)
+    mujoco.mjr_render(rect, scene, con)
+    rgb, depth = np.zeros(3 * 80 * 60, np.uint8), np.zeros((60, 80), np.float32)
+    mujoco.mjr_readPixels(rgb, depth, rect, con)
+    con.free()
+    context.free()
+    return rgb.reshape(60, 80, 3)[::-1], depth[::-1], scene
+
+
+def test_rendering_functions(shapes):
+    """They give the images of the renderer, from the lowest row, with OpenGL's depth."""
+    model, data = shapes
+    rgb, depth, _ = read_pixels(model, data)
+    with kr.Renderer(model, 60, 80) as renderer:
+        renderer.update_scene(data, 0)
+        np.testing.assert_array_equal(rgb, renderer.render())
+        renderer.enable_depth_rendering()
+        metric = renderer.render()
+    near, far = (float(x * model.stat.extent) for x in (model.vis.map.znear, model.vis.map.zfar))
+    # OpenGL's depth of single precision has steps of 6e-8, which are z² / near of the metric depth.
+    found = near / (1 - depth.astype(np.float64) * (1 - near / far))
+    hit = metric < 5
+    assert hit.mean() > 0.3
+    assert (np.abs(found - metric)[hit] < 1e-6 + 2e-7 * metric[hit] ** 2 / near).all()
+
+
+def test_segmentation_colors(shapes):
+    model, data = shapes
+    flags = (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR)
+    rgb, _, scene = read_pixels(model, data, flags)
+    ids = rgb.astype(int) @ [1, 256, 65536]
+    table = {scene.geoms[k].segid + 1: (scene.geoms[k].objid, scene.geoms[k].objtype) for k in range(scene.ngeom)}
+    with kr.Renderer(model, 60, 80) as renderer:
+        renderer.update_scene(data, 0)
+        renderer.enable_segmentation_rendering()
+        expected = renderer.render()
+    found = np.array([[table.get(k, (-1, -1)) for k in row] for row in ids])
+    np.testing.assert_array_equal(found, expected)
+    with pytest.raises(NotImplementedError, match="mjRND_IDCOLOR"):
+        read_pixels(model, data, flags[:1])
+
+
+def test_doctor():
+    run = subprocess.run(
+        [sys.executable, "-m", "kinetoscope_render", "doctor"], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert f"mujoco      {mujoco.__version__}" in run.stdout
+    assert "mujoco.Renderer" in run.stdout
+
+
+def test_import_needs_no_opengl():
+    """Neither the import nor a frame loads OpenGL."""
+    program = """
+import sys, mujoco, kinetoscope_render as kr
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+renderer = kr.Renderer(model)
+renderer.update_scene(data)
+renderer.render()
+assert "OpenGL" not in sys.modules and "mujoco.osmesa" not in sys.modules, sorted(sys.modules)
+"""
+    environment = {"MUJOCO_GL": "disable", "PATH": "/usr/bin"}
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, env=environment, timeout=120
+    )
+    assert run.returncode == 0, run.stderr

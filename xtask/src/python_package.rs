@@ -1,0 +1,143 @@
+//! The Python package `kinetoscope-render`: its wheel, and its tests with several versions of `mujoco`.
+
+use crate::python::{self, OPENGL};
+use crate::run::{Cmd, Failure, Repo, XtaskResult};
+use crate::setup::{self, Requirement};
+use crate::wheel;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folder of the package.
+const PACKAGE: &str = "python/render";
+
+/// The program that builds wheels from Rust.
+const MATURIN: &str = "maturin==1.16.0";
+
+/// Versions of `mujoco` with which the package is tested, and the requirement of NumPy of each: releases before 3.0
+/// crash with NumPy 2.
+const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), (wheel::PYTHON_VERSION, "numpy>=2")];
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct WheelArgs {
+    /// Also write a source distribution
+    #[arg(long)]
+    sdist: bool,
+}
+
+/// `cargo xtask wheel`: builds the wheel into `wheels` of the target folder and prints its path.
+///
+/// # Errors
+/// Python cannot be set up, or the package does not compile.
+pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
+    let built = build(repo)?;
+    println!("{}", built.display());
+    if args.sdist {
+        let maturin = maturin(repo)?;
+        let package = repo.root.join(PACKAGE);
+        Cmd::new(maturin).args(["sdist", "--out"]).arg(wheels(repo)).current_dir(package).run()?;
+    }
+    Ok(())
+}
+
+/// The stage `python` of CI: builds the wheel, installs it beside each tested `mujoco`, and runs the tests.
+///
+/// # Errors
+/// A step fails; the message names the version of `mujoco`.
+pub(crate) fn test(repo: &Repo) -> XtaskResult {
+    setup::try_to_have(Requirement::OsMesa);
+    let wheel = build(repo)?;
+    for (version, numpy) in TESTED {
+        let python = environment(repo, version, numpy)?;
+        let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
+        Cmd::new(&python).args(install).arg("--force-reinstall").arg(&wheel).run()?;
+        println!("kinetoscope-render with mujoco {version}");
+        // No files of Python or pytest are left in the tree.
+        let tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+        tests
+            .current_dir(repo.root.join(PACKAGE).join("tests"))
+            .env("MUJOCO_GL", "osmesa")
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .run()
+            .map_err(|failure| Failure::new(format!("with mujoco {version}: {}", failure.message)))?;
+    }
+    Ok(())
+}
+
+/// Builds the wheel and returns its path.
+fn build(repo: &Repo) -> XtaskResult<PathBuf> {
+    let maturin = maturin(repo)?;
+    let dir = wheels(repo);
+    for old in built_wheels(&dir) {
+        fs::remove_file(&old).map_err(|e| Failure::new(format!("{}: {e}", old.display())))?;
+    }
+    let package = repo.root.join(PACKAGE);
+    let build = Cmd::new(maturin).args(["build", "--release", "--locked", "--out"]).arg(&dir);
+    build.current_dir(package).env("CARGO_TARGET_DIR", &repo.target).run()?;
+    let message = || Failure::new(format!("maturin built no wheel in {}", dir.display()));
+    built_wheels(&dir).into_iter().next().ok_or_else(message)
+}
+
+fn wheels(repo: &Repo) -> PathBuf {
+    repo.target.join("wheels")
+}
+
+/// Wheels of the package in a folder that has other wheels too.
+fn built_wheels(dir: &Path) -> Vec<PathBuf> {
+    let is_ours = |path: &PathBuf| {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        name.starts_with("kinetoscope_render-") && name.ends_with(".whl")
+    };
+    fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path()).filter(is_ours).collect()
+}
+
+/// Maturin in a virtual environment below the target folder.
+fn maturin(repo: &Repo) -> XtaskResult<PathBuf> {
+    let venv = repo.target.join("maturin-venv");
+    let program = venv.join("bin/maturin");
+    let is_ready = || {
+        let version = Cmd::new(&program).arg("--version").output().unwrap_or_default();
+        let expected = MATURIN.replace("==", " ");
+        String::from_utf8_lossy(&version).trim() == expected
+    };
+    if !is_ready() {
+        create(&venv, &[MATURIN])?;
+    }
+    if is_ready() { Ok(program) } else { Err(Failure::new(format!("{MATURIN} does not start"))) }
+}
+
+/// A Python with a version of `mujoco`, its OpenGL bindings and pytest, below the target folder.
+fn environment(repo: &Repo, version: &str, numpy: &str) -> XtaskResult<PathBuf> {
+    let venv = repo.target.join(format!("python-mujoco-{version}"));
+    let python = venv.join("bin/python");
+    let check = format!("import mujoco, numpy, OpenGL, pytest; assert mujoco.__version__ == '{version}'");
+    let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
+    if !is_ready() {
+        let mujoco = format!("mujoco=={version}");
+        let packages = [&[mujoco.as_str(), numpy, "pytest==9.2.0"], OPENGL.packages].concat();
+        create(&venv, &packages)?;
+    }
+    if is_ready() { Ok(python) } else { Err(Failure::new(format!("mujoco {version} cannot be imported"))) }
+}
+
+/// Creates a virtual environment with these packages.
+fn create(venv: &Path, packages: &[&str]) -> XtaskResult {
+    setup::try_to_have(Requirement::Pip);
+    setup::try_to_have(Requirement::Venv);
+    Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(venv).run()?;
+    python::pip_install(&venv.join("bin/python"), packages)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wheels_of_the_package() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        for name in ["mujoco_core-4.0.1-cp311-any.whl", "kinetoscope_render-0.1.0.tar.gz", "kinetoscope_render-1.whl"] {
+            wheel::tests::write(&dir.path().join(name), "");
+        }
+        assert_eq!(built_wheels(dir.path()), [dir.path().join("kinetoscope_render-1.whl")]);
+        assert!(built_wheels(&dir.path().join("missing")).is_empty());
+    }
+}
