@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from ...assets import asset
+from kinetoscope.assets import asset
 
 # Names of the tutorials, and the bundled files in their place.
 BUNDLED = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from ....configclass import configclass
+from kinetoscope.compat.configclass import configclass
 
 PerJoint = Any
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ...... import SimulationManager as NativeSimulationManager
-from ...... import cfg as native
-from ......errors import ConfigError, ViewerError
-from .... import step_limit
-from ...._poses import to_row
-from ...._tensors import array, device, tensor
+from kinetoscope import SimulationManager as NativeSimulationManager
+from kinetoscope import cfg as native
+from kinetoscope.errors import ConfigError, ViewerError
+from kinetoscope.compat import step_limit
+from kinetoscope.compat._poses import to_row
+from kinetoscope.compat._tensors import array, device, tensor
 from .cfg import (
     ArticulationCfg,
     JointDrivePropertiesCfg,

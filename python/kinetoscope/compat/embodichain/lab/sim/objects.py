@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ...._poses import rows, to_matrix
-from ...._tensors import array, tensor
+from kinetoscope.compat._poses import rows, to_matrix
+from kinetoscope.compat._tensors import array, tensor
 
 
 def poses(values: Any, to_matrix_form: bool) -> Any:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ...._poses import rows, to_matrix
-from ...._tensors import array, tensor
-from ....configclass import configclass
+from kinetoscope.compat._poses import rows, to_matrix
+from kinetoscope.compat._tensors import array, tensor
+from kinetoscope.compat.configclass import configclass
 
 
 @configclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ....configclass import configclass
+from kinetoscope.compat.configclass import configclass
 
 
 @configclass
