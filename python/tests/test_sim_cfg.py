@@ -130,6 +130,26 @@ def test_only_changed_fields_travel():
     assert tomllib.loads(ks.to_toml({"simulation": ks.SimulationManagerCfg.legged(impratio=1.0)}))["simulation"]["impratio"] == 1
 
 
+def test_none_is_never_a_silent_default():
+    """A field that is present by default is removed by None, as a keyword argument, in a dict and in a class."""
+    from kinetoscope import _sim
+
+    fields = set()
+    for cls in CLASSES:
+        for field in dataclasses.fields(cls):
+            default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+            if "| None" in str(field.type) and default is not None and default is not dataclasses.MISSING:
+                fields.add(field.name)
+    assert fields == set(_sim._NONE_IS_FALSE)
+    for sim in (
+        ks.SimulationManager(ground=None),
+        ks.SimulationManager({"ground": None}),
+        ks.SimulationManager(ks.SimulationManagerCfg(ground=None)),
+    ):
+        assert "ground" not in sim.mjcf
+    assert "ground" in ks.SimulationManager().mjcf
+
+
 VARIANTS = [
     (ks.ObjectShape.box(size=[1, 2, 3]), "rigid_object", "shape"),
     (ks.ObjectShape.sphere(radius=1.0), "rigid_object", "shape"),

@@ -25,11 +25,12 @@ def scene():
     sensors = {
         "camera": ks.CameraCfg(
             width=40, height=30, extrinsics=down, history_length=2, intrinsics=ks.Intrinsics.pixels(fx=40, fy=40, cx=20, cy=15),
-            channels=["color", "depth", "distance", "mask", "normal", "shading_normal", "position", "albedo", "flow"],
+            channels=["color", "depth", "distance", "mask", "normal", "shading_normal", "position", "albedo"],
         ),
+        "moving": ks.CameraCfg(width=8, height=6, extrinsics=down, channels=["flow"]),
         "stereo": ks.StereoCameraCfg(
-            left=ks.CameraCfg(width=40, height=30, channels=["color", "depth"], extrinsics=down), disparity=True,
-        ) if "left" in ks.StereoCameraCfg.__dataclass_fields__ else None,
+            camera=ks.CameraCfg(width=40, height=30, channels=["color", "depth"], extrinsics=down),
+        ),
         "ray_camera": ks.RayCasterCameraCfg(width=8, height=6, extrinsics=down),
         "scanner": ks.RayCasterCfg(parent="dog/base", offset=[0, 0, 20, 1, 0, 0, 0], alignment="yaw", targets=ks.HitTargets.named(["ground"])),
         "feet": ks.ContactSensorCfg(
@@ -40,12 +41,11 @@ def scene():
         "frames": ks.FrameTransformerCfg(source="dog/base", targets=[ks.TargetFrameCfg(bodies="dog/.*_FOOT")]),
         "joints": ks.JointStateCfg(),
         "drives": ks.ActuatorStateCfg(),
-        "wrenches": ks.JointWrenchCfg(),
+        "wrenches": ks.JointWrenchCfg(links=["dog/.*_THIGH"]),
         "engine": ks.MujocoSensorCfg(),
     }  # fmt: skip
     for name, cfg in sensors.items():
-        if cfg is not None:
-            sim.add_sensor(name, cfg)
+        sim.add_sensor(name, cfg)
     sim.update(400)
     yield sim
     sim.destroy()

@@ -14,6 +14,15 @@ use toml::{Table, Value};
 /// File name of configurations from Python; it never appears in messages.
 pub(crate) const PYTHON: &str = "<python>";
 
+/// Optional fields that are present by default, so that `None` is the `false` of scene files. A test of the package
+/// compares the list with the classes.
+pub(crate) const NONE_IS_FALSE: [&str; 2] = ["ground", "min_thickness"];
+
+/// Value of Python's `None` for a field of a dict or a keyword argument; `None` if the field is left out.
+fn none_value(field: &str) -> Option<Value> {
+    NONE_IS_FALSE.contains(&field).then_some(Value::Boolean(false))
+}
+
 /// Largest depth of nested values; a structure that contains itself has no end.
 const MAX_DEPTH: usize = 64;
 
@@ -30,7 +39,7 @@ pub(crate) fn table(cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, Py
     };
     for (name, field) in fields.into_iter().flatten() {
         let name: String = name.extract()?;
-        match value(&field, &name, 0)? {
+        match value(&field, &name, 0)?.or_else(|| none_value(&name)) {
             Some(given) => table.insert(name, given),
             None => table.remove(&name),
         };
@@ -73,7 +82,7 @@ fn value(obj: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Option<Va
         for item in mapping.items()?.iter() {
             let (key, entry): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
             let key: String = key.extract().map_err(|_| invalid(path, "the keys of a dict must be strings"))?;
-            let entry = value(&entry, &join(path, &key), depth + 1)?;
+            let entry = value(&entry, &join(path, &key), depth + 1)?.or_else(|| none_value(&key));
             entry.into_iter().for_each(|entry| drop(table.insert(key.clone(), entry)));
         }
         return Ok(Some(Value::Table(table)));

@@ -91,5 +91,6 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(recording::read_series, module)?)?;
     module.add_function(wrap_pyfunction!(recording::recording_topics, module)?)?;
     module.add_function(wrap_pyfunction!(_panic, module)?)?;
+    module.add("_NONE_IS_FALSE", cfg::NONE_IS_FALSE.to_vec())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }
