@@ -59,7 +59,7 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
         if axis != "tile":
             return super().repeat(sizes[0], axis=axis)
         counts = sizes[0] if len(sizes) == 1 and not isinstance(sizes[0], int) else sizes
-        return np.tile(self, counts).view(Tensor)
+        return np.tile(np.asarray(self), counts).view(Tensor)
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: Any = False) -> Any:
         return np.asarray(array).view(Tensor)
