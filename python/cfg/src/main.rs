@@ -1,4 +1,4 @@
-//! Generates `python/kinetoscope/cfg.py`: the configuration structs as dataclasses.
+//! Generates `python/sim/kinetoscope/cfg.py`: the configuration structs as dataclasses.
 //!
 //! Names, types and documentation come from the Rust sources, default values from the running program. With `--check`,
 //! the file is compared instead of written. Run it with `cargo xtask python-cfg`.
@@ -13,7 +13,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let file: PathBuf = root.join("python/kinetoscope/cfg.py");
+    let file: PathBuf = root.join("python/sim/kinetoscope/cfg.py");
     let text = match python::module(&root) {
         Ok(text) => text,
         Err(problem) => {
@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     if checks && current != text {
         let first = current.lines().zip(text.lines()).position(|(old, new)| old != new);
         eprintln!(
-            "python/kinetoscope/cfg.py does not fit the Rust structs (first difference in line {}); run cargo xtask python-cfg",
+            "python/sim/kinetoscope/cfg.py does not fit the Rust structs (first difference in line {}); run cargo xtask python-cfg",
             first.map_or_else(|| current.lines().count().min(text.lines().count()) + 1, |line| line + 1)
         );
         return ExitCode::FAILURE;
