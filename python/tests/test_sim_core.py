@@ -196,8 +196,14 @@ def test_handles_belong_to_their_simulation(arm_sim):
     assert arm == sim["arm"] and arm != twin and hash(arm) == hash(sim["arm"])
     twin.set_qpos_target(START)
     np.testing.assert_array_equal(arm.qpos_target, np.zeros((2, 6)))
+    assert arm in sim and twin in other and twin not in sim
+    cube = sim.add_rigid_object(uid="cube")
+    sim.exclude_collision(arm, cube)
+    with pytest.raises(ks.ForeignHandleError, match="another simulation"):
+        sim.exclude_collision(cube, twin)
+    with pytest.raises(ks.ArgumentError, match="int"):
+        sim.exclude_collision(cube, 3)
     # A snapshot of another scene is refused.
-    other.add_rigid_object(uid="cube")
     with pytest.raises(ks.SnapshotError):
         sim.restore(other.snapshot())
     del other

@@ -5,7 +5,7 @@ use crate::types::{DECLARED_ENUMS, ENUMS, Struct, structs};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
-use syn::{Expr, GenericArgument, Lit, PathArguments, Type};
+use syn::{GenericArgument, PathArguments, Type};
 use toml::{Table, Value};
 
 const HEAD: &str = "\
@@ -233,14 +233,6 @@ impl Context {
             return format!("Mapping[str, {}]", value.map_or_else(|| "Any".into(), |value| self.annotation(value)));
         }
         if let Type::Array(array) = ty {
-            let count = match &array.len {
-                Expr::Lit(length) => match &length.lit {
-                    Lit::Int(number) => number.base10_digits().to_string(),
-                    _ => String::new(),
-                },
-                _ => String::new(),
-            };
-            let _ = count;
             return format!("Sequence[{}]", self.annotation(&array.elem));
         }
         let name = ident(ty);
@@ -255,6 +247,7 @@ impl Context {
             "Vector3" => "Sequence[float]".into(),
             "UnitQuaternion" => "Sequence[float] | Mapping[str, Sequence[float]]".into(),
             "Channels" => "Sequence[str]".into(),
+            "Array2" => "Any".into(),
             // A path in place of a table.
             "UrdfCfg" | "MjcfFile" => format!("{name} | Mapping[str, Any] | str | os.PathLike[str]"),
             _ => match self.class_of(ty) {

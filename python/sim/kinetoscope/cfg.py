@@ -1366,7 +1366,7 @@ class TerrainCfg:
     uid: str = "terrain"
     """Name of the terrain, unique in the simulation."""
 
-    heights: str | Mapping[str, Any] = field(default_factory=lambda: [(0.0, 0.0), (0.0, 0.0)])
+    heights: Any = field(default_factory=lambda: [(0.0, 0.0), (0.0, 0.0)])
     """Heights above the origin of the terrain frame [m], over a regular grid, rows along y, columns along x,
     starting at -y and -x. Between the points the surface consists of two triangles per cell, which meet in the
     diagonal from (-x, -y) to (+x, +y). MuJoCo stores heights in single precision, as fractions of the range from

@@ -60,7 +60,7 @@ def to_image(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any] | None:
         return np.asarray(gray).astype(np.uint8)[..., None]
     if values.dtype == np.int32 and values.ndim == 2:
         ids = values.astype(np.uint32)
-        return np.stack([(ids * step) & 255 for step in (97, 57, 23)], axis=-1).astype(np.uint8)
+        return np.asarray(np.stack([(ids * step) & 255 for step in (97, 57, 23)], axis=-1), dtype=np.uint8)
     return None
 
 

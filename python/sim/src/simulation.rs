@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 ///
 /// ``cfg`` is a ``SimulationManagerCfg`` or a dict of its fields; keyword arguments replace fields. All methods release
 /// the interpreter while they work, and ``update`` ends early with ``KeyboardInterrupt`` on Ctrl+C.
-#[pyclass(frozen, subclass, name = "SimulationManager", module = "kinetoscope")]
+#[pyclass(frozen, name = "SimulationManager", module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
     pub(crate) shared: Arc<Shared>,
@@ -166,9 +166,10 @@ impl Simulation {
         self.add(py, name, cfg)
     }
 
-    /// Excludes collisions between two entities or bodies from now on.
-    fn exclude_collision(&self, py: Python<'_>, one: &str, other: &str) -> PyResult<()> {
-        self.shared.write(py, |sim| Ok(sim.exclude_collision(one, other)?))
+    /// Excludes collisions between two entities or bodies from now on: names such as ``"arm/link"``, or handles.
+    fn exclude_collision(&self, py: Python<'_>, one: &Bound<'_, PyAny>, other: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (one, other) = (self.name_of(one)?, self.name_of(other)?);
+        self.shared.write(py, |sim| Ok(sim.exclude_collision(&one, &other)?))
     }
 
     /// Steps all environments ``steps`` times. Ctrl+C ends the call after at most one block of steps.
@@ -465,8 +466,9 @@ impl Simulation {
         self.handle(py, name, entity)
     }
 
+    /// True for the name of an entity, and for a handle of this simulation.
     fn __contains__(&self, name: &Bound<'_, PyAny>) -> bool {
-        name.extract::<String>().is_ok_and(|name| self.shared.keys().contains(&name))
+        self.name_of(name).is_ok_and(|name| self.shared.keys().contains(&name))
     }
 
     fn __iter__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
@@ -501,6 +503,31 @@ impl Simulation {
 }
 
 impl Simulation {
+    /// Name of an entity: a text, or the uid of a handle of this simulation.
+    fn name_of(&self, entity: &Bound<'_, PyAny>) -> PyResult<String> {
+        if let Ok(name) = entity.extract::<String>() {
+            return Ok(name);
+        }
+        macro_rules! owner {
+            ($($Type:ty),*) => {
+                None$(.or_else(|| entity.cast::<$Type>().ok().map(|handle| &handle.get().shared)))*
+            };
+        }
+        let owner: Option<&Arc<Shared>> = owner!(Robot, RigidObject, RigidObjectGroup, Terrain, MjcfPart, Weld, Sensor);
+        match owner {
+            Some(owner) if Arc::ptr_eq(owner, &self.shared) => entity.getattr("uid")?.extract(),
+            Some(_) => {
+                let message = format!("{} belongs to another simulation", entity.repr()?);
+                Err(Failure::new(Class::ForeignHandle, message).into())
+            }
+            None => Err(Failure::argument(
+                "entity",
+                format!("expected a name or a handle, not {}", entity.get_type().name()?),
+            )
+            .into()),
+        }
+    }
+
     fn of_scene(py: Python<'_>, cfg: SceneCfg) -> PyResult<Self> {
         let names: Vec<String> = cfg.keys().map(String::from).collect();
         let (manager, entities) = build(py, || {
