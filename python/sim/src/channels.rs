@@ -2,7 +2,7 @@
 
 use crate::errors::{Class, Failure};
 use crate::values::Values;
-use kinetoscope::ndarray::{ArrayView2, ArrayView3, Axis};
+use kinetoscope::ndarray::{ArrayView, Dimension};
 use kinetoscope::render::frame::Channel as _;
 use kinetoscope::scene::pattern::closest_names;
 use kinetoscope::sensors::camera::{Camera, StereoCamera};
@@ -54,7 +54,7 @@ fn owned(names: &[&str]) -> Vec<String> {
 }
 
 /// Values of the channel `name` of a sensor.
-pub(crate) fn values(sensor: &dyn Sensor, name: &str, instant: Instant) -> Result<Values, Failure> {
+pub(crate) fn values<'s>(sensor: &'s dyn Sensor, name: &str, instant: Instant) -> Result<Values<'s>, Failure> {
     let any: &dyn Any = sensor;
     let unknown = || {
         let known = names(sensor);
@@ -115,15 +115,18 @@ pub(crate) fn values(sensor: &dyn Sensor, name: &str, instant: Instant) -> Resul
     if !known {
         return Err(unknown());
     }
-    let items = shape(any, sampled, name, sampled.sampler().values(name).ncols());
+    let items = axes_of(any, sampled, name, sampled.sampler().values(name).ncols());
+    let sampler = sampled.sampler();
+    let shape = |leading: &[usize]| leading.iter().chain(&items).copied().collect();
+    let (envs, past) = (sampler.num_envs(), sampler.history_length());
     Ok(match instant {
-        Instant::Current => shaped_current(sampled.sampler().values(name), &items),
-        Instant::History => shaped_history(sampled.sampler().history(name), &items),
+        Instant::Current => shaped(sampler.values(name), shape(&[envs])),
+        Instant::History => shaped(sampler.history(name), shape(&[envs, past])),
     })
 }
 
 /// Images of a channel of a camera; `None` if the camera does not have it.
-fn image(camera: &Camera, name: &str, instant: Instant) -> Result<Option<Values>, Failure> {
+fn image<'s>(camera: &'s Camera, name: &str, instant: Instant) -> Result<Option<Values<'s>>, Failure> {
     macro_rules! by_name {
         ($($(#[$doc:meta])* $module:ident :: $Channel:ident,)*) => {{
             use kinetoscope::render::frame;
@@ -142,7 +145,7 @@ fn image(camera: &Camera, name: &str, instant: Instant) -> Result<Option<Values>
 }
 
 /// Axes of a channel after the environments: one per kind of item, and one of the components of an item.
-fn shape(sensor: &dyn Any, sampled: &dyn Sampled, name: &str, width: usize) -> Vec<usize> {
+fn axes_of(sensor: &dyn Any, sampled: &dyn Sampled, name: &str, width: usize) -> Vec<usize> {
     let items = sampled.columns().len();
     let axes = |first: &[usize]| {
         let count: usize = first.iter().product();
@@ -162,22 +165,12 @@ fn shape(sensor: &dyn Any, sampled: &dyn Sampled, name: &str, width: usize) -> V
     vec![width]
 }
 
-fn shaped_current(values: ArrayView2<'_, f64>, items: &[usize]) -> Values {
-    let shape: Vec<usize> = std::iter::once(values.nrows()).chain(items.iter().copied()).collect();
-    let owned = values.to_owned().into_dyn();
-    // The number of values is that of the shape, because `shape` divides the width.
-    match owned.clone().into_shape_with_order(shape) {
-        Ok(shaped) => Values::F64(shaped),
-        Err(_) => Values::F64(owned),
-    }
-}
-
-fn shaped_history(values: ArrayView3<'_, f64>, items: &[usize]) -> Values {
-    let shape = [values.len_of(Axis(0)), values.len_of(Axis(1))];
-    let shape: Vec<usize> = shape.into_iter().chain(items.iter().copied()).collect();
-    let owned = values.to_owned().into_dyn();
-    match owned.clone().into_shape_with_order(shape) {
-        Ok(shaped) => Values::F64(shaped),
-        Err(_) => Values::F64(owned),
+/// Values in a shape with the same number of values.
+fn shaped<'s, D: Dimension>(values: ArrayView<'s, f64, D>, shape: Vec<usize>) -> Values<'s> {
+    let values = values.into_dyn();
+    // The buffers of samplers are contiguous, and `axes` divides the width.
+    match values.clone().into_shape_with_order(shape) {
+        Ok(shaped) => shaped.into(),
+        Err(_) => values.into(),
     }
 }

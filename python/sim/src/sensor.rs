@@ -4,7 +4,7 @@ use crate::arguments::{array, env_indices};
 use crate::channels::{Instant, names, values};
 use crate::errors::Failure;
 use crate::shared::Shared;
-use crate::values::Values;
+use crate::values::{Values, read_into};
 use kinetoscope::ndarray::{Array2, ArrayD, Ix2, IxDyn};
 use kinetoscope::prelude::Intrinsics;
 use kinetoscope::sensors::camera::{Camera, CameraConvention, CameraPlacement, PointFrame, StereoCamera};
@@ -101,11 +101,11 @@ impl Sensor {
     /// Current values of a channel. With ``out``, they are copied into that array, which is returned.
     #[pyo3(signature = (channel, out=None))]
     fn read<'py>(&self, py: Python<'py>, channel: &str, out: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        let values = self.value(py, channel, Instant::Current)?;
-        match out {
-            None => Ok(values.into_python(py)),
-            Some(out) => values.copy_to(&out).map(|()| out),
-        }
+        let Some(out) = out else { return self.__getitem__(py, channel) };
+        read_into(py, &self.shared, &out, |sim| {
+            values(sim.entities().sensor_by_uid(&self.uid)?, channel, Instant::Current)
+        })?;
+        Ok(out)
     }
 
     /// Past values of a channel, newest first on the second axis.
@@ -116,11 +116,11 @@ impl Sensor {
     /// Times of capture of the current values [s], shape (num_envs,).
     #[getter]
     fn stamps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let stamps: Values = self.shared.read(py, |sim| {
+        let stamps: Values<'_> = self.shared.read(py, |sim| {
             let sensor = sim.entities().sensor_by_uid(&self.uid)?;
             match camera_of(sensor) {
-                Some(camera) => Ok(camera.stamps().into()),
-                None => Ok(sampled(sensor, &self.uid)?.stamps().into()),
+                Some(camera) => Ok(camera.stamps().to_owned().into()),
+                None => Ok(sampled(sensor, &self.uid)?.stamps().to_owned().into()),
             }
         })?;
         Ok(stamps.into_python(py))
@@ -129,11 +129,11 @@ impl Sensor {
     /// Number of measurements since the last reset, shape (num_envs,).
     #[getter]
     fn sample_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let counts: Values = self.shared.read(py, |sim| {
+        let counts: Values<'_> = self.shared.read(py, |sim| {
             let sensor = sim.entities().sensor_by_uid(&self.uid)?;
             match camera_of(sensor) {
-                Some(camera) => Ok(camera.frame_counts().into()),
-                None => Ok(sampled(sensor, &self.uid)?.sample_counts().into()),
+                Some(camera) => Ok(camera.frame_counts().to_owned().into()),
+                None => Ok(sampled(sensor, &self.uid)?.sample_counts().to_owned().into()),
             }
         })?;
         Ok(counts.into_python(py))
@@ -142,7 +142,7 @@ impl Sensor {
     /// Intrinsic matrices of a camera [pixels], shape (num_envs, 3, 3).
     #[getter]
     fn intrinsic_matrices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let matrices: Values = self.shared.read(py, |sim| {
+        let matrices: Values<'_> = self.shared.read(py, |sim| {
             let sensor: &dyn Any = sim.entities().sensor_by_uid(&self.uid)?;
             if let Some(camera) = sensor.downcast_ref::<RayCasterCamera>() {
                 return Ok(camera.intrinsic_matrices().into());
@@ -171,7 +171,7 @@ impl Sensor {
     #[pyo3(signature = (convention="ros"))]
     fn pose_w<'py>(&self, py: Python<'py>, convention: &str) -> PyResult<Bound<'py, PyAny>> {
         let convention = axes(convention)?;
-        let poses: Values = self.shared.read(py, |sim| {
+        let poses: Values<'_> = self.shared.read(py, |sim| {
             let sensor: &dyn Any = sim.entities().sensor_by_uid(&self.uid)?;
             let poses = sensor.downcast_ref::<Camera>().map(|camera| camera.pose_w(convention));
             let poses = poses.or_else(|| Some(sensor.downcast_ref::<StereoCamera>()?.pose_w(convention)));
@@ -292,7 +292,7 @@ impl Sensor {
                 return Err(Failure::argument("frame", message).into());
             }
         };
-        let points: Values = self.shared.read(py, |sim| {
+        let points: Values<'_> = self.shared.read(py, |sim| {
             let sensor = sim.entities().sensor_by_uid(&self.uid)?;
             let any: &dyn Any = sensor;
             if let Some(camera) = any.downcast_ref::<RayCasterCamera>() {
@@ -373,8 +373,8 @@ impl Sensor {
 }
 
 impl Sensor {
-    fn value(&self, py: Python<'_>, channel: &str, instant: Instant) -> PyResult<Values> {
-        self.shared.read(py, |sim| values(sim.entities().sensor_by_uid(&self.uid)?, channel, instant))
+    fn value(&self, py: Python<'_>, channel: &str, instant: Instant) -> PyResult<Values<'static>> {
+        self.shared.read(py, |sim| Ok(values(sim.entities().sensor_by_uid(&self.uid)?, channel, instant)?.into_owned()))
     }
 }
 
