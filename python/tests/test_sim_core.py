@@ -300,7 +300,7 @@ def test_created_and_destroyed_simulations_leave_no_memory():
         once()
     gc.collect()
     before = resident()
-    for _ in range(200):
+    for _ in range(500):
         once()
     gc.collect()
     # A leak of one state or image of a simulation, about 20 kB, would be 4 MB.
@@ -320,6 +320,19 @@ def test_toml_of_a_scene_is_read_back():
     sim = ks.SimulationManager.from_scene(scene)
     assert sim.keys() == ["arm", "cube", "imu"] and sim.num_envs == 3
     assert ks.to_toml(__import__("tomllib").loads(text)) == text
+
+
+def test_the_renderer_is_in_another_package():
+    """Without the package kinetoscope-render, the error names it; other names are unknown as usual."""
+    import importlib.util
+
+    if importlib.util.find_spec("kinetoscope_render") is None:
+        with pytest.raises(AttributeError, match="needs the package kinetoscope-render"):
+            ks.Renderer  # noqa: B018
+    else:
+        assert ks.Renderer.__module__.startswith("kinetoscope_render")
+    with pytest.raises(AttributeError, match="no attribute 'Rendrer'"):
+        ks.Rendrer  # noqa: B018
 
 
 def test_scene_files(tmp_path):

@@ -251,6 +251,20 @@ def test_recordings_are_replayed_bit_by_bit(tmp_path):
     times, values = ks.read_series(path, topic, field)
     np.testing.assert_array_equal(values[-1], recorded[-1, 0, 0])
     assert (np.diff(times) >= 0).all()
+    playback = ks.Playback(path)
+    assert len(playback) == len(playback.times) >= 30
+    (part,) = (playback.sim[name] for name in playback.sim)
+    ((column, _),) = part.qpos_columns([".*JOINT2"])
+    for frame in (3, 17):
+        playback.seek(frame)
+        assert playback.frame_at(playback.times[frame]) >= frame
+        seen = playback.sim[part.uid].qpos[:, column]
+        assert any((seen == row[:, 1]).all() for row in recorded), seen
+    with pytest.raises(ks.OutOfRangeError):
+        playback.seek(len(playback))
+    playback = ks.Playback(path, again)
+    playback.seek(len(playback) - 1)
+    np.testing.assert_array_equal(playback.sim[part.uid].qpos[:, column], recorded[-1, :, 1])
     with pytest.raises(ks.RecordingError, match="exists"):
         sim.record(path)
     summary = sim.record(path, overwrite=True).finish()

@@ -10,6 +10,9 @@
 
 from __future__ import annotations
 
+import importlib
+from typing import Any
+
 from ._preload import preload
 
 preload()
@@ -18,6 +21,7 @@ from . import cfg, errors  # noqa: E402
 from ._sim import (  # noqa: E402
     IkResult,
     MjcfPart,
+    Playback,
     Recorder,
     RecordingSummary,
     RigidObject,
@@ -41,9 +45,22 @@ from .assets import asset, bundled_robot  # noqa: E402
 from .cfg import *  # noqa: E402, F403
 from .errors import *  # noqa: E402, F403
 
+
+def __getattr__(name: str) -> Any:
+    """The renderer of the package kinetoscope-render, where it is installed."""
+    if name in ("Renderer", "BatchRenderer", "patch_mujoco"):
+        try:
+            render = importlib.import_module("kinetoscope_render")
+        except ImportError as error:
+            raise AttributeError(f"kinetoscope.{name} needs the package kinetoscope-render: {error}") from None
+        return getattr(render, name)
+    raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
+
+
 __all__ = [
     "IkResult",
     "MjcfPart",
+    "Playback",
     "Recorder",
     "RecordingSummary",
     "RigidObject",

@@ -82,6 +82,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::Topic>()?;
     module.add_class::<recording::Recorder>()?;
     module.add_class::<recording::RecordingSummary>()?;
+    module.add_class::<recording::Playback>()?;
     module.add_class::<viewer::Server>()?;
     module.add_class::<viewer::Window>()?;
     module.add_function(wrap_pyfunction!(asset_path, module)?)?;

@@ -2,7 +2,7 @@
 
 use crate::arguments::envs;
 use crate::errors::{Class, Failure};
-use crate::shared::Shared;
+use crate::shared::{Entity, Shared};
 use crate::simulation::Simulation;
 use kinetoscope::prelude::Record as _;
 use kinetoscope::record::{self, FieldSelector, Format, OverviewCfg, RecorderCfg, RecorderId, Recording};
@@ -11,7 +11,7 @@ use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Selection of what is recorded.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -258,6 +258,80 @@ fn format_of(name: &str) -> PyResult<Format> {
         let known: Vec<String> = Format::all().map(|(format, _)| label(format)).collect();
         Failure::new(Class::UnknownName, format!("unknown format {name:?}; known names: {}", known.join(", "))).into()
     })
+}
+
+/// Playback of a recording: ``seek`` puts the simulation ``sim`` into the state of a recorded frame.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct Playback {
+    shared: Arc<Shared>,
+    sim: Py<Simulation>,
+    inner: Mutex<record::Playback>,
+}
+
+#[pymethods]
+impl Playback {
+    /// Opens a recording. Without ``sim``, the scene in the file is built; files without a scene need one.
+    #[new]
+    #[pyo3(signature = (path, sim=None))]
+    fn new(py: Python<'_>, path: PathBuf, sim: Option<&Bound<'_, Simulation>>) -> PyResult<Self> {
+        let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+        let (inner, manager) = match sim {
+            Some(sim) => {
+                let scene = &sim.get().shared;
+                scene.read(py, |sim| Ok(record::Playback::open(&recording, Some(sim))?))?
+            }
+            None => py.detach(|| record::Playback::open(&recording, None)).map_err(Failure::from)?,
+        };
+        let entities = manager.entities();
+        let parts =
+            entities.mjcf_uids().into_iter().filter_map(|uid| Some((uid.to_string(), entities.mjcf_id(uid).ok()?)));
+        let parts: Vec<_> = parts.collect();
+        let shared = Shared::new(manager);
+        parts.into_iter().for_each(|(uid, id)| shared.register(&uid, Entity::Mjcf(id)));
+        let sim = Py::new(py, Simulation { shared: Arc::clone(&shared) })?;
+        Ok(Self { shared, sim, inner: Mutex::new(inner) })
+    }
+
+    /// Simulation that shows the recording: the recorded scene as MJCF parts.
+    #[getter]
+    fn sim(&self, py: Python<'_>) -> Py<Simulation> {
+        self.sim.clone_ref(py)
+    }
+
+    /// Times of the frames [s].
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().to_vec()).into_pyarray(py)
+    }
+
+    /// Shows a frame, by its index in ``times``.
+    fn seek(&self, py: Python<'_>, frame: usize) -> PyResult<()> {
+        self.shared.write(py, |sim| {
+            let mut playback = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let count = playback.times().len();
+            if frame >= count {
+                return Err(Failure::new(
+                    Class::OutOfRange,
+                    format!("frame {frame} does not exist; there are {count}"),
+                ));
+            }
+            Ok(playback.seek(sim, frame)?)
+        })
+    }
+
+    /// Index of the last frame at or before a time [s].
+    fn frame_at(&self, py: Python<'_>, time: f64) -> usize {
+        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).frame_at(time))
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().len())
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<Playback of {} frames>", self.__len__(py))
+    }
 }
 
 /// Times and values of a number in a recording.
