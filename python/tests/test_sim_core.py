@@ -126,7 +126,7 @@ def test_forms_of_indices(arm_sim):
         (lambda s, a: s.add_sensor("imu", ks.ImuCfg(body="nowhere")), ks.KinetoscopeError, "nowhere"),
         (lambda s, a: s.add_sensor("x", {"type": "camra"}), ks.ConfigError, "camera"),
         (lambda s, a: s.add_sensor("x", {}), ks.ConfigError, "type"),
-        (lambda s, a: s["nobody"], ks.UnknownNameError, '"arm"'),
+        (lambda s, a: s["leg"], ks.UnknownNameError, '"arm"'),
         (lambda s, a: s.update(-1), OverflowError, ""),
         (lambda s, a: ks.SimulationManager(num_envs=0), ks.ConfigError, "num_envs is 0"),
         (lambda s, a: ks.SimulationManager(num_evs=1), ks.ConfigError, "num_envs"),

@@ -159,8 +159,8 @@ def test_inverse_kinematics(arm_sim, rng):
     np.testing.assert_allclose(jacobian[:, :3, 2], slope, atol=1e-6)
     moved = arm.compute_fk(q, "arm", tcp=[0, 0, 0.1, 1, 0, 0, 0])
     np.testing.assert_allclose(np.linalg.norm(moved[:, :3] - targets[:, :3], axis=1), 0.1, atol=1e-9)
-    with pytest.raises(ks.ConfigError, match="positon_tolerance"):
-        arm.compute_ik(targets, "arm", {"positon_tolerance": 1})
+    with pytest.raises(ks.ConfigError, match="distance_tolerance"):
+        arm.compute_ik(targets, "arm", {"distance_tolerance": 1})
     with pytest.raises(ks.KinetoscopeError, match="amr"):
         arm.compute_ik(targets, "amr")
 
@@ -272,7 +272,7 @@ def test_recordings_are_replayed_bit_by_bit(tmp_path):
     with pytest.raises(ks.RecordingError):
         sim.record(tmp_path / "x.mp5")
     with pytest.raises(ks.ArgumentError, match="Topic"):
-        sim.record(tmp_path / "y.npz", ["everythin"])
+        sim.record(tmp_path / "y.npz", ["all"])
 
 
 def test_views(tmp_path):

@@ -111,7 +111,7 @@ def test_images_into_an_array_of_the_caller(scene):
     assert camera.read("depth", out=out) is out
     np.testing.assert_array_equal(out, camera["depth"])
     frozen = np.zeros((N, 30, 40), np.float32)
-    frozen.flags.writeable = False
+    frozen.setflags(write=False)
     for wrong in (np.zeros((N, 30, 41), np.float32), np.zeros((N, 30, 40)), frozen, [1]):
         with pytest.raises(ks.ArgumentError, match="out: expected a writable array of f32"):
             camera.read("depth", out=wrong)

@@ -45,6 +45,6 @@ def test_types_of_a_program(strict, tmp_path):
     )
     assert run("mypy", "--config-file", strict, str(program)).returncode == 0
     # A control: mistakes are found.
-    program.write_text(program.read_text() + "arm.qops\nks.DriveCfg(stifness=1.0)\nks.CameraCfg(width='a')\n")
+    program.write_text(program.read_text() + "arm.qops\nks.DriveCfg(stiff=1.0)\nks.CameraCfg(width='a')\n")
     result = run("mypy", "--config-file", strict, str(program))
     assert result.stdout.count(": error:") == 3, result.stdout

@@ -461,7 +461,7 @@ impl SimulationManager {
     ///
     /// # Errors
     /// An environment does not exist; then no environment is cleared.
-    pub fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+    pub(crate) fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
         envs.iter().for_each(|&env| self.simulation.batch.write(env, SimEnv::reset_buffers));

@@ -208,7 +208,7 @@ impl Simulation {
     #[pyo3(signature = (env_ids=None))]
     fn reset_buffers(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let env_ids = envs(env_ids)?;
-        self.shared.write(py, |sim| Ok(sim.reset_buffers(env_ids.as_deref())?))
+        self.shared.write(py, |sim| Ok(sim.scene_mut().reset_buffers(env_ids.as_deref())?))
     }
 
     /// Number of environments.

@@ -19,7 +19,7 @@ except ImportError:
 
 
 def tensor(array: Any) -> Any:
-    """A tensor of an array that belongs to nobody else. Numbers in double precision become single precision, as the
+    """A tensor of an array that no other object uses. Numbers in double precision become single precision, as the
     other simulators have; all other arrays keep their memory."""
     array = np.asarray(array)
     if array.dtype == np.float64:

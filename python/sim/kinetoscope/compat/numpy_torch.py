@@ -6,6 +6,7 @@ differ from those of an array. There is no automatic differentiation and no GPU.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -47,11 +48,16 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
         return np.expand_dims(self, axis)
 
     def unsqueeze_(self, axis: int) -> Tensor:
-        self.shape = np.expand_dims(self, axis).shape
-        return self
+        return self._in_place(np.expand_dims(self, axis).shape)
 
     def squeeze_(self, axis: int | None = None) -> Tensor:
-        self.shape = self.squeeze(axis).shape
+        return self._in_place(self.squeeze(axis).shape)
+
+    def _in_place(self, shape: tuple[int, ...]) -> Tensor:
+        with warnings.catch_warnings():
+            # NumPy 2.5 has no other way to change the shape of an existing array.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self.shape = shape
         return self
 
     def repeat(self, *sizes: Any, axis: Any = "tile") -> Any:  # type: ignore[override]
