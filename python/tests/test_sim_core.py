@@ -116,7 +116,7 @@ def test_forms_of_indices(arm_sim):
         (lambda s, a: a.set_qpos_target(START, env_ids=[-1]), ks.OutOfRangeError, "indices start at 0"),
         (lambda s, a: a.set_qpos_target([0], joint_ids=[6]), ks.OutOfRangeError, "joint 6"),
         (lambda s, a: a.set_qpos_target([0], joint_ids=[0.5]), ks.ArgumentError, "indices"),
-        (lambda s, a: a.set_qpos_target([0], joint_ids=["JONT1"]), ks.UnknownNameError, "JOINT1"),
+        (lambda s, a: a.set_qpos_target([0], joint_ids=["JOINT9"]), ks.UnknownNameError, "JOINT1"),
         (lambda s, a: a.joint_ids("amr"), ks.UnknownNameError, "arm"),
         (lambda s, a: a.link_pose("nothing"), ks.UnknownNameError, "nothing"),
         (lambda s, a: s.add_robot(ks.bundled_robot("sr5", uid="arm")), ks.ConfigError, "taken"),
