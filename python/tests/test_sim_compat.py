@@ -159,6 +159,10 @@ def test_targets_and_states_of_embodichain():
     np.testing.assert_allclose(np.asarray(robot.get_qpos(name="arm")), 0.25)
     with pytest.raises(ValueError, match="1 rows for 3 environments"):
         robot.set_qpos([0.0] * 6, joint_ids=arm)
+    with pytest.raises(NotImplementedError, match="init_qpos"):
+        sim.add_robot(RobotCfg(fpath=hand, init_qpos=[0.0] * 11))
+    with pytest.raises(NotImplementedError, match="profiler"):
+        SimulationManager(SimulationManagerCfg(profiler={}))
     cube = sim.add_rigid_object(RigidObjectCfg(uid="cube", shape=CubeCfg(size=[0.05] * 3), init_pos=[1.2, -0.2, 0.1]))
     assert cube.native.nominal_mass == 1.0
     sim.update()

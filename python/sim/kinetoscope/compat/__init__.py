@@ -17,6 +17,13 @@ from __future__ import annotations
 import os
 
 
+def unsupported(owner: str, **fields: bool) -> None:
+    """Raises NotImplementedError for the first field that is set, so that no setting is ignored silently."""
+    for name, is_set in fields.items():
+        if is_set:
+            raise NotImplementedError(f"{owner}: this layer does not support {name}")
+
+
 def step_limit() -> int | None:
     """Value of ``KINETOSCOPE_COMPAT_STEPS``, or None."""
     text = os.environ.get("KINETOSCOPE_COMPAT_STEPS", "")

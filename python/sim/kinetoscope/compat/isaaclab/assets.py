@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..._sim import Robot
+from .. import unsupported
 from .._poses import to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
@@ -77,6 +78,12 @@ def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
             content = {"saturation_effort": actuator.saturation_effort} if model == "dc_motor" else {}
             drive.setdefault("actuators", {}).update({pattern: {model: content} for pattern in patterns})
     start = cfg.init_state
+    unsupported(
+        "ArticulationCfg.InitialStateCfg",
+        lin_vel=any(start.lin_vel),
+        ang_vel=any(start.ang_vel),
+        joint_vel=any(start.joint_vel.values()),
+    )
     # The initial position of a joint that no pattern names is 0 here, too.
     joint_pos = {pattern: float(value) for pattern, value in start.joint_pos.items() if pattern != ".*" or value != 0}
     return {

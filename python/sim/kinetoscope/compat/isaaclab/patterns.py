@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from .. import unsupported
 from ..configclass import configclass
 
 
@@ -35,4 +36,7 @@ class BpearlPatternCfg:
     horizontal_res: float = 10.0
 
     def to_native(self) -> dict[str, Any]:
+        unsupported(
+            "BpearlPatternCfg", horizontal_fov=self.horizontal_fov != 360.0, horizontal_res=self.horizontal_res != 10.0
+        )
         return {"bpearl": {}}

@@ -10,6 +10,7 @@ import numpy as np
 from ... import SimulationManager
 from ... import cfg as native
 from ...errors import ConfigError
+from .. import unsupported
 from .._tensors import array, tensor
 from ..configclass import MISSING, configclass, fields_of
 from .assets import Articulation, ArticulationCfg, AssetBaseCfg, articulation_fields
@@ -106,6 +107,9 @@ class InteractiveScene:
             aperture = {"focal_length": float(lens.focal_length), "horizontal_aperture": float(lens.horizontal_aperture)}
             if lens.vertical_aperture is not None:
                 aperture["vertical_aperture"] = float(lens.vertical_aperture)
+            aperture["horizontal_offset"] = float(lens.horizontal_aperture_offset)
+            aperture["vertical_offset"] = float(lens.vertical_aperture_offset)
+            unsupported(name, f_stop=lens.f_stop != 0.0, history_length=cfg.history_length != 0)
             near, far = lens.clipping_range
             convention = {"opengl": "open_gl"}.get(cfg.offset.convention, cfg.offset.convention)
             pose = {"pos": numbers(cfg.offset.pos), "rotation": numbers(cfg.offset.rot)}

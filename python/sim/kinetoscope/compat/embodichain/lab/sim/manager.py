@@ -11,7 +11,7 @@ import numpy as np
 from kinetoscope import SimulationManager as NativeSimulationManager
 from kinetoscope import cfg as native
 from kinetoscope.errors import ConfigError, ViewerError
-from kinetoscope.compat import step_limit
+from kinetoscope.compat import step_limit, unsupported
 from kinetoscope.compat._poses import to_row
 from kinetoscope.compat._tensors import array, device, tensor
 from .cfg import (
@@ -35,6 +35,9 @@ class SimulationManager:
 
     def __init__(self, sim_config: SimulationManagerCfg | None = None) -> None:
         self.cfg = sim_config or SimulationManagerCfg()
+        unsupported(
+            "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
+        )
         if str(self.cfg.sim_device).startswith("cuda"):
             raise ConfigError("sim_device is 'cuda': this package simulates on the CPU; use 'cpu'")
         self._steps = 0
@@ -222,6 +225,7 @@ def urdf(cfg: URDFCfg | None, fpath: str | None) -> Any:
 
 
 def articulation_fields(cfg: Any) -> dict[str, Any]:
+    unsupported("RobotCfg", init_qpos=cfg.init_qpos is not None, solver_cfg=getattr(cfg, "solver_cfg", None) is not None)
     files, stem = urdf(getattr(cfg, "urdf_cfg", None), cfg.fpath)
     return {
         "uid": cfg.uid or stem,
@@ -234,6 +238,12 @@ def articulation_fields(cfg: Any) -> dict[str, Any]:
 
 def object_fields(cfg: RigidObjectCfg) -> dict[str, Any]:
     attrs = cfg.attrs
+    unsupported(
+        "RigidObjectCfg",
+        enable_collision=not attrs.enable_collision,
+        static_friction=attrs.static_friction != attrs.dynamic_friction,
+        max_convex_hull_num=getattr(cfg.shape, "max_convex_hull_num", 1) != 1,
+    )
     fields: dict[str, Any] = {"uid": cfg.uid, "init_pose": pose(cfg), "body_type": cfg.body_type}
     moments: float | None = None
     if isinstance(cfg.shape, CubeCfg):
