@@ -124,6 +124,7 @@ def test_targets_and_states_of_embodichain():
     from kinetoscope.compat.embodichain.data import get_data_path
     from kinetoscope.compat.embodichain.lab.sim import SimulationManager, SimulationManagerCfg
     from kinetoscope.compat.embodichain.lab.sim.cfg import JointDrivePropertiesCfg, RigidObjectCfg, RobotCfg, URDFCfg
+    from kinetoscope.compat.embodichain.lab.sim.sensors import CameraCfg
     from kinetoscope.compat.embodichain.lab.sim.shapes import CubeCfg
 
     sim = SimulationManager(SimulationManagerCfg())
@@ -155,6 +156,11 @@ def test_targets_and_states_of_embodichain():
     assert limits.shape == (3, 17, 2) and limits.dtype == np.float32
     robot.set_qpos(np.full((3, 6), 100.0), joint_ids=arm)
     np.testing.assert_allclose(np.asarray(robot.get_qpos(name="arm", target=True)), limits[:, arm, 1], rtol=1e-6)
+    # Both are clamped to the limits that are set now, not to those of the file.
+    robot.native.set_qpos_limits([[[-0.5, 0.5]] * 6], joint_ids="arm")
+    for target in (True, False):
+        robot.set_qpos(np.full((3, 6), 100.0), name="arm", target=target)
+        np.testing.assert_allclose(np.asarray(robot.get_qpos(name="arm", target=target)), 0.5)
     robot.set_qpos(np.full((3, 6), 0.25), name="arm", target=False)
     np.testing.assert_allclose(np.asarray(robot.get_qpos(name="arm")), 0.25)
     with pytest.raises(ValueError, match="1 rows for 3 environments"):
@@ -165,6 +171,14 @@ def test_targets_and_states_of_embodichain():
         SimulationManager(SimulationManagerCfg(profiler={}))
     cube = sim.add_rigid_object(RigidObjectCfg(uid="cube", shape=CubeCfg(size=[0.05] * 3), init_pos=[1.2, -0.2, 0.1]))
     assert cube.native.nominal_mass == 1.0
+    # Without a parent, the rotation is that of ROS axes; with one, of OpenGL axes in the link.
+    turned = [0.5, 0.5, -0.5, 0.5]
+    free = sim.add_sensor(CameraCfg(width=8, height=6, extrinsics=CameraCfg.ExtrinsicsCfg(pos=[1, 2, 3], quat=turned)))
+    held = sim.add_sensor(sensor_cfg=CameraCfg(width=8, height=6, extrinsics=CameraCfg.ExtrinsicsCfg(parent="ee_link")))
+    np.testing.assert_allclose(free.native.pose_w("ros")[0], [1, 2, 3, *turned], atol=1e-12)
+    own, link = held.native.pose_w("opengl")[0], robot.native.link_pose("ee_link")[0]
+    np.testing.assert_allclose(own * np.sign(own[3]), link * np.sign(link[3]), atol=1e-6)
+    assert (free.uid, held.uid) == ("camera_0", "camera_1") and held.is_attached
     sim.update()
     assert sim.native.time[0] == pytest.approx(0.1)
     ok, found = robot.compute_ik(robot.compute_fk(np.full((3, 6), 0.3), "arm"), name="arm")
