@@ -343,7 +343,7 @@ pub(crate) fn read_series<'py>(
     topic: &str,
     field: &str,
     env: Option<usize>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
     let series = py
         .detach(|| {
             let recording = Recording::open(path)?;
@@ -352,7 +352,7 @@ pub(crate) fn read_series<'py>(
         })
         .map_err(Failure::from)?;
     let first = series.into_iter().next().unwrap_or_default();
-    Ok((first.times.into_pyarray(py), first.values.into_pyarray(py)))
+    Ok([first.times.into_pyarray(py), first.values.into_pyarray(py)])
 }
 
 /// Names of the topics of a recording, each with the names of its numbers.

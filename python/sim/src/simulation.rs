@@ -269,6 +269,7 @@ impl Simulation {
 
     /// Table of the mask ids of cameras: id, entity, link (or None), semantic class.
     #[getter]
+    #[expect(clippy::type_complexity, reason = "rows of a table")]
     fn mask_ids(&self, py: Python<'_>) -> PyResult<Vec<(i32, String, Option<String>, String)>> {
         self.shared.write(py, |sim| {
             sim.scene_mut().visual_scene();
