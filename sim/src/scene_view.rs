@@ -253,6 +253,16 @@ impl<'a> SceneViewMut<'a> {
         Ok(())
     }
 
+    /// Clears the buffers that environments keep beside their state, in all of them for `env_ids = None`. Sensors
+    /// restart from the current state, external wrenches end, and actuator models lose their memory (delays, motor
+    /// states). Positions, velocities, targets and time stay. A diverged environment stays diverged.
+    ///
+    /// # Errors
+    /// An environment does not exist; then no environment is cleared.
+    pub fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.sim.reset_buffers(env_ids)
+    }
+
     /// Sets the point of view of windows, browser views and screenshots, open and future ones: from `eye` to `target`
     /// in the frame of the overview \[m\], +z up. Users can move away from it; the Home key returns to it. Named as in
     /// Isaac Lab.

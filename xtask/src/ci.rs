@@ -8,8 +8,8 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, python_package, site, source_check,
-    spelling, wheel,
+    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, python_cfg, python_package, site,
+    source_check, spelling, wheel,
 };
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -92,6 +92,12 @@ const STAGES: &[Stage] = &[
     },
     Stage { name: "clippy", what: "lints", when: When::Always, run: |c| clippy(&c.debian()?, &["--workspace"]) },
     Stage { name: "unit", what: "unit tests, MuJoCo 2.2.2", when: When::Quick, run: unit_tests },
+    Stage {
+        name: "python-cfg",
+        what: "the configuration classes of the Python package",
+        when: When::Full,
+        run: |c| python_cfg::check(&c.debian()?),
+    },
     Stage { name: "rustdoc", what: "documentation", when: When::Full, run: rustdoc },
     Stage { name: "demo", what: "the README's first command", when: When::Full, run: demo },
     Stage { name: "test", what: "the README's second command, MuJoCo 2.2.2", when: When::Full, run: readme_test },

@@ -1,11 +1,12 @@
-//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | bless`.
+//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | bless |
+//! python-cfg`.
 //!
 //! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
 //! MuJoCo, so that it builds before MuJoCo is installed.
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package` (`wheel`), `bench`, `physics_report`, `mutate`, `bless` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
@@ -31,6 +32,7 @@ mod physics_page;
 mod physics_report;
 mod progress;
 mod python;
+mod python_cfg;
 mod python_package;
 mod robots;
 mod run;
@@ -78,6 +80,8 @@ enum Task {
     Mutate(mutate::MutateArgs),
     /// Rewrite the golden files of the tests with the current output
     Bless(bless::BlessArgs),
+    /// Write the configuration classes of the Python package from the Rust structs
+    PythonCfg(python_cfg::PythonCfgArgs),
 }
 
 impl Cli {
@@ -92,6 +96,7 @@ impl Cli {
             Task::PhysicsReport(args) => physics_report::run(repo, args),
             Task::Mutate(args) => mutate::run(repo, args),
             Task::Bless(args) => bless::run(repo, args),
+            Task::PythonCfg(args) => python_cfg::run(repo, args),
         }
     }
 

@@ -40,7 +40,7 @@ impl Snapshot {
         let path = path.as_ref();
         let failed = |error| Error::File { path: path.into(), error };
         let mut file = AtomicFile::create(path).map_err(failed)?;
-        file.file().write_all(&self.encode(FORMAT, &mj::version_string())).map_err(failed)?;
+        file.file().write_all(&self.to_bytes()).map_err(failed)?;
         // Before the rename: a machine that stops in between leaves the old file, not an empty one.
         file.file().sync_all().map_err(failed)?;
         file.persist().map_err(failed)
@@ -56,6 +56,19 @@ impl Snapshot {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|error| Error::File { path: path.into(), error })?;
         Ok(Self::decode(&bytes, path)?)
+    }
+
+    /// Content of the file that [`save`](Self::save) writes, for other storage such as a pickle.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.encode(FORMAT, &mj::version_string())
+    }
+
+    /// Reads the content of a file, as [`load`](Self::load) does.
+    ///
+    /// # Errors
+    /// A [`SnapshotError`] as in [`load`](Self::load). The path in its message is `<memory>`.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        Ok(Self::decode(bytes, Path::new("<memory>"))?)
     }
 
     fn encode(&self, format: u32, mujoco: &str) -> Vec<u8> {

@@ -1,0 +1,170 @@
+//! Structs and enumerations of the Rust sources: fields, types, documentation, serde attributes.
+
+use std::path::Path;
+use syn::{Attribute, Expr, Fields, File, Item, Lit, Meta, Type};
+
+/// A field of a struct or of a variant.
+#[derive(Debug)]
+pub(crate) struct Field {
+    pub(crate) name: String,
+    pub(crate) ty: Type,
+    pub(crate) doc: String,
+    /// True if the value may be absent in a file: serde has a default for it, or it is optional.
+    pub(crate) optional: bool,
+}
+
+/// A variant of an enumeration.
+#[derive(Debug)]
+pub(crate) struct Variant {
+    pub(crate) name: String,
+    pub(crate) doc: String,
+    pub(crate) content: Content,
+}
+
+/// Content of a variant.
+#[derive(Debug)]
+pub(crate) enum Content {
+    Nothing,
+    Value(Type),
+    Fields(Vec<Field>),
+}
+
+/// Reads a source file.
+pub(crate) fn parse(root: &Path, file: &str) -> Result<File, String> {
+    let text = std::fs::read_to_string(root.join(file)).map_err(|error| format!("{file}: {error}"))?;
+    syn::parse_file(&text).map_err(|error| format!("{file}: {error}"))
+}
+
+/// Documentation and fields of a struct.
+pub(crate) fn find_struct(file: &File, name: &str) -> Option<(String, Vec<Field>)> {
+    file.items.iter().find_map(|item| match item {
+        Item::Struct(item) if item.ident == name => {
+            let default = serde_attributes(&item.attrs)
+                .any(|attribute| attribute == "default" || attribute.starts_with("try_from"));
+            Some((doc(&item.attrs), fields(&item.fields, default)))
+        }
+        _ => None,
+    })
+}
+
+/// Documentation and variants of an enumeration.
+pub(crate) fn find_enum(file: &File, name: &str) -> Option<(String, Vec<Variant>)> {
+    file.items.iter().find_map(|item| match item {
+        Item::Enum(item) if item.ident == name => {
+            let variant = |variant: &syn::Variant| {
+                let renamed = serde_attributes(&variant.attrs).find_map(|attribute| {
+                    attribute.strip_prefix("rename=").map(|name| name.trim_matches('"').to_string())
+                });
+                let content = match &variant.fields {
+                    Fields::Unit => Content::Nothing,
+                    Fields::Unnamed(values) => match values.unnamed.first() {
+                        Some(value) => Content::Value(value.ty.clone()),
+                        None => Content::Nothing,
+                    },
+                    Fields::Named(_) => Content::Fields(fields(&variant.fields, false)),
+                };
+                let name = renamed.unwrap_or_else(|| snake_case(&variant.ident.to_string()));
+                Variant { name, doc: doc(&variant.attrs), content }
+            };
+            Some((doc(&item.attrs), item.variants.iter().map(variant).collect()))
+        }
+        _ => None,
+    })
+}
+
+fn fields(fields: &Fields, default: bool) -> Vec<Field> {
+    let field = |field: &syn::Field| {
+        let name = field.ident.as_ref()?.to_string();
+        let own_default = serde_attributes(&field.attrs).any(|attribute| attribute.starts_with("default"));
+        let optional = default || own_default || is_option(&field.ty);
+        Some(Field { name, ty: field.ty.clone(), doc: doc(&field.attrs), optional })
+    };
+    fields.iter().filter_map(field).collect()
+}
+
+fn is_option(ty: &Type) -> bool {
+    matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|segment| segment.ident == "Option"))
+}
+
+/// Arguments of `#[serde(...)]` without spaces: `default`, `rename="x"`.
+fn serde_attributes(attributes: &[Attribute]) -> impl Iterator<Item = String> {
+    attributes.iter().filter(|attribute| attribute.path().is_ident("serde")).flat_map(|attribute| {
+        let Meta::List(list) = &attribute.meta else { return Vec::new() };
+        list.tokens.to_string().split(',').map(|part| part.replace(' ', "")).collect()
+    })
+}
+
+/// Documentation of an item, in the notation of Python's documentation.
+fn doc(attributes: &[Attribute]) -> String {
+    let line = |attribute: &Attribute| {
+        let Meta::NameValue(pair) = &attribute.meta else { return None };
+        let (true, Expr::Lit(literal)) = (pair.path.is_ident("doc"), &pair.value) else { return None };
+        let Lit::Str(text) = &literal.lit else { return None };
+        Some(text.value().strip_prefix(' ').map_or_else(|| text.value(), String::from))
+    };
+    let mut lines: Vec<String> = Vec::new();
+    let mut in_code = false;
+    for line in attributes.iter().filter_map(line) {
+        if line.trim_start().starts_with("```") {
+            in_code = !in_code;
+        } else if !in_code {
+            lines.push(line.trim_end().to_string());
+        }
+    }
+    while lines.last().is_some_and(String::is_empty) {
+        lines.pop();
+    }
+    without_links(&lines.join("\n")).replace("\\[", "[").replace("\\]", "]").replace('`', "``").replace('\\', "\\\\")
+}
+
+/// Removes the targets of links, and their definitions.
+fn without_links(text: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = text;
+    while let Some(open) = rest.find('[') {
+        let (before, link) = rest.split_at(open);
+        kept.push_str(before);
+        // An escaped bracket is text.
+        let end = if before.ends_with('\\') { None } else { closing(link, '[', ']') };
+        let Some(end) = end else {
+            kept.push('[');
+            rest = &link[1..];
+            continue;
+        };
+        let (label, after) = (&link[1..end], &link[end + 1..]);
+        let target = after.starts_with('(').then(|| closing(after, '(', ')')).flatten();
+        if target.is_none() && !label.starts_with('`') && !after.starts_with(':') {
+            kept.push_str(&link[..=end]);
+        } else {
+            kept.push_str(label);
+        }
+        rest = target.map_or(after, |end| &after[end + 1..]);
+        if let Some(definition) = rest.strip_prefix(':').filter(|_| kept.rsplit('\n').next() == Some(label)) {
+            kept.truncate(kept.len() - label.len());
+            rest = definition.split_once('\n').map_or("", |(_, next)| next);
+        }
+    }
+    kept.push_str(rest);
+    kept.trim_end().to_string()
+}
+
+/// Position of the bracket that closes the first one.
+fn closing(text: &str, open: char, close: char) -> Option<usize> {
+    let mut depth = 0;
+    text.char_indices().find_map(|(at, letter)| {
+        depth += i32::from(letter == open) - i32::from(letter == close);
+        (depth == 0).then_some(at)
+    })
+}
+
+/// `ImplicitFast` as `implicit_fast`, as serde's `snake_case` does.
+pub(crate) fn snake_case(name: &str) -> String {
+    let mut snake = String::new();
+    for (at, letter) in name.char_indices() {
+        if letter.is_uppercase() && at > 0 {
+            snake.push('_');
+        }
+        snake.extend(letter.to_lowercase());
+    }
+    snake
+}

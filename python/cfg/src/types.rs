@@ -1,0 +1,193 @@
+//! The configuration types of the Python package, each with its source file and its default value.
+
+use kinetoscope::render;
+use kinetoscope::robot;
+use kinetoscope::scene;
+use kinetoscope::sensors;
+use kinetoscope::sim;
+use serde::Serialize;
+use toml::{Table, Value};
+
+/// A struct that becomes a dataclass.
+#[derive(Debug)]
+pub(crate) struct Struct {
+    pub(crate) file: &'static str,
+    /// Name in Rust.
+    pub(crate) name: &'static str,
+    /// Name in Python.
+    pub(crate) class: &'static str,
+    /// Type in scene files, for entities.
+    pub(crate) entity: Option<&'static str>,
+    /// Serialized default, or the optional fields of an example.
+    pub(crate) default: Table,
+    /// Names and values of other constructors.
+    pub(crate) presets: Vec<(&'static str, Table)>,
+}
+
+/// An enumeration, which becomes a class of constructors, or a literal type if no variant has fields.
+#[derive(Debug)]
+pub(crate) struct Enum {
+    pub(crate) file: &'static str,
+    pub(crate) name: &'static str,
+}
+
+/// An enumeration that a macro declares: its name and documentation, its variants with the class of their content.
+#[derive(Debug)]
+pub(crate) struct DeclaredEnum {
+    pub(crate) name: &'static str,
+    pub(crate) doc: &'static str,
+    pub(crate) variants: &'static [(&'static str, Option<&'static str>)],
+}
+
+fn table<T: Serialize>(value: &T) -> Table {
+    match Value::try_from(value) {
+        Ok(Value::Table(table)) => table,
+        other => panic!("a configuration is a table, not {other:?}"),
+    }
+}
+
+/// Lists structs: file, Rust path, Python name, entity type.
+macro_rules! structs {
+    ($($file:literal $class:ident = $default:expr, $name:ident $(, $entity:literal)?;)*) => {
+        vec![$(Struct {
+            file: $file,
+            name: stringify!($name),
+            class: stringify!($class),
+            entity: [$($entity,)? ""].first().copied().filter(|kind: &&str| !kind.is_empty()),
+            default: table(&$default),
+            presets: Vec::new(),
+        },)*]
+    };
+}
+
+/// Default of the type of an expression's context.
+fn new<T: Default>() -> T {
+    T::default()
+}
+
+/// All structs, those that others contain first.
+pub(crate) fn structs() -> Vec<Struct> {
+    let mut all = structs! {
+        "sim/src/shard.rs" Shard = new::<sim::Shard>(), Shard;
+        "sim/src/surface_cfg.rs" SurfaceCfg = new::<sim::SurfaceCfg>(), SurfaceCfg;
+        "sim/src/simulation_cfg.rs" GroundCfg = new::<sim::GroundCfg>(), GroundCfg;
+        "sim/src/light_cfg.rs" LightCfg = new::<sim::LightCfg>(), LightCfg;
+        "sim/src/simulation_cfg.rs" SimulationManagerCfg = new::<sim::SimulationManagerCfg>(), SimulationManagerCfg;
+        "scene/src/mesh/hull.rs" HullCfg = new::<scene::mesh::HullCfg>(), HullCfg;
+        "scene/src/mesh/convex_decomposition.rs" ConvexDecompositionCfg = new::<scene::mesh::ConvexDecompositionCfg>(), ConvexDecompositionCfg;
+        "robot/src/urdf/config.rs" NameCaseCfg = new::<robot::urdf::NameCaseCfg>(), NameCaseCfg;
+        "robot/src/urdf/config.rs" ComponentCfg = robot::urdf::ComponentCfg::new("arm", "arm.urdf"), ComponentCfg;
+        "robot/src/urdf/config.rs" UrdfCfg = new::<robot::urdf::UrdfCfg>(), UrdfCfg;
+        "sim/src/objects/mjcf_file.rs" MjcfFile = new::<sim::MjcfFile>(), MjcfFile;
+        "sim/src/drive/models/dc_motor.rs" DcMotor = sim::DcMotor { saturation_effort: 1.0 }, DcMotor;
+        "sim/src/drive/cfg.rs" DriveCfg = new::<sim::DriveCfg>(), DriveCfg;
+        "sim/src/objects/robot_cfg.rs" RobotCfg = new::<sim::RobotCfg>(), RobotCfg, "robot";
+        "sim/src/objects/articulation.rs" ArticulationCfg = new::<sim::ArticulationCfg>(), ArticulationCfg, "articulation";
+        "sim/src/objects/rigid_object_data.rs" RigidObjectCfg = new::<sim::RigidObjectCfg>(), RigidObjectCfg, "rigid_object";
+        "sim/src/objects/object_group_data.rs" RigidObjectGroupCfg = new::<sim::RigidObjectGroupCfg>(), RigidObjectGroupCfg, "rigid_object_group";
+        "scene/src/terrain/rough.rs" RoughTerrain = new::<scene::terrain::RoughTerrain>(), RoughTerrain;
+        "scene/src/terrain/slope.rs" SlopeTerrain = new::<scene::terrain::Slope>(), Slope;
+        "scene/src/terrain/stairs.rs" PyramidStairsTerrain = new::<scene::terrain::PyramidStairs>(), PyramidStairs;
+        "sim/src/objects/terrain.rs" TerrainCfg = new::<sim::TerrainCfg>(), TerrainCfg, "terrain";
+        "sim/src/objects/mjcf_part_data.rs" MjcfPartCfg = new::<sim::MjcfPartCfg>(), MjcfPartCfg, "mjcf";
+        "sim/src/objects/weld_data.rs" WeldCfg = new::<sim::WeldCfg>(), WeldCfg, "weld";
+        "sensors/src/noise.rs" NoiseCfg = new::<sensors::NoiseCfg>(), NoiseCfg;
+        "sensors/src/sampling.rs" SamplingCfg = new::<sensors::SamplingCfg>(), SamplingCfg;
+        "render/src/shutter.rs" Shutter = new::<render::Shutter>(), Shutter;
+        "render/src/aperture.rs" Aperture = render::Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 1.0 }, Aperture;
+        "render/src/request.rs" RasterCfg = new::<render::RasterCfg>(), RasterCfg;
+        "render/src/lens/open_cv.rs" OpenCvLens = new::<render::lens::OpenCv>(), OpenCv;
+        "render/src/lens/open_cv_fisheye.rs" OpenCvFisheyeLens = new::<render::lens::OpenCvFisheye>(), OpenCvFisheye;
+        "render/src/lens/f_theta.rs" FThetaLens = new::<render::lens::FTheta>(), FTheta;
+        "sensors/src/camera/extrinsics.rs" Extrinsics = new::<sensors::camera::Extrinsics>(), Extrinsics;
+        "sensors/src/camera/cfg.rs" CameraCfg = new::<sensors::camera::CameraCfg>(), CameraCfg, "camera";
+        "sensors/src/camera/stereo/cfg.rs" StereoCameraCfg = new::<sensors::camera::StereoCameraCfg>(), StereoCameraCfg, "stereo_camera";
+        "sensors/src/ray/pattern/grid.rs" GridPattern = new::<sensors::ray::pattern::Grid>(), Grid;
+        "sensors/src/ray/pattern/lidar.rs" LidarPattern = new::<sensors::ray::pattern::Lidar>(), Lidar;
+        "sensors/src/ray/pattern/bpearl.rs" BpearlPattern = new::<sensors::ray::pattern::Bpearl>(), Bpearl;
+        "sensors/src/ray/pattern/pinhole.rs" PinholePattern = new::<sensors::ray::pattern::Pinhole>(), Pinhole;
+        "sensors/src/ray/pattern/custom.rs" CustomPattern = new::<sensors::ray::pattern::Custom>(), Custom;
+        "sensors/src/ray/caster/cfg.rs" RayCasterCfg = new::<sensors::ray::RayCasterCfg>(), RayCasterCfg, "ray_caster";
+        "sensors/src/ray/camera/cfg.rs" RayCasterCameraCfg = new::<sensors::ray::RayCasterCameraCfg>(), RayCasterCameraCfg, "ray_caster_camera";
+        "sensors/src/contact_sensor/cfg.rs" ContactSensorCfg = new::<sensors::ContactSensorCfg>(), ContactSensorCfg, "contact_sensor";
+        "sensors/src/imu.rs" ImuCfg = new::<sensors::ImuCfg>(), ImuCfg, "imu";
+        "sensors/src/frame_transformer.rs" TargetFrameCfg = sensors::TargetFrameCfg::for_bodies("link"), TargetFrameCfg;
+        "sensors/src/frame_transformer.rs" FrameTransformerCfg = sensors::FrameTransformerCfg::new("base", Vec::new()), FrameTransformerCfg, "frame_transformer";
+        "sensors/src/joint_state.rs" JointStateCfg = new::<sensors::JointStateCfg>(), JointStateCfg, "joint_state";
+        "sensors/src/actuator_state.rs" ActuatorStateCfg = new::<sensors::ActuatorStateCfg>(), ActuatorStateCfg, "actuator_state";
+        "sensors/src/joint_wrench.rs" JointWrenchCfg = new::<sensors::JointWrenchCfg>(), JointWrenchCfg, "joint_wrench";
+        "sensors/src/mujoco_sensor.rs" MujocoSensorCfg = new::<sensors::MujocoSensorCfg>(), MujocoSensorCfg, "mujoco_sensor";
+        "robot/src/kinematics/cfg.rs" NullSpacePosture = robot::kinematics::NullSpacePosture::at(Vec::new()), NullSpacePosture;
+        "robot/src/kinematics/cfg.rs" IkCfg = new::<robot::kinematics::IkCfg>(), IkCfg;
+        "sim/src/randomization/terms.rs" RandomizationTerm = example_term(), RandomizationTerm;
+        "sim/src/randomization/terms.rs" Randomization = new::<sim::Randomization>(), Randomization;
+    };
+    if let Some(simulation) = all.iter_mut().find(|known| known.class == "SimulationManagerCfg") {
+        simulation.presets = vec![
+            ("manipulation", table(&sim::SimulationManagerCfg::manipulation())),
+            ("legged", table(&sim::SimulationManagerCfg::legged())),
+        ];
+    }
+    all
+}
+
+/// A term whose fields are all required.
+fn example_term() -> sim::RandomizationTerm {
+    let draw = sim::RandomizationOp::Scale([1.0, 1.0]);
+    sim::RandomizationTerm { property: sim::Property::Mass, pattern: String::new(), draw }
+}
+
+/// All enumerations that a source file declares directly.
+pub(crate) const ENUMS: &[Enum] = &[
+    Enum { file: "sim/src/mjcf/document.rs", name: "Integrator" },
+    Enum { file: "sim/src/mjcf/document.rs", name: "FrictionCone" },
+    Enum { file: "sim/src/light_cfg.rs", name: "LightKindCfg" },
+    Enum { file: "sim/src/objects/rigid_object_data.rs", name: "BodyType" },
+    Enum { file: "sim/src/objects/mesh_collision.rs", name: "MeshCollision" },
+    Enum { file: "sim/src/objects/shape.rs", name: "ObjectShape" },
+    Enum { file: "robot/src/urdf/config.rs", name: "Strictness" },
+    Enum { file: "robot/src/urdf/config.rs", name: "MissingInertia" },
+    Enum { file: "robot/src/urdf/config.rs", name: "NameCase" },
+    Enum { file: "sim/src/drive/mod.rs", name: "DriveModel" },
+    Enum { file: "render/src/intrinsics.rs", name: "Intrinsics" },
+    Enum { file: "sensors/src/camera/extrinsics.rs", name: "Placement" },
+    Enum { file: "sensors/src/camera/extrinsics.rs", name: "CameraConvention" },
+    Enum { file: "sensors/src/camera/cfg.rs", name: "DepthMiss" },
+    Enum { file: "sensors/src/camera/stereo/cfg.rs", name: "StereoOrigin" },
+    Enum { file: "render/src/shade/tone.rs", name: "ToneCurve" },
+    Enum { file: "sensors/src/ray/pattern/grid.rs", name: "GridOrder" },
+    Enum { file: "sensors/src/ray/caster/alignment.rs", name: "RayAlignment" },
+    Enum { file: "sensors/src/ray/targets.rs", name: "HitTargets" },
+    Enum { file: "robot/src/kinematics/cfg.rs", name: "IkTask" },
+    Enum { file: "sim/src/randomization/property.rs", name: "Property" },
+    Enum { file: "sim/src/randomization/terms.rs", name: "RandomizationOp" },
+];
+
+/// Enumerations that macros declare. The tests of the package read each variant.
+pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
+    DeclaredEnum {
+        name: "DriveType",
+        doc: "Meaning of stiffness and damping of drives.",
+        variants: &[("force", None), ("acceleration", None), ("none", None)],
+    },
+    DeclaredEnum {
+        name: "TerrainGenerator",
+        doc: "Generator of the heights of a terrain, which also defines its size.",
+        variants: &[
+            ("rough", Some("RoughTerrain")),
+            ("slope", Some("SlopeTerrain")),
+            ("pyramid_stairs", Some("PyramidStairsTerrain")),
+        ],
+    },
+    DeclaredEnum {
+        name: "RayPattern",
+        doc: "Starts and directions of the rays of a ray caster.",
+        variants: &[
+            ("grid", Some("GridPattern")),
+            ("lidar", Some("LidarPattern")),
+            ("bpearl", Some("BpearlPattern")),
+            ("pinhole", Some("PinholePattern")),
+            ("custom", Some("CustomPattern")),
+        ],
+    },
+];

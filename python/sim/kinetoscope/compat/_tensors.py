@@ -1,0 +1,41 @@
+"""Tensors of torch where it is installed, NumPy arrays with their methods where not."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from . import numpy_torch
+
+try:
+    # The variable selects NumPy although torch is installed.
+    if os.environ.get("KINETOSCOPE_COMPAT_TORCH") == "0":
+        raise ImportError
+    import torch
+except ImportError:
+    torch = None  # type: ignore[assignment]
+
+
+def tensor(array: Any) -> Any:
+    """A tensor of an array that no other object uses. Numbers in double precision become single precision, as the
+    other simulators have; all other arrays keep their memory."""
+    array = np.asarray(array)
+    if array.dtype == np.float64:
+        array = array.astype(np.float32)
+    if array.dtype == np.uint64:
+        array = array.astype(np.int64)
+    return numpy_torch.as_tensor(array) if torch is None else torch.from_numpy(array)
+
+
+def array(values: Any) -> Any:
+    """A NumPy array of a tensor or of anything that NumPy accepts."""
+    if torch is not None and isinstance(values, torch.Tensor):
+        return values.detach().cpu().numpy()
+    return np.asarray(values)
+
+
+def device() -> Any:
+    """The device of all tensors: the CPU."""
+    return numpy_torch.device() if torch is None else torch.device("cpu")

@@ -1,0 +1,273 @@
+"""``SimulationManager`` of EmbodiChain on the one of this package."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinetoscope import SimulationManager as NativeSimulationManager
+from kinetoscope import cfg as native
+from kinetoscope.errors import ConfigError, ViewerError
+from kinetoscope.compat import step_limit, unsupported
+from kinetoscope.compat._poses import to_row
+from kinetoscope.compat._tensors import array, device, tensor
+from .cfg import (
+    ArticulationCfg,
+    JointDrivePropertiesCfg,
+    LightCfg,
+    RigidObjectCfg,
+    RobotCfg,
+    SimulationManagerCfg,
+    URDFCfg,
+)
+from .objects import Articulation, RigidObject, Robot
+from .sensors import Camera, CameraCfg, camera_cfg
+from .shapes import CubeCfg, MeshCfg, SphereCfg
+
+RENDERERS = {"auto": "raster", "hybrid": "hybrid", "fast-rt": "fast_ray_traced", "rt": "ray_traced"}
+
+
+class SimulationManager:
+    """A simulation with EmbodiChain's methods. ``native`` is the simulation of this package."""
+
+    def __init__(self, sim_config: SimulationManagerCfg | None = None) -> None:
+        self.cfg = sim_config or SimulationManagerCfg()
+        unsupported(
+            "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
+        )
+        if str(self.cfg.sim_device).startswith("cuda"):
+            raise ConfigError("sim_device is 'cuda': this package simulates on the CPU; use 'cpu'")
+        self._steps = 0
+        self._lights: list[native.LightCfg] = []
+        self._assets: dict[str, Any] = {}
+        self.native = self._build()
+        self.window: Any = None
+
+    def _build(self) -> NativeSimulationManager:
+        lights = {"lights": self._lights} if self._lights else {}
+        return NativeSimulationManager(
+            num_envs=self.cfg.num_envs,
+            physics_dt=self.cfg.physics_dt,
+            arena_space=self.cfg.arena_space,
+            gravity=tuple(float(x) for x in array(self.cfg.physics_config.gravity)),
+            threads=self.cfg.cpu_num,
+            **lights,
+        )
+
+    @property
+    def num_envs(self) -> int:
+        return self.native.num_envs
+
+    @property
+    def device(self) -> Any:
+        return device()
+
+    @property
+    def is_use_gpu_physics(self) -> bool:
+        return False
+
+    @property
+    def is_window_opened(self) -> bool:
+        return self.window is not None and self.window.is_open
+
+    @property
+    def arena_offsets(self) -> Any:
+        return tensor(self.native.env_origins)
+
+    @property
+    def asset_uids(self) -> list[str]:
+        return ["default_plane", *self._assets]
+
+    def init_gpu_physics(self) -> None:
+        """Does nothing: physics runs on the CPU."""
+
+    def build_multiple_arenas(self, num: int) -> None:
+        """Sets the number of environments, before anything is added."""
+        if self._assets:
+            raise ConfigError("build_multiple_arenas: call it before objects are added, or set num_envs in the configuration")
+        self.cfg.num_envs = num
+        self.native.destroy()
+        self.native = self._build()
+
+    def update(self, physics_dt: float | None = None, step: int = 10) -> None:
+        """Steps the simulation ``step`` times."""
+        if physics_dt is not None and abs(physics_dt - self.cfg.physics_dt) > 1e-12:
+            raise ConfigError(f"physics_dt is {physics_dt}; it is {self.cfg.physics_dt} from the creation of the simulation on")
+        limit = step_limit()
+        if limit is not None and self._steps >= limit:
+            raise KeyboardInterrupt
+        self.native.update(step)
+        self._steps += step
+
+    def open_window(self) -> bool:
+        """Opens a window. Without a display, warns and returns False."""
+        try:
+            self.window = self.native.open_window()
+        except ViewerError as error:
+            warnings.warn(f"no window: {error}", stacklevel=2)
+            return False
+        return True
+
+    def close_window(self) -> None:
+        if self.window is not None:
+            self.window.close()
+            self.window = None
+
+    def add_robot(self, cfg: RobotCfg) -> Robot:
+        fields = articulation_fields(cfg)
+        fields["control_parts"] = {name: list(patterns) for name, patterns in (cfg.control_parts or {}).items()}
+        fields["drive"] = drive(cfg.drive_pros)
+        return self._register(Robot(self, self.native.add_robot(fields), cfg))
+
+    def add_articulation(self, cfg: ArticulationCfg) -> Articulation:
+        fields = articulation_fields(cfg)
+        if cfg.drive_pros.drive_type != "none":
+            fields["drive"] = drive(cfg.drive_pros)
+        return self._register(Articulation(self, self.native.add_articulation(fields), cfg))
+
+    def add_rigid_object(self, cfg: RigidObjectCfg) -> RigidObject:
+        if cfg.uid is None:
+            raise ConfigError("a rigid object needs a uid")
+        return self._register(RigidObject(self, self.native.add_rigid_object(object_fields(cfg)), cfg))
+
+    def add_sensor(self, sensor_cfg: CameraCfg) -> Camera:
+        count = sum(isinstance(asset, Camera) for asset in self._assets.values())
+        uid = sensor_cfg.uid or f"camera_{count}"
+        fields = camera_cfg(sensor_cfg)
+        render = self.cfg.render_cfg
+        fields["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
+        return self._register(Camera(self, self.native.add_sensor(uid, fields), sensor_cfg))
+
+    def add_light(self, cfg: LightCfg) -> None:
+        """Adds a light, before anything else is added."""
+        if self._assets:
+            raise ConfigError("add_light: call it before objects are added")
+        far = cfg.light_type in ("sun", "direction")
+        self._lights.append(
+            native.LightCfg(
+                kind="directional" if far else "point",
+                position=tuple(cfg.init_pos),
+                direction=tuple(cfg.direction),
+                color=tuple(float(c) for c in cfg.color),
+                cast_shadow=cfg.enable_shadow,
+            )
+        )
+        self.native.destroy()
+        self.native = self._build()
+
+    def get_robot(self, uid: str) -> Any:
+        return self._assets.get(uid)
+
+    get_articulation = get_rigid_object = get_sensor = get_asset = get_robot
+
+    def get_robot_uid_list(self) -> list[str]:
+        return [uid for uid, asset in self._assets.items() if isinstance(asset, Robot)]
+
+    def reset_objects_state(self, env_ids: Any = None, excluded_uids: Any = None) -> None:
+        """Resets environments to their initial state."""
+        if excluded_uids:
+            raise NotImplementedError("reset_objects_state: excluded_uids")
+        self.native.reset(None if env_ids is None else array(env_ids))
+
+    def destroy(self, exit_process: bool | None = None) -> None:  # noqa: ARG002
+        """Frees the simulation. The process goes on."""
+        self.native.destroy()
+
+    def _register(self, asset: Any) -> Any:
+        self._assets[asset.uid] = asset
+        return asset
+
+
+def pose(cfg: Any) -> Any:
+    """Initial pose of an entity."""
+    if cfg.init_local_pose is not None:
+        return to_row(array(cfg.init_local_pose))
+    position = [float(x) for x in array(cfg.init_pos)]
+    return {"pos": position, "rpy_deg": [float(x) for x in array(cfg.init_rot)]}
+
+
+def per_joint(values: Any) -> Any:
+    return {key: float(value) for key, value in values.items()} if isinstance(values, dict) else float(values)
+
+
+def drive(cfg: JointDrivePropertiesCfg) -> dict[str, Any]:
+    """Drive configuration. A joint that a dict does not name keeps the default of the class."""
+    fields: dict[str, Any] = {"drive_type": cfg.drive_type}
+    for name in ("stiffness", "damping", "max_effort", "max_velocity", "friction", "armature"):
+        fields[name] = per_joint(getattr(cfg, name))
+    return fields
+
+
+def urdf(cfg: URDFCfg | None, fpath: str | None) -> Any:
+    """URDF configuration and the stem of its files. A single file is used as it is, as in EmbodiChain."""
+    if fpath is not None:
+        return fpath, Path(fpath).stem
+    if cfg is None or not cfg.components:
+        raise ConfigError("the robot has no files: set fpath or urdf_cfg")
+    paths = [component["urdf_path"] for component in cfg.components.values()]
+    if len(paths) == 1:
+        return paths[0], Path(paths[0]).stem
+    components = []
+    for name, component in cfg.components.items():
+        fields: dict[str, Any] = {"name": name, "urdf": component["urdf_path"]}
+        if component.get("transform") is not None:
+            fields["transform"] = to_row(array(component["transform"]))
+        if name in cfg.component_prefix:
+            fields["prefix"] = cfg.component_prefix[name]
+        components.append(fields)
+    merged: dict[str, Any] = {"components": components, "base_link_name": cfg.base_link_name}
+    if cfg.name_case:
+        merged["name_case"] = dict(cfg.name_case)
+    return merged, "_".join(Path(path).stem for path in paths)
+
+
+def articulation_fields(cfg: Any) -> dict[str, Any]:
+    unsupported("RobotCfg", init_qpos=cfg.init_qpos is not None, solver_cfg=getattr(cfg, "solver_cfg", None) is not None)
+    files, stem = urdf(getattr(cfg, "urdf_cfg", None), cfg.fpath)
+    return {
+        "uid": cfg.uid or stem,
+        "urdf": files,
+        "fix_base": cfg.fix_base,
+        "init_pose": pose(cfg),
+        "self_collision": not cfg.disable_self_collision,
+    }
+
+
+def object_fields(cfg: RigidObjectCfg) -> dict[str, Any]:
+    attrs = cfg.attrs
+    unsupported(
+        "RigidObjectCfg",
+        enable_collision=not attrs.enable_collision,
+        static_friction=attrs.static_friction != attrs.dynamic_friction,
+        max_convex_hull_num=getattr(cfg.shape, "max_convex_hull_num", 1) != 1,
+    )
+    fields: dict[str, Any] = {"uid": cfg.uid, "init_pose": pose(cfg), "body_type": cfg.body_type}
+    moments: float | None = None
+    if isinstance(cfg.shape, CubeCfg):
+        size = np.array(array(cfg.shape.size), dtype=float)
+        fields["shape"] = native.ObjectShape.box(size=size.tolist())
+        # Mean of the principal moments of inertia per mass.
+        moments = float((size**2).sum() / 18)
+    elif isinstance(cfg.shape, SphereCfg):
+        fields["shape"] = native.ObjectShape.sphere(radius=float(cfg.shape.radius))
+        moments = 0.4 * cfg.shape.radius**2
+    elif isinstance(cfg.shape, MeshCfg):
+        fields["shape"] = native.ObjectShape.mesh(path=cfg.shape.fpath)
+    else:
+        raise ConfigError(f"{cfg.uid}: shape is {cfg.shape!r}; use CubeCfg, SphereCfg or MeshCfg")
+    if attrs.mass > 0:
+        fields["mass"] = float(attrs.mass)
+    else:
+        fields["density"] = float(attrs.density)
+    fields["friction"] = [float(attrs.dynamic_friction), 0.005, 0.0001]
+    if attrs.restitution > 0:
+        fields["restitution"] = float(attrs.restitution)
+    if cfg.body_type == "dynamic" and attrs.mass > 0:
+        # Dampings of EmbodiChain are rates: a force per mass and velocity.
+        fields["linear_damping"] = float(attrs.linear_damping * attrs.mass)
+        if moments is not None:
+            fields["angular_damping"] = float(attrs.angular_damping * attrs.mass * moments)
+    return fields

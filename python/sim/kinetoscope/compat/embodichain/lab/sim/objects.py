@@ -1,0 +1,331 @@
+"""Robots, articulations and rigid objects of EmbodiChain. Numbers have single precision, poses are x y z qw qx qy qz."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kinetoscope.compat._poses import rows, to_matrix
+from kinetoscope.compat._tensors import array, tensor
+
+
+def poses(values: Any, to_matrix_form: bool) -> Any:
+    return tensor(to_matrix(values) if to_matrix_form else values)
+
+
+def ids(values: Any) -> Any:
+    return None if values is None else array(values)
+
+
+class ArticulationData:
+    """State of an articulation as tensors with the environments on the first axis."""
+
+    def __init__(self, native: Any) -> None:
+        self._native = native
+
+    @property
+    def qpos(self) -> Any:
+        return tensor(self._native.qpos)
+
+    @property
+    def target_qpos(self) -> Any:
+        return tensor(self._native.qpos_target)
+
+    @property
+    def qvel(self) -> Any:
+        return tensor(self._native.qvel)
+
+    @property
+    def target_qvel(self) -> Any:
+        return tensor(self._native.qvel_target)
+
+    @property
+    def qacc(self) -> Any:
+        return tensor(self._native.qacc)
+
+    @property
+    def qf(self) -> Any:
+        return tensor(self._native.qf)
+
+    @property
+    def qpos_limits(self) -> Any:
+        return tensor(self._native.qpos_limits)
+
+    @property
+    def qvel_limits(self) -> Any:
+        return tensor(self._native.qvel_limits)
+
+    @property
+    def qf_limits(self) -> Any:
+        return tensor(self._native.qf_limits)
+
+    @property
+    def joint_stiffness(self) -> Any:
+        return tensor(self._native.stiffness)
+
+    @property
+    def joint_damping(self) -> Any:
+        return tensor(self._native.damping)
+
+    @property
+    def root_pose(self) -> Any:
+        return tensor(self._native.root_pose)
+
+    @property
+    def root_vel(self) -> Any:
+        return tensor(self._native.root_velocity)
+
+    @property
+    def root_state(self) -> Any:
+        return tensor(self._native.root_state)
+
+    @property
+    def body_link_pose(self) -> Any:
+        return tensor(self._native.link_poses)
+
+    @property
+    def body_link_vel(self) -> Any:
+        return tensor(self._native.link_velocities)
+
+
+class Articulation:
+    """An articulation. ``native`` is the object of this package."""
+
+    def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
+        self.manager = manager
+        self.native = native
+        self.cfg = cfg
+        self.body_data = ArticulationData(native)
+
+    @property
+    def uid(self) -> str:
+        return self.native.uid
+
+    @property
+    def dof(self) -> int:
+        return self.native.dof
+
+    @property
+    def joint_names(self) -> list[str]:
+        return self.native.joint_names
+
+    @property
+    def active_joint_names(self) -> list[str]:
+        return self.native.active_joint_names
+
+    @property
+    def link_names(self) -> list[str]:
+        return self.native.link_names
+
+    @property
+    def num_links(self) -> int:
+        return len(self.native.link_names)
+
+    @property
+    def mimic_ids(self) -> list[int]:
+        return self.native.mimic_joint_ids
+
+    def _rows(self, values: Any, env_ids: Any) -> Any:
+        """Rows for the selected environments. As in EmbodiChain, one row does not stand for several environments."""
+        values = np.atleast_2d(np.asarray(array(values), dtype=float))
+        count = self.manager.num_envs if env_ids is None else len(array(env_ids))
+        if values.shape[0] != count:
+            raise ValueError(f"{values.shape[0]} rows for {count} environments")
+        return values
+
+    def set_qpos(self, qpos: Any, joint_ids: Any = None, env_ids: Any = None, target: bool = True) -> None:
+        """Sets position targets, or with ``target=False`` the positions themselves. Both are clamped to the limits."""
+        values = self._rows(qpos, env_ids)
+        if target:
+            self.native.set_qpos_target(values, ids(joint_ids), ids(env_ids))
+            return
+        limits = self.native.qpos_limits
+        limits = limits if env_ids is None else limits[array(env_ids)]
+        limits = limits if joint_ids is None else limits[:, array(joint_ids)]
+        self.native.write_qpos(np.clip(values, limits[..., 0], limits[..., 1]), ids(joint_ids), ids(env_ids))
+
+    def set_qvel(self, qvel: Any, joint_ids: Any = None, env_ids: Any = None, target: bool = True) -> None:
+        """Sets velocity targets, or with ``target=False`` the velocities themselves."""
+        write = self.native.set_qvel_target if target else self.native.write_qvel
+        write(self._rows(qvel, env_ids), ids(joint_ids), ids(env_ids))
+
+    def set_qf(self, qf: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        """Sets efforts that act in addition to the drives."""
+        self.native.set_qf_target(self._rows(qf, env_ids), ids(joint_ids), ids(env_ids))
+
+    def get_qpos(self, target: bool = False) -> Any:
+        return tensor(self.native.qpos_target if target else self.native.qpos)
+
+    def get_qvel(self, target: bool = False) -> Any:
+        return tensor(self.native.qvel_target if target else self.native.qvel)
+
+    def get_qf(self) -> Any:
+        return tensor(self.native.qf)
+
+    def get_qpos_limits(self) -> Any:
+        return tensor(self.native.qpos_limits)
+
+    def get_local_pose(self, to_matrix: bool = False) -> Any:
+        return poses(self.native.root_pose, to_matrix)
+
+    def set_local_pose(self, pose: Any, env_ids: Any = None) -> None:
+        self.native.write_root_pose(rows(array(pose)), ids(env_ids))
+
+    def get_link_pose(self, link_name: str, env_ids: Any = None, to_matrix: bool = False) -> Any:
+        values = self.native.link_pose(link_name)
+        return poses(values if env_ids is None else values[array(env_ids)], to_matrix)
+
+    def set_joint_drive(
+        self,
+        stiffness: Any = None,
+        damping: Any = None,
+        max_effort: Any = None,
+        max_velocity: Any = None,
+        friction: Any = None,
+        armature: Any = None,
+        drive_type: str | None = None,
+        joint_ids: Any = None,
+        env_ids: Any = None,
+    ) -> None:
+        """Changes drives. Quantities that are not given stay, the drive type too."""
+        chosen = (ids(joint_ids), ids(env_ids))
+        if drive_type is not None:
+            self.native.set_drive_type(drive_type, *chosen)
+        changes = [
+            (stiffness, self.native.set_stiffness),
+            (damping, self.native.set_damping),
+            (max_effort, self.native.set_qf_limits),
+            (max_velocity, self.native.set_qvel_limits),
+            (friction, self.native.set_friction),
+            (armature, self.native.set_armature),
+        ]
+        for values, write in changes:
+            if values is not None:
+                write(array(values), *chosen)
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Returns to the initial pose, positions and targets, with zero velocities."""
+        chosen = slice(None) if env_ids is None else array(env_ids)
+        start = self.native.default_qpos[chosen]
+        self.native.write_joint_state(start, np.zeros_like(start), None, ids(env_ids))
+        self.native.set_qpos_target(start, None, ids(env_ids))
+        if not self.cfg.fix_base:
+            self.native.write_root_state(self.native.default_root_state[chosen], ids(env_ids))
+
+
+class Robot(Articulation):
+    """A robot with control parts."""
+
+    @property
+    def control_parts(self) -> list[str]:
+        return self.native.control_parts
+
+    def get_joint_ids(self, name: str | None = None, remove_mimic: bool = False) -> list[int]:
+        """Indices of the joints of a control part, or of all joints."""
+        return self.native.active_joint_ids(name) if remove_mimic else self.native.joint_ids(name)
+
+    def _chosen(self, joint_ids: Any, name: str | None) -> Any:
+        return joint_ids if name is None else self.native.joint_ids(name)
+
+    def set_qpos(  # type: ignore[override]
+        self, qpos: Any, joint_ids: Any = None, env_ids: Any = None, target: bool = True, name: str | None = None
+    ) -> None:
+        super().set_qpos(qpos, self._chosen(joint_ids, name), env_ids, target)
+
+    def set_qvel(  # type: ignore[override]
+        self, qvel: Any, joint_ids: Any = None, env_ids: Any = None, target: bool = True, name: str | None = None
+    ) -> None:
+        super().set_qvel(qvel, self._chosen(joint_ids, name), env_ids, target)
+
+    def set_qf(self, qf: Any, joint_ids: Any = None, env_ids: Any = None, name: str | None = None) -> None:  # type: ignore[override]
+        super().set_qf(qf, self._chosen(joint_ids, name), env_ids)
+
+    def get_qpos(self, name: str | None = None, target: bool = False) -> Any:  # type: ignore[override]
+        values = self.native.qpos_target if target else self.native.qpos
+        return tensor(values if name is None else values[:, self.native.joint_ids(name)])
+
+    def get_qvel(self, name: str | None = None, target: bool = False) -> Any:  # type: ignore[override]
+        values = self.native.qvel_target if target else self.native.qvel
+        return tensor(values if name is None else values[:, self.native.joint_ids(name)])
+
+    def get_qf(self, name: str | None = None) -> Any:  # type: ignore[override]
+        values = self.native.qf
+        return tensor(values if name is None else values[:, self.native.joint_ids(name)])
+
+    def compute_fk(self, qpos: Any, name: str, env_ids: Any = None, to_matrix: bool = False) -> Any:
+        """Poses of the end of a control part, in the environment."""
+        return poses(self.native.compute_fk(np.atleast_2d(array(qpos)), name, env_ids=ids(env_ids)), to_matrix)
+
+    def compute_ik(self, pose: Any, joint_seed: Any = None, name: str = "arm", env_ids: Any = None) -> Any:
+        """Joint positions for poses of the end of a control part: success (n,) and positions (n, joints)."""
+        start = None if joint_seed is None else np.atleast_2d(array(joint_seed))
+        found = self.native.compute_ik(rows(array(pose)), name, initial=start, env_ids=ids(env_ids))
+        return tensor(found.success), tensor(found.qpos)
+
+
+class RigidObjectData:
+    """State of a rigid object."""
+
+    def __init__(self, native: Any) -> None:
+        self._native = native
+
+    @property
+    def pose(self) -> Any:
+        return tensor(self._native.pose)
+
+    @property
+    def vel(self) -> Any:
+        return tensor(self._native.velocity)
+
+    @property
+    def lin_vel(self) -> Any:
+        return tensor(self._native.velocity[:, :3])
+
+    @property
+    def ang_vel(self) -> Any:
+        return tensor(self._native.velocity[:, 3:])
+
+
+class RigidObject:
+    """A rigid object. ``native`` is the object of this package."""
+
+    def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
+        self.manager = manager
+        self.native = native
+        self.cfg = cfg
+        self.body_data = RigidObjectData(native)
+
+    @property
+    def uid(self) -> str:
+        return self.native.uid
+
+    def get_local_pose(self, to_matrix: bool = False) -> Any:
+        return poses(self.native.pose, to_matrix)
+
+    def set_local_pose(self, pose: Any, env_ids: Any = None) -> None:
+        self.native.write_pose(rows(array(pose)), ids(env_ids))
+
+    def set_velocity(self, lin_vel: Any = None, ang_vel: Any = None, env_ids: Any = None) -> None:
+        velocity = self.native.velocity
+        velocity = velocity if env_ids is None else velocity[array(env_ids)]
+        for values, columns in ((lin_vel, slice(0, 3)), (ang_vel, slice(3, 6))):
+            if values is not None:
+                velocity[:, columns] = array(values)
+        self.native.write_velocity(velocity, ids(env_ids))
+
+    def add_force_torque(self, force: Any = None, torque: Any = None, env_ids: Any = None) -> None:
+        count = self.manager.num_envs if env_ids is None else len(array(env_ids))
+        none = np.zeros((count, 3))
+        force, torque = (none if values is None else array(values) for values in (force, torque))
+        self.native.set_external_wrench(force, torque, env_ids=ids(env_ids))
+
+    def get_mass(self) -> Any:
+        return tensor(self.native.mass)
+
+    def set_mass(self, mass: Any, env_ids: Any = None) -> None:
+        self.native.set_mass(array(mass), ids(env_ids))
+
+    def get_user_ids(self) -> Any:
+        """Value in the mask channel, the same in every environment."""
+        return tensor(np.full(self.manager.num_envs, self.native.mask_id, dtype=np.int32))

@@ -1,0 +1,37 @@
+"""Actuators of Isaac."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..configclass import configclass
+
+
+@configclass
+class ActuatorBaseCfg:
+    """Gains and limits of joints: numbers, or dicts by joint pattern. None keeps the value of the file."""
+
+    joint_names_expr: Any = (".*",)
+    stiffness: Any = None
+    damping: Any = None
+    effort_limit: Any = None
+    velocity_limit: Any = None
+    armature: Any = None
+    friction: Any = None
+
+
+@configclass
+class ImplicitActuatorCfg(ActuatorBaseCfg):
+    """A drive that the physics engine solves implicitly."""
+
+
+@configclass
+class IdealPDActuatorCfg(ActuatorBaseCfg):
+    """An explicit drive."""
+
+
+@configclass
+class DCMotorCfg(IdealPDActuatorCfg):
+    """An explicit drive with the torque curve of a DC motor."""
+
+    saturation_effort: float = 0.0

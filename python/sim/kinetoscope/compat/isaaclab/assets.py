@@ -1,0 +1,294 @@
+"""Articulations, rigid objects and other assets of Isaac. Poses of data and writers are in the world frame, in which the
+environments stand side by side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..._sim import Robot
+from .. import unsupported
+from .._poses import to_world
+from .._tensors import array, tensor
+from ..configclass import configclass
+
+
+@configclass
+class AssetBaseCfg:
+    """An asset without state: the ground, or a light."""
+
+    prim_path: str = ""
+    spawn: Any = None
+    init_state: Any = None
+    collision_group: int = 0
+    debug_vis: bool = False
+
+
+@configclass
+class InitialStateCfg:
+    """Initial state: position [m], rotation w x y z, joint positions and velocities by pattern."""
+
+    pos: Any = (0.0, 0.0, 0.0)
+    rot: Any = (1.0, 0.0, 0.0, 0.0)
+    lin_vel: Any = (0.0, 0.0, 0.0)
+    ang_vel: Any = (0.0, 0.0, 0.0)
+    joint_pos: Any = {".*": 0.0}
+    joint_vel: Any = {".*": 0.0}
+
+
+@configclass
+class ArticulationCfg(AssetBaseCfg):
+    """A robot: ``spawn`` names its file, ``actuators`` its drives."""
+
+    InitialStateCfg = InitialStateCfg
+
+    init_state: Any = InitialStateCfg()
+    actuators: Any = {}
+    soft_joint_pos_limit_factor: float = 1.0
+
+
+def joint_values(values: Any, names: Any) -> dict[str, float]:
+    """Numbers by joint pattern, from one number or a dict."""
+    if isinstance(values, dict):
+        return {pattern: float(value) for pattern, value in values.items()}
+    return {pattern: float(values) for pattern in names}
+
+
+def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
+    """Fields of this package's robot."""
+    drive: dict[str, Any] = {}
+    names = {
+        "stiffness": "stiffness",
+        "damping": "damping",
+        "effort_limit": "max_effort",
+        "velocity_limit": "max_velocity",
+        "armature": "armature",
+        "friction": "friction",
+    }
+    models = {"IdealPDActuatorCfg": "ideal_pd", "DCMotorCfg": "dc_motor"}
+    for actuator in cfg.actuators.values():
+        patterns = actuator.joint_names_expr
+        for field, name in names.items():
+            values = getattr(actuator, field)
+            if values is not None:
+                drive.setdefault(name, {}).update(joint_values(values, patterns))
+        model = models.get(type(actuator).__name__)
+        if model is not None:
+            content = {"saturation_effort": actuator.saturation_effort} if model == "dc_motor" else {}
+            drive.setdefault("actuators", {}).update({pattern: {model: content} for pattern in patterns})
+    start = cfg.init_state
+    unsupported(
+        "ArticulationCfg.InitialStateCfg",
+        lin_vel=any(start.lin_vel),
+        ang_vel=any(start.ang_vel),
+        joint_vel=any(start.joint_vel.values()),
+    )
+    # The initial position of a joint that no pattern names is 0 here, too.
+    joint_pos = {pattern: float(value) for pattern, value in start.joint_pos.items() if pattern != ".*" or value != 0}
+    return {
+        "uid": uid,
+        "urdf": cfg.spawn.asset_path,
+        "fix_base": cfg.spawn.fix_base,
+        "self_collision": cfg.spawn.self_collisions,
+        "init_pose": [float(x) for x in (*start.pos, *start.rot)],
+        "init_qpos": joint_pos,
+        "drive": drive,
+        "soft_limit_factor": float(cfg.soft_joint_pos_limit_factor),
+    }
+
+
+class ArticulationData:
+    """State of an articulation as tensors."""
+
+    def __init__(self, native: Robot, origins: Any) -> None:
+        self._native = native
+        self._origins = origins
+        self.default_joint_pos = tensor(native.default_qpos)
+        self.default_joint_vel = tensor(native.default_qvel)
+        self.default_root_state = tensor(native.default_root_state)
+
+    @property
+    def joint_names(self) -> list[str]:
+        return self._native.joint_names
+
+    @property
+    def body_names(self) -> list[str]:
+        return self._native.link_names
+
+    @property
+    def joint_pos(self) -> Any:
+        return tensor(self._native.qpos)
+
+    @property
+    def joint_vel(self) -> Any:
+        return tensor(self._native.qvel)
+
+    @property
+    def joint_acc(self) -> Any:
+        return tensor(self._native.qacc)
+
+    @property
+    def joint_pos_target(self) -> Any:
+        return tensor(self._native.qpos_target)
+
+    @property
+    def joint_vel_target(self) -> Any:
+        return tensor(self._native.qvel_target)
+
+    @property
+    def applied_torque(self) -> Any:
+        return tensor(self._native.qf)
+
+    @property
+    def soft_joint_pos_limits(self) -> Any:
+        return tensor(self._native.soft_qpos_limits)
+
+    @property
+    def root_state_w(self) -> Any:
+        return tensor(to_world(self._native.root_state, self._origins))
+
+    @property
+    def root_pos_w(self) -> Any:
+        return self.root_state_w[:, :3]
+
+    @property
+    def root_quat_w(self) -> Any:
+        return self.root_state_w[:, 3:7]
+
+    @property
+    def root_lin_vel_w(self) -> Any:
+        return self.root_state_w[:, 7:10]
+
+    @property
+    def root_ang_vel_w(self) -> Any:
+        return self.root_state_w[:, 10:13]
+
+    @property
+    def root_lin_vel_b(self) -> Any:
+        return tensor(self._native.root_lin_vel_b)
+
+    @property
+    def root_ang_vel_b(self) -> Any:
+        return tensor(self._native.root_ang_vel_b)
+
+    @property
+    def projected_gravity_b(self) -> Any:
+        return tensor(self._native.projected_gravity_b)
+
+    @property
+    def heading_w(self) -> Any:
+        return tensor(self._native.root_heading)
+
+    @property
+    def body_state_w(self) -> Any:
+        states = np.concatenate([self._native.link_poses, self._native.link_velocities], axis=-1)
+        return tensor(to_world(states, self._origins))
+
+    @property
+    def body_pos_w(self) -> Any:
+        return self.body_state_w[..., :3]
+
+    @property
+    def body_quat_w(self) -> Any:
+        return self.body_state_w[..., 3:7]
+
+
+class Articulation:
+    """A robot. ``native`` is the object of this package. Targets take effect in ``write_data_to_sim``."""
+
+    def __init__(self, native: Robot, origins: Any, cfg: ArticulationCfg) -> None:
+        self.native = native
+        self.cfg = cfg
+        self.data = ArticulationData(native, origins)
+        self._origins = origins
+        self._pending: dict[str, tuple[Any, Any, Any]] = {}
+
+    @property
+    def num_instances(self) -> int:
+        return len(self._origins)
+
+    @property
+    def num_joints(self) -> int:
+        return self.native.dof
+
+    @property
+    def num_bodies(self) -> int:
+        return len(self.native.link_names)
+
+    @property
+    def joint_names(self) -> list[str]:
+        return self.native.joint_names
+
+    @property
+    def body_names(self) -> list[str]:
+        return self.native.link_names
+
+    def find_joints(self, name_keys: Any) -> tuple[list[int], list[str]]:
+        """Indices and names of the joints that match a pattern or a list of patterns."""
+        found = self.native.find_joints([name_keys] if isinstance(name_keys, str) else list(name_keys))
+        return found, [self.native.joint_names[index] for index in found]
+
+    def find_bodies(self, name_keys: Any) -> tuple[list[int], list[str]]:
+        found = self.native.find_links([name_keys] if isinstance(name_keys, str) else list(name_keys))
+        return found, [self.native.link_names[index] for index in found]
+
+    def _local(self, states: Any, env_ids: Any) -> Any:
+        states = np.array(array(states), dtype=float)
+        states[:, :3] -= self._origins if env_ids is None else self._origins[array(env_ids)]
+        return states
+
+    def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
+        """Writes poses (world frame) and velocities of the root, shape (n, 13)."""
+        self.native.write_root_state(self._local(root_state, env_ids), _ids(env_ids))
+
+    def write_root_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
+        self.native.write_root_pose(self._local(root_pose, env_ids), _ids(env_ids))
+
+    def write_root_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
+        self.native.write_root_velocity(array(root_velocity), _ids(env_ids))
+
+    def write_joint_state_to_sim(self, position: Any, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.native.write_joint_state(array(position), array(velocity), _ids(joint_ids), _ids(env_ids))
+
+    def set_joint_position_target(self, target: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._set("set_qpos_target", "qpos_target", target, joint_ids, env_ids)
+
+    def set_joint_velocity_target(self, target: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._set("set_qvel_target", "qvel_target", target, joint_ids, env_ids)
+
+    def set_joint_effort_target(self, target: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._set("set_qf_target", "qf_target", target, joint_ids, env_ids)
+
+    def _set(self, writer: str, reader: str, target: Any, joint_ids: Any, env_ids: Any) -> None:
+        """Changes the buffer of targets."""
+        values = np.array(array(target), dtype=float)
+        if joint_ids is None and env_ids is None:
+            self._pending[writer] = values
+            return
+        current = self._pending.get(writer)
+        current = getattr(self.native, reader) if current is None else current
+        rows = np.arange(self.num_instances) if env_ids is None else array(env_ids)
+        columns = np.arange(self.num_joints) if joint_ids is None else array(joint_ids)
+        current[np.ix_(rows, columns)] = values
+        self._pending[writer] = current
+
+    def set_external_force_and_torque(self, forces: Any, torques: Any, body_ids: Any = None, env_ids: Any = None) -> None:
+        """Forces and torques on links, in the axes of the links, until they are set again."""
+        self.native.set_external_wrench(array(forces), array(torques), "link", _ids(body_ids), _ids(env_ids))
+
+    def write_data_to_sim(self) -> None:
+        """Writes the targets to the simulation."""
+        for writer, values in self._pending.items():
+            getattr(self.native, writer)(values)
+        self._pending.clear()
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Does nothing: ``InteractiveScene.reset`` clears the buffers of all entities."""
+
+    def update(self, dt: float) -> None:
+        """Does nothing: data is read from the simulation."""
+
+
+def _ids(values: Any) -> Any:
+    return None if values is None else array(values)

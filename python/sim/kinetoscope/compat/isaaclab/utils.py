@@ -1,0 +1,7 @@
+"""Configuration classes."""
+
+from __future__ import annotations
+
+from ..configclass import configclass
+
+__all__ = ["configclass"]

@@ -1,0 +1,143 @@
+//! Arguments of calls: arrays, environments, joints, links.
+
+use crate::errors::{Class, Failure};
+use kinetoscope::ndarray::{Array, ArrayD, Axis, Dimension};
+use kinetoscope::robot::description::LinkId;
+use kinetoscope::sim::{EnvId, JointIndex, RobotId, SimulationManager};
+use numpy::{PyArray, PyArray1, PyArrayDyn, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBool, PyDict, PyInt, PyList, PyString, PyTuple};
+
+/// Numbers of an argument: an array, a list, a tensor, anything that NumPy accepts. Missing leading axes are added, so
+/// that one row stands for all environments.
+pub(crate) fn array<D: Dimension>(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Array<f64, D>> {
+    if let Ok(array) = obj.cast::<PyArray<f64, D>>() {
+        return copy(array, name);
+    }
+    let converted = numpy(obj, name, "float64")?;
+    let converted = converted.cast::<PyArrayDyn<f64>>().map_err(|error| Failure::argument(name, error))?;
+    let mut values: ArrayD<f64> = copy(converted, name)?;
+    let axes = D::NDIM.unwrap_or(values.ndim());
+    let shape = values.shape().to_vec();
+    while values.ndim() < axes {
+        values.insert_axis_inplace(Axis(0));
+    }
+    let wrong = |_| Failure::argument(name, format!("the shape {shape:?} has too many axes; expected {axes}"));
+    Ok(values.into_dimensionality::<D>().map_err(wrong)?)
+}
+
+fn copy<D: Dimension>(array: &Bound<'_, PyArray<f64, D>>, name: &str) -> PyResult<Array<f64, D>> {
+    let borrowed = array.try_readonly().map_err(|error| Failure::argument(name, error))?;
+    Ok(borrowed.as_array().to_owned())
+}
+
+/// `numpy.asarray(obj, dtype)`.
+fn numpy<'py>(obj: &Bound<'py, PyAny>, name: &str, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
+    static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let py = obj.py();
+    let asarray = ASARRAY.import(py, "numpy", "asarray")?;
+    let options = PyDict::new(py);
+    if !dtype.is_empty() {
+        options.set_item("dtype", dtype)?;
+    }
+    asarray.call((obj,), Some(&options)).map_err(|error| Failure::argument(name, error.value(py)).into())
+}
+
+/// Indices of an argument: a number, a list, an array, or an array of booleans that selects them.
+pub(crate) fn indices(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> {
+    let plain = |item: &Bound<'_, PyAny>| item.is_instance_of::<PyInt>() && !item.is_instance_of::<PyBool>();
+    let index = |item: Bound<'_, PyAny>| {
+        item.extract::<usize>().map_err(|_| {
+            PyErr::from(Failure::new(Class::OutOfRange, format!("{name}: {item} is not an index; indices start at 0")))
+        })
+    };
+    if plain(obj) {
+        return Ok(vec![index(obj.clone())?]);
+    }
+    if let Ok(list) = obj.cast::<PyList>()
+        && list.iter().all(|item| plain(&item))
+    {
+        return list.iter().map(index).collect();
+    }
+    if let Ok(tuple) = obj.cast::<PyTuple>()
+        && tuple.iter().all(|item| plain(&item))
+    {
+        return tuple.iter().map(index).collect();
+    }
+    let array = numpy(obj, name, "")?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    let array = match kind.as_str() {
+        "b" => array.call_method0("ravel")?.call_method0("nonzero")?.get_item(0)?,
+        "i" | "u" => array.call_method0("ravel")?,
+        _ if array.getattr("size")?.extract::<usize>()? == 0 => return Ok(Vec::new()),
+        _ => {
+            let message = format!("expected indices (whole numbers) or booleans, not {}", obj.get_type().name()?);
+            return Err(Failure::argument(name, message).into());
+        }
+    };
+    let array = array.call_method1("astype", ("int64",))?;
+    let array = array.cast::<PyArray1<i64>>().map_err(|error| Failure::argument(name, error))?;
+    let out_of_range = |index: i64| {
+        Failure::new(Class::OutOfRange, format!("{name}: {index} is not an index; indices start at 0")).into()
+    };
+    let numbers = array.try_readonly().map_err(|error| Failure::argument(name, error))?;
+    numbers.as_array().iter().map(|&i| usize::try_from(i).map_err(|_| out_of_range(i))).collect()
+}
+
+/// Environments of an argument; `None` for all.
+pub(crate) fn envs(obj: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<EnvId>>> {
+    let Some(obj) = obj.filter(|obj| !obj.is_none()) else { return Ok(None) };
+    Ok(Some(indices(obj, "env_ids")?.into_iter().map(EnvId).collect()))
+}
+
+/// Indices of environments, for sensors.
+pub(crate) fn env_indices(obj: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<usize>>> {
+    Ok(envs(obj)?.map(|ids| ids.into_iter().map(|id| id.0).collect()))
+}
+
+/// Joints or links of an argument.
+#[derive(Debug)]
+pub(crate) enum Selection {
+    All,
+    Ids(Vec<usize>),
+    /// Name of a control part.
+    Part(String),
+    Patterns(Vec<String>),
+}
+
+impl Selection {
+    pub(crate) fn of(obj: Option<&Bound<'_, PyAny>>, name: &str) -> PyResult<Self> {
+        let Some(obj) = obj.filter(|obj| !obj.is_none()) else { return Ok(Self::All) };
+        if let Ok(part) = obj.cast::<PyString>() {
+            return Ok(Self::Part(part.to_str()?.into()));
+        }
+        let texts = obj
+            .cast::<PyList>()
+            .is_ok_and(|list| !list.is_empty() && list.iter().all(|item| item.is_instance_of::<PyString>()));
+        if texts {
+            return obj.extract().map(Self::Patterns);
+        }
+        indices(obj, name).map(Self::Ids)
+    }
+
+    /// Joints of a robot: a text is a control part, a list of texts are patterns of joint names.
+    pub(crate) fn joints(&self, sim: &SimulationManager, robot: RobotId) -> Result<Option<Vec<JointIndex>>, Failure> {
+        Ok(match self {
+            Self::All => None,
+            Self::Ids(ids) => Some(ids.iter().map(|&id| JointIndex(id)).collect()),
+            Self::Part(part) => Some(sim.robot(robot).joint_ids(part.as_str())?),
+            Self::Patterns(patterns) => Some(sim.robot(robot).find_joints(patterns)?),
+        })
+    }
+
+    /// Links of a robot: texts are patterns of link names.
+    pub(crate) fn links(&self, sim: &SimulationManager, robot: RobotId) -> Result<Option<Vec<LinkId>>, Failure> {
+        Ok(match self {
+            Self::All => None,
+            Self::Ids(ids) => Some(ids.iter().map(|&id| LinkId(id)).collect()),
+            Self::Part(pattern) => Some(sim.robot(robot).find_links(&[pattern])?),
+            Self::Patterns(patterns) => Some(sim.robot(robot).find_links(patterns)?),
+        })
+    }
+}

@@ -1,0 +1,229 @@
+//! Configurations: Python values in the form of scene files.
+//!
+//! A dataclass, mapping, sequence, number or NumPy array becomes a TOML value, and the text is read like a scene file.
+//! So Python accepts what scene files accept, with the same error messages.
+
+use crate::errors::{Class, Failure};
+use kinetoscope::prelude::{EntityCfg, SceneCfg};
+use kinetoscope::sim::{EntityTypes, SimulationManagerCfg};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple, PyType};
+use serde::de::DeserializeOwned;
+use toml::{Table, Value};
+
+/// File name of configurations from Python; it never appears in messages.
+pub(crate) const PYTHON: &str = "<python>";
+
+/// Optional fields that are present by default, so that `None` is the `false` of scene files. A test of the package
+/// compares the list with the classes.
+pub(crate) const NONE_IS_FALSE: [&str; 2] = ["ground", "min_thickness"];
+
+/// Value of Python's `None` for a field of a dict or a keyword argument; `None` if the field is left out.
+fn none_value(field: &str) -> Option<Value> {
+    NONE_IS_FALSE.contains(&field).then_some(Value::Boolean(false))
+}
+
+/// Largest depth of nested values; a structure that contains itself has no end.
+const MAX_DEPTH: usize = 64;
+
+/// Converts the fields of a configuration: of a dataclass, those that differ from their defaults; of a mapping, all.
+pub(crate) fn table(cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Table> {
+    let mut table = match cfg.map(|cfg| value(cfg, "", 0)).transpose()? {
+        None | Some(None) => Table::new(),
+        Some(Some(Value::Table(table))) => table,
+        Some(Some(_)) => {
+            let found = cfg.map_or(Ok(String::new()), |cfg| Ok::<_, PyErr>(cfg.get_type().name()?.to_string()))?;
+            let message = format!("expected a configuration or a dict of its fields, not {found}");
+            return Err(Failure::new(Class::Config, message).into());
+        }
+    };
+    for (name, field) in fields.into_iter().flatten() {
+        let name: String = name.extract()?;
+        match value(&field, &name, 0)?.or_else(|| none_value(&name)) {
+            Some(given) => table.insert(name, given),
+            None => table.remove(&name),
+        };
+    }
+    Ok(table)
+}
+
+/// Converts a value; `None` for Python's `None`. `path` names it in errors.
+fn value(obj: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Option<Value>> {
+    if depth > MAX_DEPTH {
+        return Err(invalid(path, "the configuration is nested too deeply, or contains itself"));
+    }
+    if obj.is_none() {
+        return Ok(None);
+    }
+    if let Ok(text) = obj.cast::<PyString>() {
+        return Ok(Some(Value::String(text.to_str()?.into())));
+    }
+    if let Ok(yes) = obj.cast::<PyBool>() {
+        return Ok(Some(Value::Boolean(yes.is_true())));
+    }
+    if let Ok(number) = obj.cast::<PyInt>() {
+        let number = number.extract().map_err(|_| invalid(path, "the number must be from -2^63 to 2^63 - 1"))?;
+        return Ok(Some(Value::Integer(number)));
+    }
+    if let Ok(number) = obj.cast::<PyFloat>() {
+        return Ok(Some(Value::Float(number.value())));
+    }
+    if obj.hasattr("__dataclass_fields__")? && !obj.is_instance_of::<PyType>() {
+        return dataclass(obj, path, depth).map(|table| Some(Value::Table(table)));
+    }
+    if let Ok(items) = obj.cast::<PyList>() {
+        return sequence(items.iter(), path, depth).map(Some);
+    }
+    if let Ok(items) = obj.cast::<PyTuple>() {
+        return sequence(items.iter(), path, depth).map(Some);
+    }
+    if let Ok(mapping) = obj.cast::<PyMapping>() {
+        let mut table = Table::new();
+        for item in mapping.items()?.iter() {
+            let (key, entry): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
+            let key: String = key.extract().map_err(|_| invalid(path, "the keys of a dict must be strings"))?;
+            let entry = value(&entry, &join(path, &key), depth + 1)?.or_else(|| none_value(&key));
+            entry.into_iter().for_each(|entry| drop(table.insert(key.clone(), entry)));
+        }
+        return Ok(Some(Value::Table(table)));
+    }
+    // Paths, NumPy arrays and scalars, tensors, members of enumerations.
+    if obj.hasattr("__fspath__")? {
+        return value(&obj.call_method0("__fspath__")?, path, depth + 1);
+    }
+    if obj.hasattr("tolist")? {
+        return value(&obj.call_method0("tolist")?, path, depth + 1);
+    }
+    if obj.hasattr("__array__")? {
+        return value(&obj.call_method0("__array__")?.call_method0("tolist")?, path, depth + 1);
+    }
+    if obj.hasattr("value")? {
+        return value(&obj.getattr("value")?, path, depth + 1);
+    }
+    let found = obj.get_type().name()?;
+    Err(invalid(path, &format!("{found} is not a number, text, list, dict or configuration")))
+}
+
+/// Fields of a dataclass that differ from their defaults. `None` where the default is another value is the `false` of
+/// scene files.
+fn dataclass(obj: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Table> {
+    let fields = obj.getattr("__dataclass_fields__")?;
+    let mut table = Table::new();
+    for field in fields.call_method0("values")?.try_iter()? {
+        let field = field?;
+        let name: String = field.getattr("name")?.extract()?;
+        let own = obj.getattr(name.as_str())?;
+        let default = default_of(&field)?;
+        if default.as_ref().is_some_and(|default| is_same(&own, default)) {
+            continue;
+        }
+        let converted = value(&own, &join(path, &name), depth + 1)?;
+        if let Some(converted) = converted.or_else(|| default.map(|_| Value::Boolean(false))) {
+            table.insert(name, converted);
+        }
+    }
+    Ok(table)
+}
+
+/// Default of a field of a dataclass; `None` if it must be given.
+fn default_of<'py>(field: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let missing = field.py().import("dataclasses")?.getattr("MISSING")?;
+    let default = field.getattr("default")?;
+    if !default.is(&missing) {
+        return Ok(Some(default));
+    }
+    let factory = field.getattr("default_factory")?;
+    if factory.is(&missing) { Ok(None) } else { factory.call0().map(Some) }
+}
+
+/// True if the values are equal. Values that cannot be compared, such as arrays, differ.
+fn is_same(own: &Bound<'_, PyAny>, default: &Bound<'_, PyAny>) -> bool {
+    own.is(default) || (own.get_type().is(default.get_type()) && own.eq(default).unwrap_or(false))
+}
+
+fn sequence<'py>(items: impl Iterator<Item = Bound<'py, PyAny>>, path: &str, depth: usize) -> PyResult<Value> {
+    let convert = |(index, item): (usize, Bound<'py, PyAny>)| {
+        let path = format!("{path}[{index}]");
+        value(&item, &path, depth + 1)?.ok_or_else(|| invalid(&path, "a list cannot contain None"))
+    };
+    items.enumerate().map(convert).collect::<PyResult<Vec<Value>>>().map(Value::Array)
+}
+
+fn join(path: &str, name: &str) -> String {
+    if path.is_empty() { name.into() } else { format!("{path}.{name}") }
+}
+
+fn invalid(path: &str, problem: &str) -> PyErr {
+    let message = if path.is_empty() { problem.into() } else { format!("{path}: {problem}") };
+    Failure::new(Class::Config, message).into()
+}
+
+/// Reads the text of a scene file that came from Python. Relative paths are relative to the working folder.
+pub(crate) fn scene(document: &Table) -> Result<SceneCfg, Failure> {
+    let text = toml::to_string(document)?;
+    Ok(SceneCfg::from_toml(&text, PYTHON, &EntityTypes::default())?)
+}
+
+/// Reads the configuration of a simulation.
+pub(crate) fn simulation(fields: Table) -> Result<SimulationManagerCfg, Failure> {
+    let document = Table::from_iter([("simulation".to_string(), Value::Table(fields))]);
+    Ok(scene(&document)?.simulation)
+}
+
+/// Reads the configuration of one entity of type `kind`. The name is the argument, or else the field `uid`, or else
+/// the default of the type.
+pub(crate) fn entity(kind: &str, name: Option<String>, mut fields: Table) -> Result<(String, EntityCfg), Failure> {
+    let uid = match fields.remove("uid") {
+        None => None,
+        Some(Value::String(uid)) => Some(uid),
+        Some(other) => return Err(Failure::new(Class::Config, format!("uid: expected a text, not {other}"))),
+    };
+    let name = name.or(uid).unwrap_or_else(|| kind.to_string());
+    fields.insert("type".into(), Value::String(kind.into()));
+    let entities = Table::from_iter([(name.clone(), Value::Table(fields))]);
+    let document = Table::from_iter([("entities".to_string(), Value::Table(entities))]);
+    let (_, cfg) = scene(&document)?.entities.pop().ok_or_else(|| Failure::new(Class::Internal, "no entity"))?;
+    Ok((name, cfg))
+}
+
+/// Reads a configuration that is not part of scene files.
+pub(crate) fn read<T: DeserializeOwned>(what: &str, cfg: Option<&Bound<'_, PyAny>>) -> PyResult<T> {
+    let fields = table(cfg, None)?;
+    Value::Table(fields)
+        .try_into()
+        .map_err(|error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message())).into())
+}
+
+/// Type name of a configuration in scene files: the class attribute `_type` of its dataclass, or its key `type`.
+pub(crate) fn type_of(cfg: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+    if let Ok(mapping) = cfg.cast::<PyMapping>() {
+        return mapping.get_item("type").map_or(Ok(None), |kind| kind.extract().map(Some));
+    }
+    cfg.getattr_opt("_type")?.map(|kind| kind.extract()).transpose()
+}
+
+/// Changes fields of a configuration of a simulation.
+pub(crate) fn changed_simulation(cfg: &SimulationManagerCfg, changes: Table) -> Result<SimulationManagerCfg, Failure> {
+    let mut fields = Table::try_from(cfg)?;
+    fields.extend(changes);
+    simulation(fields)
+}
+
+/// Table of a scene from a dict: entities may be configurations with a type, whose `uid` is replaced by the name.
+pub(crate) fn scene_table(scene: &Bound<'_, PyAny>) -> PyResult<Table> {
+    let mut document = table(Some(scene), None)?;
+    let entities = scene.get_item("entities").ok();
+    if let (Some(Value::Table(converted)), Some(entities)) = (document.get_mut("entities"), entities) {
+        for item in entities.cast::<PyMapping>()?.items()?.iter() {
+            let (name, entity): (String, Bound<'_, PyAny>) = item.extract()?;
+            let Some(Value::Table(fields)) = converted.get_mut(&name) else { continue };
+            if let Some(kind) = type_of(&entity)? {
+                fields.insert("type".into(), Value::String(kind));
+            }
+            if entity.cast::<PyMapping>().is_err() {
+                fields.remove("uid");
+            }
+        }
+    }
+    Ok(document)
+}

@@ -1,0 +1,97 @@
+//! Extension module of the Python package `kinetoscope`: the Rust API as Python classes.
+//!
+//! A class holds a shared simulation behind a lock ([`shared`]); its methods convert arguments, release the interpreter,
+//! call the Rust method of the same name, and convert the result. Configurations arrive in the form of scene files
+//! ([`cfg`]). Every failure is an exception of `kinetoscope.errors` ([`errors`]), panics included.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod cfg;
+mod channels;
+mod errors;
+mod html;
+mod objects;
+mod recording;
+mod robot;
+mod sensor;
+mod shared;
+mod simulation;
+mod snapshot;
+mod values;
+mod viewer;
+
+use errors::Failure;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// Path of a bundled asset such as ``sr5/SR5.urdf``, searched in the folder ``KINETOSCOPE_ASSETS`` first.
+#[pyfunction]
+fn asset_path(asset: PathBuf) -> PyResult<PathBuf> {
+    Ok(kinetoscope::assets::path(asset).map_err(Failure::from)?)
+}
+
+/// Configuration of a bundled robot as the text of a scene file with this one entity.
+#[pyfunction]
+fn bundled_robot(name: &str) -> PyResult<String> {
+    use kinetoscope::assets;
+    let robot = match name {
+        "quadruped" => assets::quadruped(),
+        "sr5" => assets::sr5(),
+        "revo1_left" => assets::revo1_left(),
+        "sr5_with_hand" => assets::sr5_with_hand(),
+        other => {
+            let message = format!("unknown robot {other:?}; known names: quadruped, sr5, revo1_left, sr5_with_hand");
+            return Err(Failure::new(errors::Class::UnknownName, message).into());
+        }
+    };
+    let robot = robot.map_err(Failure::from)?;
+    let scene = kinetoscope::sim::SceneCfg::default().with(robot.uid.clone(), robot);
+    Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default()).map_err(Failure::from)?)
+}
+
+/// Version of the MuJoCo library that is loaded.
+#[pyfunction]
+fn mujoco_version() -> String {
+    kinetoscope::mujoco::version_string()
+}
+
+/// Panics, to test that a panic becomes an ``InternalError``.
+#[pyfunction]
+fn _panic(simulation: &Bound<'_, simulation::Simulation>, write: bool) -> PyResult<()> {
+    let shared = &simulation.get().shared;
+    let py = simulation.py();
+    if write {
+        shared.write(py, |_| panic!("requested by a test"))
+    } else {
+        shared.read(py, |_| panic!("requested by a test"))
+    }
+}
+
+#[pymodule]
+fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<simulation::Simulation>()?;
+    module.add_class::<robot::Robot>()?;
+    module.add_class::<robot::IkResult>()?;
+    module.add_class::<objects::RigidObject>()?;
+    module.add_class::<objects::RigidObjectGroup>()?;
+    module.add_class::<objects::Terrain>()?;
+    module.add_class::<objects::MjcfPart>()?;
+    module.add_class::<objects::Weld>()?;
+    module.add_class::<sensor::Sensor>()?;
+    module.add_class::<snapshot::Snapshot>()?;
+    module.add_class::<recording::Topic>()?;
+    module.add_class::<recording::Recorder>()?;
+    module.add_class::<recording::RecordingSummary>()?;
+    module.add_class::<recording::Playback>()?;
+    module.add_class::<viewer::Server>()?;
+    module.add_class::<viewer::Window>()?;
+    module.add_function(wrap_pyfunction!(asset_path, module)?)?;
+    module.add_function(wrap_pyfunction!(bundled_robot, module)?)?;
+    module.add_function(wrap_pyfunction!(mujoco_version, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::to_toml, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::read_series, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::recording_topics, module)?)?;
+    module.add_function(wrap_pyfunction!(_panic, module)?)?;
+    module.add("_NONE_IS_FALSE", cfg::NONE_IS_FALSE.to_vec())?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))
+}

@@ -1,0 +1,363 @@
+//! Recordings and replay.
+
+use crate::arguments::envs;
+use crate::errors::{Class, Failure};
+use crate::shared::{Entity, Shared};
+use crate::simulation::Simulation;
+use kinetoscope::prelude::Record as _;
+use kinetoscope::record::{self, FieldSelector, Format, OverviewCfg, RecorderCfg, RecorderId, Recording};
+use kinetoscope::sim::EnvId;
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Selection of what is recorded.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Clone, Debug)]
+pub(crate) struct Topic {
+    inner: record::Topic,
+}
+
+/// Declares topics with the name of an entity.
+macro_rules! named_topics {
+    ($($(#[$doc:meta])* $name:ident => $Variant:ident,)*) => {
+        #[pymethods]
+        impl Topic {
+            $($(#[$doc])*
+            #[staticmethod]
+            fn $name(uid: String) -> Self {
+                Self { inner: record::Topic::$Variant(uid) }
+            })*
+        }
+    };
+}
+
+named_topics! {
+    /// Joint positions, velocities and efforts of a robot or articulation.
+    joint_states => JointStates,
+    /// Position, velocity and effort targets of a robot or articulation.
+    targets => Targets,
+    /// Link poses of a robot or articulation.
+    link_poses => LinkPoses,
+    /// Pose of a rigid object.
+    object_pose => ObjectPose,
+    /// Positions, velocities and controls of an MJCF part.
+    mjcf_state => MjcfState,
+    /// Body poses of an MJCF part.
+    body_poses => BodyPoses,
+    /// All channels of a sensor.
+    sensor => Sensor,
+}
+
+/// Declares topics without a name.
+macro_rules! plain_topics {
+    ($($(#[$doc:meta])* $name:ident => $Variant:ident,)*) => {
+        #[pymethods]
+        impl Topic {
+            $($(#[$doc])*
+            #[staticmethod]
+            fn $name() -> Self {
+                Self { inner: record::Topic::$Variant }
+            })*
+        }
+    };
+}
+
+plain_topics! {
+    /// Everything that the format supports.
+    everything => Everything,
+    /// Times, positions and velocities of all joints in MuJoCo's order.
+    engine_states => EngineStates,
+    /// Rewards and ends of episodes.
+    task_results => TaskResults,
+    /// Overview image of all environments.
+    overview => Overview,
+    /// Resets, writes, divergence and notes.
+    events => Events,
+}
+
+#[pymethods]
+impl Topic {
+    /// One channel of a camera.
+    #[staticmethod]
+    fn channel(sensor: String, channel: String) -> Self {
+        Self { inner: record::Topic::Channel { sensor, channel } }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Topic({:?})", self.inner)
+    }
+}
+
+/// A running recording. ``finish`` completes the file; as a context manager, it is finished at the end of the block.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct Recorder {
+    shared: Arc<Shared>,
+    id: RecorderId,
+    path: PathBuf,
+}
+
+/// Summary of a finished recording.
+#[pyclass(frozen, get_all, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct RecordingSummary {
+    /// File or folder.
+    path: PathBuf,
+    /// Size [bytes].
+    bytes: u64,
+    /// Number of rows and events.
+    packets: u64,
+    /// Number of times that the simulation waited for the writer.
+    waits: u64,
+    /// What was left out, with the reason.
+    left_out: Vec<String>,
+    text: String,
+}
+
+#[pymethods]
+impl RecordingSummary {
+    fn __repr__(&self) -> &str {
+        &self.text
+    }
+}
+
+impl Recorder {
+    fn finish_once(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
+        let summary = self.shared.write(py, |sim| Ok(sim.finish_recording(self.id)?))?;
+        let text = summary.to_string();
+        let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
+        Ok(RecordingSummary { path, bytes, packets, waits, left_out, text })
+    }
+}
+
+#[pymethods]
+impl Recorder {
+    /// Path of the file or folder.
+    #[getter]
+    fn path(&self) -> &PathBuf {
+        &self.path
+    }
+
+    /// Completes the file.
+    fn finish(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
+        self.finish_once(py)
+    }
+
+    /// Writes a text into the recording, about one environment or all.
+    #[pyo3(signature = (text, env=None))]
+    fn note(&self, py: Python<'_>, text: &str, env: Option<usize>) -> PyResult<()> {
+        self.shared.write(py, |sim| Ok(sim.note(self.id, env.map(EnvId), text)?))
+    }
+
+    fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        self.finish_once(py).map(drop)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Recorder {}>", self.path.display())
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    /// Begins a recording; its format follows from the extension of the path. Keyword arguments are the fields of the
+    /// Rust ``RecorderCfg``.
+    #[pyo3(signature = (path, topics=None, *, format=None, env_ids=None, period_steps=1, stream_periods=None, scene=true,
+        overview_size=None, overview_fps=None, task=None, overwrite=false))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
+    fn record(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        topics: Option<Vec<Bound<'_, PyAny>>>,
+        format: Option<&str>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+        period_steps: u64,
+        stream_periods: Option<&Bound<'_, PyDict>>,
+        scene: bool,
+        overview_size: Option<[usize; 2]>,
+        overview_fps: Option<f64>,
+        task: Option<String>,
+        overwrite: bool,
+    ) -> PyResult<Recorder> {
+        let defaults = RecorderCfg::default();
+        let periods = stream_periods.map(|periods| {
+            periods
+                .iter()
+                .map(|(name, period)| Ok((name.extract()?, period.extract()?)))
+                .collect::<PyResult<Vec<(String, u64)>>>()
+        });
+        let overview = OverviewCfg {
+            size: overview_size.unwrap_or(defaults.overview.size),
+            fps: overview_fps.unwrap_or(defaults.overview.fps),
+            ..defaults.overview.clone()
+        };
+        let cfg = RecorderCfg {
+            path: path.clone(),
+            format: format.map(format_of).transpose()?,
+            topics: topics.map_or(Ok(defaults.topics.clone()), |topics| topics.iter().map(topic_of).collect())?,
+            envs: envs(env_ids)?,
+            period_steps,
+            stream_periods: periods.transpose()?.unwrap_or_default(),
+            scene,
+            overview,
+            task: task.unwrap_or_default(),
+            overwrite,
+            ..defaults
+        };
+        let id = self.shared.write(py, |sim| Ok(sim.record(cfg)?))?;
+        Ok(Recorder { shared: Arc::clone(&self.shared), id, path })
+    }
+
+    /// Replays a recording (``.npz`` or ``.mcap``) in this simulation, built as the recorded one was, and compares the
+    /// states bit by bit. Returns a dict: ``identical``, ``steps``, ``values``, and ``difference`` (a text, or None).
+    fn verify_recording<'py>(&self, py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
+        let result = self.shared.write(py, |sim| Ok(record::replay::verify(sim, path)?))?;
+        let dict = PyDict::new(py);
+        dict.set_item("identical", result.is_identical())?;
+        dict.set_item("steps", result.steps)?;
+        dict.set_item("values", result.values)?;
+        dict.set_item("difference", result.difference.map(|difference| format!("{difference:?}")))?;
+        Ok(dict)
+    }
+}
+
+fn topic_of(topic: &Bound<'_, PyAny>) -> PyResult<record::Topic> {
+    if let Ok(topic) = topic.cast::<Topic>() {
+        return Ok(topic.get().inner.clone());
+    }
+    let plain = [
+        ("everything", record::Topic::Everything),
+        ("engine_states", record::Topic::EngineStates),
+        ("task_results", record::Topic::TaskResults),
+        ("overview", record::Topic::Overview),
+        ("events", record::Topic::Events),
+    ];
+    let name = topic.cast::<PyString>().ok().and_then(|name| name.to_str().ok().map(String::from));
+    let found = name.as_ref().and_then(|name| plain.into_iter().find(|(known, _)| known == name));
+    found.map(|(_, topic)| topic).ok_or_else(|| {
+        let message = format!(
+            "{topic} is not a topic; use Topic.joint_states(\"arm\") and the like, or \"everything\", \"engine_states\", \
+             \"task_results\", \"overview\", \"events\""
+        );
+        Failure::argument("topics", message).into()
+    })
+}
+
+fn format_of(name: &str) -> PyResult<Format> {
+    let label = |format: Format| format!("{format:?}").to_lowercase();
+    Format::all().map(|(format, _)| format).find(|format| label(*format) == name).ok_or_else(|| {
+        let known: Vec<String> = Format::all().map(|(format, _)| label(format)).collect();
+        Failure::new(Class::UnknownName, format!("unknown format {name:?}; known names: {}", known.join(", "))).into()
+    })
+}
+
+/// Playback of a recording: ``seek`` puts the simulation ``sim`` into the state of a recorded frame.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct Playback {
+    shared: Arc<Shared>,
+    sim: Py<Simulation>,
+    inner: Mutex<record::Playback>,
+}
+
+#[pymethods]
+impl Playback {
+    /// Opens a recording. Without ``sim``, the scene in the file is built; files without a scene need one.
+    #[new]
+    #[pyo3(signature = (path, sim=None))]
+    fn new(py: Python<'_>, path: PathBuf, sim: Option<&Bound<'_, Simulation>>) -> PyResult<Self> {
+        let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+        let (inner, manager) = match sim {
+            Some(sim) => {
+                let scene = &sim.get().shared;
+                scene.read(py, |sim| Ok(record::Playback::open(&recording, Some(sim))?))?
+            }
+            None => py.detach(|| record::Playback::open(&recording, None)).map_err(Failure::from)?,
+        };
+        let entities = manager.entities();
+        let parts =
+            entities.mjcf_uids().into_iter().filter_map(|uid| Some((uid.to_string(), entities.mjcf_id(uid).ok()?)));
+        let parts: Vec<_> = parts.collect();
+        let shared = Shared::new(manager);
+        parts.into_iter().for_each(|(uid, id)| shared.register(&uid, Entity::Mjcf(id)));
+        let sim = Py::new(py, Simulation { shared: Arc::clone(&shared) })?;
+        Ok(Self { shared, sim, inner: Mutex::new(inner) })
+    }
+
+    /// Simulation that shows the recording: the recorded scene as MJCF parts.
+    #[getter]
+    fn sim(&self, py: Python<'_>) -> Py<Simulation> {
+        self.sim.clone_ref(py)
+    }
+
+    /// Times of the frames [s].
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().to_vec()).into_pyarray(py)
+    }
+
+    /// Shows a frame, by its index in ``times``.
+    fn seek(&self, py: Python<'_>, frame: usize) -> PyResult<()> {
+        self.shared.write(py, |sim| {
+            let mut playback = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let count = playback.times().len();
+            if frame >= count {
+                return Err(Failure::new(
+                    Class::OutOfRange,
+                    format!("frame {frame} does not exist; there are {count}"),
+                ));
+            }
+            Ok(playback.seek(sim, frame)?)
+        })
+    }
+
+    /// Index of the last frame at or before a time [s].
+    fn frame_at(&self, py: Python<'_>, time: f64) -> usize {
+        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).frame_at(time))
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().len())
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<Playback of {} frames>", self.__len__(py))
+    }
+}
+
+/// Times and values of a number in a recording.
+#[pyfunction]
+#[pyo3(signature = (path, topic, field, env=None))]
+pub(crate) fn read_series<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    topic: &str,
+    field: &str,
+    env: Option<usize>,
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+    let series = py
+        .detach(|| {
+            let recording = Recording::open(path)?;
+            let topic = recording.topic(topic, env)?.name.clone();
+            recording.time_series(&[FieldSelector::new(topic, field)])
+        })
+        .map_err(Failure::from)?;
+    let first = series.into_iter().next().unwrap_or_default();
+    Ok([first.times.into_pyarray(py), first.values.into_pyarray(py)])
+}
+
+/// Names of the topics of a recording, each with the names of its numbers.
+#[pyfunction]
+pub(crate) fn recording_topics(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<String>)>> {
+    let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+    Ok(recording.topics().iter().map(|topic| (topic.name.clone(), topic.fields.clone())).collect())
+}

@@ -1,0 +1,172 @@
+//! The simulation behind all Python objects that refer to it.
+//!
+//! Lock order: a thread waits for the lock of the simulation only while it does not hold the interpreter. Otherwise a
+//! stepping thread that needs the interpreter and a thread that needs the simulation could wait for each other.
+
+use crate::errors::{Class, Failure};
+use kinetoscope::sim::{MjcfId, RigidObjectGroupId, RigidObjectId, RobotId, SimulationManager, TerrainId, WeldId};
+use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+
+/// Handle of an entity.
+#[derive(Clone, Debug)]
+pub(crate) enum Entity {
+    Robot(RobotId),
+    RigidObject(RigidObjectId),
+    Group(RigidObjectGroupId),
+    Terrain(TerrainId),
+    Mjcf(MjcfId),
+    Weld(WeldId),
+    Sensor,
+}
+
+/// A simulation, its entities by name, and the process that created it.
+pub(crate) struct Shared {
+    /// `None` after `destroy`.
+    manager: Mutex<Option<SimulationManager>>,
+    entities: Mutex<Vec<(String, Entity)>>,
+    process: u32,
+    /// True if the simulation has no threads of its own, so that a forked process can use it.
+    single_threaded: bool,
+}
+
+impl Shared {
+    pub(crate) fn new(manager: SimulationManager) -> Arc<Self> {
+        let single_threaded = manager.cfg().num_threads() == 1;
+        Arc::new(Self {
+            manager: Mutex::new(Some(manager)),
+            entities: Mutex::new(Vec::new()),
+            process: std::process::id(),
+            single_threaded,
+        })
+    }
+
+    /// Reads the simulation without holding the interpreter. A panic leaves the simulation usable.
+    pub(crate) fn read<T: Send>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&SimulationManager) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| {
+            let guard = self.lock()?;
+            let sim = guard.as_ref().ok_or_else(destroyed)?;
+            catch_unwind(AssertUnwindSafe(|| act(sim))).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
+        })
+        .map_err(Into::into)
+    }
+
+    /// Changes the simulation without holding the interpreter. After a panic, later calls fail.
+    pub(crate) fn write<T: Send>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&mut SimulationManager) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| self.write_detached(act)).map_err(Into::into)
+    }
+
+    /// [`write`](Self::write) for a caller that does not hold the interpreter.
+    pub(crate) fn write_detached<T>(
+        &self,
+        act: impl FnOnce(&mut SimulationManager) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let locked = || {
+            let mut guard = self.lock()?;
+            // The guard is dropped while the panic unwinds, which poisons the lock.
+            act(guard.as_mut().ok_or_else(destroyed)?)
+        };
+        catch_unwind(AssertUnwindSafe(locked)).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
+    }
+
+    /// Frees the simulation. Its Python objects raise `DestroyedError` from then on.
+    pub(crate) fn destroy(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| {
+            let manager = match self.lock() {
+                Ok(mut guard) => guard.take(),
+                Err(failure) if failure.is_broken() => {
+                    self.manager.lock().unwrap_or_else(PoisonError::into_inner).take()
+                }
+                Err(failure) => return Err(failure),
+            };
+            drop(manager);
+            Ok(())
+        })
+        .map_err(Into::into)
+    }
+
+    fn lock(&self) -> Result<MutexGuard<'_, Option<SimulationManager>>, Failure> {
+        if std::process::id() == self.process {
+            return self.manager.lock().map_err(|_| Failure::broken());
+        }
+        if !self.single_threaded {
+            let message = format!(
+                "this simulation belongs to process {}, and its threads do not exist in the forked process {}; create \
+                 the simulation in the child process, start children with the method \"spawn\" or \"forkserver\", or \
+                 use threads=1",
+                self.process,
+                std::process::id()
+            );
+            return Err(Failure::new(Class::Fork, message));
+        }
+        self.manager.try_lock().map_err(|error| match error {
+            TryLockError::Poisoned(_) => Failure::broken(),
+            // Another thread of the parent held the lock at the time of the fork and does not exist here.
+            TryLockError::WouldBlock => Failure::new(
+                Class::Fork,
+                "the process was forked while another thread used this simulation; create the simulation in the child \
+                 process",
+            ),
+        })
+    }
+
+    /// Registers an entity under its name.
+    pub(crate) fn register(&self, name: &str, entity: Entity) {
+        self.entities().push((name.into(), entity));
+    }
+
+    pub(crate) fn keys(&self) -> Vec<String> {
+        self.entities().iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Finds an entity by name; the names of all entities if there is no such entity.
+    pub(crate) fn find(&self, name: &str) -> Result<Entity, Failure> {
+        let entities = self.entities();
+        let found = entities.iter().find(|(known, _)| known == name);
+        found.map(|(_, entity)| entity.clone()).ok_or_else(|| {
+            let known: Vec<String> = entities.iter().map(|(name, _)| format!("{name:?}")).collect();
+            Failure::new(
+                Class::UnknownName,
+                match known.len() {
+                    0 => format!("unknown entity {name:?}; the simulation has no entities"),
+                    _ => format!("unknown entity {name:?}; known names: {}", known.join(", ")),
+                },
+            )
+        })
+    }
+
+    /// The list of entities. The lock is never held during a call into the simulation or into Python.
+    fn entities(&self) -> MutexGuard<'_, Vec<(String, Entity)>> {
+        self.entities.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        // In a forked process, the threads that the manager would wait for do not exist: leave its memory to the end of
+        // the process.
+        if std::process::id() != self.process && !self.single_threaded {
+            let manager = self.manager.get_mut().unwrap_or_else(PoisonError::into_inner);
+            std::mem::forget(manager.take());
+        }
+    }
+}
+
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared").field("process", &self.process).finish_non_exhaustive()
+    }
+}
+
+fn destroyed() -> Failure {
+    Failure::new(Class::Destroyed, "the simulation was destroyed")
+}

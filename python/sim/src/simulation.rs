@@ -1,0 +1,634 @@
+//! The class `SimulationManager`.
+
+use crate::arguments::{array, envs};
+use crate::cfg;
+use crate::errors::{Class, Failure};
+use crate::objects::{MjcfPart, RigidObject, RigidObjectGroup, Terrain, Weld};
+use crate::robot::Robot;
+use crate::sensor::Sensor;
+use crate::shared::{Entity, Shared};
+use crate::snapshot::Snapshot;
+use kinetoscope::ndarray::{Ix3, IxDyn};
+use kinetoscope::prelude::{ArticulationCfg, MjcfPartCfg, RigidObjectCfg, RobotCfg, SceneCfg, TerrainCfg};
+use kinetoscope::sim::{
+    EntityCfg, EntityTypes, EnvId, InteractiveScene, Property, Randomization, RigidObjectGroupCfg, SimulationManager,
+    WeldCfg,
+};
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Robots, objects and sensors in parallel environments.
+///
+/// ``cfg`` is a ``SimulationManagerCfg`` or a dict of its fields; keyword arguments replace fields. All methods release
+/// the interpreter while they work, and ``update`` ends early with ``KeyboardInterrupt`` on Ctrl+C.
+#[pyclass(frozen, name = "SimulationManager", module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct Simulation {
+    pub(crate) shared: Arc<Shared>,
+}
+
+/// Wall time of a block of steps, after which signals are handled.
+const BLOCK: Duration = Duration::from_millis(50);
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn new(py: Python<'_>, cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let cfg = cfg::simulation(cfg::table(cfg, fields)?)?;
+        let manager = build(py, || Ok(SimulationManager::new(cfg)?))?;
+        Ok(Self { shared: Shared::new(manager) })
+    }
+
+    /// Builds the scene of a scene file (TOML or YAML). Keyword arguments replace fields of ``[simulation]``.
+    #[classmethod]
+    #[pyo3(signature = (path, **fields))]
+    fn from_file(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        path: PathBuf,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut scene = py.detach(|| SceneCfg::from_file(path)).map_err(Failure::from)?;
+        let changes = cfg::table(None, fields)?;
+        if !changes.is_empty() {
+            scene.simulation = cfg::changed_simulation(&scene.simulation, changes)?;
+        }
+        Self::of_scene(py, scene)
+    }
+
+    /// Builds a scene from a dict in the form of scene files: ``simulation``, ``entities`` by name (configurations, or
+    /// dicts with a ``type``), ``exclude_collisions``.
+    #[classmethod]
+    fn from_scene(_class: &Bound<'_, PyType>, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let scene = cfg::scene(&cfg::scene_table(scene)?)?;
+        Self::of_scene(py, scene)
+    }
+
+    /// Adds an entity of any type under a name: a robot, object, terrain, sensor and so on. Returns its handle.
+    #[pyo3(signature = (name, cfg))]
+    fn add(&self, py: Python<'_>, name: String, cfg: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        let mut table = cfg::table(Some(cfg), None)?;
+        table.remove("type");
+        let kind = cfg::type_of(cfg)?.ok_or_else(|| {
+            Failure::new(
+                Class::Config,
+                "the configuration has no `type`: use a class such as RobotCfg, or a dict with `type`",
+            )
+        })?;
+        self.add_entity(py, &kind, Some(name), table)
+    }
+
+    /// Adds a robot and returns its handle. Fields of ``RobotCfg`` may be given as keyword arguments.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_robot(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "robot", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Adds a passive articulation, such as a cabinet, and returns its handle.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_articulation(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "articulation", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Adds a rigid object and returns its handle.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_rigid_object(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "rigid_object", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Adds a group of rigid objects and returns its handle.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_rigid_object_group(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "rigid_object_group", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Adds a terrain and returns its handle.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_terrain(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "terrain", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Attaches an MJCF file and returns its handle.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_mjcf(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "mjcf", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Adds a weld, initially released, and returns its handle.
+    #[pyo3(signature = (cfg=None, **fields))]
+    fn add_weld(
+        &self,
+        py: Python<'_>,
+        cfg: Option<&Bound<'_, PyAny>>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Py<PyAny>> {
+        self.add_entity(py, "weld", None, cfg::table(cfg, fields)?)
+    }
+
+    /// Adds a sensor under a name and returns its handle.
+    fn add_sensor(&self, py: Python<'_>, name: String, cfg: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        self.add(py, name, cfg)
+    }
+
+    /// Excludes collisions between two entities or bodies from now on: names such as ``"arm/link"``, or handles.
+    fn exclude_collision(&self, py: Python<'_>, one: &Bound<'_, PyAny>, other: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (one, other) = (self.name_of(one)?, self.name_of(other)?);
+        self.shared.write(py, |sim| Ok(sim.exclude_collision(&one, &other)?))
+    }
+
+    /// Steps all environments ``steps`` times. Ctrl+C ends the call after at most one block of steps.
+    #[pyo3(signature = (steps=1))]
+    fn update(&self, py: Python<'_>, steps: u32) -> PyResult<()> {
+        let mut left = steps;
+        let mut block = 1;
+        while left > 0 {
+            let now = block.min(left);
+            let started = Instant::now();
+            self.shared.write(py, |sim| {
+                sim.update(now);
+                Ok(())
+            })?;
+            left -= now;
+            if left > 0 {
+                py.check_signals()?;
+                // Steps per block from the time of the last block, at most twice as many.
+                let per_step = started.elapsed().as_secs_f64() / f64::from(now);
+                let fitting = (BLOCK.as_secs_f64() / per_step.max(1e-9)).clamp(1.0, 1000.0) as u32;
+                block = fitting.min(block * 2);
+            }
+        }
+        Ok(())
+    }
+
+    /// Resets environments to their initial state and time 0.
+    #[pyo3(signature = (env_ids=None))]
+    fn reset(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let env_ids = envs(env_ids)?;
+        self.shared.write(py, |sim| Ok(sim.reset(env_ids.as_deref())?))
+    }
+
+    /// Clears what environments keep beside their state: histories of sensors, external wrenches, memory of actuator
+    /// models. Positions, velocities, targets and time stay.
+    #[pyo3(signature = (env_ids=None))]
+    fn reset_buffers(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let env_ids = envs(env_ids)?;
+        self.shared.write(py, |sim| Ok(sim.scene_mut().reset_buffers(env_ids.as_deref())?))
+    }
+
+    /// Number of environments.
+    #[getter]
+    fn num_envs(&self, py: Python<'_>) -> PyResult<usize> {
+        self.shared.read(py, |sim| Ok(sim.num_envs()))
+    }
+
+    /// Number of threads that step.
+    #[getter]
+    fn threads(&self, py: Python<'_>) -> PyResult<usize> {
+        self.shared.read(py, |sim| Ok(sim.threads()))
+    }
+
+    /// Physics time step [s].
+    #[getter]
+    fn physics_dt(&self, py: Python<'_>) -> PyResult<f64> {
+        self.shared.read(py, |sim| Ok(sim.cfg().physics_dt))
+    }
+
+    /// Simulation time of each environment since its last reset [s], shape (num_envs,).
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(self.shared.read(py, |sim| Ok(sim.time()))?.into_pyarray(py))
+    }
+
+    /// Origins of the environments in the overview [m], shape (num_envs, 3). Poses do not contain them.
+    #[getter]
+    fn env_origins<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.shared.read(py, |sim| Ok(sim.cfg().env_origins()))?.into_pyarray(py).into_any())
+    }
+
+    /// Everything repaired, ignored or unusual in the files and configurations of all entities.
+    #[getter]
+    fn diagnostics(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.shared.read(py, |sim| Ok(sim.diagnostics().iter().map(ToString::to_string).collect()))
+    }
+
+    /// Counts of all warnings by name: diagnostics, and MuJoCo's warnings over all environments.
+    #[getter]
+    fn warnings(&self, py: Python<'_>) -> PyResult<BTreeMap<String, u64>> {
+        self.shared.read(py, |sim| Ok(sim.warnings().counts()))
+    }
+
+    /// Environments that are frozen after an invalid state, with the step and the reason.
+    #[getter]
+    fn diverged(&self, py: Python<'_>) -> PyResult<Vec<(usize, u64, String)>> {
+        self.shared.read(py, |sim| {
+            Ok(sim.diverged().into_iter().map(|diverged| (diverged.env.0, diverged.step, diverged.reason)).collect())
+        })
+    }
+
+    /// The MJCF document of the simulation.
+    #[getter]
+    fn mjcf(&self, py: Python<'_>) -> PyResult<String> {
+        self.shared.read(py, |sim| Ok(sim.scene().mjcf().to_string()))
+    }
+
+    /// Table of the mask ids of cameras: id, entity, link (or None), semantic class.
+    #[getter]
+    #[expect(clippy::type_complexity, reason = "rows of a table")]
+    fn mask_ids(&self, py: Python<'_>) -> PyResult<Vec<(i32, String, Option<String>, String)>> {
+        self.shared.write(py, |sim| {
+            sim.scene_mut().visual_scene();
+            let rows = sim.scene().mask_ids().iter();
+            Ok(rows.map(|row| (row.id, row.object.clone(), row.link.clone(), row.class.clone())).collect())
+        })
+    }
+
+    /// Names of the bodies of contacts and body indices.
+    #[getter]
+    fn body_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.shared.read(py, |sim| Ok(sim.entities().body_names().to_vec()))
+    }
+
+    /// Names of the columns of controls in ``rollout``.
+    #[getter]
+    fn control_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.shared.read(py, |sim| Ok(sim.entities().control_names()))
+    }
+
+    /// Names of the columns of states in ``rollout``.
+    #[getter]
+    fn state_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.shared.read(py, |sim| Ok(sim.entities().state_names()))
+    }
+
+    /// Contacts of each selected environment: dicts with ``bodies`` (names; None for the world), ``point``, ``normal``,
+    /// ``distance``, ``force`` on the second body, ``normal_force``.
+    #[pyo3(signature = (env_ids=None))]
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<Vec<Bound<'py, PyDict>>>> {
+        let env_ids = envs(env_ids)?;
+        let (names, contacts) = self.shared.write(py, |sim| {
+            let names = sim.entities().body_names();
+            Ok((names, sim.scene_mut().contacts(env_ids.as_deref())?))
+        })?;
+        let row = |contact: &kinetoscope::scene::Contact| {
+            let body = |index: Option<u32>| index.and_then(|index| names.get(index as usize)).cloned();
+            let dict = PyDict::new(py);
+            dict.set_item("bodies", (body(contact.bodies[0]), body(contact.bodies[1])))?;
+            dict.set_item("point", contact.point)?;
+            dict.set_item("normal", contact.normal)?;
+            dict.set_item("distance", contact.distance)?;
+            dict.set_item("force", contact.force)?;
+            dict.set_item("normal_force", contact.normal_force)?;
+            Ok(dict)
+        };
+        contacts.iter().map(|env| env.iter().map(row).collect()).collect()
+    }
+
+    /// Copies the states of environments.
+    #[pyo3(signature = (env_ids=None))]
+    fn snapshot(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<Snapshot> {
+        let env_ids = envs(env_ids)?;
+        Ok(Snapshot { inner: self.shared.read(py, |sim| Ok(sim.snapshot(env_ids.as_deref())?))? })
+    }
+
+    /// Restores states of a snapshot. With ``properties``, masses, gains and other properties are restored as well.
+    #[pyo3(signature = (snapshot, env_ids=None, properties=false))]
+    fn restore(
+        &self,
+        py: Python<'_>,
+        snapshot: &Bound<'_, Snapshot>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+        properties: bool,
+    ) -> PyResult<()> {
+        let (env_ids, snapshot) = (envs(env_ids)?, &snapshot.get().inner);
+        self.shared.write(py, |sim| {
+            if properties {
+                sim.properties_mut().restore(snapshot, env_ids.as_deref())?;
+            }
+            Ok(sim.restore(snapshot, env_ids.as_deref())?)
+        })
+    }
+
+    /// Simulates copies of environments: controls, shape (num_envs, steps, columns of ``control_names``). Returns the
+    /// states after each step, shape (num_envs, steps, columns of ``state_names``), the final states as a snapshot, and
+    /// the diverged rows with their reasons. The simulation does not change.
+    #[pyo3(signature = (controls, start=None, env_ids=None))]
+    #[expect(clippy::type_complexity, reason = "a tuple of Python")]
+    fn rollout<'py>(
+        &self,
+        py: Python<'py>,
+        controls: &Bound<'_, PyAny>,
+        start: Option<&Bound<'_, Snapshot>>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Bound<'py, PyAny>, Snapshot, Vec<(usize, String)>)> {
+        let (controls, env_ids) = (array::<Ix3>(controls, "rollout, controls")?, envs(env_ids)?);
+        let start = start.map(|start| &start.get().inner);
+        let rollout = self.shared.read(py, |sim| Ok(sim.rollout(&controls, start, env_ids.as_deref())?))?;
+        let final_states = Snapshot { inner: rollout.final_states };
+        Ok((rollout.states.into_pyarray(py).into_any(), final_states, rollout.diverged))
+    }
+
+    /// Randomizes properties of environments: a ``Randomization``, or a list of its terms.
+    #[pyo3(signature = (randomization, env_ids=None))]
+    fn randomize(
+        &self,
+        py: Python<'_>,
+        randomization: &Bound<'_, PyAny>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let terms = PyDict::new(py);
+        let is_list = randomization.try_iter().is_ok() && !randomization.is_instance_of::<PyDict>();
+        let randomization: Randomization = if is_list {
+            terms.set_item("terms", randomization.try_iter()?.collect::<PyResult<Vec<_>>>()?)?;
+            cfg::read("randomization", Some(terms.as_any()))?
+        } else {
+            cfg::read("randomization", Some(randomization))?
+        };
+        let env_ids = envs(env_ids)?;
+        self.shared.write(py, |sim| Ok(sim.properties_mut().randomize(&randomization, env_ids.as_deref())?))
+    }
+
+    /// Names that have a property, such as the links and objects with a ``"mass"``.
+    fn property_names(&self, py: Python<'_>, property: &str) -> PyResult<Vec<String>> {
+        let property = property_of(property)?;
+        self.shared
+            .read(py, |sim| Ok(sim.properties().of(EnvId(0))?.names(property).into_iter().map(String::from).collect()))
+    }
+
+    /// Values of a property of a link, object or joint in every environment, shape (num_envs, values).
+    fn property<'py>(&self, py: Python<'py>, property: &str, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let property = property_of(property)?;
+        let rows = self.shared.read(py, |sim| {
+            let mut rows = kinetoscope::ndarray::Array2::zeros((sim.num_envs(), property.width()));
+            for (env, mut row) in rows.rows_mut().into_iter().enumerate() {
+                let properties = sim.properties().of(EnvId(env))?;
+                row.iter_mut().zip(properties.get(property, name)?).for_each(|(to, from)| *to = *from);
+            }
+            Ok(rows)
+        })?;
+        Ok(rows.into_pyarray(py).into_any())
+    }
+
+    /// Sets a property of a link, object or joint: one row for each of ``env_ids``, or one for all.
+    #[pyo3(signature = (property, name, values, env_ids=None))]
+    fn set_property(
+        &self,
+        py: Python<'_>,
+        property: &str,
+        name: &str,
+        values: &Bound<'_, PyAny>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let property = property_of(property)?;
+        let (values, env_ids) = (array::<IxDyn>(values, "set_property")?, envs(env_ids)?);
+        let width = property.width();
+        let numbers: Vec<f64> = values.iter().copied().collect();
+        self.shared.write(py, |sim| {
+            let chosen = env_ids.clone().unwrap_or_else(|| (0..sim.num_envs()).map(EnvId).collect());
+            if numbers.len() != width && numbers.len() != width * chosen.len() {
+                let (found, n) = (values.shape(), chosen.len());
+                let message = format!("shape {found:?}; expected ({n}, {width}), or one row for all environments");
+                return Err(Failure::argument("set_property", message));
+            }
+            let rows: Vec<&[f64]> = numbers.chunks_exact(width).collect();
+            sim.properties_mut().randomize_with(Some(&chosen), |_, env, properties| {
+                let row = chosen.iter().position(|chosen| *chosen == env).unwrap_or(0);
+                properties.set(property, name, rows[row % rows.len()])
+            })?;
+            Ok(())
+        })
+    }
+
+    /// Resets all properties of environments to their nominal values.
+    #[pyo3(signature = (env_ids=None))]
+    fn reset_properties(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let env_ids = envs(env_ids)?;
+        self.shared.write(py, |sim| Ok(sim.properties_mut().reset(env_ids.as_deref())?))
+    }
+
+    /// Sets the view of windows, browser views and screenshots [m].
+    fn set_camera_view(&self, py: Python<'_>, eye: [f64; 3], target: [f64; 3]) -> PyResult<()> {
+        self.shared.write(py, |sim| Ok(sim.scene_mut().set_camera_view(eye, target)?))
+    }
+
+    /// Writes the merged robots, the MJCF documents for both MuJoCo versions and the meshes to a folder. Returns
+    /// diagnostics for everything left out.
+    fn dump(&self, py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
+        self.shared.read(py, |sim| Ok(sim.dump(folder)?.iter().map(ToString::to_string).collect()))
+    }
+
+    /// Names of the entities, in the order in which they were added.
+    fn keys(&self) -> Vec<String> {
+        self.shared.keys()
+    }
+
+    /// The entity of this name.
+    fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        let entity = self.shared.find(name)?;
+        self.handle(py, name, entity)
+    }
+
+    /// True for the name of an entity, and for a handle of this simulation.
+    fn __contains__(&self, name: &Bound<'_, PyAny>) -> bool {
+        self.name_of(name).is_ok_and(|name| self.shared.keys().contains(&name))
+    }
+
+    fn __iter__(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        Ok(self.shared.keys().into_pyobject(py)?.into_any().try_iter()?.into_any().unbind())
+    }
+
+    fn __len__(&self) -> usize {
+        self.shared.keys().len()
+    }
+
+    /// Frees the simulation. Later calls of it and of its handles raise ``DestroyedError``.
+    fn destroy(&self, py: Python<'_>) -> PyResult<()> {
+        self.shared.destroy(py)
+    }
+
+    fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        self.destroy(py)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let keys = self.shared.keys();
+        self.shared.read(py, |sim| {
+            let names = if keys.is_empty() { "no entities".into() } else { keys.join(", ") };
+            Ok(format!("<SimulationManager: {} envs, dt {} s, {names}>", sim.num_envs(), sim.cfg().physics_dt))
+        })
+    }
+}
+
+impl Simulation {
+    /// Name of an entity: a text, or the uid of a handle of this simulation.
+    fn name_of(&self, entity: &Bound<'_, PyAny>) -> PyResult<String> {
+        if let Ok(name) = entity.extract::<String>() {
+            return Ok(name);
+        }
+        macro_rules! owner {
+            ($($Type:ty),*) => {
+                None$(.or_else(|| entity.cast::<$Type>().ok().map(|handle| &handle.get().shared)))*
+            };
+        }
+        let owner: Option<&Arc<Shared>> = owner!(Robot, RigidObject, RigidObjectGroup, Terrain, MjcfPart, Weld, Sensor);
+        match owner {
+            Some(owner) if Arc::ptr_eq(owner, &self.shared) => entity.getattr("uid")?.extract(),
+            Some(_) => {
+                let message = format!("{} belongs to another simulation", entity.repr()?);
+                Err(Failure::new(Class::ForeignHandle, message).into())
+            }
+            None => Err(Failure::argument(
+                "entity",
+                format!("expected a name or a handle, not {}", entity.get_type().name()?),
+            )
+            .into()),
+        }
+    }
+
+    fn of_scene(py: Python<'_>, cfg: SceneCfg) -> PyResult<Self> {
+        let names: Vec<String> = cfg.keys().map(String::from).collect();
+        let (manager, entities) = build(py, || {
+            let scene = InteractiveScene::new(cfg)?;
+            let entities: Vec<(String, Entity)> = names
+                .into_iter()
+                .map(|name| entity_of(&scene, &name).map(|entity| (name, entity)))
+                .collect::<Result<_, _>>()?;
+            Ok((scene.into_sim(), entities))
+        })?;
+        let shared = Shared::new(manager);
+        entities.into_iter().for_each(|(name, entity)| shared.register(&name, entity));
+        Ok(Self { shared })
+    }
+
+    fn add_entity(&self, py: Python<'_>, kind: &str, name: Option<String>, fields: toml::Table) -> PyResult<Py<PyAny>> {
+        let (name, cfg) = cfg::entity(kind, name, fields)?;
+        let entity = self.shared.write(py, |sim| add(sim, &name, cfg))?;
+        self.shared.register(&name, entity.clone());
+        self.handle(py, &name, entity)
+    }
+
+    /// Python object of an entity.
+    fn handle(&self, py: Python<'_>, name: &str, entity: Entity) -> PyResult<Py<PyAny>> {
+        let shared = Arc::clone(&self.shared);
+        Ok(match entity {
+            Entity::Robot(id) => {
+                let passive = self.shared.read(py, |sim| Ok(sim.entities().articulation_id(name).is_ok()))?;
+                let kind = if passive { "articulation" } else { "robot" };
+                Py::new(py, Robot { shared, id, kind })?.into_any()
+            }
+            Entity::RigidObject(id) => Py::new(py, RigidObject { shared, id })?.into_any(),
+            Entity::Group(id) => Py::new(py, RigidObjectGroup { shared, id })?.into_any(),
+            Entity::Terrain(id) => Py::new(py, Terrain { shared, id })?.into_any(),
+            Entity::Mjcf(id) => Py::new(py, MjcfPart { shared, id })?.into_any(),
+            Entity::Weld(id) => Py::new(py, Weld { shared, id })?.into_any(),
+            Entity::Sensor => Py::new(py, Sensor { shared, uid: name.into() })?.into_any(),
+        })
+    }
+}
+
+/// Adds an entity to a simulation.
+fn add(sim: &mut SimulationManager, name: &str, cfg: EntityCfg) -> Result<Entity, Failure> {
+    let uid = name.to_string();
+    Ok(match cfg {
+        EntityCfg::Robot(cfg) => Entity::Robot(sim.add_robot(RobotCfg { uid, ..*cfg })?),
+        EntityCfg::Articulation(cfg) => {
+            sim.add_articulation(ArticulationCfg { uid, ..*cfg })?;
+            Entity::Robot(sim.entities().articulated_id(name)?)
+        }
+        EntityCfg::RigidObject(cfg) => Entity::RigidObject(sim.add_rigid_object(RigidObjectCfg { uid, ..*cfg })?),
+        EntityCfg::Group(cfg) => Entity::Group(sim.add_rigid_object_group(RigidObjectGroupCfg { uid, ..*cfg })?),
+        EntityCfg::Terrain(cfg) => Entity::Terrain(sim.add_terrain(TerrainCfg { uid, ..*cfg })?),
+        EntityCfg::Mjcf(cfg) => Entity::Mjcf(sim.add_mjcf(MjcfPartCfg { uid, ..*cfg })?),
+        EntityCfg::Weld(cfg) => Entity::Weld(sim.add_weld(WeldCfg { uid, ..*cfg })?),
+        EntityCfg::Sensor(cfg) => {
+            cfg.add_to(sim, name)?;
+            Entity::Sensor
+        }
+        _ => return Err(Failure::new(Class::Internal, "this package does not have the type of the entity")),
+    })
+}
+
+/// Handle of an entity of a scene.
+fn entity_of(scene: &InteractiveScene, name: &str) -> Result<Entity, Failure> {
+    if let Ok(id) = scene.robot_id(name) {
+        return Ok(Entity::Robot(id));
+    }
+    if scene.articulation_id(name).is_ok() {
+        return Ok(Entity::Robot(scene.sim().entities().articulated_id(name)?));
+    }
+    let found = scene.rigid_object_id(name).map(Entity::RigidObject);
+    let found = found.or_else(|_| scene.rigid_object_group_id(name).map(Entity::Group));
+    let found = found.or_else(|_| scene.terrain_id(name).map(Entity::Terrain));
+    let found = found.or_else(|_| scene.mjcf_id(name).map(Entity::Mjcf));
+    let found = found.or_else(|_| scene.weld_id(name).map(Entity::Weld));
+    Ok(found.unwrap_or(Entity::Sensor))
+}
+
+/// Builds a simulation without holding the interpreter; a panic becomes an error.
+fn build<T: Send>(py: Python<'_>, make: impl FnOnce() -> Result<T, Failure> + Send) -> PyResult<T> {
+    py.detach(|| {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(make))
+            .unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
+    })
+    .map_err(Into::into)
+}
+
+/// The property of a name in configurations.
+fn property_of(name: &str) -> PyResult<Property> {
+    Property::ALL.into_iter().find(|property| property.name() == name).ok_or_else(|| {
+        let known = kinetoscope::scene::pattern::closest_names(name, Property::ALL.map(Property::name));
+        let message = format!("unknown property {name:?}; known names: {}", known.join(", "));
+        Failure::new(Class::UnknownName, message).into()
+    })
+}
+
+/// Text of a scene file: the scene as Rust reads it, with all fields.
+#[pyfunction]
+pub(crate) fn to_toml(scene: &Bound<'_, PyAny>) -> PyResult<String> {
+    let scene = cfg::scene(&cfg::scene_table(scene)?)?;
+    Ok(scene.to_toml(&EntityTypes::default()).map_err(Failure::from)?)
+}

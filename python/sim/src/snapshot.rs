@@ -1,0 +1,63 @@
+//! Snapshots: saved states of environments.
+
+use crate::errors::Failure;
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
+use std::path::PathBuf;
+
+/// States of environments, made by ``SimulationManager.snapshot``. Snapshots can be pickled.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct Snapshot {
+    pub(crate) inner: kinetoscope::sim::Snapshot,
+}
+
+#[pymethods]
+impl Snapshot {
+    /// Reads a file that ``save`` wrote.
+    #[classmethod]
+    fn load(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Ok(Self { inner: py.detach(|| kinetoscope::sim::Snapshot::load(path)).map_err(Failure::from)? })
+    }
+
+    /// Writes the snapshot to a file.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        Ok(py.detach(|| self.inner.save(path)).map_err(Failure::from)?)
+    }
+
+    /// Environments of the snapshot.
+    #[getter]
+    fn env_ids(&self) -> Vec<usize> {
+        self.inner.env_ids().into_iter().map(|env| env.0).collect()
+    }
+
+    /// Simulation times of the environments [s].
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.inner.time().into_pyarray(py)
+    }
+
+    /// Content of the file of the snapshot.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.inner.to_bytes())
+    }
+
+    /// Reads the content of a file of a snapshot.
+    #[classmethod]
+    fn from_bytes(_class: &Bound<'_, PyType>, content: &[u8]) -> PyResult<Self> {
+        Ok(Self { inner: kinetoscope::sim::Snapshot::from_bytes(content).map_err(Failure::from)? })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((slf.get_type().getattr("from_bytes")?, (slf.get().to_bytes(slf.py()),)))
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Snapshot of {} envs>", self.inner.len())
+    }
+}

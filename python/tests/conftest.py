@@ -1,0 +1,22 @@
+"""Simulations shared by the tests of the package kinetoscope."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def arm_sim():
+    """Two environments with the bundled arm."""
+    import kinetoscope as ks
+
+    sim = ks.SimulationManager(num_envs=2, threads=2)
+    arm = sim.add_robot(ks.bundled_robot("sr5", uid="arm"))
+    yield sim, arm
+    sim.destroy()
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(7)

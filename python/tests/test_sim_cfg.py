@@ -1,0 +1,217 @@
+"""Generated configurations: defaults, names, documentation."""
+
+import ast
+import dataclasses
+import inspect
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import kinetoscope as ks
+from kinetoscope import cfg
+
+CLASSES = [cls for _, cls in inspect.getmembers(cfg, inspect.isclass) if dataclasses.is_dataclass(cls)]
+ENTITIES = [cls for cls in CLASSES if hasattr(cls, "_type")]
+
+# A configuration that contains an object of a class; classes without an entry are entities themselves.
+CONTAINERS = {
+    "ActuatorStateCfg": lambda own: own,
+    "Aperture": lambda own: {"type": "camera", "aperture": own},
+    "BpearlPattern": lambda own: {"type": "ray_caster", "pattern": {"bpearl": own}},
+    "ComponentCfg": lambda own: {"type": "robot", "urdf": {"components": [own]}},
+    "ConvexDecompositionCfg": lambda own: {"type": "rigid_object", "mesh_collision": {"pieces": own}},
+    "CustomPattern": lambda own: {"type": "ray_caster", "pattern": {"custom": own}},
+    "DcMotor": lambda own: {"type": "robot", "drive": {"actuators": {"a": {"dc_motor": own}}}},
+    "DriveCfg": lambda own: {"type": "robot", "drive": own},
+    "Extrinsics": lambda own: {"type": "camera", "extrinsics": own},
+    "FThetaLens": lambda own: {"type": "camera", "lens": {"f_theta": own}},
+    "GridPattern": lambda own: {"type": "ray_caster", "pattern": {"grid": own}},
+    "HullCfg": lambda own: {"type": "robot", "hull": own},
+    "LidarPattern": lambda own: {"type": "ray_caster", "pattern": {"lidar": own}},
+    "MjcfFile": lambda own: {"type": "robot", "mjcf": own},
+    "NameCaseCfg": lambda own: {"type": "robot", "urdf": {"name_case": own}},
+    "NoiseCfg": lambda own: {"type": "imu", "sampling": {"noise": {"lin_acc_b": own}}},
+    "OpenCvFisheyeLens": lambda own: {"type": "camera", "lens": {"opencv_fisheye": own}},
+    "OpenCvLens": lambda own: {"type": "camera", "lens": {"opencv": own}},
+    "PinholePattern": lambda own: {"type": "ray_caster", "pattern": {"pinhole": own}},
+    "PyramidStairsTerrain": lambda own: {"type": "terrain", "heights": {"pyramid_stairs": own}},
+    "RasterCfg": lambda own: {"type": "camera", "raster": own},
+    "RoughTerrain": lambda own: {"type": "terrain", "heights": {"rough": own}},
+    "SamplingCfg": lambda own: {"type": "imu", "sampling": own},
+    "Shutter": lambda own: {"type": "camera", "shutter": own},
+    "SlopeTerrain": lambda own: {"type": "terrain", "heights": {"slope": own}},
+    "SurfaceCfg": lambda own: {"type": "rigid_object", "surface": own},
+    "TargetFrameCfg": lambda own: {"type": "frame_transformer", "source": "a", "targets": [own]},
+    "UrdfCfg": lambda own: {"type": "robot", "urdf": own},
+}
+SIMULATION = {
+    "SimulationManagerCfg": lambda own: own,
+    "GroundCfg": lambda own: {"ground": own},
+    "LightCfg": lambda own: {"lights": [own]},
+    "Shard": lambda own: {"shard": own},
+}
+# Read by other functions than scene files.
+ELSEWHERE = {"IkCfg", "NullSpacePosture", "Randomization", "RandomizationTerm"}
+REQUIRED = {
+    "ComponentCfg": {"name": "a", "urdf": "a.urdf"},
+    "DcMotor": {"saturation_effort": 1.0},
+    "Aperture": {"focal_length": 0.05, "f_number": 2.0, "focus_distance": 1.0},
+    "TargetFrameCfg": {"bodies": "a"},
+    "FrameTransformerCfg": {"source": "a", "targets": []},
+    "NullSpacePosture": {"rest": [0.0]},
+    "RandomizationTerm": {"property": "mass", "pattern": ".*", "draw": {"scale": [1, 2]}},
+}
+
+
+def read(cls, own):
+    """A configuration as Rust reads it, with all its fields."""
+    if cls.__name__ in SIMULATION:
+        return tomllib.loads(ks.to_toml({"simulation": SIMULATION[cls.__name__](own)}))
+    contained = CONTAINERS.get(cls.__name__, lambda own: {"type": cls._type, **own})(own)
+    if "type" not in contained:
+        contained = {"type": cls._type, **contained}
+    return tomllib.loads(ks.to_toml({"entities": {"x": contained}}))
+
+
+def all_fields(obj):
+    """All fields of a configuration, also those with their defaults, in the form of scene files."""
+    if dataclasses.is_dataclass(obj):
+        fields = {}
+        for field in dataclasses.fields(obj):
+            value = getattr(obj, field.name)
+            if value is not None:
+                fields[field.name] = all_fields(value)
+        return fields
+    if isinstance(obj, dict):
+        return {key: all_fields(value) for key, value in obj.items()}
+    if isinstance(obj, list | tuple):
+        return [all_fields(value) for value in obj]
+    return obj
+
+
+@pytest.mark.parametrize("cls", [c for c in CLASSES if c.__name__ not in ELSEWHERE], ids=lambda c: c.__name__)
+def test_defaults_are_those_of_rust(cls):
+    required = REQUIRED.get(cls.__name__, {})
+    default = cls(**required)
+    given = all_fields(default)
+    given.pop("uid", None)
+    if cls.__name__ == "TerrainCfg":
+        assert given["heights"] == [[0, 0], [0, 0]]
+    assert read(cls, given) == read(cls, dict(required)), cls.__name__
+
+
+def test_every_class_is_tested():
+    names = {cls.__name__ for cls in CLASSES}
+    known = set(CONTAINERS) | set(SIMULATION) | ELSEWHERE | {cls.__name__ for cls in ENTITIES}
+    assert names <= known, names - known
+    assert {cls._type for cls in ENTITIES} == {
+        "robot", "articulation", "rigid_object", "rigid_object_group", "terrain", "mjcf", "weld", "camera",
+        "stereo_camera", "ray_caster", "ray_caster_camera", "contact_sensor", "imu", "frame_transformer", "joint_state",
+        "actuator_state", "joint_wrench", "mujoco_sensor",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("cls", [c for c in CLASSES if c.__name__ not in ELSEWHERE], ids=lambda c: c.__name__)
+def test_unknown_fields_are_refused(cls):
+    """A control: Rust sees the fields of every class."""
+    own = dict(REQUIRED.get(cls.__name__, {})) | {"no_such_field": 1}
+    with pytest.raises(ks.ConfigError, match="no_such_field"):
+        read(cls, own)
+
+
+def test_only_changed_fields_travel():
+    text = ks.to_toml({"simulation": ks.SimulationManagerCfg(ground=None, num_envs=2)})
+    simulation = tomllib.loads(text)["simulation"]
+    assert simulation["ground"] is False and simulation["num_envs"] == 2
+    legged = tomllib.loads(ks.to_toml({"simulation": ks.SimulationManagerCfg.legged()}))
+    assert legged == tomllib.loads(ks.to_toml({"simulation": {"preset": "legged"}}))
+    # A preset may be changed back to a default.
+    assert tomllib.loads(ks.to_toml({"simulation": ks.SimulationManagerCfg.legged(impratio=1.0)}))["simulation"]["impratio"] == 1
+
+
+def test_none_is_never_a_silent_default():
+    """A field that is present by default is removed by None, as a keyword argument, in a dict and in a class."""
+    from kinetoscope import _sim
+
+    fields = set()
+    for cls in CLASSES:
+        for field in dataclasses.fields(cls):
+            default = field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+            if "| None" in str(field.type) and default is not None and default is not dataclasses.MISSING:
+                fields.add(field.name)
+    assert fields == set(_sim._NONE_IS_FALSE)
+    for sim in (
+        ks.SimulationManager(ground=None),
+        ks.SimulationManager({"ground": None}),
+        ks.SimulationManager(ks.SimulationManagerCfg(ground=None)),
+    ):
+        assert "ground" not in sim.mjcf
+    assert "ground" in ks.SimulationManager().mjcf
+
+
+VARIANTS = [
+    (ks.ObjectShape.box(size=[1, 2, 3]), "rigid_object", "shape"),
+    (ks.ObjectShape.sphere(radius=1.0), "rigid_object", "shape"),
+    (ks.ObjectShape.cylinder(radius=1.0, length=2.0), "rigid_object", "shape"),
+    (ks.ObjectShape.capsule(radius=1.0, length=2.0), "rigid_object", "shape"),
+    (ks.MeshCollision.pieces(ks.ConvexDecompositionCfg(max_pieces=3)), "rigid_object", "mesh_collision"),
+    (ks.MeshCollision.triangles(thickness=0.1), "rigid_object", "mesh_collision"),
+    (ks.Intrinsics.pixels(fx=1, fy=2, cx=3, cy=4), "camera", "intrinsics"),
+    (ks.Intrinsics.aperture(focal_length=24.0, horizontal_aperture=21.0, vertical_aperture=None), "camera", "intrinsics"),
+    (ks.HitTargets.named(["ground"]), "ray_caster", "targets"),
+    (ks.HitTargets.static_only, "ray_caster", "targets"),
+    (ks.RayPattern.grid(ks.GridPattern(resolution=0.5)), "ray_caster", "pattern"),
+    (ks.RayPattern.lidar(ks.LidarPattern()), "ray_caster", "pattern"),
+    (ks.RayPattern.bpearl(ks.BpearlPattern()), "ray_caster", "pattern"),
+    (ks.RayPattern.pinhole(ks.PinholePattern()), "ray_caster", "pattern"),
+]
+
+
+@pytest.mark.parametrize(("value", "kind", "field"), VARIANTS, ids=lambda v: str(v)[:30])
+def test_constructors_of_variants(value, kind, field):
+    name = value if isinstance(value, str) else next(iter(value))
+    found = tomllib.loads(ks.to_toml({"entities": {"x": {"type": kind, field: value}}}))["entities"]["x"][field]
+    assert name == found or name in found
+
+
+def test_declared_names_are_complete():
+    """Names of enumerations that macros declare are refused or accepted by Rust as the classes say."""
+    for name in ("force", "acceleration", "none"):
+        ks.to_toml({"entities": {"x": {"type": "robot", "drive": {"drive_type": name}}}})
+    with pytest.raises(ks.ConfigError) as error:
+        ks.to_toml({"entities": {"x": {"type": "robot", "drive": {"drive_type": "?"}}}})
+    assert all(f"`{name}`" in str(error.value) for name in ("force", "acceleration", "none"))
+    assert str(error.value).count("`") == 8
+    with pytest.raises(ks.ConfigError) as error:
+        ks.to_toml({"entities": {"x": {"type": "ray_caster", "pattern": "?"}}})
+    patterns = [name for name in dir(ks.RayPattern) if not name.startswith("_")]
+    assert all(f"`{name}`" in str(error.value) for name in patterns) and len(patterns) == 5
+
+
+def test_values_of_other_types():
+    np = pytest.importorskip("numpy")
+    cube = {"type": "rigid_object", "rgba": np.array([0.5, 0.5, 0.5, 1]), "mass": np.float32(2), "shape": {"box": {"size": (1, 1, 1)}}}
+    found = tomllib.loads(ks.to_toml({"entities": {"x": cube}}))["entities"]["x"]
+    assert found["mass"] == 2.0 and found["rgba"] == [0.5, 0.5, 0.5, 1.0]
+    urdf = {"type": "robot", "urdf": Path("a") / "b.urdf", "drive": {"max_effort": float("inf")}}
+    found = tomllib.loads(ks.to_toml({"entities": {"x": urdf}}))["entities"]["x"]
+    assert found["drive"]["max_effort"] == float("inf")
+    loop = {}
+    loop["self"] = loop
+    for wrong in ({"type": "imu", "body": object()}, {"type": "imu", 3: 1}, {"type": "imu", "body": [None]}, loop):
+        with pytest.raises(ks.ConfigError):
+            ks.to_toml({"entities": {"x": wrong}})
+
+
+def test_classes_are_documented():
+    tree = ast.parse(Path(cfg.__file__).read_text())
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            assert ast.get_docstring(node), node.name
+            for at, item in enumerate(node.body):
+                if isinstance(item, ast.AnnAssign) and not item.target.id.startswith("_"):
+                    after = node.body[at + 1]
+                    assert isinstance(after, ast.Expr), f"{node.name}.{item.target.id}"
+    text = Path(cfg.__file__).read_text()
+    assert "](" not in text and "[`" not in text

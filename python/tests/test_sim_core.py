@@ -1,0 +1,347 @@
+"""Simulations, arrays and errors of the package kinetoscope."""
+
+import copy
+import gc
+import os
+import pickle
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kinetoscope as ks
+from kinetoscope import _sim
+
+START = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0]
+
+
+def test_the_example_of_the_readme():
+    sim = ks.SimulationManager(num_envs=64)
+    arm = sim.add_robot(
+        ks.RobotCfg(
+            urdf=ks.asset("sr5/SR5.urdf"),
+            control_parts={"arm": ["JOINT[1-6]"]},
+            drive=ks.DriveCfg(stiffness=1e4, damping=1e3),
+        )
+    )
+    arm.set_qpos_target(START, joint_ids=arm.joint_ids("arm"))
+    look = ks.Placement.look_at(eye=[2, 0, 1], target=[0, 0, 0.3])
+    cfg = ks.CameraCfg(width=32, height=24, channels=["rgb", "depth"], extrinsics=ks.Extrinsics(placement=look))
+    cam = sim.add_sensor("camera", cfg)
+    sim.update(500)
+    assert arm.qpos.shape == (64, 6) and arm.qpos.dtype == np.float64
+    # The drive sags by the torque of gravity over its stiffness, at most 113 N m / 1e4 N m/rad.
+    assert np.abs(arm.qpos - START).max() < 0.0113
+    assert cam["rgb"].shape == (64, 24, 32, 4) and cam["rgb"].dtype == np.uint8
+    assert cam["depth"].shape == (64, 24, 32) and cam["depth"].dtype == np.float32
+    # All environments are alike.
+    assert (cam["depth"] == cam["depth"][:1]).all()
+    np.testing.assert_array_equal(sim.time, np.full(64, sim.time[0]))
+    assert sim.time[0] == pytest.approx(5.0, abs=1e-9)
+
+
+def test_update_of_n_steps_equals_n_updates(arm_sim):
+    sim, arm = arm_sim
+    arm.set_qpos_target(START)
+    start = sim.snapshot()
+    sim.update(120)
+    at_once = arm.qpos
+    sim.restore(start)
+    for _ in range(120):
+        sim.update()
+    np.testing.assert_array_equal(arm.qpos, at_once)
+    assert (arm.qvel != 0).any()
+
+
+def test_arrays_never_change_under_the_reader(arm_sim):
+    sim, arm = arm_sim
+    before = arm.qpos
+    kept = before.copy()
+    assert before.flags.owndata or before.base is not None
+    arm.set_qpos_target(START)
+    sim.update(50)
+    np.testing.assert_array_equal(before, kept)
+    assert (arm.qpos != kept).any()
+    # An array of the caller is not kept either.
+    target = np.tile(START, (2, 1))
+    arm.set_qpos_target(target)
+    target[:] = 9
+    np.testing.assert_array_equal(arm.qpos_target, np.tile(START, (2, 1)))
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        lambda rows: rows.tolist(),
+        lambda rows: tuple(map(tuple, rows.tolist())),
+        lambda rows: rows.astype(np.float32).astype(np.float64),
+        lambda rows: np.asfortranarray(rows),
+        lambda rows: rows[:, ::-1][:, ::-1],
+        lambda rows: rows[0],
+        lambda rows: rows[:1],
+    ],
+)
+def test_forms_of_arrays(arm_sim, form):
+    _, arm = arm_sim
+    rows = np.tile(np.float32(START).astype(float), (2, 1))
+    arm.set_qpos_target(form(rows))
+    np.testing.assert_array_equal(arm.qpos_target, rows)
+
+
+def test_forms_of_indices(arm_sim):
+    _, arm = arm_sim
+    for joints in ([1, 2], (1, 2), np.array([1, 2]), np.array([1, 2], dtype=np.uint8), range(1, 3), ["JOINT[23]"]):
+        arm.set_qpos_target(np.zeros(6))
+        arm.set_qpos_target([0.25, -0.5], joint_ids=joints)
+        np.testing.assert_array_equal(arm.qpos_target, np.tile([0, 0.25, -0.5, 0, 0, 0], (2, 1)))
+    mask = np.array([False, True])
+    for envs in (1, [1], np.array([1]), mask, [False, True]):
+        arm.set_qpos_target(np.zeros(6))
+        arm.set_qpos_target([0.1] * 6, env_ids=envs)
+        np.testing.assert_array_equal(arm.qpos_target, [[0] * 6, [0.1] * 6])
+    arm.set_qpos_target([0.2] * 6, joint_ids="arm")
+    np.testing.assert_array_equal(arm.qpos_target, np.full((2, 6), 0.2))
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "text"),
+    [
+        (lambda s, a: a.set_qpos_target([1, 2]), ks.ArgumentError, "shape"),
+        (lambda s, a: a.set_qpos_target(np.zeros((1, 1, 6))), ks.ArgumentError, "too many axes"),
+        (lambda s, a: a.set_qpos_target(np.full((2, 6), np.nan)), ks.ArgumentError, 'joint "JOINT1"'),
+        (lambda s, a: a.set_qpos_target(["a"] * 6), ks.ArgumentError, "set_qpos_target"),
+        (lambda s, a: a.set_qpos_target(START, env_ids=[2]), ks.OutOfRangeError, "there are 2"),
+        (lambda s, a: a.set_qpos_target(START, env_ids=[-1]), ks.OutOfRangeError, "indices start at 0"),
+        (lambda s, a: a.set_qpos_target([0], joint_ids=[6]), ks.OutOfRangeError, "joint 6"),
+        (lambda s, a: a.set_qpos_target([0], joint_ids=[0.5]), ks.ArgumentError, "indices"),
+        (lambda s, a: a.set_qpos_target([0], joint_ids=["JOINT9"]), ks.UnknownNameError, "JOINT1"),
+        (lambda s, a: a.joint_ids("amr"), ks.UnknownNameError, "arm"),
+        (lambda s, a: a.link_pose("nothing"), ks.UnknownNameError, "nothing"),
+        (lambda s, a: s.add_robot(ks.bundled_robot("sr5", uid="arm")), ks.ConfigError, "taken"),
+        (lambda s, a: s.add_robot(urdf="missing.urdf"), ks.KinetoscopeError, "missing.urdf"),
+        (lambda s, a: s.add_robot(urdf=ks.asset("sr5/SR5.urdf"), drvie={}), ks.ConfigError, "drvie"),
+        (lambda s, a: s.add_robot(urdf=ks.asset("sr5/SR5.urdf"), drive={"stiffnes": 1}), ks.ConfigError, "stiffness"),
+        (lambda s, a: s.add_sensor("imu", ks.ImuCfg(body="nowhere")), ks.KinetoscopeError, "nowhere"),
+        (lambda s, a: s.add_sensor("x", {"type": "camra"}), ks.ConfigError, "camera"),
+        (lambda s, a: s.add_sensor("x", {}), ks.ConfigError, "type"),
+        (lambda s, a: s["leg"], ks.UnknownNameError, '"arm"'),
+        (lambda s, a: s.update(-1), OverflowError, ""),
+        (lambda s, a: ks.SimulationManager(num_envs=0), ks.ConfigError, "num_envs is 0"),
+        (lambda s, a: ks.SimulationManager(num_evs=1), ks.ConfigError, "num_envs"),
+        (lambda s, a: ks.SimulationManager(7), ks.ConfigError, "int"),
+        (lambda s, a: ks.asset("no/such.urdf"), ks.FileError, "KINETOSCOPE_ASSETS"),
+        (lambda s, a: s.property("mss", "arm/LINK1"), ks.UnknownNameError, "mass"),
+    ],
+)
+def test_errors(arm_sim, call, error, text):
+    sim, arm = arm_sim
+    with pytest.raises(error) as caught:
+        call(sim, arm)
+    assert text in str(caught.value), str(caught.value)
+    # The simulation is usable after an error.
+    sim.update()
+
+
+def test_errors_are_also_pythons_own():
+    pairs = [
+        (ks.ConfigError, ValueError),
+        (ks.UnknownNameError, LookupError),
+        (ks.OutOfRangeError, IndexError),
+        (ks.FileError, OSError),
+        (ks.DestroyedError, RuntimeError),
+        (ks.ForkError, RuntimeError),
+    ]
+    for own, builtin in pairs:
+        assert issubclass(own, builtin) and issubclass(own, ks.KinetoscopeError)
+        assert str(own("text")) == "text"
+
+
+def test_destroyed_simulations(arm_sim):
+    sim, arm = arm_sim
+    cam = sim.add_sensor("camera", ks.CameraCfg(width=8, height=8))
+    sim.destroy()
+    sim.destroy()
+    for use in (sim.update, lambda: arm.qpos, lambda: cam["color"], lambda: arm.set_qpos_target(START), lambda: repr(arm)):
+        with pytest.raises(ks.DestroyedError):
+            use()
+    with ks.SimulationManager() as other:
+        other.update()
+    with pytest.raises(ks.DestroyedError):
+        other.update()
+
+
+@pytest.mark.parametrize("write", [False, True])
+def test_panics_are_exceptions(arm_sim, write):
+    sim, arm = arm_sim
+    try:
+        _sim._panic(sim, write)
+    except Exception as error:  # noqa: BLE001
+        assert isinstance(error, ks.InternalError) and "requested by a test" in str(error)
+    else:
+        pytest.fail("no exception")
+    if write:
+        with pytest.raises(ks.InternalError, match="create a new simulation"):
+            arm.qpos  # noqa: B018
+        sim.destroy()
+    else:
+        assert arm.qpos.shape == (2, 6)
+
+
+def test_handles_belong_to_their_simulation(arm_sim):
+    sim, arm = arm_sim
+    other = ks.SimulationManager(num_envs=2)
+    twin = other.add_robot(ks.bundled_robot("sr5", uid="arm"))
+    assert arm == sim["arm"] and arm != twin and hash(arm) == hash(sim["arm"])
+    twin.set_qpos_target(START)
+    np.testing.assert_array_equal(arm.qpos_target, np.zeros((2, 6)))
+    assert arm in sim and twin in other and twin not in sim
+    cube = sim.add_rigid_object(uid="cube")
+    sim.exclude_collision(arm, cube)
+    with pytest.raises(ks.ForeignHandleError, match="another simulation"):
+        sim.exclude_collision(cube, twin)
+    with pytest.raises(ks.ArgumentError, match="int"):
+        sim.exclude_collision(cube, 3)
+    # A snapshot of another scene is refused.
+    with pytest.raises(ks.SnapshotError):
+        sim.restore(other.snapshot())
+    del other
+    gc.collect()
+    # A handle keeps its simulation.
+    assert twin.qpos.shape == (2, 6)
+
+
+def test_names_and_collections(arm_sim):
+    sim, arm = arm_sim
+    assert sim.keys() == ["arm"] == list(sim) and len(sim) == 1 and "arm" in sim and "leg" not in sim
+    assert arm.uid == "arm" and arm.kind == "robot" and arm.dof == 6 == len(arm.joint_names)
+    assert arm.joint_ids("arm") == [0, 1, 2, 3, 4, 5] == arm.joint_ids()
+    assert "arm" in repr(sim) and "6 joints" in repr(arm)
+    html = arm._repr_html_()
+    assert html.count("<tr>") == 7 and "JOINT6" in html
+
+
+def test_pickles(arm_sim):
+    sim, arm = arm_sim
+    for cfg in (ks.bundled_robot("quadruped"), ks.CameraCfg(width=5), ks.SimulationManagerCfg.legged(num_envs=3)):
+        assert pickle.loads(pickle.dumps(cfg)) == cfg == copy.deepcopy(cfg)
+    arm.set_qpos_target(START)
+    sim.update(7)
+    saved = pickle.loads(pickle.dumps(sim.snapshot()))
+    sim.update(30)
+    later = arm.qpos
+    sim.restore(saved)
+    sim.update(30)
+    np.testing.assert_array_equal(arm.qpos, later)
+    with pytest.raises(ks.SnapshotError):
+        ks.Snapshot.from_bytes(b"not a snapshot")
+
+
+def work(steps, done):
+    sim = ks.SimulationManager(num_envs=8, threads=1)
+    arm = sim.add_robot(ks.bundled_robot("sr5"))
+    arm.set_qpos_target(START)
+    done.append((time.perf_counter(), sim.update(steps), time.perf_counter(), arm.qpos))
+
+
+def test_python_runs_while_a_simulation_steps():
+    """A Python thread counts while another is inside one call of update; both results of two threads are equal."""
+    done = []
+    threads = [threading.Thread(target=work, args=(400, done)) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    counted = 0
+    while any(thread.is_alive() for thread in threads):
+        counted += 1
+    for thread in threads:
+        thread.join()
+    np.testing.assert_array_equal(done[0][3], done[1][3])
+    # Both were inside update at the same time.
+    assert max(done[0][0], done[1][0]) < min(done[0][2], done[1][2])
+    assert counted > 1000
+
+
+def test_threads_share_a_simulation(arm_sim):
+    sim, arm = arm_sim
+    errors = []
+
+    def use():
+        try:
+            for _ in range(100):
+                sim.update()
+                assert arm.qpos.shape == (2, 6)
+                arm.set_qpos_target(START)
+        except Exception as error:  # noqa: BLE001
+            errors.append(error)
+
+    threads = [threading.Thread(target=use) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not errors and not any(thread.is_alive() for thread in threads)
+    assert sim.time[0] == pytest.approx(4.0, abs=1e-9)
+
+
+def resident() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_created_and_destroyed_simulations_leave_no_memory():
+    def once():
+        with ks.SimulationManager(num_envs=2, threads=2) as sim:
+            sim.add_rigid_object(uid="cube", init_pose={"pos": [0, 0, 1]})
+            cam = sim.add_sensor("camera", ks.CameraCfg(width=16, height=16))
+            sim.update(3)
+            assert cam["color"].any()
+
+    for _ in range(40):
+        once()
+    gc.collect()
+    before = resident()
+    for _ in range(500):
+        once()
+    gc.collect()
+    # A leak of one state or image of a simulation, about 20 kB, would be 4 MB.
+    assert resident() - before < 2e6
+
+
+def test_toml_of_a_scene_is_read_back():
+    scene = {
+        "simulation": ks.SimulationManagerCfg(num_envs=3, ground=None, lights=[]),
+        "entities": {
+            "arm": ks.bundled_robot("sr5"),
+            "cube": ks.RigidObjectCfg(shape=ks.ObjectShape.box(size=[0.1, 0.1, 0.1])),
+            "imu": ks.ImuCfg(body="cube"),
+        },
+    }
+    text = ks.to_toml(scene)
+    sim = ks.SimulationManager.from_scene(scene)
+    assert sim.keys() == ["arm", "cube", "imu"] and sim.num_envs == 3
+    assert ks.to_toml(__import__("tomllib").loads(text)) == text
+
+
+def test_the_renderer_is_in_another_package():
+    """Without the package kinetoscope-render, the error names it; other names are unknown as usual."""
+    import importlib.util
+
+    if importlib.util.find_spec("kinetoscope_render") is None:
+        with pytest.raises(AttributeError, match="needs the package kinetoscope-render"):
+            ks.Renderer  # noqa: B018
+    else:
+        assert ks.Renderer.__module__.startswith("kinetoscope_render")
+    with pytest.raises(AttributeError, match="no attribute 'Rendrer'"):
+        ks.Rendrer  # noqa: B018
+
+
+def test_scene_files(tmp_path):
+    path = ks.asset("scenes/quadruped.toml")
+    sim = ks.SimulationManager.from_file(path, num_envs=3)
+    assert sim.num_envs == 3 and sim.physics_dt == 0.005
+    assert sim.keys() == ["robot", "camera", "height_scanner", "contact_forces"]
+    sim.update(4)
+    assert sim["height_scanner"]["hits"].shape == (3, 187, 3)
+    (tmp_path / "bad.toml").write_text('[entities.a]\ntype = "robot"\nurfd = "x"\n')
+    with pytest.raises(ks.ConfigError, match=r"bad.toml:3.*urdf"):
+        ks.SimulationManager.from_file(tmp_path / "bad.toml")

@@ -1,0 +1,335 @@
+"""Entities, states, kinematics, properties, snapshots, shards, recordings and views of the package kinetoscope."""
+
+import http.client
+import json
+import subprocess
+import sys
+from urllib.parse import urlparse
+
+import numpy as np
+import pytest
+
+import kinetoscope as ks
+
+G = 9.81
+CABINET = {"urdf": "cabinet/cabinet.urdf"}
+
+
+def free_fall(steps, dt):
+    """Drop of a body under semi-implicit Euler [m]."""
+    return G * dt * dt * steps * (steps + 1) / 2
+
+
+def test_rigid_objects_fall_and_are_pushed():
+    sim = ks.SimulationManager(num_envs=3, ground=None)
+    ball = sim.add_rigid_object(
+        uid="ball", shape=ks.ObjectShape.sphere(radius=0.1), mass=2.0, init_pose={"pos": [0, 0, 5], "rpy_deg": [0, 0, 90]}
+    )
+    assert ball.nominal_mass == 2.0 and (ball.mass == 2.0).all() and "dynamic" in repr(ball)
+    np.testing.assert_allclose(ball.pose[0], [0, 0, 5, np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-12)
+    sim.update(100)
+    np.testing.assert_allclose(ball.pose[:, 2], 5 - free_fall(100, 0.01), atol=1e-9)
+    np.testing.assert_allclose(ball.velocity[:, 2], -G, atol=1e-9)
+    sim.reset()
+    # A force that carries the weight, and one along x in the second environment: v = F t / m.
+    force = np.tile([0, 0, 2 * G], (3, 1))
+    force[1, 0] = 4.0
+    ball.set_external_wrench(force, [0, 0, 0])
+    sim.update(100)
+    np.testing.assert_allclose(ball.velocity[:, :3], [[0, 0, 0], [2, 0, 0], [0, 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(ball.external_wrench[:, :3], force)
+    ball.write_pose([1, 2, 3, 1, 0, 0, 0], env_ids=[2])
+    ball.write_velocity(np.zeros(6), env_ids=2)
+    np.testing.assert_allclose(ball.pose[2], [1, 2, 3, 1, 0, 0, 0])
+    ball.set_mass([1.0, 2.0, 4.0])
+    assert ball.mass.tolist() == [1, 2, 4]
+    with pytest.raises(ks.ArgumentError, match="frame"):
+        ball.set_external_wrench(force, force, frame="body")
+
+
+def test_groups_terrains_and_welds():
+    sim = ks.SimulationManager(num_envs=2, ground=None)
+    one = ks.RigidObjectCfg(uid="a", init_pose=[0, 0, 2, 1, 0, 0, 0])
+    group = sim.add_rigid_object_group(
+        uid="boxes", objects=[one, ks.RigidObjectCfg(uid="b", init_pose=[0.5, 0, 2, 1, 0, 0, 0])]
+    )
+    assert len(group) == 2 and group.pose.shape == (2, 2, 7) and group.names == ["boxes.a", "boxes.b"]
+    terrain = sim.add_terrain(uid="hills", heights=ks.TerrainGenerator.rough(ks.RoughTerrain(seed=3)))
+    low, high = terrain.height_range
+    assert low <= terrain.height_at(0.1, 0.2) <= high and terrain.height_at(100, 0) is None
+    assert terrain.heights.min() == low
+    slope = sim.add_terrain(uid="plate", heights=np.zeros((3, 3)), size=[1, 1], init_pose=[20, 0, 0, 1, 0, 0, 0])
+    assert slope.height_range == [0, 0]
+    weld = sim.add_weld(uid="joint", first="boxes.a", second="boxes.b")
+    assert not weld.is_attached.any()
+    weld.attach(env_ids=[1])
+    assert weld.is_attached.tolist() == [False, True]
+    poses = group.pose
+    poses[:, 0, 2] = 3
+    weld.release()
+    group.write_pose(poses)
+    sim["joint"].attach([1])
+    sim.update(20)
+    # In the second environment the boxes keep their distance; they all fall alike.
+    np.testing.assert_allclose(group.pose[:, 0, 2] - group.pose[:, 1, 2], [1, 1], atol=1e-6)
+    assert {sim[name].uid for name in sim} == {"boxes", "hills", "plate", "joint"}
+
+
+def test_articulations():
+    sim = ks.SimulationManager(num_envs=2)
+    cabinet = sim.add_articulation(uid="cabinet", urdf=ks.asset("cabinet/cabinet.urdf"))
+    assert cabinet.kind == "articulation" == sim["cabinet"].kind and "Articulation" in repr(cabinet)
+    assert (np.array(cabinet.drive_types) == "none").all() and cabinet.stiffness.max() == 0
+    cabinet.write_qpos(cabinet.qpos_limits[:, :, 1] * 0.5)
+    np.testing.assert_allclose(cabinet.qpos, cabinet.qpos_limits[:, :, 1] * 0.5)
+    cabinet.set_qf_target(np.ones(cabinet.dof))
+    sim.update(2)
+    assert (cabinet.qvel > 0).all()
+
+
+def test_mjcf_parts():
+    text = """<mujoco><worldbody><body name="cart"><joint name="slide" type="slide" axis="1 0 0"/>
+      <geom size="0.1" mass="3"/><site name="s"/></body>
+      <body name="target" mocap="true" pos="0 0 1"><geom size="0.05" contype="0" conaffinity="0"/></body></worldbody>
+      <actuator><motor name="push" joint="slide"/></actuator></mujoco>"""
+    sim = ks.SimulationManager(num_envs=2, ground=None)
+    cart = sim.add_mjcf(uid="cart", text=text)
+    assert cart.joint_names == ["slide"] and cart.actuator_names == ["push"] and cart.total_mass == pytest.approx(3, rel=0.5)
+    cart.set_ctrl([[6.0], [0.0]], actuators=cart.actuator_ids(["push"]))
+    sim.update(50)
+    # v = F t / m.
+    np.testing.assert_allclose(cart.qvel[:, 0], [1.0, 0.0], atol=1e-9)
+    assert cart.qpos_columns(["slide"]) == [(0, 1)]
+    np.testing.assert_allclose(cart.body_pose("cart")[:, 0], cart.qpos[:, 0], atol=1e-12)
+    cart.write_mocap_pose("target", [0, 0, 2, 1, 0, 0, 0], env_ids=[1])
+    np.testing.assert_allclose(cart.body_pose("target")[:, 2], [1, 2])
+    robot = sim.add_robot(uid="arm", mjcf=ks.MjcfFile(text="""<mujoco><worldbody><body name="b"><geom size="0.1"/>
+      <body name="l"><joint name="j" axis="0 1 0"/><geom size="0.05" pos="0.3 0 0" mass="1"/></body></body></worldbody></mujoco>"""))
+    assert robot.joint_names == ["j"]
+
+
+def test_states_of_robots(rng):
+    sim = ks.SimulationManager(ks.SimulationManagerCfg.legged(num_envs=3, ground=None))
+    dog = sim.add_robot(ks.bundled_robot("quadruped", uid="dog"))
+    for name in [n for n in dir(dog) if not n.startswith("_") and isinstance(getattr(type(dog), n, None), type(type(dog).qpos))]:
+        value = getattr(dog, name)
+        if isinstance(value, np.ndarray):
+            assert value.shape[0] == 3, name
+    state = dog.default_root_state
+    state[:, 7:] = rng.normal(size=(3, 6))
+    dog.write_root_state(state)
+    np.testing.assert_allclose(dog.root_state, state, atol=1e-12)
+    q, v = rng.normal(size=(2, 3, 12)) * 0.1
+    dog.write_joint_state(q, v)
+    np.testing.assert_allclose(dog.qpos, q)
+    np.testing.assert_allclose(dog.qvel, v)
+    feet = dog.find_links([".*_FOOT"])
+    assert [dog.link_names[i] for i in feet] == [f"{leg}_FOOT" for leg in ("LF", "RF", "LH", "RH")]
+    np.testing.assert_array_equal(dog.link_poses[:, feet[0]], dog.link_pose("LF_FOOT"))
+    np.testing.assert_allclose(dog.compute_link_fk(q), dog.link_poses, atol=1e-9)
+    dog.set_external_wrench([0, 0, dog.total_mass * G], [0, 0, 0], link_ids=["base"])
+    assert dog.external_wrenches[:, 0, 2] == pytest.approx([dog.total_mass * G] * 3)
+    dog.set_stiffness([100.0], joint_ids=["LF_HAA"], env_ids=[1])
+    assert dog.stiffness[:, dog.joint_names.index("LF_HAA")].tolist() == [80, 100, 80]
+    dog.set_drive_type("none", joint_ids=["RF_HAA"])
+    assert {row[dog.joint_names.index("RF_HAA")] for row in dog.drive_types} == {"none"}
+    with pytest.raises(ks.ArgumentError, match="acceleration"):
+        dog.set_drive_type("torque")
+
+
+def test_inverse_kinematics(arm_sim, rng):
+    sim, arm = arm_sim
+    q = rng.uniform(-1, 1, (2, 6))
+    targets = arm.compute_fk(q, "arm")
+    found = arm.compute_ik(targets, "arm", ks.IkCfg(position_tolerance=1e-5))
+    assert found.success.all() and found.success.dtype == bool
+    # The judge is forward kinematics, and physics at these positions.
+    np.testing.assert_allclose(arm.compute_fk(found.qpos, "arm")[:, :3], targets[:, :3], atol=1e-5)
+    arm.write_qpos(found.qpos)
+    link = arm.link_names[-1]
+    np.testing.assert_allclose(arm.link_pose(link)[:, :3], arm.compute_fk(found.qpos, link)[:, :3], atol=1e-9)
+    far = targets.copy()
+    far[:, 0] += 10
+    assert not arm.compute_ik(far, "arm").success.any()
+    # The Jacobian against a difference quotient of forward kinematics.
+    jacobian = arm.jacobian("arm", q)
+    step = np.zeros(6)
+    step[2] = 1e-6
+    slope = (arm.compute_fk(q + step, "arm") - arm.compute_fk(q - step, "arm"))[:, :3] / 2e-6
+    np.testing.assert_allclose(jacobian[:, :3, 2], slope, atol=1e-6)
+    moved = arm.compute_fk(q, "arm", tcp=[0, 0, 0.1, 1, 0, 0, 0])
+    np.testing.assert_allclose(np.linalg.norm(moved[:, :3] - targets[:, :3], axis=1), 0.1, atol=1e-9)
+    with pytest.raises(ks.ConfigError, match="distance_tolerance"):
+        arm.compute_ik(targets, "arm", {"distance_tolerance": 1})
+    with pytest.raises(ks.KinetoscopeError, match="amr"):
+        arm.compute_ik(targets, "amr")
+
+
+def test_randomization_and_shards():
+    def build(**fields):
+        sim = ks.SimulationManager(seed=5, **fields)
+        sim.add_rigid_object(uid="cube", mass=2.0)
+        sim.add_sensor("imu", ks.ImuCfg(body="cube", sampling=ks.SamplingCfg(noise={"ang_vel_b": ks.NoiseCfg(std=0.1)})))
+        sim.randomize([ks.RandomizationTerm(property="mass", pattern="cube", draw=ks.RandomizationOp.scale([0.5, 1.5]))])
+        sim.update(3)
+        return sim
+
+    whole = build(num_envs=8)
+    masses = whole["cube"].mass
+    assert len(set(masses)) == 8 and (masses >= 1).all() and (masses <= 3).all()
+    np.testing.assert_array_equal(whole.property("mass", "cube")[:, 0], masses)
+    assert "cube" in whole.property_names("mass")
+    # Two processes of four environments have the bits of one of eight.
+    halves = [build(num_envs=4, shard=ks.Shard(rank=rank, world=2)) for rank in range(2)]
+    np.testing.assert_array_equal(np.concatenate([half["cube"].mass for half in halves]), masses)
+    noise = np.concatenate([half["imu"]["ang_vel_b"] for half in halves])
+    np.testing.assert_array_equal(noise, whole["imu"]["ang_vel_b"])
+    assert (noise != 0).all()
+    whole.set_property("mass", "cube", 3.0, env_ids=[1])
+    whole.set_property("mass", "cube", [[1.0], [2.0]], env_ids=[2, 3])
+    assert whole["cube"].mass[1:4].tolist() == [3, 1, 2]
+    whole.reset_properties()
+    assert (whole["cube"].mass == 2).all()
+    with pytest.raises(ks.ArgumentError, match="expected"):
+        whole.set_property("mass", "cube", [1.0, 2.0])
+    with pytest.raises(ks.ConfigError, match="scale"):
+        whole.randomize({"terms": [{"property": "mass", "pattern": "cube", "draw": {"scael": [1, 1]}}]})
+
+
+def test_snapshots_and_rollouts(arm_sim, tmp_path):
+    sim, arm = arm_sim
+    arm.set_qpos_target([0.3] * 6)
+    sim.update(20)
+    snapshot = sim.snapshot()
+    snapshot.save(tmp_path / "state.kts")
+    controls = np.tile([0.3] * 6, (2, 15, 1))
+    assert sim.control_names == [f"arm/{name}" for name in arm.joint_names]
+    states, final, diverged = sim.rollout(controls)
+    assert states.shape == (2, 15, 12) and not diverged and len(final) == 2
+    before = arm.qpos
+    sim.update(15)
+    np.testing.assert_array_equal(states[:, -1, :6], arm.qpos)
+    sim.restore(ks.Snapshot.load(tmp_path / "state.kts"))
+    np.testing.assert_array_equal(arm.qpos, before)
+    sim.restore(final, properties=True)
+    np.testing.assert_array_equal(arm.qpos, states[:, -1, :6])
+    one = sim.snapshot(env_ids=[1])
+    assert one.env_ids == [1] and len(one) == 1
+    (tmp_path / "bad").write_bytes(b"x" * 100)
+    with pytest.raises(ks.SnapshotError):
+        ks.Snapshot.load(tmp_path / "bad")
+    with pytest.raises(ks.FileError):
+        ks.Snapshot.load(tmp_path / "missing")
+
+
+def test_recordings_are_replayed_bit_by_bit(tmp_path):
+    def build():
+        sim = ks.SimulationManager(num_envs=2, threads=2)
+        return sim, sim.add_robot(ks.bundled_robot("sr5", uid="arm"))
+
+    sim, arm = build()
+    path = tmp_path / "run.npz"
+    with sim.record(path, ["events", *(getattr(ks.Topic, t)("arm") for t in ("joint_states", "targets", "link_poses"))]) as recorder:
+        for step in range(30):
+            if step % 10 == 0:
+                arm.set_qpos_target([0.1 * step] * 6)
+            sim.update()
+        recorder.note("half", env=1)
+    archive = np.load(path)
+    recorded = archive["arm/joint_states/positions"]
+    np.testing.assert_array_equal(recorded[-1], arm.qpos)
+    again, _ = build()
+    result = again.verify_recording(path)
+    assert result["identical"] and result["steps"] == 30 and result["values"] > 0 and result["difference"] is None
+    # A control: another scene gives another motion.
+    other = ks.SimulationManager(num_envs=2, gravity=[0, 0, -1])
+    other.add_robot(ks.bundled_robot("sr5", uid="arm"))
+    assert not other.verify_recording(path)["identical"]
+    names = dict(ks.recording_topics(path))
+    topic = next(name for name in names if name.endswith("env_0/arm/joint_states"))
+    field = next(field for field in names[topic] if "position" in field)
+    times, values = ks.read_series(path, topic, field)
+    np.testing.assert_array_equal(values[-1], recorded[-1, 0, 0])
+    assert (np.diff(times) >= 0).all()
+    playback = ks.Playback(path)
+    assert len(playback) == len(playback.times) >= 30
+    (part,) = (playback.sim[name] for name in playback.sim)
+    ((column, _),) = part.qpos_columns([".*JOINT2"])
+    for frame in (3, 17):
+        playback.seek(frame)
+        assert playback.frame_at(playback.times[frame]) >= frame
+        seen = playback.sim[part.uid].qpos[:, column]
+        assert any((seen == row[:, 1]).all() for row in recorded), seen
+    with pytest.raises(ks.OutOfRangeError):
+        playback.seek(len(playback))
+    playback = ks.Playback(path, again)
+    playback.seek(len(playback) - 1)
+    np.testing.assert_array_equal(playback.sim[part.uid].qpos[:, column], recorded[-1, :, 1])
+    with pytest.raises(ks.RecordingError, match="exists"):
+        sim.record(path)
+    summary = sim.record(path, overwrite=True).finish()
+    assert summary.path == path or str(summary.path) == str(path)
+    with pytest.raises(ks.RecordingError):
+        sim.record(tmp_path / "x.mp5")
+    with pytest.raises(ks.ArgumentError, match="Topic"):
+        sim.record(tmp_path / "y.npz", ["all"])
+
+
+def test_views(tmp_path):
+    sim = ks.SimulationManager(num_envs=2)
+    sim.add_rigid_object(uid="cube", rgba=[1, 0, 0, 1], init_pose=[0, 0, 0.5, 1, 0, 0, 0], shape=ks.ObjectShape.box(size=[1, 1, 1]))
+    image = sim.screenshot(size=[64, 48], eye=[4, 0, 1], target=[0, 0, 0.5], env=0)
+    assert image.shape == (48, 64, 4) and image.dtype == np.uint8
+    red, green, blue, _ = image[24, 32].astype(int)
+    assert red > 2 * green and red > 2 * blue
+    assert sim.screenshot(tmp_path / "scene.png") is None
+    assert (tmp_path / "scene.png").read_bytes()[:4] == b"\x89PNG"
+    with pytest.raises(ks.ViewerError, match="png"):
+        sim.screenshot(tmp_path / "scene.jpg")
+    with pytest.raises(ks.ArgumentError, match="both"):
+        sim.screenshot(eye=[1, 1, 1])
+    frame = sim.show(width=300)
+    url = urlparse(frame.server.url)
+    connection = http.client.HTTPConnection(url.hostname, url.port, timeout=20)
+    connection.request("GET", "/")
+    page = connection.getresponse()
+    assert page.status == 200 and b"<html" in page.read().lower()
+    assert frame.server.url in frame._repr_html_() and 'width="300"' in frame._repr_html_()
+    frame.server.close()
+    with pytest.raises(OSError):
+        http.client.HTTPConnection(url.hostname, url.port, timeout=5).request("GET", "/")
+    with pytest.raises(ks.ViewerError):
+        sim.serve("nonsense:address:1")
+
+
+def test_a_window_needs_a_display():
+    code = (
+        "import os, kinetoscope as ks\nos.environ.pop('DISPLAY', None)\n"
+        "try:\n    ks.SimulationManager().open_window()\nexcept ks.ViewerError as error:\n    print('DISPLAY' in str(error))\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True).stdout == "True\n"
+
+
+def test_diagnostics_and_divergence(tmp_path):
+    urdf = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>
+      <inertia ixx="1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint></robot>"""
+    (tmp_path / "r.urdf").write_text(urdf)
+    sim = ks.SimulationManager(num_envs=2)
+    sim.add_robot(uid="r", urdf=tmp_path / "r.urdf")
+    assert any("r.urdf:" in text and "b" in text for text in sim.diagnostics)
+    assert "inertia-repaired" in sim.warnings
+    robot = sim["r"]
+    robot.write_qvel([1e12], env_ids=[1])
+    sim.update(2)
+    assert [env for env, *_ in sim.diverged] == [1]
+    assert np.isfinite(robot.qpos).all()
+    sim.reset([1])
+    assert not sim.diverged
+    notes = sim.dump(tmp_path / "dump")
+    assert (tmp_path / "dump").is_dir() and isinstance(notes, list)
+    assert "<mujoco" in sim.mjcf
+    sim.exclude_collision("r", "world")
+    with pytest.raises(ks.KinetoscopeError):
+        sim.exclude_collision("r", "nowhere")
+    json.dumps(sim.warnings)

@@ -1,0 +1,65 @@
+"""The example scripts, the notebook and the demo of the package kinetoscope."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+FOLDER = Path(__file__).parents[1] / "examples"
+
+
+def run(*command, folder):
+    result = subprocess.run([sys.executable, *command], capture_output=True, text=True, timeout=200, cwd=folder, check=False)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_reach(tmp_path):
+    text = run(FOLDER / "reach.py", "--num-envs", "4", folder=tmp_path)
+    assert "solved 4 of 4" in text
+    # The drives sag by the torque of gravity over their stiffness, at most 11 mrad at 1 m.
+    assert float(re.search(r"([\d.]+) mm at most", text)[1]) < 12
+
+
+def test_quadruped(tmp_path):
+    text = run(FOLDER / "quadruped.py", "--num-envs", "2", "--out", "run.npz", folder=tmp_path)
+    assert "(2, 120, 160, 4)" in text
+    # The recording has a camera image every 0.1 s, and the states of all 400 steps.
+    archive = np.load(tmp_path / "run.npz")
+    assert archive["dog/joint_states/positions"].shape[1:] == (2, 12)
+    assert archive["camera/color"].shape[1:] == (2, 120, 160, 4)
+
+
+def test_dataset(tmp_path):
+    run(FOLDER / "dataset.py", "--num-envs", "3", folder=tmp_path)
+    archive = np.load(tmp_path / "labels.npz")
+    assert archive["mask"].shape == (3, 128, 128) and archive["color"].shape == (3, 128, 128, 4)
+    # Three cubes and the ground.
+    assert len(np.unique(archive["mask"])) == 4
+
+
+def test_notebook():
+    cells = json.loads((FOLDER / "tour.ipynb").read_text())["cells"]
+    names: dict = {}
+    shown = []
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]
+            *lines, last = "".join(cell["source"]).rstrip().split("\n")
+            if re.fullmatch(r"[\w.()\[\]\", :]+", last) and "destroy" not in last:
+                exec("\n".join(lines), names)  # noqa: S102
+                shown.append(eval(last, names))  # noqa: S307
+            else:
+                exec("\n".join([*lines, last]), names)  # noqa: S102
+    robot, camera, positions, view = shown
+    assert robot.__class__.__name__ == "Robot" and positions.shape == (4, 6)
+    assert "<iframe" in view._repr_html_() and camera.uid == "camera"
+
+
+def test_demo(tmp_path):
+    text = run("-m", "kinetoscope", "demo", "--headless", "--steps", "50", "--out", "a.png", folder=tmp_path)
+    assert "50 steps of 4 environments" in text and (tmp_path / "a.png").is_file()
+    assert run("-m", "kinetoscope", "--version", folder=tmp_path).endswith("MuJoCo 4.0.1\n")

@@ -1,0 +1,105 @@
+"""Signals, forks and imports, each in a process of its own."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+
+def python(code: str, **options):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+SCENE = """
+import kinetoscope as ks
+sim = ks.SimulationManager(num_envs=64, threads={threads})
+arm = sim.add_robot(ks.bundled_robot("sr5"))
+"""
+
+
+def test_ctrl_c_ends_update():
+    code = SCENE.format(threads=2) + (
+        "import time\nprint('ready', flush=True)\n"
+        "try:\n    sim.update(10_000_000)\nexcept KeyboardInterrupt:\n    print('interrupted', time.time(), sim.time[0] > 0)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(1.0)
+        sent = time.time()
+        process.send_signal(signal.SIGINT)
+        words = process.communicate(timeout=60)[0].split()
+    finally:
+        process.kill()
+    assert words[0] == "interrupted" and words[2] == "True"
+    assert float(words[1]) - sent < 0.2
+
+
+def test_python_handlers_run_during_update():
+    """A handler may use the simulation: no lock is held while it runs."""
+    code = SCENE.format(threads=2) + (
+        "import signal\nseen = []\n"
+        "signal.signal(signal.SIGALRM, lambda *_: seen.append(sim.time[0]))\n"
+        "signal.setitimer(signal.ITIMER_REAL, 0.3)\n"
+        "while not seen:\n    sim.update(2000)\n"
+        "print(len(seen))\n"
+    )
+    assert python(code).stdout == "1\n"
+
+
+FORK = """
+import os, signal
+pid = os.fork()
+if pid == 0:
+    signal.alarm(30)
+    try:
+        sim.update(3)
+        arm.qpos
+        code = 3
+    except ks.ForkError as error:
+        assert "spawn" in str(error)
+        code = 4
+    except BaseException as error:
+        print(repr(error), flush=True)
+        code = 5
+    if code == 4:
+        # A simulation of the child's own works, and the parent's can be dropped.
+        own = ks.SimulationManager(num_envs=4, threads=2)
+        own.add_rigid_object(uid="cube")
+        own.update(5)
+        del sim, arm
+        del own
+    os._exit(code)
+status = os.waitpid(pid, 0)[1]
+sim.update(3)
+print(os.waitstatus_to_exitcode(status), sim.time[0])
+"""
+
+
+@pytest.mark.parametrize(("threads", "code"), [(2, "4"), (1, "3")])
+def test_fork(threads, code):
+    result = python(SCENE.format(threads=threads) + "sim.update(1)\n" + FORK)
+    assert result.stdout.split() == [code, "0.04"], result.stdout + result.stderr
+
+
+def test_import_needs_the_library_of_mujoco(tmp_path):
+    """Without the package mujoco, or with another version of its library, the error says what to install."""
+    (tmp_path / "mujoco").mkdir()
+    (tmp_path / "mujoco" / "__init__.py").touch()
+    (tmp_path / "mujoco" / "libmujoco.so.3.0.0").touch()
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    result = python("import kinetoscope", env={**os.environ, "PYTHONPATH": path})
+    assert re.search(r"ImportError: .*needs MuJoCo 4\.0\.1, but .* has libmujoco\.so\.3\.0\.0; install it with", result.stderr)
+
+
+def test_import_is_fast():
+    """Importing takes less than 0.15 s of CPU time beyond NumPy."""
+    code = (
+        "import numpy, resource\nuse = lambda: sum(resource.getrusage(resource.RUSAGE_SELF)[:2])\n"
+        "start = use()\nimport kinetoscope\nprint(use() - start)"
+    )
+    assert min(float(python(code).stdout) for _ in range(3)) < 0.15
