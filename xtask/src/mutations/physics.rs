@@ -205,8 +205,11 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
         "Runge-Kutta stepped as Euler",
-        "sim/src/env.rs",
-        ["if self.data.model().integrator() == mj::mjINT_RK4 {", "if self.data.model().integrator() == u32::MAX {"],
+        "sim/src/env/step.rs",
+        [
+            "        if self.data.model().integrator() == mj::mjINT_RK4 {",
+            "        if self.data.model().integrator() == u32::MAX {",
+        ],
         &["order_of_runge_kutta", "free_fall", "asymmetric_top"],
     ),
     Mutation::of(

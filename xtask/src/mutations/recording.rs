@@ -12,13 +12,6 @@ pub(super) const RECORDING: &[Mutation] = &[
     ),
     Mutation::of(
         "kinetoscope-record",
-        "files that share bytes accepted in archives",
-        "record/src/archive.rs",
-        ["|| reader.0.has_overlapping_files().ok()?", ""],
-        &["archive::tests::"],
-    ),
-    Mutation::of(
-        "kinetoscope-record",
         "time that an environment is set to ignored",
         "record/src/clock.rs",
         ["self.offsets[env] = now - times[env];", "self.offsets[env] = now;"],
