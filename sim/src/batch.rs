@@ -44,9 +44,9 @@ struct LockedChunk<'a> {
 pub struct Batch {
     chunks: Chunks,
     /// Working memory of each thread.
-    seats: Vec<Mutex<SimEnv>>,
+    workspaces: Vec<Mutex<SimEnv>>,
     /// Further working memory, for reads while all others are in use.
-    spare_seats: Mutex<SpareSeats>,
+    spare_workspaces: Mutex<SpareSeats>,
     pool: ThreadPool,
     model: Model,
     num_envs: usize,
@@ -59,7 +59,7 @@ pub struct Batch {
 /// Working memory for reads while that of all threads is in use.
 #[derive(Debug)]
 struct SpareSeats {
-    seats: Vec<SimEnv>,
+    workspaces: Vec<SimEnv>,
     created: usize,
     /// Environment that further working memory is created from.
     origin: SimEnv,
@@ -89,30 +89,30 @@ impl std::fmt::Debug for Chunks {
 
 /// An environment in working memory. The row returns to the batch when the lease ends, also after a panic.
 struct Lease<'a> {
-    seat: &'a mut SimEnv,
+    workspace: &'a mut SimEnv,
     row: &'a mut Box<EnvRow>,
     /// True if the environment may have changed.
     writes: bool,
 }
 
 impl<'a> Lease<'a> {
-    fn new(seat: &'a mut SimEnv, row: &'a mut Box<EnvRow>, writes: bool) -> Self {
-        seat.load(row, true);
-        Self { seat, row, writes }
+    fn new(workspace: &'a mut SimEnv, row: &'a mut Box<EnvRow>, writes: bool) -> Self {
+        workspace.load(row, true);
+        Self { workspace, row, writes }
     }
 
     /// Lease for at least one step.
-    fn for_step(seat: &'a mut SimEnv, row: &'a mut Box<EnvRow>) -> Self {
+    fn for_step(workspace: &'a mut SimEnv, row: &'a mut Box<EnvRow>) -> Self {
         // A diverged environment does not step and keeps its results.
         let with_results = row.diverged.is_some();
-        seat.load(row, with_results);
-        Self { seat, row, writes: true }
+        workspace.load(row, with_results);
+        Self { workspace, row, writes: true }
     }
 }
 
 impl Drop for Lease<'_> {
     fn drop(&mut self) {
-        if self.writes { self.seat.store(self.row) } else { self.seat.put_back(self.row) }
+        if self.writes { self.workspace.store(self.row) } else { self.workspace.put_back(self.row) }
     }
 }
 
@@ -165,14 +165,14 @@ impl Batch {
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
         pool.start(threads).map_err(|error| BatchError::Thread(error.to_string()))?;
         let shares = (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect();
-        let seats: Result<Vec<_>, _> = (0..threads).map(|slot| first.for_slot(slot + 1).map(Mutex::new)).collect();
-        let seats = seats.map_err(failed)?;
+        let workspaces: Result<Vec<_>, _> = (0..threads).map(|slot| first.for_slot(slot + 1).map(Mutex::new)).collect();
+        let workspaces = workspaces.map_err(failed)?;
         let chunks = Chunks { chunks, chunk_size, shares };
-        let spare_seats = Mutex::new(SpareSeats { seats: Vec::new(), created: 0, origin: first });
+        let spare_workspaces = Mutex::new(SpareSeats { workspaces: Vec::new(), created: 0, origin: first });
         Ok(Self {
             chunks,
-            seats,
-            spare_seats,
+            workspaces,
+            spare_workspaces,
             pool,
             model: model.clone(),
             num_envs,
@@ -199,7 +199,7 @@ impl Batch {
 
     /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
-        self.run_chunks(|seat, taken| taken.for_each_env(seat, count, |_, env, _| env.advance(count, None)));
+        self.run_chunks(|workspace, taken| taken.for_each_env(workspace, count, |_, env, _| env.advance(count, None)));
     }
 
     /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
@@ -211,8 +211,8 @@ impl Batch {
         stage: Stage,
         visit: impl Fn(usize, &SimEnv) + Sync,
     ) {
-        self.run_chunks(|seat, taken| {
-            taken.for_each_env(seat, count, |i, env, _| {
+        self.run_chunks(|workspace, taken| {
+            taken.for_each_env(workspace, count, |i, env, _| {
                 env.advance(count, capture);
                 env.reach(stage);
                 visit(i, env);
@@ -222,12 +222,12 @@ impl Batch {
 
     /// Calls `visit` for every environment, in parallel and in any order, with the quantities that `stage` contains.
     pub(crate) fn visit(&self, stage: Stage, visit: impl Fn(usize, &SimEnv) + Sync) {
-        self.run_chunks(|seat, taken| {
+        self.run_chunks(|workspace, taken| {
             let first = taken.first;
             taken.for_each_row(|k, row| {
-                let lease = Lease::new(seat, row, false);
-                lease.seat.reach(stage);
-                visit(first + k, lease.seat);
+                let lease = Lease::new(workspace, row, false);
+                lease.workspace.reach(stage);
+                visit(first + k, lease.workspace);
             });
         });
     }
@@ -267,9 +267,9 @@ impl Batch {
         };
         if self.threads() == 1 {
             // A single thread writes directly to the outputs.
-            let seat = &mut *lock(&self.seats[0]);
+            let workspace = &mut *lock(&self.workspaces[0]);
             for c in 0..self.chunks.chunks.len() {
-                self.chunks.lock_chunk(c).for_each_env(seat, count, |index, env, _| {
+                self.chunks.lock_chunk(c).for_each_env(workspace, count, |index, env, _| {
                     step(env, &mut |k, values| {
                         outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
                     });
@@ -277,9 +277,11 @@ impl Batch {
             }
             return;
         }
-        let job = |seat: &mut SimEnv, taken: &mut LockedChunk| {
+        let job = |workspace: &mut SimEnv, taken: &mut LockedChunk| {
             taken.chunk.read_values.clear();
-            taken.for_each_env(seat, count, |_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
+            taken.for_each_env(workspace, count, |_, env, read| {
+                step(env, &mut |_, values| read.extend_from_slice(values))
+            });
         };
         let mut copied = vec![false; self.chunks.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
@@ -308,8 +310,8 @@ impl Batch {
     /// # Panics
     /// `job` panics.
     pub fn run(&mut self, job: impl Fn(usize, &mut SimEnv) + Sync) {
-        self.run_chunks(|seat, taken| {
-            taken.for_each_env(seat, 0, |i, env, _| {
+        self.run_chunks(|workspace, taken| {
+            taken.for_each_env(workspace, 0, |i, env, _| {
                 env.reach(Stage::Forward);
                 job(i, env);
             });
@@ -321,11 +323,11 @@ impl Batch {
     pub(crate) fn run_in(&mut self, chosen: &[usize], job: impl Fn(usize, &mut SimEnv) + Sync) {
         let mut mask = vec![false; self.num_envs];
         chosen.iter().for_each(|&env| mask[env] = true);
-        self.run_chunks(|seat, taken| {
+        self.run_chunks(|workspace, taken| {
             let first = taken.first;
             taken.for_each_row(|k, row| {
                 if mask[first + k] {
-                    job(first + k, Lease::new(seat, row, true).seat);
+                    job(first + k, Lease::new(workspace, row, true).workspace);
                 }
             });
         });
@@ -343,50 +345,51 @@ impl Batch {
         then: impl FnMut(&LockedChunk) + Send,
     ) {
         let _running = lock(&self.running);
-        let (chunks, seats) = (&self.chunks, &self.seats);
+        let (chunks, workspaces) = (&self.chunks, &self.workspaces);
         for share in &chunks.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
         }
-        // No contention: only slot 0, the calling thread, takes this lock, and every slot its own seat.
+        // No contention: only slot 0, the calling thread, takes this lock, and every slot its own workspace.
         let then = Mutex::new(then);
         self.pool.run(chunks.shares.len(), |slot| {
-            let seat = &mut *lock(&seats[slot]);
+            let workspace = &mut *lock(&workspaces[slot]);
             if slot == 0 {
                 let then = &mut *lock(&then);
                 chunks.process_shares(slot, |taken| {
-                    job(seat, taken);
+                    job(workspace, taken);
                     then(taken);
                 });
             } else {
-                chunks.process_shares(slot, |taken| job(seat, taken));
+                chunks.process_shares(slot, |taken| job(workspace, taken));
             }
         });
     }
 
-    /// Runs `act` with working memory that no other thread uses; preferably that which holds version `version` of a row.
-    fn with_seat<T>(&self, version: u64, act: impl FnOnce(&mut SimEnv) -> T) -> T {
-        // The upper bits of a version name the seat that made it.
+    /// Runs `act` with working memory that no other thread uses, preferably the one that holds version `version` of a
+    /// row.
+    fn with_workspace<T>(&self, version: u64, act: impl FnOnce(&mut SimEnv) -> T) -> T {
+        // The upper bits of a version name the workspace that made it.
         let last = SimEnv::slot_of(version).wrapping_sub(1);
-        let preferred = self.seats.get(last).into_iter().chain(&self.seats);
-        for seat in preferred {
-            match seat.try_lock() {
-                Ok(mut seat) => return act(&mut seat),
-                Err(std::sync::TryLockError::Poisoned(seat)) => return act(&mut seat.into_inner()),
+        let preferred = self.workspaces.get(last).into_iter().chain(&self.workspaces);
+        for workspace in preferred {
+            match workspace.try_lock() {
+                Ok(mut workspace) => return act(&mut workspace),
+                Err(std::sync::TryLockError::Poisoned(workspace)) => return act(&mut workspace.into_inner()),
                 Err(std::sync::TryLockError::WouldBlock) => {}
             }
         }
-        let spare = lock(&self.spare_seats).seats.pop();
-        let mut spare = spare.unwrap_or_else(|| self.new_spare_seat());
+        let spare = lock(&self.spare_workspaces).workspaces.pop();
+        let mut spare = spare.unwrap_or_else(|| self.new_spare_workspace());
         let result = act(&mut spare);
-        lock(&self.spare_seats).seats.push(spare);
+        lock(&self.spare_workspaces).workspaces.push(spare);
         result
     }
 
     /// Creates working memory for a read inside of other reads.
-    fn new_spare_seat(&self) -> SimEnv {
-        let mut spare = lock(&self.spare_seats);
+    fn new_spare_workspace(&self) -> SimEnv {
+        let mut spare = lock(&self.spare_workspaces);
         spare.created += 1;
-        let slot = self.seats.len() + spare.created;
+        let slot = self.workspaces.len() + spare.created;
         spare.origin.for_slot(slot).expect("MuJoCo allocated data of this model before")
     }
 
@@ -406,10 +409,10 @@ impl Batch {
     #[track_caller]
     pub(crate) fn read_at<T>(&self, index: usize, stage: Stage, read: impl FnOnce(&SimEnv) -> T) -> T {
         self.with_row(index, |row| {
-            self.with_seat(row.version, |seat| {
-                let lease = Lease::new(seat, row, false);
-                lease.seat.reach(stage);
-                read(lease.seat)
+            self.with_workspace(row.version, |workspace| {
+                let lease = Lease::new(workspace, row, false);
+                lease.workspace.reach(stage);
+                read(lease.workspace)
             })
         })
     }
@@ -513,10 +516,10 @@ impl Batch {
     #[track_caller]
     pub(crate) fn write_at<T>(&mut self, index: usize, stage: Stage, write: impl FnOnce(&mut SimEnv) -> T) -> T {
         self.with_row(index, |row| {
-            self.with_seat(row.version, |seat| {
-                let lease = Lease::new(seat, row, true);
-                lease.seat.reach(stage);
-                write(lease.seat)
+            self.with_workspace(row.version, |workspace| {
+                let lease = Lease::new(workspace, row, true);
+                lease.workspace.reach(stage);
+                write(lease.workspace)
             })
         })
     }
@@ -540,11 +543,11 @@ impl Batch {
     /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
     /// and on which of them took an environment.
     pub fn buffer_growths(&self) -> u64 {
-        let growths = |seat: &SimEnv| u64::from(seat.buffer_growths());
-        let spare = lock(&self.spare_seats);
+        let growths = |workspace: &SimEnv| u64::from(workspace.buffer_growths());
+        let spare = lock(&self.spare_workspaces);
         let initial = growths(&spare.origin);
-        let seats = self.seats.iter().map(|seat| growths(&lock(seat))).sum::<u64>();
-        self.earlier_growths + initial + seats + spare.seats.iter().map(growths).sum::<u64>()
+        let workspaces = self.workspaces.iter().map(|workspace| growths(&lock(workspace))).sum::<u64>();
+        self.earlier_growths + initial + workspaces + spare.workspaces.iter().map(growths).sum::<u64>()
     }
 
     /// Counts the growths of `old`, which this batch replaces, as growths of this batch.
@@ -559,9 +562,14 @@ impl LockedChunk<'_> {
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
-    /// Calls `act` for every environment of the chunk in `seat`, with its index and the read buffer of the chunk. `act`
-    /// does `steps` steps first.
-    fn for_each_env(&mut self, seat: &mut SimEnv, steps: u32, mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>)) {
+    /// Does `steps` steps with every environment of the chunk in `workspace`, then calls `act` with its index and the
+    /// read buffer of the chunk.
+    fn for_each_env(
+        &mut self,
+        workspace: &mut SimEnv,
+        steps: u32,
+        mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>),
+    ) {
         let Chunk { rows, read_values } = &mut *self.chunk;
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
@@ -572,8 +580,8 @@ impl LockedChunk<'_> {
                 kinetoscope_mujoco::prefetch(std::slice::from_ref(&**after));
             }
             let row = &mut rows[k];
-            let lease = if steps > 0 { Lease::for_step(seat, row) } else { Lease::new(seat, row, true) };
-            act(self.first + k, lease.seat, read_values);
+            let lease = if steps > 0 { Lease::for_step(workspace, row) } else { Lease::new(workspace, row, true) };
+            act(self.first + k, lease.workspace, read_values);
         }
     }
 }
