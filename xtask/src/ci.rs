@@ -8,8 +8,8 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, python_cfg, python_package, site,
-    source_check, spelling, wheel,
+    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, python_cfg, python_package,
+    python_simulation, site, source_check, spelling, wheel,
 };
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -125,9 +125,15 @@ const STAGES: &[Stage] = &[
     },
     Stage {
         name: "python",
-        what: "the Python package with several versions of mujoco",
+        what: "the Python package kinetoscope-render with several versions of mujoco",
         when: When::Wheel,
         run: |c| python_package::test(c.repo),
+    },
+    Stage {
+        name: "python-sim",
+        what: "the Python package kinetoscope",
+        when: When::Wheel,
+        run: |c| python_simulation::test(c.repo),
     },
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];

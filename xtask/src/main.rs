@@ -6,7 +6,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
@@ -34,6 +34,7 @@ mod progress;
 mod python;
 mod python_cfg;
 mod python_package;
+mod python_simulation;
 mod robots;
 mod run;
 mod same_images;

@@ -1,6 +1,8 @@
-//! The Python package `kinetoscope-render`: its wheel, and its tests with several versions of `mujoco`.
+//! The Python package `kinetoscope-render`: its wheel, and its tests with several versions of `mujoco`. Also the parts
+//! that it shares with the [package `kinetoscope`](python_simulation): maturin and virtual environments.
 
 use crate::python::{self, OPENGL};
+use crate::python_simulation::{self, BuildProfile};
 use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, Requirement};
 use crate::wheel;
@@ -9,6 +11,9 @@ use std::path::{Path, PathBuf};
 
 /// Folder of the package.
 const PACKAGE: &str = "python/render";
+
+/// Beginning of the names of its wheels.
+const PREFIX: &str = "kinetoscope_render-";
 
 /// The program that builds wheels from Rust.
 const MATURIN: &str = "maturin==1.16.0";
@@ -24,13 +29,14 @@ pub(crate) struct WheelArgs {
     sdist: bool,
 }
 
-/// `cargo xtask wheel`: builds the wheel into `wheels` of the target folder and prints its path.
+/// `cargo xtask wheel`: builds the wheels of both packages into `wheels` of the target folder and prints their paths.
 ///
 /// # Errors
 /// Python cannot be set up, or the package does not compile.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
-    let built = build(repo)?;
+    let built = build(repo, BuildProfile::Release)?;
     println!("{}", built.display());
+    println!("{}", python_simulation::build(repo, BuildProfile::Release)?.display());
     if args.sdist {
         let maturin = maturin(repo)?;
         let package = repo.root.join(PACKAGE);
@@ -45,7 +51,7 @@ pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
 /// A step fails; the message names the version of `mujoco`.
 pub(crate) fn test(repo: &Repo) -> XtaskResult {
     setup::try_to_have(Requirement::OsMesa);
-    let wheel = build(repo)?;
+    let wheel = build(repo, BuildProfile::Test)?;
     for (version, numpy) in TESTED {
         let python = environment(repo, version, numpy)?;
         let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
@@ -64,34 +70,52 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
 }
 
 /// Builds the wheel and returns its path.
-fn build(repo: &Repo) -> XtaskResult<PathBuf> {
+fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> {
     let maturin = maturin(repo)?;
     let dir = wheels(repo);
-    for old in built_wheels(&dir) {
-        fs::remove_file(&old).map_err(|e| Failure::new(format!("{}: {e}", old.display())))?;
-    }
+    remove_wheels(&dir, PREFIX)?;
     let package = repo.root.join(PACKAGE);
-    let build = Cmd::new(maturin).args(["build", "--release", "--locked", "--out"]).arg(&dir);
+    let build = Cmd::new(maturin).args(["build", "--locked", "--profile", profile.name(), "--out"]).arg(&dir);
     build.current_dir(package).env("CARGO_TARGET_DIR", &repo.target).run()?;
-    let message = || Failure::new(format!("maturin built no wheel in {}", dir.display()));
-    built_wheels(&dir).into_iter().next().ok_or_else(message)
+    built_wheel(&dir, PREFIX)
 }
 
-fn wheels(repo: &Repo) -> PathBuf {
+/// The wheel whose name begins with `prefix`.
+///
+/// # Errors
+/// There is no such wheel.
+pub(crate) fn built_wheel(dir: &Path, prefix: &str) -> XtaskResult<PathBuf> {
+    let message = || Failure::new(format!("maturin built no wheel in {}", dir.display()));
+    built_wheels(dir, prefix).into_iter().next().ok_or_else(message)
+}
+
+/// Removes wheels of earlier builds whose names begin with `prefix`.
+pub(crate) fn remove_wheels(dir: &Path, prefix: &str) -> XtaskResult {
+    for old in built_wheels(dir, prefix) {
+        fs::remove_file(&old).map_err(|e| Failure::new(format!("{}: {e}", old.display())))?;
+    }
+    Ok(())
+}
+
+/// Folder of built wheels.
+pub(crate) fn wheels(repo: &Repo) -> PathBuf {
     repo.target.join("wheels")
 }
 
-/// Wheels of the package in a folder that has other wheels too.
-fn built_wheels(dir: &Path) -> Vec<PathBuf> {
+/// Wheels of a package in a folder that has other wheels too.
+fn built_wheels(dir: &Path, prefix: &str) -> Vec<PathBuf> {
     let is_ours = |path: &PathBuf| {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        name.starts_with("kinetoscope_render-") && name.ends_with(".whl")
+        name.starts_with(prefix) && name.ends_with(".whl")
     };
     fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path()).filter(is_ours).collect()
 }
 
 /// Maturin in a virtual environment below the target folder.
-fn maturin(repo: &Repo) -> XtaskResult<PathBuf> {
+///
+/// # Errors
+/// It cannot be installed.
+pub(crate) fn maturin(repo: &Repo) -> XtaskResult<PathBuf> {
     let venv = repo.target.join("maturin-venv");
     let program = venv.join("bin/maturin");
     let is_ready = || {
@@ -120,7 +144,7 @@ fn environment(repo: &Repo, version: &str, numpy: &str) -> XtaskResult<PathBuf> 
 }
 
 /// Creates a virtual environment with these packages.
-fn create(venv: &Path, packages: &[&str]) -> XtaskResult {
+pub(crate) fn create(venv: &Path, packages: &[&str]) -> XtaskResult {
     setup::try_to_have(Requirement::Pip);
     setup::try_to_have(Requirement::Venv);
     Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(venv).run()?;
@@ -137,7 +161,7 @@ mod tests {
         for name in ["mujoco_core-4.0.1-cp311-any.whl", "kinetoscope_render-0.1.0.tar.gz", "kinetoscope_render-1.whl"] {
             wheel::tests::write(&dir.path().join(name), "");
         }
-        assert_eq!(built_wheels(dir.path()), [dir.path().join("kinetoscope_render-1.whl")]);
-        assert!(built_wheels(&dir.path().join("missing")).is_empty());
+        assert_eq!(built_wheels(dir.path(), PREFIX), [dir.path().join("kinetoscope_render-1.whl")]);
+        assert!(built_wheels(&dir.path().join("missing"), PREFIX).is_empty());
     }
 }

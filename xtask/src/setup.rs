@@ -54,6 +54,22 @@ impl Prepared {
         }
     }
 
+    /// A program that compiles with the chosen MuJoCo.
+    pub(crate) fn program(&self, program: impl AsRef<std::ffi::OsStr>) -> Cmd {
+        match &self.choice {
+            Choice::Environment => Cmd::new(program),
+            Choice::Debian => Cmd::new(program).env_remove("MUJOCO_DIR"),
+            Choice::Wheel { mujoco_dir } => {
+                Cmd::new(program).env("MUJOCO_DIR", mujoco_dir).env("CARGO_TARGET_DIR", &self.target)
+            }
+        }
+    }
+
+    /// Path of a program built by cargo with the profile of the tests.
+    pub(crate) fn binary(&self, name: &str) -> PathBuf {
+        self.target.join("debug").join(name)
+    }
+
     /// An example built by cargo with the profile of the tests, run in the root of the repository.
     pub(crate) fn example(&self, name: &str) -> Cmd {
         let cmd = Cmd::new(self.target.join("debug/examples").join(name)).current_dir(&self.root);

@@ -1,0 +1,144 @@
+//! The Python package `kinetoscope`: its wheel, built for the MuJoCo of the wheel `mujoco-core`, and its tests in an
+//! environment of its own.
+
+use crate::python_package::{built_wheel, create, maturin, remove_wheels, wheels};
+use crate::run::{Cmd, Failure, Repo, XtaskResult};
+use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
+use crate::wheel;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folder of the package.
+const PACKAGE: &str = "python/sim";
+
+/// Beginning of the names of its wheels.
+const PREFIX: &str = "kinetoscope-";
+
+/// Robots and meshes for the wheel: a copy of the folder `assets` while it is built.
+const ASSETS: &str = "python/sim/kinetoscope/assets";
+
+/// Scripts of other simulators that the compatibility layers run; tests that need them are skipped elsewhere.
+const SCRIPTS: &str = "../shared/seeds";
+
+/// Packages of the tests. `create_sensor` of EmbodiChain calls a method that NumPy 2 does not have.
+const PACKAGES: [&str; 7] = [
+    "numpy==1.26.4",
+    "pytest==9.2.0",
+    "scipy==1.17.1",
+    "matplotlib==3.11.2",
+    "opencv-python-headless==4.11.0.86",
+    "mypy==2.4.1",
+    "pillow==13.0.0",
+];
+
+/// Cargo profile of a wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BuildProfile {
+    /// For users.
+    Release,
+    /// For tests, which share the compiled crates of the other stages.
+    Test,
+}
+
+impl BuildProfile {
+    /// Its name for cargo.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Release => "release",
+            Self::Test => "dev",
+        }
+    }
+}
+
+/// Builds the wheel and returns its path.
+///
+/// # Errors
+/// MuJoCo or Python cannot be set up, or the package does not compile.
+pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> {
+    let ready = prepare(repo)?;
+    let (maturin, dir) = (maturin(repo)?, wheels(repo));
+    remove_wheels(&dir, PREFIX)?;
+    let assets = repo.root.join(ASSETS);
+    let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", assets.display()));
+    let remove = || if assets.exists() { fs::remove_dir_all(&assets) } else { Ok(()) };
+    remove().map_err(fail)?;
+    copy(&repo.root.join("assets"), &assets).map_err(fail)?;
+    // The library of MuJoCo is not copied into the wheel: the package loads that of `mujoco-core`.
+    let build = ready.program(maturin).args(["build", "--locked", "--auditwheel", "skip", "--profile", profile.name()]);
+    let built = build.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run();
+    remove().map_err(fail)?;
+    built?;
+    built_wheel(&dir, PREFIX)
+}
+
+/// The stage `python-sim` of CI: builds the wheel, installs it in an environment, and runs the tests there.
+///
+/// # Errors
+/// A step fails.
+pub(crate) fn test(repo: &Repo) -> XtaskResult {
+    let ready = prepare(repo)?;
+    setup::try_to_have(Requirement::Xvfb);
+    let wheel = build(repo, BuildProfile::Test)?;
+    // The judge of the test that compares with Rust.
+    ready.cargo().args(["build", "--package", "kinetoscope-cli"]).run()?;
+    let python = environment(repo)?;
+    let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
+    Cmd::new(&python).args(install).arg("--force-reinstall").arg(&wheel).run()?;
+    let mut tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+    let scripts = repo.root.join(SCRIPTS);
+    if scripts.is_dir() {
+        tests = tests.env("KINETOSCOPE_SEEDS", scripts);
+    }
+    tests
+        .current_dir(repo.root.join("python/tests"))
+        .env("KINETOSCOPE_CLI", ready.binary("kinetoscope"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .run()
+}
+
+fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
+    setup::prepare(repo, Requirements { version: Some(MujocoVersion::Wheel), extras: &[] })
+}
+
+/// The environment of the tests, below the target folder.
+fn environment(repo: &Repo) -> XtaskResult<PathBuf> {
+    let venv = repo.target.join("python-sim-venv");
+    let python = venv.join("bin/python");
+    let check = "import cv2, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '1.26.4'";
+    let is_ready = || Cmd::new(&python).args(["-c", check]).quiet().succeeds();
+    if !is_ready() {
+        let core = format!("mujoco-core=={}", wheel::VERSION);
+        create(&venv, &[&[core.as_str()][..], &PACKAGES].concat())?;
+    }
+    if is_ready() { Ok(python) } else { Err(Failure::new("the packages of the tests cannot be imported")) }
+}
+
+/// Copies a folder.
+fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            copy(&entry.path(), &target)?;
+        } else {
+            fs::copy(entry.path(), target)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copied_folders() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let [from, to] = ["from", "to"].map(|name| dir.path().join(name));
+        fs::create_dir_all(from.join("a/b")).expect("writable");
+        fs::write(from.join("a/b/c.stl"), "solid").expect("writable");
+        copy(&from, &to).expect("copied");
+        assert_eq!(fs::read_to_string(to.join("a/b/c.stl")).expect("a file"), "solid");
+    }
+}
