@@ -24,7 +24,9 @@ ENV = "{ENV_REGEX_NS}/"
 
 @configclass
 class InteractiveSceneCfg:
-    """A scene: every further attribute of a subclass is an entity."""
+    """A scene: every further attribute of a subclass or of an object is an entity."""
+
+    _accepts_new = True
 
     num_envs: int = MISSING  # type: ignore[assignment]
     env_spacing: float = MISSING  # type: ignore[assignment]
@@ -38,7 +40,8 @@ class InteractiveScene:
     def __init__(self, cfg: InteractiveSceneCfg) -> None:
         self.cfg = cfg
         context = SimulationContext.instance() or SimulationContext()
-        names = [name for name in fields_of(type(cfg)) if name not in fields_of(InteractiveSceneCfg)]
+        own = fields_of(InteractiveSceneCfg)
+        names = [name for name in {**fields_of(type(cfg)), **vars(cfg)} if name not in own and not name.startswith("_")]
         entities = {name: getattr(cfg, name) for name in names if getattr(cfg, name) is not None}
         self.native = SimulationManager(self._simulation(context, entities))
         self._origins = self.native.env_origins
@@ -72,6 +75,8 @@ class InteractiveScene:
     def _simulation(self, context: SimulationContext, entities: dict[str, Any]) -> native.SimulationManagerCfg:
         spawned = [entity.spawn for entity in entities.values() if isinstance(entity, AssetBaseCfg)]
         ground = next((spawn for spawn in spawned if isinstance(spawn, GroundPlaneCfg)), None)
+        if ground is not None:
+            unsupported("GroundPlaneCfg", size=tuple(numbers(ground.size)) != (100.0, 100.0))
         lights = []
         for light in spawned:
             if isinstance(light, DomeLightCfg):
