@@ -2,7 +2,7 @@
 
 use crate::arguments::envs;
 use crate::errors::{Class, Failure};
-use crate::shared::{Entity, Shared};
+use crate::shared::{Entity, Shared, detached};
 use crate::simulation::Simulation;
 use kinetoscope::prelude::Record as _;
 use kinetoscope::record::{self, FieldSelector, Format, OverviewCfg, RecorderCfg, RecorderId, Recording};
@@ -11,6 +11,7 @@ use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Selection of what is recorded.
@@ -98,6 +99,8 @@ pub(crate) struct Recorder {
     shared: Arc<Shared>,
     id: RecorderId,
     path: PathBuf,
+    /// True after `finish`.
+    finished: AtomicBool,
 }
 
 /// Summary of a finished recording.
@@ -126,7 +129,12 @@ impl RecordingSummary {
 
 impl Recorder {
     fn finish_once(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
-        let summary = self.shared.write(py, |sim| Ok(sim.finish_recording(self.id)?))?;
+        let summary = self.shared.write(py, |sim| {
+            let finished = sim.finish_recording(self.id);
+            // Also after an error: the recorder is gone.
+            self.finished.store(true, Ordering::Relaxed);
+            Ok(finished?)
+        })?;
         let text = summary.to_string();
         let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
         Ok(RecordingSummary { path, bytes, packets, waits, left_out, text })
@@ -141,8 +149,12 @@ impl Recorder {
         &self.path
     }
 
-    /// Completes the file.
+    /// Completes the file. A second call raises ``RecordingError``.
     fn finish(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
+        if self.finished.load(Ordering::Relaxed) {
+            let message = format!("{}: the recording is already finished", self.path.display());
+            return Err(Failure::new(Class::Recording, message).into());
+        }
         self.finish_once(py)
     }
 
@@ -156,9 +168,15 @@ impl Recorder {
         slf
     }
 
-    #[pyo3(signature = (*_exception))]
-    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
-        self.finish_once(py).map(drop)
+    #[pyo3(signature = (*exception))]
+    fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        if self.finished.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let finished = self.finish_once(py).map(drop);
+        // An error of the recording must not hide the exception of the block.
+        let block_failed = exception.iter().any(|part| !part.is_none());
+        if block_failed { Ok(()) } else { finished }
     }
 
     fn __repr__(&self) -> String {
@@ -204,7 +222,7 @@ impl Simulation {
             path: path.clone(),
             format: format.map(format_of).transpose()?,
             topics: topics.map_or(Ok(defaults.topics.clone()), |topics| topics.iter().map(topic_of).collect())?,
-            envs: envs(env_ids)?,
+            envs: envs(&self.shared, env_ids)?,
             period_steps,
             stream_periods: periods.transpose()?.unwrap_or_default(),
             scene,
@@ -213,8 +231,8 @@ impl Simulation {
             overwrite,
             ..defaults
         };
-        let id = self.shared.write(py, |sim| Ok(sim.record(cfg)?))?;
-        Ok(Recorder { shared: Arc::clone(&self.shared), id, path })
+        let id = self.shared.write_with_threads(py, |sim| Ok(sim.record(cfg)?))?;
+        Ok(Recorder { shared: Arc::clone(&self.shared), id, path, finished: AtomicBool::new(false) })
     }
 
     /// Replays a recording (``.npz`` or ``.mcap``) in this simulation, built as the recorded one was, and compares the
@@ -275,13 +293,13 @@ impl Playback {
     #[new]
     #[pyo3(signature = (path, sim=None))]
     fn new(py: Python<'_>, path: PathBuf, sim: Option<&Bound<'_, Simulation>>) -> PyResult<Self> {
-        let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+        let recording = detached(py, || Ok(Recording::open(path)?))?;
         let (inner, manager) = match sim {
             Some(sim) => {
                 let scene = &sim.get().shared;
                 scene.read(py, |sim| Ok(record::Playback::open(&recording, Some(sim))?))?
             }
-            None => py.detach(|| record::Playback::open(&recording, None)).map_err(Failure::from)?,
+            None => detached(py, || Ok(record::Playback::open(&recording, None)?))?,
         };
         let entities = manager.entities();
         let parts =
@@ -344,13 +362,11 @@ pub(crate) fn read_series<'py>(
     field: &str,
     env: Option<usize>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
-    let series = py
-        .detach(|| {
-            let recording = Recording::open(path)?;
-            let topic = recording.topic(topic, env)?.name.clone();
-            recording.time_series(&[FieldSelector::new(topic, field)])
-        })
-        .map_err(Failure::from)?;
+    let series = detached(py, || {
+        let recording = Recording::open(path)?;
+        let topic = recording.topic(topic, env)?.name.clone();
+        Ok(recording.time_series(&[FieldSelector::new(topic, field)])?)
+    })?;
     let first = series.into_iter().next().unwrap_or_default();
     Ok([first.times.into_pyarray(py), first.values.into_pyarray(py)])
 }
@@ -358,6 +374,6 @@ pub(crate) fn read_series<'py>(
 /// Names of the topics of a recording, each with the names of its numbers.
 #[pyfunction]
 pub(crate) fn recording_topics(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<String>)>> {
-    let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+    let recording = detached(py, || Ok(Recording::open(path)?))?;
     Ok(recording.topics().iter().map(|topic| (topic.name.clone(), topic.fields.clone())).collect())
 }
