@@ -3,6 +3,7 @@
 The scripts belong to their projects and are not in this one: ``KINETOSCOPE_SEEDS`` names their folder.
 """
 
+import ast
 import os
 import re
 import shutil
@@ -43,15 +44,31 @@ def display():
         process.wait()
 
 
+def without_imports(source):
+    """The syntax tree of a script without its import statements, and their number."""
+    tree, count = ast.parse(source), 0
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            kept = [item for item in body if not isinstance(item, ast.Import | ast.ImportFrom)]
+            count += len(body) - len(kept)
+            node.body = kept
+    return ast.dump(tree), count
+
+
+@pytest.mark.needs_seeds
 def test_only_import_lines_change():
     for name in ("create_robot.py", "create_sensor.py", "add_sensors_on_robot.py"):
         source = (seeds.folder() / name).read_text()
         for with_torch in (False, True):
             new = seeds.adapted(source, with_torch)
-            pairs = [(a, b) for a, b in zip(source.split("\n"), new.split("\n"), strict=True) if a != b]
-            assert pairs and all(re.match(r"\s*(import|from) ", a) for a, _ in pairs)
+            # Judge: Python's parser. Everything but the import statements is the same.
+            assert new != source and without_imports(new) == without_imports(source)
+            assert without_imports(source)[1] >= 5
+            assert without_imports(new + "\nprint()")[0] != without_imports(source)[0]
 
 
+@pytest.mark.needs_seeds
 @pytest.mark.parametrize("tensors", TENSORS)
 @pytest.mark.parametrize("envs", [1, 4])
 def test_create_robot(tensors, envs):
@@ -64,6 +81,7 @@ def test_create_robot(tensors, envs):
     assert lines[-3:-1] == ["Stopping simulation...", "Cleaning up..."]
 
 
+@pytest.mark.needs_seeds
 @pytest.mark.parametrize("tensors", TENSORS)
 @pytest.mark.parametrize("flags", [[], ["--attach_sensor"], ["--enable_rt"]])
 def test_create_sensor(tensors, flags, tmp_path):
@@ -84,6 +102,7 @@ def test_create_sensor(tensors, flags, tmp_path):
         np.testing.assert_array_equal(grid[490, 650], [127, 127, 255])
 
 
+@pytest.mark.needs_seeds
 def test_create_sensor_with_four_environments_fails_in_the_script():
     """The script colors one mask image, (h, w), and gets four, (4, h, w), as from EmbodiChain."""
     result = run("create_sensor.py", "numpy", ["--headless", "--num_envs", "4"], 10)
@@ -91,6 +110,7 @@ def test_create_sensor_with_four_environments_fails_in_the_script():
     assert "kinetoscope" not in result.stderr.strip().split("\n")[-1]
 
 
+@pytest.mark.needs_seeds
 @pytest.mark.parametrize("tensors", TENSORS)
 @pytest.mark.parametrize("envs", [1, 4])
 def test_add_sensors_on_robot(tensors, envs):
@@ -107,15 +127,21 @@ def test_add_sensors_on_robot(tensors, envs):
     assert 115 < forces[490] < 200
 
 
+@pytest.mark.needs_seeds
 def test_under_a_display(display):
     """Windows open where there is a display and the script is not headless."""
     for name, flags in (("create_robot.py", []), ("add_sensors_on_robot.py", []), ("create_sensor.py", [])):
-        started = time.time()
         result = run(name, "numpy", flags, 40, DISPLAY=display)
         assert result.returncode == 0, result.stderr
         assert "no window" not in result.stderr
-        # The window runs in real time: 40 steps of 5 or 10 ms.
-        assert time.time() - started > 0.2
+
+    def seconds(steps, **variables):
+        started = time.perf_counter()
+        assert run("create_robot.py", "numpy", [] if variables else ["--headless"], steps, **variables).returncode == 0
+        return time.perf_counter() - started
+
+    # The window runs in real time: 500 more steps of 10 ms take 5 s more, apart from the start. Without a window, less.
+    assert seconds(540, DISPLAY=display) - seconds(40, DISPLAY=display) > 4.5 > seconds(540) - seconds(40)
     result = run("create_robot.py", "numpy", [], 5)
     assert result.returncode == 0 and "no window" in result.stderr
 
