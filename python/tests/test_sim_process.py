@@ -86,8 +86,8 @@ def test_fork(threads, code):
     assert result.stdout.split() == [code, "0.04"], result.stdout + result.stderr
 
 
-@pytest.mark.parametrize("start", ["r = sim.record('file.npz')", "s = sim.serve()", "s = sim.show()"])
-@pytest.mark.parametrize("act", ["sim.update(500)", "sim.destroy()", "del sim, arm"])
+@pytest.mark.parametrize("start", ["keep = sim.record('file.npz')", "keep = sim.serve()", "keep = sim.show()"])
+@pytest.mark.parametrize("act", ["sim.update(500)", "sim.destroy()", "del sim, arm, keep"])
 def test_fork_with_threads_of_recordings_and_viewers(start, act, tmp_path):
     """threads=1 starts no workers, but recordings and viewers have threads, which the child does not have."""
     code = SCENE.format(threads=1) + f"{start}\n" + (

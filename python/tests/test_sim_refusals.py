@@ -81,7 +81,7 @@ def test_masks_select(arm_sim):
     assert arm.qpos_target[1, 5] != 0 and arm.qpos_target[0, 5] == 0
 
 
-def test_none_is_refused_for_fields_that_need_a_value():
+def test_none_is_refused_for_fields_that_need_a_value(tmp_path):
     for make in (
         lambda: ks.SimulationManager({"physics_dt": 0.002}, physics_dt=None),
         lambda: ks.SimulationManager(physics_dt=None),
@@ -92,6 +92,14 @@ def test_none_is_refused_for_fields_that_need_a_value():
         with pytest.raises(ks.ConfigError, match="None"):
             make()
     assert ks.SimulationManager({"threads": 1}, threads=None).physics_dt == 0.01
+    # None replaces the value of a file, too.
+    path = tmp_path / "two.toml"
+    path.write_text("[simulation]\nthreads = 3\nnum_envs = 8\n")
+    assert ks.SimulationManager.from_file(path).threads == 3
+    default = ks.SimulationManager(num_envs=8).threads
+    assert ks.SimulationManager.from_file(path, threads=None).threads == default != 3
+    with pytest.raises(ks.ConfigError, match="None"):
+        ks.SimulationManager.from_file(path, num_envs=None)
     sim = ks.SimulationManager()
     camera = {"type": "camera", "width": 8, "height": 8, "extrinsics": {"parent": None}}
     sim.add_sensor("camera", camera)

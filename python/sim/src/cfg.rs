@@ -230,9 +230,8 @@ pub(crate) fn default_uid(kind: &str) -> String {
 /// Reads a configuration that is not part of scene files.
 pub(crate) fn read<T: DeserializeOwned>(what: &str, cfg: Option<&Bound<'_, PyAny>>) -> PyResult<T> {
     let fields = table(ANY, cfg, None)?;
-    Value::Table(fields)
-        .try_into()
-        .map_err(|error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message())).into())
+    let invalid = |error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message()));
+    Ok(guarded(|| Value::Table(fields).try_into().map_err(invalid))?)
 }
 
 /// Type name of a configuration in scene files: the class attribute `_type` of its dataclass, or its key `type`.
@@ -243,9 +242,14 @@ pub(crate) fn type_of(cfg: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
     cfg.getattr_opt("_type")?.map(|kind| kind.extract()).transpose()
 }
 
-/// Changes fields of a configuration of a simulation.
-pub(crate) fn changed_simulation(cfg: &SimulationManagerCfg, changes: Table) -> Result<SimulationManagerCfg, Failure> {
-    let mut fields = Table::try_from(cfg)?;
+/// Changes the named fields of a configuration of a simulation. A field without a value in `changes` is None.
+pub(crate) fn changed_simulation(
+    cfg: &SimulationManagerCfg,
+    names: &[String],
+    changes: Table,
+) -> Result<SimulationManagerCfg, Failure> {
+    let mut fields = guarded(|| Ok(Table::try_from(cfg)?))?;
+    names.iter().for_each(|name| drop(fields.remove(name)));
     fields.extend(changes);
     simulation(fields)
 }

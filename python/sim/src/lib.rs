@@ -27,7 +27,7 @@ use std::path::PathBuf;
 /// Path of a bundled asset such as ``sr5/SR5.urdf``, searched in the folder ``KINETOSCOPE_ASSETS``, then in the package.
 #[pyfunction]
 fn asset_path(asset: PathBuf) -> PyResult<PathBuf> {
-    Ok(kinetoscope::assets::path(asset).map_err(Failure::from)?)
+    Ok(shared::guarded(|| Ok(kinetoscope::assets::path(asset)?))?)
 }
 
 /// Names the folder of assets of the package.
@@ -52,7 +52,7 @@ fn bundled_robot(name: &str) -> PyResult<String> {
     };
     let robot = robot.map_err(Failure::from)?;
     let scene = kinetoscope::sim::SceneCfg::default().with(robot.uid.clone(), robot);
-    Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default()).map_err(Failure::from)?)
+    Ok(shared::guarded(|| Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default())?))?)
 }
 
 /// Version of the MuJoCo library that is loaded.

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Selection of what is recorded.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -320,13 +320,13 @@ impl Playback {
     /// Times of the frames [s].
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().to_vec()).into_pyarray(py)
+        py.detach(|| self.lock().times().to_vec()).into_pyarray(py)
     }
 
     /// Shows a frame, by its index in ``times``.
     fn seek(&self, py: Python<'_>, frame: usize) -> PyResult<()> {
         self.shared.write(py, |sim| {
-            let mut playback = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut playback = self.lock();
             let count = playback.times().len();
             if frame >= count {
                 return Err(Failure::new(
@@ -340,15 +340,22 @@ impl Playback {
 
     /// Index of the last frame at or before a time [s].
     fn frame_at(&self, py: Python<'_>, time: f64) -> usize {
-        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).frame_at(time))
+        py.detach(|| self.lock().frame_at(time))
     }
 
     fn __len__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().len())
+        py.detach(|| self.lock().times().len())
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
         format!("<Playback of {} frames>", self.__len__(py))
+    }
+}
+
+impl Playback {
+    /// The playback. Its lock is held while a frame is shown, so callers do not hold the interpreter.
+    fn lock(&self) -> MutexGuard<'_, record::Playback> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

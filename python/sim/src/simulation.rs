@@ -59,8 +59,9 @@ impl Simulation {
     ) -> PyResult<Self> {
         let mut scene = detached(py, || Ok(SceneCfg::from_file(path)?))?;
         let changes = cfg::table(cfg::SIMULATION, None, fields)?;
-        if !changes.is_empty() {
-            scene.simulation = cfg::changed_simulation(&scene.simulation, changes)?;
+        if let Some(given) = fields {
+            let names = given.keys().extract::<Vec<String>>()?;
+            scene.simulation = cfg::changed_simulation(&scene.simulation, &names, changes)?;
         }
         Self::of_scene(py, scene)
     }
