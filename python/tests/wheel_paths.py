@@ -1,7 +1,7 @@
 """Paths of the machine that built a wheel, in its files: ``python wheel_paths.py WHEEL [FOLDER ...]``.
 
-Rust puts the paths of source files into panic messages. A wheel is built with ``--remap-path-prefix`` for the checkout and
-for the folder of Cargo. The command lists what is left and then fails. Folders are further prefixes to search for.
+Rust puts the paths of source files into panic messages. A wheel is built with ``--remap-path-prefix`` for the checkout, the
+folder of Cargo, the build folder, and the folder that ``rustc --print sysroot`` prints. The command lists what is left and then fails. Folders are further prefixes to search for.
 """
 
 from __future__ import annotations

@@ -166,6 +166,8 @@ class SimulationManager:
         uid = sensor_cfg.uid or f"camera_{count}"
         fields = camera_cfg(sensor_cfg)
         render = self.cfg.render_cfg
+        if render.renderer not in RENDERERS:
+            raise ConfigError(f"RenderCfg.renderer is {render.renderer!r}; known names: {', '.join(RENDERERS)}")
         fields["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
         return self._register(Camera(self, self.native.add_sensor(uid, fields), sensor_cfg))
 
