@@ -13,7 +13,7 @@ from ...errors import ConfigError
 from .. import unsupported
 from .._tensors import array, tensor
 from ..configclass import MISSING, configclass, fields_of
-from .assets import Articulation, ArticulationCfg, AssetBaseCfg, articulation_fields
+from .assets import Articulation, ArticulationCfg, AssetBaseCfg, articulation_fields, joints_of_file
 from .sensors import Camera, CameraCfg, ContactSensor, ContactSensorCfg, RayCaster, RayCasterCfg, SensorBaseCfg
 from .sim import DistantLightCfg, DomeLightCfg, GroundPlaneCfg, SimulationContext
 
@@ -62,6 +62,10 @@ class InteractiveScene:
         for name, entity in entities.items():
             if isinstance(entity, ArticulationCfg):
                 robot = self.native.add_robot(articulation_fields(name, entity))
+                unnamed = set(robot.joint_names) - set(joints_of_file(entity.spawn.asset_path))
+                if unnamed:
+                    # Their drives would be those of this package.
+                    raise ConfigError(f"{name}: actuators do not know the joints {', '.join(sorted(unnamed))}")
                 self.articulations[name] = Articulation(robot, self._origins, entity)
         for name, entity in entities.items():
             if isinstance(entity, SensorBaseCfg):
