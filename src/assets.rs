@@ -15,6 +15,7 @@ use kinetoscope_scene::pose::from_xyz_rpy;
 use kinetoscope_sim::{DriveCfg, RobotCfg};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Error of [`path`] and of the robots: an asset does not exist.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,12 +42,23 @@ impl std::error::Error for AssetNotFound {}
 /// Returns the path of an asset such as `sr5/SR5.urdf`.
 ///
 /// An absolute path that exists is returned unchanged. Other paths are looked up below the folder `KINETOSCOPE_ASSETS`,
-/// then below the folder that comes with this crate.
+/// then below the folder of [`set_folder`], then below the folder that comes with this crate, unless it is built with the
+/// feature `relocated-assets`.
 ///
 /// # Errors
 /// The asset is in none of these places; the error lists them.
 pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetNotFound> {
-    resolve(asset.as_ref(), std::env::var_os("KINETOSCOPE_ASSETS").map(PathBuf::from))
+    resolve(asset.as_ref(), std::env::var_os("KINETOSCOPE_ASSETS").map(PathBuf::from), INSTALLED.get().cloned())
+}
+
+/// Folder of assets that a program installs with itself.
+static INSTALLED: OnceLock<PathBuf> = OnceLock::new();
+
+/// Names the folder of assets of an installed program, where assets are looked up before the folder of this crate. The
+/// first call counts: returns false if another folder was named before.
+pub fn set_folder(folder: impl Into<PathBuf>) -> bool {
+    let folder = folder.into();
+    *INSTALLED.get_or_init(|| folder.clone()) == folder
 }
 
 /// Quadruped with a free base, standing with bent knees, its base 0.6 m above the origin; drives of 80 N m/rad and 5 N
@@ -128,12 +140,19 @@ const ARM: &str = "JOINT[1-6]";
 /// Pattern of the hand's joints.
 const HAND: &str = "LEFT_.*";
 
-fn resolve(asset: &Path, own: Option<PathBuf>) -> Result<PathBuf, AssetNotFound> {
+/// Folder of this crate. A program for other machines must not contain the path of the machine that builds it.
+fn shipped() -> Option<PathBuf> {
+    #[cfg(feature = "relocated-assets")]
+    return None;
+    #[cfg(not(feature = "relocated-assets"))]
+    Some(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets"))
+}
+
+fn resolve(asset: &Path, own: Option<PathBuf>, installed: Option<PathBuf>) -> Result<PathBuf, AssetNotFound> {
     let tried: Vec<PathBuf> = if asset.is_absolute() {
         vec![asset.to_path_buf()]
     } else {
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
-        own.into_iter().chain([shipped]).map(|folder| folder.join(asset)).collect()
+        own.into_iter().chain(installed).chain(shipped()).map(|folder| folder.join(asset)).collect()
     };
     match tried.iter().find(|place| place.exists()) {
         Some(place) => Ok(place.clone()),

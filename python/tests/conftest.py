@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "needs_seeds: needs the tutorials of EmbodiChain and Orbit in KINETOSCOPE_SEEDS")
+
+
 @pytest.fixture
 def arm_sim():
     """Two environments with the bundled arm."""

@@ -32,8 +32,11 @@ def adapted(source: str, with_torch: bool) -> str:
 
 
 def folder() -> Path:
-    """Folder of the scripts, outside of the project."""
-    return Path(os.environ.get("KINETOSCOPE_SEEDS", Path(__file__).parents[2] / "../shared/seeds"))
+    """Folder of the scripts, outside of the project, from ``KINETOSCOPE_SEEDS``."""
+    named = os.environ.get("KINETOSCOPE_SEEDS")
+    if not named:
+        raise RuntimeError("set KINETOSCOPE_SEEDS to the folder of the tutorials of EmbodiChain and Orbit")
+    return Path(named)
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import kinetoscope as ks
-from kinetoscope import cfg
+from kinetoscope import _sim, cfg
 
 CLASSES = [cls for _, cls in inspect.getmembers(cfg, inspect.isclass) if dataclasses.is_dataclass(cls)]
 ENTITIES = [cls for cls in CLASSES if hasattr(cls, "_type")]
@@ -95,10 +95,34 @@ def test_defaults_are_those_of_rust(cls):
     required = REQUIRED.get(cls.__name__, {})
     default = cls(**required)
     given = all_fields(default)
-    given.pop("uid", None)
+    uid = given.pop("uid", None)
+    if uid is not None:
+        # Scene files name entities by their keys: the default is the name of an entity without one.
+        assert _sim._default_uid(cls._type) == uid
     if cls.__name__ == "TerrainCfg":
         assert given["heights"] == [[0, 0], [0, 0]]
-    assert read(cls, given) == read(cls, dict(required)), cls.__name__
+    found = read(cls, dict(required))
+    assert read(cls, given) == found, cls.__name__
+    # A field that is None here has no value in Rust, or the `false` that stands for None.
+    own = [table for table in tables(found) if set(given) <= set(table)]
+    for field in dataclasses.fields(cls):
+        if getattr(default, field.name) is None:
+            assert any(table.get(field.name, False) is False for table in own), field.name
+
+
+def tables(value):
+    """All dicts in a value."""
+    if isinstance(value, dict):
+        yield value
+    for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from tables(item)
+
+
+@pytest.mark.parametrize("cls", [c for c in ENTITIES if "uid" in c.__dataclass_fields__], ids=lambda c: c.__name__)
+def test_entities_have_default_names(cls):
+    """A control: every entity that is not a sensor has a name, and Rust gives the same."""
+    names = {"robot", "articulation", "rigid_object", "rigid_object_group", "terrain", "mjcf", "weld"}
+    assert cls._type in names and cls().uid == _sim._default_uid(cls._type)
 
 
 def test_every_class_is_tested():
@@ -132,8 +156,6 @@ def test_only_changed_fields_travel():
 
 def test_none_is_never_a_silent_default():
     """A field that is present by default is removed by None, as a keyword argument, in a dict and in a class."""
-    from kinetoscope import _sim
-
     fields = set()
     for cls in CLASSES:
         for field in dataclasses.fields(cls):

@@ -86,6 +86,69 @@ def test_fork(threads, code):
     assert result.stdout.split() == [code, "0.04"], result.stdout + result.stderr
 
 
+@pytest.mark.parametrize("start", ["keep = sim.record('file.npz')", "keep = sim.serve()", "keep = sim.show()"])
+@pytest.mark.parametrize("act", ["sim.update(500)", "sim.destroy()", "del sim, arm, keep"])
+def test_fork_with_threads_of_recordings_and_viewers(start, act, tmp_path):
+    """threads=1 starts no workers, but recordings and viewers have threads, which the child does not have."""
+    code = SCENE.format(threads=1) + f"{start}\n" + (
+        "import os, signal\nsim.update(2)\npid = os.fork()\n"
+        "if pid == 0:\n    signal.alarm(20)\n    code = 3\n"
+        f"    try:\n        {act}\n"
+        "    except ks.ForkError:\n        code = 4\n"
+        "    except BaseException as error:\n        print(repr(error), flush=True)\n        code = 5\n"
+        "    os._exit(code)\n"
+        "print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))\n"
+    )
+    result = python(code, cwd=tmp_path)
+    assert result.stdout == ("3\n" if act.startswith("del") else "4\n"), result.stdout + result.stderr
+
+
+VIEWED = """
+import signal, threading, time
+import kinetoscope as ks
+sim = ks.SimulationManager(num_envs=2, threads=2)
+arm = sim.add_robot(ks.bundled_robot("sr5"))
+server = sim.serve(speed=1e-3)
+signal.alarm(60)
+"""
+
+
+def test_ctrl_c_while_a_viewer_paces():
+    """A viewer waits inside the step, where signals were not handled: a step takes 10 s here."""
+    code = VIEWED + (
+        "import os\n"
+        "sent = []\n"
+        "def kick():\n    time.sleep(1.0)\n    arm.qpos\n    sent.append(time.time())\n    os.kill(os.getpid(), signal.SIGINT)\n"
+        "threading.Thread(target=kick, daemon=True).start()\n"
+        "try:\n    sim.update(100)\nexcept KeyboardInterrupt:\n    print(time.time() - sent[0], sim.time[0])\n"
+    )
+    result = python(code)
+    late, reached = map(float, result.stdout.split())
+    assert late < 0.5 and 0 < reached < 0.05, result.stderr
+
+
+def test_other_threads_use_a_simulation_that_a_viewer_paces():
+    """The lock is not held during the wait: closing the server ends the pace, and the update completes."""
+    code = VIEWED + (
+        "thread = threading.Thread(target=sim.update, args=(20,))\nthread.start()\ntime.sleep(0.5)\n"
+        "assert thread.is_alive() and arm.qpos.shape == (2, 6)\n"
+        "server.close()\nthread.join(20)\nprint(thread.is_alive(), round(sim.time[0], 9))\n"
+    )
+    result = python(code)
+    assert result.stdout == "False 0.2\n", result.stdout + result.stderr
+
+
+def test_pace_of_a_viewer():
+    """50 steps of 10 ms at speed 2 take 0.25 s; without a viewer, much less."""
+    code = VIEWED.replace("speed=1e-3", "speed=2.0") + (
+        "started = time.perf_counter()\nsim.update(50)\nprint(time.perf_counter() - started)\n"
+        "server.close()\nsim.update(1)\nstarted = time.perf_counter()\nsim.update(50)\nprint(time.perf_counter() - started)\n"
+    )
+    paced, free = map(float, python(code).stdout.split())
+    # The first step starts the clock.
+    assert paced > 0.24 and free < paced
+
+
 def test_import_needs_the_library_of_mujoco(tmp_path):
     """Without the package mujoco, or with another version of its library, the error says what to install."""
     (tmp_path / "mujoco").mkdir()

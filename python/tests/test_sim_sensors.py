@@ -113,7 +113,7 @@ def test_images_into_an_array_of_the_caller(scene):
     frozen = np.zeros((N, 30, 40), np.float32)
     frozen.setflags(write=False)
     for wrong in (np.zeros((N, 30, 41), np.float32), np.zeros((N, 30, 40)), frozen, [1]):
-        with pytest.raises(ks.ArgumentError, match="out: expected a writable array of f32"):
+        with pytest.raises(ks.ArgumentError, match="out: expected a writable, aligned array of f32"):
             camera.read("depth", out=wrong)
 
 

@@ -135,7 +135,8 @@ impl Context {
 
     /// A dataclass.
     fn class(&self, known: &Struct, doc: &str, fields: &[Field]) -> String {
-        let mut text = format!("\n\n@dataclass(kw_only=True)\nclass {}:\n{}", known.class, docstring(doc, 4));
+        let mut text =
+            format!("\n\n@dataclass(kw_only=True, slots=True)\nclass {}:\n{}", known.class, docstring(doc, 4));
         if let Some(kind) = known.entity {
             let _ = write!(text, "\n    _type: ClassVar[str] = \"{kind}\"\n");
         }

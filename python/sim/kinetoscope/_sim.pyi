@@ -33,7 +33,9 @@ __all__ = [
     "Window",
     "_NONE_IS_FALSE",
     "__version__",
+    "_default_uid",
     "_panic",
+    "_set_assets",
     "asset_path",
     "bundled_robot",
     "mujoco_version",
@@ -53,6 +55,8 @@ def read_series(
     path: str | os.PathLike[str], topic: str, field: str, env: int | None = None
 ) -> list[_Array]: ...
 def recording_topics(path: str | os.PathLike[str]) -> list[tuple[str, list[str]]]: ...
+def _default_uid(kind: str) -> str: ...
+def _set_assets(folder: str | os.PathLike[str]) -> bool: ...
 def _panic(simulation: SimulationManager, write: bool) -> None: ...
 
 

@@ -9,12 +9,8 @@ from typing import Any
 
 from . import _sim
 from .cfg import RobotCfg
-from .errors import FileError
 
-# In an installed package the files are below this folder; in a source tree, Rust knows their place.
-_FOLDER = Path(__file__).parent / "assets"
-if _FOLDER.is_dir():
-    os.environ.setdefault("KINETOSCOPE_ASSETS", str(_FOLDER))
+_sim._set_assets(Path(__file__).parent / "assets")
 
 
 def asset(path: str | os.PathLike[str]) -> str:
@@ -23,13 +19,7 @@ def asset(path: str | os.PathLike[str]) -> str:
     An existing absolute path is returned unchanged. Other paths are searched below the folder of the environment
     variable ``KINETOSCOPE_ASSETS``, then in the package. A missing asset raises ``FileError``.
     """
-    bundled = _FOLDER / path
-    try:
-        return str(_sim.asset_path(os.fspath(path)))
-    except FileError:
-        if bundled.exists():
-            return str(bundled)
-        raise
+    return str(_sim.asset_path(os.fspath(path)))
 
 
 def bundled_robot(name: str, **fields: Any) -> RobotCfg:

@@ -657,7 +657,7 @@ class RayPattern:
         return {"custom": value}
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Shard:
     """Rank of this process and number of processes that simulate together. Each process has
     ``num_envs`` environments.
@@ -675,7 +675,7 @@ class Shard:
     """Number of processes."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class SurfaceCfg:
     """Surface properties besides color and texture, for rendering only. ``None`` keeps the value of the file or model, or
     MuJoCo's default where these give none.
@@ -714,7 +714,7 @@ class SurfaceCfg:
     """Index of refraction of the inside, 1..=10: 1.5 for glass, 1.33 for water."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class GroundCfg:
     """A ground plane at z = 0."""
 
@@ -733,7 +733,7 @@ class GroundCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LightCfg:
     """Configuration of a light. ``Default`` is a gray (0.8) directional light from above, slightly tilted."""
 
@@ -766,7 +766,7 @@ class LightCfg:
     """True if objects cast shadows in this light."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class SimulationManagerCfg:
     """Configuration of a simulation. ``Default`` has the values of EmbodiChain: 100 Hz, gravity, ground and one light."""
 
@@ -828,7 +828,7 @@ class SimulationManagerCfg:
         return cls(**{"physics_dt": 0.005, "cone": "elliptic", "impratio": 100.0, **fields})
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class HullCfg:
     """Simplification of a convex hull."""
 
@@ -848,7 +848,7 @@ class HullCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ConvexDecompositionCfg:
     """Configuration of the decomposition into convex pieces."""
 
@@ -861,7 +861,7 @@ class ConvexDecompositionCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class NameCaseCfg:
     """Letter case of the names of a merged robot, prefixes and added names included."""
 
@@ -872,7 +872,7 @@ class NameCaseCfg:
     """Case of link names."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ComponentCfg:
     """One URDF file of a robot and its attachment."""
 
@@ -911,7 +911,7 @@ class ComponentCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class UrdfCfg:
     """Robot made of one or several URDF files."""
 
@@ -951,7 +951,7 @@ class UrdfCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class MjcfFile:
     """MJCF file of a robot or articulation: see ``RobotCfg::mjcf``."""
 
@@ -962,7 +962,7 @@ class MjcfFile:
     """MJCF source text, without references to other files. ``None`` reads the file at ``path``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class DcMotor:
     """DC motor with a gear, as in Isaac Lab 2. In all four quadrants of speed and effort, the effort of
     ``IdealPd`` is limited to the range
@@ -981,7 +981,7 @@ class DcMotor:
     """Stall effort [N m or N]. It depends on the motor, so it has no default."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class DriveCfg:
     """Drive properties of a robot. A ``PerJoint`` field is a number for all joints or a map ``{pattern: value}``."""
 
@@ -1026,7 +1026,7 @@ class DriveCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RobotCfg:
     """Configuration of a robot."""
 
@@ -1132,7 +1132,7 @@ class RobotCfg:
     """Settings for the convex hulls of collision meshes."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ArticulationCfg:
     """Configuration of an articulation: a jointed object that is passive by default.
 
@@ -1196,7 +1196,7 @@ class ArticulationCfg:
     """Semantic class in the table of mask ids; ``None`` for ``articulation``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RigidObjectCfg:
     """Configuration of a rigid object."""
 
@@ -1274,7 +1274,7 @@ class RigidObjectCfg:
     """Semantic class in the table of mask ids; ``None`` for ``object``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RigidObjectGroupCfg:
     """Configuration of a group of rigid objects."""
 
@@ -1289,7 +1289,7 @@ class RigidObjectGroupCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RoughTerrain:
     """Terrain with independent random heights at its points. Every multiple of ``step`` within the range is equally likely.
 
@@ -1312,7 +1312,7 @@ class RoughTerrain:
     """Seed. Equal seeds give the same heights, bit for bit, on every machine."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class SlopeTerrain:
     """An inclined plane: height 0 at the center, rising along x and y."""
 
@@ -1326,7 +1326,7 @@ class SlopeTerrain:
     """Rise per meter along x and y: the tangent of the angle."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class PyramidStairsTerrain:
     """Stairs from all four sides up (or down) to a platform at the center, which is square if the field is.
 
@@ -1349,7 +1349,7 @@ class PyramidStairsTerrain:
     """Smallest side of the platform [m]. The platform is larger if the rest is not a whole number of treads."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class TerrainCfg:
     """Configuration of a terrain: a height field that is fixed in every environment.
 
@@ -1394,7 +1394,7 @@ class TerrainCfg:
     """Surface properties besides the color, for rendering only."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class MjcfPartCfg:
     """Configuration of an MJCF file as a part of a scene.
 
@@ -1427,7 +1427,7 @@ class MjcfPartCfg:
     """Semantic class in the table of mask ids; ``None`` for ``mjcf``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class WeldCfg:
     """Configuration of a weld. It does not hold until it is attached."""
 
@@ -1445,7 +1445,7 @@ class WeldCfg:
     """Second body, named like the first."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class NoiseCfg:
     """Noise of the numbers of one channel, independent for each number: ``round(value + bias + std * n)``, with n standard
     normal. All parameters are 0 to 1e100. In a channel with bounds, such as distances, noisy values are clamped to the
@@ -1469,7 +1469,7 @@ class NoiseCfg:
     """Quantization step: values are rounded to multiples of this, in the unit of the channel; 0 for no rounding."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class SamplingCfg:
     """Rate, history, latency, dropout and noise of a sensor. ``Default`` is a perfect sensor that measures every step."""
 
@@ -1507,7 +1507,7 @@ class SamplingCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Shutter:
     """Rolling shutter with an exposure time: each row of pixels is read ``row_time`` after the row above it, and each
     collects light for ``exposure_time`` before it is read. The last row is read at the time stamp of the image, so
@@ -1530,7 +1530,7 @@ class Shutter:
     """Exposure time of each row [s]."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Aperture:
     """Aperture of a thin lens: surfaces away from the focus distance are blurred.
 
@@ -1554,7 +1554,7 @@ class Aperture:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RasterCfg:
     """Options of a renderer. The rasterizer uses all of them except ``occlusion_rays``; each field names its exceptions for
     the other renderers.
@@ -1619,7 +1619,7 @@ class RasterCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class OpenCvLens:
     """A pinhole with OpenCV's distortion: with (x, y) = (X / Z, Y / Z) and r² = x² + y² the normalized image has
 
@@ -1688,7 +1688,7 @@ class OpenCvLens:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class OpenCvFisheyeLens:
     """Coefficients of OpenCV's fisheye lens: r = theta (1 + k1 theta² + k2 theta⁴ + k3 theta⁶ + k4 theta⁸), with r in the
     normalized image. Focal lengths and principal point are in ``Intrinsics``. Calibration files of
@@ -1717,7 +1717,7 @@ class OpenCvFisheyeLens:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class FThetaLens:
     """NVIDIA's f-theta lens: theta = a + b r + c r² + d r³ + e r⁴ + f r⁵ [rad], where r is the distance from the
     principal point in pixels of the calibration image.
@@ -1744,7 +1744,7 @@ class FThetaLens:
     """Largest visible angle from the optical axis [rad]: half of Isaac's ``fisheye_max_fov``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Extrinsics:
     """Pose of a camera relative to a body or to the environment."""
 
@@ -1762,7 +1762,7 @@ class Extrinsics:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class CameraCfg:
     """Configuration of a ``Camera``."""
 
@@ -1878,7 +1878,7 @@ class CameraCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class StereoCameraCfg:
     """Configuration of a ``StereoCamera``: a camera, and the differences of its right camera."""
 
@@ -1923,7 +1923,7 @@ class StereoCameraCfg:
     """Point of the rig that the extrinsics place."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class GridPattern:
     """Parallel rays over a rectangle in the xy plane around the sensor, as in height scanners.
 
@@ -1947,7 +1947,7 @@ class GridPattern:
     """Centers the rays at the sensor for any size."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LidarPattern:
     """A spinning lidar with channels at equal steps of elevation. Each channel is a ring of rays at equal steps of
     azimuth. The rays are ordered by channel, and the azimuth changes fastest.
@@ -1969,7 +1969,7 @@ class LidarPattern:
     """Angle between neighboring azimuths [deg]."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class BpearlPattern:
     """The hemispherical lidar RS-Bpearl, with its dome along z (on robots it is mounted upside down or tilted: rotate the
     sensor). There are 32 beams at each azimuth; the beams of an azimuth are consecutive.
@@ -1985,7 +1985,7 @@ class BpearlPattern:
     """Elevations of the beams [deg]: 0 is in the xy plane, 90 is along +z."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class PinholePattern:
     """One ray through the center of every pixel of a pinhole camera that looks along x with z up, row by row from the top
     left.
@@ -2001,7 +2001,7 @@ class PinholePattern:
     """Focal lengths and principal point."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class CustomPattern:
     """User-defined rays, in the frame of the sensor; both lists have the same length."""
 
@@ -2012,7 +2012,7 @@ class CustomPattern:
     """Directions of the rays, of any length except zero."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RayCasterCfg:
     """Configuration of a ``RayCaster``.
 
@@ -2070,7 +2070,7 @@ class RayCasterCfg:
     """Shows a red ball at every hit (``Sensor::markers``)."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RayCasterCameraCfg:
     """Configuration of a ``RayCasterCamera``: a pinhole camera that casts one ray through the center of every pixel.
 
@@ -2120,7 +2120,7 @@ class RayCasterCameraCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ContactSensorCfg:
     """Configuration of a ``ContactSensor``."""
 
@@ -2172,7 +2172,7 @@ class ContactSensorCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ImuCfg:
     """Configuration of an ``Imu``."""
 
@@ -2202,7 +2202,7 @@ class ImuCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class TargetFrameCfg:
     """A target frame, or a target frame on each of several bodies."""
 
@@ -2220,7 +2220,7 @@ class TargetFrameCfg:
     """Pose of the frame in the frame of its body."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class FrameTransformerCfg:
     """Configuration of a ``FrameTransformer``."""
 
@@ -2244,7 +2244,7 @@ class FrameTransformerCfg:
     """Shows the axes of source and targets (``Sensor::markers``)."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class JointStateCfg:
     """Configuration of a ``JointState`` sensor."""
 
@@ -2259,7 +2259,7 @@ class JointStateCfg:
     """Rate, history, latency, dropout and noise; the channels are ``positions``, ``velocities`` and ``efforts``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ActuatorStateCfg:
     """Configuration of an ``ActuatorState`` sensor."""
 
@@ -2275,7 +2275,7 @@ class ActuatorStateCfg:
     """Rate, history, latency, dropout and noise; the channels are ``controls``, ``forces`` and ``activations``."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class JointWrenchCfg:
     """Configuration of a ``JointWrench`` sensor."""
 
@@ -2302,7 +2302,7 @@ class JointWrenchCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class MujocoSensorCfg:
     """Selection of MuJoCo's own sensors that a ``MujocoSensor`` reads, and their sampling."""
 
@@ -2319,7 +2319,7 @@ class MujocoSensorCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class NullSpacePosture:
     """Preferred joint positions, for joints that the target leaves free (null-space posture)."""
 
@@ -2333,7 +2333,7 @@ class NullSpacePosture:
     """Fraction of the remaining distance to the posture that one step covers, above 0 and at most 1."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class IkCfg:
     """Settings of an inverse-kinematics solver; see ``IkSolver``."""
 
@@ -2370,7 +2370,7 @@ class IkCfg:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RandomizationTerm:
     """One random operation on one property, for all names that a pattern matches."""
 
@@ -2386,7 +2386,7 @@ class RandomizationTerm:
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Randomization:
     """Randomization of the properties of environments."""
 

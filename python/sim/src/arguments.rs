@@ -1,10 +1,11 @@
 //! Arguments of calls: arrays, environments, joints, links.
 
 use crate::errors::{Class, Failure};
+use crate::shared::Shared;
 use kinetoscope::ndarray::{Array, ArrayD, Axis, Dimension};
 use kinetoscope::robot::description::LinkId;
 use kinetoscope::sim::{EnvId, JointIndex, RobotId, SimulationManager};
-use numpy::{PyArray, PyArray1, PyArrayDyn, PyArrayMethods};
+use numpy::{PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyInt, PyList, PyString, PyTuple};
@@ -12,11 +13,22 @@ use pyo3::types::{PyBool, PyDict, PyInt, PyList, PyString, PyTuple};
 /// Numbers of an argument: an array, a list, a tensor, anything that NumPy accepts. Missing leading axes are added, so
 /// that one row stands for all environments.
 pub(crate) fn array<D: Dimension>(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Array<f64, D>> {
-    if let Ok(array) = obj.cast::<PyArray<f64, D>>() {
+    if let Ok(array) = obj.cast::<PyArray<f64, D>>()
+        && is_plain(array)
+    {
         return copy(array, name);
     }
-    let converted = numpy(obj, name, "float64")?;
-    let converted = converted.cast::<PyArrayDyn<f64>>().map_err(|error| Failure::argument(name, error))?;
+    let mut converted = numpy(obj, name, "float64")?;
+    let axes = converted.getattr("ndim")?.extract::<usize>()?;
+    if axes >= MAX_AXES {
+        return Err(Failure::argument(name, format!("the array has {axes} axes; at most 3 have a meaning")).into());
+    }
+    let mut array = converted.cast::<PyArrayDyn<f64>>().map_err(|error| Failure::argument(name, error))?;
+    if !is_plain(array) {
+        converted = array.call_method0("copy")?;
+        array = converted.cast::<PyArrayDyn<f64>>().map_err(|error| Failure::argument(name, error))?;
+    }
+    let converted = array;
     let mut values: ArrayD<f64> = copy(converted, name)?;
     let axes = D::NDIM.unwrap_or(values.ndim());
     let shape = values.shape().to_vec();
@@ -25,6 +37,16 @@ pub(crate) fn array<D: Dimension>(obj: &Bound<'_, PyAny>, name: &str) -> PyResul
     }
     let wrong = |_| Failure::argument(name, format!("the shape {shape:?} has too many axes; expected {axes}"));
     Ok(values.into_dimensionality::<D>().map_err(wrong)?)
+}
+
+/// Number of axes from which on arrays are refused. The array type of Rust panics above 32.
+const MAX_AXES: usize = 32;
+
+/// True if the array has the form that the array type of Rust assumes: an aligned address, strides that are multiples
+/// of the size of an element (those of a field of a packed structured array are not), and few axes.
+pub(crate) fn is_plain<T: numpy::Element, D: Dimension>(array: &Bound<'_, PyArray<T, D>>) -> bool {
+    let size = size_of::<T>() as isize;
+    array.ndim() < MAX_AXES && array.data().is_aligned() && array.strides().iter().all(|stride| stride % size == 0)
 }
 
 fn copy<D: Dimension>(array: &Bound<'_, PyArray<f64, D>>, name: &str) -> PyResult<Array<f64, D>> {
@@ -44,8 +66,31 @@ fn numpy<'py>(obj: &Bound<'py, PyAny>, name: &str, dtype: &str) -> PyResult<Boun
     asarray.call((obj,), Some(&options)).map_err(|error| Failure::argument(name, error.value(py)).into())
 }
 
+/// Indices, or a mask of the items that are selected.
+#[derive(Debug)]
+pub(crate) enum Indices {
+    Ids(Vec<usize>),
+    /// Shape and entries of an array of booleans.
+    Mask(Vec<usize>, Vec<bool>),
+}
+
+impl Indices {
+    /// Selected indices. A mask must have one entry for each of `count` items.
+    pub(crate) fn resolve(&self, name: &str, count: usize) -> Result<Vec<usize>, Failure> {
+        match self {
+            Self::Ids(ids) => Ok(ids.clone()),
+            Self::Mask(shape, mask) if *shape == [count] => {
+                Ok(mask.iter().enumerate().filter(|(_, chosen)| **chosen).map(|(index, _)| index).collect())
+            }
+            Self::Mask(shape, _) => {
+                Err(Failure::argument(name, format!("the mask has the shape {shape:?}; expected [{count}]")))
+            }
+        }
+    }
+}
+
 /// Indices of an argument: a number, a list, an array, or an array of booleans that selects them.
-pub(crate) fn indices(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> {
+pub(crate) fn indices(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Indices> {
     let plain = |item: &Bound<'_, PyAny>| item.is_instance_of::<PyInt>() && !item.is_instance_of::<PyBool>();
     let index = |item: Bound<'_, PyAny>| {
         item.extract::<usize>().map_err(|_| {
@@ -53,24 +98,27 @@ pub(crate) fn indices(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>
         })
     };
     if plain(obj) {
-        return Ok(vec![index(obj.clone())?]);
+        return Ok(Indices::Ids(vec![index(obj.clone())?]));
     }
     if let Ok(list) = obj.cast::<PyList>()
         && list.iter().all(|item| plain(&item))
     {
-        return list.iter().map(index).collect();
+        return list.iter().map(index).collect::<PyResult<_>>().map(Indices::Ids);
     }
     if let Ok(tuple) = obj.cast::<PyTuple>()
         && tuple.iter().all(|item| plain(&item))
     {
-        return tuple.iter().map(index).collect();
+        return tuple.iter().map(index).collect::<PyResult<_>>().map(Indices::Ids);
     }
     let array = numpy(obj, name, "")?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let array = match kind.as_str() {
-        "b" => array.call_method0("ravel")?.call_method0("nonzero")?.get_item(0)?,
+        "b" => {
+            let shape = array.getattr("shape")?.extract()?;
+            return Ok(Indices::Mask(shape, array.call_method0("ravel")?.call_method0("tolist")?.extract()?));
+        }
         "i" | "u" => array.call_method0("ravel")?,
-        _ if array.getattr("size")?.extract::<usize>()? == 0 => return Ok(Vec::new()),
+        _ if array.getattr("size")?.extract::<usize>()? == 0 => return Ok(Indices::Ids(Vec::new())),
         _ => {
             let message = format!("expected indices (whole numbers) or booleans, not {}", obj.get_type().name()?);
             return Err(Failure::argument(name, message).into());
@@ -82,25 +130,29 @@ pub(crate) fn indices(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>
         Failure::new(Class::OutOfRange, format!("{name}: {index} is not an index; indices start at 0")).into()
     };
     let numbers = array.try_readonly().map_err(|error| Failure::argument(name, error))?;
-    numbers.as_array().iter().map(|&i| usize::try_from(i).map_err(|_| out_of_range(i))).collect()
+    let numbers = numbers.as_array();
+    let ids = numbers.iter().map(|&i| usize::try_from(i).map_err(|_| out_of_range(i)));
+    ids.collect::<PyResult<_>>().map(Indices::Ids)
 }
 
 /// Environments of an argument; `None` for all.
-pub(crate) fn envs(obj: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<EnvId>>> {
+pub(crate) fn envs(shared: &Shared, obj: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<EnvId>>> {
     let Some(obj) = obj.filter(|obj| !obj.is_none()) else { return Ok(None) };
-    Ok(Some(indices(obj, "env_ids")?.into_iter().map(EnvId).collect()))
+    let ids = indices(obj, "env_ids")?.resolve("env_ids", shared.num_envs())?;
+    Ok(Some(ids.into_iter().map(EnvId).collect()))
 }
 
 /// Indices of environments, for sensors.
-pub(crate) fn env_indices(obj: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<usize>>> {
-    Ok(envs(obj)?.map(|ids| ids.into_iter().map(|id| id.0).collect()))
+pub(crate) fn env_indices(shared: &Shared, obj: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<usize>>> {
+    Ok(envs(shared, obj)?.map(|ids| ids.into_iter().map(|id| id.0).collect()))
 }
 
 /// Joints or links of an argument.
 #[derive(Debug)]
 pub(crate) enum Selection {
     All,
-    Ids(Vec<usize>),
+    /// Indices or a mask, and the name of the argument.
+    Ids(Indices, String),
     /// Name of a control part.
     Part(String),
     Patterns(Vec<String>),
@@ -118,14 +170,16 @@ impl Selection {
         if texts {
             return obj.extract().map(Self::Patterns);
         }
-        indices(obj, name).map(Self::Ids)
+        Ok(Self::Ids(indices(obj, name)?, name.into()))
     }
 
     /// Joints of a robot: a text is a control part, a list of texts are patterns of joint names.
     pub(crate) fn joints(&self, sim: &SimulationManager, robot: RobotId) -> Result<Option<Vec<JointIndex>>, Failure> {
         Ok(match self {
             Self::All => None,
-            Self::Ids(ids) => Some(ids.iter().map(|&id| JointIndex(id)).collect()),
+            Self::Ids(ids, name) => {
+                Some(ids.resolve(name, sim.robot(robot).dof())?.into_iter().map(JointIndex).collect())
+            }
             Self::Part(part) => Some(sim.robot(robot).joint_ids(part.as_str())?),
             Self::Patterns(patterns) => Some(sim.robot(robot).find_joints(patterns)?),
         })
@@ -135,7 +189,9 @@ impl Selection {
     pub(crate) fn links(&self, sim: &SimulationManager, robot: RobotId) -> Result<Option<Vec<LinkId>>, Failure> {
         Ok(match self {
             Self::All => None,
-            Self::Ids(ids) => Some(ids.iter().map(|&id| LinkId(id)).collect()),
+            Self::Ids(ids, name) => {
+                Some(ids.resolve(name, sim.robot(robot).link_names().len())?.into_iter().map(LinkId).collect())
+            }
             Self::Part(pattern) => Some(sim.robot(robot).find_links(&[pattern])?),
             Self::Patterns(patterns) => Some(sim.robot(robot).find_links(patterns)?),
         })

@@ -4,8 +4,9 @@
 //! So Python accepts what scene files accept, with the same error messages.
 
 use crate::errors::{Class, Failure};
-use kinetoscope::prelude::{EntityCfg, SceneCfg};
-use kinetoscope::sim::{EntityTypes, SimulationManagerCfg};
+use crate::shared::guarded;
+use kinetoscope::prelude::{ArticulationCfg, EntityCfg, MjcfPartCfg, RigidObjectCfg, RobotCfg, SceneCfg, TerrainCfg};
+use kinetoscope::sim::{EntityTypes, RigidObjectGroupCfg, SimulationManagerCfg, WeldCfg};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple, PyType};
 use serde::de::DeserializeOwned;
@@ -18,17 +19,33 @@ pub(crate) const PYTHON: &str = "<python>";
 /// compares the list with the classes.
 pub(crate) const NONE_IS_FALSE: [&str; 2] = ["ground", "min_thickness"];
 
+/// Type of the configuration of a simulation, for [`table`].
+pub(crate) const SIMULATION: &str = "simulation";
+/// Type of a configuration that is part of another, or that is not known, for [`table`].
+pub(crate) const ANY: &str = "";
+
 /// Value of Python's `None` for a field of a dict or a keyword argument; `None` if the field is left out.
-fn none_value(field: &str) -> Option<Value> {
-    NONE_IS_FALSE.contains(&field).then_some(Value::Boolean(false))
+///
+/// # Errors
+/// The field needs a value: `None` would be a silent default.
+fn none_value(py: Python<'_>, kind: &str, field: &str, path: &str) -> PyResult<Option<Value>> {
+    if NONE_IS_FALSE.contains(&field) {
+        return Ok(Some(Value::Boolean(false)));
+    }
+    let optional = py.import("kinetoscope._optional")?.getattr("is_optional")?.call1((kind, field))?;
+    if optional.extract::<bool>()? {
+        return Ok(None);
+    }
+    Err(invalid(path, "None is not a value of this field; leave it out for its default"))
 }
 
 /// Largest depth of nested values; a structure that contains itself has no end.
 const MAX_DEPTH: usize = 64;
 
 /// Converts the fields of a configuration: of a dataclass, those that differ from their defaults; of a mapping, all.
-pub(crate) fn table(cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Table> {
-    let mut table = match cfg.map(|cfg| value(cfg, "", 0)).transpose()? {
+/// `kind` is the type of the configuration, [`SIMULATION`] or [`ANY`].
+pub(crate) fn table(kind: &str, cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Table> {
+    let mut table = match cfg.map(|cfg| value(cfg, kind, "", 0)).transpose()? {
         None | Some(None) => Table::new(),
         Some(Some(Value::Table(table))) => table,
         Some(Some(_)) => {
@@ -39,7 +56,11 @@ pub(crate) fn table(cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, Py
     };
     for (name, field) in fields.into_iter().flatten() {
         let name: String = name.extract()?;
-        match value(&field, &name, 0)?.or_else(|| none_value(&name)) {
+        let given = match value(&field, ANY, &name, 0)? {
+            None => none_value(field.py(), kind, &name, &name)?,
+            given => given,
+        };
+        match given {
             Some(given) => table.insert(name, given),
             None => table.remove(&name),
         };
@@ -47,8 +68,8 @@ pub(crate) fn table(cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, Py
     Ok(table)
 }
 
-/// Converts a value; `None` for Python's `None`. `path` names it in errors.
-fn value(obj: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Option<Value>> {
+/// Converts a value; `None` for Python's `None`. `kind` is the type of a dict, `path` names the value in errors.
+fn value(obj: &Bound<'_, PyAny>, kind: &str, path: &str, depth: usize) -> PyResult<Option<Value>> {
     if depth > MAX_DEPTH {
         return Err(invalid(path, "the configuration is nested too deeply, or contains itself"));
     }
@@ -82,23 +103,27 @@ fn value(obj: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Option<Va
         for item in mapping.items()?.iter() {
             let (key, entry): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
             let key: String = key.extract().map_err(|_| invalid(path, "the keys of a dict must be strings"))?;
-            let entry = value(&entry, &join(path, &key), depth + 1)?.or_else(|| none_value(&key));
+            let path = join(path, &key);
+            let entry = match value(&entry, ANY, &path, depth + 1)? {
+                None => none_value(obj.py(), kind, &key, &path)?,
+                entry => entry,
+            };
             entry.into_iter().for_each(|entry| drop(table.insert(key.clone(), entry)));
         }
         return Ok(Some(Value::Table(table)));
     }
     // Paths, NumPy arrays and scalars, tensors, members of enumerations.
     if obj.hasattr("__fspath__")? {
-        return value(&obj.call_method0("__fspath__")?, path, depth + 1);
+        return value(&obj.call_method0("__fspath__")?, ANY, path, depth + 1);
     }
     if obj.hasattr("tolist")? {
-        return value(&obj.call_method0("tolist")?, path, depth + 1);
+        return value(&obj.call_method0("tolist")?, ANY, path, depth + 1);
     }
     if obj.hasattr("__array__")? {
-        return value(&obj.call_method0("__array__")?.call_method0("tolist")?, path, depth + 1);
+        return value(&obj.call_method0("__array__")?.call_method0("tolist")?, ANY, path, depth + 1);
     }
     if obj.hasattr("value")? {
-        return value(&obj.getattr("value")?, path, depth + 1);
+        return value(&obj.getattr("value")?, ANY, path, depth + 1);
     }
     let found = obj.get_type().name()?;
     Err(invalid(path, &format!("{found} is not a number, text, list, dict or configuration")))
@@ -117,7 +142,7 @@ fn dataclass(obj: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Table
         if default.as_ref().is_some_and(|default| is_same(&own, default)) {
             continue;
         }
-        let converted = value(&own, &join(path, &name), depth + 1)?;
+        let converted = value(&own, ANY, &join(path, &name), depth + 1)?;
         if let Some(converted) = converted.or_else(|| default.map(|_| Value::Boolean(false))) {
             table.insert(name, converted);
         }
@@ -144,7 +169,7 @@ fn is_same(own: &Bound<'_, PyAny>, default: &Bound<'_, PyAny>) -> bool {
 fn sequence<'py>(items: impl Iterator<Item = Bound<'py, PyAny>>, path: &str, depth: usize) -> PyResult<Value> {
     let convert = |(index, item): (usize, Bound<'py, PyAny>)| {
         let path = format!("{path}[{index}]");
-        value(&item, &path, depth + 1)?.ok_or_else(|| invalid(&path, "a list cannot contain None"))
+        value(&item, ANY, &path, depth + 1)?.ok_or_else(|| invalid(&path, "a list cannot contain None"))
     };
     items.enumerate().map(convert).collect::<PyResult<Vec<Value>>>().map(Value::Array)
 }
@@ -160,8 +185,10 @@ fn invalid(path: &str, problem: &str) -> PyErr {
 
 /// Reads the text of a scene file that came from Python. Relative paths are relative to the working folder.
 pub(crate) fn scene(document: &Table) -> Result<SceneCfg, Failure> {
-    let text = toml::to_string(document)?;
-    Ok(SceneCfg::from_toml(&text, PYTHON, &EntityTypes::default())?)
+    guarded(|| {
+        let text = toml::to_string(document)?;
+        Ok(SceneCfg::from_toml(&text, PYTHON, &EntityTypes::default())?)
+    })
 }
 
 /// Reads the configuration of a simulation.
@@ -178,7 +205,7 @@ pub(crate) fn entity(kind: &str, name: Option<String>, mut fields: Table) -> Res
         Some(Value::String(uid)) => Some(uid),
         Some(other) => return Err(Failure::new(Class::Config, format!("uid: expected a text, not {other}"))),
     };
-    let name = name.or(uid).unwrap_or_else(|| kind.to_string());
+    let name = name.or(uid).unwrap_or_else(|| default_uid(kind));
     fields.insert("type".into(), Value::String(kind.into()));
     let entities = Table::from_iter([(name.clone(), Value::Table(fields))]);
     let document = Table::from_iter([("entities".to_string(), Value::Table(entities))]);
@@ -186,12 +213,25 @@ pub(crate) fn entity(kind: &str, name: Option<String>, mut fields: Table) -> Res
     Ok((name, cfg))
 }
 
+/// Name of an entity without one: the default of its configuration, as in the classes of Python.
+pub(crate) fn default_uid(kind: &str) -> String {
+    match kind {
+        "robot" => RobotCfg::default().uid,
+        "articulation" => ArticulationCfg::default().uid,
+        "rigid_object" => RigidObjectCfg::default().uid,
+        "rigid_object_group" => RigidObjectGroupCfg::default().uid,
+        "terrain" => TerrainCfg::default().uid,
+        "mjcf" => MjcfPartCfg::default().uid,
+        "weld" => WeldCfg::default().uid,
+        other => other.into(),
+    }
+}
+
 /// Reads a configuration that is not part of scene files.
 pub(crate) fn read<T: DeserializeOwned>(what: &str, cfg: Option<&Bound<'_, PyAny>>) -> PyResult<T> {
-    let fields = table(cfg, None)?;
-    Value::Table(fields)
-        .try_into()
-        .map_err(|error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message())).into())
+    let fields = table(ANY, cfg, None)?;
+    let invalid = |error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message()));
+    Ok(guarded(|| Value::Table(fields).try_into().map_err(invalid))?)
 }
 
 /// Type name of a configuration in scene files: the class attribute `_type` of its dataclass, or its key `type`.
@@ -202,16 +242,21 @@ pub(crate) fn type_of(cfg: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
     cfg.getattr_opt("_type")?.map(|kind| kind.extract()).transpose()
 }
 
-/// Changes fields of a configuration of a simulation.
-pub(crate) fn changed_simulation(cfg: &SimulationManagerCfg, changes: Table) -> Result<SimulationManagerCfg, Failure> {
-    let mut fields = Table::try_from(cfg)?;
+/// Changes the named fields of a configuration of a simulation. A field without a value in `changes` is None.
+pub(crate) fn changed_simulation(
+    cfg: &SimulationManagerCfg,
+    names: &[String],
+    changes: Table,
+) -> Result<SimulationManagerCfg, Failure> {
+    let mut fields = guarded(|| Ok(Table::try_from(cfg)?))?;
+    names.iter().for_each(|name| drop(fields.remove(name)));
     fields.extend(changes);
     simulation(fields)
 }
 
 /// Table of a scene from a dict: entities may be configurations with a type, whose `uid` is replaced by the name.
 pub(crate) fn scene_table(scene: &Bound<'_, PyAny>) -> PyResult<Table> {
-    let mut document = table(Some(scene), None)?;
+    let mut document = table(ANY, Some(scene), None)?;
     let entities = scene.get_item("entities").ok();
     if let (Some(Value::Table(converted)), Some(entities)) = (document.get_mut("entities"), entities) {
         for item in entities.cast::<PyMapping>()?.items()?.iter() {

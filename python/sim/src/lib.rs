@@ -24,10 +24,16 @@ use errors::Failure;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// Path of a bundled asset such as ``sr5/SR5.urdf``, searched in the folder ``KINETOSCOPE_ASSETS`` first.
+/// Path of a bundled asset such as ``sr5/SR5.urdf``, searched in the folder ``KINETOSCOPE_ASSETS``, then in the package.
 #[pyfunction]
 fn asset_path(asset: PathBuf) -> PyResult<PathBuf> {
-    Ok(kinetoscope::assets::path(asset).map_err(Failure::from)?)
+    Ok(shared::guarded(|| Ok(kinetoscope::assets::path(asset)?))?)
+}
+
+/// Names the folder of assets of the package.
+#[pyfunction]
+fn _set_assets(folder: PathBuf) -> bool {
+    kinetoscope::assets::set_folder(folder)
 }
 
 /// Configuration of a bundled robot as the text of a scene file with this one entity.
@@ -46,13 +52,19 @@ fn bundled_robot(name: &str) -> PyResult<String> {
     };
     let robot = robot.map_err(Failure::from)?;
     let scene = kinetoscope::sim::SceneCfg::default().with(robot.uid.clone(), robot);
-    Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default()).map_err(Failure::from)?)
+    Ok(shared::guarded(|| Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default())?))?)
 }
 
 /// Version of the MuJoCo library that is loaded.
 #[pyfunction]
 fn mujoco_version() -> String {
     kinetoscope::mujoco::version_string()
+}
+
+/// Name of an entity without one, by its type in scene files.
+#[pyfunction]
+fn _default_uid(kind: &str) -> String {
+    cfg::default_uid(kind)
 }
 
 /// Panics, to test that a panic becomes an ``InternalError``.
@@ -91,6 +103,8 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::to_toml, module)?)?;
     module.add_function(wrap_pyfunction!(recording::read_series, module)?)?;
     module.add_function(wrap_pyfunction!(recording::recording_topics, module)?)?;
+    module.add_function(wrap_pyfunction!(_set_assets, module)?)?;
+    module.add_function(wrap_pyfunction!(_default_uid, module)?)?;
     module.add_function(wrap_pyfunction!(_panic, module)?)?;
     module.add("_NONE_IS_FALSE", cfg::NONE_IS_FALSE.to_vec())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -89,7 +89,7 @@ impl RigidObject {
     ) -> PyResult<()> {
         let force = array::<Ix2>(force, "set_external_wrench, force")?;
         let torque = array::<Ix2>(torque, "set_external_wrench, torque")?;
-        let (frame, env_ids, id) = (wrench_frame(frame)?, envs(env_ids)?, self.id);
+        let (frame, env_ids, id) = (wrench_frame(frame)?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| {
             Ok(sim.rigid_object_mut(id).set_external_wrench(&force, &torque, frame, env_ids.as_deref())?)
         })
@@ -328,12 +328,15 @@ impl MjcfPart {
         actuators: Option<&Bound<'_, PyAny>>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (values, env_ids, id) = (array::<Ix2>(values, "set_ctrl")?, envs(env_ids)?, self.id);
+        let (values, env_ids, id) = (array::<Ix2>(values, "set_ctrl")?, envs(&self.shared, env_ids)?, self.id);
         let actuators = actuators.map(|actuators| indices(actuators, "actuators")).transpose()?;
-        let actuators: Option<Vec<ActuatorIndex>> =
-            actuators.map(|actuators| actuators.into_iter().map(ActuatorIndex).collect());
-        self.shared
-            .write(py, |sim| Ok(sim.mjcf_part_mut(id).set_ctrl(&values, actuators.as_deref(), env_ids.as_deref())?))
+        self.shared.write(py, |sim| {
+            let count = sim.mjcf_part(id).actuator_names().len();
+            let actuators = actuators.map(|actuators| actuators.resolve("actuators", count)).transpose()?;
+            let actuators: Option<Vec<ActuatorIndex>> =
+                actuators.map(|actuators| actuators.into_iter().map(ActuatorIndex).collect());
+            Ok(sim.mjcf_part_mut(id).set_ctrl(&values, actuators.as_deref(), env_ids.as_deref())?)
+        })
     }
 
     /// Writes poses of a mocap body, rows x y z qw qx qy qz.
@@ -345,7 +348,7 @@ impl MjcfPart {
         values: &Bound<'_, PyAny>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (values, env_ids, id) = (array::<Ix2>(values, "write_mocap_pose")?, envs(env_ids)?, self.id);
+        let (values, env_ids, id) = (array::<Ix2>(values, "write_mocap_pose")?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| Ok(sim.mjcf_part_mut(id).write_mocap_pose(body, &values, env_ids.as_deref())?))
     }
 
@@ -382,14 +385,14 @@ impl Weld {
     /// Welds the bodies in their current relative pose.
     #[pyo3(signature = (env_ids=None))]
     fn attach(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let (env_ids, id) = (envs(env_ids)?, self.id);
+        let (env_ids, id) = (envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| Ok(sim.weld_mut(id).attach(env_ids.as_deref())?))
     }
 
     /// Releases the bodies.
     #[pyo3(signature = (env_ids=None))]
     fn release(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let (env_ids, id) = (envs(env_ids)?, self.id);
+        let (env_ids, id) = (envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| Ok(sim.weld_mut(id).release(env_ids.as_deref())?))
     }
 

@@ -2,7 +2,7 @@
 
 use crate::arguments::envs;
 use crate::errors::{Class, Failure};
-use crate::shared::{Entity, Shared};
+use crate::shared::{Entity, Shared, detached};
 use crate::simulation::Simulation;
 use kinetoscope::prelude::Record as _;
 use kinetoscope::record::{self, FieldSelector, Format, OverviewCfg, RecorderCfg, RecorderId, Recording};
@@ -11,7 +11,8 @@ use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Selection of what is recorded.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -98,6 +99,8 @@ pub(crate) struct Recorder {
     shared: Arc<Shared>,
     id: RecorderId,
     path: PathBuf,
+    /// True after `finish`.
+    finished: AtomicBool,
 }
 
 /// Summary of a finished recording.
@@ -126,7 +129,12 @@ impl RecordingSummary {
 
 impl Recorder {
     fn finish_once(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
-        let summary = self.shared.write(py, |sim| Ok(sim.finish_recording(self.id)?))?;
+        let summary = self.shared.write(py, |sim| {
+            let finished = sim.finish_recording(self.id);
+            // Also after an error: the recorder is gone.
+            self.finished.store(true, Ordering::Relaxed);
+            Ok(finished?)
+        })?;
         let text = summary.to_string();
         let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
         Ok(RecordingSummary { path, bytes, packets, waits, left_out, text })
@@ -141,8 +149,12 @@ impl Recorder {
         &self.path
     }
 
-    /// Completes the file.
+    /// Completes the file. A second call raises ``RecordingError``.
     fn finish(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
+        if self.finished.load(Ordering::Relaxed) {
+            let message = format!("{}: the recording is already finished", self.path.display());
+            return Err(Failure::new(Class::Recording, message).into());
+        }
         self.finish_once(py)
     }
 
@@ -156,9 +168,15 @@ impl Recorder {
         slf
     }
 
-    #[pyo3(signature = (*_exception))]
-    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
-        self.finish_once(py).map(drop)
+    #[pyo3(signature = (*exception))]
+    fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        if self.finished.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let finished = self.finish_once(py).map(drop);
+        // An error of the recording must not hide the exception of the block.
+        let block_failed = exception.iter().any(|part| !part.is_none());
+        if block_failed { Ok(()) } else { finished }
     }
 
     fn __repr__(&self) -> String {
@@ -204,7 +222,7 @@ impl Simulation {
             path: path.clone(),
             format: format.map(format_of).transpose()?,
             topics: topics.map_or(Ok(defaults.topics.clone()), |topics| topics.iter().map(topic_of).collect())?,
-            envs: envs(env_ids)?,
+            envs: envs(&self.shared, env_ids)?,
             period_steps,
             stream_periods: periods.transpose()?.unwrap_or_default(),
             scene,
@@ -213,8 +231,8 @@ impl Simulation {
             overwrite,
             ..defaults
         };
-        let id = self.shared.write(py, |sim| Ok(sim.record(cfg)?))?;
-        Ok(Recorder { shared: Arc::clone(&self.shared), id, path })
+        let id = self.shared.write_with_threads(py, |sim| Ok(sim.record(cfg)?))?;
+        Ok(Recorder { shared: Arc::clone(&self.shared), id, path, finished: AtomicBool::new(false) })
     }
 
     /// Replays a recording (``.npz`` or ``.mcap``) in this simulation, built as the recorded one was, and compares the
@@ -275,13 +293,13 @@ impl Playback {
     #[new]
     #[pyo3(signature = (path, sim=None))]
     fn new(py: Python<'_>, path: PathBuf, sim: Option<&Bound<'_, Simulation>>) -> PyResult<Self> {
-        let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+        let recording = detached(py, || Ok(Recording::open(path)?))?;
         let (inner, manager) = match sim {
             Some(sim) => {
                 let scene = &sim.get().shared;
                 scene.read(py, |sim| Ok(record::Playback::open(&recording, Some(sim))?))?
             }
-            None => py.detach(|| record::Playback::open(&recording, None)).map_err(Failure::from)?,
+            None => detached(py, || Ok(record::Playback::open(&recording, None)?))?,
         };
         let entities = manager.entities();
         let parts =
@@ -302,13 +320,13 @@ impl Playback {
     /// Times of the frames [s].
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().to_vec()).into_pyarray(py)
+        py.detach(|| self.lock().times().to_vec()).into_pyarray(py)
     }
 
     /// Shows a frame, by its index in ``times``.
     fn seek(&self, py: Python<'_>, frame: usize) -> PyResult<()> {
         self.shared.write(py, |sim| {
-            let mut playback = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut playback = self.lock();
             let count = playback.times().len();
             if frame >= count {
                 return Err(Failure::new(
@@ -322,15 +340,22 @@ impl Playback {
 
     /// Index of the last frame at or before a time [s].
     fn frame_at(&self, py: Python<'_>, time: f64) -> usize {
-        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).frame_at(time))
+        py.detach(|| self.lock().frame_at(time))
     }
 
     fn __len__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).times().len())
+        py.detach(|| self.lock().times().len())
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
         format!("<Playback of {} frames>", self.__len__(py))
+    }
+}
+
+impl Playback {
+    /// The playback. Its lock is held while a frame is shown, so callers do not hold the interpreter.
+    fn lock(&self) -> MutexGuard<'_, record::Playback> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -344,13 +369,11 @@ pub(crate) fn read_series<'py>(
     field: &str,
     env: Option<usize>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
-    let series = py
-        .detach(|| {
-            let recording = Recording::open(path)?;
-            let topic = recording.topic(topic, env)?.name.clone();
-            recording.time_series(&[FieldSelector::new(topic, field)])
-        })
-        .map_err(Failure::from)?;
+    let series = detached(py, || {
+        let recording = Recording::open(path)?;
+        let topic = recording.topic(topic, env)?.name.clone();
+        Ok(recording.time_series(&[FieldSelector::new(topic, field)])?)
+    })?;
     let first = series.into_iter().next().unwrap_or_default();
     Ok([first.times.into_pyarray(py), first.values.into_pyarray(py)])
 }
@@ -358,6 +381,6 @@ pub(crate) fn read_series<'py>(
 /// Names of the topics of a recording, each with the names of its numbers.
 #[pyfunction]
 pub(crate) fn recording_topics(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<String>)>> {
-    let recording = py.detach(|| Recording::open(path)).map_err(Failure::from)?;
+    let recording = detached(py, || Ok(Recording::open(path)?))?;
     Ok(recording.topics().iter().map(|topic| (topic.name.clone(), topic.fields.clone())).collect())
 }

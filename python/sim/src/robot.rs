@@ -55,7 +55,7 @@ macro_rules! writers {
                 values: &Bound<'_, PyAny>,
                 env_ids: Option<&Bound<'_, PyAny>>,
             ) -> PyResult<()> {
-                let (values, env_ids, id) = (array::<$Axes>(values, stringify!($name))?, envs(env_ids)?, self.id);
+                let (values, env_ids, id) = (array::<$Axes>(values, stringify!($name))?, envs(&self.shared, env_ids)?, self.id);
                 self.shared.write(py, |sim| Ok(sim.$view(id).$name(&values, env_ids.as_deref())?))
             })*
         }
@@ -78,7 +78,7 @@ macro_rules! joint_writers {
                 env_ids: Option<&Bound<'_, PyAny>>,
             ) -> PyResult<()> {
                 let values = array::<$Axes>(values, stringify!($name))?;
-                let (joints, env_ids) = (Selection::of(joint_ids, "joint_ids")?, envs(env_ids)?);
+                let (joints, env_ids) = (Selection::of(joint_ids, "joint_ids")?, envs(&self.shared, env_ids)?);
                 let id = self.id;
                 self.shared.write(py, |sim| {
                     let joints = joints.joints(sim, id)?;
@@ -340,7 +340,7 @@ impl Robot {
     ) -> PyResult<()> {
         let positions = array::<Ix2>(positions, "write_joint_state, positions")?;
         let velocities = array::<Ix2>(velocities, "write_joint_state, velocities")?;
-        let (joints, env_ids, id) = (Selection::of(joint_ids, "joint_ids")?, envs(env_ids)?, self.id);
+        let (joints, env_ids, id) = (Selection::of(joint_ids, "joint_ids")?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| {
             let joints = joints.joints(sim, id)?;
             let mut robot = sim.robot_mut(id);
@@ -358,7 +358,7 @@ impl Robot {
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let kind: DriveType = drive_type.parse().map_err(|error| Failure::argument("drive_type", error))?;
-        let (joints, env_ids, id) = (Selection::of(joint_ids, "joint_ids")?, envs(env_ids)?, self.id);
+        let (joints, env_ids, id) = (Selection::of(joint_ids, "joint_ids")?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| {
             let joints = joints.joints(sim, id)?;
             Ok(sim.robot_mut(id).set_drive_type(kind, joints.as_deref(), env_ids.as_deref())?)
@@ -380,7 +380,7 @@ impl Robot {
             return Err(Failure::argument("set_delay", format!("{wrong} is not a whole number of steps")).into());
         }
         let values: Array2<u32> = values.mapv(|x| x as u32);
-        let (joints, env_ids, id) = (Selection::of(joint_ids, "joint_ids")?, envs(env_ids)?, self.id);
+        let (joints, env_ids, id) = (Selection::of(joint_ids, "joint_ids")?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| {
             let joints = joints.joints(sim, id)?;
             Ok(sim.robot_mut(id).set_delay(&values, joints.as_deref(), env_ids.as_deref())?)
@@ -402,7 +402,7 @@ impl Robot {
         let forces = array::<Ix3>(forces, "set_external_wrench, forces")?;
         let torques = array::<Ix3>(torques, "set_external_wrench, torques")?;
         let frame = wrench_frame(frame)?;
-        let (links, env_ids, id) = (Selection::of(link_ids, "link_ids")?, envs(env_ids)?, self.id);
+        let (links, env_ids, id) = (Selection::of(link_ids, "link_ids")?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| {
             let links = links.links(sim, id)?;
             let mut robot = sim.robot_mut(id);
@@ -419,7 +419,7 @@ impl Robot {
         link_ids: Option<&Bound<'_, PyAny>>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (links, env_ids, id) = (Selection::of(link_ids, "link_ids")?, envs(env_ids)?, self.id);
+        let (links, env_ids, id) = (Selection::of(link_ids, "link_ids")?, envs(&self.shared, env_ids)?, self.id);
         self.shared.write(py, |sim| {
             let links = links.links(sim, id)?;
             Ok(sim.robot_mut(id).set_gravity_compensation(on, links.as_deref(), env_ids.as_deref())?)
@@ -438,7 +438,8 @@ impl Robot {
         tcp: Option<[f64; 7]>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (qpos, env_ids, tip) = (array::<Ix2>(qpos, "compute_fk, qpos")?, envs(env_ids)?, frame(tip, link, tcp)?);
+        let (qpos, env_ids, tip) =
+            (array::<Ix2>(qpos, "compute_fk, qpos")?, envs(&self.shared, env_ids)?, frame(tip, link, tcp)?);
         let poses = self.shared.read(py, |sim| Ok(sim.robot(self.id).compute_fk(&qpos, tip, env_ids.as_deref())?))?;
         Ok(poses.into_pyarray(py).into_any())
     }
@@ -451,7 +452,7 @@ impl Robot {
         qpos: &Bound<'_, PyAny>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (qpos, env_ids) = (array::<Ix2>(qpos, "compute_link_fk, qpos")?, envs(env_ids)?);
+        let (qpos, env_ids) = (array::<Ix2>(qpos, "compute_link_fk, qpos")?, envs(&self.shared, env_ids)?);
         let poses = self.shared.read(py, |sim| Ok(sim.robot(self.id).compute_link_fk(&qpos, env_ids.as_deref())?))?;
         Ok(poses.into_pyarray(py).into_any())
     }
@@ -468,7 +469,7 @@ impl Robot {
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let qpos = qpos.map(|qpos| array::<Ix2>(qpos, "jacobian, qpos")).transpose()?;
-        let (env_ids, tip) = (envs(env_ids)?, frame(tip, link, tcp)?);
+        let (env_ids, tip) = (envs(&self.shared, env_ids)?, frame(tip, link, tcp)?);
         let jacobians = self.shared.read(py, |sim| {
             Ok(sim.robot(self.id).jacobian(tip, qpos.as_ref().map(|qpos| qpos.view()), env_ids.as_deref())?)
         })?;
@@ -493,7 +494,7 @@ impl Robot {
         let targets = array::<Ix2>(targets, "compute_ik, targets")?;
         let initial = initial.map(|initial| array::<Ix2>(initial, "compute_ik, initial")).transpose()?;
         let settings: IkCfg = cfg::read("IkCfg", cfg)?;
-        let (env_ids, tip) = (envs(env_ids)?, frame(tip, link, tcp)?);
+        let (env_ids, tip) = (envs(&self.shared, env_ids)?, frame(tip, link, tcp)?);
         let found = self.shared.read(py, |sim| {
             let initial = initial.as_ref().map(|rows| rows.view());
             Ok(sim.robot(self.id).compute_ik(&targets, tip, &settings, initial, env_ids.as_deref())?)

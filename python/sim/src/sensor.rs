@@ -199,7 +199,7 @@ impl Sensor {
         env_ids: Option<&Bound<'_, PyAny>>,
         convention: &str,
     ) -> PyResult<()> {
-        let (poses, env_ids) = (array::<Ix2>(poses, "set_local_pose")?, env_indices(env_ids)?);
+        let (poses, env_ids) = (array::<Ix2>(poses, "set_local_pose")?, env_indices(&self.shared, env_ids)?);
         let convention = axes(convention)?;
         self.shared.write(py, |sim| {
             for_camera!(sim, &self.uid, |camera| camera.set_local_pose(&poses, env_ids.as_deref(), convention)?);
@@ -216,7 +216,7 @@ impl Sensor {
         env_ids: Option<&Bound<'_, PyAny>>,
         convention: &str,
     ) -> PyResult<()> {
-        let (poses, env_ids) = (array::<Ix2>(poses, "set_world_poses")?, env_indices(env_ids)?);
+        let (poses, env_ids) = (array::<Ix2>(poses, "set_world_poses")?, env_indices(&self.shared, env_ids)?);
         let convention = axes(convention)?;
         self.shared.write(py, |sim| {
             for_camera!(sim, &self.uid, |camera| camera.set_world_poses(&poses, env_ids.as_deref(), convention)?);
@@ -236,7 +236,7 @@ impl Sensor {
     ) -> PyResult<()> {
         let (eye, target) = (points(eye, "look_at, eye")?, points(target, "look_at, target")?);
         let up = up.map_or(Ok(vec![[0.0, 0.0, 1.0]]), |up| points(up, "look_at, up"))?;
-        let env_ids = env_indices(env_ids)?;
+        let env_ids = env_indices(&self.shared, env_ids)?;
         self.shared.write(py, |sim| {
             for_camera!(sim, &self.uid, |camera| camera.look_at(&eye, &target, &up, env_ids.as_deref())?);
             Ok(())
@@ -251,7 +251,7 @@ impl Sensor {
         intrinsics: &Bound<'_, PyAny>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (rows, env_ids) = (array::<Ix2>(intrinsics, "set_intrinsics")?, env_indices(env_ids)?);
+        let (rows, env_ids) = (array::<Ix2>(intrinsics, "set_intrinsics")?, env_indices(&self.shared, env_ids)?);
         if rows.ncols() != 4 {
             return Err(Failure::argument(
                 "set_intrinsics",
@@ -273,7 +273,7 @@ impl Sensor {
     /// Restores the configured poses and intrinsics of a camera.
     #[pyo3(signature = (env_ids=None))]
     fn restore(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let env_ids = env_indices(env_ids)?;
+        let env_ids = env_indices(&self.shared, env_ids)?;
         self.shared.write(py, |sim| {
             for_camera!(sim, &self.uid, |camera| camera.restore(env_ids.as_deref())?);
             Ok(())

@@ -7,6 +7,7 @@ use crate::errors::{Class, Failure};
 use kinetoscope::sim::{MjcfId, RigidObjectGroupId, RigidObjectId, RobotId, SimulationManager, TerrainId, WeldId};
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// Handle of an entity.
@@ -26,19 +27,39 @@ pub(crate) struct Shared {
     /// `None` after `destroy`.
     manager: Mutex<Option<SimulationManager>>,
     entities: Mutex<Vec<(String, Entity)>>,
+    num_envs: usize,
     process: u32,
-    /// True if the simulation has no threads of its own, so that a forked process can use it.
-    single_threaded: bool,
+    /// True if the simulation has threads of its own: workers, the writer of a recording, a viewer. A forked process
+    /// does not have them, and cannot use it. The flag stays when the threads end.
+    has_threads: AtomicBool,
 }
 
 impl Shared {
     pub(crate) fn new(manager: SimulationManager) -> Arc<Self> {
-        let single_threaded = manager.cfg().num_threads() == 1;
+        let has_threads = AtomicBool::new(manager.cfg().num_threads() != 1);
         Arc::new(Self {
+            num_envs: manager.num_envs(),
             manager: Mutex::new(Some(manager)),
             entities: Mutex::new(Vec::new()),
             process: std::process::id(),
-            single_threaded,
+            has_threads,
+        })
+    }
+
+    /// Number of environments, which never changes.
+    pub(crate) fn num_envs(&self) -> usize {
+        self.num_envs
+    }
+
+    /// [`write`](Self::write) for a call that may start threads.
+    pub(crate) fn write_with_threads<T: Send>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&mut SimulationManager) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        self.write(py, |sim| {
+            self.has_threads.store(true, Ordering::Relaxed);
+            act(sim)
         })
     }
 
@@ -80,7 +101,7 @@ impl Shared {
 
     /// Frees the simulation. Its Python objects raise `DestroyedError` from then on.
     pub(crate) fn destroy(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| {
+        detached(py, || {
             let manager = match self.lock() {
                 Ok(mut guard) => guard.take(),
                 Err(failure) if failure.is_broken() => {
@@ -91,18 +112,17 @@ impl Shared {
             drop(manager);
             Ok(())
         })
-        .map_err(Into::into)
     }
 
     fn lock(&self) -> Result<MutexGuard<'_, Option<SimulationManager>>, Failure> {
         if std::process::id() == self.process {
             return self.manager.lock().map_err(|_| Failure::broken());
         }
-        if !self.single_threaded {
+        if self.has_threads.load(Ordering::Relaxed) {
             let message = format!(
                 "this simulation belongs to process {}, and its threads do not exist in the forked process {}; create \
                  the simulation in the child process, start children with the method \"spawn\" or \"forkserver\", or \
-                 use threads=1",
+                 use threads=1 without recordings and viewers",
                 self.process,
                 std::process::id()
             );
@@ -154,10 +174,13 @@ impl Drop for Shared {
     fn drop(&mut self) {
         // In a forked process, the threads that the manager would wait for do not exist: leave its memory to the end of
         // the process.
-        if std::process::id() != self.process && !self.single_threaded {
-            let manager = self.manager.get_mut().unwrap_or_else(PoisonError::into_inner);
-            std::mem::forget(manager.take());
+        let manager = self.manager.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        if std::process::id() != self.process && *self.has_threads.get_mut() {
+            std::mem::forget(manager);
+            return;
         }
+        // A destructor cannot raise an exception, and a panic must not reach Python.
+        let _ = catch_unwind(AssertUnwindSafe(|| drop(manager)));
     }
 }
 
@@ -165,6 +188,16 @@ impl std::fmt::Debug for Shared {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Shared").field("process", &self.process).finish_non_exhaustive()
     }
+}
+
+/// Runs a call that needs no simulation without holding the interpreter. A panic becomes an `InternalError`.
+pub(crate) fn detached<T: Send>(py: Python<'_>, act: impl FnOnce() -> Result<T, Failure> + Send) -> PyResult<T> {
+    py.detach(|| guarded(act)).map_err(Into::into)
+}
+
+/// Runs a call; a panic becomes an `InternalError`.
+pub(crate) fn guarded<T>(act: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    catch_unwind(AssertUnwindSafe(act)).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
 }
 
 fn destroyed() -> Failure {

@@ -6,14 +6,15 @@ use crate::errors::{Class, Failure};
 use crate::objects::{MjcfPart, RigidObject, RigidObjectGroup, Terrain, Weld};
 use crate::robot::Robot;
 use crate::sensor::Sensor;
-use crate::shared::{Entity, Shared};
+use crate::shared::{Entity, Shared, detached, guarded};
 use crate::snapshot::Snapshot;
-use kinetoscope::ndarray::{Ix3, IxDyn};
+use kinetoscope::ndarray::{Ix2, Ix3};
 use kinetoscope::prelude::{ArticulationCfg, MjcfPartCfg, RigidObjectCfg, RobotCfg, SceneCfg, TerrainCfg};
 use kinetoscope::sim::{
     EntityCfg, EntityTypes, EnvId, InteractiveScene, Property, Randomization, RigidObjectGroupCfg, SimulationManager,
     WeldCfg,
 };
+use kinetoscope::viewer::ViewerExt as _;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
@@ -34,14 +35,16 @@ pub(crate) struct Simulation {
 
 /// Wall time of a block of steps, after which signals are handled.
 const BLOCK: Duration = Duration::from_millis(50);
+/// Longest sleep while a viewer pauses or paces the simulation; commands of viewers wait as long.
+const MAX_SLEEP: Duration = Duration::from_millis(10);
 
 #[pymethods]
 impl Simulation {
     #[new]
     #[pyo3(signature = (cfg=None, **fields))]
     fn new(py: Python<'_>, cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let cfg = cfg::simulation(cfg::table(cfg, fields)?)?;
-        let manager = build(py, || Ok(SimulationManager::new(cfg)?))?;
+        let cfg = cfg::simulation(cfg::table(cfg::SIMULATION, cfg, fields)?)?;
+        let manager = detached(py, || Ok(SimulationManager::new(cfg)?))?;
         Ok(Self { shared: Shared::new(manager) })
     }
 
@@ -54,10 +57,11 @@ impl Simulation {
         path: PathBuf,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut scene = py.detach(|| SceneCfg::from_file(path)).map_err(Failure::from)?;
-        let changes = cfg::table(None, fields)?;
-        if !changes.is_empty() {
-            scene.simulation = cfg::changed_simulation(&scene.simulation, changes)?;
+        let mut scene = detached(py, || Ok(SceneCfg::from_file(path)?))?;
+        let changes = cfg::table(cfg::SIMULATION, None, fields)?;
+        if let Some(given) = fields {
+            let names = given.keys().extract::<Vec<String>>()?;
+            scene.simulation = cfg::changed_simulation(&scene.simulation, &names, changes)?;
         }
         Self::of_scene(py, scene)
     }
@@ -73,14 +77,14 @@ impl Simulation {
     /// Adds an entity of any type under a name: a robot, object, terrain, sensor and so on. Returns its handle.
     #[pyo3(signature = (name, cfg))]
     fn add(&self, py: Python<'_>, name: String, cfg: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
-        let mut table = cfg::table(Some(cfg), None)?;
-        table.remove("type");
         let kind = cfg::type_of(cfg)?.ok_or_else(|| {
             Failure::new(
                 Class::Config,
                 "the configuration has no `type`: use a class such as RobotCfg, or a dict with `type`",
             )
         })?;
+        let mut table = cfg::table(&kind, Some(cfg), None)?;
+        table.remove("type");
         self.add_entity(py, &kind, Some(name), table)
     }
 
@@ -92,7 +96,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "robot", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "robot", None, cfg::table("robot", cfg, fields)?)
     }
 
     /// Adds a passive articulation, such as a cabinet, and returns its handle.
@@ -103,7 +107,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "articulation", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "articulation", None, cfg::table("articulation", cfg, fields)?)
     }
 
     /// Adds a rigid object and returns its handle.
@@ -114,7 +118,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "rigid_object", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "rigid_object", None, cfg::table("rigid_object", cfg, fields)?)
     }
 
     /// Adds a group of rigid objects and returns its handle.
@@ -125,7 +129,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "rigid_object_group", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "rigid_object_group", None, cfg::table("rigid_object_group", cfg, fields)?)
     }
 
     /// Adds a terrain and returns its handle.
@@ -136,7 +140,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "terrain", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "terrain", None, cfg::table("terrain", cfg, fields)?)
     }
 
     /// Attaches an MJCF file and returns its handle.
@@ -147,7 +151,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "mjcf", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "mjcf", None, cfg::table("mjcf", cfg, fields)?)
     }
 
     /// Adds a weld, initially released, and returns its handle.
@@ -158,7 +162,7 @@ impl Simulation {
         cfg: Option<&Bound<'_, PyAny>>,
         fields: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Py<PyAny>> {
-        self.add_entity(py, "weld", None, cfg::table(cfg, fields)?)
+        self.add_entity(py, "weld", None, cfg::table("weld", cfg, fields)?)
     }
 
     /// Adds a sensor under a name and returns its handle.
@@ -172,23 +176,26 @@ impl Simulation {
         self.shared.write(py, |sim| Ok(sim.exclude_collision(&one, &other)?))
     }
 
-    /// Steps all environments ``steps`` times. Ctrl+C ends the call after at most one block of steps.
+    /// Steps all environments ``steps`` times. Ctrl+C ends the call after at most one block of steps, also while a viewer
+    /// pauses the simulation or sets its speed.
     #[pyo3(signature = (steps=1))]
     fn update(&self, py: Python<'_>, steps: u32) -> PyResult<()> {
         let mut left = steps;
         let mut block = 1;
         while left > 0 {
-            let now = block.min(left);
             let started = Instant::now();
-            self.shared.write(py, |sim| {
-                sim.update(now);
-                Ok(())
-            })?;
+            let (now, mut wait) = self.shared.write(py, |sim| Ok(sim.update_without_waiting(block.min(left))))?;
             left -= now;
+            // Outside the lock, so that other threads and signal handlers can use the simulation meanwhile.
+            while !wait.is_zero() {
+                py.check_signals()?;
+                py.detach(|| std::thread::sleep(wait.min(MAX_SLEEP)));
+                (_, wait) = self.shared.write(py, |sim| Ok(sim.update_without_waiting(0)))?;
+            }
             if left > 0 {
                 py.check_signals()?;
                 // Steps per block from the time of the last block, at most twice as many.
-                let per_step = started.elapsed().as_secs_f64() / f64::from(now);
+                let per_step = started.elapsed().as_secs_f64() / f64::from(now.max(1));
                 let fitting = (BLOCK.as_secs_f64() / per_step.max(1e-9)).clamp(1.0, 1000.0) as u32;
                 block = fitting.min(block * 2);
             }
@@ -199,7 +206,7 @@ impl Simulation {
     /// Resets environments to their initial state and time 0.
     #[pyo3(signature = (env_ids=None))]
     fn reset(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let env_ids = envs(env_ids)?;
+        let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.reset(env_ids.as_deref())?))
     }
 
@@ -207,7 +214,7 @@ impl Simulation {
     /// models. Positions, velocities, targets and time stay.
     #[pyo3(signature = (env_ids=None))]
     fn reset_buffers(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let env_ids = envs(env_ids)?;
+        let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.scene_mut().reset_buffers(env_ids.as_deref())?))
     }
 
@@ -304,7 +311,7 @@ impl Simulation {
         py: Python<'py>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<Vec<Bound<'py, PyDict>>>> {
-        let env_ids = envs(env_ids)?;
+        let env_ids = envs(&self.shared, env_ids)?;
         let (names, contacts) = self.shared.write(py, |sim| {
             let names = sim.entities().body_names();
             Ok((names, sim.scene_mut().contacts(env_ids.as_deref())?))
@@ -326,7 +333,7 @@ impl Simulation {
     /// Copies the states of environments.
     #[pyo3(signature = (env_ids=None))]
     fn snapshot(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<Snapshot> {
-        let env_ids = envs(env_ids)?;
+        let env_ids = envs(&self.shared, env_ids)?;
         Ok(Snapshot { inner: self.shared.read(py, |sim| Ok(sim.snapshot(env_ids.as_deref())?))? })
     }
 
@@ -339,7 +346,7 @@ impl Simulation {
         env_ids: Option<&Bound<'_, PyAny>>,
         properties: bool,
     ) -> PyResult<()> {
-        let (env_ids, snapshot) = (envs(env_ids)?, &snapshot.get().inner);
+        let (env_ids, snapshot) = (envs(&self.shared, env_ids)?, &snapshot.get().inner);
         self.shared.write(py, |sim| {
             if properties {
                 sim.properties_mut().restore(snapshot, env_ids.as_deref())?;
@@ -360,7 +367,7 @@ impl Simulation {
         start: Option<&Bound<'_, Snapshot>>,
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Bound<'py, PyAny>, Snapshot, Vec<(usize, String)>)> {
-        let (controls, env_ids) = (array::<Ix3>(controls, "rollout, controls")?, envs(env_ids)?);
+        let (controls, env_ids) = (array::<Ix3>(controls, "rollout, controls")?, envs(&self.shared, env_ids)?);
         let start = start.map(|start| &start.get().inner);
         let rollout = self.shared.read(py, |sim| Ok(sim.rollout(&controls, start, env_ids.as_deref())?))?;
         let final_states = Snapshot { inner: rollout.final_states };
@@ -383,7 +390,7 @@ impl Simulation {
         } else {
             cfg::read("randomization", Some(randomization))?
         };
-        let env_ids = envs(env_ids)?;
+        let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.properties_mut().randomize(&randomization, env_ids.as_deref())?))
     }
 
@@ -419,29 +426,14 @@ impl Simulation {
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let property = property_of(property)?;
-        let (values, env_ids) = (array::<IxDyn>(values, "set_property")?, envs(env_ids)?);
-        let width = property.width();
-        let numbers: Vec<f64> = values.iter().copied().collect();
-        self.shared.write(py, |sim| {
-            let chosen = env_ids.clone().unwrap_or_else(|| (0..sim.num_envs()).map(EnvId).collect());
-            if numbers.len() != width && numbers.len() != width * chosen.len() {
-                let (found, n) = (values.shape(), chosen.len());
-                let message = format!("shape {found:?}; expected ({n}, {width}), or one row for all environments");
-                return Err(Failure::argument("set_property", message));
-            }
-            let rows: Vec<&[f64]> = numbers.chunks_exact(width).collect();
-            sim.properties_mut().randomize_with(Some(&chosen), |_, env, properties| {
-                let row = chosen.iter().position(|chosen| *chosen == env).unwrap_or(0);
-                properties.set(property, name, rows[row % rows.len()])
-            })?;
-            Ok(())
-        })
+        let (values, env_ids) = (array::<Ix2>(values, "set_property")?, envs(&self.shared, env_ids)?);
+        self.shared.write(py, |sim| Ok(sim.properties_mut().set(property, name, &values, env_ids.as_deref())?))
     }
 
     /// Resets all properties of environments to their nominal values.
     #[pyo3(signature = (env_ids=None))]
     fn reset_properties(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let env_ids = envs(env_ids)?;
+        let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.properties_mut().reset(env_ids.as_deref())?))
     }
 
@@ -531,7 +523,7 @@ impl Simulation {
 
     fn of_scene(py: Python<'_>, cfg: SceneCfg) -> PyResult<Self> {
         let names: Vec<String> = cfg.keys().map(String::from).collect();
-        let (manager, entities) = build(py, || {
+        let (manager, entities) = detached(py, || {
             let scene = InteractiveScene::new(cfg)?;
             let entities: Vec<(String, Entity)> = names
                 .into_iter()
@@ -608,15 +600,6 @@ fn entity_of(scene: &InteractiveScene, name: &str) -> Result<Entity, Failure> {
     Ok(found.unwrap_or(Entity::Sensor))
 }
 
-/// Builds a simulation without holding the interpreter; a panic becomes an error.
-fn build<T: Send>(py: Python<'_>, make: impl FnOnce() -> Result<T, Failure> + Send) -> PyResult<T> {
-    py.detach(|| {
-        std::panic::catch_unwind(std::panic::AssertUnwindSafe(make))
-            .unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
-    })
-    .map_err(Into::into)
-}
-
 /// The property of a name in configurations.
 fn property_of(name: &str) -> PyResult<Property> {
     Property::ALL.into_iter().find(|property| property.name() == name).ok_or_else(|| {
@@ -630,5 +613,5 @@ fn property_of(name: &str) -> PyResult<Property> {
 #[pyfunction]
 pub(crate) fn to_toml(scene: &Bound<'_, PyAny>) -> PyResult<String> {
     let scene = cfg::scene(&cfg::scene_table(scene)?)?;
-    Ok(scene.to_toml(&EntityTypes::default()).map_err(Failure::from)?)
+    Ok(guarded(|| Ok(scene.to_toml(&EntityTypes::default())?))?)
 }

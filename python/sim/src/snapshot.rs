@@ -1,6 +1,6 @@
 //! Snapshots: saved states of environments.
 
-use crate::errors::Failure;
+use crate::shared::{detached, guarded};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
@@ -18,12 +18,12 @@ impl Snapshot {
     /// Reads a file that ``save`` wrote.
     #[classmethod]
     fn load(_class: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Ok(Self { inner: py.detach(|| kinetoscope::sim::Snapshot::load(path)).map_err(Failure::from)? })
+        Ok(Self { inner: detached(py, || Ok(kinetoscope::sim::Snapshot::load(path)?))? })
     }
 
     /// Writes the snapshot to a file.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        Ok(py.detach(|| self.inner.save(path)).map_err(Failure::from)?)
+        detached(py, || Ok(self.inner.save(path)?))
     }
 
     /// Environments of the snapshot.
@@ -46,7 +46,7 @@ impl Snapshot {
     /// Reads the content of a file of a snapshot.
     #[classmethod]
     fn from_bytes(_class: &Bound<'_, PyType>, content: &[u8]) -> PyResult<Self> {
-        Ok(Self { inner: kinetoscope::sim::Snapshot::from_bytes(content).map_err(Failure::from)? })
+        Ok(Self { inner: guarded(|| Ok(kinetoscope::sim::Snapshot::from_bytes(content)?))? })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {

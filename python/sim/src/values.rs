@@ -1,10 +1,11 @@
 //! Arrays of any element type, on their way from a sensor to NumPy.
 
+use crate::arguments::is_plain;
 use crate::errors::Failure;
 use crate::shared::Shared;
 use kinetoscope::ndarray::{Array, ArrayView, ArrayViewMutD, CowArray, Dimension, IxDyn};
 use kinetoscope::sim::SimulationManager;
-use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods};
+use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 /// An array of one of the element types of sensors, owned or borrowed from a sensor.
@@ -64,6 +65,8 @@ macro_rules! elements {
             values: impl for<'s> FnOnce(&'s SimulationManager) -> Result<Values<'s>, Failure> + Send,
         ) -> PyResult<()> {
             $(if let Ok(array) = out.cast::<PyArrayDyn<$Element>>()
+                && is_plain(array)
+                && array.strides().iter().zip(array.shape()).all(|(stride, length)| *stride != 0 || *length < 2)
                 && let Ok(mut guard) = array.try_readwrite()
             {
                 let view = guard.as_array_mut();
@@ -75,7 +78,7 @@ macro_rules! elements {
                     other => Err(mismatch(&other)),
                 });
             })*
-            // Not an array, read-only, or of a type that no sensor has.
+            // Not an array, read-only, with gaps that are no multiple of an element, or of a type that no sensor has.
             shared.read(py, |sim| Err(mismatch(&values(sim)?)))
         }
     };
@@ -99,5 +102,5 @@ fn copy<T: Copy>(from: &CowArray<'_, T, IxDyn>, mut to: ArrayViewMutD<'_, T>) {
 
 fn mismatch(values: &Values<'_>) -> Failure {
     let (element, shape) = values.layout();
-    Failure::argument("out", format!("expected a writable array of {element}, shape {shape:?}"))
+    Failure::argument("out", format!("expected a writable, aligned array of {element}, shape {shape:?}"))
 }

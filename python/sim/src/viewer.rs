@@ -96,7 +96,7 @@ impl Simulation {
             jpeg_quality: jpeg_quality.unwrap_or(defaults.jpeg_quality),
             ..defaults
         };
-        let inner = self.shared.write(py, |sim| Ok(sim.serve_with(address, cfg)?))?;
+        let inner = self.shared.write_with_threads(py, |sim| Ok(sim.serve_with(address, cfg)?))?;
         Ok(Server { shared: Arc::clone(&self.shared), inner })
     }
 
@@ -119,7 +119,7 @@ impl Simulation {
             display,
             ..WindowCfg::default()
         };
-        let inner = self.shared.write(py, |sim| Ok(sim.open_window_with(cfg)?))?;
+        let inner = self.shared.write_with_threads(py, |sim| Ok(sim.open_window_with(cfg)?))?;
         Ok(Window { inner })
     }
 

@@ -34,3 +34,5 @@ pub(crate) mod terrain;
 mod terrain_file;
 pub(crate) mod weld;
 pub(crate) mod weld_data;
+
+pub(crate) use rows::unique_envs;

@@ -86,7 +86,7 @@ pub(super) fn check_unique_indices(
 }
 
 /// Selected environments in the given order; all for `None`. A repeated environment is an error.
-pub(super) fn unique_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
+pub(crate) fn unique_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
     let envs = env_list(env_ids, num_envs)?;
     if env_ids.is_some() {
         check_unique_indices(argument, &envs, &|env| format!("environment {env}"))?;

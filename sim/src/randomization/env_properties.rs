@@ -2,11 +2,13 @@
 
 use super::{Properties, Property, PropertyOverrides, Randomization};
 use crate::env::Stage;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_mask};
 use crate::manager::SimulationManager;
+use crate::objects::unique_envs;
 use crate::snapshot::Snapshot;
 use kinetoscope_scene::KeyedRng;
+use ndarray::Array2;
 
 impl SimulationManager {
     /// Read access to properties of environments: masses, frictions, sizes, gains.
@@ -126,6 +128,36 @@ impl<'a> EnvPropertiesMut<'a> {
     ) -> Result<()> {
         let keys = self.rng_keys();
         self.randomize_counted(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
+    }
+
+    /// Sets a property of a link, object or joint: one row of values for each of `env_ids` (all environments for
+    /// `None`), or one row for all. Does not count as a randomization.
+    ///
+    /// # Errors
+    /// The shape of `values` does not fit, an environment does not exist or is repeated, no element of this name has the
+    /// property, or a value is invalid; then nothing changes.
+    pub fn set(
+        &mut self,
+        property: Property,
+        name: &str,
+        values: &Array2<f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        let envs = unique_envs("env_ids", env_ids, self.sim.num_envs())?;
+        let (rows, width) = values.dim();
+        if width != property.width() || (rows != 1 && rows != envs.len()) {
+            return Err(Error::Shape {
+                argument: "properties.set",
+                found: vec![rows, width],
+                expected: vec![envs.len(), property.width()],
+                meaning: "environments, values",
+            });
+        }
+        self.change(env_ids, |env, properties| {
+            let row = envs.iter().position(|chosen| *chosen == env).unwrap_or(0);
+            let row: Vec<f64> = values.row(row % rows).to_vec();
+            properties.set(property, name, &row)
+        })
     }
 
     /// Resets environments to the nominal properties (all environments for `None`), gains and effort limits of drives

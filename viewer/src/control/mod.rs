@@ -15,6 +15,7 @@ pub use view_controller::{Play, PlayError, PlaybackSource, ViewController};
 
 use crate::scene_view::EnvSelection;
 use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
+use std::time::Duration;
 
 /// A request of a viewer to the simulation. Commands run between two steps, on the simulation's thread.
 /// [`RunState::last_refusal`](crate::RunState::last_refusal) has the reason if a command cannot be run.
@@ -168,6 +169,13 @@ pub trait ViewerExt {
     /// Sets the record button that all viewers show. The recording of the previous button is stopped, unless both
     /// buttons are equal.
     fn set_record_button(&mut self, button: RecordButton);
+
+    /// Steps like [`update`](SimulationManager::update), but returns where `update` would wait for viewers: while they
+    /// pause the simulation, or it is ahead of their speed. Returns the number of steps done, and the time after which
+    /// to call again: zero after all steps. With 0 steps, only viewers are served.
+    ///
+    /// For callers that must not block, such as a program that handles signals.
+    fn update_without_waiting(&mut self, steps: u32) -> (u32, Duration);
 }
 
 impl ViewerExt for SimulationManager {
@@ -182,6 +190,29 @@ impl ViewerExt for SimulationManager {
 
     fn set_record_button(&mut self, button: RecordButton) {
         with_view_controller(self, |controller, sim| controller.set_button(sim, button));
+    }
+
+    fn update_without_waiting(&mut self, steps: u32) -> (u32, Duration) {
+        if self.observers().ids::<ViewController>().is_empty() {
+            self.update(steps);
+            return (steps, Duration::ZERO);
+        }
+        let turn = |sim: &mut Self| {
+            with_view_controller(sim, |controller, sim| {
+                controller.set_caller_waits(true);
+                controller.turn_of_caller(sim)
+            })
+            .unwrap_or_default()
+        };
+        let mut done = 0;
+        let mut wait = turn(self);
+        while done < steps && wait.is_zero() {
+            self.update(1);
+            done += 1;
+            wait = turn(self);
+        }
+        with_view_controller(self, |controller, _| controller.set_caller_waits(false));
+        (done, wait)
     }
 }
 

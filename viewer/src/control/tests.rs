@@ -62,6 +62,36 @@ fn pause_and_steps() {
     running.end();
 }
 
+#[test]
+fn caller_waits() {
+    let mut sim = sample(1).sim;
+    assert_eq!(sim.update_without_waiting(3), (3, Duration::ZERO), "without viewers");
+    let viewer = sim.viewer(SnapshotRequest::default());
+    assert_eq!(sim.update_without_waiting(3), (3, Duration::ZERO));
+    viewer.send(Command::Pause);
+    // Commands run some milliseconds later.
+    let (done, wait) = sim.update_without_waiting(1_000_000);
+    assert!(done < 1_000_000 && !wait.is_zero());
+    let steps = sim.observers().steps();
+    assert_eq!(sim.update_without_waiting(5).0, 0);
+    viewer.send(Command::Step(2));
+    assert_eq!(sim.update_without_waiting(5).0, 2);
+    assert_eq!(sim.observers().steps(), steps + 2);
+    viewer.send(Command::Resume);
+    assert_eq!(sim.update_without_waiting(5), (5, Duration::ZERO));
+    // At a hundredth of real time, a step of 10 ms takes 1 s.
+    viewer.send(Command::SetSpeed(Speed::Factor(0.01)));
+    let (done, wait) = sim.update_without_waiting(1_000_000);
+    assert!(done < 1_000_000 && !wait.is_zero());
+    // `update` waits itself, as before.
+    let start = Instant::now();
+    viewer.send(Command::SetSpeed(Speed::Factor(0.1)));
+    sim.update(3);
+    assert!(start.elapsed() > Duration::from_millis(150));
+    drop(viewer);
+    assert_eq!(sim.update_without_waiting(5), (5, Duration::ZERO));
+}
+
 /// The simulation resumes when all viewers that paused it are dropped.
 #[test]
 fn pause_ends_with_viewer() {

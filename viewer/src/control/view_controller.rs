@@ -54,6 +54,10 @@ pub struct ViewController {
     /// Viewer that started the recording; `None` if the program started it.
     recorded_by: Option<u64>,
     refusals: Refusals,
+    /// True while the caller of `update` waits for viewers, instead of this observer.
+    caller_waits: bool,
+    /// True if the caller has to wait before the next step.
+    must_wait: bool,
 }
 
 impl ViewController {
@@ -75,6 +79,8 @@ impl ViewController {
             recording: None,
             recorded_by: None,
             refusals: Refusals::default(),
+            caller_waits: false,
+            must_wait: false,
         }
     }
 
@@ -311,22 +317,62 @@ impl ViewController {
         pace.record_steps(steps, Instant::now());
         self.dirty = true;
         loop {
-            if !self.handle_commands(sim) {
-                return self.reset_viewer_settings(sim);
-            }
-            let holds = self.pause_at.is_some_and(|step| step <= steps);
-            let ahead = self.clock.as_mut().map_or(Duration::ZERO, |pace| pace.time_ahead(steps, Instant::now()));
-            let (rest, waits) = (self.time_to_next_snapshot(), holds || !ahead.is_zero());
-            if self.dirty && rest.is_zero() {
-                self.publish(sim);
-            }
-            if !waits {
+            let Some(wait) = self.turn(sim, steps) else { return };
+            if wait.is_zero() {
                 break;
             }
-            let until_shown = if self.dirty { rest.max(Duration::from_millis(1)) } else { MAX_WAIT };
-            let until_stepped = if holds { MAX_WAIT } else { ahead };
-            self.hub.wait_for_input(until_shown.min(until_stepped).min(MAX_WAIT));
+            if self.caller_waits {
+                self.must_wait = true;
+                self.next_check = steps + 1;
+                return;
+            }
+            self.hub.wait_for_input(wait);
         }
+        self.end_wait(sim, steps);
+    }
+
+    /// Runs commands and publishes a snapshot. Returns the time until the next turn, zero if the simulation can step,
+    /// or `None` after the last viewer was dropped.
+    fn turn(&mut self, sim: &mut SimulationManager, steps: u64) -> Option<Duration> {
+        if !self.handle_commands(sim) {
+            self.reset_viewer_settings(sim);
+            return None;
+        }
+        let holds = self.pause_at.is_some_and(|step| step <= steps);
+        let ahead = self.clock.as_mut().map_or(Duration::ZERO, |pace| pace.time_ahead(steps, Instant::now()));
+        let (rest, waits) = (self.time_to_next_snapshot(), holds || !ahead.is_zero());
+        if self.dirty && rest.is_zero() {
+            self.publish(sim);
+        }
+        if !waits {
+            return Some(Duration::ZERO);
+        }
+        let until_shown = if self.dirty { rest.max(Duration::from_millis(1)) } else { MAX_WAIT };
+        let until_stepped = if holds { MAX_WAIT } else { ahead };
+        Some(until_shown.min(until_stepped).min(MAX_WAIT))
+    }
+
+    /// [`turn`](Self::turn) for a caller that waits: the time until the next turn, zero if the simulation can step.
+    pub(super) fn turn_of_caller(&mut self, sim: &mut SimulationManager) -> Duration {
+        if !self.must_wait {
+            return Duration::ZERO;
+        }
+        let steps = sim.observers().steps();
+        let wait = self.turn(sim, steps);
+        self.must_wait = wait.is_some_and(|wait| !wait.is_zero());
+        if wait == Some(Duration::ZERO) {
+            self.end_wait(sim, steps);
+        }
+        wait.unwrap_or_default()
+    }
+
+    /// Chooses who waits for viewers: the caller of `update`, or this observer.
+    pub(super) fn set_caller_waits(&mut self, caller_waits: bool) {
+        self.caller_waits = caller_waits;
+    }
+
+    fn end_wait(&mut self, sim: &mut SimulationManager, steps: u64) {
+        self.must_wait = false;
         self.clock.iter_mut().for_each(|pace| pace.end_wait(steps, Instant::now()));
         self.apply_springs(sim);
         let block = self.clock.as_ref().map_or(1, RealTimeClock::steps_until_check);

@@ -71,7 +71,15 @@ def configclass(cls: type[T]) -> type[T]:
     def __eq__(self: Any, other: Any) -> bool:
         return type(self) is type(other) and bool(vars(self) == vars(other))
 
-    for function in (__init__, replace, to_dict, __repr__, __eq__):
+    def __setattr__(self: Any, name: str, value: Any) -> None:
+        # Classes of scripts may have attributes of their own.
+        closed = type(self).__module__.startswith(__package__) and not getattr(self, "_accepts_new", False)
+        if closed and not name.startswith("_") and name not in fields_of(type(self)):
+            known = ", ".join(fields_of(type(self)))
+            raise AttributeError(f"{type(self).__name__} has no field {name!r}; fields: {known}")
+        object.__setattr__(self, name, value)
+
+    for function in (__init__, replace, to_dict, __repr__, __eq__, __setattr__):
         setattr(cls, function.__name__, function)
     cls.copy = copy.deepcopy  # type: ignore[attr-defined]
     cls.__hash__ = None  # type: ignore[assignment]

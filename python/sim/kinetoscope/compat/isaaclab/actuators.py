@@ -9,7 +9,9 @@ from ..configclass import configclass
 
 @configclass
 class ActuatorBaseCfg:
-    """Gains and limits of joints: numbers, or dicts by joint pattern. None keeps the value of the file."""
+    """Gains and limits of joints: numbers, or dicts by joint pattern. As in Orbit, a gain of None is that of the file, and a
+    URDF file has none: 0. A joint that no pattern of a dict names has the gain 0, too. Limits, friction and armature of None
+    are those of the file."""
 
     joint_names_expr: Any = (".*",)
     stiffness: Any = None

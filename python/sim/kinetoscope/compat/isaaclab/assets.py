@@ -3,11 +3,15 @@ environments stand side by side."""
 
 from __future__ import annotations
 
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..._sim import Robot
+from ...errors import ConfigError
 from .. import unsupported
 from .._poses import to_world
 from .._tensors import array, tensor
@@ -39,7 +43,7 @@ class InitialStateCfg:
 
 @configclass
 class ArticulationCfg(AssetBaseCfg):
-    """A robot: ``spawn`` names its file, ``actuators`` its drives."""
+    """A robot: ``spawn`` names its file, ``actuators`` its drives. Joints without an actuator are passive."""
 
     InitialStateCfg = InitialStateCfg
 
@@ -48,16 +52,43 @@ class ArticulationCfg(AssetBaseCfg):
     soft_joint_pos_limit_factor: float = 1.0
 
 
-def joint_values(values: Any, names: Any) -> dict[str, float]:
-    """Numbers by joint pattern, from one number or a dict."""
-    if isinstance(values, dict):
-        return {pattern: float(value) for pattern, value in values.items()}
-    return {pattern: float(values) for pattern in names}
+# Types of joints that move.
+MOVING = ("revolute", "continuous", "prismatic")
 
 
-def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
-    """Fields of this package's robot."""
-    drive: dict[str, Any] = {}
+def joints_of_file(path: str) -> list[str]:
+    """Names of the joints of a URDF file that move."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError as error:
+        raise ConfigError(f"{path}: {error}") from None
+    return [joint.get("name", "") for joint in root.iter("joint") if joint.get("type") in MOVING]
+
+
+def matching(patterns: Any, names: Sequence[str], owner: str) -> list[str]:
+    """The names that a pattern or a list of patterns matches as a whole. Each pattern must match."""
+    found: list[str] = []
+    for pattern in [patterns] if isinstance(patterns, str) else patterns:
+        matched = [name for name in names if re.fullmatch(pattern, name)]
+        if not matched:
+            raise ConfigError(f"{owner}: no joint matches {pattern!r}; joints: {', '.join(names)}")
+        found += [name for name in matched if name not in found]
+    return found
+
+
+def joint_values(values: Any, names: Sequence[str], owner: str) -> dict[str, float]:
+    """Numbers by joint, from one number or a dict of numbers by pattern."""
+    if not isinstance(values, dict):
+        return {name: float(values) for name in names}
+    numbers: dict[str, float] = {}
+    for pattern, value in values.items():
+        numbers |= {name: float(value) for name in matching(pattern, names, owner)}
+    return numbers
+
+
+def drive_fields(cfg: ArticulationCfg) -> dict[str, Any]:
+    """Drives of all joints. A joint without an actuator, or without a gain, has the gain 0."""
+    joints = joints_of_file(cfg.spawn.asset_path)
     names = {
         "stiffness": "stiffness",
         "damping": "damping",
@@ -67,16 +98,25 @@ def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
         "friction": "friction",
     }
     models = {"IdealPDActuatorCfg": "ideal_pd", "DCMotorCfg": "dc_motor"}
-    for actuator in cfg.actuators.values():
-        patterns = actuator.joint_names_expr
+    zero = dict.fromkeys(joints, 0.0)
+    drive: dict[str, Any] = {"stiffness": dict(zero), "damping": dict(zero)}
+    for group, actuator in cfg.actuators.items():
+        owner = f"actuators[{group!r}]"
+        own = matching(actuator.joint_names_expr, joints, owner)
         for field, name in names.items():
             values = getattr(actuator, field)
             if values is not None:
-                drive.setdefault(name, {}).update(joint_values(values, patterns))
+                drive.setdefault(name, {}).update(joint_values(values, own, f"{owner}.{field}"))
         model = models.get(type(actuator).__name__)
         if model is not None:
-            content = {"saturation_effort": actuator.saturation_effort} if model == "dc_motor" else {}
-            drive.setdefault("actuators", {}).update({pattern: {model: content} for pattern in patterns})
+            content = {"saturation_effort": float(actuator.saturation_effort)} if model == "dc_motor" else {}
+            drive.setdefault("actuators", {}).update({name: {model: content} for name in own})
+    # Keys of this package are patterns.
+    return {field: {re.escape(name): value for name, value in values.items()} for field, values in drive.items()}
+
+
+def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
+    """Fields of this package's robot."""
     start = cfg.init_state
     unsupported(
         "ArticulationCfg.InitialStateCfg",
@@ -93,7 +133,7 @@ def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
         "self_collision": cfg.spawn.self_collisions,
         "init_pose": [float(x) for x in (*start.pos, *start.rot)],
         "init_qpos": joint_pos,
-        "drive": drive,
+        "drive": drive_fields(cfg),
         "soft_limit_factor": float(cfg.soft_joint_pos_limit_factor),
     }
 
@@ -235,21 +275,22 @@ class Articulation:
 
     def _local(self, states: Any, env_ids: Any) -> Any:
         states = np.array(array(states), dtype=float)
-        states[:, :3] -= self._origins if env_ids is None else self._origins[array(env_ids)]
+        chosen = _ids(env_ids, self.num_instances)
+        states[:, :3] -= self._origins if chosen is None else self._origins[chosen]
         return states
 
     def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
         """Writes poses (world frame) and velocities of the root, shape (n, 13)."""
-        self.native.write_root_state(self._local(root_state, env_ids), _ids(env_ids))
+        self.native.write_root_state(self._local(root_state, env_ids), _ids(env_ids, self.num_instances))
 
     def write_root_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
-        self.native.write_root_pose(self._local(root_pose, env_ids), _ids(env_ids))
+        self.native.write_root_pose(self._local(root_pose, env_ids), _ids(env_ids, self.num_instances))
 
     def write_root_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
-        self.native.write_root_velocity(array(root_velocity), _ids(env_ids))
+        self.native.write_root_velocity(array(root_velocity), _ids(env_ids, self.num_instances))
 
     def write_joint_state_to_sim(self, position: Any, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
-        self.native.write_joint_state(array(position), array(velocity), _ids(joint_ids), _ids(env_ids))
+        self.native.write_joint_state(array(position), array(velocity), _ids(joint_ids, self.num_joints), _ids(env_ids, self.num_instances))
 
     def set_joint_position_target(self, target: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
         self._set("set_qpos_target", "qpos_target", target, joint_ids, env_ids)
@@ -263,19 +304,21 @@ class Articulation:
     def _set(self, writer: str, reader: str, target: Any, joint_ids: Any, env_ids: Any) -> None:
         """Changes the buffer of targets."""
         values = np.array(array(target), dtype=float)
+        joint_ids, env_ids = _ids(joint_ids, self.num_joints), _ids(env_ids, self.num_instances)
         if joint_ids is None and env_ids is None:
             self._pending[writer] = values
             return
         current = self._pending.get(writer)
         current = getattr(self.native, reader) if current is None else current
-        rows = np.arange(self.num_instances) if env_ids is None else array(env_ids)
-        columns = np.arange(self.num_joints) if joint_ids is None else array(joint_ids)
+        rows = np.arange(self.num_instances) if env_ids is None else np.atleast_1d(env_ids)
+        columns = np.arange(self.num_joints) if joint_ids is None else np.atleast_1d(joint_ids)
         current[np.ix_(rows, columns)] = values
         self._pending[writer] = current
 
     def set_external_force_and_torque(self, forces: Any, torques: Any, body_ids: Any = None, env_ids: Any = None) -> None:
         """Forces and torques on links, in the axes of the links, until they are set again."""
-        self.native.set_external_wrench(array(forces), array(torques), "link", _ids(body_ids), _ids(env_ids))
+        links = _ids(body_ids, self.num_bodies)
+        self.native.set_external_wrench(array(forces), array(torques), "link", links, _ids(env_ids, self.num_instances))
 
     def write_data_to_sim(self) -> None:
         """Writes the targets to the simulation."""
@@ -284,11 +327,18 @@ class Articulation:
         self._pending.clear()
 
     def reset(self, env_ids: Any = None) -> None:
-        """Does nothing: ``InteractiveScene.reset`` clears the buffers of all entities."""
+        """Removes the external forces and torques. ``InteractiveScene.reset`` clears all buffers."""
+        chosen = _ids(env_ids, self.num_instances)
+        none = np.zeros((self.num_instances if chosen is None else np.atleast_1d(chosen).size, self.num_bodies, 3))
+        if len(none):
+            self.native.set_external_wrench(none, none, "link", None, chosen)
 
     def update(self, dt: float) -> None:
         """Does nothing: data is read from the simulation."""
 
 
-def _ids(values: Any) -> Any:
+def _ids(values: Any, count: int) -> Any:
+    """Indices as an array; None for all of ``count``."""
+    if isinstance(values, slice):
+        return None if values == slice(None) else np.arange(count)[values]
     return None if values is None else array(values)

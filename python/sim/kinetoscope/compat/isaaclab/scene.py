@@ -13,7 +13,7 @@ from ...errors import ConfigError
 from .. import unsupported
 from .._tensors import array, tensor
 from ..configclass import MISSING, configclass, fields_of
-from .assets import Articulation, ArticulationCfg, AssetBaseCfg, articulation_fields
+from .assets import Articulation, ArticulationCfg, AssetBaseCfg, articulation_fields, joints_of_file
 from .sensors import Camera, CameraCfg, ContactSensor, ContactSensorCfg, RayCaster, RayCasterCfg, SensorBaseCfg
 from .sim import DistantLightCfg, DomeLightCfg, GroundPlaneCfg, SimulationContext
 
@@ -24,7 +24,9 @@ ENV = "{ENV_REGEX_NS}/"
 
 @configclass
 class InteractiveSceneCfg:
-    """A scene: every further attribute of a subclass is an entity."""
+    """A scene: every further attribute of a subclass or of an object is an entity."""
+
+    _accepts_new = True
 
     num_envs: int = MISSING  # type: ignore[assignment]
     env_spacing: float = MISSING  # type: ignore[assignment]
@@ -38,7 +40,8 @@ class InteractiveScene:
     def __init__(self, cfg: InteractiveSceneCfg) -> None:
         self.cfg = cfg
         context = SimulationContext.instance() or SimulationContext()
-        names = [name for name in fields_of(type(cfg)) if name not in fields_of(InteractiveSceneCfg)]
+        own = fields_of(InteractiveSceneCfg)
+        names = [name for name in {**fields_of(type(cfg)), **vars(cfg)} if name not in own and not name.startswith("_")]
         entities = {name: getattr(cfg, name) for name in names if getattr(cfg, name) is not None}
         self.native = SimulationManager(self._simulation(context, entities))
         self._origins = self.native.env_origins
@@ -59,6 +62,10 @@ class InteractiveScene:
         for name, entity in entities.items():
             if isinstance(entity, ArticulationCfg):
                 robot = self.native.add_robot(articulation_fields(name, entity))
+                unnamed = set(robot.joint_names) - set(joints_of_file(entity.spawn.asset_path))
+                if unnamed:
+                    # Their drives would be those of this package.
+                    raise ConfigError(f"{name}: actuators do not know the joints {', '.join(sorted(unnamed))}")
                 self.articulations[name] = Articulation(robot, self._origins, entity)
         for name, entity in entities.items():
             if isinstance(entity, SensorBaseCfg):
@@ -72,6 +79,8 @@ class InteractiveScene:
     def _simulation(self, context: SimulationContext, entities: dict[str, Any]) -> native.SimulationManagerCfg:
         spawned = [entity.spawn for entity in entities.values() if isinstance(entity, AssetBaseCfg)]
         ground = next((spawn for spawn in spawned if isinstance(spawn, GroundPlaneCfg)), None)
+        if ground is not None:
+            unsupported("GroundPlaneCfg", size=tuple(numbers(ground.size)) != (100.0, 100.0))
         lights = []
         for light in spawned:
             if isinstance(light, DomeLightCfg):

@@ -108,7 +108,8 @@ class _Sensor:
         """Does nothing: the simulation updates its sensors."""
 
     def reset(self, env_ids: Any = None) -> None:
-        """Does nothing: ``InteractiveScene.reset`` clears the buffers of all sensors."""
+        """Not supported for one sensor: ``InteractiveScene.reset`` clears the buffers of all."""
+        raise NotImplementedError(f"{type(self).__name__}.reset: use InteractiveScene.reset, which clears all sensors")
 
 
 class CameraData:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from kinetoscope.compat import unsupported
 from kinetoscope.compat.configclass import configclass
 
 PerJoint = Any
@@ -53,13 +54,13 @@ class URDFCfg:
         base_link_name: str = "base_link",
         component_prefix: Any = None,
         name_case: Any = None,
-        **ignored: Any,
+        **others: Any,
     ) -> None:
+        unsupported("URDFCfg", **{name: value is not None for name, value in others.items()})
         self.components: dict[str, dict[str, Any]] = {}
         self.base_link_name = base_link_name
         self.component_prefix = dict(component_prefix or {})
         self.name_case = name_case
-        self.ignored = ignored
         for component in components or []:
             self.add_component(**component)
 

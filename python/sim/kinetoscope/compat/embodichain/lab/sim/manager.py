@@ -18,6 +18,9 @@ from .cfg import (
     ArticulationCfg,
     JointDrivePropertiesCfg,
     LightCfg,
+    PhysicsCfg,
+    RenderCfg,
+    RigidBodyAttributesCfg,
     RigidObjectCfg,
     RobotCfg,
     SimulationManagerCfg,
@@ -27,6 +30,18 @@ from .objects import Articulation, RigidObject, Robot
 from .sensors import Camera, CameraCfg, camera_cfg
 from .shapes import CubeCfg, MeshCfg, SphereCfg
 
+# Fields of RigidBodyAttributesCfg that only PhysX has.
+WITHOUT_MEANING = (
+    "contact_offset",
+    "rest_offset",
+    "sleep_threshold",
+    "enable_ccd",
+    "max_depenetration_velocity",
+    "min_position_iters",
+    "min_velocity_iters",
+    "max_linear_velocity",
+    "max_angular_velocity",
+)
 RENDERERS = {"auto": "raster", "hybrid": "hybrid", "fast-rt": "fast_ray_traced", "rt": "ray_traced"}
 
 
@@ -35,6 +50,10 @@ class SimulationManager:
 
     def __init__(self, sim_config: SimulationManagerCfg | None = None) -> None:
         self.cfg = sim_config or SimulationManagerCfg()
+        physics, defaults = self.cfg.physics_config, PhysicsCfg()
+        changed("PhysicsCfg", physics, defaults, "bounce_threshold", "enable_ccd", "length_tolerance", "speed_tolerance")
+        render = self.cfg.render_cfg
+        changed("RenderCfg", render, RenderCfg(), "spp", "tone_mapping_enabled", "tone_mapping_exposure")
         unsupported(
             "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
         )
@@ -75,7 +94,11 @@ class SimulationManager:
 
     @property
     def arena_offsets(self) -> Any:
-        return tensor(self.native.env_origins)
+        """Origins of the arenas [m], shape (n, 3): a grid with arena 0 at the origin. Poses do not contain them, and the
+        overview of this package has a grid of its own, around the origin."""
+        side = int(np.ceil(np.sqrt(self.num_envs)))
+        arenas = np.arange(self.num_envs)
+        return tensor(np.stack([arenas % side, arenas // side, 0 * arenas], axis=1) * float(self.cfg.arena_space))
 
     @property
     def asset_uids(self) -> list[str]:
@@ -120,13 +143,18 @@ class SimulationManager:
         fields = articulation_fields(cfg)
         fields["control_parts"] = {name: list(patterns) for name, patterns in (cfg.control_parts or {}).items()}
         fields["drive"] = drive(cfg.drive_pros)
-        return self._register(Robot(self, self.native.add_robot(fields), cfg))
+        robot = self.native.add_robot(fields)
+        lift_limits(robot, cfg.drive_pros, fields["control_parts"])
+        return self._register(Robot(self, robot, cfg))
 
     def add_articulation(self, cfg: ArticulationCfg) -> Articulation:
         fields = articulation_fields(cfg)
         if cfg.drive_pros.drive_type != "none":
             fields["drive"] = drive(cfg.drive_pros)
-        return self._register(Articulation(self, self.native.add_articulation(fields), cfg))
+        articulation = self.native.add_articulation(fields)
+        if cfg.drive_pros.drive_type != "none":
+            lift_limits(articulation, cfg.drive_pros, {})
+        return self._register(Articulation(self, articulation, cfg))
 
     def add_rigid_object(self, cfg: RigidObjectCfg) -> RigidObject:
         if cfg.uid is None:
@@ -138,6 +166,8 @@ class SimulationManager:
         uid = sensor_cfg.uid or f"camera_{count}"
         fields = camera_cfg(sensor_cfg)
         render = self.cfg.render_cfg
+        if render.renderer not in RENDERERS:
+            raise ConfigError(f"RenderCfg.renderer is {render.renderer!r}; known names: {', '.join(RENDERERS)}")
         fields["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
         return self._register(Camera(self, self.native.add_sensor(uid, fields), sensor_cfg))
 
@@ -145,6 +175,7 @@ class SimulationManager:
         """Adds a light, before anything else is added."""
         if self._assets:
             raise ConfigError("add_light: call it before objects are added")
+        changed("LightCfg", cfg, LightCfg(), "intensity", "radius")
         far = cfg.light_type in ("sun", "direction")
         self._lights.append(
             native.LightCfg(
@@ -191,6 +222,26 @@ def pose(cfg: Any) -> Any:
 
 def per_joint(values: Any) -> Any:
     return {key: float(value) for key, value in values.items()} if isinstance(values, dict) else float(values)
+
+
+def changed(owner: str, cfg: Any, defaults: Any, *names: str) -> None:
+    """Refuses fields without a meaning here that differ from their defaults."""
+    unsupported(owner, **{name: getattr(cfg, name) != getattr(defaults, name) for name in names})
+
+
+def lift_limits(native_robot: Any, cfg: JointDrivePropertiesCfg, parts: Any) -> None:
+    """Gives the limits of the class to the joints that a dict of limits does not name, instead of those of the URDF."""
+    setters = {"max_effort": native_robot.set_qf_limits, "max_velocity": native_robot.set_qvel_limits}
+    for name, set_limits in setters.items():
+        limits = getattr(cfg, name)
+        if not isinstance(limits, dict):
+            continue
+        named = set()
+        for key in limits:
+            named |= set(native_robot.joint_ids(key) if key in parts else native_robot.find_joints([key]))
+        rest = [joint for joint in range(native_robot.dof) if joint not in named]
+        if rest:
+            set_limits(np.full((1, len(rest)), getattr(JointDrivePropertiesCfg(), name)), rest)
 
 
 def drive(cfg: JointDrivePropertiesCfg) -> dict[str, Any]:
@@ -244,6 +295,7 @@ def object_fields(cfg: RigidObjectCfg) -> dict[str, Any]:
         static_friction=attrs.static_friction != attrs.dynamic_friction,
         max_convex_hull_num=getattr(cfg.shape, "max_convex_hull_num", 1) != 1,
     )
+    changed("RigidBodyAttributesCfg", attrs, RigidBodyAttributesCfg(), *WITHOUT_MEANING)
     fields: dict[str, Any] = {"uid": cfg.uid, "init_pose": pose(cfg), "body_type": cfg.body_type}
     moments: float | None = None
     if isinstance(cfg.shape, CubeCfg):

@@ -205,11 +205,13 @@ class Articulation:
                 write(array(values), *chosen)
 
     def reset(self, env_ids: Any = None) -> None:
-        """Returns to the initial pose, positions and targets, with zero velocities."""
+        """Returns to the initial pose, positions and targets; velocities and their targets, and efforts, become 0."""
         chosen = slice(None) if env_ids is None else array(env_ids)
         start = self.native.default_qpos[chosen]
         self.native.write_joint_state(start, np.zeros_like(start), None, ids(env_ids))
         self.native.set_qpos_target(start, None, ids(env_ids))
+        self.native.set_qvel_target(np.zeros_like(start), None, ids(env_ids))
+        self.native.set_qf_target(np.zeros_like(start), None, ids(env_ids))
         if not self.cfg.fix_base:
             self.native.write_root_state(self.native.default_root_state[chosen], ids(env_ids))
 
