@@ -37,8 +37,8 @@ impl ThreadPool {
         self
     }
 
-    /// Starts the `slots - 1` threads for jobs with `slots` slots now, instead of with the first job. Does nothing for
-    /// threads that exist, or in a [serial](Self::serial) pool.
+    /// Starts the `slots - 1` worker threads of a job with `slots` slots immediately, so that the first job does not
+    /// start them. Running threads are kept. Does nothing in a [serial](Self::serial) pool.
     ///
     /// # Errors
     /// The operating system cannot start a thread.

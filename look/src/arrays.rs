@@ -69,7 +69,8 @@ pub struct MaterialValues {
     pub texture: Option<usize>,
     /// Number of repetitions of the texture along its two axes.
     pub tex_repeat: [f32; 2],
-    /// True if [`tex_repeat`](Self::tex_repeat) is per length instead of per shape: per 2 m in MuJoCo's renderer.
+    /// MuJoCo's `texuniform`: true if [`tex_repeat`](Self::tex_repeat) counts repetitions per length (2 m in MuJoCo's
+    /// renderer), false for repetitions over the whole shape.
     pub tex_uniform: bool,
     /// Emitted light, as a factor of the color.
     pub emission: f32,

@@ -182,8 +182,8 @@ impl Data {
         unsafe { self.raw.as_mut() }
     }
 
-    /// Resets state, inputs and warning counters to the model's initial state. Also clears the effects of an engine
-    /// error. Derived quantities are not computed.
+    /// Resets to the model's initial state (`mj_resetData`), with zero inputs and warning counters. Also clears the
+    /// effects of an engine error. Derived quantities are not computed.
     pub fn reset(&mut self) {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together.

@@ -157,7 +157,7 @@ impl PlotLayout {
     }
 }
 
-/// Shortens a name to `room` characters. Keeps its end, because long names usually differ there.
+/// Shortens a name to `room` characters, dots included, and keeps its end, where long names usually differ.
 fn truncate_start(name: &str, room: usize) -> String {
     let count = name.chars().count();
     if count <= room {

@@ -23,21 +23,21 @@ pub struct RecorderCfg {
     pub period_steps: u64,
     /// Periods of single streams: the name of a stream, and the number of physics steps between two of its rows.
     ///
-    /// A name is that of the file, such as `arm/link_poses`, or a prefix such as `camera` for all its streams. A name
-    /// without a recorded stream is an error. The last entry that matches a stream applies. A sensor with a period is
-    /// recorded at these steps, with its last measurement, if that is new. Results of tasks have no period. LeRobot
-    /// datasets have a single frame rate: any entry is an error.
+    /// A name is that of a stream in the file, such as `arm/link_poses`, or its first parts, such as `camera` for all
+    /// streams of that camera. A name without a recorded stream is an error. The last entry that matches a stream
+    /// applies. A sensor with a period is recorded at these steps: its last measurement, if it is new. Task results are
+    /// always recorded when they are published. LeRobot datasets have a single frame rate: any entry is an error.
     pub stream_periods: Vec<(String, u64)>,
-    /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. When all of them
-    /// wait to be written, the simulation waits. The pool may take up to 16 GiB.
+    /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. If all packets
+    /// wait to be written, the simulation waits. A pool larger than 16 GiB is an error.
     pub packets: usize,
     /// True to store the scene in an MCAP file or a NumPy archive; other formats do not contain it.
     ///
     /// MCAP files and NumPy archives get the scene as MJCF with its meshes, once, when the recording begins. Such a
     /// file is enough to show the recording (`kinetoscope replay`).
     ///
-    /// MCAP files additionally get scene messages for viewers (Foxglove): what cameras draw by default, attached to the
-    /// recorded frames. A message is repeated when the appearance changes or an entity is added. Moving entities
+    /// MCAP files additionally get scene messages for viewers (Foxglove): what cameras render by default, attached to
+    /// the recorded frames. A message is repeated when the appearance changes or an entity is added. Moving entities
     /// without a recorded pose are left out, and so are environments beyond the limit of 64 MiB for all messages.
     /// [`RecordingSummary::left_out`](crate::RecordingSummary::left_out) lists both.
     pub scene: bool,

@@ -84,7 +84,8 @@ pub struct RenderRequest<'a> {
     pub poses: &'a [PoseF32],
     /// Camera: pose, image size, focal lengths, principal point, and near and far limits.
     pub view: &'a View,
-    /// Lights that replace the scene's, for lights that move; `None` for the scene's.
+    /// Lights of this frame, used instead of the lights of the scene if lights move; `None` for the lights of the
+    /// scene.
     pub lights: Option<&'a [Light]>,
     /// Rays of a lens, used instead of the view's focal lengths and principal point; `None` is a pinhole. They must
     /// have been computed for the image size of the view.

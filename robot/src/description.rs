@@ -33,7 +33,7 @@ pub struct RobotDescription {
     pub root: LinkId,
 }
 
-/// A rigid body of the description.
+/// A link of the description: a rigid body, or a frame without mass (a site, an auxiliary frame).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// Unique name.
@@ -58,9 +58,9 @@ pub struct Link {
     pub parent_joint: Option<JointId>,
     /// Joints whose parent this link is, in file order.
     pub child_joints: Vec<JointId>,
-    /// True for an auxiliary frame of an MJCF body that has several joints, or a joint whose anchor is not at the
-    /// origin of the body. An auxiliary frame has no mass, no shape and no body in MuJoCo. Lists of links for users
-    /// omit it.
+    /// True for an auxiliary frame of an MJCF body. Such frames are added if the body has several joints, or if the
+    /// anchor of a joint is not at the body's origin. An auxiliary frame has no mass, no shape and no body in MuJoCo.
+    /// Lists of links for users omit it.
     pub is_auxiliary_frame: bool,
 }
 
@@ -211,11 +211,13 @@ pub struct JointDefaults {
 pub enum FileActuation {
     /// The file has no actuators at all.
     Unspecified,
-    /// The file has actuators, but no actuator acts on this joint.
+    /// The file has actuators, but they give this joint no drive. A mimic joint is passive, too: its actuators count
+    /// for the joint that it follows.
     Passive,
     /// Actuated without stiffness and damping: the control is an effort.
     Effort,
-    /// Actuated by position or velocity actuators. Gains of several actuators on the joint are added.
+    /// Actuated by actuators with stiffness or damping, on the joint, on a fixed tendon or on joints that mimic this
+    /// joint. The gains are those at the joint, summed over the actuators.
     Servo {
         /// Stiffness \[N m/rad or N/m\].
         stiffness: f64,
@@ -286,7 +288,8 @@ impl JointKind {
 }
 
 /// Limits of a joint as the file gives them; `None` where the file has no value. Both position limits are `None` if the
-/// lower one exceeds the upper one.
+/// lower one exceeds the upper one (in a URDF, a missing one counts as 0). Drives ignore the position limits of a
+/// continuous joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimit {
     /// Location of the declaration.
@@ -297,8 +300,8 @@ pub struct JointLimit {
     pub upper: Option<f64>,
     /// Largest effort \[N m or N\]. Drives treat 0 as unlimited.
     pub effort: Option<f64>,
-    /// Largest speed \[rad/s or m/s\]. It does not limit the motion; actuator models may use it, such as `DcMotor` as
-    /// the no-load speed.
+    /// Largest speed \[rad/s or m/s\]. Drives treat 0 as unlimited. It does not limit the motion; actuator models may
+    /// use it, such as `DcMotor` as the no-load speed.
     pub velocity: Option<f64>,
 }
 

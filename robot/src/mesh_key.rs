@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 pub struct MeshKey {
     /// Path of the mesh file.
     pub path: PathBuf,
-    /// Bit patterns of the scale factors, which makes keys comparable.
+    /// Bit patterns of the scale factors, so that keys are comparable and ordered.
     scale: [u64; 3],
 }
 

@@ -29,7 +29,7 @@ pub struct Instance {
     /// True if the shape may differ in every frame, as for tendons and skins. Cameras draw such instances, ray casters
     /// ignore them.
     pub is_deformable: bool,
-    /// Pose in the frame of its owner (the link or object); the identity for a geom of the world.
+    /// Pose in the frame of its owner (link, object or MJCF body); the identity for a geom of the world.
     pub frame_from_instance: Pose,
 }
 

@@ -24,11 +24,13 @@ use std::sync::Arc;
 pub struct SamplingCfg {
     /// Time between measurements \[s\]; 0 is every physics step.
     pub update_period: f64,
-    /// Rounds a period that is not a whole number of physics steps to the nearest one, instead of returning an error.
+    /// Rounds a period that is not a whole number of physics steps to the nearest whole number, at least 1 step.
+    /// Without it, such a period is an error.
     pub round_period: bool,
-    /// Measures when the sensor is read, not when it is due: [`SensorCfg::lazy`](crate::SensorCfg::lazy). The values
-    /// are the same, bit for bit. A sensor with a history, a latency, dropout or noise always measures when it is due,
-    /// because its values depend on all measurements before.
+    /// True to store the state when the sensor is due, and to measure this stored state when the sensor is read
+    /// ([`SensorCfg::lazy`](crate::SensorCfg::lazy)). The values are those of an eager sensor, bit for bit. A sensor
+    /// with a history, a latency, dropout or noise always measures when it is due, because its values depend on earlier
+    /// measurements.
     pub lazy: bool,
     /// Number of measurements in the history, the newest included.
     pub history_length: usize,

@@ -25,7 +25,8 @@ impl Schedule {
     /// # Errors
     ///
     /// A step that is not positive and finite; a period that is negative, not finite, or at least 2^53 steps; without
-    /// `round_period`, a period that differs from a whole number of steps by more than 1e-8 of it.
+    /// `round_period`, a period that differs from a whole number of steps by more than 1e-8 of it, or by more than 1e-3
+    /// steps.
     pub fn new(update_period: f64, dt: f64, round_period: bool) -> Result<Self, SensorError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SensorError::InvalidTimeStep { dt });

@@ -79,11 +79,11 @@ pub(crate) fn at_least_one(count: usize, choice: Selection, names: &[String]) ->
     Err(SensorError::EmptySelection { sensor, field, what, candidates })
 }
 
-/// Returns the indices of the names that one pattern matches, at least one.
+/// Returns the indices of the names that a pattern matches, in ascending order.
 ///
 /// # Errors
 ///
-/// Same as [`select`].
+/// A pattern that is not a regular expression or matches nothing.
 pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
     let pattern = strip_env_prefix(pattern);
     let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;

@@ -10,7 +10,7 @@ use kinetoscope_scene::StateFields;
 /// An eager or [lazy](crate::SensorCfg::lazy) sensor in its owner. The owner forwards all updates, resets and refreshes
 /// to the slot, and reads the sensor through it.
 ///
-/// After an error, the sensor is not called any more; reading returns the error. The methods that forward a state
+/// After an error, the sensor no longer gets states; reading returns the error. The methods that forward a state
 /// therefore return no errors.
 #[derive(Debug)]
 pub struct SensorSlot {
@@ -115,7 +115,7 @@ impl SensorSlot {
         self.store_written(env_ids, state);
     }
 
-    /// Stores environments that were reset or written to; their earlier states are never measured.
+    /// Replaces the stored states of environments that were reset or written to. Has no effect for an eager sensor.
     fn store_written(&mut self, env_ids: &[usize], state: &SceneState) {
         if self.phases.is_none() {
             return;
@@ -132,8 +132,8 @@ impl SensorSlot {
         }
     }
 
-    /// Physics steps until the next update of the slot: [`Sensor::due_in`] of an eager sensor (`u64::MAX` after a
-    /// panic), or the schedule of a lazy one.
+    /// Returns the physics steps until the slot needs its next update. `step` is the step of each environment. For an
+    /// eager sensor, this is [`Sensor::due_in`] (`u64::MAX` after a panic); for a lazy one, its schedule decides.
     pub fn due_in(&self, step: &[u64]) -> u64 {
         match &self.phases {
             Some(phases) => phases.due_in(step.iter().copied()),

@@ -59,7 +59,8 @@ impl EntitySet {
         links.chain(bodies).chain(objects).chain(terrains).collect()
     }
 
-    /// Checks that no entity has the name `uid`, and its syntax. Names of sensors are separate.
+    /// Checks the syntax of `uid`, and that no entity, object group or weld has this name. Sensors have their own
+    /// namespace.
     pub(crate) fn check_uid_free(&self, uid: &str) -> Result<()> {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
         let objects = objects.chain(self.mjcf_models.iter().map(|p| p.uid()));

@@ -198,7 +198,7 @@ impl<'a> ObserversMut<'a> {
         self.sim.notify_each_with(|observer, sim| observer.on_published(sim, event));
     }
 
-    /// Adds an observer, which receives all events from now on.
+    /// Adds an observer, which receives events from now on. Earlier writes are reported to the existing observers only.
     pub fn add<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
         // Earlier writes are reported to the existing observers only.
         self.sim.notify_written();

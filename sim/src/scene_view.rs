@@ -121,7 +121,8 @@ impl<'a> SceneView<'a> {
     }
 }
 
-/// Access for viewers and renderers that change the simulation; see [`SimulationManager::scene_mut`].
+/// Access for viewers and renderers that needs `&mut`: visual scene and state, contacts, forces, MuJoCo's data; see
+/// [`SimulationManager::scene_mut`].
 #[derive(Debug)]
 pub struct SceneViewMut<'a> {
     sim: &'a mut SimulationManager,

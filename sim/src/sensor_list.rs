@@ -106,7 +106,8 @@ impl std::fmt::Debug for SensorList {
 }
 
 impl SensorList {
-    /// Creates an empty list for a simulation with `substeps` MuJoCo steps per physics step.
+    /// Creates an empty list for the manager with serial number `manager`, with `substeps` MuJoCo steps per physics
+    /// step.
     pub(crate) fn new(manager: u64, substeps: u32) -> Self {
         Self { manager, substeps, ..Self::default() }
     }

@@ -14,7 +14,7 @@ pub enum EventMode {
     /// Once, when the task is built, in all environments. Later resets undo changes of the state, but not of properties
     /// such as masses.
     Startup,
-    /// When an episode begins, after the simulation went back to the initial state there.
+    /// When an episode begins, after the environment was reset to its initial state.
     Reset,
     /// Repeatedly during an episode, after steps in which the episode does not end. The number of steps before the
     /// first event of an episode, and between two events, is drawn anew each time, uniformly from `steps`.

@@ -63,7 +63,7 @@ pub struct FieldSelector {
 }
 
 impl FieldSelector {
-    /// Selects the number `field`, such as `position[J1]`, of a topic.
+    /// Selects the number `field`, such as `position[J1]`, in the messages of `topic`, a topic name or its end.
     pub fn new(topic: impl Into<String>, field: impl Into<String>) -> Self {
         Self { topic: topic.into(), field: field.into() }
     }

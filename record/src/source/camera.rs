@@ -28,7 +28,8 @@ pub(super) enum StereoSide {
 }
 
 impl StereoSide {
-    /// The cameras of a sensor.
+    /// Returns the cameras of a sensor: both sides of a stereo camera, `Mono` for a camera or ray-caster camera, none
+    /// for other sensors.
     pub(super) fn of(sensor: &dyn Any) -> &'static [Self] {
         if sensor.is::<StereoCamera>() {
             &[Self::Left, Self::Right]

@@ -101,8 +101,9 @@ pub struct RayWorld {
 }
 
 impl RayTargets {
-    /// Prepares the instances of `scene` with the `wanted` indices; repeated indices count once, indices out of range
-    /// are ignored. Invisible instances are never hit. BVHs over meshes are taken from `assets`, or built.
+    /// Prepares the instances of `scene` with the indices `wanted`. Repeated indices count once; indices out of range
+    /// are ignored. Invisible instances are never hit. Deformable instances keep the shape that they have in `scene`;
+    /// ray-casting sensors leave them out. BVHs over meshes are taken from `assets`, or built.
     pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssetCache) -> Self {
         let mut is_wanted = vec![false; scene.instances().len()];
         for index in wanted {
@@ -166,7 +167,8 @@ impl RayTargets {
         poses[self.targets[index as usize].instance as usize]
     }
 
-    /// A target at a pose; `None` if the pose is not finite or the target is invisible.
+    /// Target `index` of this list at `pose` (world from instance); `None` if the pose is not finite or the target is
+    /// invisible.
     fn place(&self, index: u32, pose: PoseF64) -> Option<PlacedTarget> {
         let target = &self.targets[index as usize];
         if !pose.is_finite() || !target.visible {
@@ -265,8 +267,8 @@ impl RayWorld {
         self.place_moving(targets.moving_poses(poses));
     }
 
-    /// Replaces the targets, and places them. `fixed` must be built for `targets`; `moving` holds the poses of the
-    /// moving targets as in [`RayTargets::moving_poses`].
+    /// Replaces the targets and places them. `fixed` must be built for `targets`. `moving` holds one pose (world from
+    /// instance) per moving target, in the order of [`RayTargets::moving_poses`]; targets without a pose are never hit.
     pub fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedTargets>, moving: &[PoseF64]) {
         if !Arc::ptr_eq(&self.targets, targets) {
             self.targets = Arc::clone(targets);

@@ -29,7 +29,7 @@ use std::cell::RefCell;
 /// Largest number of lights with a shadow map.
 const MAX_SHADOWS: usize = 4;
 
-/// A frame that is prepared for rendering, band by band; keeps its memory.
+/// A frame prepared for rendering by bands; its memory is reused for the next frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PreparedFrame {
     pub(crate) list: DrawList,

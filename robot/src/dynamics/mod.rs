@@ -359,7 +359,8 @@ impl<'a> Dynamics<'a> {
         self.inverse_dynamics(&zero, &zero, gravity)
     }
 
-    /// Bias force c(q, v) + g(q): the generalized force at zero acceleration (`qfrc_bias` of MuJoCo).
+    /// Bias force c(q, v) + g(q): the generalized force at zero acceleration (`qfrc_bias` of MuJoCo), under `gravity`
+    /// in world axes \[m/s²\] (z = -9.81 on earth).
     ///
     /// # Panics
     ///

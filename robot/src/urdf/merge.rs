@@ -25,7 +25,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 /// Merged robot with the warnings about its files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MergedRobot {
-    /// Merged robot.
+    /// Links and joints of all files. Missing mass properties are not completed.
     pub description: RobotDescription,
     /// Warnings, file by file in the order of merging.
     pub diagnostics: Vec<Diagnostic>,

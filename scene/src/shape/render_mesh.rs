@@ -241,10 +241,11 @@ impl RenderMesh {
         Self::new(&out, crease)
     }
 
-    /// Adds a cluster of triangles with their unit normals, which are zero for triangles without an area.
+    /// Adds a cluster of the triangles in the given range. `faces` are their unit normals, zero for triangles without
+    /// an area; `closed` is [`Cluster::closed`].
     ///
-    /// `number(vertex, next)` returns the number of a vertex in the cluster and true if the vertex is new. The number
-    /// of a new vertex is `next`.
+    /// `number(vertex, next)` returns the number of a vertex in the cluster, and true if the vertex is new; a new
+    /// vertex gets `next`.
     fn push_cluster(
         &mut self,
         Range { start: first, end }: Range<usize>,

@@ -15,7 +15,7 @@ pub use stairs::PyramidStairs;
 
 use thiserror::Error;
 
-/// Largest number of points of a height field. Rendering takes about 200 bytes for each.
+/// Largest number of points of a height field. Rendering needs about 200 bytes of memory per point.
 pub const MAX_POINTS: usize = 1 << 22;
 
 /// Error of a terrain generator.

@@ -167,7 +167,7 @@ impl Camera {
         }
     }
 
-    /// Returns the history images, updated with all delivered frames.
+    /// Returns the history images after updating those that are outdated.
     fn history_images(&self) -> Result<&HistoryImages, CameraError> {
         let (rows, length) = (self.env_ids().len(), self.history_length());
         let filled = |row: usize| self.frames.stamp_history().filled(row);

@@ -22,11 +22,13 @@ pub trait PlaceRows {
     /// Environments that the sensor sees.
     fn env_rows(&self) -> &EnvRows;
 
-    /// Sets poses of optical frames: one for each of `rows`, or one for all.
+    /// Sets camera poses in optical axes (for a stereo camera: poses of the rig's origin): one for each of `rows`, or
+    /// one for all. `rows` are rows of [`env_rows`](Self::env_rows), not environment indices.
     ///
     /// # Errors
     ///
-    /// A wrong number of poses, or a parent whose pose is unknown. Nothing is changed then.
+    /// A wrong number of poses, an invalid pose, or, with [`PoseFrame::Environment`], a parent whose pose is unknown.
+    /// Nothing is changed then.
     fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError>;
 
     /// Restores the configured poses and intrinsics.

@@ -41,9 +41,9 @@ use std::sync::{Arc, Mutex};
 /// [`restore`](CameraPlacement::restore).
 ///
 /// A camera is perfect by default. Optionally it has a [`history`](Self::history), latency, dropout, noise, and
-/// imperfections of real cameras ([`CameraCfg::imperfections`]). It stays lazy and gives the same bits: each capture is
-/// kept until it is delivered or read. Setters affect the shown frame and frames in flight; frames in the history keep
-/// the pose and the intrinsics of their delivery.
+/// imperfections of real cameras ([`CameraCfg::imperfections`]). With these options, the camera stays lazy and gives
+/// the same bits: each capture is kept until it is delivered or read. Setters affect the shown frame and frames in
+/// flight; frames in the history keep the pose and the intrinsics of their delivery.
 ///
 /// Returned views borrow the camera, so images are not overwritten while they are read. The first axis of all arrays is
 /// the environments of the camera, [`env_ids`](Self::env_ids). Poses are in the frame of the environment, lengths in

@@ -17,7 +17,7 @@ pub(super) struct MeasurementLayout {
     pub air: bool,
 }
 
-/// Returns the number of values of a measurement.
+/// Returns the number of values of a measurement of one environment.
 pub(super) fn value_count(layout: &MeasurementLayout) -> usize {
     let per_body = 9
         + 3 * layout.groups

@@ -34,7 +34,8 @@ pub struct JointPlan {
     pub friction: f64,
     /// Rotor inertia \[kg m² or kg\]: that of the configuration, else that of an MJCF file, else 0.
     pub armature: f64,
-    /// Viscous damping of the joint itself, from the file \[N m s/rad or N s/m\].
+    /// Viscous damping of the joint itself, from the file, else 0 \[N m s/rad or N s/m\]. It adds to the damping of the
+    /// drive.
     pub damping: f64,
     /// The joint's own position limits \[rad or m\]; `None` without limits. A mimic joint whose limits leave its driver
     /// no range has the limits that follow from the driver's range.

@@ -34,7 +34,7 @@ pub struct Drive {
     pub ctrl: usize,
     /// Realization in MuJoCo.
     pub realization: Realization,
-    /// Nominal gains in torque units, and limits.
+    /// Nominal gains in torque units and limits, with which every environment starts.
     pub initial: Gains,
     /// Drive type, stiffness and damping, in the unit of the drive type, that the gains are computed from.
     pub setting: DriveSetting,

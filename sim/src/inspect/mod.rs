@@ -144,8 +144,8 @@ pub fn inspect(cfg: &InspectCfg) -> Result<RobotReport, InspectError> {
     Ok(RobotReport::new(cfg, &description, &kinematics, qpos, &GRAVITY, &diagnostics))
 }
 
-/// Returns the configuration with the given positions, in the order of the drivable joints. Adds a warning for each
-/// ignored position of a joint that follows another.
+/// Returns the configuration with the positions of `cfg.qpos`; other joints have the start position of the MJCF file,
+/// else 0. Adds a warning for a given position of a joint that an equality or mimic relation puts elsewhere.
 fn configuration(
     description: &RobotDescription,
     cfg: &InspectCfg,

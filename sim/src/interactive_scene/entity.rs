@@ -18,25 +18,25 @@ use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Configuration of one entity of a scene.
+/// Configuration of one entity of a scene. The name of the entity replaces the `uid` in the configuration.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum EntityCfg {
-    /// A robot. Its uid is the name of the entity.
+    /// A robot.
     Robot(Box<RobotCfg>),
-    /// A passive articulation. Its uid is the name of the entity.
+    /// A passive articulation.
     Articulation(Box<ArticulationCfg>),
-    /// A rigid object. Its uid is the name of the entity.
+    /// A rigid object.
     RigidObject(Box<RigidObjectCfg>),
-    /// A group of rigid objects. Its uid is the name of the entity; the uid of each object is `group.object`.
+    /// A group of rigid objects. Each object is also available as a single object called `group.object`.
     Group(Box<RigidObjectGroupCfg>),
-    /// A terrain. Its uid is the name of the entity.
+    /// A terrain.
     Terrain(Box<TerrainCfg>),
-    /// An attached MJCF file. Its uid is the name of the entity.
+    /// An attached MJCF file.
     Mjcf(Box<MjcfPartCfg>),
-    /// A weld, initially released. Its uid is the name of the entity.
+    /// A weld, initially released.
     Weld(Box<WeldCfg>),
-    /// A sensor of any type. Its uid is the name of the entity.
+    /// A sensor of any type.
     Sensor(Box<dyn AnySensorCfg>),
 }
 

@@ -99,10 +99,10 @@ impl Integrator {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum FrictionCone {
-    /// Four-sided pyramid.
+    /// Pyramid inside the cone: 4 edges, or 6 and 10 for contacts with torsional and rolling friction (`condim` 4, 6).
     #[default]
     Pyramidal,
-    /// Quadratic cone.
+    /// Exact elliptic cone.
     Elliptic,
 }
 
@@ -261,7 +261,7 @@ pub struct Geom {
     pub shape: Shape,
     /// Pose in the body frame.
     pub pose: Pose,
-    /// Role of the geom: collision or visual.
+    /// Collision (with its contact bits) or visual only.
     pub role: GeomRole,
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\]; `None` for the document's default.
     pub friction: Option<[f64; 3]>,

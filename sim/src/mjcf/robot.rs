@@ -95,7 +95,8 @@ pub(crate) struct GeomOwner {
     pub visual: Option<usize>,
 }
 
-/// Joint whose viscous damping is left out of the document; its armature there includes the implicit part.
+/// Joint whose viscous damping is left out of the document. Its armature in the document includes the time step times
+/// the damping (see `drive::implicit`).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct DampedJoint {
     /// Name of the joint in the document.
@@ -104,7 +105,7 @@ pub(crate) struct DampedJoint {
     pub dofs: usize,
     /// Damping of each degree of freedom \[N m s/rad or N s/m\].
     pub damping: f64,
-    /// Armature of each degree of freedom without the implicit part \[kg m² or kg\].
+    /// Armature of each degree of freedom, without the addition for damping \[kg m² or kg\].
     pub armature: f64,
 }
 

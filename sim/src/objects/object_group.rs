@@ -137,7 +137,8 @@ impl<'a> RigidObjectGroupMut<'a> {
         Ok(())
     }
 
-    /// Checks the shape of an array with `numbers` values for every object. Returns the selected environments.
+    /// Checks that an array has shape (selected environments or 1, objects, `numbers`), and returns the indices of the
+    /// selected environments. `meaning` names the axes in errors.
     fn check_shape(
         &self,
         argument: &'static str,

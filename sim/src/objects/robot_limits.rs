@@ -68,8 +68,8 @@ impl RobotMut<'_> {
     /// Sets the range of position targets \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (`None` for
     /// all environments; a single row applies to all of them), joints as `joint_ids` (`None` for all joints). Current
     /// targets are clamped at once; delayed targets of [`DelayedPd`](crate::DelayedPd) are clamped when they act. The
-    /// range may be tighter than the robot's own limits and be widened again, up to those. Entries of mimic joints are
-    /// accepted and ignored.
+    /// range may be tighter than the robot's own limits and be widened again, up to those. It stays over a reset.
+    /// Entries of mimic joints are accepted and ignored.
     ///
     /// The range limits commands only. The joint stops are in MuJoCo's model and stay unchanged: a load may push a
     /// joint beyond a tighter range. [`compute_ik`](Robot::compute_ik) searches within the limits that the robot was

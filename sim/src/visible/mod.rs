@@ -256,7 +256,8 @@ impl VisualScene {
         })
     }
 
-    /// Adds the properties of lights that MuJoCo does not have: their radii, by name, and dome lights.
+    /// Sets the radii of lights, by their names in the model, and replaces the ambient light by the sum of the dome
+    /// lights, if there are any.
     pub(crate) fn with_light_cfgs(mut self, model: &Model, lights: &[LightCfg]) -> Self {
         let scene = Arc::make_mut(&mut self.scene);
         if let Some(light) = lighting::dome_light_sum(lights) {

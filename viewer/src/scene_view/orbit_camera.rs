@@ -121,7 +121,8 @@ impl OrbitCamera {
     }
 
     /// Turns the camera in place, for a mouse drag of `[dx, dy]` pixels (right, down) in an image of `height` rows. The
-    /// image moves with the mouse: a drag to the right turns the camera to the left. The target moves.
+    /// image moves with the mouse: a drag to the right turns the camera to the left. The position stays, and the target
+    /// moves.
     pub fn look_around(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let eye = Vector3::from(self.position());
         self.orbit([-dx, -dy], height);

@@ -15,7 +15,7 @@ use kinetoscope_scene::Marker;
 use kinetoscope_sim::JointAxis;
 use nalgebra::Vector3;
 
-/// Overlays and geom groups that are drawn.
+/// Selection of the drawn overlays and geom groups; true is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overlays {
     /// Debug markers of the sensors that enable them (`debug_vis`).
@@ -24,7 +24,7 @@ pub struct Overlays {
     pub contacts: bool,
     /// Frames of links, objects and bodies of MJCF files.
     pub frames: bool,
-    /// Axes of hinge and slide joints.
+    /// Axes of hinge and slide joints, as arrows.
     pub joints: bool,
     /// Centers of mass of all bodies with a mass, as discs with four quarters.
     pub centers_of_mass: bool,

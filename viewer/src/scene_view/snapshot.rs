@@ -38,13 +38,13 @@ impl EnvSelection {
 /// [`origin`](SnapshotEnv::origin).
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Sequence number, from 1, increasing; some numbers may be skipped.
+    /// Sequence number, increasing from 1, possibly with gaps.
     pub number: u64,
     /// Run state of the simulation.
     pub run: RunState,
     /// Render scene of all environments that have no own [`env_scene`](EnvVisualState::env_scene), without poses.
     pub scene: Option<Arc<RenderScene>>,
-    /// Elements (links, objects, world geoms) with their mask ids.
+    /// Entity and link of each value in the mask channel, in ascending order of the values.
     pub mask_ids: Arc<[MaskId]>,
     /// Names of bodies, joints and cameras.
     pub names: Arc<Names>,

@@ -40,7 +40,7 @@ pub enum Input {
     FocusLost,
 }
 
-/// Modifier keys held during a button press.
+/// Modifier keys held when a mouse button is pressed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Modifiers {
     /// The Shift key.

@@ -134,7 +134,8 @@ pub(super) fn slider_joints(snapshot: &Snapshot) -> Vec<usize> {
     snapshot.names.joints.iter().enumerate().filter(|(_, joint)| joint.accepts_target).map(|(k, _)| k).collect()
 }
 
-/// Returns the range of the slider of a joint.
+/// Returns the range of the slider of a joint \[rad or m\]: its limits, or a default where a limit is missing. `values`
+/// are position, target, lower and upper limit of the joint.
 fn slider_ends(snapshot: &Snapshot, joint: usize, values: &[f64; 4]) -> [f64; 2] {
     let slides = snapshot.names.joints.get(joint).is_some_and(|name| name.is_prismatic);
     slider_range([values[2], values[3]], slides)

@@ -8,8 +8,8 @@ use kinetoscope_render::Layer;
 use kinetoscope_scene::{Instance, Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// A box around a segment, aligned with the axes of the segment's frame. A link has its own frame. An object with
-/// several links, and a class, have the frame of the rendered link or object with the smallest mask id.
+/// A box around a segment, aligned with the axes of the segment's frame. The frame of a link segment is the frame of
+/// the link. For a segment of several links or objects, it is the frame of the rendered one with the smallest mask id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Box3d {
     /// Segment id, see [`Segmentation::segments`].

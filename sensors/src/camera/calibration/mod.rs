@@ -28,8 +28,8 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 /// `kannala_brandt4` and more. `equidistant` has its ROS meaning, OpenCV's fisheye model.
 ///
 /// `plumb_bob` and `rational_polynomial` describe the same lens. Both accept as many coefficients as OpenCV: 0, 4, 5,
-/// 8, 12 or 14. The last two of 14 must be 0, because tilted sensors are not supported. If a file names no model, the
-/// number of coefficients selects the one that ROS nodes write.
+/// 8, 12 or 14. The last two of 14 must be 0, because tilted sensors are not supported. If a file names no model, up to
+/// 5 coefficients mean `plumb_bob`, more mean `rational_polynomial`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DistortionModel {
     /// k1, k2, p1, p2, k3 of [`OpenCv`].

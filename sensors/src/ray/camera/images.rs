@@ -28,7 +28,7 @@ impl RayImages {
         self.distance.view()
     }
 
-    /// Unit normals of faces, turned to the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
+    /// Unit normals of the hit surfaces, facing the camera, in world axes, shape (N, H, W, 3); 0 for a miss.
     pub fn normal(&self) -> ArrayView4<'_, f32> {
         self.normal.view()
     }

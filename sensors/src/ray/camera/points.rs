@@ -9,9 +9,9 @@ use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3};
 
 impl RayCasterCamera {
-    /// Returns the points of all pixels \[m\], shape (N, H * W, 3), row by row from the top left: the measured depth
-    /// along the ray through the pixel center, noise included. (+inf, +inf, +inf) where nothing was hit, which is where
-    /// the mask is 0.
+    /// Returns the points of all pixels in `frame` \[m\], shape (N, H * W, 3), row by row from the top left. Each point
+    /// is on the ray through the pixel center, at the measured distance, noise included. Misses (mask 0) are (+inf,
+    /// +inf, +inf).
     pub fn points(&self, frame: PointFrame) -> Array3<f32> {
         let (height, width) = self.image_shape();
         let count = self.sampler().num_envs();

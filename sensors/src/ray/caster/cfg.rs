@@ -110,6 +110,8 @@ impl SensorCfg for RayCasterCfg {
         self.sampling.lazy_schedule(dt)
     }
 
+    /// Creates the ray caster.
+    ///
     /// # Errors
     ///
     /// An invalid pattern, distance, offset or drift; an unknown parent or target; a period that is not a whole number

@@ -5,7 +5,8 @@ use super::{PartError, PartWriter, mj_index, row, row_of};
 use kinetoscope_mujoco::mjcf_keywords;
 
 impl PartWriter<'_> {
-    /// Writes actuators without an activation state, and actuators with one. A robot has drives in their place.
+    /// Returns the actuators without an activation state, and those with one, one XML element each. Both lists are
+    /// empty for a robot, because drives replace its actuators.
     pub(super) fn actuators(&self) -> Result<[Vec<String>; 2], PartError> {
         let mut lists = [Vec::new(), Vec::new()];
         if self.rig.is_some() {
