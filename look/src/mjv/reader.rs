@@ -3,12 +3,15 @@
 use super::frame::{Background, MjvFrame, MjvObject};
 use super::layout::{GeomLayout, LayoutError, LightLayout, floats, int};
 use super::soft::{MjvMemory, SkinFaces, SoftBody};
-use crate::{GeomShapes, GeomType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
+use crate::{GeomShapes, GeomType, LightType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
 use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Shape};
 use kinetoscope_scene::{
     Headlight, Hemisphere, Instance, Light, LightingSpace, Material, PoseF32, RenderScene, Sky, Texture,
 };
 use std::sync::Arc;
+
+/// Ambient light of scenes without lights in MuJoCo's renderer.
+const AMBIENT_WITHOUT_LIGHTS: [f32; 3] = [0.3; 3];
 
 /// Reader of the scenes of one model. Meshes and textures are prepared once.
 #[derive(Debug)]
@@ -29,6 +32,8 @@ struct LastScene {
     looks: Vec<GeomLook>,
     background: Background,
     lights: usize,
+    /// True if a light is active.
+    is_lit: bool,
     scene: Arc<RenderScene>,
     segment_scene: Option<Arc<RenderScene>>,
     /// Geom of each instance.
@@ -60,6 +65,8 @@ struct GeomLook {
     /// Emission, specular, shininess, reflectance.
     shading: [u32; 4],
     has_segment: bool,
+    /// True if the pose is a rotation and a position, which the renderer needs.
+    is_rigid: bool,
     /// Skin or flex, and its number of triangles.
     soft: Option<(SoftBody, usize)>,
 }
@@ -80,6 +87,7 @@ impl GeomLook {
             rgba: [0, 4, 8, 12].map(|k| bits(layout.rgba + k)),
             shading: [layout.emission, layout.specular, layout.shininess, layout.reflectance].map(bits),
             has_segment: int(row, layout.segid) >= 0,
+            is_rigid: soft.is_some() || InstanceRow { geom: 0, is_back: false }.pose(row, layout).is_rigid(),
             soft: soft.map(|body| (body, body.faces(skins, memory))),
         }
     }
@@ -123,20 +131,36 @@ impl<M: VisualModel> MjvReader<M> {
         check_length(lights, self.lights.stride)?;
         let layout = self.geoms;
         let rows = || geoms.chunks_exact(layout.stride);
+        let light_layout = self.lights;
+        let is_drawn = |row: &[u8]| {
+            let kind = light_layout.read(row).values.kind;
+            matches!(kind, LightType::Directional | LightType::Spot)
+        };
         let lights: Vec<Light> = lights
             .chunks_exact(self.lights.stride)
             .map(|row| {
                 let light = self.lights.read(row);
                 let position = light.position;
                 let direction = if light.is_headlight { memory.forward } else { light.direction };
-                Light { position, direction, ..scene_light(&light.values, LightingSpace::Display) }
+                let light = scene_light(&light.values, LightingSpace::Display);
+                // MuJoCo's renderer leaves out lights of all other types.
+                Light { position, direction, active: light.active && is_drawn(row), ..light }
             })
             .collect();
+        for row in memory.lights.chunks_exact(light_layout.stride).filter(|row| !is_drawn(row)) {
+            let kind = light_layout.kind.map_or(0, |at| int(row, at));
+            self.omit(format!("lights of type {kind} are not rendered: only directional and spot lights are"));
+        }
         let last = self.last.take();
         let looks = rows().map(|row| GeomLook::read(row, &layout, &self.skins, memory));
         let looks: Vec<GeomLook> = looks.collect();
+        let is_lit = lights.iter().any(|light| light.active);
+        let is_same = |last: &LastScene| {
+            let same_lights = last.lights == lights.len() && last.is_lit == is_lit;
+            last.background == background && same_lights && last.looks == looks
+        };
         let last = match last {
-            Some(last) if last.background == background && last.lights == lights.len() && last.looks == looks => last,
+            Some(last) if is_same(&last) => last,
             _ => self.build(looks, background, &lights, memory),
         };
         let mut poses: Vec<PoseF32> =
@@ -222,6 +246,7 @@ impl<M: VisualModel> MjvReader<M> {
             looks,
             background,
             lights: lights.len(),
+            is_lit: lights.iter().any(|light| light.active),
             scene: Arc::new(scene),
             segment_scene: segment_scene.map(Arc::new),
             rows,
@@ -240,7 +265,9 @@ impl<M: VisualModel> MjvReader<M> {
         };
         scene.lights = lights.to_vec();
         scene.headlight = Headlight { active: false, ..Headlight::default() };
-        scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+        // Without any light, MuJoCo's renderer adds ambient light.
+        let ambient = if lights.iter().any(|light| light.active) { [0.0; 3] } else { AMBIENT_WITHOUT_LIGHTS };
+        scene.ambient = Hemisphere { sky: ambient, ground: ambient };
         scene.lighting_space = LightingSpace::Display;
         // The background is behind all fog.
         scene.sky = Sky::uniform(background.fog.and_then(|fog| fog.color).unwrap_or([0.0; 3]));
@@ -252,6 +279,9 @@ impl<M: VisualModel> MjvReader<M> {
 
     /// Instance of a geom.
     fn instance(&mut self, look: &GeomLook, mask_id: i32, memory: &MjvMemory<'_>) -> Result<Instance, String> {
+        if !look.is_rigid {
+            return Err("a pose is not a rotation and a position".into());
+        }
         let shape = self.shape(look, memory)?;
         let of_material = self.materials.get(look.matid);
         let texture = match self.geoms.texid {
