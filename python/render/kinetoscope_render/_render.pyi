@@ -34,4 +34,5 @@ class FrameList:
         segmentation: npt.NDArray[np.int32] | None = None,
         segments: npt.NDArray[np.int32] | None = None,
         normal: npt.NDArray[np.float32] | None = None,
+        surfaces_of_color: bool = False,
     ) -> None: ...

@@ -131,7 +131,11 @@ def patch_mujoco() -> list[str]:
 
 
 def unpatch_mujoco() -> None:
-    """Undoes `patch_mujoco`."""
+    """Undoes `patch_mujoco`.
+
+    Renderers of this package keep working. Environments that were created in between cannot render any more: MuJoCo's
+    own functions raise `TypeError` for their contexts.
+    """
     while _undo:
         owner, name, old = _undo.pop()
         if isinstance(owner, dict):

@@ -7,6 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from conftest import SHAPES, load
+
 import kinetoscope_render as kr
 
 
@@ -80,6 +82,46 @@ def test_segmentation_colors(shapes):
     np.testing.assert_array_equal(found, expected)
     with pytest.raises(NotImplementedError, match="mjRND_IDCOLOR"):
         read_pixels(model, data, flags[:1])
+
+
+def test_objects_from_before():
+    """Contexts and renderers that exist already keep MuJoCo's own functions; renderers from between stay usable."""
+    kr.unpatch_mujoco()
+    model, data = load(SHAPES)
+    old = mujoco.Renderer(model, 60, 80)
+    old.update_scene(data, 0)
+    expected = old.render().copy()
+    context = mujoco.GLContext(80, 60)
+    context.make_current()
+    con, scene = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150), old.scene
+    rect, native = mujoco.MjrRect(0, 0, 80, 60), mujoco.mjr_render
+    kr.patch_mujoco()
+    assert mujoco.mjr_render is not native
+    np.testing.assert_array_equal(old.render(), expected)
+    context.make_current()
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, con)
+    rgb = np.zeros((60, 80, 3), np.uint8)
+    mujoco.mjr_render(rect, scene, con)
+    mujoco.mjr_readPixels(rgb, None, rect, con)
+    np.testing.assert_array_equal(rgb[::-1], expected)
+    con.free()
+    context.free()
+    ours, ours_con = mujoco.Renderer(model, 60, 80), mujoco.MjrContext(model, 1)
+    assert isinstance(ours, kr.Renderer)
+    kr.unpatch_mujoco()
+    ours.update_scene(data, 0)
+    assert ours.render().std() > 5
+    # MuJoCo's own functions refuse the contexts from between.
+    with pytest.raises(TypeError):
+        mujoco.mjr_render(rect, scene, ours_con)
+
+
+def test_uploads_have_the_names_of_mujoco(shapes):
+    model, _ = shapes
+    con = mujoco.MjrContext(model, 1)
+    mujoco.mjr_uploadTexture(m=model, con=con, texid=0)
+    mujoco.mjr_uploadMesh(m=model, con=con, meshid=0)
+    mujoco.mjr_uploadHField(m=model, con=con, hfieldid=0)
 
 
 def test_doctor():
