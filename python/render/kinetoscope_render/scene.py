@@ -26,6 +26,8 @@ _SIZES = (
     ("ten_length", "ntendon"), ("mocap_pos", "nmocap"), ("sensordata", "nsensordata"), ("flexvert_xpos", "nflexvert"),
 )
 _MAX_THREADS = 1024
+# True for versions whose spheres, boxes, ... have texture coordinates.
+_WRAPS_TEXTURES = tuple(int(part) for part in mujoco.__version__.split(".")[:2]) >= (4, 0)
 
 
 def default_threads() -> int:
@@ -127,7 +129,9 @@ class SceneCapture:
         self.scene = mujoco.MjvScene(model, max_geom)
         self.option = mujoco.MjvOption()
         self._geoms, self._lights = scene_memory(self.scene)
-        self._new_frames = lambda arrays: _render.FrameList(arrays, found.geom, found.light, threads, samples)
+        self._new_frames = lambda arrays: _render.FrameList(
+            arrays, found.geom, found.light, threads, samples, _WRAPS_TEXTURES
+        )
         self.frames = self._new_frames(model_arrays(model))
         visual, extent = model.vis, model.stat.extent
         self._haze = [*map(float, visual.rgba.haze[:3]), float(visual.map.haze)]

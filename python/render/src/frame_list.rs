@@ -4,7 +4,7 @@ use crate::layout::{geom_layout, light_layout};
 use crate::model_arrays::ModelArrays;
 use crate::panic::catch;
 use kinetoscope_look::horizon_haze;
-use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader};
+use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader, TextureRule};
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest, ToneCurve, View};
 use kinetoscope_scene::Haze;
@@ -85,6 +85,7 @@ fn background(numbers: [f64; 13], has_skybox: bool) -> Background {
 #[pymethods]
 impl FrameList {
     /// Copies the arrays of a model. `arrays` has the names of `MjModel`; the layouts have the places of fields.
+    /// `wraps_textures` is true for versions of MuJoCo whose shapes have texture coordinates.
     #[new]
     fn new(
         arrays: &Bound<'_, PyDict>,
@@ -92,6 +93,7 @@ impl FrameList {
         light_fields: &Bound<'_, PyDict>,
         threads: usize,
         samples: u8,
+        wraps_textures: bool,
     ) -> PyResult<Self> {
         catch(|| {
             let model = ModelArrays::from_dict(arrays)?;
@@ -99,6 +101,8 @@ impl FrameList {
             let skins = model.skins();
             let (geoms, lights) = (geom_layout(geom_fields)?, light_layout(light_fields)?);
             let reader = MjvReader::new(model, skins, geoms, lights).map_err(invalid)?;
+            let rule = if wraps_textures { TextureRule::Wrapped } else { TextureRule::Projected };
+            let reader = reader.with_texture_rule(rule);
             let cfg = RasterCfg { samples, tone: ToneCurve::Clip, groups: u32::MAX, ..RasterCfg::default() };
             let renderer = Some(ParallelRenderer::new(cfg, threads));
             let process = std::process::id();

@@ -6,6 +6,7 @@ import pytest
 from conftest import CLOTH, MESHES, SHAPES, load, version
 
 import kinetoscope_render as kr
+from kinetoscope_render import scene
 
 SIZE = (120, 160)
 # Scene, camera, and least PSNR of color [dB]; measured values are 3 dB and more above.
@@ -238,3 +239,29 @@ def test_lights_that_are_not_drawn(kind):
         np.testing.assert_array_equal(found, renderer.render())
     if version() >= (4, 0):  # the renderer of 3.3.7 raises FatalError
         assert color_psnr(xml) > 35
+
+
+TEXTURED = """<mujoco><visual><headlight ambient=".2 .2 .2" diffuse=".4 .4 .4" specular="0 0 0"/></visual>
+  <asset><texture name="t" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 .5" mark="edge" markrgb="1 0 0" width="64"
+      height="64"/><material name="t" texture="t" texrepeat="3 2" {uniform}/></asset>
+  <worldbody><light pos="0 -2 3" dir="0 .5 -1" diffuse=".5 .5 .5"/><camera name="c" pos="0 -2 1.3" xyaxes="1 0 0 0 .35 1"/>
+    <geom type="plane" size="3 3 .1" rgba=".5 .5 .5 1"/><geom {geom} pos="0 0 .5" euler="10 20 30" material="t"/>
+  </worldbody></mujoco>"""
+GEOMS = {
+    "plane": 'type="plane" size=".6 .4 .1"', "box": 'type="box" size=".5 .3 .4"', "sphere": 'size=".4"',
+    "ellipsoid": 'type="ellipsoid" size=".5 .3 .4"', "capsule": 'type="capsule" size=".2 .3"',
+    "cylinder": 'type="cylinder" size=".3 .4"',
+}
+
+
+@pytest.mark.parametrize("uniform", ["", 'texuniform="true"'], ids=["per-shape", "uniform"])
+@pytest.mark.parametrize("kind", GEOMS)
+def test_textures(kind, uniform, monkeypatch):
+    """Two-dimensional textures lie on shapes as in this version of MuJoCo; those of other versions differ."""
+    model, data = load(TEXTURED.format(geom=GEOMS[kind], uniform=uniform))
+    theirs, ours = (images(cls, model, data, "c")[0] for cls in (mujoco.Renderer, kr.Renderer))
+    monkeypatch.setattr(scene, "_WRAPS_TEXTURES", not scene._WRAPS_TEXTURES)
+    other = images(kr.Renderer, model, data, "c")[0]
+    found, control = psnr(theirs, ours), psnr(theirs, other)
+    print(kind, uniform, round(found, 1), round(control, 1))
+    assert found > 27 and control < 23, (found, control)
