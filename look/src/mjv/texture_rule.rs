@@ -155,3 +155,89 @@ pub(super) fn moved_texture(texture: &Texture, [left, up]: [usize; 2]) -> Option
     let bytes: Vec<u8> = (0..height).flat_map(|row| (0..width).flat_map(move |column| pixel(row, column))).collect();
     Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, level.width(), level.height(), 4, &bytes).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Sphere};
+
+    /// Texture coordinates by the formulas of each shape at all vertices, whose triangles face outward.
+    #[test]
+    fn wrapped_coordinates() {
+        let scale = [1.5f32, 2.0];
+        let shapes: [Shape; 5] = [
+            Sphere { radius: 0.4 }.into(),
+            Ellipsoid { radii: [0.5, 0.3, 0.4] }.into(),
+            Capsule { radius: 0.2, half_length: 0.3 }.into(),
+            Cylinder { radius: 0.3, half_length: 0.4 }.into(),
+            Box { half: [0.5, 0.3, 0.4] }.into(),
+        ];
+        for shape in &shapes {
+            let mesh = wrapped_mesh(shape, scale).expect("a mesh");
+            let uvs = mesh.uvs().expect("texture coordinates");
+            let [low, high] = mesh.bounds();
+            for ((&position, &normal), uv) in mesh.positions().iter().zip(mesh.normals()).zip(uvs) {
+                let [x, y, z] = [0, 1, 2].map(|k| position[k] / high[k]);
+                let longitude = (y.atan2(x) / (2.0 * PI as f32)).rem_euclid(1.0);
+                let latitude = |z: f32| z.clamp(-1.0, 1.0).asin() / PI as f32;
+                let [u, v] = match shape {
+                    Shape::Capsule(capsule) => {
+                        // The three parts: each has the whole height of the texture, so that borders have both ends.
+                        let beyond = position[2].abs() - capsule.half_length;
+                        let part = latitude(beyond / capsule.radius) * 2.0;
+                        let along = 0.5 - 0.5 * position[2] / capsule.half_length;
+                        let v = if beyond <= 1e-6 {
+                            along
+                        } else if z > 0.0 {
+                            1.0 - part
+                        } else {
+                            part
+                        };
+                        [longitude, v]
+                    }
+                    Shape::Cylinder(_) if normal[2].abs() > 0.9 => [0.5 + 0.5 * x, 0.5 + 0.5 * y],
+                    Shape::Cylinder(_) => [longitude, 0.5 - 0.5 * z],
+                    Shape::Box(_) => {
+                        let across = if normal[0].abs() > 0.9 { y } else { x };
+                        let down = if normal[2].abs() > 0.9 { y } else { z };
+                        [0.5 + 0.5 * across, 0.5 - 0.5 * down]
+                    }
+                    _ => [longitude, 0.5 - latitude(z)],
+                };
+                let found = [uv[0] / scale[0], (1.0 - uv[1]) / scale[1]];
+                // At the seam, the longitude is 0 or 1; at poles, any; between parts of a capsule, v is 0 or 1.
+                let is_pole = position[0].hypot(position[1]) < 1e-6;
+                let off = [found[0] - u, found[1] - v].map(|x| (x - x.round()).abs());
+                assert!((is_pole || off[0] < 1e-4) && off[1] < 1e-3, "{shape:?} {position:?}: {found:?}, {u} {v}");
+                assert!(found.iter().all(|x| (-1e-6..1.0 + 1e-6).contains(x)));
+                // All of these shapes are convex and around their origin.
+                assert!((0..3).map(|k| normal[k] * position[k]).sum::<f32>() > 0.0, "{shape:?} {position:?}");
+            }
+            assert!((0..3).all(|k| (low[k] + high[k]).abs() < 1e-6));
+        }
+        assert!(wrapped_mesh(&Plane { half: [1.0; 2] }.into(), scale).is_none());
+    }
+
+    /// The middle of a moved texture is in the middle of a plane: OpenGL's coordinate there is -1/2.
+    #[test]
+    fn moved_textures() {
+        let (width, height) = (8u32, 4u32);
+        let bytes: Vec<u8> = (0..width * height).flat_map(|k| [k as u8, 0, 0]).collect();
+        let texture = Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, width, height, 3, &bytes)
+            .expect("a texture");
+        let plane = Plane { half: [2.0, 1.0] };
+        // An odd number of images on a plane has the middle of an image in its middle, wherever images begin.
+        assert_eq!(plane_shift(&plane, [0.5, 1.5], &texture), None);
+        assert_eq!(plane_shift(&Plane::INFINITE, [1.0, 1.0], &texture), None);
+        // Two images along x begin at the middle: move them by half an image.
+        let shift = plane_shift(&plane, [1.0, 0.5], &texture).expect("a shift");
+        assert_eq!(shift, [4, 0]);
+        let pixel = |texture: &Texture, row: usize, column: usize| {
+            texture.mip_levels()[0].bytes()[4 * (row * (width as usize + 1) + column)]
+        };
+        let moved = moved_texture(&texture, [3, 1]).expect("a texture");
+        for (row, column) in (0..4).flat_map(|row| (0..8).map(move |column| (row, column))) {
+            assert_eq!(pixel(&moved, row, column), pixel(&texture, (row + 1) % 4, (column + 3) % 8));
+        }
+    }
+}
