@@ -1,5 +1,6 @@
 """Replacement of the renderers of other libraries."""
 
+import importlib
 import subprocess
 import sys
 
@@ -122,6 +123,50 @@ def test_uploads_have_the_names_of_mujoco(shapes):
     mujoco.mjr_uploadTexture(m=model, con=con, texid=0)
     mujoco.mjr_uploadMesh(m=model, con=con, meshid=0)
     mujoco.mjr_uploadHField(m=model, con=con, hfieldid=0)
+
+
+def fake_dm_control(folder, monkeypatch):
+    """A package with the interface of dm_control that the replacement uses."""
+    package = folder / "dm_control" / "_render"
+    package.mkdir(parents=True)
+    (folder / "dm_control" / "__init__.py").write_text("")
+    (package / "__init__.py").write_text("Renderer = 'original'")
+    (package / "executor.py").write_text("class PassthroughRenderExecutor: pass")
+    (package / "base.py").write_text("""class ContextBase:
+    def __init__(self, width, height, executor): self.made = (width, height, executor.__name__)""")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "dm_control"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(folder)
+
+
+def test_dm_control_when_imported(tmp_path, monkeypatch):
+    """Libraries are not imported by the replacement, which takes place when the program imports them."""
+    kr.unpatch_mujoco()
+    fake_dm_control(tmp_path, monkeypatch)
+    finders = list(sys.meta_path)
+    kr.patch_mujoco()
+    assert "dm_control" not in sys.modules
+    render = importlib.import_module("dm_control._render")
+    assert render.Renderer(3, 4).made == (3, 4, "PassthroughRenderExecutor")
+    assert "dm_control._render.Renderer" in kr.patch_mujoco()
+    kr.unpatch_mujoco()
+    assert (render.Renderer, sys.meta_path) == ("original", finders)
+    # A library that is imported already is changed at once.
+    kr.patch_mujoco()
+    assert render.Renderer != "original"
+
+
+def test_all_or_nothing(tmp_path, monkeypatch):
+    """If a library cannot be changed, nothing is."""
+    kr.unpatch_mujoco()
+    before = dict(vars(mujoco)), dict(sys.modules)
+    fake_dm_control(tmp_path, monkeypatch)
+    (tmp_path / "dm_control" / "_render" / "base.py").write_text("")
+    importlib.import_module("dm_control._render")
+    with pytest.raises(AttributeError, match="ContextBase"):
+        kr.patch_mujoco()
+    assert dict(vars(mujoco)) == before[0]
+    assert sys.modules.get("mujoco.osmesa") is before[1].get("mujoco.osmesa")
 
 
 def test_doctor():
