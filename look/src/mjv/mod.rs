@@ -13,9 +13,11 @@ mod reader;
 mod soft;
 #[cfg(test)]
 mod tests;
+mod texture_rule;
 
 pub use camera::{MjvCamera, MjvCameraError};
 pub use frame::{Background, MjvFrame, MjvObject};
 pub use layout::{GeomLayout, LayoutError, LightLayout, SoftTypes};
 pub use reader::MjvReader;
 pub use soft::{MjvMemory, SkinFaces};
+pub use texture_rule::TextureRule;

@@ -3,12 +3,17 @@
 use super::frame::{Background, MjvFrame, MjvObject};
 use super::layout::{GeomLayout, LayoutError, LightLayout, floats, int};
 use super::soft::{MjvMemory, SkinFaces, SoftBody};
-use crate::{GeomShapes, GeomType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
-use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Shape};
+use super::texture_rule::{TextureRule, moved_texture, plane_shift, wrapped_mesh};
+use crate::{GeomShapes, GeomType, LightType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
+use kinetoscope_scene::shape::{Capsule, Mesh, Plane, RenderMesh, Shape};
 use kinetoscope_scene::{
-    Headlight, Hemisphere, Instance, Light, LightingSpace, Material, PoseF32, RenderScene, Sky, Texture,
+    Headlight, Hemisphere, Instance, Light, LightingSpace, Material, PoseF32, RenderScene, Sky, Texture, TextureKind,
 };
+use std::collections::HashMap;
 use std::sync::Arc;
+
+/// Ambient light of scenes without lights in MuJoCo's renderer.
+const AMBIENT_WITHOUT_LIGHTS: [f32; 3] = [0.3; 3];
 
 /// Reader of the scenes of one model. Meshes and textures are prepared once.
 #[derive(Debug)]
@@ -20,8 +25,19 @@ pub struct MjvReader<M> {
     omitted: Vec<String>,
     geoms: GeomLayout,
     lights: LightLayout,
+    texture_rule: TextureRule,
+    /// Meshes with texture coordinates, by type, size and scale of the texture.
+    wrapped: HashMap<WrappedKey, Arc<RenderMesh>>,
+    /// Textures by address of the original, and pixels by which they are moved.
+    moved: HashMap<(usize, [usize; 2]), Arc<Texture>>,
     last: Option<LastScene>,
 }
+
+/// Type, size and scale of the texture of a shape, as bits.
+type WrappedKey = (i32, [u32; 3], [u32; 2]);
+
+/// Number of meshes after which those of former sizes are forgotten.
+const MAX_WRAPPED: usize = 1000;
 
 /// The scene of the last frame, and all that it was made of.
 #[derive(Debug)]
@@ -29,6 +45,8 @@ struct LastScene {
     looks: Vec<GeomLook>,
     background: Background,
     lights: usize,
+    /// True if a light is active.
+    is_lit: bool,
     scene: Arc<RenderScene>,
     segment_scene: Option<Arc<RenderScene>>,
     /// Geom of each instance.
@@ -60,6 +78,8 @@ struct GeomLook {
     /// Emission, specular, shininess, reflectance.
     shading: [u32; 4],
     has_segment: bool,
+    /// True if the pose is a rotation and a position, which the renderer needs.
+    is_rigid: bool,
     /// Skin or flex, and its number of triangles.
     soft: Option<(SoftBody, usize)>,
 }
@@ -80,6 +100,7 @@ impl GeomLook {
             rgba: [0, 4, 8, 12].map(|k| bits(layout.rgba + k)),
             shading: [layout.emission, layout.specular, layout.shininess, layout.reflectance].map(bits),
             has_segment: int(row, layout.segid) >= 0,
+            is_rigid: soft.is_some() || InstanceRow { geom: 0, is_back: false }.pose(row, layout).is_rigid(),
             soft: soft.map(|body| (body, body.faces(skins, memory))),
         }
     }
@@ -100,7 +121,25 @@ impl<M: VisualModel> MjvReader<M> {
                 .map_err(|reason| omitted.push(format!("the skybox, texture {texture}, is not rendered: {reason}")))
                 .ok()
         });
-        Ok(Self { shapes: GeomShapes::new(model), materials, sky, skins, omitted, geoms, lights, last: None })
+        Ok(Self {
+            shapes: GeomShapes::new(model),
+            materials,
+            sky,
+            skins,
+            omitted,
+            geoms,
+            lights,
+            texture_rule: TextureRule::default(),
+            wrapped: HashMap::new(),
+            moved: HashMap::new(),
+            last: None,
+        })
+    }
+
+    /// Sets the mapping of textures, which depends on the version of MuJoCo.
+    #[must_use]
+    pub fn with_texture_rule(self, texture_rule: TextureRule) -> Self {
+        Self { texture_rule, last: None, ..self }
     }
 
     /// True if the model has a skybox.
@@ -123,20 +162,36 @@ impl<M: VisualModel> MjvReader<M> {
         check_length(lights, self.lights.stride)?;
         let layout = self.geoms;
         let rows = || geoms.chunks_exact(layout.stride);
+        let light_layout = self.lights;
+        let is_drawn = |row: &[u8]| {
+            let kind = light_layout.read(row).values.kind;
+            matches!(kind, LightType::Directional | LightType::Spot)
+        };
         let lights: Vec<Light> = lights
             .chunks_exact(self.lights.stride)
             .map(|row| {
                 let light = self.lights.read(row);
                 let position = light.position;
                 let direction = if light.is_headlight { memory.forward } else { light.direction };
-                Light { position, direction, ..scene_light(&light.values, LightingSpace::Display) }
+                let light = scene_light(&light.values, LightingSpace::Display);
+                // MuJoCo's renderer leaves out lights of all other types.
+                Light { position, direction, active: light.active && is_drawn(row), ..light }
             })
             .collect();
+        for row in memory.lights.chunks_exact(light_layout.stride).filter(|row| !is_drawn(row)) {
+            let kind = light_layout.kind.map_or(0, |at| int(row, at));
+            self.omit(format!("lights of type {kind} are not rendered: only directional and spot lights are"));
+        }
         let last = self.last.take();
         let looks = rows().map(|row| GeomLook::read(row, &layout, &self.skins, memory));
         let looks: Vec<GeomLook> = looks.collect();
+        let is_lit = lights.iter().any(|light| light.active);
+        let is_same = |last: &LastScene| {
+            let same_lights = last.lights == lights.len() && last.is_lit == is_lit;
+            last.background == background && same_lights && last.looks == looks
+        };
         let last = match last {
-            Some(last) if last.background == background && last.lights == lights.len() && last.looks == looks => last,
+            Some(last) if is_same(&last) => last,
             _ => self.build(looks, background, &lights, memory),
         };
         let mut poses: Vec<PoseF32> =
@@ -222,6 +277,7 @@ impl<M: VisualModel> MjvReader<M> {
             looks,
             background,
             lights: lights.len(),
+            is_lit: lights.iter().any(|light| light.active),
             scene: Arc::new(scene),
             segment_scene: segment_scene.map(Arc::new),
             rows,
@@ -240,7 +296,9 @@ impl<M: VisualModel> MjvReader<M> {
         };
         scene.lights = lights.to_vec();
         scene.headlight = Headlight { active: false, ..Headlight::default() };
-        scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+        // Without any light, MuJoCo's renderer adds ambient light.
+        let ambient = if lights.iter().any(|light| light.active) { [0.0; 3] } else { AMBIENT_WITHOUT_LIGHTS };
+        scene.ambient = Hemisphere { sky: ambient, ground: ambient };
         scene.lighting_space = LightingSpace::Display;
         // The background is behind all fog.
         scene.sky = Sky::uniform(background.fog.and_then(|fog| fog.color).unwrap_or([0.0; 3]));
@@ -252,24 +310,36 @@ impl<M: VisualModel> MjvReader<M> {
 
     /// Instance of a geom.
     fn instance(&mut self, look: &GeomLook, mask_id: i32, memory: &MjvMemory<'_>) -> Result<Instance, String> {
+        if !look.is_rigid {
+            return Err("a pose is not a rotation and a position".into());
+        }
         let shape = self.shape(look, memory)?;
         let of_material = self.materials.get(look.matid);
-        let texture = match self.geoms.texid {
+        // A geom without a texture of its own has that of its material.
+        let own_texture = self.geoms.texid.filter(|_| look.texid >= 0);
+        let texture = match own_texture {
             Some(_) => self.materials.texture(look.texid).cloned(),
             None => of_material.and_then(|material| material.texture.clone()),
         };
         let model_material = of_material.cloned().unwrap_or_default();
-        let tex_repeat = match self.geoms.texrepeat {
+        let tex_repeat = match self.geoms.texrepeat.and(own_texture) {
             Some(_) => look.texrepeat.map(f32::from_bits),
             None => model_material.tex_repeat,
         };
-        let tex_uniform = match self.geoms.texuniform {
+        let tex_uniform = match self.geoms.texuniform.and(own_texture) {
             Some(_) => look.texuniform != 0,
             None => model_material.tex_uniform,
         };
         let [emission, specular, shininess, reflectance] = look.shading.map(f32::from_bits);
         // MuJoCo reflects the scene in planes and in the upper face of boxes only.
         let mirrors = matches!(GeomType::from_id(look.kind), Some(GeomType::Plane | GeomType::Box));
+        let is_mirror = mirrors && reflectance > 0.0;
+        let (shape, texture) = match texture {
+            Some(texture) if texture.kind() == TextureKind::TwoD => {
+                self.mapped(look, shape, texture, is_mirror, (tex_repeat, tex_uniform))
+            }
+            texture => (shape, texture),
+        };
         let rgba = look.rgba.map(|x| f32::from_bits(x).clamp(0.0, 1.0));
         let material = Material {
             rgba,
@@ -286,6 +356,49 @@ impl<M: VisualModel> MjvReader<M> {
         let instance = Instance { visible, is_deformable, ..Instance::new(shape, material, mask_id) };
         instance.validate().map_err(|error| error.to_string())?;
         Ok(instance)
+    }
+
+    /// Shape and texture such that the texture has the place of MuJoCo's renderer. Boxes that are mirrors stay as they
+    /// are, because meshes do not mirror.
+    fn mapped(
+        &mut self,
+        look: &GeomLook,
+        shape: Shape,
+        texture: Arc<Texture>,
+        is_mirror: bool,
+        (repeat, is_uniform): ([f32; 2], bool),
+    ) -> (Shape, Option<Arc<Texture>>) {
+        let repeat = repeat.map(|r| if r > 0.0 { r } else { 1.0 });
+        let size = look.size.map(f32::from_bits);
+        let of_size = |k: usize| repeat[k] * if is_uniform && size[k] > 0.0 { size[k] } else { 1.0 };
+        let scale = [of_size(0), of_size(1)];
+        match (self.texture_rule, &shape) {
+            (TextureRule::Projected, Shape::Plane(plane)) => {
+                let Some(shift) = plane_shift(plane, scale.map(|images| 0.5 * images), &texture) else {
+                    return (shape, Some(texture));
+                };
+                let key = (Arc::as_ptr(&texture).addr(), shift);
+                let known = self.moved.get(&key).cloned();
+                let moved = known.or_else(|| moved_texture(&texture, shift).map(Arc::new));
+                if let Some(moved) = &moved {
+                    self.moved.insert(key, Arc::clone(moved));
+                }
+                (shape, moved.or(Some(texture)))
+            }
+            (TextureRule::Wrapped, _) if !is_mirror => {
+                if self.wrapped.len() > MAX_WRAPPED {
+                    self.wrapped.clear();
+                }
+                let key = (look.kind, look.size, scale.map(f32::to_bits));
+                let known = self.wrapped.get(&key).cloned();
+                let Some(mesh) = known.or_else(|| wrapped_mesh(&shape, scale).map(Arc::new)) else {
+                    return (shape, Some(texture));
+                };
+                self.wrapped.insert(key, Arc::clone(&mesh));
+                (Mesh { mesh }.into(), Some(texture))
+            }
+            _ => (shape, Some(texture)),
+        }
     }
 
     fn shape(&mut self, look: &GeomLook, memory: &MjvMemory<'_>) -> Result<Shape, String> {

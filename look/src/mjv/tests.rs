@@ -236,6 +236,47 @@ fn lights() {
     assert_eq!((sun.direction, head.direction), ([0.0, 0.0, -1.0], [0.6, 0.8, 0.0]));
 }
 
+/// Point lights and image lights are not drawn by MuJoCo's renderer, which adds ambient light to scenes without lights.
+#[test]
+fn lights_that_are_not_drawn() {
+    let light = |kind: i32| {
+        let mut row = vec![0; LIGHT.stride];
+        put(&mut row, LIGHT.dir, &[0.0, 0.0, -1.0]);
+        put_int(&mut row, 24, kind);
+        row
+    };
+    let mut reader = reader();
+    let ball = geom(2, -1, [0.5; 3], 0);
+    let mut read = |lights: &[u8]| {
+        let memory = MjvMemory { lights, ..memory(&ball) };
+        let frame = reader.read(&memory, Background::default()).expect("whole structures");
+        (frame.lights.iter().map(|light| light.active).collect::<Vec<_>>(), frame.scene.ambient.sky)
+    };
+    assert_eq!(read(&[light(2), light(3)].concat()), (vec![false, false], [0.3; 3]));
+    assert_eq!(read(&[light(2), light(0)].concat()), (vec![false, true], [0.0; 3]), "the scene is built anew");
+    assert_eq!(read(&light(1)), (vec![true], [0.0; 3]));
+    assert_eq!(read(&[]), (Vec::new(), [0.3; 3]));
+    let message = |kind| format!("lights of type {kind} are not rendered: only directional and spot lights are");
+    assert_eq!(reader.omitted(), [message(2), message(3)]);
+}
+
+/// A geom whose pose is not rigid is left out, alone, and comes back with a rigid pose.
+#[test]
+fn poses_that_are_not_rigid() {
+    let good = geom(2, -1, [0.5; 3], 0);
+    let mut reader = reader();
+    for matrix in [[2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [0.0; 9], [f32::NAN; 9]] {
+        let mut bad = geom(6, -1, [0.5; 3], 1);
+        put(&mut bad, GEOM.mat, &matrix);
+        let mut count = |row: &[u8]| {
+            let rows = [&good[..], row].concat();
+            reader.read(&memory(&rows), Background::default()).expect("whole structures").poses.len()
+        };
+        assert_eq!([count(&bad), count(&geom(6, -1, [0.5; 3], 1))], [1, 2]);
+    }
+    assert_eq!(reader.omitted(), ["geoms of type 6 are not rendered: a pose is not a rotation and a position"]);
+}
+
 #[test]
 fn invalid_layouts_and_memory() {
     let outside = GeomLayout { mat: GEOM.stride - 35, ..GEOM };
@@ -272,6 +313,12 @@ fn cameras() {
     // Depth is along x of the world, the right of the image along -y.
     assert_eq!(pose.apply([0.0, 0.0, 2.0]), [3.0, 2.0, 3.0]);
     assert_eq!(pose.apply([1.0, 0.0, 0.0]), [1.0, 1.0, 3.0]);
+    // A half width of its own sets the horizontal focal length: half of 4/3 of the vertical half height, twice the angle.
+    let wide = MjvCamera { half_width: 0.5 * half * 4.0 / 3.0, ..camera };
+    let [wide_fx, wide_fy, wide_cx, _] = wide.intrinsics(640, 480).expect("a frustum");
+    for (found, expected) in [(wide_fx, 2.0 * focal), (wide_fy, focal), (wide_cx, 320.0 - 0.5 * 320.0)] {
+        assert!((f64::from(found) - expected).abs() < 1e-3, "{found} {expected}");
+    }
     assert!(MjvCamera { up: [2.0, 0.0, 0.0], ..camera }.world_from_camera().is_err());
     assert!(MjvCamera { top: -half, ..camera }.intrinsics(640, 480).is_err());
 }

@@ -13,6 +13,7 @@ class FrameList:
         light_fields: dict[str, int],
         threads: int,
         samples: int,
+        wraps_textures: bool,
     ) -> None: ...
     def omitted(self) -> list[str]: ...
     def __len__(self) -> int: ...
@@ -34,4 +35,5 @@ class FrameList:
         segmentation: npt.NDArray[np.int32] | None = None,
         segments: npt.NDArray[np.int32] | None = None,
         normal: npt.NDArray[np.float32] | None = None,
+        surfaces_of_color: bool = False,
     ) -> None: ...

@@ -62,8 +62,8 @@ class BatchRenderer:
             An array if `channels` is a name, or else a dictionary of arrays by channel.
 
         Raises:
-            RuntimeError: The renderer is closed.
-            ValueError: An unknown channel or camera, an array of another shape, a state of a model of another size.
+            RuntimeError: The renderer is closed, or another thread uses it.
+            ValueError: An unknown channel or camera, an array of another shape, a state of another model.
         """
         capture = self._capture
         if capture is None:
@@ -88,12 +88,13 @@ class BatchRenderer:
         for name in names:
             components, dtype = _CHANNELS[name]
             buffers[name] = output_buffer(outs.get(name), (count, *size, *components), dtype, f"out[{name!r}]")
-        capture.frames.clear()
-        for data, which in zip(states, cameras):
-            capture.update(data, which, scene_option)
-            capture.capture(self.height, self.width)
-        if states:
-            capture.frames.render(**{name: buffer.reshape(-1) for name, buffer in buffers.items()})
+        with capture.exclusive():
+            capture.frames.clear()
+            for data, which in zip(states, cameras):
+                capture.update(data, which, scene_option)
+                capture.capture(self.height, self.width, colors="rgb" in names)
+            if states:
+                capture.frames.render(**{name: buffer.reshape(-1) for name, buffer in buffers.items()})
         for name, buffer in buffers.items():
             given = outs.get(name)
             if given is not None and given is not buffer:
@@ -102,7 +103,7 @@ class BatchRenderer:
         return buffers[names[0]] if single else buffers
 
     def close(self) -> None:
-        """Frees the memory of the renderer. Further calls do nothing."""
+        """Frees the memory of the renderer. A second call does nothing; `render` raises `RuntimeError`."""
         self._capture = None
 
     def __enter__(self) -> "BatchRenderer":

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import importlib.abc
 import importlib.util
 import sys
 import types
-from typing import Any
+from typing import Any, Callable, Optional
 
 import mujoco
 
@@ -63,9 +64,47 @@ def _patch_library() -> None:
         _gl_module(name, GLContext=software_context.GLContext)
 
 
+class _AfterImport(importlib.abc.MetaPathFinder):
+    """Calls `action` with a module when a program imports it: patch_mujoco imports no library."""
+
+    def __init__(self, name: str, action: Callable[[Any], None]) -> None:
+        self._name, self._action, self._is_searching = name, action, False
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> Any:
+        """Specification of the module whose loader also calls the action; None for other modules."""
+        del path, target
+        if fullname != self._name or self._is_searching:
+            return None
+        self._is_searching = True
+        try:
+            spec = importlib.util.find_spec(fullname)
+        finally:
+            self._is_searching = False
+        loader: Optional[Any] = spec.loader if spec is not None else None
+        if loader is None:
+            return spec
+        execute = loader.exec_module
+
+        def execute_and_act(module: Any) -> None:
+            execute(module)
+            # unpatch_mujoco may have run since.
+            if self in sys.meta_path:
+                self._action(module)
+
+        loader.exec_module = execute_and_act
+        return spec
+
+
 def _patch_dm_control() -> None:
+    name = "dm_control._render"
+    if name in sys.modules:
+        _patch_dm_control_render(sys.modules[name])
+    else:
+        sys.meta_path.insert(0, _AfterImport(name, _patch_dm_control_render))
+
+
+def _patch_dm_control_render(render: Any) -> None:
     # Its contexts are those of OpenGL libraries, whose import may fail; a fake one needs only this interface.
-    render = importlib.import_module("dm_control._render")
     base = importlib.import_module("dm_control._render.base")
     executor = importlib.import_module("dm_control._render.executor")
 
@@ -118,20 +157,32 @@ def patch_mujoco() -> list[str]:
     names imported earlier by `from mujoco import Renderer`. A second call changes nothing. Windows (`mujoco.viewer`,
     `render_mode="human"`) are not replaced: they draw in their own process of OpenGL.
 
+    No library is imported for this: dm_control's context is replaced when the program imports it. If a replacement
+    fails, all are undone, and the error is raised.
+
     Returns:
-        The names of the replaced attributes.
+        The names of the attributes that are replaced now.
     """
     if not _undo:
-        _patch_library()
-        if _exists("dm_control"):
-            _patch_dm_control()
-        if _exists("robosuite"):
-            _patch_robosuite()
+        try:
+            _patch_library()
+            if _exists("dm_control"):
+                _patch_dm_control()
+            if _exists("robosuite"):
+                _patch_robosuite()
+        except BaseException:
+            unpatch_mujoco()
+            raise
     return patched()
 
 
 def unpatch_mujoco() -> None:
-    """Undoes `patch_mujoco`."""
+    """Undoes `patch_mujoco`.
+
+    Renderers of this package keep working. Environments that were created in between cannot render any more: MuJoCo's
+    own functions raise `TypeError` for their contexts.
+    """
+    sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _AfterImport)]
     while _undo:
         owner, name, old = _undo.pop()
         if isinstance(owner, dict):

@@ -13,7 +13,7 @@ from kinetoscope_render.scene import SceneCapture, check_size
 class Renderer:
     """Renders MuJoCo scenes, with the interface of `mujoco.Renderer`.
 
-    A renderer is used by one thread at a time. It releases the GIL while it renders.
+    One thread at a time uses a renderer. It releases the GIL while it renders.
     """
 
     _capture: Optional[SceneCapture] = None
@@ -40,7 +40,7 @@ class Renderer:
             width: Width of images [pixels], up to 8192, whatever the model's `offwidth`.
             max_geom: Largest number of geoms in the scene.
             font_scale: Ignored: labels are not rendered.
-            threads: Number of threads; all cores by default.
+            threads: Number of threads, up to 1024; all cores by default.
             samples: Samples per pixel of color, 1 or 4; by default 4, or 1 if the model's `offsamples` is 0.
 
         Raises:
@@ -108,9 +108,12 @@ class Renderer:
             scene_option: Options of the visualizer; the default ones by default.
 
         Raises:
-            ValueError: The model has no such camera, or `data` belongs to a model of another size.
+            ValueError: The model has no such camera, or `data` belongs to another model.
+            RuntimeError: The renderer is closed, or another thread uses it.
         """
-        self._open().update(data, camera, scene_option)
+        capture = self._open()
+        with capture.exclusive():
+            capture.update(data, camera, scene_option)
 
     def render(self, *, out: Optional[np.ndarray] = None) -> np.ndarray:
         """Renders the scene.
@@ -124,7 +127,7 @@ class Renderer:
             object id and object type (`mujoco.mjtObj`), int32, (height, width, 2), and (-1, -1) in the background.
 
         Raises:
-            RuntimeError: The renderer is closed.
+            RuntimeError: The renderer is closed, or another thread uses it.
             ValueError: `out` has another shape.
             NotImplementedError: The scene has a flag or a camera that is not supported.
         """
@@ -137,9 +140,10 @@ class Renderer:
         else:
             channel, shape, dtype = "rgb", (*size, 3), np.uint8
         buffer = output_buffer(out, shape, dtype, "out")
-        capture.frames.clear()
-        capture.capture(self._height, self._width)
-        capture.frames.render(**{channel: buffer.reshape(-1)})
+        with capture.exclusive():
+            capture.frames.clear()
+            capture.capture(self._height, self._width, colors=channel == "rgb")
+            capture.frames.render(**{channel: buffer.reshape(-1)})
         if out is None or out is buffer:
             return buffer
         np.copyto(out, buffer, casting="unsafe")
@@ -155,7 +159,7 @@ class Renderer:
         return self._capture
 
     def close(self) -> None:
-        """Frees the memory of the renderer. Further calls do nothing."""
+        """Frees the memory of the renderer. A second call does nothing; other methods raise `RuntimeError`."""
         self._capture = None
 
     def __enter__(self) -> "Renderer":

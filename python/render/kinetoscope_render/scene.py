@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
-from typing import Any, Optional, Union
+import threading
+from typing import Any, Iterator, Optional, Union
 
 import mujoco
 import numpy as np
@@ -13,11 +15,19 @@ from kinetoscope_render import _render
 from kinetoscope_render.layout import layouts, scene_memory
 from kinetoscope_render.model import model_arrays
 
-# Flags of rendering that have no counterpart here.
+# Flags of rendering that have no counterpart here, and those that replace colors by other quantities.
 _UNSUPPORTED_FLAGS = ("mjRND_WIREFRAME", "mjRND_ADDITIVE")
+_COLOR_FLAGS = ("mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
 _FLAGS = {name: int(value) for name, value in mujoco.mjtRndFlag.__members__.items()}
 # Arrays of a state whose lengths are compared with those of the model.
-_SIZES = (("qpos", "nq"), ("xpos", "nbody"), ("geom_xpos", "ngeom"), ("site_xpos", "nsite"), ("cam_xpos", "ncam"))
+_SIZES = (
+    ("qpos", "nq"), ("qvel", "nv"), ("ctrl", "nu"), ("act", "na"), ("xpos", "nbody"), ("xaxis", "njnt"),
+    ("geom_xpos", "ngeom"), ("site_xpos", "nsite"), ("cam_xpos", "ncam"), ("light_xpos", "nlight"),
+    ("ten_length", "ntendon"), ("mocap_pos", "nmocap"), ("sensordata", "nsensordata"), ("flexvert_xpos", "nflexvert"),
+)
+_MAX_THREADS = 1024
+# True for versions whose spheres, boxes, ... have texture coordinates.
+_WRAPS_TEXTURES = tuple(int(part) for part in mujoco.__version__.split(".")[:2]) >= (4, 0)
 
 
 def default_threads() -> int:
@@ -42,6 +52,16 @@ def check_size(height: Any, width: Any) -> tuple[int, int]:
             raise ValueError(f"{name} must be between 1 and 8192 pixels, not {number}")
         sizes.append(number)
     return sizes[0], sizes[1]
+
+
+def _check_threads(threads: Any) -> int:
+    try:
+        number = int(threads.__index__())
+    except AttributeError:
+        raise TypeError(f"threads must be an integer, not {type(threads).__name__}") from None
+    if not 1 <= number <= _MAX_THREADS:
+        raise ValueError(f"threads must be between 1 and {_MAX_THREADS}, not {number}")
+    return number
 
 
 def _names(model: mujoco.MjModel, kind: Any, count: int) -> list[str]:
@@ -95,9 +115,7 @@ class SceneCapture:
     def __init__(self, model: mujoco.MjModel, max_geom: Optional[int], threads: Optional[int], samples: Optional[int]):
         if not isinstance(model, mujoco.MjModel):
             raise TypeError(f"model must be a mujoco.MjModel, not {type(model).__name__}")
-        threads = default_threads() if threads is None else threads
-        if threads < 1:
-            raise ValueError(f"threads must be at least 1, not {threads}")
+        threads = min(default_threads(), _MAX_THREADS) if threads is None else _check_threads(threads)
         if samples is None:
             samples = 4 if model.vis.quality.offsamples > 0 else 1
         if samples not in (1, 4):
@@ -111,12 +129,33 @@ class SceneCapture:
         self.scene = mujoco.MjvScene(model, max_geom)
         self.option = mujoco.MjvOption()
         self._geoms, self._lights = scene_memory(self.scene)
-        self._new_frames = lambda arrays: _render.FrameList(arrays, found.geom, found.light, threads, samples)
+        self._new_frames = lambda arrays: _render.FrameList(
+            arrays, found.geom, found.light, threads, samples, _WRAPS_TEXTURES
+        )
         self.frames = self._new_frames(model_arrays(model))
         visual, extent = model.vis, model.stat.extent
         self._haze = [*map(float, visual.rgba.haze[:3]), float(visual.map.haze)]
         self._fog = [*map(float, visual.rgba.fog[:3])]
         self._fog += [float(visual.map.fogstart * extent), float(visual.map.fogend * extent)]
+        self._lock = threading.Lock()
+        self._process = os.getpid()
+
+    @contextlib.contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """Keeps other threads from using the scene and the frames.
+
+        Raises:
+            RuntimeError: Another thread uses them.
+        """
+        if self._process != os.getpid():
+            # A thread of the parent process may have held the lock. It does not exist here.
+            self._lock, self._process = threading.Lock(), os.getpid()
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("another thread uses this renderer; each thread needs a renderer of its own")
+        try:
+            yield
+        finally:
+            self._lock.release()
 
     def use_scene(self, scene: "mujoco.MjvScene") -> None:
         """Captures another scene of the model from now on."""
@@ -134,38 +173,50 @@ class SceneCapture:
         if not isinstance(data, mujoco.MjData):
             raise TypeError(f"data must be a mujoco.MjData, not {type(data).__name__}")
         for array, count in _SIZES:
+            if not hasattr(data, array) or not hasattr(model, count):
+                continue  # flexes, before 3.0
             found, expected = len(getattr(data, array)), getattr(model, count)
             if found != expected:
                 raise ValueError(
                     f"data belongs to another model: {array} has {found} rows, but the model of this renderer has "
                     f"{count} = {expected}"
                 )
+        # Other sizes differ too: the visualizer reads arrays of the state by the sizes of the model.
+        if getattr(data, "signature", None) != getattr(model, "signature", None):
+            raise ValueError("data belongs to another model: its signature is not that of the model of this renderer")
         camera = resolve_camera(model, camera)
         mujoco.mjv_updateScene(
             model, data, option or self.option, None, camera, int(mujoco.mjtCatBit.mjCAT_ALL), self.scene
         )
 
-    def capture(self, height: int, width: int) -> None:
-        """Adds the scene, as it is now, to the frames.
+    def capture(self, height: int, width: int, *, colors: bool) -> None:
+        """Adds the scene, as it is now, to the frames. `colors` is true if the image of color is wanted.
 
         Raises:
-            NotImplementedError: The scene has a flag or a camera that is not supported.
+            NotImplementedError: The scene has a flag, a transform or a camera that is not supported.
         """
         scene = self.scene
         flags = scene.flags
-        for name in _UNSUPPORTED_FLAGS:
-            if flags[_FLAGS[name]]:
+        for name in _UNSUPPORTED_FLAGS + (_COLOR_FLAGS if colors else ()):
+            if name in _FLAGS and flags[_FLAGS[name]]:
                 raise NotImplementedError(f"scene.flags[mujoco.mjtRndFlag.{name}] is not supported")
+        if int(scene.stereo) != int(mujoco.mjtStereo.mjSTEREO_NONE):
+            raise NotImplementedError("scene.stereo is not supported: only mjSTEREO_NONE is")
+        if scene.enabletransform:
+            raise NotImplementedError("scene.enabletransform is not supported")
         left, right = scene.camera
         if getattr(left, "orthographic", 0):
             raise NotImplementedError("orthographic cameras are not supported")
+
         # The cameras of a stereo pair are averaged, as in MuJoCo's images.
-        position = (0.5 * (left.pos + right.pos)).tolist()
-        near, far = float(left.frustum_near), float(left.frustum_far)
-        camera = [
-            *position, *left.forward.tolist(), *left.up.tolist(), float(left.frustum_center), 0.0,
-            float(left.frustum_bottom), float(left.frustum_top), near, far,
-        ]
+        def mean(field: str) -> float:
+            # Before 3.0, all pixels are square: there is no width.
+            return 0.5 * (float(getattr(left, field, 0.0)) + float(getattr(right, field, 0.0)))
+
+        vectors = [0.5 * (getattr(left, field) + getattr(right, field)) for field in ("pos", "forward", "up")]
+        far = mean("frustum_far")
+        frustum = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near")
+        camera = [*np.concatenate(vectors).tolist(), *map(mean, frustum), far]
         on = [float(flags[_FLAGS[name]]) for name in ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")]
         effects = [bool(flags[_FLAGS[name]]) for name in ("mjRND_SHADOW", "mjRND_REFLECTION")]
         self.frames.capture(
@@ -179,6 +230,7 @@ class SceneCapture:
         has_flexes = getattr(scene, "nflex", 0) > 0
         if not has_flexes and scene.nskin == 0:
             return None
+
         def flat(name: str, dtype: Any) -> np.ndarray:
             array = getattr(scene, name, None) if has_flexes or name.startswith("skin") else None
             return np.zeros(0, dtype) if array is None else np.ascontiguousarray(np.ravel(array), dtype)

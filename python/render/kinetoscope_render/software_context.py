@@ -1,11 +1,13 @@
 """The rendering functions of `mujoco` (`MjrContext`, `mjr_render`, `mjr_readPixels`, ...) without OpenGL.
 
-`patch_mujoco` puts them in the place of the originals, which Gymnasium, dm_control and robosuite call.
+`patch_mujoco` puts them in the place of the originals, which Gymnasium, dm_control and robosuite call. Calls with an
+original context, from before `patch_mujoco`, go to the originals.
 """
 
 from __future__ import annotations
 
-from typing import Any, Optional
+import functools
+from typing import Any, Callable, Optional
 
 import mujoco
 import numpy as np
@@ -55,28 +57,45 @@ class MjrContext:
         return self._capture
 
 
+def _for_our_context(function: Callable[..., None]) -> Callable[..., None]:
+    """`function` for contexts of this module, and the original of the same name for others."""
+    original = getattr(mujoco, function.__name__, None)
+
+    @functools.wraps(function)
+    def dispatch(*args: Any, **kwargs: Any) -> None:
+        is_ours = any(isinstance(value, MjrContext) for value in (*args, *kwargs.values()))
+        if is_ours or original is None:
+            return function(*args, **kwargs)
+        return original(*args, **kwargs)
+
+    return dispatch
+
+
 def _extent(viewport: Any) -> tuple[int, int]:
     if viewport.left or viewport.bottom:
         raise NotImplementedError("viewports that do not begin at (0, 0) are not supported")
     return int(viewport.height), int(viewport.width)
 
 
+@_for_our_context
 def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
     """Captures a scene; `mjr_readPixels` renders it."""
     capture, (height, width) = con._open(), _extent(viewport)
-    capture.use_scene(scn)
-    capture.frames.clear()
     segment, id_color = (bool(scn.flags[int(flag)]) for flag in (
         mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR,
     ))
     if segment and not id_color:
         raise NotImplementedError("scene.flags[mjRND_SEGMENT] without mjRND_IDCOLOR (random colors) is not supported")
-    capture.capture(height, width)
+    with capture.exclusive():
+        capture.use_scene(scn)
+        capture.frames.clear()
+        capture.capture(height, width, colors=False)
     con._size, con._flags = (height, width), (segment, id_color)
     camera = scn.camera[0]
     con._range = float(camera.frustum_near), float(camera.frustum_far)
 
 
+@_for_our_context
 def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None:
     """Renders the captured scene, from the lowest row, into the given arrays: color, and OpenGL's depth in 0..=1."""
     capture, (height, width) = con._open(), _extent(viewport)
@@ -94,7 +113,9 @@ def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None
         wanted["depth"] = np.empty(height * width, np.float32)
     if not wanted:
         return
-    capture.frames.render(**wanted)
+    # Without the segmentation flag, depth shows all that color shows.
+    with capture.exclusive():
+        capture.frames.render(**wanted, surfaces_of_color=not segment)
     if rgb is not None:
         if segment:
             ids = (wanted["segments"] + 1).reshape(height, width)
@@ -118,25 +139,39 @@ def _store(array: np.ndarray, image: np.ndarray, name: str) -> None:
     array[...] = image.reshape(array.shape)
 
 
+@_for_our_context
 def mjr_setBuffer(framebuffer: Any, con: MjrContext) -> None:
     """Selects the framebuffer: only the offscreen one exists."""
     con.currentBuffer = int(framebuffer)
 
 
+@_for_our_context
 def mjr_resizeOffscreen(width: int, height: int, con: MjrContext) -> None:
     """Sets the size of the offscreen framebuffer, which limits nothing."""
     con.offWidth, con.offHeight = width, height
 
 
-def mjr_uploadTexture(model: Any, con: MjrContext, texid: int) -> None:
+@_for_our_context
+def mjr_uploadTexture(m: Any, con: MjrContext, texid: int) -> None:
     """Copies the textures of a model again."""
     del texid
-    con._open().reload(model)
+    con._open().reload(m)
 
 
-mjr_uploadMesh = mjr_uploadTexture
-mjr_uploadHField = mjr_uploadTexture
+@_for_our_context
+def mjr_uploadMesh(m: Any, con: MjrContext, meshid: int) -> None:
+    """Copies the meshes of a model again."""
+    del meshid
+    con._open().reload(m)
 
 
+@_for_our_context
+def mjr_uploadHField(m: Any, con: MjrContext, hfieldid: int) -> None:
+    """Copies the height fields of a model again."""
+    del hfieldid
+    con._open().reload(m)
+
+
+@_for_our_context
 def mjr_overlay(*_: Any, **__: Any) -> None:
     """Text over images is not rendered."""

@@ -4,24 +4,28 @@ use crate::layout::{geom_layout, light_layout};
 use crate::model_arrays::ModelArrays;
 use crate::panic::catch;
 use kinetoscope_look::horizon_haze;
-use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader};
+use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader, TextureRule};
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest, ToneCurve, View};
 use kinetoscope_scene::Haze;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::fmt::Display;
 
-/// Frames that are rendered at once: their color images in RGBA are in memory together.
+/// Frames that are rendered at once, at most: their color images in RGBA are in memory together.
 const BLOCK: usize = 64;
+
+/// Largest size of the color images and masks of a block \[bytes\]. A single frame may be larger.
+const SCRATCH_BYTES: usize = 64 << 20;
 
 /// Renderer of one model, and the frames that it renders next.
 #[pyclass(module = "kinetoscope_render._render")]
 pub(crate) struct FrameList {
     reader: MjvReader<ModelArrays>,
-    renderer: ParallelRenderer,
+    /// Present until the list is dropped.
+    renderer: Option<ParallelRenderer>,
     /// Process that started the renderer's threads: a forked process has none of them.
     process: u32,
     cfg: RasterCfg,
@@ -81,6 +85,7 @@ fn background(numbers: [f64; 13], has_skybox: bool) -> Background {
 #[pymethods]
 impl FrameList {
     /// Copies the arrays of a model. `arrays` has the names of `MjModel`; the layouts have the places of fields.
+    /// `wraps_textures` is true for versions of MuJoCo whose shapes have texture coordinates.
     #[new]
     fn new(
         arrays: &Bound<'_, PyDict>,
@@ -88,6 +93,7 @@ impl FrameList {
         light_fields: &Bound<'_, PyDict>,
         threads: usize,
         samples: u8,
+        wraps_textures: bool,
     ) -> PyResult<Self> {
         catch(|| {
             let model = ModelArrays::from_dict(arrays)?;
@@ -95,8 +101,10 @@ impl FrameList {
             let skins = model.skins();
             let (geoms, lights) = (geom_layout(geom_fields)?, light_layout(light_fields)?);
             let reader = MjvReader::new(model, skins, geoms, lights).map_err(invalid)?;
+            let rule = if wraps_textures { TextureRule::Wrapped } else { TextureRule::Projected };
+            let reader = reader.with_texture_rule(rule);
             let cfg = RasterCfg { samples, tone: ToneCurve::Clip, groups: u32::MAX, ..RasterCfg::default() };
-            let renderer = ParallelRenderer::new(cfg, threads);
+            let renderer = Some(ParallelRenderer::new(cfg, threads));
             let process = std::process::id();
             let (frames, rgba, mask) = (Vec::new(), Vec::new(), Vec::new());
             Ok(Self { reader, renderer, process, cfg, threads, frames, rgba, mask })
@@ -176,8 +184,10 @@ impl FrameList {
     }
 
     /// Renders all captured frames into flat arrays: RGB bytes, depth \[m\], pairs of object id and object type,
-    /// segmentation ids (-1 in the background), normals. The frames must have one size. The interpreter runs other threads meanwhile.
-    #[pyo3(signature = (rgb=None, depth=None, segmentation=None, segments=None, normal=None))]
+    /// segmentation ids (-1 in the background), normals. The frames must have one size. Depth and normals show geoms
+    /// without a segmentation id only with `surfaces_of_color`. The interpreter runs other threads meanwhile.
+    #[pyo3(signature = (rgb=None, depth=None, segmentation=None, segments=None, normal=None, surfaces_of_color=false))]
+    #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn render(
         &mut self,
         py: Python<'_>,
@@ -186,6 +196,7 @@ impl FrameList {
         mut segmentation: Option<PyReadwriteArray1<'_, i32>>,
         mut segments: Option<PyReadwriteArray1<'_, i32>>,
         mut normal: Option<PyReadwriteArray1<'_, f32>>,
+        surfaces_of_color: bool,
     ) -> PyResult<()> {
         let mut images = Images {
             rgb: slice_of(&mut rgb)?,
@@ -193,6 +204,7 @@ impl FrameList {
             segmentation: slice_of(&mut segmentation)?,
             segments: slice_of(&mut segments)?,
             normal: slice_of(&mut normal)?,
+            surfaces_of_color,
         };
         py.detach(|| catch(|| self.render_frames(&mut images)))
     }
@@ -205,6 +217,8 @@ struct Images<'a> {
     segmentation: Option<&'a mut [i32]>,
     segments: Option<&'a mut [i32]>,
     normal: Option<&'a mut [f32]>,
+    /// True if depth and normals show geoms without a segmentation id too, like color.
+    surfaces_of_color: bool,
 }
 
 impl Images<'_> {
@@ -234,6 +248,20 @@ impl Images<'_> {
     }
 }
 
+/// Lengthens scratch memory to `length` elements.
+///
+/// # Errors
+/// `MemoryError` if there is not enough memory.
+fn grow<T: Clone + Default>(scratch: &mut Vec<T>, length: usize) -> PyResult<()> {
+    let missing = length.saturating_sub(scratch.len());
+    scratch.try_reserve_exact(missing).map_err(|_| {
+        let megabytes = length.saturating_mul(size_of::<T>()) >> 20;
+        PyMemoryError::new_err(format!("no memory for images of {megabytes} MiB"))
+    })?;
+    scratch.resize(scratch.len() + missing, T::default());
+    Ok(())
+}
+
 /// Part of a slice of images, `components` numbers per pixel: those of frames `first..first + count`.
 fn part<'a, T>(
     all: &'a mut Option<&mut [T]>,
@@ -241,6 +269,12 @@ fn part<'a, T>(
     each: usize,
 ) -> Option<std::slice::ChunksExactMut<'a, T>> {
     all.as_mut().map(|all| all[first * each..(first + count) * each].chunks_exact_mut(each))
+}
+
+impl Drop for FrameList {
+    fn drop(&mut self) {
+        self.forget_threads_of_parent();
+    }
 }
 
 impl FrameList {
@@ -254,24 +288,40 @@ impl FrameList {
         }
         images.validate(self.frames.len() * width * height)?;
         if self.process != std::process::id() {
-            // The threads of the parent process do not exist here. Waiting for them would take forever.
-            let renderer = ParallelRenderer::new(self.cfg, self.threads);
-            std::mem::forget(std::mem::replace(&mut self.renderer, renderer));
+            self.forget_threads_of_parent();
+            self.renderer = Some(ParallelRenderer::new(self.cfg, self.threads));
             self.process = std::process::id();
         }
         let mut start = 0;
         while start < self.frames.len() {
             // Effects are options of the renderer, so the frames of a block agree on them.
             let effects = self.frames[start].effects;
-            let count = self.frames[start..].iter().take(BLOCK).take_while(|frame| frame.effects == effects).count();
+            let block = (SCRATCH_BYTES / (4 * width * height)).clamp(1, BLOCK);
+            let count = self.frames[start..].iter().take(block).take_while(|frame| frame.effects == effects).count();
             self.render_block([start, count], effects, images)?;
             start += count;
+        }
+        if self.rgba.capacity() > SCRATCH_BYTES {
+            self.rgba = Vec::new();
+        }
+        if self.mask.capacity() > SCRATCH_BYTES / 4 {
+            self.mask = Vec::new();
         }
         Ok(())
     }
 
+    /// Leaves the threads of the renderer alone if they belong to the parent process: they do not exist here, so that
+    /// waiting for their end would take forever.
+    fn forget_threads_of_parent(&mut self) {
+        if self.process != std::process::id() {
+            std::mem::forget(self.renderer.take());
+        }
+    }
+
     fn render_block(&mut self, range: [usize; 2], effects: Effects, images: &mut Images<'_>) -> PyResult<()> {
-        let Self { renderer, frames, rgba, mask, cfg, .. } = self;
+        let Self { renderer: Some(renderer), frames, rgba, mask, cfg, .. } = self else {
+            return Err(PyRuntimeError::new_err("the renderer has no threads"));
+        };
         let [start, count] = range;
         let frames = &frames[start..start + count];
         let pixels = frames.first().map_or(0, |frame| frame.view.width * frame.view.height);
@@ -279,26 +329,28 @@ impl FrameList {
         let failure = |(index, error): (usize, kinetoscope_render::RenderError)| {
             PyValueError::new_err(format!("frame {}: {error}", start + index))
         };
-        let geometry = images.depth.is_some() || images.need_masks() || images.normal.is_some();
+        let surfaces = images.depth.is_some() || images.normal.is_some();
         // Geoms without a segmentation id are visible in color only.
         let split = frames.iter().any(|frame| frame.content.segment_scene.is_some());
         if images.rgb.is_some() {
-            rgba.resize(rgba.len().max(4 * pixels * count), 0);
+            grow(rgba, 4 * pixels * count)?;
         }
         if images.need_masks() {
-            mask.resize(mask.len().max(pixels * count), 0);
+            grow(mask, pixels * count)?;
         }
         for pass in 0..if split { 2 } else { 1 } {
             let (with_color, with_geometry) = if split { (pass == 0, pass == 1) } else { (true, true) };
-            let (with_color, with_geometry) = (with_color && images.rgb.is_some(), with_geometry && geometry);
-            if !with_color && !with_geometry {
+            let with_color = with_color && images.rgb.is_some();
+            let with_masks = with_geometry && images.need_masks();
+            // Surfaces are those of the scene of masks, unless those of color are asked for.
+            let with_surfaces = surfaces && if images.surfaces_of_color { pass == 0 } else { with_geometry };
+            if !with_color && !with_masks && !with_surfaces {
                 continue;
             }
             let mut colors = with_color.then(|| rgba[..4 * pixels * count].chunks_exact_mut(4 * pixels));
-            let mut masks =
-                (with_geometry && images.need_masks()).then(|| mask[..pixels * count].chunks_exact_mut(pixels));
-            let mut depths = if with_geometry { part(&mut images.depth, range, pixels) } else { None };
-            let mut normals = if with_geometry { part(&mut images.normal, range, 3 * pixels) } else { None };
+            let mut masks = with_masks.then(|| mask[..pixels * count].chunks_exact_mut(pixels));
+            let mut depths = if with_surfaces { part(&mut images.depth, range, pixels) } else { None };
+            let mut normals = if with_surfaces { part(&mut images.normal, range, 3 * pixels) } else { None };
             let mut jobs: Vec<_> = frames
                 .iter()
                 .map(|frame| {

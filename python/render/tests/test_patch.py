@@ -1,11 +1,14 @@
 """Replacement of the renderers of other libraries."""
 
+import importlib
 import subprocess
 import sys
 
 import mujoco
 import numpy as np
 import pytest
+
+from conftest import SHAPES, load
 
 import kinetoscope_render as kr
 
@@ -80,6 +83,90 @@ def test_segmentation_colors(shapes):
     np.testing.assert_array_equal(found, expected)
     with pytest.raises(NotImplementedError, match="mjRND_IDCOLOR"):
         read_pixels(model, data, flags[:1])
+
+
+def test_objects_from_before():
+    """Contexts and renderers that exist already keep MuJoCo's own functions; renderers from between stay usable."""
+    kr.unpatch_mujoco()
+    model, data = load(SHAPES)
+    old = mujoco.Renderer(model, 60, 80)
+    old.update_scene(data, 0)
+    expected = old.render().copy()
+    context = mujoco.GLContext(80, 60)
+    context.make_current()
+    con, scene = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150), old.scene
+    rect, native = mujoco.MjrRect(0, 0, 80, 60), mujoco.mjr_render
+    kr.patch_mujoco()
+    assert mujoco.mjr_render is not native
+    np.testing.assert_array_equal(old.render(), expected)
+    context.make_current()
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, con)
+    rgb = np.zeros((60, 80, 3), np.uint8)
+    mujoco.mjr_render(rect, scene, con)
+    mujoco.mjr_readPixels(rgb, None, rect, con)
+    np.testing.assert_array_equal(rgb[::-1], expected)
+    con.free()
+    context.free()
+    ours, ours_con = mujoco.Renderer(model, 60, 80), mujoco.MjrContext(model, 1)
+    assert isinstance(ours, kr.Renderer)
+    kr.unpatch_mujoco()
+    ours.update_scene(data, 0)
+    assert ours.render().std() > 5
+    # MuJoCo's own functions refuse the contexts from between.
+    with pytest.raises(TypeError):
+        mujoco.mjr_render(rect, scene, ours_con)
+
+
+def test_uploads_have_the_names_of_mujoco(shapes):
+    model, _ = shapes
+    con = mujoco.MjrContext(model, 1)
+    mujoco.mjr_uploadTexture(m=model, con=con, texid=0)
+    mujoco.mjr_uploadMesh(m=model, con=con, meshid=0)
+    mujoco.mjr_uploadHField(m=model, con=con, hfieldid=0)
+
+
+def fake_dm_control(folder, monkeypatch):
+    """A package with the interface of dm_control that the replacement uses."""
+    package = folder / "dm_control" / "_render"
+    package.mkdir(parents=True)
+    (folder / "dm_control" / "__init__.py").write_text("")
+    (package / "__init__.py").write_text("Renderer = 'original'")
+    (package / "executor.py").write_text("class PassthroughRenderExecutor: pass")
+    (package / "base.py").write_text("""class ContextBase:
+    def __init__(self, width, height, executor): self.made = (width, height, executor.__name__)""")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "dm_control"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(folder)
+
+
+def test_dm_control_when_imported(tmp_path, monkeypatch):
+    """Libraries are not imported by the replacement, which takes place when the program imports them."""
+    kr.unpatch_mujoco()
+    fake_dm_control(tmp_path, monkeypatch)
+    finders = list(sys.meta_path)
+    kr.patch_mujoco()
+    assert "dm_control" not in sys.modules
+    render = importlib.import_module("dm_control._render")
+    assert render.Renderer(3, 4).made == (3, 4, "PassthroughRenderExecutor")
+    assert "dm_control._render.Renderer" in kr.patch_mujoco()
+    kr.unpatch_mujoco()
+    assert (render.Renderer, sys.meta_path) == ("original", finders)
+    # A library that is imported already is changed at once.
+    kr.patch_mujoco()
+    assert render.Renderer != "original"
+
+
+def test_all_or_nothing(tmp_path, monkeypatch):
+    """If a library cannot be changed, nothing is."""
+    kr.unpatch_mujoco()
+    before = dict(vars(mujoco)), dict(sys.modules)
+    fake_dm_control(tmp_path, monkeypatch)
+    (tmp_path / "dm_control" / "_render" / "base.py").write_text("")
+    importlib.import_module("dm_control._render")
+    with pytest.raises(AttributeError, match="ContextBase"):
+        kr.patch_mujoco()
+    assert dict(vars(mujoco)) == before[0]
+    assert sys.modules.get("mujoco.osmesa") is before[1].get("mujoco.osmesa")
 
 
 def test_doctor():

@@ -1,6 +1,9 @@
 """The interface of the renderer."""
 
+import copy
 import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -92,9 +95,16 @@ def test_invalid_arguments(shapes):
     ):
         with pytest.raises(error, match=text):
             kr.Renderer(*arguments)
-    for keyword, text in ((dict(threads=0), "threads must be at least 1"), (dict(samples=3), "samples must be 1 or 4")):
+    for keyword, text in (
+        (dict(threads=0), "threads must be between 1 and 1024, not 0"),
+        (dict(threads=10**9), "threads must be between 1 and 1024, not 1000000000"),
+        (dict(threads=10**18), "threads must be between 1 and 1024"),
+        (dict(samples=3), "samples must be 1 or 4"),
+    ):
         with pytest.raises(ValueError, match=text):
             kr.Renderer(model, 10, 10, **keyword)
+    with pytest.raises(TypeError, match="threads must be an integer, not str"):
+        kr.Renderer(model, 10, 10, threads="4")
     renderer = kr.Renderer(model, 10, 10)
     small, other = load("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     del small
@@ -114,10 +124,156 @@ def test_invalid_arguments(shapes):
         setattr(camera, field, 50)
         with pytest.raises(ValueError, match=f"camera.{field} = 50 is out of range"):
             renderer.update_scene(data, camera)
+
+
+def test_unsupported_state_of_scenes(shapes):
+    """Flags and fields of the scene that change MuJoCo's images are refused, not ignored."""
+    model, data = shapes
+    renderer = kr.Renderer(model, 10, 10)
     renderer.update_scene(data)
-    renderer.scene.flags[int(mujoco.mjtRndFlag.mjRND_WIREFRAME)] = 1
-    with pytest.raises(NotImplementedError, match="mjRND_WIREFRAME"):
-        renderer.render()
+    flags = renderer.scene.flags
+    colors = [name for name in ("mjRND_SEGMENT", "mjRND_IDCOLOR", "mjRND_DEPTH") if hasattr(mujoco.mjtRndFlag, name)]
+    for name in ["mjRND_WIREFRAME", "mjRND_ADDITIVE", *colors]:
+        flags[int(getattr(mujoco.mjtRndFlag, name))] = 1
+        with pytest.raises(NotImplementedError, match=name):
+            renderer.render()
+        # Flags of colors do not concern depth.
+        renderer.enable_depth_rendering()
+        if name in colors:
+            renderer.render()
+        renderer.disable_depth_rendering()
+        flags[int(getattr(mujoco.mjtRndFlag, name))] = 0
+    for field, value in (("stereo", int(mujoco.mjtStereo.mjSTEREO_SIDEBYSIDE)), ("enabletransform", 1)):
+        old = getattr(renderer.scene, field)
+        setattr(renderer.scene, field, value)
+        with pytest.raises(NotImplementedError, match=f"scene.{field}"):
+            renderer.render()
+        setattr(renderer.scene, field, old)
+    renderer.render()
+
+
+def test_states_of_other_models():
+    """A state of a model with fewer lights, tendons or joints has shorter arrays than the visualizer reads."""
+    xml = """<mujoco><worldbody>{}<body>{}<geom size=".1"/><site name="s"/></body><body pos="1 0 0"><geom size=".1"/>
+        <site name="t"/></body></worldbody>{}</mujoco>"""
+    light, joint = "<light/>", "<joint type='slide'/>"
+    tendon = "<tendon><spatial><site site='s'/><site site='t'/></spatial></tendon>"
+    plain = load(xml.format("", "", ""))[1]
+    for full in ((60 * light, "", ""), ("", joint, ""), ("", "", tendon)):
+        model, data = load(xml.format(*full))
+        with kr.Renderer(model, 10, 10) as renderer:
+            renderer.update_scene(data)
+            with pytest.raises(ValueError, match="data belongs to another model"):
+                renderer.update_scene(plain)
+            # A model of the same description, and a copy of the state, are the same.
+            renderer.update_scene(load(xml.format(*full))[1])
+            renderer.update_scene(copy.copy(data))
+
+
+def test_poses_that_are_not_rigid(shapes):
+    """A geom with such a pose is left out by name; the rest of the scene is rendered."""
+    model, data = shapes
+    with kr.Renderer(model, 30, 40) as renderer:
+        renderer.enable_segmentation_rendering()
+        renderer.update_scene(data, "front")
+        expected = renderer.render()
+        scene = renderer.scene
+        for matrix in (2 * np.eye(3), np.zeros((3, 3)), np.full((3, 3), np.nan)):
+            renderer.update_scene(data, "front")
+            geom = scene.geoms[scene.ngeom]
+            mujoco.mjv_initGeom(
+                geom, int(mujoco.mjtGeom.mjGEOM_BOX), np.full(3, 0.2), np.array([0, 0, 1.0]), np.eye(3).ravel(),
+                np.ones(4, np.float32),
+            )
+            geom.mat[:], geom.segid = matrix, scene.ngeom
+            scene.ngeom += 1
+            np.testing.assert_array_equal(renderer.render(), expected)
+        assert any("a pose is not a rotation" in text for text in renderer.omitted()), renderer.omitted()
+
+
+def test_one_thread_at_a_time(shapes):
+    """A second thread is refused while the first one renders."""
+    model, data = shapes
+    renderer = kr.Renderer(model, 1500, 2000, threads=1)
+    renderer.update_scene(data, "front")
+    thread = threading.Thread(target=renderer.render)
+    thread.start()
+    messages = []
+    while thread.is_alive():
+        for call in (renderer.render, lambda: renderer.update_scene(data, "front")):
+            try:
+                if renderer._capture._lock.locked():
+                    call()
+            except RuntimeError as error:
+                messages.append(str(error))
+        time.sleep(0.005)
+    thread.join()
+    assert messages and set(messages) == {"another thread uses this renderer; each thread needs a renderer of its own"}
+    renderer.update_scene(data, "front")
+
+
+MEMORY = """
+import resource, sys
+import mujoco, numpy as np
+import kinetoscope_render as kr
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+small = kr.BatchRenderer(model, 16, 16, threads=1, samples=1)
+small.render([data])
+def used():
+    return int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+# The images of 64 frames, 3 bytes per pixel, and little more: not their copies in RGBA.
+count, side = 64, 512
+out = np.zeros((count, side, side, 3), np.uint8)
+batch = kr.BatchRenderer(model, side, side, threads=1, samples=1)
+batch.render([data], out=out[:1])
+before = used()
+resource.setrlimit(resource.RLIMIT_AS, (before + (48 << 20) + (64 << 20) * int(sys.argv[1]), -1))
+try:
+    batch.render([data] * count, out=out)
+    print("rendered")
+except MemoryError as error:
+    print("MemoryError:", error)
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="needs Linux")
+def test_memory():
+    """Scratch memory is limited, whatever the number of frames; without it, MemoryError."""
+    for blocks, expected in ((1, "rendered"), (0, "MemoryError: no memory for images of 64 MiB")):
+        run = subprocess.run(
+            [sys.executable, "-c", MEMORY, str(blocks)], capture_output=True, text=True, check=False, timeout=120
+        )
+        assert (run.returncode, run.stdout.strip()) == (0, expected), run.stderr
+
+
+FORK = """
+import os, sys, mujoco, kinetoscope_render as kr
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+closed, dropped, reloaded, kept = [kr.Renderer(model, 30, 40, threads=3) for _ in range(4)]
+for renderer in (closed, dropped, reloaded, kept):
+    renderer.update_scene(data)
+    renderer.render()
+child = os.fork()
+if child == 0:
+    closed.close()
+    del dropped
+    reloaded._capture.reload(model)
+    sys.exit(0)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_end_of_forked_process():
+    """A forked process closes, frees and reloads renderers of its parent, and ends, without a word."""
+    run = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", FORK], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (run.returncode, run.stderr) == (0, "")
 
 
 def test_closed(shapes):
