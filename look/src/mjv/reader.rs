@@ -26,15 +26,15 @@ pub struct MjvReader<M> {
     geoms: GeomLayout,
     lights: LightLayout,
     texture_rule: TextureRule,
-    /// Meshes with texture coordinates, by type, size and scale of the texture.
+    /// Meshes with scaled texture coordinates.
     wrapped: HashMap<WrappedKey, Arc<RenderMesh>>,
     /// Textures by address of the original, and pixels by which they are moved.
     moved: HashMap<(usize, [usize; 2]), Arc<Texture>>,
     last: Option<LastScene>,
 }
 
-/// Type, size and scale of the texture of a shape, as bits.
-type WrappedKey = (i32, [u32; 3], [u32; 2]);
+/// Type, mesh, size and scale of the texture of a shape, as bits.
+type WrappedKey = (i32, i32, [u32; 3], [u32; 2]);
 
 /// Number of meshes after which those of former sizes are forgotten.
 const MAX_WRAPPED: usize = 1000;
@@ -385,11 +385,11 @@ impl<M: VisualModel> MjvReader<M> {
                 }
                 (shape, moved.or(Some(texture)))
             }
-            (TextureRule::Wrapped, _) if !is_mirror => {
+            (TextureRule::Wrapped, _) if !is_mirror && look.soft.is_none() => {
                 if self.wrapped.len() > MAX_WRAPPED {
                     self.wrapped.clear();
                 }
-                let key = (look.kind, look.size, scale.map(f32::to_bits));
+                let key = (look.kind, look.dataid, look.size, scale.map(f32::to_bits));
                 let known = self.wrapped.get(&key).cloned();
                 let Some(mesh) = known.or_else(|| wrapped_mesh(&shape, scale).map(Arc::new)) else {
                     return (shape, Some(texture));

@@ -313,7 +313,7 @@ fn cameras() {
     // Depth is along x of the world, the right of the image along -y.
     assert_eq!(pose.apply([0.0, 0.0, 2.0]), [3.0, 2.0, 3.0]);
     assert_eq!(pose.apply([1.0, 0.0, 0.0]), [1.0, 1.0, 3.0]);
-    // A half width of its own sets the horizontal focal length: half of 4/3 of the vertical half height, twice the angle.
+    // A half width of its own sets the horizontal focal length: half the width of square pixels, twice the length.
     let wide = MjvCamera { half_width: 0.5 * half * 4.0 / 3.0, ..camera };
     let [wide_fx, wide_fy, wide_cx, _] = wide.intrinsics(640, 480).expect("a frustum");
     for (found, expected) in [(wide_fx, 2.0 * focal), (wide_fy, focal), (wide_cx, 320.0 - 0.5 * 320.0)] {

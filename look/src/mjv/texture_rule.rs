@@ -20,9 +20,12 @@ pub enum TextureRule {
 const SLICES: usize = 64;
 const STACKS: usize = SLICES / 2;
 
-/// A mesh of a round shape or a box, with the texture coordinates of [`TextureRule::Wrapped`] times `scale`; `None` for
-/// other shapes.
+/// A mesh of a round shape or a box with the texture coordinates of [`TextureRule::Wrapped`] times `scale`, or a mesh
+/// with its own texture coordinates times `scale`; `None` for other shapes.
 pub(super) fn wrapped_mesh(shape: &Shape, scale: [f32; 2]) -> Option<RenderMesh> {
+    if let Shape::Mesh(mesh) = shape {
+        return scaled_mesh(&mesh.mesh, scale);
+    }
     let mut grid = Grid { scale, ..Grid::default() };
     match shape {
         Shape::Sphere(sphere) => grid.ball([sphere.radius; 3]),
@@ -77,6 +80,17 @@ pub(super) fn wrapped_mesh(shape: &Shape, scale: [f32; 2]) -> Option<RenderMesh>
     }
     let mut mesh = TriMesh::from_triangles(grid.positions, grid.triangles);
     mesh.uvs = Some(grid.uvs);
+    Some(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE))
+}
+
+/// A mesh whose texture coordinates are scaled; `None` for a mesh without them, and if nothing would change.
+fn scaled_mesh(mesh: &RenderMesh, scale: [f32; 2]) -> Option<RenderMesh> {
+    let mut mesh = mesh.to_tri_mesh();
+    let uvs = mesh.uvs.as_mut().filter(|_| scale != [1.0; 2])?;
+    for [u, v] in uvs {
+        // Image rows run downward in MuJoCo, and upward here.
+        (*u, *v) = (*u * scale[0], 1.0 - (1.0 - *v) * scale[1]);
+    }
     Some(RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE))
 }
 
@@ -216,6 +230,30 @@ mod tests {
             assert!((0..3).all(|k| (low[k] + high[k]).abs() < 1e-6));
         }
         assert!(wrapped_mesh(&Plane { half: [1.0; 2] }.into(), scale).is_none());
+    }
+
+    /// Texture coordinates of a mesh are scaled from the upper left corner of the image, and nothing else changes.
+    #[test]
+    fn scaled_coordinates() {
+        let ball = wrapped_mesh(&Sphere { radius: 0.4 }.into(), [1.0, 1.0]).expect("a mesh");
+        let scaled = scaled_mesh(&ball, [3.0, 2.0]).expect("texture coordinates");
+        let key = |position: [f32; 3], uv: [f32; 2], normal: [f32; 3]| {
+            [&position[..], &uv, &normal].concat().iter().map(|x| (x * 1e4).round() as i64).collect::<Vec<_>>()
+        };
+        let all = |mesh: &RenderMesh, scale: [f32; 2]| {
+            let uvs = mesh.uvs().expect("texture coordinates");
+            let mut all: Vec<_> = (0..uvs.len())
+                .map(|k| {
+                    let uv = [uvs[k][0] * scale[0], (1.0 - uvs[k][1]) * scale[1]];
+                    key(mesh.positions()[k], uv, mesh.normals()[k])
+                })
+                .collect();
+            all.sort();
+            all
+        };
+        assert_eq!(all(&ball, [3.0, 2.0]), all(&scaled, [1.0, 1.0]));
+        assert_ne!(all(&ball, [2.0, 2.0]), all(&scaled, [1.0, 1.0]));
+        assert!(scaled_mesh(&ball, [1.0; 2]).is_none());
     }
 
     /// The middle of a moved texture is in the middle of a plane: OpenGL's coordinate there is -1/2.

@@ -27,7 +27,7 @@ _SIZES = (
 )
 _MAX_THREADS = 1024
 # True for versions whose spheres, boxes, ... have texture coordinates.
-_WRAPS_TEXTURES = tuple(int(part) for part in mujoco.__version__.split(".")[:2]) >= (4, 0)
+_WRAPS_TEXTURES = tuple(int(part) for part in mujoco.__version__.split(".")[:2]) >= (3, 12)
 
 
 def default_threads() -> int:

@@ -84,6 +84,9 @@ def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
     segment, id_color = (bool(scn.flags[int(flag)]) for flag in (
         mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR,
     ))
+    depth = getattr(mujoco.mjtRndFlag, "mjRND_DEPTH", None)
+    if depth is not None and scn.flags[int(depth)]:
+        raise NotImplementedError("scene.flags[mjRND_DEPTH] (depth as colors) is not supported")
     if segment and not id_color:
         raise NotImplementedError("scene.flags[mjRND_SEGMENT] without mjRND_IDCOLOR (random colors) is not supported")
     with capture.exclusive():

@@ -243,22 +243,55 @@ def test_lights_that_are_not_drawn(kind):
 
 TEXTURED = """<mujoco><visual><headlight ambient=".2 .2 .2" diffuse=".4 .4 .4" specular="0 0 0"/></visual>
   <asset><texture name="t" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 .5" mark="edge" markrgb="1 0 0" width="64"
-      height="64"/><material name="t" texture="t" texrepeat="3 2" {uniform}/></asset>
+      height="64"/><material name="t" texture="t" texrepeat="3 2" {uniform}/>{mesh}</asset>
   <worldbody><light pos="0 -2 3" dir="0 .5 -1" diffuse=".5 .5 .5"/><camera name="c" pos="0 -2 1.3" xyaxes="1 0 0 0 .35 1"/>
     <geom type="plane" size="3 3 .1" rgba=".5 .5 .5 1"/><geom {geom} pos="0 0 .5" euler="10 20 30" material="t"/>
   </worldbody></mujoco>"""
 GEOMS = {
     "plane": 'type="plane" size=".6 .4 .1"', "box": 'type="box" size=".5 .3 .4"', "sphere": 'size=".4"',
     "ellipsoid": 'type="ellipsoid" size=".5 .3 .4"', "capsule": 'type="capsule" size=".2 .3"',
-    "cylinder": 'type="cylinder" size=".3 .4"',
+    "cylinder": 'type="cylinder" size=".3 .4"', "mesh": 'type="mesh" mesh="m"',
 }
+
+if version() < (3, 0):
+    del GEOMS["mesh"]  # its compiler ends the process for this description of a mesh
+
+
+def test_material_of_appended_geom():
+    """A geom that a program appends with a material, but no texture of its own, has the texture of its material."""
+    model, data = load(SHAPES.replace('texrepeat="2 2" texuniform="true" reflectance=".2"', 'texrepeat="2 2"'))
+    found = []
+    for cls, material in ((mujoco.Renderer, "grid"), (kr.Renderer, "grid"), (kr.Renderer, None)):
+        renderer = cls(model, *SIZE)
+        renderer.update_scene(data, "front")
+        visual = renderer.scene
+        geom = visual.geoms[visual.ngeom]
+        mujoco.mjv_initGeom(
+            geom, int(mujoco.mjtGeom.mjGEOM_BOX), np.full(3, 0.3), np.array([0, -0.5, 0.5]), np.eye(3).ravel(),
+            np.ones(4, np.float32),
+        )
+        geom.segid = -1
+        if material:
+            index = mujoco.mj_name2id(model, int(mujoco.mjtObj.mjOBJ_MATERIAL), material)
+            if hasattr(geom, "matid"):
+                geom.matid = index
+            else:  # before 3.0, geoms have textures instead of materials
+                geom.texid, geom.texrepeat[:] = model.mat_texid[index], model.mat_texrepeat[index]
+        visual.ngeom += 1
+        found.append(renderer.render().copy())
+    textured, plain = psnr(found[0], found[1]), psnr(found[0], found[2])
+    assert textured > 30 and plain < 20, (textured, plain)
+
+
+MESH = """<mesh name="m" vertex="0 0 0  .8 0 0  0 .8 0  0 0 .8" texcoord="0 0  1 0  0 1  1 1"
+    face="0 2 1  0 1 3  0 3 2  1 2 3"/>"""
 
 
 @pytest.mark.parametrize("uniform", ["", 'texuniform="true"'], ids=["per-shape", "uniform"])
 @pytest.mark.parametrize("kind", GEOMS)
 def test_textures(kind, uniform, monkeypatch):
     """Two-dimensional textures lie on shapes as in this version of MuJoCo; those of other versions differ."""
-    model, data = load(TEXTURED.format(geom=GEOMS[kind], uniform=uniform))
+    model, data = load(TEXTURED.format(geom=GEOMS[kind], uniform=uniform, mesh=MESH if kind == "mesh" else ""))
     def image(cls):
         renderer = cls(model, *SIZE)
         renderer.update_scene(data, "c")

@@ -83,6 +83,9 @@ def test_segmentation_colors(shapes):
     np.testing.assert_array_equal(found, expected)
     with pytest.raises(NotImplementedError, match="mjRND_IDCOLOR"):
         read_pixels(model, data, flags[:1])
+    if hasattr(mujoco.mjtRndFlag, "mjRND_DEPTH"):
+        with pytest.raises(NotImplementedError, match="mjRND_DEPTH"):
+            read_pixels(model, data, [mujoco.mjtRndFlag.mjRND_DEPTH])
 
 
 def test_objects_from_before():

@@ -253,7 +253,7 @@ import os, sys, mujoco, kinetoscope_render as kr
 model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><light/><geom size='1'/></worldbody></mujoco>")
 data = mujoco.MjData(model)
 mujoco.mj_forward(model, data)
-closed, dropped, reloaded, kept = [kr.Renderer(model, 30, 40, threads=3) for _ in range(4)]
+closed, dropped, reloaded, kept = [kr.Renderer(model, 300, 400, threads=3) for _ in range(4)]
 for renderer in (closed, dropped, reloaded, kept):
     renderer.update_scene(data)
     renderer.render()
