@@ -115,9 +115,9 @@ Integrator: TypeAlias = Literal["euler", "rk4", "implicit", "implicit_fast"]
 FrictionCone: TypeAlias = Literal["pyramidal", "elliptic"]
 """Type of friction cone.
 
-``"pyramidal"``: Four-sided pyramid.
+``"pyramidal"``: Pyramid inside the cone: 4 edges, or 6 and 10 for contacts with torsional and rolling friction (``condim`` 4, 6).
 
-``"elliptic"``: Quadratic cone.
+``"elliptic"``: Exact elliptic cone.
 """
 
 
@@ -701,8 +701,8 @@ class SurfaceCfg:
     """Metalness, 0..=1. A metal has no diffuse reflection, and its color tints the specular reflection."""
 
     roughness: float | None = None
-    """Roughness, 0..=1; 0 is polished. If both are set, it replaces ``shininess``. The alpha of the GGX distribution is
-    the square of the roughness.
+    """Roughness, 0..=1; 0 is polished. If ``roughness`` and ``shininess`` are both set, ``roughness`` is used. The alpha of
+    the GGX distribution is the square of the roughness.
     """
 
     transmission: float | None = None
@@ -893,7 +893,7 @@ class ComponentCfg:
     parent: str | None = None
     """Parent component. The default is the first one present of: ``chassis`` for ``legs``; ``legs``, ``chassis`` for ``torso``
     (only with a ``chassis``); ``torso``, ``chassis`` for ``head`` and arms; the arm of the same side for hands. Without any
-    of these, the component is a root. A component with a custom name must be the first or have a ``parent``.
+    of these, the component is a root. A component with any other name must be the first or have a ``parent``.
     """
 
     parent_link: str | None = None
@@ -916,8 +916,8 @@ class UrdfCfg:
     """Robot made of one or several URDF files."""
 
     components: Sequence[ComponentCfg | Mapping[str, Any]] = field(default_factory=list)
-    """URDF files of the robot; a parent may follow its children. A component with a custom
-    ``name`` and without ``parent`` must be the first.
+    """Components of the robot, one URDF file each, in any order of parents and children. A component with a name
+    outside the list at ``ComponentCfg::name`` needs a ``parent``, unless it is the first.
     """
 
     name_case: NameCaseCfg | Mapping[str, Any] = field(default_factory=NameCaseCfg)
@@ -1129,7 +1129,9 @@ class RobotCfg:
     """
 
     hull: HullCfg | Mapping[str, Any] = field(default_factory=HullCfg)
-    """Settings for the convex hulls of collision meshes."""
+    """Settings for the convex hulls of collision meshes of URDF files. No effect on an MJCF file: MuJoCo computes its
+    hulls.
+    """
 
 
 @dataclass(kw_only=True, slots=True)
@@ -1190,7 +1192,9 @@ class ArticulationCfg:
     """
 
     hull: HullCfg | Mapping[str, Any] = field(default_factory=HullCfg)
-    """Settings for the convex hulls of collision meshes."""
+    """Settings for the convex hulls of collision meshes of URDF files. No effect on an MJCF file: MuJoCo computes its
+    hulls.
+    """
 
     semantic_class: str | None = None
     """Semantic class in the table of mask ids; ``None`` for ``articulation``."""
@@ -1418,9 +1422,9 @@ class MjcfPartCfg:
     """Pose of the file's world in the environment."""
 
     surfaces: Mapping[str, SurfaceCfg | Mapping[str, Any]] = field(default_factory=dict)
-    """Surface properties for rendering, by pattern of body names. They replace those of the file; a property that is
-    ``None`` keeps the value of the file. ``world`` selects the geoms of the file's world. A body may match only one
-    pattern.
+    """Surface properties for rendering, by pattern of body names in the file (without ``uid/``). They replace those of
+    the file; a property that is ``None`` keeps the value of the file. ``world`` selects the geoms of the file's world.
+    A body may match only one pattern.
     """
 
     semantic_class: str | None = None
@@ -1477,12 +1481,15 @@ class SamplingCfg:
     """Time between measurements [s]; 0 is every physics step."""
 
     round_period: bool = False
-    """Rounds a period that is not a whole number of physics steps to the nearest one, instead of returning an error."""
+    """Rounds a period that is not a whole number of physics steps to the nearest whole number, at least 1 step.
+    Without it, such a period is an error.
+    """
 
     lazy: bool = False
-    """Measures when the sensor is read, not when it is due: ``SensorCfg::lazy``. The values
-    are the same, bit for bit. A sensor with a history, a latency, dropout or noise always measures when it is due,
-    because its values depend on all measurements before.
+    """True to store the state when the sensor is due, and to measure this stored state when the sensor is read
+    (``SensorCfg::lazy``). The values are those of an eager sensor, bit for bit. A sensor
+    with a history, a latency, dropout or noise always measures when it is due, because its values depend on earlier
+    measurements.
     """
 
     history_length: int = 0
@@ -1796,8 +1803,8 @@ class CameraCfg:
     """
 
     far: float = 100.0
-    """Far limit: largest depth along the optical axis [m], or largest distance along the ray, as
-    ``near``.
+    """Far limit: largest depth along the optical axis [m], above ``near`` and finite. For lenses whose
+    rays do not all go forward, largest distance along the ray, as for ``near``.
     """
 
     extrinsics: Extrinsics | Mapping[str, Any] = field(default_factory=Extrinsics)
@@ -2282,9 +2289,9 @@ class JointWrenchCfg:
     _type: ClassVar[str] = "joint_wrench"
 
     links: Sequence[str] = field(default_factory=list)
-    """Name patterns of the links whose joints are measured (``uid/link``, or ``link`` alone), in the order they are
-    reported. A link that fixed joints fuse to another link has no joint to measure, which is an error: see
-    ``frames``.
+    """Name patterns of the links whose joints are measured (``uid/link``, or ``link`` alone). Results have the order of
+    the patterns. A link that fixed joints fuse to another link has no measurable joint and is an error; list it in
+    ``frames`` instead.
     """
 
     frames: Sequence[str] = field(default_factory=list)
