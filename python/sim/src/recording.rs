@@ -115,7 +115,7 @@ pub(crate) struct RecordingSummary {
     packets: u64,
     /// Number of times that the simulation waited for the writer.
     waits: u64,
-    /// What was left out, with the reason.
+    /// Topics and entities that were left out, each with the reason.
     left_out: Vec<String>,
     text: String,
 }
