@@ -69,7 +69,7 @@ impl PartialFile {
         Self::create_as(path, partial_file, overwrite)
     }
 
-    /// Creates the file as [`create`](Self::create) does, with the temporary name `partial_file`, which must not exist.
+    /// Creates the file as [`create`](Self::create) does, with the temporary name `part`, which must not exist.
     pub(crate) fn create_as(path: &Path, part: PathBuf, overwrite: bool) -> Result<(Self, File)> {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordError::Exists { path: path.into() });
