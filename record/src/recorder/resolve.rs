@@ -146,7 +146,8 @@ fn set_periods(sources: &mut [StreamSource], cfg: &RecorderCfg, format: Format) 
     Ok(())
 }
 
-/// All streams of the simulation that the format supports.
+/// All streams of the simulation that the format supports, except engine states. An animation gets the first camera in
+/// its first environment; without a camera, formats of images get the overview image.
 fn all_streams(
     sim: &mut SimulationManager,
     cfg: &RecorderCfg,
