@@ -29,7 +29,7 @@ pub(crate) struct StreamSource {
     last_times: Vec<f64>,
     /// Physics step of the simulation at which the next row is due.
     pub(crate) next_step: u64,
-    /// Physics steps between two rows; `None` for a sensor that is recorded whenever it measures.
+    /// Physics steps between two rows; `None` for task results, and for a sensor that is recorded whenever it measures.
     pub(crate) period_steps: Option<u64>,
     /// Renderer of the overview image; `None` for other streams.
     overview_renderer: Option<OverviewRenderer>,
