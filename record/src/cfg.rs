@@ -16,7 +16,7 @@ pub struct RecorderCfg {
     pub format: Option<Format>,
     /// Recorded topics.
     pub topics: Vec<Topic>,
-    /// Recorded environments, in any order without repetitions; `None` for all.
+    /// Recorded environments, at least one, in any order without repetitions; `None` for all.
     pub envs: Option<Vec<EnvId>>,
     /// Physics steps between two rows of states, targets and poses. Sensors are recorded whenever they measure. See
     /// [`stream_periods`](Self::stream_periods) for other rates.

@@ -43,7 +43,7 @@ impl StorageFactory {
 }
 
 /// A file that is called `NAME.part` until it is complete. If it is dropped earlier, the partial file is deleted,
-/// unless its content is readable.
+/// unless its content is readable or only the renaming failed.
 #[derive(Debug)]
 pub(crate) struct PartialFile {
     /// Locked while it is written, so that other recorders do not take it for a remainder.

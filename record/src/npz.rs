@@ -191,7 +191,7 @@ impl BufferFile {
         Ok(())
     }
 
-    /// Reads the byte range `range` of all records.
+    /// Reads the byte range `range` of all records, which have `record` bytes each.
     fn column(&mut self, range: Range<usize>, record: usize) -> io::Result<ColumnReader<'_>> {
         self.file.flush()?;
         let file = self.file.get_mut();

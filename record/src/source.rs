@@ -23,7 +23,7 @@ pub(crate) struct StreamSource {
     pub(crate) sensor: Option<String>,
     /// Row of each environment of the stream in the arrays of the source.
     rows: Vec<usize>,
-    /// Number of measurements of each row so far, for sensors.
+    /// Number of measurements of each row at the last read, for sensors.
     counts: Vec<u64>,
     /// Simulation time at the last read of each row \[s\], for states.
     last_times: Vec<f64>,

@@ -150,7 +150,7 @@ impl StreamKind {
         Self::SensorValues { rows: Vec::new(), filters: Vec::new() }
     }
 
-    /// Names of the columns.
+    /// Names of the columns; empty for kinds without names.
     pub(crate) fn names(&self) -> &[String] {
         match self {
             Self::Joints { names: columns }

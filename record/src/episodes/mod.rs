@@ -155,7 +155,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
         Some(EpisodeFrame { numbers, images, reward: 0.0, done: false })
     }
 
-    /// Creates the frame of a row, which waits for its action.
+    /// Creates the frame of a row, which waits for its action; there is no frame if a stream has no value yet.
     fn hold_frame(&mut self, k: usize, step: u64) {
         self.envs[k].pending = self.present_frame(k);
         self.envs[k].pending_step = step;

@@ -150,7 +150,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     Ok((topics, warnings))
 }
 
-/// Reads the selected numbers.
+/// Reads the selected numbers; topics are given by their full names.
 pub(super) fn samples(path: &Path, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
     let mut by_topic: BTreeMap<&str, Vec<(usize, Vec<PathSegment>)>> = BTreeMap::new();
     for (place, FieldSelector { topic, field }) in wanted.iter().enumerate() {
@@ -175,7 +175,7 @@ pub(super) fn samples(path: &Path, wanted: &[FieldSelector]) -> Result<Vec<TimeS
     Ok(samples)
 }
 
-/// Reads an attachment.
+/// Reads the last attachment of this name; `None` without one.
 pub(super) fn attachment(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
     let mut found = None;
     visit_items(path, |told| {

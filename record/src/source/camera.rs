@@ -78,7 +78,7 @@ impl StereoSide {
         }
     }
 
-    /// Height and width of the images \[pixels\].
+    /// Height and width of the images \[pixels\]; 0 for other sensors.
     pub(super) fn image_shape(self, sensor: &dyn Any) -> (usize, usize) {
         let camera = self.camera(sensor).map(Camera::image_shape);
         camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
