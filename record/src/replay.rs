@@ -252,7 +252,7 @@ impl Replay {
     }
 }
 
-/// First value of a stream that differs from the archive.
+/// First value of a stream whose bits differ from the archive; `None` if all are equal.
 fn difference(
     archive: &RecordedArrays,
     source: &StreamSource,

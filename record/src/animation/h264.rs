@@ -129,7 +129,7 @@ fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     .filter(|unit| !unit.is_empty())
 }
 
-/// Begin and end of the first start code.
+/// Begin and end of the first start code; `None` without one.
 fn start_code(bytes: &[u8]) -> Option<(usize, usize)> {
     let at = bytes.windows(3).position(|three| three == [0, 0, 1])?;
     let begin = if at > 0 && bytes[at - 1] == 0 { at - 1 } else { at };

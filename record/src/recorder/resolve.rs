@@ -193,7 +193,8 @@ fn all_streams(
     Ok(sources)
 }
 
-/// Packs the scene, and lists what was left out of it. A scene that cannot be packed does not prevent the recording.
+/// Packs the scene, and lists what was left out of it. A scene that cannot be packed is `None`; it does not prevent the
+/// recording.
 pub(super) fn packed_scene(sim: &SimulationManager) -> (Option<Vec<u8>>, Vec<String>) {
     match scene_file::pack(sim) {
         Ok((scene, left_out)) => (Some(scene), left_out.iter().map(|what| format!("of the scene: {what}")).collect()),
