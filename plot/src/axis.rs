@@ -16,7 +16,8 @@ const TICK_SPACING: f64 = 80.0;
 
 impl Axis {
     /// Creates an axis that shows all `values` with a margin, from pixel `pixel_range[0]` to pixel `pixel_range[1]`.
-    /// Values of a logarithmic axis must be above 0. Without values, the range is about 0 to 1.
+    /// Values of a logarithmic axis must be above 0. Without values, the range is about 0 to 1, or 1 to 10 on a
+    /// logarithmic axis.
     pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, pixel_range: [f64; 2]) -> Self {
         let values = values.map(|x| if log { x.log10() } else { x });
         let (mut low, mut high) = values.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));

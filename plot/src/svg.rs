@@ -65,7 +65,7 @@ fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// Escapes XML characters, and removes control characters, which XML does not allow.
+/// Escapes `&`, `<` and `>`, and removes control characters, most of which XML does not allow.
 fn escaped(text: &str) -> String {
     let text: String = text.chars().filter(|c| !c.is_control()).collect();
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

@@ -12,8 +12,8 @@ const MAX_UNCOMPRESSED: u128 = 1 << 31;
 /// Writer of an archive.
 pub(crate) struct ArchiveWriter<W: Write + Seek>(zip::ZipWriter<FusedWriter<W>>);
 
-/// A writer that discards data after an error, as if the disk had room. When it is dropped, the crate's writer completes
-/// the archive, and prints to the terminal if it cannot.
+/// A writer that discards data after an error, as if the disk had room. When the crate's writer is dropped, it
+/// completes the archive, and prints to the terminal if it cannot.
 struct FusedWriter<W> {
     to: W,
     has_failed: bool,
@@ -182,7 +182,8 @@ fn is_damage(error: &io::Error) -> bool {
     matches!(error.kind(), InvalidData | InvalidInput | Other | UnexpectedEof)
 }
 
-/// Reads all files of an archive; `None` if it is no archive, is damaged, or is too large.
+/// Reads all files of an archive; `None` if it is no archive, is damaged, is larger than [`MAX_UNCOMPRESSED`], or has
+/// files that share bytes or a name that is not UTF-8.
 pub(crate) fn read_all(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
     let mut reader = ArchiveReader::open(io::Cursor::new(bytes)).ok()?;
     // Files that share bytes would be read many times.

@@ -16,7 +16,7 @@ pub struct RecorderCfg {
     pub format: Option<Format>,
     /// Recorded topics.
     pub topics: Vec<Topic>,
-    /// Recorded environments, in any order without repetitions; `None` for all.
+    /// Recorded environments, at least one, in any order without repetitions; `None` for all.
     pub envs: Option<Vec<EnvId>>,
     /// Physics steps between two rows of states, targets and poses. Sensors are recorded whenever they measure. See
     /// [`stream_periods`](Self::stream_periods) for other rates.
@@ -38,8 +38,8 @@ pub struct RecorderCfg {
     ///
     /// MCAP files additionally get scene messages for viewers (Foxglove): what cameras render by default, attached to
     /// the recorded frames. A message is repeated when the appearance changes or an entity is added. Moving entities
-    /// without a recorded pose are left out, and so are environments beyond the limit of 64 MiB for all messages.
-    /// [`RecordingSummary::left_out`](crate::RecordingSummary::left_out) lists both.
+    /// without a recorded pose and shapes that deform are left out, and so are environments beyond the limit of 64 MiB
+    /// for all messages. [`RecordingSummary::left_out`](crate::RecordingSummary::left_out) lists all of these.
     pub scene: bool,
     /// Settings of the overview image, if it is recorded ([`Topic::Overview`]).
     pub overview: OverviewCfg,

@@ -52,14 +52,14 @@ pub enum RecordError {
         /// Cargo feature that adds the format.
         feature: &'static str,
     },
-    /// The format does not support a topic that was requested by name.
+    /// The format does not support a topic, a selection of topics, a stream period or a note that was requested.
     #[error("{path}: {} does not support {topic}", .format.name())]
     UnsupportedTopic {
         /// The file.
         path: PathBuf,
         /// Its format.
         format: Format,
-        /// The unsupported topic.
+        /// The unsupported topic or request.
         topic: String,
     },
     /// Rewards were requested, but no task publishes them.
@@ -120,8 +120,8 @@ pub enum RecordError {
         period_steps: u64,
         /// Rows per second \[Hz\].
         found: f64,
-        /// Values of [`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) that give a whole rate, the
-        /// nearest first; empty if none does.
+        /// Values of [`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) that give a whole rate, at most
+        /// three, the nearest first; empty if there is no such value up to 1000.
         candidates: Vec<u64>,
     },
     /// A stream is missing in an environment of a dataset, whose rows must be complete.
@@ -137,14 +137,14 @@ pub enum RecordError {
         /// The environment.
         env: usize,
     },
-    /// There is no entity, topic or field of this name.
+    /// There is no channel, topic or field of this name.
     #[error("unknown {what} {name:?}{}", candidates_text(.candidates))]
     UnknownName {
         /// Kind of name.
         what: &'static str,
         /// The name.
         name: String,
-        /// Existing names.
+        /// Existing names, or the 12 nearest of them.
         candidates: Vec<String>,
     },
     /// A name is ambiguous.
@@ -248,7 +248,7 @@ pub enum RecordError {
     NoFrame {
         /// The file or folder.
         path: PathBuf,
-        /// The data that every frame needs and that was never measured.
+        /// Reason, such as data that every frame needs.
         why: &'static str,
     },
     /// The writer thread panicked.

@@ -43,7 +43,7 @@ impl StorageFactory {
 }
 
 /// A file that is called `NAME.part` until it is complete. If it is dropped earlier, the partial file is deleted,
-/// unless its content is readable.
+/// unless its content is readable or only the renaming failed.
 #[derive(Debug)]
 pub(crate) struct PartialFile {
     /// Locked while it is written, so that other recorders do not take it for a remainder.
@@ -69,7 +69,7 @@ impl PartialFile {
         Self::create_as(path, partial_file, overwrite)
     }
 
-    /// Creates the file as [`create`](Self::create) does, with the temporary name `partial_file`, which must not exist.
+    /// Creates the file as [`create`](Self::create) does, with the temporary name `part`, which must not exist.
     pub(crate) fn create_as(path: &Path, part: PathBuf, overwrite: bool) -> Result<(Self, File)> {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordError::Exists { path: path.into() });

@@ -23,7 +23,8 @@ impl PartialFolder {
     /// Creates the folder, and the file `marker` in it, which is locked while the recorder exists.
     ///
     /// # Errors
-    /// The folder exists and is not empty. With `overwrite`, a folder with the marker of a recorder is replaced.
+    /// The folder or its partial folder exists and is not empty, another recorder writes it, or it cannot be created.
+    /// With `overwrite`, folders with the marker of a recorder are replaced.
     pub(crate) fn create(path: &Path, overwrite: bool, marker: &'static str) -> Result<(Self, File)> {
         // Removes a separator at the end.
         let path: PathBuf = path.components().collect();

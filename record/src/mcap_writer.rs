@@ -63,7 +63,7 @@ pub(crate) struct McapWriter {
     /// `None` once the file is complete.
     writer: Option<Writer<BufWriter<Box<dyn Storage>>>>,
     channels: ChannelRegistry,
-    /// Channels of each row of each stream, in the order in which a row is written.
+    /// Channels of each row of each stream, in the order of [`topics`].
     rows: Vec<Vec<Vec<u16>>>,
     events: u16,
     cdr: CdrWriter,
@@ -322,13 +322,15 @@ impl McapWriter {
     }
 }
 
-/// Mask ids as 16-bit numbers, which viewers support; `None` for other types of values, and if an id is larger.
+/// Mask ids as 16-bit numbers, which viewers support; `None` for other types of values, and if an id is negative or
+/// larger.
 fn small_mask_ids(values: &ValueBuffer, range: std::ops::Range<usize>) -> Option<Vec<u16>> {
     let ValueBuffer::I32(ids) = values else { return None };
     ids.get(range)?.iter().map(|id| u16::try_from(*id).ok()).collect()
 }
 
-/// Channel metadata of field number `part` of a stream: names, separated by commas, and the unit.
+/// Channel metadata of field number `part` of a stream of sensor values: names, separated by commas, and the unit.
+/// Empty for other streams.
 fn channel_metadata(stream: &StreamSchema, part: usize) -> BTreeMap<String, String> {
     let StreamKind::SensorValues { rows, filters } = &stream.kind else { return BTreeMap::new() };
     let unit = stream.fields.get(part).map(|part| part.unit.clone()).unwrap_or_default();

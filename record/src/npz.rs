@@ -92,7 +92,7 @@ impl NpzWriter {
     }
 }
 
-/// Serializes a snapshot as a file.
+/// Serializes a snapshot to the bytes of its file, through a temporary file in `folder`.
 pub(crate) fn snapshot_bytes(start: &Snapshot, folder: &Path) -> io::Result<Vec<u8>> {
     let scratch = tempfile::tempdir_in(folder)?;
     let path = scratch.path().join(INITIAL_STATE);
@@ -191,7 +191,7 @@ impl BufferFile {
         Ok(())
     }
 
-    /// Reads the byte range `range` of all records.
+    /// Reads the byte range `range` of all records, which have `record` bytes each.
     fn column(&mut self, range: Range<usize>, record: usize) -> io::Result<ColumnReader<'_>> {
         self.file.flush()?;
         let file = self.file.get_mut();

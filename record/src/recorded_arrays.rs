@@ -92,7 +92,7 @@ impl RecordedArrays {
         Ok(Self { path: path.into(), metadata, content: Content::Npz(Mutex::new(file)), arrays })
     }
 
-    /// Reads a member of the archive; `None` if there is no such member.
+    /// Reads a member of the archive; `None` if there is no such member. An MCAP file has only the initial state.
     pub(crate) fn member(&self, name: &str) -> Result<Option<Vec<u8>>> {
         let file = match &self.content {
             Content::Npz(file) => file,

@@ -121,7 +121,7 @@ impl fmt::Display for RecordingSummary {
 /// Copies due values into packets, which a writer thread writes to a file.
 ///
 /// [`Record::record`] creates a recorder. Dropping it without [`finish`](Self::finish) aborts the recording: no file
-/// gets the final name. A readable partial file (MCAP, folders of images) remains as `NAME.part`.
+/// gets the final name. A partial MCAP file or a partial folder (images, LeRobot datasets) remains as `NAME.part`.
 pub struct Recorder {
     cfg: RecorderCfg,
     sources: Vec<StreamSource>,
@@ -394,7 +394,7 @@ impl Recorder {
         self.fail(error);
     }
 
-    /// Returns an empty packet, after a wait if necessary.
+    /// Returns an empty packet, after a wait if necessary; `None` if the writer thread has ended.
     fn acquire_packet(&mut self) -> Option<Packet> {
         if let Some(packet) = self.empty_packets.pop() {
             return Some(packet);
@@ -433,7 +433,7 @@ impl Recorder {
         self.cfg.envs.as_ref().is_none_or(|wanted| wanted.contains(&EnvId(env)))
     }
 
-    /// Records the environments that have diverged since the last call.
+    /// Records the environments that have diverged since the last call, if the format contains events.
     fn record_divergence(&mut self, sim: &SimulationManager) {
         if !self.format.supports_events() {
             return;

@@ -10,7 +10,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Upper limit of the uncompressed size of a chunk \[bytes\].
+/// Upper limit of the uncompressed size of a chunk \[bytes\], or the size of the file if that is larger.
 const LARGEST_CHUNK: usize = 1 << 30;
 
 /// Number of recovered messages, and damage of the partial file, from [`recover`].

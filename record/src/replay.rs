@@ -93,8 +93,8 @@ type SourceFn = fn(&SimulationManager, &str, &[usize]) -> Result<StreamSource>;
 /// ([`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) 1). If a step has several rows because of events,
 /// the first and the last are compared.
 ///
-/// External wrenches, welds, gains and poses of kinematic objects are not recorded and not repeated. The first
-/// difference shows when they mattered.
+/// External wrenches, welds and gains are not recorded. Like poses of kinematic objects, they are not repeated. The
+/// first difference shows when they mattered.
 ///
 /// # Errors
 /// The file is not a complete recording, lacks required targets, controls or steps, or is of another scene, another
@@ -252,7 +252,7 @@ impl Replay {
     }
 }
 
-/// First value of a stream that differs from the archive.
+/// First value of a stream whose bits differ from the archive; `None` if all are equal.
 fn difference(
     archive: &RecordedArrays,
     source: &StreamSource,

@@ -60,7 +60,7 @@ fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 /// Creates a simulation of a packed scene, for display, with the recorded number of environments. The scene is one MJCF
-/// part without drives. `path` is the recording, for error messages.
+/// part, in which drives are plain MuJoCo actuators. `path` is the recording, for error messages.
 ///
 /// # Errors
 /// The archive is damaged, or its scene cannot be compiled.

@@ -148,7 +148,7 @@ fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
 pub(crate) struct SceneTracker {
     /// Frames with recorded poses, without the environment prefix.
     frames: BTreeSet<String>,
-    /// Last written scene of each recorded environment.
+    /// Last scene of each recorded environment, written or left out because of the size limit.
     last_scenes: BTreeMap<usize, Option<Arc<RenderScene>>>,
     /// Remaining size for messages \[bytes\].
     bytes_left: u64,
@@ -220,7 +220,8 @@ impl SceneTracker {
         Ok(updates)
     }
 
-    /// All drawn instances of an environment, attached to their frames.
+    /// Drawn instances of an environment, attached to their frames. Moving ones without a recorded pose are left out
+    /// and listed.
     fn entities(
         &mut self,
         sim: &mut SimulationManager,

@@ -23,13 +23,13 @@ pub(crate) struct StreamSource {
     pub(crate) sensor: Option<String>,
     /// Row of each environment of the stream in the arrays of the source.
     rows: Vec<usize>,
-    /// Number of measurements of each row so far, for sensors.
+    /// Number of measurements of each row at the last read, for sensors.
     counts: Vec<u64>,
     /// Simulation time at the last read of each row \[s\], for states.
     last_times: Vec<f64>,
     /// Physics step of the simulation at which the next row is due.
     pub(crate) next_step: u64,
-    /// Physics steps between two rows; `None` for a sensor that is recorded whenever it measures.
+    /// Physics steps between two rows; `None` for task results, and for a sensor that is recorded whenever it measures.
     pub(crate) period_steps: Option<u64>,
     /// Renderer of the overview image; `None` for other streams.
     overview_renderer: Option<OverviewRenderer>,

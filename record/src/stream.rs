@@ -14,8 +14,8 @@ pub struct StreamSchema {
     pub element_type: ElementType,
     /// Fields, in their order in a row.
     pub fields: Vec<StreamField>,
-    /// Recorded environments, in ascending order; for the overview image, only the first one. A row has the values of
-    /// one environment.
+    /// Recorded environments, in ascending order; for the overview image and for animations of all topics, only the
+    /// first one. A row has the values of one environment.
     pub env_ids: Vec<usize>,
 }
 
@@ -113,7 +113,7 @@ pub enum StreamKind {
         width: usize,
     },
     /// Intrinsic matrix of a camera \[pixels\] and its pose in the environment, with ROS camera axes. A camera of a
-    /// stereo pair also has `rectification` and `projection`; see
+    /// stereo pair that can be rectified also has `rectification` and `projection`; see
     /// [`Rectification`](kinetoscope_sensors::camera::Rectification).
     CameraInfo {
         /// Name of the camera.
@@ -128,8 +128,8 @@ pub enum StreamKind {
     /// Inertial measurement unit; the fields have the names of its channels.
     Imu,
     /// Ray caster; the fields have the names of its channels. Hit points in the environment \[m\], distances \[m\],
-    /// normals, mask ids, and the pose of the parent body. A miss has infinite points and distances, and zero normals
-    /// and ids.
+    /// normals, mask ids, and the pose of the parent body, with the drift. A miss has infinite points and distances,
+    /// and zero normals and ids.
     RayHits,
     /// Simulation time, positions and velocities of all joints in MuJoCo's order: `clock`, `qpos`, `qvel`.
     EngineState,
@@ -150,7 +150,7 @@ impl StreamKind {
         Self::SensorValues { rows: Vec::new(), filters: Vec::new() }
     }
 
-    /// Names of the columns.
+    /// Names of the columns; empty for kinds without names.
     pub(crate) fn names(&self) -> &[String] {
         match self {
             Self::Joints { names: columns }

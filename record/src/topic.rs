@@ -39,7 +39,7 @@ pub enum Topic {
     /// ray-caster cameras also record their intrinsics and pose.
     ///
     /// A measurement with a latency has the values and the time stamp of its capture. Measurements that were pending
-    /// during a write to the state are recorded, although the sensor itself drops them.
+    /// during a write to the state are recorded, although the sensor itself does not show them.
     Sensor(String),
     /// One channel of a camera, such as `depth`, without intrinsics and pose.
     Channel {

@@ -25,7 +25,7 @@ pub(crate) enum WriteError {
     /// A limit of the format is exceeded; the text says what to change.
     #[error("{0}")]
     Limit(String),
-    /// An animation or a dataset has no frame; the text says what every frame needs.
+    /// An animation or a dataset has no frame; the text is the reason.
     #[error("the recording has no frame: {0}")]
     NoFrame(&'static str),
 }
@@ -51,7 +51,8 @@ pub(crate) trait FormatWriter: Send {
     /// Writes the content of a packet.
     fn write(&mut self, streams: &[StreamSchema], packet: &Packet) -> WriteResult;
 
-    /// Writes buffered data to the file, so that it survives a kill of the process.
+    /// Writes buffered data to the file, so that it survives a kill of the process. Does nothing in formats that are
+    /// not readable before their end.
     fn flush(&mut self) -> WriteResult;
 
     /// Completes the file, renames it to its final name, and returns its size \[bytes\]. Called once.

@@ -39,6 +39,7 @@ impl<T: Clone> DelayLine<T> {
     }
 
     /// Puts a value of environment `env` in flight at `step`. The returned slot holds an old value, to be overwritten.
+    /// A full queue drops its oldest value.
     pub(crate) fn push(&mut self, env: usize, step: u64) -> &mut T {
         let queue = &mut self.queues[env];
         if queue.len == self.capacity {
@@ -53,7 +54,7 @@ impl<T: Clone> DelayLine<T> {
     }
 
     /// Takes the oldest value of environment `env` that is due for delivery by `step`, with true if it was captured
-    /// after the last [`refresh`](Self::refresh).
+    /// after the last [`refresh`](Self::refresh); `None` if no value is due.
     pub(crate) fn take(&mut self, env: usize, step: u64) -> Option<(&T, bool)> {
         self.next_delivery(env).filter(|&arrival| arrival <= step)?;
         let queue = &mut self.queues[env];
@@ -69,8 +70,9 @@ impl<T: Clone> DelayLine<T> {
         (queue.len > 0).then(|| self.slots[env * self.capacity + queue.first].0 + self.steps)
     }
 
-    /// Returns the steps until the next delivery in any environment, at least 1, with the environments at `steps`;
-    /// `None` if no value is in flight.
+    /// Returns the number of steps until the next delivery in any environment, at least 1. `steps` are the current
+    /// steps of the environments; environments at [`Phases::QUARANTINED`] are skipped. `None` if no other environment
+    /// has a value in flight.
     pub(crate) fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> Option<u64> {
         let running = steps.into_iter().enumerate().filter(|(_, now)| *now != Phases::QUARANTINED);
         running.filter_map(|(env, now)| Some(self.next_delivery(env)?.saturating_sub(now).max(1))).min()

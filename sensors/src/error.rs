@@ -155,7 +155,7 @@ pub enum SensorError {
         /// The name.
         name: String,
     },
-    /// History and latency do not fit into memory.
+    /// The measurements of history and latency need more than 4 GiB.
     #[error(
         "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; reduce history_length \
          or latency_steps"

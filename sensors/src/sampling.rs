@@ -162,13 +162,14 @@ const STAMP_COUNT: usize = 2;
 const MAX_NUMBERS: usize = 1 << 29;
 
 impl Sampler {
-    /// Creates a sampler for the kind of sensor named `sensor`, which requires `requires` and measures `channels`.
+    /// Creates a sampler. `sensor` is the kind of sensor for error messages; `requires` are the state fields it reads,
+    /// and `channels` its measured values.
     ///
     /// # Errors
     ///
     /// A physics step that is not positive; an invalid period, or one that is not a whole number of steps; noise of a
     /// channel that is unknown or cannot have noise, or noise parameters outside 0 to 1e100; a dropout that is not a
-    /// probability; a history or a latency that does not fit into memory.
+    /// probability; a history or a latency that needs more than 4 GiB.
     pub fn new(
         sensor: &'static str,
         requires: StateFields,
@@ -359,7 +360,7 @@ impl Sampler {
         read(env, values);
     }
 
-    /// Adds `row` to the history.
+    /// Adds `row` to the history, counts it, and makes it the latest delivered measurement.
     fn push_to_history(&mut self, env: usize) {
         let (stamps, mut values) = self.row.split_at(STAMP_COUNT);
         self.stamp_history.push(env, stamps);
@@ -441,8 +442,8 @@ impl Sampler {
         found.unwrap_or_else(|| panic!("this sampler was built without the channel {channel:?}"))
     }
 
-    /// Current values of a channel, shape \[num_envs, width\]: those of the latest measurement, reset or refresh; 0
-    /// before.
+    /// Current values of a channel, shape \[num_envs, width\]: those of the latest delivered measurement, or of a later
+    /// reset or refresh; 0 before.
     ///
     /// # Panics
     ///

@@ -130,7 +130,8 @@ impl Phases {
         self.min_wait(steps, |wait| wait)
     }
 
-    /// Returns the minimum over all environments of `of` applied to the steps until the environment is due.
+    /// Returns the minimum over all environments of `of` applied to the steps until the environment is due. Quarantined
+    /// environments are skipped; without any other, returns one period.
     pub(crate) fn min_wait(&self, steps: impl IntoIterator<Item = u64>, of: impl Fn(u64) -> u64) -> u64 {
         let running =
             steps.into_iter().take(self.envs.len()).enumerate().filter(|(_, step)| *step != Self::QUARANTINED);

@@ -192,7 +192,7 @@ impl SensorContext {
     }
 }
 
-/// Returns the bodies whose full or short name is most similar to `name`, nearest first.
+/// Returns the bodies whose full or short name is most similar to `name`, nearest first, at most 12.
 fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
     let bare: Vec<&str> = bodies.iter().map(|b| b.split_once('/').map_or(b.as_str(), |(_, link)| link)).collect();
     let wanted = if name.contains('/') { bodies.iter().map(String::as_str).collect() } else { bare.clone() };

@@ -18,7 +18,7 @@ pub fn axes(svg: &str) -> [Ticks; 2] {
     })
 }
 
-/// Points of all curves, in the units of the axes.
+/// Points of each polyline, in the units of the axes: a curve with gaps has several, and single points are left out.
 pub fn curves(svg: &str) -> Vec<Vec<[f64; 2]>> {
     let [across, up] = axes(svg);
     let back = |[[a, x], [b, y]]: Ticks, pixel: &str| a + (pixel.parse::<f64>().unwrap() - x) / (y - x) * (b - a);

@@ -14,8 +14,8 @@ pub const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 /// Environment variable with a Python that has MuJoCo 4 and OpenGL.
 pub const RENDERER_VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 
-/// Folders that may hold real robots: [`ROBOTS_VARIABLE`], `shared/robots` beside the repository or above it, and the one that
-/// `cargo xtask test` fills from PyPI.
+/// Folders that may hold real robots: [`ROBOTS_VARIABLE`], `shared/robots` beside the repository or above it, and the
+/// one that `cargo xtask test` fills from PyPI.
 fn robot_folders() -> impl Iterator<Item = PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let above = root.ancestors().skip(1).map(|dir| dir.join("shared/robots"));

@@ -207,7 +207,7 @@ pub fn look_at(eye: [f64; 3], target: [f64; 3]) -> Extrinsics {
     Extrinsics { placement, ..Extrinsics::default() }
 }
 
-/// The mask id of an object.
+/// The mask id of an object, or the first one if it has several links.
 pub fn mask_id(sim: &SimulationManager, object: &str) -> i32 {
     sim.scene().mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
 }

@@ -1,7 +1,7 @@
 //! H.264 stream of an MP4 file (ITU-T H.264, constrained baseline), encoded by the crate `rusty_h264-encoder`.
 //!
-//! Frames are converted to Y'CbCr here. The encoder predicts each frame from the one before it, and quantizes the
-//! difference with a fixed step, so that the error does not depend on the motion.
+//! Frames are converted to Y'CbCr here. The encoder predicts each frame, except IDR frames, from the one before it, and
+//! quantizes the difference with a fixed step, so that the error does not depend on the motion.
 
 use super::level::{H264Level, HIGHEST, MB_SIZE};
 use rusty_h264_common::YuvPlanes;
@@ -129,7 +129,7 @@ fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     .filter(|unit| !unit.is_empty())
 }
 
-/// Begin and end of the first start code.
+/// Begin and end of the first start code; `None` without one.
 fn start_code(bytes: &[u8]) -> Option<(usize, usize)> {
     let at = bytes.windows(3).position(|three| three == [0, 0, 1])?;
     let begin = if at > 0 && bytes[at - 1] == 0 { at - 1 } else { at };

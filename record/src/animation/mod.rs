@@ -48,7 +48,7 @@ pub(crate) struct Animation {
     encoder: Box<dyn Encoder>,
     /// The last frame, whose duration is not known yet, and its time \[s\].
     pending: Option<(Vec<u8>, f64)>,
-    /// Time of the first frame \[s\]; `None` before it.
+    /// Time of the first frame \[s\]; `None` until it is encoded.
     first: Option<f64>,
     /// Duration of the previous frame \[s\].
     last_duration: f64,
@@ -85,7 +85,7 @@ impl Animation {
     }
 
     /// Encodes the pending frame, which ends at `next` \[s\]. Without a next frame, it has the duration of the previous
-    /// one. Returns the pixel buffer for reuse.
+    /// one. Returns the pixel buffer for reuse, or an empty one if no frame is pending.
     fn encode_pending(&mut self, next: Option<f64>) -> WriteResult<Vec<u8>> {
         let (Some((rgba, time)), Some(out)) = (self.pending.take(), &mut self.file) else { return Ok(Vec::new()) };
         self.last_duration = next.map_or(self.last_duration, |next| next - time);

@@ -113,11 +113,13 @@ impl Mp4 {
         let frames = self.frames.iter().map(|frame| [frame.duration, frame.bytes]);
         let ParameterSets { sequence, image } = &self.stream.headers(PER_SECOND, frames);
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
-        // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the first.
+        // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the sequence
+        // parameter set.
         let profile = sequence.get(1..4).unwrap_or_default();
         let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(image), image];
         let avc = make_box(b"avcC", &avc);
-        // Primaries, transfer function and matrix as in the stream, limited range.
+        // The stream has no color description: primaries and matrix of BT.709, transfer function of sRGB, limited
+        // range.
         let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
         let sides = be_bytes(self.size.map(|side| (side as u16).to_be_bytes()));
         let inch = u32s(&[72 << 16, 72 << 16, 0]);

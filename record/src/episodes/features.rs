@@ -12,7 +12,7 @@ pub(crate) struct Features {
     pub(crate) images: Vec<ImageFeature>,
     /// Stream whose rows are frames.
     pub(crate) frame_stream: usize,
-    /// Stream with the results of task steps.
+    /// Stream with the results of task steps; `None` without a task.
     pub(crate) result_stream: Option<usize>,
 }
 

@@ -1,12 +1,12 @@
 //! Episodes and frames of learning datasets, independent of their file formats.
 //!
-//! An episode lasts from one reset of an environment to the next. Its frames have one rate, that of the rows of the
-//! recording. A frame contains the last measurements and the action that follows: the targets of the next step. The
-//! last row of an episode, which no action follows, is therefore no frame.
+//! An episode lasts from one reset of an environment to the next, or until the environment diverges. Its frames have
+//! one rate, that of the rows of the recording. A frame contains the last measurements and the action that follows: the
+//! targets of the next step. No action follows the last row of an episode, so this row is not a frame.
 //!
 //! The result of a task step ([`StreamKind::TaskResult`](crate::stream::StreamKind::TaskResult)) belongs to the action
-//! of the previous frame. A frame therefore waits for results until the second row after it. If a frame lasts longer
-//! than a step of the task, its rewards are summed.
+//! of the previous frame. A frame is therefore written only at the second row after it, when the results of its action
+//! are complete. If a frame lasts longer than a step of the task, its rewards are summed.
 
 mod features;
 
@@ -116,7 +116,8 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
         Self { dataset, features, period_steps, envs: envs.iter().map(none).collect() }
     }
 
-    /// True if the row of a step is a frame, regardless of events.
+    /// True if `step` is a multiple of the row period: a regular row of the recording. Rows at other steps exist for
+    /// events only.
     fn is_due(&self, step: u64) -> bool {
         step.is_multiple_of(self.period_steps)
     }
@@ -154,7 +155,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
         Some(EpisodeFrame { numbers, images, reward: 0.0, done: false })
     }
 
-    /// Creates the frame of a row, which waits for its action.
+    /// Creates the frame of a row, which waits for its action; there is no frame if a stream has no value yet.
     fn hold_frame(&mut self, k: usize, step: u64) {
         self.envs[k].pending = self.present_frame(k);
         self.envs[k].pending_step = step;

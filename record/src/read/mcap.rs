@@ -12,7 +12,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Upper limit of the uncompressed size of a chunk \[bytes\].
+/// Upper limit of the uncompressed size of a chunk \[bytes\], or the size of the file if that is larger.
 const MAX_CHUNK: usize = 1 << 30;
 
 /// A channel with its message type; `None` for types that cannot be read.
@@ -101,7 +101,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         known: BTreeSet<String>,
         /// True if later messages may have new fields.
         scan_fields: bool,
-        /// Number of unreadable messages, and index of the first.
+        /// Number of unreadable messages, and number of the first, counted from 1.
         unread: u64,
         first_unread: u64,
     }
@@ -150,7 +150,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     Ok((topics, warnings))
 }
 
-/// Reads the selected numbers.
+/// Reads the selected numbers; topics are given by their full names.
 pub(super) fn samples(path: &Path, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
     let mut by_topic: BTreeMap<&str, Vec<(usize, Vec<PathSegment>)>> = BTreeMap::new();
     for (place, FieldSelector { topic, field }) in wanted.iter().enumerate() {
@@ -175,7 +175,7 @@ pub(super) fn samples(path: &Path, wanted: &[FieldSelector]) -> Result<Vec<TimeS
     Ok(samples)
 }
 
-/// Reads an attachment.
+/// Reads the last attachment of this name; `None` without one.
 pub(super) fn attachment(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
     let mut found = None;
     visit_items(path, |told| {

@@ -65,7 +65,8 @@ impl StreamAssembler {
         Some(Self { name, envs, parts, frames, steps: Vec::new(), rows, present_row, has_message, step: 0.0 })
     }
 
-    /// Adds the values of an array in an environment at a step; `None` if they do not have the declared width.
+    /// Adds the values of an array in an environment at a step; `None` if they do not have the declared width, the
+    /// environment is unknown, or the row before lacks an environment.
     fn add_values(&mut self, part: usize, env: usize, step: f64, numbers: Vec<f64>) -> Option<()> {
         let row = self.envs.iter().position(|of| *of == env)?;
         if self.parts.get(part)?.2 != numbers.len() {
@@ -101,7 +102,7 @@ impl StreamAssembler {
     }
 }
 
-/// Values of a list of numbers in a message.
+/// Values of a list of numbers in a message; empty without such a list.
 fn numbers(message: &Message, field: &str) -> Vec<f64> {
     match message.field(field) {
         Some(Message::Numbers(numbers)) => numbers.clone(),
@@ -167,7 +168,7 @@ pub(crate) fn read_arrays(path: &Path) -> Result<McapArrays> {
             }
             McapItem::Message { channel, time, data } => (channel, time, data),
         };
-        // Messages before the description are origins of environments, which are no rows.
+        // Without the description, a message cannot be assigned to a stream.
         let Some(reads) = channel.message_type.as_ref().filter(|_| dt > 0.0) else { return Ok(()) };
         if channel.topic == "/events" {
             let message = reads.read(data);

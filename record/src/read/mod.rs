@@ -79,10 +79,11 @@ pub struct TimeSeries {
 }
 
 impl Recording {
-    /// Opens a recording and reads its list of topics.
+    /// Opens a recording and lists its topics. The extension decides the format: `.mcap` or `.npz`. An MCAP file is
+    /// read to its end. Topics with other encodings than ROS 2 have no fields.
     ///
     /// # Errors
-    /// There is no such file, it is neither an MCAP file of ROS 2 messages nor a NumPy archive of a recorder, or it is
+    /// The file does not exist, has another extension, is not an MCAP file or a NumPy archive of a recorder, or is
     /// incomplete.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();

@@ -46,7 +46,8 @@ fn streams(archive: &RecordedArrays) -> Vec<RecordedStream<'_>> {
     .collect()
 }
 
-/// Names of the numbers of a field: joints as in messages, poses by frame, others by index.
+/// Names of the numbers of a field: by column if each column has one number (joints as in messages), poses by frame,
+/// others by index.
 fn fields(own: &str, columns: &[String], shape: &[usize]) -> Vec<String> {
     let named = match own {
         "positions" => "position",

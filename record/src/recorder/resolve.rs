@@ -146,7 +146,8 @@ fn set_periods(sources: &mut [StreamSource], cfg: &RecorderCfg, format: Format) 
     Ok(())
 }
 
-/// All streams of the simulation that the format supports.
+/// All streams of the simulation that the format supports, except engine states. An animation gets the first camera in
+/// its first environment; without a camera, formats of images get the overview image.
 fn all_streams(
     sim: &mut SimulationManager,
     cfg: &RecorderCfg,
@@ -192,7 +193,8 @@ fn all_streams(
     Ok(sources)
 }
 
-/// Packs the scene, and lists what was left out of it. A scene that cannot be packed does not prevent the recording.
+/// Packs the scene, and lists what was left out of it. A scene that cannot be packed is `None`; it does not prevent the
+/// recording.
 pub(super) fn packed_scene(sim: &SimulationManager) -> (Option<Vec<u8>>, Vec<String>) {
     match scene_file::pack(sim) {
         Ok((scene, left_out)) => (Some(scene), left_out.iter().map(|what| format!("of the scene: {what}")).collect()),

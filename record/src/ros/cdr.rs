@@ -74,7 +74,7 @@ impl CdrWriter {
         self.0.extend_from_slice(bytes);
     }
 
-    /// Writes a sequence of `length` bytes, which `put` appends.
+    /// Writes a sequence of `count` bytes, which `put` appends.
     pub(crate) fn octet_sequence_with(&mut self, count: usize, put: impl FnOnce(&mut Vec<u8>)) {
         self.length(count);
         put(&mut self.0);

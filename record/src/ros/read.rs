@@ -58,7 +58,7 @@ pub(crate) enum Value {
     Numbers(Vec<f64>),
     Text(String),
     Texts(Vec<String>),
-    /// Bytes of images or point clouds, which are not read as numbers.
+    /// Array of bytes or booleans, such as the data of an image, which is not read as numbers.
     Bytes,
     Struct(Vec<(Arc<str>, Value)>),
     List(Vec<Value>),
@@ -305,7 +305,8 @@ impl Value {
         }
     }
 
-    /// True if other messages of the same type may have other fields.
+    /// True if the message has a list of structures, which may have other elements in other messages. Lists of numbers
+    /// count as constant.
     pub(crate) fn has_variable_fields(&self) -> bool {
         let Self::Struct(fields) = self else { return false };
         fields.iter().any(|(_, value)| matches!(value, Self::List(_)) || value.has_variable_fields())

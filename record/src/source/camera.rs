@@ -56,7 +56,7 @@ impl StereoSide {
         left.or_else(|| of("right/").map(|rest| (Self::Right, rest))).unwrap_or((Self::Mono, channel))
     }
 
-    /// The camera, if the sensor has it.
+    /// Rendered camera of this side; `None` for other sensors and for ray-caster cameras.
     pub(super) fn camera(self, sensor: &dyn Any) -> Option<&Camera> {
         let pair = sensor.downcast_ref::<StereoCamera>();
         match self {
@@ -78,14 +78,14 @@ impl StereoSide {
         }
     }
 
-    /// Height and width of the images \[pixels\].
+    /// Height and width of the images \[pixels\]; 0 for other sensors.
     pub(super) fn image_shape(self, sensor: &dyn Any) -> (usize, usize) {
         let camera = self.camera(sensor).map(Camera::image_shape);
         camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
     }
 
     /// Lens distortion, which is the same in all environments; `None` if ROS has no model for the lens. A ray-caster
-    /// camera has no distortion.
+    /// camera has zero coefficients.
     pub(super) fn distortion(self, sensor: &dyn Any) -> Option<Distortion> {
         let Some(camera) = self.camera(sensor) else {
             // Ray-caster cameras are pinhole cameras.

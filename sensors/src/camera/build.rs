@@ -52,7 +52,8 @@ impl SensorCfg for CameraCfg {
 
     /// # Errors
     ///
-    /// An invalid size, lens, depth range or pose; an unknown parent; environments that do not exist or are named
+    /// No scene or no channels; an invalid size, lens, depth range or pose; a renderer, aperture, shutter, imperfection
+    /// or flow that does not fit the other settings; an unknown parent; environments that do not exist or are named
     /// twice; a period that is not a whole number of steps; a dropout that is not a probability; noise of a channel
     /// that is off or cannot have noise; invalid numbers of noise or imperfections; images, history or latency that do
     /// not fit into memory.
@@ -159,7 +160,8 @@ impl CameraCfg {
         Ok(LensRayTables::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
     }
 
-    /// Rejects sizes whose allocation would fail and abort the process; `views` is the number of environments.
+    /// Rejects sizes above [`MAX_BYTES`], or whose allocation would fail and abort the process; `views` is the number
+    /// of environments.
     fn check_memory(
         &self,
         views: usize,

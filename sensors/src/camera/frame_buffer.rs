@@ -181,8 +181,8 @@ impl DeliveredFrames {
 }
 
 impl FrameBuffer {
-    /// Returns the maximum number of frames of an environment that are in flight at once; 0 for a camera without
-    /// latency, history and dropout.
+    /// Returns an upper bound of the number of frames of an environment that are in flight at once; 0 for a camera
+    /// without latency, history and dropout.
     pub(super) fn max_pending(cfg: &CameraCfg, schedule: Schedule) -> usize {
         let keeps_frames = cfg.latency_steps > 0 || cfg.history_length > 0 || cfg.dropout > 0.0;
         if keeps_frames { delay::capacity(cfg.latency_steps.into(), schedule.period_steps()) } else { 0 }
@@ -273,8 +273,9 @@ impl FrameBuffer {
         }
     }
 
-    /// Returns the steps until the next frame is delivered, at least 1, with the rows at `steps`; `None` if no frame is
-    /// in flight.
+    /// Returns the number of steps until the next frame is delivered in any row, at least 1. `steps` are the current
+    /// steps of the rows; rows at [`Phases::QUARANTINED`](crate::Phases::QUARANTINED) are skipped. `None` if no other
+    /// row has a frame in flight.
     pub(super) fn next_delivery_in(&self, steps: impl Iterator<Item = u64>) -> Option<u64> {
         self.delay.as_ref()?.due_in(steps)
     }
@@ -293,7 +294,8 @@ impl FrameBuffer {
         self.shows_latest[row] = shows_latest;
     }
 
-    /// Returns the latest delivered frame of a row if it is not the shown one.
+    /// Returns the latest delivered frame of a row if it is not the shown one; always `None` without a latency, and
+    /// before the first delivery.
     pub(super) fn latest_if_not_shown(&self, row: usize) -> Option<FrameSource<'_>> {
         let [latest] = self.delivered.latest.slice(row, 0).filter(|_| !self.shows_latest[row])? else { return None };
         Some(latest.source(row))

@@ -63,8 +63,9 @@ pub trait CameraPlacement: PlaceRows {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`](super::CameraError::Pose), [`CameraError::Count`](super::CameraError::Count), an
-    /// environment that the camera does not see or that is named twice. Nothing is changed then.
+    /// [`CameraError::Pose`](super::CameraError::Pose), [`CameraError::PoseColumns`](super::CameraError::PoseColumns),
+    /// [`CameraError::Count`](super::CameraError::Count), an environment that the camera does not see or that is named
+    /// twice. Nothing is changed then.
     fn set_local_pose(
         &mut self,
         poses: &(impl Poses + ?Sized),

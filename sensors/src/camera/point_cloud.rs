@@ -77,7 +77,8 @@ pub(crate) fn unproject(
     unproject_along(ray, pose, width, depths, points);
 }
 
-/// Writes points along rays of the optical frame, given in multiples of the ray vector.
+/// Writes points along rays of the optical frame, given in multiples of the ray vector; `None` leaves the point
+/// unchanged.
 fn unproject_along(
     ray: impl Fn([usize; 2]) -> [f64; 3],
     pose: &Pose,

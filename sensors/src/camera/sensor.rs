@@ -355,7 +355,8 @@ impl Camera {
         self.viewpoints.envs.row(env)
     }
 
-    /// Returns true if a number of the depth channel is a hit.
+    /// Returns true if a number is a hit: of the depth channel, or of the distance channel if rays do not all go
+    /// forward.
     pub(super) fn is_hit(&self, depth: f32) -> bool {
         match self.cfg.depth_miss {
             DepthMiss::Inf => depth.is_finite(),
@@ -375,7 +376,7 @@ impl Camera {
         if lens.is_pinhole() { Ok(()) } else { Err(CameraError::PinholeOnly { what, lens: lens.name() }) }
     }
 
-    /// Returns the optics of a row.
+    /// Returns the optics of a row; `None` only for invalid intrinsics, which setters reject.
     fn optics_of(&self, row: usize) -> Option<Optics> {
         match self.rays_of(row) {
             Some(rays) => Some(*rays.optics()),

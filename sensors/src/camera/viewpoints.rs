@@ -70,7 +70,8 @@ impl Viewpoints {
         self.rays.bytes()
     }
 
-    /// Frees rays that no row uses any more.
+    /// Frees rays without users, except those of the configured intrinsics. Rays that pending frames reference stay in
+    /// memory.
     pub(crate) fn free_unused_rays(&mut self) {
         self.rays.drop_unused();
     }

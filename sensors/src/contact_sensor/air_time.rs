@@ -43,7 +43,8 @@ impl ContactTimers {
         Self { bodies, dt, threshold, last_step, phases, net: vec![0.0; 3 * bodies] }
     }
 
-    /// Updates environment `env` at the physics step `step`; `net_forces` adds the net forces on its bodies \[N\].
+    /// Updates environment `env` at the physics step `step`; `net_forces` adds the net forces on its bodies \[N\]. Does
+    /// nothing at the step of the last update or reset.
     pub(super) fn update(&mut self, env: usize, step: u64, net_forces: impl FnOnce(&mut [f64])) {
         let steps = step.saturating_sub(self.last_step[env]);
         if steps == 0 {

@@ -19,8 +19,9 @@ pub(crate) trait RayModel {
     /// Rays of the sensor.
     type Rays: Rays;
 
-    /// Returns the view of the rays in an environment. `parent` is the pose row of the parent, `None` for a sensor
-    /// without a parent. The sampled numbers of the frame are written to `values`.
+    /// Returns the per-environment data of the rays ([`Rays::View`]), such as their pose. `parent` is the pose of the
+    /// parent as a row `[x, y, z, qw, qx, qy, qz]`, `None` for a sensor without a parent. Writes the values of the
+    /// frame channels to `values`.
     fn frame(&mut self, env: usize, parent: Option<[f64; 7]>, values: &mut [f64]) -> <Self::Rays as Rays>::View;
 
     /// Updates the outputs of an environment from the current values of the sampler.
@@ -185,7 +186,8 @@ impl<R: Rays> RaySampler<R> {
     }
 }
 
-/// Writes the hits of an environment and the numbers of its frame to a row of the sampler.
+/// Writes one environment's row of the sampler: distances, normals and ids of its hits, then the values of the frame
+/// channels.
 fn write<R: Rays>(scan: &Scan<R>, frames: &[f64], frame_width: usize, env: usize, row: &mut [f64]) {
     let count = scan.rays().count();
     let (distances, row) = row.split_at_mut(count);
@@ -199,7 +201,8 @@ fn write<R: Rays>(scan: &Scan<R>, frames: &[f64], frame_width: usize, env: usize
     frame.copy_from_slice(&frames[env * frame_width..][..frame_width]);
 }
 
-/// Rejects an allocation that would abort the process: `rays` in each of `envs` environments.
+/// Rejects memory above [`MAX_BYTES`], or an allocation that would abort the process, for `rays` in each of `envs`
+/// environments.
 pub(crate) fn check_memory(envs: usize, rays: usize, bytes_per_ray: usize) -> Result<(), RayError> {
     let bytes = rays.checked_mul(envs).and_then(|n| n.checked_mul(bytes_per_ray)).filter(|&b| b as u64 <= MAX_BYTES);
     let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());

@@ -53,8 +53,8 @@ impl Rays for Vec<Ray> {
     }
 }
 
-/// Casts the rays of a sensor in many environments. Hits are the same bit for bit with any number of threads. Only the
-/// first casts allocate memory.
+/// Casts the rays of a sensor in many environments. Hits are the same bit for bit with any number of threads. After the
+/// first casts, only new lookup structures of meshes and changed fixed instances allocate memory.
 #[derive(Clone)]
 pub(crate) struct Scan<R: Rays> {
     pool: ThreadPool,

@@ -62,7 +62,8 @@ impl Extent {
 }
 
 /// Returns the extent of the part of an instance that is in the frustum \[pixels\]: smallest and largest u, then v. The
-/// frustum ends at the near plane, the far plane and the four edges of the image. `None` if no part is in the frustum.
+/// frustum ends at the near plane, the far plane and the four edges of the image. `None` if no part is in the frustum,
+/// or if a one-sided plane is seen from behind.
 pub(super) fn projected_extent(
     view: &View,
     instance: &Instance,

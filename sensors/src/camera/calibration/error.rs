@@ -68,7 +68,7 @@ pub enum CalibrationError {
         line: usize,
         /// Name of the model.
         model: String,
-        /// Known models, nearest first.
+        /// Known models, nearest first, at most 12.
         candidates: Vec<&'static str>,
     },
     /// The lens has no `camera_info` distortion model.

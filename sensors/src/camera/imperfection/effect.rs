@@ -42,7 +42,8 @@ pub(super) struct PixelContext<'a> {
 }
 
 impl ImageContext<'_> {
-    /// Returns the ray through the center of a pixel, scaled to reach 1; 0 if the lens has no ray there.
+    /// Returns the ray through the center of a pixel in the optical frame, scaled to depth 1 if all rays go forward,
+    /// else to length 1; 0 if the lens has no ray there.
     pub(super) fn ray(&self, pixel: usize) -> [f64; 3] {
         let View { width, fx, fy, cx, cy, .. } = *self.view;
         let [column, row] = [pixel % width, pixel / width];

@@ -65,7 +65,8 @@ fn inverse_depth(depth: f32) -> Option<f64> {
     depth.is_finite().then(|| 1.0 / f64::from(depth.abs()))
 }
 
-/// Returns the cosine of the angle between a pixel's ray and the surface normal; `None` for a miss.
+/// Returns the cosine of the angle between a pixel's ray and the surface normal; `None` for a miss, and without a
+/// measured neighbor in the row or in the column.
 ///
 /// On a plane, the inverse depth is a linear function of the ray, and its coefficients n are the normal. Three rays
 /// determine them, by Cramer's rule.
@@ -92,9 +93,10 @@ fn incidence_cosine(depths: &[f32], pixel: usize, image: &ImageContext<'_>) -> O
     cosine.is_finite().then_some(cosine)
 }
 
-/// Marks the pixels of a row that the projector does not reach. The projector sees a point at depth z `reach / z`
-/// pixels to the left of its position in the camera image. So the order along the row, starting at the side of the
-/// projector, gives the occlusion: a point that does not extend the farthest position so far is in a shadow.
+/// Marks the pixels of a row of depths \[m\] that the projector does not reach, by a negative sign. The projector sees
+/// a point at depth z `reach / z` pixels to the left of its position in the camera image (to the right for a negative
+/// `reach`). Pixels are visited from the side of the projector. A point that is not farther from that side than all
+/// earlier points, as the projector sees it, is in a shadow.
 fn mark_projector_shadow(row: &mut [f32], reach: f64) {
     let count = row.len();
     // A projector to the left is the mirror image of a projector to the right.

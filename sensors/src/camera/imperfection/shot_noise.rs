@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// `x / electrons`. Red, green and blue are independent. Source: EMVA standard 1288, release 3.1, section 2.2; plotting
 /// variance against signal (a photon transfer curve, Janesick 2007) gives the slope `1 / electrons`.
 ///
-/// Up to a mean of 50 electrons the distribution is Poisson's, above it a normal distribution with the same mean and
+/// Below a mean of 50 electrons the distribution is Poisson's, from 50 on a normal distribution with the same mean and
 /// variance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -58,7 +58,7 @@ impl RadianceEffect for ShotNoise {
 fn poisson(mean: f64, uniform: f64) -> f64 {
     let (mut count, mut probability) = (0.0, (-mean).exp());
     let mut below = probability;
-    // The rest of the distribution at twenty times its mean is smaller than 32-bit numbers resolve.
+    // The rest of the distribution at twenty times the largest mean is smaller than 32-bit numbers resolve.
     while uniform > below && count < 20.0 * NORMAL_APPROXIMATION_MIN {
         count += 1.0;
         probability *= mean / count;

@@ -64,8 +64,9 @@ impl Segmentation {
     }
 }
 
-/// Writes the colors of ids; neighboring pixels mostly have the same id.
+/// Writes the RGBA color of each id to `out`, shape (N, H, W, 4).
 fn write_colors(ids: ArrayView3<'_, i32>, out: &mut Array4<u8>, color_of: impl Fn(i32) -> [u8; 4]) {
+    // Neighboring pixels mostly have the same id.
     let (mut last, mut color) = (0, color_of(0));
     for (&id, out) in ids.iter().zip(out.rows_mut()) {
         if id != last {

@@ -33,8 +33,8 @@ impl SegmentedEntity {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum SegmentLevel {
-    /// One segment per object, such as a whole robot. Its id is the smallest mask id of its links, so it stays when
-    /// more is added.
+    /// One segment per object, such as a whole robot. Its id is the smallest mask id of its links, so the id does not
+    /// change when other entities are added.
     #[default]
     Instance,
     /// One segment per link, and per object without links. Ids are mask ids.
@@ -101,7 +101,7 @@ pub(super) struct SegmentTable {
 }
 
 impl SegmentTable {
-    /// Returns the segment id of a mask id.
+    /// Returns the segment id of a mask id: 0 for 0, [`Segmentation::UNKNOWN`] for unknown mask ids.
     pub(super) fn segment_of(&self, mask_id: i32) -> i32 {
         if mask_id == 0 {
             return 0;

@@ -54,7 +54,7 @@ impl StereoCamera {
         self.rig_origins(&self.left.pose_w(CameraConvention::Ros), convention)
     }
 
-    /// Returns the poses of the origins from poses of the left cameras.
+    /// Returns the poses of the origins from poses of the left cameras in optical axes; NaN for unknown poses.
     fn rig_origins(&self, left: &Array2<f64>, convention: CameraConvention) -> Array2<f64> {
         let left_from_origin = self.rig.origin_from_left.inverse();
         let rows = left.rows().into_iter().map(|row| {

@@ -68,9 +68,9 @@ pub struct RayCasterCfg {
     /// Geom groups of the targets: bit k is group k. MuJoCo's viewers show the first three; collision shapes are
     /// usually in group 3 or above.
     pub groups: u32,
-    /// Rate, history, latency and noise. The channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`, of which
-    /// only `distances` can have noise. Points lie on the ray at the noisy distance, which is clamped to the range from
-    /// 0 to `max_distance`; misses stay misses.
+    /// Rate, history, latency, dropout and noise. The channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`,
+    /// of which only `distances` can have noise. Points lie on the ray at the noisy distance, which is clamped to the
+    /// range from 0 to `max_distance`; misses stay misses.
     pub sampling: SamplingCfg,
     /// Shows a red ball at every hit ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,

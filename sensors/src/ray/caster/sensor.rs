@@ -250,8 +250,8 @@ impl RayCaster {
         self.sampler().history("distances")
     }
 
-    /// Indices in [`RenderScene::instances`](kinetoscope_scene::RenderScene::instances) of the instances that rays can
-    /// hit.
+    /// Indices in [`RenderScene::instances`](kinetoscope_scene::RenderScene::instances) of the target instances. Hidden
+    /// instances are included: rays hit them only in environments whose own scene shows them.
     pub fn target_instances(&self) -> impl Iterator<Item = usize> {
         self.rays.targets().instances()
     }

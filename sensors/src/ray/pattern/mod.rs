@@ -95,7 +95,7 @@ impl RayPattern {
     }
 }
 
-/// Checks that a number is positive and finite.
+/// Checks that a number is positive and finite, and returns it.
 fn check_positive(owner: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
@@ -103,7 +103,7 @@ fn check_positive(owner: &'static str, what: &'static str, value: f64) -> Result
     Err(RayError::Number { what, owner, value, allowed: "positive and finite" })
 }
 
-/// Checks that a number is finite.
+/// Checks that a number is finite, and returns it.
 fn check_finite(owner: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
     if value.is_finite() { Ok(value) } else { Err(RayError::Number { what, owner, value, allowed: "finite" }) }
 }
