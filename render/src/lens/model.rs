@@ -20,7 +20,7 @@ pub struct Domain {
 
 impl Domain {
     /// Creates a domain from its [`angle`](Self::angle), [`radius`](Self::radius) and [`folds`](Self::folds), without
-    /// poles (for lenses other than [`OpenCv`]).
+    /// poles (for lenses other than [`OpenCv`](super::OpenCv)).
     pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
         Self { angle, radius, folds, poles: Poles::NONE }
     }

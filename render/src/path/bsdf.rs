@@ -54,8 +54,8 @@ pub(super) struct BsdfValue {
 }
 
 impl Bsdf {
-    /// Creates the BSDF. `reflectance` is that of the material if the point mirrors, else 0; `front` is true if the path
-    /// comes from outside of the body.
+    /// Creates the BSDF. `reflectance` is that of the material if the point mirrors, else 0; `front` is true if the
+    /// path comes from outside of the body.
     pub(super) fn new(material: &Material, reflectance: f32, albedo: V3, front: bool) -> Self {
         let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
         let (layer, metal) = (0.08 * part(material.specular), part(material.metallic));

@@ -67,7 +67,8 @@ impl EmitterShape {
 
 impl Emitter {
     /// Samples a point that may be visible from `from`, both in the emitter's frame, by three random numbers in 0..1.
-    /// Returns the point and the pdf of its direction \[1/sr\], given this emitter; `None` if the numbers give no point.
+    /// Returns the point and the pdf of its direction \[1/sr\], given this emitter; `None` if the numbers give no
+    /// point.
     pub(super) fn sample(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, f64)> {
         let (point, density) = self.surface.sampling()?.sample_from(from, side, at)?;
         let density = density.or_else(|| self.pdf_by_area(from, point.position, point.normal))?;
@@ -75,8 +76,8 @@ impl Emitter {
     }
 
     /// Pdf with which [`sample`](Self::sample) finds the direction from `from` to the visible surface point `at`
-    /// \[1/sr\], given this emitter; all in the emitter's frame. `None` if the surface is not sampled there: from behind
-    /// if one-sided, or at a grazing angle.
+    /// \[1/sr\], given this emitter; all in the emitter's frame. `None` if the surface is not sampled there: from
+    /// behind if one-sided, or at a grazing angle.
     pub(super) fn pdf(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
         self.surface.sampling()?.pdf_from(from).or_else(|| self.pdf_by_area(from, at, normal))
     }

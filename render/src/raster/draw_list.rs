@@ -71,9 +71,9 @@ impl Layer {
         }
     }
 
-    /// True if an instance casts shadows into shadow maps: it is rendered, it is not a marker, and its alpha is at least
-    /// 0.5, or `space` is [`LightingSpace::Display`]: MuJoCo's renderer casts shadows whatever the alpha. Markers show
-    /// measurements and are not part of the scene.
+    /// True if an instance casts shadows into shadow maps: it is rendered, it is not a marker, and its alpha is at
+    /// least 0.5, or `space` is [`LightingSpace::Display`]: MuJoCo's renderer casts shadows whatever the alpha. Markers
+    /// show measurements and are not part of the scene.
     pub(crate) fn casts_shadows(instance: &Instance, groups: u32, space: LightingSpace) -> bool {
         Self::for_instance(instance, groups) != Self::Hidden
             && (instance.material.rgba[3] >= 0.5 || space == LightingSpace::Display)

@@ -168,8 +168,8 @@ fn joint_color(joint: &JointAxis) -> [f32; 4] {
     if joint.is_slide { color::SLIDE } else { color::HINGE }
 }
 
-/// Draws the center-of-mass symbol, a disc with dark and bright quarters, at a point in the frame of the overview \[m\].
-/// It is as large as a ball of radius 2 cm there; its radius is limited to 1.5 to 7 pixels.
+/// Draws the center-of-mass symbol, a disc with dark and bright quarters, at a point in the frame of the overview
+/// \[m\]. It is as large as a ball of radius 2 cm there; its radius is limited to 1.5 to 7 pixels.
 fn draw_center_of_mass(at: [f64; 3], view: &View, canvas: &mut Canvas) {
     let Some([x, y]) = project(view, at) else { return };
     let z = view.world_from_camera.apply_inverse(at.map(|p| p as f32))[2];

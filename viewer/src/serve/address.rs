@@ -74,8 +74,8 @@ fn next_free(address: SocketAddr) -> Option<SocketAddr> {
     ports.map(|port| SocketAddr::new(address.ip(), port)).find(|address| TcpListener::bind(address).is_ok())
 }
 
-/// Returns the address under which other machines reach the server. For an unspecified address, this is the IPv4 address
-/// of the default network interface, or 127.0.0.1 without one.
+/// Returns the address under which other machines reach the server. For an unspecified address, this is the IPv4
+/// address of the default network interface, or 127.0.0.1 without one.
 pub(super) fn reachable_address(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;

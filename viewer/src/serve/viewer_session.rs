@@ -18,8 +18,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Smallest side of the page's image area, and largest side of an image \[pixels\]. Areas up to four times that side get
-/// an image of lower resolution, larger ones are refused.
+/// Smallest side of the page's image area, and largest side of an image \[pixels\]. Areas up to four times that side
+/// get an image of lower resolution, larger ones are refused.
 const SIDE_RANGE: [usize; 2] = [16, 2048];
 /// Maximum number of pixels of an image. Larger pages get an image of lower resolution.
 const MAX_PIXELS: usize = 1920 * 1080;

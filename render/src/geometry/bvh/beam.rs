@@ -137,8 +137,8 @@ impl<S: Simd> Beam<S> {
     }
 }
 
-/// The line through two heights: height at depth 0, positive and negative part of the slope. If the depths are too close
-/// together, the slope is 0 and `outer` chooses one of the heights.
+/// The line through two heights: height at depth 0, positive and negative part of the slope. If the depths are too
+/// close together, the slope is 0 and `outer` chooses one of the heights.
 #[inline(always)]
 fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64) -> f64) -> [f32; 3] {
     let long = end - start;

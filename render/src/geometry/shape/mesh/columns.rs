@@ -210,8 +210,8 @@ struct Pairs {
 }
 
 impl Columns {
-    /// Intersects a packet of steep rays. Returns false, without writing, if they pass too many columns or triangles, or
-    /// if they begin so far away that rounding could put them into triangles whose BVH boxes they miss.
+    /// Intersects a packet of steep rays. Returns false, without writing, if they pass too many columns or triangles,
+    /// or if they begin so far away that rounding could put them into triangles whose BVH boxes they miss.
     #[inline(always)]
     pub(crate) fn intersect_packet<S: Simd>(
         &self,
