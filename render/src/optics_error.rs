@@ -38,10 +38,10 @@ pub enum OpticsError {
         /// Name of the lens.
         lens: &'static str,
     },
-    /// The rays of all intrinsics of a lens do not fit into memory.
+    /// The rays of the given intrinsics of a lens do not fit into memory.
     #[error("the lens rays of {tables} different intrinsics need {bytes} bytes of memory; the limit is {limit} bytes")]
     LensMemory {
-        /// Number of different intrinsics.
+        /// Number of different intrinsics, up to the first whose rays do not fit.
         tables: usize,
         /// Memory that their rays need \[bytes\].
         bytes: usize,

@@ -28,9 +28,9 @@ pub type RenderJob<'a> = (RenderRequest<'a>, FrameMut<'a>);
 /// any number of threads.
 ///
 /// In a large batch, one thread renders each frame. All threads together render the frames of a small batch (fewer than
-/// two frames per thread) and the last frames of a larger batch, so that no thread is idle: first their visibility is
-/// prepared, then their shadow maps in parts, then bands of the images. Path tracing renders one frame after the other,
-/// each by all threads.
+/// two frames per thread) and the last frames of a medium one (fewer than eight per thread), so that no thread is idle:
+/// first their visibility is prepared, then their shadow maps in parts, then bands of the images. Path tracing renders
+/// one frame after the other, each by all threads.
 #[derive(Debug)]
 pub struct ParallelRenderer {
     renderers: Vec<ImageRenderer>,

@@ -6,9 +6,9 @@
 //!                      ViewController <- Command   <==  Viewer
 //! ```
 //!
-//! The [`ViewController`] is an observer of the simulation. It copies the scene state into a [`Snapshot`] at the highest
-//! rate that any viewer requests. It renders nothing and never waits for a viewer. Each viewer renders the newest
-//! snapshot on its own thread and sends commands back.
+//! The [`ViewController`] is an observer of the simulation. It copies the scene state into a [`Snapshot`] at the
+//! highest rate that any viewer requests. It renders nothing, and waits only while viewers pause or slow down the
+//! simulation. Each viewer renders the newest snapshot on its own thread and sends commands back.
 //!
 //! | Module | Contents |
 //! |---|---|

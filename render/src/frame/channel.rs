@@ -24,7 +24,8 @@ pub struct PixelGroup {
     pub shading_normal: [[f32; LANES]; 3],
     /// Position of the surface, frame of the environment \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
-    /// Motion since the previous frame (right, down) \[pixels\]; +inf on a miss or without a previous frame.
+    /// Motion since the previous frame (right, down) \[pixels\]; +inf on a miss, without a previous frame, and where
+    /// the point was not in front of the camera then.
     pub flow: [[f32; LANES]; 2],
 }
 

@@ -4,7 +4,8 @@ use super::{Channel, PixelGroup, Stage};
 use ndarray::Ix4;
 
 /// Optical flow \[pixels\]: motion of the visible surface point since the previous frame, u to the right and v down.
-/// The point was at (u + 0.5 - flow u, v + 0.5 - flow v) in the previous frame, inside or outside of the image.
+/// The point seen in column i and row j was at (i + 0.5 - u, j + 0.5 - v) in the previous frame, inside or outside of
+/// the image.
 ///
 /// The flow is exact: it comes from the poses of the instance and of the camera at both instants, and from both lenses.
 /// It does not tell if the point was occluded in the previous frame. It is exactly 0 where neither instance nor camera

@@ -45,7 +45,7 @@ macro_rules! with_channels {
             /// Base color without lighting (sRGB), and opacity, u8, 4 per pixel; 0 where no surface was hit.
             albedo::Albedo,
             /// Motion of the visible surface since the previous image (right, down) \[pixels\], f32, 2 per pixel; +inf
-            /// where no surface was hit and in the first image.
+            /// where no surface was hit, in images without a previous one, and where it was not in front of the camera.
             flow::Flow,
         }
     };

@@ -9,14 +9,16 @@ const MAX_LIFT: f64 = 0.15;
 /// Interpolated attributes at a point of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceAttributes {
+    /// Interpolated outward normal, not of unit length.
     pub(crate) normal: V3,
-    /// Offset from the flat triangle to the smooth surface that it approximates.
+    /// Offset from the flat triangle to the smooth surface that it approximates, as seen from the given side.
     pub(crate) lift: V3,
+    /// Texture coordinates, and their number per meter; `None` for a mesh without.
     pub(crate) uv: Option<([f64; 2], f64)>,
 }
 
-/// The interpolated normal at a point of a triangle seen from a side (1 from outside), its texture coordinates and
-/// their number per meter.
+/// Interpolates the attributes of a mesh at a point `at` of a triangle, all in the frame of the mesh. `side` is 1 for a
+/// triangle seen from outside, -1 from inside.
 pub(crate) fn interpolate_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> SurfaceAttributes {
     let corners = mesh.triangles()[triangle].map(|i| i as usize);
     let ends @ [a, b, c] = corners.map(|i| to_f64(mesh.positions()[i]));

@@ -89,9 +89,9 @@ impl Packet {
         D::load(s, &self.limit)
     }
 
-    /// The rays that may meet a sphere, given in their own frame, before their limits: transformed to the frame that
-    /// `pose` maps from; `None` if no ray does. All rays meet a sphere of radius +inf. Each lane equals, to the bit,
-    /// the transform of its ray alone.
+    /// The rays that may meet a sphere, given in the frame of the rays, before their limits: transformed to the frame
+    /// that `pose` maps from. The other lanes have no ray; `None` if no lane has one. All rays meet a sphere of radius
+    /// +inf. Each lane equals, to the bit, the transform of its ray alone.
     #[inline(always)]
     pub(super) fn in_local_frame<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
         let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));
@@ -126,7 +126,7 @@ impl Packet {
     }
 }
 
-/// The rotation of [`PoseF64::rotate_inverse`], to the bit.
+/// Packet version of [`PoseF64::rotate_inverse`]: the same bits.
 #[inline(always)]
 fn rotate_inverse<S: Simd>(pose: &PoseF64, v: D3<S>) -> [[f64; WIDTH]; 3] {
     let r = &pose.rotation;

@@ -35,7 +35,8 @@ impl ShearedRay {
         Self { origin: ray.origin, axes, shear: [d[axes[0]] * inverse, d[axes[1]] * inverse, inverse] }
     }
 
-    /// Distance of the triangle's plane, of any sign, if the ray is inside of the triangle; from either side.
+    /// Distance of the triangle's plane, of any sign, from either side; `None` if the ray's line is outside of the
+    /// triangle or in its plane.
     #[inline(always)]
     pub(crate) fn distance(&self, triangle: &Triangle) -> Option<f64> {
         let [i, j, k] = self.axes;
@@ -64,8 +65,8 @@ impl ShearedRay {
     }
 }
 
-/// Packet version of [`ShearedRay`] for rays with the same dominant axis: the same operations in the same order, so the same
-/// bits.
+/// Packet version of [`ShearedRay`] for rays with the same dominant axis: the same operations in the same order, so the
+/// same bits.
 #[derive(Clone, Copy)]
 pub(crate) struct ShearedPacket<S: Simd> {
     s: S,

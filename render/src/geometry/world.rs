@@ -200,7 +200,8 @@ impl FixedTargets {
         Self { placed, bvh: Some((bvh, order)), unindexed }
     }
 
-    /// True if the fixed targets are still at the poses that this was built for.
+    /// True if the visible fixed targets of `targets` are still at the poses of [`new`](Self::new), and no other fixed
+    /// target is visible. `poses` is as in `new`.
     pub fn is_at(&self, targets: &RayTargets, poses: &[PoseF64]) -> bool {
         let mut placed = self.placed.iter();
         let same = targets.fixed.iter().all(|&t| match targets.place(t, targets.pose_of(t, poses)) {

@@ -53,7 +53,7 @@ macro_rules! lenses {
         impl std::str::FromStr for Lens {
             type Err = UnknownName;
 
-            /// The lens of a name or alias, as [`Lens::from_name`].
+            /// Creates the lens of a name or alias; same as [`Lens::from_name`].
             fn from_str(name: &str) -> Result<Self, UnknownName> {
                 Self::from_name(name)
             }
@@ -104,8 +104,8 @@ macro_rules! lenses {
             ///
             /// # Errors
             ///
-            /// [`OpticsError::Lens`] for an invalid number; [`OpticsError::LensFolds`] if the mapping folds back before
-            /// the requested `max_angle`.
+            /// [`OpticsError::Lens`] for an invalid number; [`OpticsError::LensFolds`] if the mapping folds back or has
+            /// a pole before the requested `max_angle`.
             pub fn domain(&self) -> Result<Domain, OpticsError> {
                 let (domain, max_angle) = match self { $(Self::$Name(lens) => {
                     lens.validate()?;

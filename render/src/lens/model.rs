@@ -10,7 +10,7 @@ pub struct Domain {
     /// angle that depends on the direction, directions beyond this angle may be visible too.
     pub angle: f64,
     /// Distance of a ray at this angle from the principal point in the normalized image (times fx: in pixels); +inf for
-    /// a pinhole.
+    /// a pinhole, and at a pole where the image radius grows without bound.
     pub radius: f64,
     /// True if the domain ends at this angle because the mapping folds back or has a pole, not at a requested angle.
     pub folds: bool,
@@ -19,7 +19,8 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Creates the domain of a lens whose mapping has no poles.
+    /// Creates a domain from its [`angle`](Self::angle), [`radius`](Self::radius) and [`folds`](Self::folds), without
+    /// poles (for lenses other than [`OpenCv`](super::OpenCv)).
     pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
         Self { angle, radius, folds, poles: Poles::NONE }
     }

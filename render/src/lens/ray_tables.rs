@@ -5,7 +5,7 @@ use crate::intrinsics::PixelIntrinsics;
 use crate::optics_error::OpticsError;
 use std::sync::Arc;
 
-/// Largest memory of the rays of a camera \[bytes\].
+/// Largest memory of the rays that one call returns \[bytes\].
 const MAX_BYTES: usize = 16 << 30;
 
 /// Lens of a camera, and the rays of each of its views (rows). A lens without distortion has no rays.

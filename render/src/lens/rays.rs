@@ -12,7 +12,8 @@ const GROUP_FLOATS: usize = 3 * LANES;
 /// Widening of cones \[rad\]: more than the error of single precision.
 const CONE_MARGIN: f64 = 1e-5;
 
-/// Precomputed rays of an image through a lens, single precision; see [`RenderRequest::lens`](crate::request::RenderRequest::lens).
+/// Precomputed rays of an image through a lens, single precision; see
+/// [`RenderRequest::lens`](crate::request::RenderRequest::lens).
 ///
 /// The table takes 12 bytes per pixel, 60 with four color samples, and 4 more with vignetting. It is computed once:
 /// cameras keep one for each combination of lens and intrinsics among their environments.

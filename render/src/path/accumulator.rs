@@ -27,7 +27,7 @@ pub struct Accumulator {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
     pub(crate) color: [f32; 3],
-    /// Variance of the brightness.
+    /// Variance of the mean brightness; with denoising, relative to the squared brightness of the albedo.
     pub(crate) variance: f32,
 }
 

@@ -26,9 +26,9 @@ pub(super) struct Bsdf {
     pub(super) mirror: f64,
     /// Fraction of light that meets a smooth surface of glass.
     glass: f64,
-    /// Refractive index of the side that light comes from, divided by that of the other side.
+    /// Refractive index of the side that the path comes from, divided by that of the other side.
     ratio: f64,
-    /// True if light comes from outside of the body.
+    /// True if the path comes from outside of the body.
     front: bool,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct BsdfSample {
     /// Factor of the light from there: BSDF times cosine, divided by the pdf.
     pub(super) weight: V3,
     pub(super) is_specular: bool,
-    /// Pdf of the direction \[1/sr\]; 0 for mirrors, which have a single direction.
+    /// Pdf of the direction \[1/sr\]; 0 for mirrors and glass, whose directions are not distributed.
     pub(super) pdf: f64,
 }
 
@@ -54,8 +54,8 @@ pub(super) struct BsdfValue {
 }
 
 impl Bsdf {
-    /// Creates the BSDF. `reflectance` is that of the material if the point mirrors; `front` is true if light comes
-    /// from outside of the body.
+    /// Creates the BSDF. `reflectance` is that of the material if the point mirrors, else 0; `front` is true if the
+    /// path comes from outside of the body.
     pub(super) fn new(material: &Material, reflectance: f32, albedo: V3, front: bool) -> Self {
         let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
         let (layer, metal) = (0.08 * part(material.specular), part(material.metallic));
@@ -95,9 +95,9 @@ impl Bsdf {
         self.f0.map(|f0| f0 + (self.f90 - f0) * grazing)
     }
 
-    /// Refraction at a smooth surface: the reflected fraction, and the direction that light refracted from `o` (from
-    /// outside, z up) takes. Snell's law and Fresnel's equations of unpolarized light; `None` at total internal
-    /// reflection. Source: Born and Wolf, Principles of Optics, section 1.5.
+    /// Refraction at a smooth surface: the reflected fraction, and the direction on the other side (z down) of a path
+    /// whose direction on this side is `o` (z up). Snell's law and Fresnel's equations of unpolarized light; `None` at
+    /// total internal reflection. Source: Born and Wolf, Principles of Optics, section 1.5.
     fn refract(&self, o: V3) -> (f64, Option<V3>) {
         let square = 1.0 - self.ratio * self.ratio * (1.0 - o[2] * o[2]);
         if square <= 0.0 {
@@ -132,7 +132,8 @@ impl Bsdf {
         2.0 * cos / (cos + (self.alpha2 + (1.0 - self.alpha2) * cos * cos).sqrt())
     }
 
-    /// Evaluates the BSDF for light from `i` to `o`, both unit and in the local frame of the point.
+    /// Evaluates the BSDF times the cosine of `i` for light from `i` to `o`, both unit and in the local frame of the
+    /// point. Perfect mirroring and glass are left out.
     pub(super) fn evaluate(&self, o: V3, i: V3) -> BsdfValue {
         if o[2] <= 0.0 || i[2] <= 0.0 {
             return BsdfValue { diffuse: [0.0; 3], specular: [0.0; 3] };
@@ -175,7 +176,7 @@ impl Bsdf {
         let lobe = lobe - self.mirror;
         if lobe < self.glass {
             let (mirrored, through) = self.refract(o);
-            // Light that enters takes the color.
+            // A path that enters the body takes the color.
             let tint = if self.front { self.albedo } else { [1.0; 3] };
             let (direction, weight) = match through {
                 Some(through) if lobe >= mirrored * self.glass => (through, tint),

@@ -47,7 +47,7 @@ impl EmitterShape {
         triangles.or_else(|| shape.area_sampling().map(|_| Self::Closed(shape.clone())))
     }
 
-    /// True if the surface is that of `shape`: meshes are compared by address.
+    /// True if the surface is the mesh of `shape`, compared by address; false for other surfaces.
     fn matches(&self, shape: &Shape) -> bool {
         // Other surfaces hold no data worth keeping.
         matches!((self, shape.mesh()), (Self::Triangles(sampling), Some(mesh)) if Arc::ptr_eq(sampling.mesh(), mesh))
@@ -66,15 +66,18 @@ impl EmitterShape {
 }
 
 impl Emitter {
-    /// Samples a point that is visible from `from`, both in the emitter's frame, by three random numbers in 0..1.
-    /// Returns the point and the pdf of its direction \[1/sr\], given this emitter.
+    /// Samples a point that may be visible from `from`, both in the emitter's frame, by three random numbers in 0..1.
+    /// Returns the point and the pdf of its direction \[1/sr\], given this emitter; `None` if the numbers give no
+    /// point.
     pub(super) fn sample(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, f64)> {
         let (point, density) = self.surface.sampling()?.sample_from(from, side, at)?;
         let density = density.or_else(|| self.pdf_by_area(from, point.position, point.normal))?;
         Some((point, density))
     }
 
-    /// Pdf of the direction from `from` to a point of the surface \[1/sr\]; `None` if the point is never sampled.
+    /// Pdf with which [`sample`](Self::sample) finds the direction from `from` to the visible surface point `at`
+    /// \[1/sr\], given this emitter; all in the emitter's frame. `None` if the surface is not sampled there: from
+    /// behind if one-sided, or at a grazing angle.
     pub(super) fn pdf(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
         self.surface.sampling()?.pdf_from(from).or_else(|| self.pdf_by_area(from, at, normal))
     }

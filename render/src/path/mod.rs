@@ -42,7 +42,7 @@ use std::sync::Arc;
 
 /// Largest number of sampled lights; the headlight is counted separately.
 const MAX_LIGHTS: usize = crate::shade::light::MAX_LIGHTS;
-/// Offset of ray origins above a surface, as a fraction of the largest coordinate.
+/// Offset of ray origins above a surface, as a fraction of the largest coordinate, or \[m\] if that is below 1 m.
 const RAY_OFFSET: f64 = 1e-7;
 /// Bounces after which Russian roulette starts.
 const RR_START: u32 = 2;

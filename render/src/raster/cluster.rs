@@ -199,7 +199,8 @@ fn draw_outlined<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient,
     );
 }
 
-/// Clips a triangle to the region in front of the camera and inside the guard band.
+/// Clips a triangle to the region in front of the camera and inside the guard band. Returns the corners of the polygon
+/// and their number; `None` if nothing is left.
 fn clip(projection: &Projection, triangle: [[f32; 3]; 3]) -> Option<([[f32; 3]; 9], usize)> {
     let p = projection;
     // Signed distances: positive inside. The screen coordinate is fx x / z + cx, for parallel rays fx x + cx.

@@ -28,7 +28,8 @@ pub(crate) struct DrawItem {
 pub(crate) struct PlacedInstance {
     pub(crate) camera_from_instance: PoseF32,
     pub(crate) local: LocalCamera,
-    /// True if the camera is outside of the instance's bounds, by enough that the near plane cuts nothing off.
+    /// True if the camera is outside of the instance's bounds, by enough that the near plane cuts nothing off. Always
+    /// true in a parallel projection.
     pub(crate) outside: bool,
     /// Level of the mesh that is rendered: ids count that level's triangles.
     pub(crate) level: u8,
@@ -70,9 +71,9 @@ impl Layer {
         }
     }
 
-    /// True if an instance casts shadows into shadow maps: it is rendered, its alpha is at least 0.5, and it is not a
-    /// marker. Markers show measurements and are not part of the scene. In MuJoCo's renderer, transparent objects cast
-    /// shadows whatever their alpha.
+    /// True if an instance casts shadows into shadow maps: it is rendered, it is not a marker, and its alpha is at
+    /// least 0.5, or `space` is [`LightingSpace::Display`]: MuJoCo's renderer casts shadows whatever the alpha. Markers
+    /// show measurements and are not part of the scene.
     pub(crate) fn casts_shadows(instance: &Instance, groups: u32, space: LightingSpace) -> bool {
         Self::for_instance(instance, groups) != Self::Hidden
             && (instance.material.rgba[3] >= 0.5 || space == LightingSpace::Display)
@@ -207,7 +208,7 @@ impl DrawList {
     }
 }
 
-/// True if all triangles of a closed cluster are back-facing.
+/// True if all triangles of a cluster are certainly back-facing; false for a cluster that is not closed.
 fn faces_away(projection: &Projection, placed: &PlacedInstance, cluster: &Cluster) -> bool {
     if !cluster.closed || cluster.cone_cos <= 0.0 {
         return false;

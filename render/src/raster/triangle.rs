@@ -28,8 +28,9 @@ pub(crate) struct Gradient {
     pub(crate) high: f32,
 }
 
-/// Rasterizes a triangle given by its snapped corners. The gradient costs several divisions: most triangles of dense
-/// meshes lie between the samples, and return before it is computed.
+/// Rasterizes a triangle given by its snapped corners `p`, in the order in which (p1 - p0) x (p2 - p0) is positive. The
+/// gradient costs several divisions: most triangles of dense meshes lie between the samples, and return before it is
+/// computed. Samples nearer than `nearest` are not drawn.
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(
     s: S,

@@ -63,7 +63,7 @@ impl RasterScratch {
         &mut self.stack
     }
 
-    /// Renders a band of a shadow map.
+    /// Renders a band of a shadow map into the memory of `band`.
     pub(crate) fn render_shadow_band(&mut self, scene: &RenderScene, band: ShadowBand<'_>) {
         band.draw(self.level, scene, &mut self.tile, &mut self.rasterizer);
     }

@@ -128,7 +128,7 @@ fn resolve_lanes<S: Simd>(
         // Some pixels have no ray.
         length = select(length.simd_gt(zero), length, one);
     }
-    // Conversion from distances along a ray to depths.
+    // Positions along forward rays are depths, along all others distances.
     let forward = context.lens.is_none_or(LensRays::is_forward);
     let ray = bent.map(|ray| LensRayLanes { direction: ray, forward });
     let rays = CameraRays { uv, lens_rays: ray, direction };

@@ -211,7 +211,8 @@ struct Highlight {
 }
 
 impl Highlight {
-    /// A metal mirrors lights as it mirrors everything, whatever the `specular` of its nonmetallic part.
+    /// The highlight of a material. A metal mirrors lights as it mirrors everything, whatever the `specular` of its
+    /// nonmetallic part, except in MuJoCo's light model (`display`).
     fn from_material(material: &Material, display: bool) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
         let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };

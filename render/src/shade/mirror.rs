@@ -33,7 +33,8 @@ pub(crate) struct Mirrors<'a> {
     pub(crate) first: usize,
     /// True if no other instance mirrors, as in MuJoCo's renderer.
     pub(crate) only_first: bool,
-    /// Bounding box of the objects that mirrored rays may hit; `None` if one of them is unbounded.
+    /// Bounding box of the objects that mirrored rays may hit; `None` if one of them is unbounded, or if several
+    /// instances mirror.
     pub(crate) bounds: Option<ReflectionBounds>,
 }
 

@@ -84,7 +84,8 @@ impl PreparedFrame {
             + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
     }
 
-    /// Validates a request and builds its draw list. Shadow maps are rendered later, see [`PreparedFrame::shadow_bands`].
+    /// Validates a request and builds its draw list. Shadow maps are rendered later, see
+    /// [`PreparedFrame::shadow_bands`].
     pub(crate) fn prepare(
         &mut self,
         style: RenderSettings<'_>,

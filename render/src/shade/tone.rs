@@ -54,13 +54,14 @@ impl ToneCurve {
 }
 
 impl ToneCurve {
-    /// The sRGB value of linear light, 0..=255, plus 0.5 and at most 255: its integer part is the sRGB byte.
+    /// The sRGB value of linear light after this curve, 0..=255, plus 0.5 and at most 255: its integer part is the sRGB
+    /// byte.
     pub fn encode(self, intensity: f32) -> f32 {
         encode(Scalar, self, splat(Scalar, intensity)).array()[0]
     }
 }
 
-/// The sRGB value of linear light plus 0.5, at most 255: its integer part is the sRGB byte.
+/// The sRGB value of linear light after the tone curve plus 0.5, at most 255: its integer part is the sRGB byte.
 #[inline(always)]
 pub(crate) fn encode<S: Simd>(s: S, curve: ToneCurve, x: F<S>) -> F<S> {
     to_srgb(s, curve.apply(s, max(x, splat(s, 0.0))))
@@ -83,7 +84,7 @@ pub(crate) fn decode_bytes<S: Simd>(x: F<S>) -> F<S> {
     (((x * -0.156_114_5 + 0.615_823_9) * x + 0.494_052_83) * x + 0.045_749_872) * x
 }
 
-/// Linear light as sRGB, 0..=255, not rounded: the inverse of [`decode_bytes`].
+/// Linear light as sRGB, not rounded: the inverse of [`decode_bytes`] for 0 to 254.5, its largest value.
 #[inline(always)]
 pub(crate) fn to_bytes<S: Simd>(s: S, x: F<S>) -> F<S> {
     to_srgb(s, min(max(x, splat(s, 0.0)), splat(s, 1.0))) - 0.5

@@ -231,7 +231,7 @@ impl RayTracer {
     }
 
     /// Fraction of light that passes along a ray from distance 0 to `limit` \[m\], at a time: 0 past an opaque surface,
-    /// and `1 - alpha` past each front of a transparent one. One copy per instruction set.
+    /// and `1 - alpha` past each front of a transparent one. Markers are ignored. One copy per instruction set.
     #[inline(never)]
     pub(crate) fn transmittance<S: Simd>(
         &self,
@@ -472,8 +472,8 @@ impl LocalCameraRays {
         out
     }
 
-    /// Casts the rays of eight samples, and keeps hits that are nearer than the stored ones. Returns true if any is
-    /// kept.
+    /// Casts the rays of eight samples, and keeps hits that are nearer than the stored ones, or as near with a larger
+    /// id. Returns true if any is kept.
     #[inline(always)]
     fn cast<S: Simd>(
         &self,

@@ -42,7 +42,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// [`RenderError::LookAt`] if eye and target coincide, and the errors of [`View::validate`].
+    /// [`RenderError::LookAt`] if eye and target coincide or are not finite, and the errors of [`View::validate`].
     pub fn look_at(
         size: [usize; 2],
         fovy: f32,

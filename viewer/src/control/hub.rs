@@ -97,7 +97,8 @@ impl Hub {
 }
 
 /// Handle of a viewer: receives snapshots and sends commands. It can move to another thread. Dropping it undoes its
-/// pause, speed and spring, and stops a recording that it started, at the next step.
+/// pause, speed and spring, and stops a recording that it started, at the next step. During playback, its pause and
+/// speed stay.
 #[derive(Debug)]
 pub struct Viewer {
     hub: Arc<Hub>,

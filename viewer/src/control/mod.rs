@@ -171,8 +171,9 @@ pub trait ViewerExt {
     fn set_record_button(&mut self, button: RecordButton);
 
     /// Steps like [`update`](SimulationManager::update), but returns where `update` would wait for viewers: while they
-    /// pause the simulation, or it is ahead of their speed. Returns the number of steps done, and the time after which
-    /// to call again: zero after all steps. With 0 steps, only viewers are served.
+    /// pause the simulation, or it is ahead of their speed. Returns the number of steps done, and the time to wait
+    /// before the next call: above zero if viewers hold the next step, even after all steps. During such a wait, a call
+    /// with 0 steps serves viewers.
     ///
     /// For callers that must not block, such as a program that handles signals.
     fn update_without_waiting(&mut self, steps: u32) -> (u32, Duration);
@@ -216,7 +217,8 @@ impl ViewerExt for SimulationManager {
     }
 }
 
-/// Calls `act` with the view controller of the simulation, which is added if missing.
+/// Calls `act` with the view controller of the simulation, which is added if missing. Returns the result; `None` if the
+/// controller cannot be removed for the call.
 fn with_view_controller<T>(
     sim: &mut SimulationManager,
     act: impl FnOnce(&mut ViewController, &mut SimulationManager) -> T,

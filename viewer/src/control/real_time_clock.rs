@@ -78,7 +78,7 @@ impl RealTimeClock {
         }
     }
 
-    /// Returns the time to wait before the next step; zero if the simulation lags behind.
+    /// Returns the time to wait before the next step; zero if the simulation lags behind or its speed is unlimited.
     pub(super) fn time_ahead(&mut self, steps: u64, now: Instant) -> Duration {
         let Speed::Factor(factor) = self.speed else { return Duration::ZERO };
         let (began, first) = self.schedule_start;

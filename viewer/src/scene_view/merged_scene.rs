@@ -13,6 +13,7 @@ pub(super) struct MergedScene {
     /// Render scene; `None` if it would have too many triangles. The mask id of an instance is its index in
     /// `instance_sources` plus one; markers have [`Marker::MASK_ID`].
     pub(super) scene: Option<RenderScene>,
+    /// Poses of all instances, markers included, in the frame of the overview.
     pub(super) poses: Vec<PoseF32>,
     /// Environment and instance index of each instance; markers come last and have no entry.
     pub(super) instance_sources: Vec<(usize, usize)>,

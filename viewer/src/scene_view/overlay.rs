@@ -149,7 +149,7 @@ pub(super) fn in_overview(env: &SnapshotEnv, point: [f64; 3]) -> [f64; 3] {
 }
 
 /// Arrow of the force on the second body, starting at the contact point. Its length is `0.05 m log2(1 + F / 1 N)`: 5 cm
-/// for 1 N, a third of a meter for 100 N, half a meter for 1000 N.
+/// for 1 N, a third of a meter for 100 N, half a meter for 1000 N. `None` for (almost) no force.
 fn force_arrow(contact: &Contact) -> Option<Marker> {
     let force = Vector3::from(contact.force);
     let size = force.norm();
@@ -168,8 +168,8 @@ fn joint_color(joint: &JointAxis) -> [f32; 4] {
     if joint.is_slide { color::SLIDE } else { color::HINGE }
 }
 
-/// Draws the center-of-mass symbol, a disc with dark and bright quarters. Its radius is that of a ball of 2 cm at that
-/// distance, limited to 1.5 to 7 pixels.
+/// Draws the center-of-mass symbol, a disc with dark and bright quarters, at a point in the frame of the overview
+/// \[m\]. It is as large as a ball of radius 2 cm there; its radius is limited to 1.5 to 7 pixels.
 fn draw_center_of_mass(at: [f64; 3], view: &View, canvas: &mut Canvas) {
     let Some([x, y]) = project(view, at) else { return };
     let z = view.world_from_camera.apply_inverse(at.map(|p| p as f32))[2];

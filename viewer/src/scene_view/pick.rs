@@ -76,7 +76,7 @@ impl Selection {
     }
 }
 
-/// Returns the text lines about a selection: name, pose, and contact force.
+/// Returns the text lines about a selection: name, pose and contact force; for the world, name and point.
 pub(crate) fn selection_text(picked: &Selection, snapshot: &Snapshot) -> Vec<String> {
     let mut lines = vec![format!("{}  (environment {}, mask id {})", picked.name, picked.env, picked.mask_id)];
     let Some(pose) = picked.pose(snapshot) else {

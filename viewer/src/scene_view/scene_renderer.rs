@@ -69,7 +69,7 @@ impl SceneRenderer {
 
     /// Renders a snapshot through `view`, whose pose is in the frame of the overview. A single environment stays at its
     /// place in the overview. All environments have the lights of the first one in the image. The canvas is resized to
-    /// the view.
+    /// the view. If all instances together have too many triangles, only trails and overlays are drawn on top of it.
     ///
     /// # Errors
     /// The view is invalid, or the renderer failed.

@@ -68,14 +68,14 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     }
 }
 
-/// Returns the next free port.
+/// Returns the same address with the next free port; `None` if the following 64 ports are in use.
 fn next_free(address: SocketAddr) -> Option<SocketAddr> {
     let ports = (1..=PORT_CANDIDATES).filter_map(|k| address.port().checked_add(k));
     ports.map(|port| SocketAddr::new(address.ip(), port)).find(|address| TcpListener::bind(address).is_ok())
 }
 
-/// Returns the address under which other machines reach the server. For an unspecified address, this is the address of
-/// the default network interface.
+/// Returns the address under which other machines reach the server. For an unspecified address, this is the IPv4
+/// address of the default network interface, or 127.0.0.1 without one.
 pub(super) fn reachable_address(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;

@@ -19,7 +19,7 @@
 //! encrypted: over an untrusted network, listen on loopback and use a tunnel (`ssh -L 8080:localhost:8080 robot`).
 //!
 //! Each viewer has its own thread, which renders images of the newest [`Snapshot`](crate::Snapshot). Only one viewer of
-//! a server renders at a time, so all viewers together use at most one core. The simulation waits for none of them.
+//! a server renders at a time, so all viewers together use at most one core. The simulation does not wait for images.
 
 mod access_policy;
 mod address;

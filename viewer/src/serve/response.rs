@@ -93,7 +93,7 @@ fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, w
     }
 }
 
-/// Reads the remaining request data, within limits.
+/// Ends the sending side of the connection, then reads the remaining request data, within limits.
 pub(super) fn drain(stream: &mut TcpStream) {
     let (most, time) = DRAIN_LIMIT;
     let start = Instant::now();

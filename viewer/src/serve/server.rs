@@ -141,7 +141,7 @@ fn listen(listener: &TcpListener, house: &Arc<ServerContext>) {
     }
 }
 
-/// Starts the thread of a connection.
+/// Starts the thread of a connection; closes the connection without a response if there are too many.
 fn spawn_connection(mut stream: TcpStream, house: &Arc<ServerContext>) {
     // Accepted sockets may inherit the non-blocking mode of the listener on some systems (not on Linux).
     if stream.set_nonblocking(false).is_err() || stream.set_nodelay(true).is_err() {
@@ -226,7 +226,7 @@ fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
     }
 }
 
-/// Upgrades the connection to a WebSocket (RFC 6455, section 4.2).
+/// Upgrades the connection to a WebSocket (RFC 6455, section 4.2) and runs its session to the end.
 fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
     let asks = head.header_contains("connection", "upgrade") && head.header_contains("upgrade", "websocket");
     let version = head.header("sec-websocket-version").ok().flatten();

@@ -32,7 +32,7 @@ pub(super) trait ViewSession: Send {
 pub(super) struct EncodedImage {
     /// Description of the image for the page.
     pub(super) description: Value,
-    /// Image file, JPEG or PNG.
+    /// Image file, of the type in `description`.
     pub(super) file: Vec<u8>,
 }
 

@@ -18,7 +18,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Smallest and largest side of an image \[pixels\].
+/// Smallest side of the page's image area, and largest side of an image \[pixels\]. Areas up to four times that side
+/// get an image of lower resolution, larger ones are refused.
 const SIDE_RANGE: [usize; 2] = [16, 2048];
 /// Maximum number of pixels of an image. Larger pages get an image of lower resolution.
 const MAX_PIXELS: usize = 1920 * 1080;
@@ -210,7 +211,7 @@ impl ViewerSession {
         Ok(())
     }
 
-    /// Requests the snapshot contents that are drawn, and no others, because contacts are expensive to compute.
+    /// Requests the contacts that are drawn, and no others, because contacts are expensive to compute.
     fn update_request(&mut self) {
         let contacts = required_contacts(self.env_selection, &self.overlays, self.selection.as_ref());
         let wants = SnapshotRequest { contacts, ..self.wants };

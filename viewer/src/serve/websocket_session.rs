@@ -25,7 +25,7 @@ const PING_INTERVAL: Duration = Duration::from_secs(4);
 const MAX_MESSAGE: usize = 16 << 10;
 /// Maximum number of characters of a refusal, since some refusals quote the command.
 const MAX_REASON: usize = 500;
-/// Maximum number of unacknowledged images and states.
+/// Numbers of unacknowledged images and states from which on no more are sent. Two may be sent at once.
 const MAX_UNSEEN_IMAGES: u32 = 2;
 const MAX_UNSEEN_STATES: u32 = 3;
 /// Minimum interval between two states.

@@ -73,7 +73,7 @@ struct Drag {
     last: [f64; 2],
 }
 
-/// Maximum frame rate \[Hz\], the refresh rate of most screens.
+/// Rate of snapshots that a window requests \[Hz\], the refresh rate of most screens.
 const MAX_FPS: f64 = 60.0;
 /// Largest mouse motion of a click \[pixels\].
 const MAX_CLICK_MOTION: f64 = 3.0;
@@ -524,7 +524,8 @@ impl App {
         eye.translate((way * eye.distance * seconds).into());
     }
 
-    /// Renders the image of the window, including overlays and panels; black before the first snapshot.
+    /// Renders the image of the window, including overlays and panels. Before the first snapshot, it only resizes
+    /// `canvas`.
     pub fn draw(&mut self, canvas: &mut Canvas, now: Instant) {
         let [width, height] = self.size.map(|n| n.clamp(1, View::MAX_SIDE));
         canvas.resize(width, height);

@@ -65,7 +65,7 @@ pub(crate) enum Action {
 }
 
 impl Action {
-    /// True if a held key repeats the action. Steps repeat; toggles do not.
+    /// True if a held key repeats the action: steps, and changes of environment and speed. Toggles do not repeat.
     pub(crate) fn repeats(self) -> bool {
         matches!(self, Self::Steps(_) | Self::NextEnv | Self::PreviousEnv | Self::Slower | Self::Faster)
     }

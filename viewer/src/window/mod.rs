@@ -54,7 +54,7 @@ impl Default for WindowCfg {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindowError {
-    /// No X display is set, or the connection to it failed.
+    /// No X display is set, the connection to it failed, or the display does not respond or has unsupported pixels.
     #[error(
         "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which Wayland \
          desktops provide as XWayland, or run without a window: the examples with --headless, or with --serve for a \
@@ -266,7 +266,7 @@ fn no_display(failure: &DisplayError) -> WindowError {
     WindowError::NoDisplay { reason: failure.to_string(), display, wayland }
 }
 
-/// Longest time between two checks for user input.
+/// Longest wait for a snapshot or an image between two checks for user input.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Shows snapshots until the window closes.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 /// Share of the requested speed below which physics is late.
 const MIN_SPEED_RATIO: f64 = 0.97;
-/// Duration for which a late simulation keeps half of the threads.
+/// Time for which half of the threads render after physics was last late.
 const HOLD_TIME: Duration = Duration::from_secs(5);
 
 /// Consecutive late measurements after which physics counts as held up. One measurement of half a second may be late

@@ -1,5 +1,5 @@
-//! A window on an X server, through the X11 protocol without C libraries. A lost connection is an error and nothing
-//! else.
+//! A window on an X server, through the X11 protocol without C libraries. A lost connection is an error, and does not
+//! end the program.
 
 use super::app::{Input, Modifiers};
 use super::key_bindings::Key;
@@ -168,12 +168,13 @@ impl XWindow {
         self.window
     }
 
-    /// Returns the events since the last call.
+    /// Returns the events since the last call; the last key release may be returned by the next call.
     pub(super) fn poll(&mut self) -> Result<Vec<WindowEvent>, DisplayError> {
         self.events().map_err(|failure| self.resolve_error(failure))
     }
 
-    /// Replaces the error by [`DisplayError::Unresponsive`] if the connection was closed because the display did not respond.
+    /// Replaces the error by [`DisplayError::Unresponsive`] if the connection was closed because the display did not
+    /// respond.
     fn resolve_error(&self, failure: DisplayError) -> DisplayError {
         if self.watch.has_timed_out() { DisplayError::Unresponsive } else { failure }
     }

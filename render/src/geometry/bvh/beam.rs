@@ -47,12 +47,13 @@ pub(crate) struct Beam<S: Simd> {
 pub(crate) enum Traversal {
     /// All leaves that the rays may meet were visited.
     Complete,
-    /// Stopped because the budget was exceeded.
+    /// Stopped before the budget was exceeded; leaves are missing.
     OverBudget,
 }
 
 impl<S: Simd> Beam<S> {
-    /// The beam around all lanes of a packet, within a tree; `None` if single precision cannot bound it.
+    /// The beam around all lanes of a packet, within a tree; `None` if rays go both ways along the axis of depth, or if
+    /// single precision cannot bound them.
     #[inline(always)]
     pub(crate) fn enclosing(s: S, packet: &Packet, shear: &ShearedPacket<S>, tree: &Bvh) -> Option<Self> {
         let axes @ [i, j, k] = shear.axes();
@@ -136,8 +137,8 @@ impl<S: Simd> Beam<S> {
     }
 }
 
-/// Height at depth 0 and slope of the line through two heights. If the depths are too close together, `outer` chooses
-/// one of the heights.
+/// The line through two heights: height at depth 0, positive and negative part of the slope. If the depths are too
+/// close together, the slope is 0 and `outer` chooses one of the heights.
 #[inline(always)]
 fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64) -> f64) -> [f32; 3] {
     let long = end - start;
@@ -147,9 +148,9 @@ fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64
 }
 
 impl Bvh {
-    /// Visits the leaves that the rays of a beam may meet within its limits, those of near nodes first, until more than
-    /// `budget` primitives were visited. `leaf` receives the primitives of a leaf and returns new limits if they
-    /// changed.
+    /// Visits the leaves that the rays of a beam may meet within their limits, those of near nodes first, and stops
+    /// before a leaf that exceeds the `budget` of primitives. `leaf` receives the primitives of a leaf and returns new
+    /// limits if they changed.
     #[inline(always)]
     pub(crate) fn traverse_beam<S: Simd>(
         &self,

@@ -166,7 +166,8 @@ impl MeshBvh {
         blocked
     }
 
-    /// The nearest triangle up to `limit`, or the one `found` before: distance, and position in the BVH.
+    /// The nearest triangle up to `limit`, or the one `found` before, whose distance is then `limit`: distance, and
+    /// position in the BVH.
     #[inline(always)]
     pub(crate) fn closest_hit(
         &self,
@@ -198,8 +199,8 @@ impl MeshBvh {
         best
     }
 
-    /// Packet version of [`closest_hit`](Self::closest_hit): the same bits for every ray, up to its limit. `shear` is that of
-    /// the rays, if they share one. Nearly parallel rays take one traversal together. Only lanes with a ray are
+    /// Packet version of [`closest_hit`](Self::closest_hit): the same bits for every ray, up to its limit. `shear` is
+    /// that of the rays, if they share one. Nearly parallel rays take one traversal together. Only lanes with a ray are
     /// written.
     #[inline(always)]
     pub(crate) fn closest_hits<S: Simd>(

@@ -14,8 +14,8 @@ pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit` \[m\], both included; `None` if the ray hits nothing there.
     fn intersect(&self, ray: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<Intersection>;
 
-    /// Packet version of `intersect`: the same bits for every ray, up to its limit. Overwrites `touches` in all lanes with
-    /// a ray.
+    /// Packet version of `intersect`: the same bits for every ray, up to its limit. All lanes of `touches` are `None`
+    /// before; lanes whose ray hits the shape are written.
     #[inline(always)]
     fn intersect_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut TraversalStack, touches: &mut Intersections)
     where

@@ -113,7 +113,7 @@ impl MortonOrder {
     }
 }
 
-/// Finds the starts of the groups of sorted keys.
+/// Appends the starts of the groups of sorted keys, the first of which is at `first`. Crowded keys are sorted again.
 fn find_groups<S: Simd>(s: S, items: &[BuildItem], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let place = |key: u64| (key >> 32) as u32;
     // The first cell cannot join a group before it.

@@ -9,8 +9,9 @@ const BINS: usize = 16;
 /// filling them.
 const MAX_CURVE_SPLIT: usize = 16;
 
-/// The best split of at least two groups within a box: the number of groups before it, once they are sorted by it, and
-/// the boxes of both sides; `None` if no plane separates the groups.
+/// Finds the best split of at least two groups within a box, and sorts the groups by it if it is a plane. Returns the
+/// number of groups before it and the boxes of both sides; `None` if there are more than [`MAX_CURVE_SPLIT`] groups and
+/// no plane separates them. `aside` is scratch memory.
 #[inline(always)]
 pub(super) fn best_split(
     within: &Bounds,
@@ -25,8 +26,8 @@ pub(super) fn best_split(
     }
 }
 
-/// The best position to split up to [`MAX_CURVE_SPLIT`] groups along the curve: the number of groups before it, and the boxes of
-/// both sides.
+/// The best position to split up to [`MAX_CURVE_SPLIT`] groups along the curve: the number of groups before it, and the
+/// boxes of both sides.
 fn best_curve_split(groups: &[BuildItem]) -> (usize, [Bounds; 2]) {
     let n = groups.len().min(MAX_CURVE_SPLIT);
     let mut rest = [EMPTY; MAX_CURVE_SPLIT];

@@ -68,7 +68,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Builds columns slightly narrower than the mean triangle; `None` if triangles are in too many columns.
+    /// Builds columns, slightly narrower than the mean triangle if their number allows it. `None` for small meshes, and
+    /// if triangles are in too many columns.
     pub(crate) fn new(triangles: &[Triangle], bounds: &[V3; 2], axes: [usize; 3]) -> Option<Self> {
         if triangles.len() < MIN_TRIANGLES {
             return None;
@@ -209,8 +210,8 @@ struct Pairs {
 }
 
 impl Columns {
-    /// Intersects a packet of steep rays. Returns false if their columns hold too many triangles, or if the rays begin
-    /// so far away that rounding could put them into triangles whose BVH boxes they miss.
+    /// Intersects a packet of steep rays. Returns false, without writing, if they pass too many columns or triangles,
+    /// or if they begin so far away that rounding could put them into triangles whose BVH boxes they miss.
     #[inline(always)]
     pub(crate) fn intersect_packet<S: Simd>(
         &self,
