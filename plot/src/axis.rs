@@ -42,22 +42,57 @@ impl Axis {
         self.pixel_range[0] + share * (self.pixel_range[1] - self.pixel_range[0])
     }
 
-    /// Ticks with their labels, at multiples of 1, 2 or 5 times a power of ten. A logarithmic axis has its ticks at
-    /// integer powers of ten.
+    /// Ticks within the range with their labels, at multiples of 1, 2 or 5 times a power of ten: about one per
+    /// `TICK_SPACING`, at least two. A logarithmic axis has its ticks at integer powers of ten, and a short one also at
+    /// 2 and 5 times those, or at the ticks of a linear axis.
     pub(super) fn ticks(&self) -> Vec<(f64, String)> {
+        if self.log { self.logarithmic_ticks() } else { self.linear_ticks() }
+    }
+
+    fn linear_ticks(&self) -> Vec<(f64, String)> {
+        let step = self.tick_step();
+        // The step is at most five times the wanted distance, and the range at least twice: a tenth is always enough.
+        let steps = [step, 0.5 * step, 0.2 * step, 0.1 * step];
+        let step = steps.into_iter().find(|step| self.multiples(*step).len() >= 2).unwrap_or(steps[3]);
+        self.multiples(step).into_iter().map(|tick| (tick, self.label(tick, step))).collect()
+    }
+
+    fn logarithmic_ticks(&self) -> Vec<(f64, String)> {
+        let powers = self.multiples(self.tick_step().max(1.0).round());
+        if powers.len() >= 2 {
+            return powers.into_iter().map(|power| (10.0_f64.powf(power), format!("1e{power}"))).collect();
+        }
+        let decades = self.low.floor() as i32..=self.high.floor() as i32;
+        let all = decades.flat_map(|power| [1, 2, 5].map(|digit| (digit, power)));
+        let ticks: Vec<(f64, String)> = all
+            .map(|(digit, power)| (f64::from(digit) * 10.0_f64.powi(power), format!("{digit}e{power}")))
+            .filter(|(tick, _)| (self.low..=self.high).contains(&tick.log10()))
+            .collect();
+        if ticks.len() >= 2 {
+            return ticks;
+        }
+        let [low, high] = [self.low, self.high].map(|power| 10.0_f64.powf(power));
+        Self { log: false, low, high, pixel_range: self.pixel_range }.linear_ticks()
+    }
+
+    /// Distance between two ticks, in the unit of the range: 1, 2 or 5 times a power of ten, and at least the distance of
+    /// `TICK_SPACING` pixels.
+    fn tick_step(&self) -> f64 {
         let wanted = ((self.pixel_range[1] - self.pixel_range[0]).abs() / TICK_SPACING).clamp(2.0, 20.0);
         let raw = (self.high - self.low) / wanted;
         let power = 10.0_f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 5.0].map(|k| k * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power);
-        let step = if self.log { step.max(1.0).round() } else { step };
+        [1.0, 2.0, 5.0].map(|k| k * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power)
+    }
+
+    /// Multiples of a step in the range, at most 101.
+    fn multiples(&self, step: f64) -> Vec<f64> {
         let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
-        // Bounds the number of ticks in case of rounding errors.
-        let count = (last - first).clamp(0.0, 100.0) as u32;
-        let ticks = (0..=count).map(|k| (first + f64::from(k)) * step).filter(|tick| tick.is_finite());
-        if self.log {
-            return ticks.map(|power| (10.0_f64.powf(power), format!("1e{power}"))).collect();
+        if first > last {
+            return Vec::new();
         }
-        ticks.map(|tick| (tick, self.label(tick, step))).collect()
+        // Bounds the number of ticks in case of rounding errors.
+        let count = (last - first).min(100.0) as u32;
+        (0..=count).map(|k| (first + f64::from(k)) * step).filter(|tick| tick.is_finite()).collect()
     }
 
     /// Formats a tick with as many digits as neighboring ticks need to differ.
@@ -98,6 +133,26 @@ mod tests {
             assert!((2..=12).contains(&labels.len()), "{values:?}: {labels:?}");
             assert!(labels.windows(2).all(|pair| pair[0] != pair[1]), "{values:?}: {labels:?}");
             assert!(labels.iter().all(|label| label.parse::<f64>().is_ok_and(f64::is_finite)), "{labels:?}");
+        }
+    }
+
+    /// Short axes: the only tick of an axis was drawn outside of it.
+    #[test]
+    fn ticks_of_short_axes() {
+        for (values, log, expected) in [
+            ([0.6, 4.5], false, "2 4"),
+            ([2.0, 5.0], true, "2e0 5e0"),
+            ([3.0, 40.0], true, "5e0 1e1 2e1"),
+            ([2.1, 4.9], true, "3 4"),
+        ] {
+            let axis = Axis::new(values.into_iter(), log, [108.0, 0.0]);
+            let ticks = axis.ticks();
+            let labels: Vec<&str> = ticks.iter().map(|(_, label)| &label[..]).collect();
+            assert_eq!(labels.join(" "), expected, "{values:?}");
+            assert!(
+                ticks.iter().all(|(tick, _)| (0.0..=108.0).contains(&axis.pixel_of(*tick))),
+                "{values:?}: {ticks:?}"
+            );
         }
     }
 

@@ -39,10 +39,10 @@ impl Tolerance {
         self.absolute.max(self.relative * expected.abs())
     }
 
-    /// True if `found` is within the limit of `expected`. This holds for equal values, infinities included, but not for
-    /// NaN.
+    /// True if `found` is within the limit of `expected`. Only the same infinity is within the limit of an infinity, and
+    /// nothing is within the limit of NaN.
     pub fn holds(&self, found: f64, expected: f64) -> bool {
-        found == expected || (found - expected).abs() <= self.limit(expected)
+        found == expected || (expected.is_finite() && (found - expected).abs() <= self.limit(expected))
     }
 }
 
@@ -76,7 +76,7 @@ pub fn assert_close(
     }
 }
 
-/// Asserts closeness as [`assert_close`] does, with the limit of the largest expected element for every element.
+/// Asserts closeness as [`assert_close`] does, with the limit of the largest finite expected element for every element.
 #[track_caller]
 pub fn assert_vector(
     what: &str,
@@ -85,7 +85,9 @@ pub fn assert_vector(
     tolerance: Tolerance,
 ) {
     let expected: Vec<f64> = expected.into_iter().map(|x| *x.borrow()).collect();
-    let largest = expected.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    // An infinite element must not loosen the limit of the others.
+    let finite = expected.iter().filter(|x| x.is_finite());
+    let largest = finite.fold(0.0, |largest: f64, x| largest.max(x.abs()));
     let limit = Tolerance::absolute(tolerance.limit(largest), tolerance.derivation);
     assert_close(what, found, &expected, limit);
 }
@@ -94,4 +96,24 @@ pub fn assert_vector(
 #[track_caller]
 pub fn assert_number(what: &str, found: f64, expected: f64, tolerance: Tolerance) {
     assert_close(what, [&found], [&expected], tolerance);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An infinite expected value made its relative limit infinite, and accepted every number.
+    #[test]
+    fn infinities() {
+        let limit = Tolerance::relative(1e-9, "none");
+        assert!(limit.holds(f64::INFINITY, f64::INFINITY) && limit.holds(1.0 + 1e-10, 1.0));
+        for (found, expected) in
+            [(0.0, f64::INFINITY), (f64::NEG_INFINITY, f64::INFINITY), (f64::INFINITY, 1.0), (f64::NAN, 1.0)]
+        {
+            assert!(!limit.holds(found, expected), "{found} {expected}");
+        }
+        let loose =
+            std::panic::catch_unwind(|| assert_vector("rows", [f64::INFINITY, 2.0], [f64::INFINITY, 1.0], limit));
+        assert!(loose.is_err());
+    }
 }

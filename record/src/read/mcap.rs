@@ -2,7 +2,7 @@
 
 use super::{FieldSelector, RecordedTopic, TimeSeries};
 use crate::error::{RecordError, Result};
-use crate::ros::{MessageType, PathSegment, SCENE_UPDATE};
+use crate::ros::{MessageType, PathSegment, SCENE_UPDATE, Value};
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError};
@@ -99,8 +99,8 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         count: u64,
         fields: Vec<String>,
         known: BTreeSet<String>,
-        /// True if later messages may have new fields.
-        scan_fields: bool,
+        /// The last message, if it was readable.
+        last: Option<Value>,
         /// Number of unreadable messages, and number of the first, counted from 1.
         unread: u64,
         first_unread: u64,
@@ -109,10 +109,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     visit_items(path, |told| {
         let McapItem::Message { channel, data, .. } = told else { return Ok(()) };
         if !all.contains_key(&channel.topic) {
-            all.insert(
-                channel.topic.clone(),
-                TopicScan { kind: channel.type_name.clone(), scan_fields: true, ..TopicScan::default() },
-            );
+            all.insert(channel.topic.clone(), TopicScan { kind: channel.type_name.clone(), ..TopicScan::default() });
         }
         let Some(found) = all.get_mut(&channel.topic) else { return Ok(()) };
         found.count += 1;
@@ -125,14 +122,13 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
             found.unread += 1;
             return Ok(());
         };
-        if !found.scan_fields {
-            return Ok(());
+        if !found.last.as_ref().is_some_and(|last| value.has_fields_of(last)) {
+            let mut fields = Vec::new();
+            value.fields("", &mut fields);
+            let known = &mut found.known;
+            found.fields.extend(fields.into_iter().filter(|field| known.insert(field.clone())));
         }
-        found.scan_fields = value.has_variable_fields();
-        let mut fields = Vec::new();
-        value.fields("", &mut fields);
-        let known = &mut found.known;
-        found.fields.extend(fields.into_iter().filter(|field| known.insert(field.clone())));
+        found.last = Some(value);
         Ok(())
     })?;
     let mut warnings = Vec::new();

@@ -218,3 +218,32 @@ fn unreadable_messages() {
     let without = |all: &[f64]| all.iter().enumerate().filter(|(k, _)| ![1, 3].contains(k)).map(|(_, x)| *x).collect();
     assert_eq!(*lacking, TimeSeries { times: without(&whole.times), values: without(&whole.values) });
 }
+
+/// Root cause: fields of later messages were collected only for lists of structures. Joints of a second publisher on a
+/// topic were unknown.
+#[test]
+fn two_publishers() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, other) = (folder.path().join("run.mcap"), folder.path().join("other.mcap"));
+    recorded(&path, None);
+    // The joint states of two articulations, on one topic.
+    let bytes = std::fs::read(&path).unwrap();
+    let mut writer = ::mcap::Writer::new(std::fs::File::create(&other).unwrap()).unwrap();
+    let mut names = std::collections::BTreeSet::new();
+    for message in ::mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.topic.ends_with("/joint_states") {
+            names.insert(message.channel.topic.clone());
+            let channel = ::mcap::Channel { id: 97, topic: "/joint_states".into(), ..(*message.channel).clone() };
+            writer.write(&::mcap::Message { channel: channel.into(), ..message }).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let fields = |path: &Path, topic: &str| Recording::open(path).unwrap().topic(topic, None).unwrap().fields.clone();
+    let mut expected: Vec<String> = names.iter().flat_map(|topic| fields(&path, topic)).collect();
+    let mut found = fields(&other, "/joint_states");
+    (expected.sort(), found.sort());
+    expected.dedup();
+    assert!(names.len() > 1, "{names:?}");
+    assert_eq!(found, expected);
+}

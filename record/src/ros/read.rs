@@ -305,11 +305,30 @@ impl Value {
         }
     }
 
-    /// True if the message has a list of structures, which may have other elements in other messages. Lists of numbers
-    /// count as constant.
-    pub(crate) fn has_variable_fields(&self) -> bool {
-        let Self::Struct(fields) = self else { return false };
-        fields.iter().any(|(_, value)| matches!(value, Self::List(_)) || value.has_variable_fields())
+    /// True if [`fields`](Self::fields) of both messages, of one type, are equal: lengths of arrays and names of elements.
+    pub(crate) fn has_fields_of(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Struct(fields), Self::Struct(others)) => {
+                fields.len() == others.len()
+                    && fields.iter().zip(others).all(|((name, value), (other_name, other_value))| {
+                        name == other_name
+                            && match (value, other_value) {
+                                (Self::Numbers(a), Self::Numbers(b)) => {
+                                    a.len() == b.len() && self.sibling_names(a.len()) == other.sibling_names(b.len())
+                                }
+                                _ => value.has_fields_of(other_value),
+                            }
+                    })
+            }
+            (Self::List(values), Self::List(others)) => {
+                values.len() == others.len()
+                    && values
+                        .iter()
+                        .zip(others)
+                        .all(|(a, b)| a.element_name() == b.element_name() && a.has_fields_of(b))
+            }
+            _ => std::mem::discriminant(self) == std::mem::discriminant(other),
+        }
     }
 
     /// The number at a path of [`fields`](Self::fields); `None` if this message does not contain it.
@@ -407,6 +426,11 @@ mod tests {
         let expected = "header.stamp.sec header.stamp.nanosec position[J1] position[J.2] velocity[J1] velocity[J.2] \
                         effort[J1] effort[J.2]";
         assert_eq!(fields.join(" "), expected);
+        let of =
+            |names: &[String], state: &[f64]| read(Schema::JointState, |cdr| joint_state(cdr, STAMP, names, state));
+        let other_names = ["J1".to_string(), "J3".to_string()];
+        assert!(joints.has_fields_of(&of(&names, &[0.0; 6])) && !joints.has_fields_of(&of(&names[..1], &[0.0; 3])));
+        assert!(!joints.has_fields_of(&of(&other_names, &[0.0; 6])));
         let values = fields.iter().map(|field| number(&joints, field).unwrap()).collect::<Vec<_>>();
         assert_eq!(values, [1.0, 500_000_000.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let unknown = "position[J3] position position[0] header header.stamp x.y[ header.stamp.sec.x";
@@ -420,7 +444,9 @@ mod tests {
         let frames = ["a".to_string(), "b/c".to_string()];
         let poses: Vec<f64> = (0..14).map(f64::from).collect();
         let value = read(Schema::TfMessage, |cdr| transforms(cdr, STAMP, "env_0/", &frames, &poses));
-        assert!(value.has_variable_fields());
+        let renamed = ["a".to_string(), "c".to_string()];
+        let other = read(Schema::TfMessage, |cdr| transforms(cdr, STAMP, "env_0/", &renamed, &poses));
+        assert!(value.has_fields_of(&value.clone()) && !value.has_fields_of(&other));
         assert_eq!(number(&value, "transforms[env_0/b/c].transform.translation.y"), Some(8.0));
         // ROS has w last.
         assert_eq!(number(&value, "transforms[env_0/a].transform.rotation.w"), Some(3.0));

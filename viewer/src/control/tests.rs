@@ -491,9 +491,22 @@ fn recording_ends_with_viewer() {
     drop(viewer);
     sim.update(200);
     assert_eq!(counted(), (true, 2, 1));
+    // So does the one that it starts after it stopped a viewer's recording: the viewer stayed its owner.
+    counter.lock().unwrap().set(&mut sim, false).unwrap();
+    let viewer = sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
+    viewer.send(Command::Record(true));
+    step_until(&mut sim, |_| counted() == (true, 3, 2));
+    counter.lock().unwrap().set(&mut sim, false).unwrap();
+    step_until(&mut sim, |_| run(&viewer).recording.is_some_and(|recording| !recording.on));
+    counter.lock().unwrap().set(&mut sim, true).unwrap();
+    viewer.send(Command::Record(false));
+    step_until(&mut sim, |_| run(&viewer).last_refusal.is_some_and(|reason| reason.contains("only the program")));
+    drop(viewer);
+    sim.update(200);
+    assert_eq!(counted(), (true, 4, 3));
     // Setting the same button again changes nothing; another button stops the recording of the first.
     sim.set_record_button(button);
-    assert_eq!(counted(), (true, 2, 1));
+    assert_eq!(counted(), (true, 4, 3));
     sim.set_record_button(RecordButton::new(Counter::default()));
-    assert_eq!(counted(), (false, 2, 2));
+    assert_eq!(counted(), (false, 4, 4));
 }

@@ -111,6 +111,9 @@ impl ViewController {
     fn record(&mut self, sim: &mut SimulationManager, viewer: u64, on: bool) -> Result<(), String> {
         let button = self.button.as_ref().ok_or("cannot record: the program has not set a record button")?;
         let was = button.state(sim).is_some_and(|state| state.on);
+        if !was {
+            self.recorded_by = None;
+        }
         if was && !on && self.recorded_by.is_none() {
             return Err("the program started this recording; only the program can stop it".into());
         }
@@ -136,6 +139,10 @@ impl ViewController {
     pub(super) fn publish(&mut self, sim: &mut SimulationManager) {
         if let Some(button) = &self.button {
             self.recording = button.state(sim).or(self.recording.take());
+            if self.recording.as_ref().is_some_and(|state| !state.on) {
+                // The program stopped the viewer's recording; the next one may be its own.
+                self.recorded_by = None;
+            }
         }
         let run = RunState {
             steps: sim.observers().steps(),

@@ -52,10 +52,14 @@ fn format_number(x: f64) -> String {
     format!("{digits}{point}e{sign}{exponent}")
 }
 
+/// Words that YAML 1.1 reads as booleans or null, in any case.
+const YAML_WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
+
 /// Formats a string, quoted unless it is a plain word.
 fn quoted_scalar(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
-    if text.chars().all(plain) && text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+    let is_word = text.chars().all(plain) && text.starts_with(|c: char| c.is_ascii_alphabetic());
+    if is_word && !YAML_WORDS.iter().any(|word| text.eq_ignore_ascii_case(word)) {
         return text.into();
     }
     let mut out = String::from("\"");

@@ -143,6 +143,12 @@ fn round_trip() {
     let text = info.to_yaml();
     assert!(text.contains("1.0e-7, -2.5e-300, 1.0e+16"), "{text}");
     assert_eq!(CameraInfo::parse(&text, "again").unwrap(), info);
+    // YAML 1.1 reads these words as a boolean and as null.
+    for word in ["true", "Yes", "NULL", "n"] {
+        let named = CameraInfo { name: word.into(), ..info.clone() };
+        assert!(named.to_yaml().contains(&format!("camera_name: \"{word}\"\n")), "{}", named.to_yaml());
+        assert_eq!(CameraInfo::parse(&named.to_yaml(), "again").unwrap(), named);
+    }
     let pixels = PixelIntrinsics { fx: 300.25, fy: 301.0, cx: 320.0, cy: 240.0 };
     let twelve: Vec<f64> = (1..13).map(|k| 0.001 * f64::from(k)).collect();
     for (lens, model, count) in [
