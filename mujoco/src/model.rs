@@ -278,8 +278,9 @@ impl Model {
         Buffers { contacts: m.nconmax.max(0) as usize, constraints: m.njmax.max(0) as usize, arena_bytes }
     }
 
-    /// Small initial buffer sizes: room for all permanent constraints (equalities, drives, friction, limits) and 16
-    /// contacts.
+    /// Small initial buffer sizes: room for the permanent constraints (at most six rows per equality; drives, friction,
+    /// limits) and for 16 contacts of four rows (pyramidal cones, `condim` 3). A model that needs more overflows
+    /// ([`WarningCounts::overflow`](crate::WarningCounts::overflow)): see [`Buffers::enlarged`].
     pub fn small_buffers(&self) -> Buffers {
         const CONTACTS: usize = 16;
         /// Rows of a contact with a pyramidal cone of dimension 3.

@@ -146,7 +146,7 @@ fn same_bits(one: &[f64], other: &[f64]) -> bool {
 }
 
 impl IntegrationState {
-    /// Empty state, which restores nothing.
+    /// State without values; [`restore`](Self::restore) does nothing with it.
     pub const EMPTY: Self = Self { values: Vec::new() };
 
     /// Copies the state of `data`, reusing memory.
@@ -284,8 +284,8 @@ impl SolvedState {
         self.save_arrays(data);
     }
 
-    /// Copies the results into `data`, whose model must have the same sizes; other sizes panic, and a state that was
-    /// never saved changes nothing. Its buffers may be larger.
+    /// Copies the results into `data`, whose model must have the same sizes; its buffers may be larger. Does nothing if
+    /// no results were saved. Too few numbers panic; too many are detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         if !self.values.is_empty() {
             self.restore_arrays(data, &self.values);

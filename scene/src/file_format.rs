@@ -6,7 +6,7 @@
 //! | rotation | `[w, x, y, z]`, or `{ rpy_deg = [r, p, y] }` |
 //! | vector | `[x, y, z]` |
 //! | list of pairs | a table that keeps its order |
-//! | optional value with a default | the value, or `false` |
+//! | optional value with a default | the value; `false` for `None` |
 
 use nalgebra::UnitQuaternion;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};

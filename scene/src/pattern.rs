@@ -1,8 +1,8 @@
 //! Name patterns: regular expressions that must match a whole name.
 //!
 //! The dialect is that of the `regex` crate. Matching is case-sensitive and against the full name, as in Python's
-//! `re.fullmatch`. A pattern without a match is an error, and so is a name that is matched twice: a typing error in a
-//! script must never silently drive fewer joints than the user meant.
+//! `re.fullmatch`. A pattern without a match is an error, and so is a name that is matched twice. A typing error in a
+//! script thus never drives fewer joints without an error.
 
 use regex::Regex;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ pub struct UnknownName {
     pub what: &'static str,
     /// The given name.
     pub name: String,
-    /// Known names, the most similar first.
+    /// Known names, the most similar first; at most [`MAX_CANDIDATES`].
     pub candidates: Vec<String>,
 }
 

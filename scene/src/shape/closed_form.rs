@@ -14,7 +14,7 @@ pub struct Intersection {
     pub normal: V3,
 }
 
-/// A part of a shape, in the frame of the shape. The shape is the convex hull of its parts.
+/// A part of a shape, in the frame of the shape. The convex hull of all parts is the convex hull of the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HullPart {
     /// A point \[m\].
