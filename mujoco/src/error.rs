@@ -44,8 +44,8 @@ impl CompileError {
         }
     }
 
-    /// Returns the error with the position in `file` of the name that MuJoCo does not support, unless MuJoCo itself
-    /// names a line of `file`.
+    /// Returns the error with the position of the name that MuJoCo does not support, in `file` or a file that it
+    /// includes. If MuJoCo names a line and `file` includes nothing, the error stays unchanged.
     pub(crate) fn with_location_in(self, file: &std::path::Path) -> Self {
         // MuJoCo does not say whether a line belongs to the file itself or to an included file.
         if self.line.is_some() && !includes(file) {

@@ -74,7 +74,7 @@ pub(super) struct ShallowModel {
     own: Arc<[OwnArray]>,
 }
 
-/// An array of one model alone. Nothing writes to it once the model is made.
+/// An array that a model does not share with its compiled model. Nothing writes to it once the model is made.
 #[derive(Clone)]
 pub(super) struct OwnArray {
     pub(super) field: ModelArray,
@@ -158,8 +158,8 @@ impl Model {
         &self.0.header
     }
 
-    /// True if one is a clone of the other. Results of [`with_buffers`](Self::with_buffers) and of other methods are
-    /// different models, even with equal content.
+    /// True if one is a clone of the other. Results of [`with_buffers`](Self::with_buffers) are different models, even
+    /// with equal content.
     pub fn ptr_eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -422,7 +422,7 @@ impl Model {
         None
     }
 
-    /// True if actuators or sensors have a delay or an interval (4.x).
+    /// True if actuators or sensors keep a history of values (`nsample`, for delays and intervals; 4.x).
     pub fn has_history(&self) -> bool {
         #[cfg(mj4)]
         return self.header().nhistory > 0;

@@ -190,8 +190,8 @@ impl IntegrationState {
         Self { values }
     }
 
-    /// Copies the state into `data`, whose model must have the same sizes; other sizes panic. Its buffers may be
-    /// larger. Derived quantities are not updated.
+    /// Copies the state into `data`, whose model must have the same sizes; its buffers may be larger. Too few numbers
+    /// panic; too many are detected by debug builds only. Derived quantities are not updated.
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
             data.set_time(time);
@@ -222,7 +222,8 @@ impl JointInputs {
         self.save_arrays(data);
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Too few numbers panic; too many are
+    /// detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
     }
@@ -264,7 +265,8 @@ impl BodyInputs {
         }
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Too few numbers panic; too many are
+    /// detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
@@ -386,8 +388,8 @@ impl UserInputs {
         self.equals_arrays(data)
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Its buffers may be larger. Inputs of other
-    /// sizes, or inputs that were never saved, panic.
+    /// Copies the inputs into `data`, whose model must have the same sizes; its buffers may be larger. Too few numbers,
+    /// such as of inputs that were never saved, panic; too many are detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]

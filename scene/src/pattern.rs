@@ -228,8 +228,8 @@ pub fn closest_names<'c>(name: &str, candidates: impl IntoIterator<Item = &'c st
     ranked.into_iter().map(|(_, c)| c).collect()
 }
 
-/// The candidate that `name` may be a misspelling of: at most a third of its characters, and at most three, differ.
-/// `None` without such a candidate.
+/// The candidate that `name` may be a misspelling of: apart from case, at most a third of its characters, and at most
+/// three, differ. `None` without such a candidate.
 pub fn similar_name<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     let nearest = candidates.into_iter().map(|c| (edit_distance(name, c), c)).min_by_key(|&(distance, _)| distance);
     let most = 2 * (name.chars().count() / 3).min(3) + 1;
@@ -243,7 +243,8 @@ fn edit_distance(a: &str, b: &str) -> usize {
     2 * strsim::levenshtein(&lower(a), &lower(b)) + usize::from(a != b)
 }
 
-/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if `total` is larger than the list.
+/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if `total` is larger than the list. A `total` of 0
+/// gives `no names are defined`.
 pub fn format_candidates(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {

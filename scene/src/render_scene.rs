@@ -232,7 +232,8 @@ impl RenderScene {
         }
     }
 
-    /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance.
+    /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance. Sizes are not
+    /// checked.
     ///
     /// # Panics
     ///

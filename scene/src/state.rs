@@ -1,8 +1,8 @@
 //! `SceneState`: the state of all environments that sensors measure, as plain arrays.
 //!
-//! The simulation fills the state after every physics step, and sensors read it. The first axis is the environment.
-//! Arrays are in C order, in the environment frame with world axes, and in SI units. They are f64, except for the poses
-//! of [`VisibleState`]. Only requested quantities are present.
+//! The simulation fills the state when a sensor is due, and sensors read it. The first axis is the environment. Arrays
+//! are in C order, in the environment frame with world axes, and in SI units. They are f64, except for those of
+//! [`VisibleState`], which are f32. Only requested quantities are present.
 //!
 //! A step from t_k to t_(k+1) involves two times: contacts, efforts and accelerations are solved for t_k, positions and
 //! velocities are those of t_(k+1). The state has both times.
@@ -150,8 +150,8 @@ impl StateDims {
 
 /// Render scene of one environment; `None` if the environment uses the shared scene.
 ///
-/// An own scene has the instances of the shared scene, in the same order and of the same kinds, with its own sizes or
-/// colors. Two values are equal if they are the same object in memory.
+/// An own scene has the instances of the shared scene, in the same order and of the same kinds, with its own sizes,
+/// colors or deformed shapes. Two values are equal if they are the same object in memory.
 #[derive(Clone, Debug, Default)]
 pub struct EnvScene(pub Option<Arc<RenderScene>>);
 

@@ -218,7 +218,7 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// Reads exactly `N` finite numbers.
+    /// Reads exactly `N` finite numbers; `None` without the attribute.
     pub(super) fn numbers<const N: usize>(
         &self,
         node: Node<'_, '_>,

@@ -118,7 +118,8 @@ fn parameter<'a, 'i>(effect: Node<'a, 'i>, sid: &str) -> Option<Node<'a, 'i>> {
     effect.descendants().find(|n| n.tag_name().name() == "newparam" && n.attribute("sid") == Some(sid))
 }
 
-/// Element with the base color: `<diffuse>` of the shading model, or `<emission>` of a constant one; `None` without it.
+/// Element with the base color: `<diffuse>` of the shading model, or its `<emission>` without a `<diffuse>`; `None`
+/// without both.
 fn diffuse<'a, 'i>(effect: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
     let profile = child(effect, "profile_COMMON")?;
     let technique = child(profile, "technique")?;
