@@ -6,7 +6,8 @@ use mujoco_sys::fields::model::{ModelArray, each};
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-/// Owner of a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`). The model is freed with the last [`Model`].
+/// Owner of a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`). The model is freed with its last owner: a
+/// [`Model`] or an editor.
 #[derive(Debug)]
 pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 

@@ -88,9 +88,9 @@ impl CameraFit {
 /// A drawn instance: the instance, its pose and its offset.
 type DrawnInstance<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
 
-/// Instances that must fit in the image: visible ones of geom groups 0 to 2, without planes, without movable instances
-/// beyond `reach`, and without static instances whose bounding box is more than twice as large as that of the bodies
-/// (if there are bodies).
+/// Instances that must fit in the image: visible ones of geom groups 0 to 2. Planes and movable instances beyond
+/// `reach` are left out. If there are bodies, static instances with a bounding box more than twice as large as that of
+/// the bodies are left out, too.
 fn drawn_instances<'a>(placed: &[PosedScene<'a>]) -> Vec<DrawnInstance<'a>> {
     let each = |placed: &PosedScene<'a>| {
         let PosedScene { scene, poses, origin, reach } = *placed;

@@ -113,7 +113,7 @@ pub struct RenderScene {
     linear_colors: Vec<[f32; 3]>,
     texture_scales: Vec<[f32; 3]>,
     texture_offsets: Vec<[f32; 2]>,
-    /// Lights of the scene, used if the renderer is given no others.
+    /// Lights of the scene, used if the renderer is given no others. Renderers use the first 16 active lights.
     pub lights: Vec<Light>,
     /// Headlight of every camera.
     pub headlight: Headlight,

@@ -235,9 +235,9 @@ impl SceneState {
     /// Copies the environments where `chosen` is true from `other`: steps, times, and the fields that this state has.
     ///
     /// Returns `false` and changes nothing if `chosen` does not have one element per environment, or if `other` is not
-    /// of the same scene: it lacks a field of this state, or has other sizes. Allocates only if the capacity of the
-    /// contact list does not suffice for old and new contacts together: the new list is built behind the old one, and
-    /// the capacity is kept.
+    /// of the same scene: it lacks a field of this state, or has other sizes. Allocates for own scenes and for longer
+    /// lists of markers. Also allocates if the capacity of the contact list does not suffice for old and new contacts
+    /// together: the new list is built behind the old one, and the capacity is kept.
     #[must_use]
     pub fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) -> bool {
         if !(chosen.len() == self.num_envs() && self.same_shape(other)) {

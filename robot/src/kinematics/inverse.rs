@@ -53,8 +53,8 @@ impl IkSolver {
     /// upper) \[rad or m\]. Limits may be infinite. [`Chain::reduced`] fixes variables that must not move.
     ///
     /// # Errors
-    /// The chain has no variable or one that does not move its frame, the length of `limits` differs from the number of
-    /// variables, a lower limit exceeds the upper one, or `cfg` is invalid.
+    /// The chain has no variable, or one that does not move its frame. The length of `limits` differs from the number
+    /// of variables, a lower limit exceeds the upper one, or `cfg` is invalid.
     pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
         let joints = limits.len();
         if chain.variables() > joints {
