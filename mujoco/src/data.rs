@@ -107,8 +107,8 @@ impl WarningCounts {
         [Warning::BadAcceleration, Warning::BadPosition, Warning::BadVelocity].into_iter().find(|&w| self.get(w) > 0)
     }
 
-    /// Returns the buffer that overflowed, if any: contacts before constraints. An overflow of the stack is an
-    /// [`EngineError`] instead.
+    /// Returns the buffer that overflowed, contacts before constraints; `None` without an overflow. An overflow of the
+    /// stack is an [`EngineError`] instead.
     pub fn overflow(&self) -> Option<Overflow> {
         if self.get(Warning::ContactFull) > 0 {
             Some(Overflow::Contacts)

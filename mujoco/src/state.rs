@@ -17,7 +17,8 @@ pub struct IntegrationState {
 /// change their last bits. On 4.x positions do not change, so no quaternion is stored.
 #[derive(Clone, Debug, Default)]
 pub struct UnnormalizedQuats {
-    /// First quaternion, stored without heap memory: a robot has at most one in the common case.
+    /// First quaternion, `None` if there is nothing to store. It needs no heap memory: a robot has at most one in the
+    /// common case.
     first: Option<UnnormalizedQuat>,
     others: Box<[UnnormalizedQuat]>,
 }

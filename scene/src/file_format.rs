@@ -255,7 +255,7 @@ pub mod or_false {
         }
     }
 
-    /// Reads a table, a number or `false`.
+    /// Reads a table or a number, or `false` as `None`.
     ///
     /// # Errors
     /// Errors of the deserializer: the value has another form (`true`, a list, a text), or is invalid.

@@ -331,7 +331,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Triangles of the shape, if it is a mesh or a height field.
+    /// Triangles of a mesh or height field; `None` for other shapes.
     #[inline]
     pub fn mesh(&self) -> Option<&crate::shape::RenderMesh> {
         self.shape.mesh().map(Arc::as_ref)

@@ -355,7 +355,7 @@ fn read_mesh(
     Ok(())
 }
 
-/// Reads the scale of a mesh. In lenient reading, a single number applies to all axes.
+/// Reads the scale of a mesh; `None` without the attribute. In lenient reading, a single number applies to all axes.
 fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64; 3]>, UrdfError> {
     let error = match reader.numbers::<3>(mesh, "scale") {
         Ok(scale) => return Ok(scale),

@@ -34,7 +34,8 @@ impl<'a, 'i> Binding<'a, 'i> {
 }
 
 impl<'a, 'i> Dae<'a, 'i> {
-    /// Material of a primitive, and the texture coordinate set of its diffuse texture, if the file names one.
+    /// Material of a primitive, `None` if the file does not define one, and the texture coordinate set of its diffuse
+    /// texture, if the file names one.
     pub(super) fn material_of(
         &mut self,
         primitive: Node<'a, 'i>,

@@ -47,7 +47,7 @@ pub trait ClosedForm {
     /// Calls `add` for each part. The shape is the convex hull of its parts.
     fn hull(&self, add: &mut dyn FnMut(HullPart));
 
-    /// Returns the nearest intersection at a distance from 0 to `limit` \[m\], both included.
+    /// Returns the nearest intersection at a distance from 0 to `limit` \[m\], both included; `None` without one.
     ///
     /// A ray that begins inside of a solid intersects it at its exit. A plane is intersected from +z only.
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection>;
