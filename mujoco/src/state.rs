@@ -191,8 +191,9 @@ impl IntegrationState {
         Self { values }
     }
 
-    /// Copies the state into `data`, whose model must have the same sizes; its buffers may be larger. Too few numbers
-    /// panic; too many are detected by debug builds only. Derived quantities are not updated.
+    /// Copies the state into `data`, whose model must have the same sizes; its buffers may be larger. Does nothing with
+    /// an empty state. Too few numbers panic; too many are detected by debug builds only. Derived quantities are not
+    /// updated.
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
             data.set_time(time);

@@ -119,7 +119,7 @@ fn is_within_reach(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
 }
 
-/// Largest coordinate of the instances along a direction.
+/// Largest coordinate of the instances along a direction, times the length of the direction \[m\].
 fn support(framed: &[DrawnInstance<'_>], direction: [f64; 3]) -> f64 {
     let of = |(instance, pose, origin): &DrawnInstance<'_>| {
         let rotation = pose.rotation.map(|row| row.map(f64::from));
