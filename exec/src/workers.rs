@@ -30,7 +30,7 @@ struct Shared {
     job: Mutex<JobState>,
     wake: Condvar,
     done: Condvar,
-    /// Number of jobs so far; polled by idle workers, written under the lock of `job`.
+    /// Number of jobs so far; polled by idle workers, written under the lock of `job`, except at the end of the pool.
     epoch: AtomicU64,
     /// Workers that run the work now; polled by the caller, written under the lock of `job`.
     active: AtomicUsize,

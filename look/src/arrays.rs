@@ -53,8 +53,9 @@ pub struct TextureArrays<'a> {
     pub height: usize,
     /// Bytes per pixel.
     pub channels: usize,
-    /// True if the file of the image says that it is sRGB (3.3.3 and later). MuJoCo's renderer converts such an image to
-    /// linear light, and uses all others as they are.
+    /// True if the color space of the compiled texture is sRGB (`tex_colorspace`, MuJoCo 3.3.3 and later): by the
+    /// attribute `colorspace` of `<texture>`, or with `auto` by the image file. MuJoCo's renderer converts such an
+    /// image to linear light. It uses all others as they are.
     pub is_srgb: bool,
     /// Pixels, row by row from the top left.
     pub pixels: &'a [u8],
@@ -69,8 +70,8 @@ pub struct MaterialValues {
     pub texture: Option<usize>,
     /// Number of repetitions of the texture along its two axes.
     pub tex_repeat: [f32; 2],
-    /// MuJoCo's `texuniform`: true if [`tex_repeat`](Self::tex_repeat) counts repetitions per length (2 m in MuJoCo's
-    /// renderer), false for repetitions over the whole shape.
+    /// MuJoCo's `texuniform`: true if [`tex_repeat`](Self::tex_repeat) counts repetitions per 2 m, as in MuJoCo's
+    /// renderer; false if it counts repetitions per shape.
     pub tex_uniform: bool,
     /// Emitted light, as a factor of the color.
     pub emission: f32,

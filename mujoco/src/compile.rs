@@ -47,7 +47,7 @@ impl Vfs {
         Self(raw)
     }
 
-    /// Returns false if MuJoCo rejects the file (name used twice, table full).
+    /// Returns false if the file cannot be added (name used twice or with a NUL, table full, 2 GiB or more).
     fn add(&mut self, asset: &Asset) -> bool {
         let (Ok(name), Ok(size)) = (CString::new(asset.name.as_str()), i32::try_from(asset.bytes.len())) else {
             return false;

@@ -107,8 +107,8 @@ impl WarningCounts {
         [Warning::BadAcceleration, Warning::BadPosition, Warning::BadVelocity].into_iter().find(|&w| self.get(w) > 0)
     }
 
-    /// Returns the buffer that overflowed, if any: contacts before constraints. An overflow of the stack is an
-    /// [`EngineError`] instead.
+    /// Returns the buffer that overflowed, contacts before constraints; `None` without an overflow. An overflow of the
+    /// stack is an [`EngineError`] instead.
     pub fn overflow(&self) -> Option<Overflow> {
         if self.get(Warning::ContactFull) > 0 {
             Some(Overflow::Contacts)
@@ -326,7 +326,7 @@ impl Data {
 
     /// Force \[N\] and torque \[N m\] of contact `index` on its second geom (`geom2`), from the last solve, in the
     /// contact frame: along the normal (from `geom1` to `geom2`) and two tangents, then about these three axes at the
-    /// contact point. A positive normal force pushes the geoms apart.
+    /// contact point. A positive normal force pushes the geoms apart. A contact without constraint rows has no force.
     ///
     /// # Panics
     /// `index` is not smaller than the number of contacts.

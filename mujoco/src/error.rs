@@ -27,7 +27,7 @@ pub struct CompileError {
     pub message: String,
     /// Line of the MJCF that MuJoCo's message names, from 1; `None` if the message names no line.
     pub line: Option<u32>,
-    /// Location of the rejected element in the user's file, if known.
+    /// Location of the rejected element in the user's file; `None` if unknown.
     pub source_location: Option<SourceLocation>,
 }
 
@@ -44,8 +44,8 @@ impl CompileError {
         }
     }
 
-    /// Returns the error with the position in `file` of the name that MuJoCo does not support, unless MuJoCo itself
-    /// names a line of `file`.
+    /// Returns the error with the position of the name that MuJoCo does not support, in `file` or a file that it
+    /// includes. If MuJoCo names a line and `file` includes nothing, the error stays unchanged.
     pub(crate) fn with_location_in(self, file: &std::path::Path) -> Self {
         // MuJoCo does not say whether a line belongs to the file itself or to an included file.
         if self.line.is_some() && !includes(file) {
@@ -88,8 +88,8 @@ fn newer_version_hint(message: &str) -> String {
     }
 }
 
-/// Line number in a message. MuJoCo writes `line 12` or `line = 12` (2.2.2 and 4.x, reader and compiler). For text that
-/// is not XML, the parser writes `Line number=12`.
+/// Line number in a message; `None` without one. MuJoCo writes `line 12` or `line = 12` (2.2.2 and 4.x, reader and
+/// compiler). For text that is not XML, the parser writes `Line number=12`.
 fn parse_line_number(message: &str) -> Option<u32> {
     let number_after = |word: &str| {
         let after = &message[message.rfind(word)? + word.len()..];

@@ -6,7 +6,8 @@ use mujoco_sys::fields::model::{ModelArray, each};
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-/// Owner of a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`). The model is freed with the last [`Model`].
+/// Owner of a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`). The model is freed with its last owner: a
+/// [`Model`] or an editor.
 #[derive(Debug)]
 pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 
@@ -74,7 +75,7 @@ pub(super) struct ShallowModel {
     own: Arc<[OwnArray]>,
 }
 
-/// An array of one model alone. Nothing writes to it once the model is made.
+/// An array that a model does not share with its compiled model. Nothing writes to it once the model is made.
 #[derive(Clone)]
 pub(super) struct OwnArray {
     pub(super) field: ModelArray,
@@ -158,8 +159,8 @@ impl Model {
         &self.0.header
     }
 
-    /// True if one is a clone of the other. Results of [`with_buffers`](Self::with_buffers) and of other methods are
-    /// different models, even with equal content.
+    /// True if one is a clone of the other. Results of [`with_buffers`](Self::with_buffers) are different models, even
+    /// with equal content.
     pub fn ptr_eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -278,8 +279,9 @@ impl Model {
         Buffers { contacts: m.nconmax.max(0) as usize, constraints: m.njmax.max(0) as usize, arena_bytes }
     }
 
-    /// Small initial buffer sizes: room for all permanent constraints (equalities, drives, friction, limits) and 16
-    /// contacts.
+    /// Small initial buffer sizes: room for the permanent constraints (at most six rows per equality; drives, friction,
+    /// limits) and for 16 contacts of four rows (pyramidal cones, `condim` 3). A model that needs more overflows
+    /// ([`WarningCounts::overflow`](crate::WarningCounts::overflow)): see [`Buffers::enlarged`].
     pub fn small_buffers(&self) -> Buffers {
         const CONTACTS: usize = 16;
         /// Rows of a contact with a pyramidal cone of dimension 3.
@@ -421,7 +423,7 @@ impl Model {
         None
     }
 
-    /// True if actuators or sensors have a delay or an interval (4.x).
+    /// True if actuators or sensors keep a history of values (`nsample`, for delays and intervals; 4.x).
     pub fn has_history(&self) -> bool {
         #[cfg(mj4)]
         return self.header().nhistory > 0;

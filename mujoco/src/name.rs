@@ -63,7 +63,7 @@ unsafe fn id(model: *const mj::mjModel, kind: ObjectKind, name: &str) -> Option<
 }
 
 impl Compiled {
-    /// Index of the object called `name`, if it exists.
+    /// Index of the object called `name`; `None` if there is no such object.
     pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
         // SAFETY: the model is alive as long as `self`.
         unsafe { id(self.raw(), kind, name) }
@@ -82,7 +82,7 @@ impl Compiled {
 }
 
 impl Model {
-    /// Index of the object called `name`, if it exists.
+    /// Index of the object called `name`; `None` if there is no such object.
     pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
         // SAFETY: the model is alive as long as `self`.
         unsafe { id(self.raw(), kind, name) }

@@ -1,4 +1,4 @@
-//! MuJoCo's ray casting: a reference for that of `kinetoscope-render`.
+//! MuJoCo's ray casting: a reference for the ray casting of `kinetoscope-render`.
 
 use super::data::Data;
 use super::error::EngineError;

@@ -17,7 +17,8 @@ pub struct IntegrationState {
 /// change their last bits. On 4.x positions do not change, so no quaternion is stored.
 #[derive(Clone, Debug, Default)]
 pub struct UnnormalizedQuats {
-    /// First quaternion, stored without heap memory: a robot has at most one in the common case.
+    /// First quaternion, `None` if there is nothing to store. It needs no heap memory: a robot has at most one in the
+    /// common case.
     first: Option<UnnormalizedQuat>,
     others: Box<[UnnormalizedQuat]>,
 }
@@ -146,7 +147,7 @@ fn same_bits(one: &[f64], other: &[f64]) -> bool {
 }
 
 impl IntegrationState {
-    /// Empty state, which restores nothing.
+    /// State without values; [`restore`](Self::restore) does nothing with it.
     pub const EMPTY: Self = Self { values: Vec::new() };
 
     /// Copies the state of `data`, reusing memory.
@@ -190,8 +191,9 @@ impl IntegrationState {
         Self { values }
     }
 
-    /// Copies the state into `data`, whose model must have the same sizes; other sizes panic. Its buffers may be
-    /// larger. Derived quantities are not updated.
+    /// Copies the state into `data`, whose model must have the same sizes; its buffers may be larger. Does nothing with
+    /// an empty state. Too few numbers panic; too many are detected by debug builds only. Derived quantities are not
+    /// updated.
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
             data.set_time(time);
@@ -222,7 +224,8 @@ impl JointInputs {
         self.save_arrays(data);
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Too few numbers panic; too many are
+    /// detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
     }
@@ -264,7 +267,8 @@ impl BodyInputs {
         }
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Inputs of other sizes panic.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Too few numbers panic; too many are
+    /// detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
@@ -284,8 +288,8 @@ impl SolvedState {
         self.save_arrays(data);
     }
 
-    /// Copies the results into `data`, whose model must have the same sizes; other sizes panic, and a state that was
-    /// never saved changes nothing. Its buffers may be larger.
+    /// Copies the results into `data`, whose model must have the same sizes; its buffers may be larger. Does nothing if
+    /// no results were saved. Too few numbers panic; too many are detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         if !self.values.is_empty() {
             self.restore_arrays(data, &self.values);
@@ -386,8 +390,8 @@ impl UserInputs {
         self.equals_arrays(data)
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Its buffers may be larger. Inputs of other
-    /// sizes, or inputs that were never saved, panic.
+    /// Copies the inputs into `data`, whose model must have the same sizes; its buffers may be larger. Too few numbers,
+    /// such as of inputs that were never saved, panic; too many are detected by debug builds only.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]

@@ -107,7 +107,7 @@ impl<'m> UnknownKeyword<'m> {
         message.contains("unrecognized element").then_some(Self { element, keyword: None, is_value: false })
     }
 
-    /// First MuJoCo version with this name, if it is known and later than 2.2.2.
+    /// First MuJoCo version with this name, if it is later than 2.2.2; `None` for other and unknown names.
     pub(super) fn introduced_in(&self) -> Option<&'static str> {
         let word = self.keyword.unwrap_or_default();
         let is_it = |(element, known, _): &&(&str, &str, &str)| {

@@ -14,13 +14,13 @@ pub struct UnsupportedFeature {
 }
 
 impl Model {
-    /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
+    /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any; `None` on 2.2.2.
     #[cfg(not(mj4))]
     pub fn unsupported_feature(&self) -> Option<UnsupportedFeature> {
         None
     }
 
-    /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
+    /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any; `None` on 2.2.2.
     #[cfg(mj4)]
     pub fn unsupported_feature(&self) -> Option<UnsupportedFeature> {
         use super::arrays::is_set;

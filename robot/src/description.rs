@@ -86,7 +86,7 @@ pub struct PartialInertial {
     pub link_from_com: Option<Pose>,
     /// Mass \[kg\].
     pub mass: Option<f64>,
-    /// Density \[kg/m³\], an extension of Isaac Gym.
+    /// Density \[kg/m³\], an extension of Isaac Gym; `None` if the mass is given.
     pub density: Option<f64>,
     /// Inertia tensor \[kg m²\] about the center of mass, in the axes of the center-of-mass frame.
     pub inertia: Option<Matrix3<f64>>,

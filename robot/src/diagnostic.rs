@@ -54,7 +54,7 @@ pub enum DiagnosticKind {
     MimicPositionIgnored,
     /// An element that may occur once occurs again: the first one is used.
     ElementRepeated,
-    /// A shape has a size of 0: it is left out.
+    /// A shape has a size of 0, or a `<visual>` has no shape: it is left out.
     ShapeEmpty,
     /// An XML prefix has no namespace: its elements and attributes are ignored.
     NamespaceUnbound,
@@ -66,8 +66,8 @@ pub enum DiagnosticKind {
     CommasIgnored,
     /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
     InertialIncomplete,
-    /// Mass properties that were missing, or impossible for the shapes, were computed from the shapes. Without shapes,
-    /// an incomplete `<inertial>` got the inertia of a sphere or, without a mass, was ignored.
+    /// Mass properties that were missing, or impossible for the shapes, were computed from the shapes. An incomplete
+    /// `<inertial>` without shapes got the inertia of a sphere; one for which no mass could be computed was ignored.
     InertiaFromShapes,
     /// The inertia of a jointed link is that of a rigid body far larger than its shapes: it is kept.
     InertiaImplausible,

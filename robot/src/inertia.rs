@@ -304,7 +304,7 @@ mod tests {
         r.matrix() * Matrix3::from_diagonal(moments) * r.matrix().transpose()
     }
 
-    /// MuJoCo's checks of `diaginertia`: exact comparisons, in double precision.
+    /// True if MuJoCo's checks of `diaginertia` pass: exact comparisons, in double precision.
     fn mujoco_accepts(b: &RigidInertia) -> bool {
         let (i, _) = b.principal();
         b.mass >= 1e-15 && i.min() >= 1e-15 && i[0] + i[1] >= i[2] && i[0] + i[2] >= i[1] && i[1] + i[2] >= i[0]

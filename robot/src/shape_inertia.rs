@@ -108,7 +108,8 @@ impl<'c> HullSet<'c> {
 
 /// Computes mass properties from shapes for a robot from URDF files: those of incomplete `<inertial>`s, and those of
 /// links of moving bodies where no link has any (see [`MissingInertia`]). Also replaces inertias of moving bodies that
-/// are impossible, or too large for the shapes of a free body. Adds a warning for each change.
+/// are impossible, or too large for the shapes of a free body. Adds a warning for each change, except for an incomplete
+/// `<inertial>` that shapes complete, because the reader of the file reported it.
 ///
 /// `floating_base` is true if the root link moves.
 ///
@@ -357,7 +358,8 @@ fn corners([low, high]: [Vector3<f64>; 2], pose: &Pose) -> [Vector3<f64>; 8] {
     })
 }
 
-/// Mass properties of a shape for a density of 1 kg/m³ and its bounding box, in its own frame.
+/// Mass properties of a shape for a density of 1 kg/m³ and its bounding box, in its own frame. `None` for a mesh that
+/// cannot be read or whose hull has no volume.
 ///
 /// The closed forms are those of solids of uniform density in any textbook. A capsule is a cylinder and two half balls,
 /// each with its center of mass 3r/8 from its plane.

@@ -88,7 +88,9 @@ impl CameraFit {
 /// A drawn instance: the instance, its pose and its offset.
 type DrawnInstance<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
 
-/// Instances that an initial view shows.
+/// Instances that must fit in the image: visible ones of geom groups 0 to 2. Planes and movable instances beyond
+/// `reach` are left out. If there are bodies, static instances with a bounding box more than twice as large as that of
+/// the bodies are left out, too.
 fn drawn_instances<'a>(placed: &[PosedScene<'a>]) -> Vec<DrawnInstance<'a>> {
     let each = |placed: &PosedScene<'a>| {
         let PosedScene { scene, poses, origin, reach } = *placed;
@@ -117,7 +119,7 @@ fn is_within_reach(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
 }
 
-/// Largest coordinate of the instances along a direction.
+/// Largest coordinate of the instances along a direction, times the length of the direction \[m\].
 fn support(framed: &[DrawnInstance<'_>], direction: [f64; 3]) -> f64 {
     let of = |(instance, pose, origin): &DrawnInstance<'_>| {
         let rotation = pose.rotation.map(|row| row.map(f64::from));

@@ -6,7 +6,7 @@
 //! | rotation | `[w, x, y, z]`, or `{ rpy_deg = [r, p, y] }` |
 //! | vector | `[x, y, z]` |
 //! | list of pairs | a table that keeps its order |
-//! | optional value with a default | the value, or `false` |
+//! | optional value with a default | the value; `false` for `None` |
 
 use nalgebra::UnitQuaternion;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -255,7 +255,7 @@ pub mod or_false {
         }
     }
 
-    /// Reads a table, a number or `false`.
+    /// Reads a table or a number, or `false` as `None`.
     ///
     /// # Errors
     /// Errors of the deserializer: the value has another form (`true`, a list, a text), or is invalid.

@@ -49,7 +49,7 @@ pub struct Light {
 }
 
 impl Default for Light {
-    /// A directional light straight down, at a height of 3 m: MuJoCo's defaults.
+    /// A directional light straight down, at a height of 3 m. Colors, attenuation and shadows have MuJoCo's defaults.
     fn default() -> Self {
         Self {
             kind: LightKind::Directional,

@@ -31,8 +31,9 @@ pub struct Material {
     /// Roughness in 0..=1; the alpha of the GGX distribution is its square. `None` derives alpha from
     /// [`exponent`](Self::exponent): `alpha² = 2 / (exponent + 2)`.
     pub roughness: Option<f32>,
-    /// Share of transmitted light in 0..=1, refracted as by glass. Only the path tracer transmits light, through closed
-    /// shapes; other renderers draw the surface. The opacity of `rgba` is transparency without refraction.
+    /// Fraction in 0..=1 of the light not mirrored by `reflectance` that meets smooth glass, which refracts it, or
+    /// mirrors it by Fresnel's equations. Only the path tracer transmits light, through closed shapes; other renderers
+    /// draw the surface. The opacity of `rgba` is transparency without refraction.
     pub transmission: f32,
     /// Refractive index of the interior, at least 1: 1.5 for glass, 1.33 for water.
     pub refractive_index: f32,
@@ -202,8 +203,8 @@ impl Texture {
         self.kind
     }
 
-    /// Mip levels, the largest first, down to 1 x 1 pixel. The levels of a cube texture end when the side of a face is
-    /// odd.
+    /// Mip levels, the largest first. The last level of a 2D texture has 1 x 1 pixel. The levels of a cube texture end
+    /// at the first level with an odd face side; with [`LightingSpace::Display`], they end at faces of 1 pixel.
     pub fn mip_levels(&self) -> &[MipLevel] {
         &self.levels
     }

@@ -1,8 +1,8 @@
 //! Name patterns: regular expressions that must match a whole name.
 //!
 //! The dialect is that of the `regex` crate. Matching is case-sensitive and against the full name, as in Python's
-//! `re.fullmatch`. A pattern without a match is an error, and so is a name that is matched twice: a typing error in a
-//! script must never silently drive fewer joints than the user meant.
+//! `re.fullmatch`. A pattern without a match is an error, and so is a name that is matched twice. A typing error in a
+//! script thus never drives fewer joints without an error.
 
 use regex::Regex;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ pub struct UnknownName {
     pub what: &'static str,
     /// The given name.
     pub name: String,
-    /// Known names, the most similar first.
+    /// Known names, the most similar first; at most [`MAX_CANDIDATES`].
     pub candidates: Vec<String>,
 }
 
@@ -228,8 +228,8 @@ pub fn closest_names<'c>(name: &str, candidates: impl IntoIterator<Item = &'c st
     ranked.into_iter().map(|(_, c)| c).collect()
 }
 
-/// The candidate that `name` may be a misspelling of: at most a third of its characters, and at most three, differ.
-/// `None` without such a candidate.
+/// The candidate that `name` may be a misspelling of: apart from case, at most a third of its characters, and at most
+/// three, differ. `None` without such a candidate.
 pub fn similar_name<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     let nearest = candidates.into_iter().map(|c| (edit_distance(name, c), c)).min_by_key(|&(distance, _)| distance);
     let most = 2 * (name.chars().count() / 3).min(3) + 1;
@@ -243,7 +243,8 @@ fn edit_distance(a: &str, b: &str) -> usize {
     2 * strsim::levenshtein(&lower(a), &lower(b)) + usize::from(a != b)
 }
 
-/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if `total` is larger than the list.
+/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if `total` is larger than the list. A `total` of 0
+/// gives `no names are defined`.
 pub fn format_candidates(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {

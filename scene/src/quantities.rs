@@ -131,8 +131,9 @@ macro_rules! quantities {
                 }
             }
 
-            /// Returns the first array of `requires` with a size other than in `lengths`, if any: name of the axis,
-            /// expected size, found size. Absent arrays, contacts, markers and `visible` are not checked.
+            /// Returns the first axis of the arrays of `requires` that has another length than in `lengths`: its name,
+            /// expected and found length; `None` if all fit. Absent arrays, contacts, markers and `visible` are not
+            /// checked.
             pub fn misfit(&self, requires: StateFields, lengths: &StateDims) -> Option<(&'static str, usize, usize)> {
                 $($($(if let Some([envs, count, ..]) = self.$field.as_ref().map(|array| array.shape())
                     && requires.contains(StateFields::$FLAG)

@@ -113,7 +113,7 @@ pub struct RenderScene {
     linear_colors: Vec<[f32; 3]>,
     texture_scales: Vec<[f32; 3]>,
     texture_offsets: Vec<[f32; 2]>,
-    /// Lights of the scene, used if the renderer is given no others.
+    /// Lights of the scene, used if the renderer is given no others. Renderers use the first 16 active lights.
     pub lights: Vec<Light>,
     /// Headlight of every camera.
     pub headlight: Headlight,
@@ -232,7 +232,8 @@ impl RenderScene {
         }
     }
 
-    /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance.
+    /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance. Sizes are not
+    /// checked.
     ///
     /// # Panics
     ///
@@ -330,7 +331,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Triangles of the shape, if it is a mesh or a height field.
+    /// Triangles of a mesh or height field; `None` for other shapes.
     #[inline]
     pub fn mesh(&self) -> Option<&crate::shape::RenderMesh> {
         self.shape.mesh().map(Arc::as_ref)

@@ -1,8 +1,8 @@
 //! `SceneState`: the state of all environments that sensors measure, as plain arrays.
 //!
-//! The simulation fills the state after every physics step, and sensors read it. The first axis is the environment.
-//! Arrays are in C order, in the environment frame with world axes, and in SI units. They are f64, except for the poses
-//! of [`VisibleState`]. Only requested quantities are present.
+//! The simulation fills the state when a sensor is due, and sensors read it. The first axis is the environment. Arrays
+//! are in C order, in the environment frame with world axes, and in SI units. They are f64, except for those of
+//! [`VisibleState`], which are f32. Only requested quantities are present.
 //!
 //! A step from t_k to t_(k+1) involves two times: contacts, efforts and accelerations are solved for t_k, positions and
 //! velocities are those of t_(k+1). The state has both times.
@@ -150,8 +150,8 @@ impl StateDims {
 
 /// Render scene of one environment; `None` if the environment uses the shared scene.
 ///
-/// An own scene has the instances of the shared scene, in the same order and of the same kinds, with its own sizes or
-/// colors. Two values are equal if they are the same object in memory.
+/// An own scene has the instances of the shared scene, in the same order and of the same kinds, with its own sizes,
+/// colors or deformed shapes. Two values are equal if they are the same object in memory.
 #[derive(Clone, Debug, Default)]
 pub struct EnvScene(pub Option<Arc<RenderScene>>);
 
@@ -235,9 +235,9 @@ impl SceneState {
     /// Copies the environments where `chosen` is true from `other`: steps, times, and the fields that this state has.
     ///
     /// Returns `false` and changes nothing if `chosen` does not have one element per environment, or if `other` is not
-    /// of the same scene: it lacks a field of this state, or has other sizes. Allocates only if the capacity of the
-    /// contact list does not suffice for old and new contacts together: the new list is built behind the old one, and
-    /// the capacity is kept.
+    /// of the same scene: it lacks a field of this state, or has other sizes. Allocates for own scenes and for longer
+    /// lists of markers. Also allocates if the capacity of the contact list does not suffice for old and new contacts
+    /// together: the new list is built behind the old one, and the capacity is kept.
     #[must_use]
     pub fn copy_envs_from(&mut self, other: &Self, chosen: &[bool]) -> bool {
         if !(chosen.len() == self.num_envs() && self.same_shape(other)) {

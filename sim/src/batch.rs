@@ -1,9 +1,9 @@
 //! N environments on worker threads, bit-identical for any number of threads and environments.
 //!
-//! The batch holds a [row](crate::row) per environment and an `mjData` per thread. A thread takes an environment:
-//! it restores the row, steps, gathers what is asked for while the data is in the core's cache, and saves the row.
-//! An `mjData` that still belongs to the environment is not restored, so a batch with no more environments than threads
-//! works like environments with an `mjData` each.
+//! The batch holds a [row](crate::row) per environment and an `mjData` per thread. For each environment, a thread
+//! restores the row, steps, gathers the requested values and saves the row. The data stays in the core's cache
+//! meanwhile. An `mjData` that still belongs to the environment is not restored, so a batch with no more environments
+//! than threads works like environments with an `mjData` each.
 //!
 //! Rows are grouped in chunks, and every thread owns a share of the chunks. A thread first takes the chunks of its own
 //! share, then helps with the remaining shares. The assignment of threads cannot change results, because a row contains
@@ -562,8 +562,9 @@ impl LockedChunk<'_> {
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
-    /// Does `steps` steps with every environment of the chunk in `workspace`, then calls `act` with its index and the
-    /// read buffer of the chunk.
+    /// Loads every environment of the chunk into `workspace` in turn, and calls `act` with its index in the batch and
+    /// the read buffer of the chunk. `act` does the steps, `steps` in number. With `steps` above 0, results of the last
+    /// solve are restored only for diverged environments and for models with a history.
     fn for_each_env(
         &mut self,
         workspace: &mut SimEnv,

@@ -220,7 +220,8 @@ fn two_digits(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
 
-/// Writes every visual mesh once, one file per material, and declares the assets in `mjcf`.
+/// Writes every visual mesh of robots and objects to `dir` once, one OBJ file per material, and declares the assets in
+/// `mjcf`. Unreadable meshes and textures are reported in `left_out`.
 fn export_meshes(
     contents: &EntitySet,
     mjcf: &mut Mjcf,

@@ -1,4 +1,4 @@
-//! Rows: an environment outside of working memory.
+//! Rows: the stored states of environments that no `mjData` holds at the moment.
 //!
 //! A batch holds one row per environment and one `mjData` per thread. A row has everything that determines future
 //! steps, and what readers see of the last step. Everything else is computed from it when it is needed. Quaternions are
@@ -79,7 +79,7 @@ impl EnvRow {
         }
     }
 
-    /// Prefetches the arrays of this row, without waiting for them.
+    /// Prefetches the arrays that this row does not share with other rows, without waiting for them.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(self.motion.values());
         mj::prefetch(self.solved.values());

@@ -34,10 +34,11 @@ pub struct MjvCameraError {
 }
 
 impl MjvCamera {
-    /// Focal lengths and principal point, fx, fy, cx, cy \[pixels\], for an image of this size.
+    /// Returns the focal lengths and the principal point, fx, fy, cx, cy \[pixels\], for an image of `width` x
+    /// `height`. The top left corner of the image is (0, 0), pixel centers are at half pixels.
     ///
     /// # Errors
-    /// The frustum is empty.
+    /// The frustum is empty, or `near` is not above 0.
     pub fn intrinsics(&self, width: usize, height: usize) -> Result<[f32; 4], MjvCameraError> {
         let (width, height) = (width as f64, height as f64);
         let side = self.top - self.bottom;

@@ -1,4 +1,4 @@
-//! Places of the fields of `mjvGeom` and `mjvLight` in memory.
+//! Byte offsets of the fields of `mjvGeom` and `mjvLight`.
 
 use crate::{LightType, LightValues};
 
@@ -36,8 +36,8 @@ pub struct SoftTypes {
     pub flex: Option<i32>,
 }
 
-/// Byte offsets of the fields of `mjvGeom`, and the size of the structure. Fields are 4 bytes wide, and arrays of such
-/// numbers. Optional fields exist in some versions of MuJoCo only.
+/// Byte offsets of the fields of `mjvGeom`, and the size of the structure. Each field is a 4-byte number or an array of
+/// 4-byte numbers. Optional fields exist in some versions of MuJoCo only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GeomLayout {
     /// Size of the structure \[bytes\].
@@ -115,8 +115,8 @@ impl GeomLayout {
     }
 }
 
-/// Byte offsets of the fields of `mjvLight`, and the size of the structure. Fields are 4 bytes wide unless stated
-/// otherwise, and arrays of such numbers.
+/// Byte offsets of the fields of `mjvLight`, and the size of the structure. Each field is a 4-byte number or an array
+/// of 4-byte numbers, unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightLayout {
     /// Size of the structure \[bytes\].

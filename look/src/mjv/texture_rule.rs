@@ -147,8 +147,9 @@ fn cosine(latitude: f64) -> f64 {
     if latitude.abs() > FRAC_PI_2 - 1e-9 { 0.0 } else { latitude.cos() }
 }
 
-/// Pixels by which the texture of a finite plane, which begins at its corner, is to be moved so that its middle is in
-/// the middle of the plane: to the left, and upward. `scale` has the numbers of images along the half lengths.
+/// Returns the shift of a 2D texture, left and up \[pixels\], that puts the center of an image at the center of a
+/// finite plane. The texture starts at a corner of the plane. `scale` is the number of repetitions along each half
+/// length. `None` for infinite planes, for cube textures, and if no shift is needed.
 pub(super) fn plane_shift(plane: &Plane, scale: [f32; 2], texture: &Texture) -> Option<[usize; 2]> {
     let level = texture.mip_levels().first().filter(|_| texture.kind() == TextureKind::TwoD)?;
     let sizes = [level.width(), level.height()];
@@ -160,7 +161,7 @@ pub(super) fn plane_shift(plane: &Plane, scale: [f32; 2], texture: &Texture) -> 
     is_finite.then(|| [shift(0), shift(1)]).filter(|shift| *shift != [0, 0])
 }
 
-/// A texture whose pixels are moved to the left and upward, and come back at the other side.
+/// Returns the texture with its pixels shifted left and up, wrapped around at the borders.
 pub(super) fn moved_texture(texture: &Texture, [left, up]: [usize; 2]) -> Option<Texture> {
     let level = texture.mip_levels().first()?;
     let (width, height) = (level.width() as usize, level.height() as usize);

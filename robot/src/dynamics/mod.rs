@@ -258,7 +258,7 @@ impl<'a> Dynamics<'a> {
         &self.world_from_link
     }
 
-    /// Pose `world_from_link` of a link.
+    /// Pose `world_from_link` of a link. Panics if there is no such link.
     pub fn link_pose(&self, link: LinkId) -> Pose {
         self.world_from_link[link.0]
     }

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub struct TipFrame<'n> {
     /// Control part or link that selects the joints and, unless [`link`](Self::link) is set, the link.
     pub name: TipSelector<'n>,
-    /// Link that the frame is fixed to, instead of the link that [`name`](Self::name) selects.
+    /// Link that the frame is fixed to; `None` for the link that [`name`](Self::name) selects.
     pub link: Option<&'n str>,
     /// Pose of the tool center point in the frame of the link \[m\].
     pub tcp: Pose,

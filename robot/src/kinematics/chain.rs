@@ -173,6 +173,10 @@ impl Chain {
     /// Writes the chain that [`reduced`](Self::reduced) returns into an existing chain, without allocating.
     /// `variable_of` gives the new index of each variable that stays free, and `None` for each variable that is fixed
     /// at its value in `positions`.
+    ///
+    /// # Panics
+    /// If `variable_of` has fewer entries than the chain has [`variables`](Self::variables), or `positions` lacks a
+    /// fixed one.
     #[track_caller]
     pub fn reduce_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
         held.base = self.base;

@@ -30,6 +30,9 @@ impl Chain {
 ///
 /// `standing` returns the pose of the root link and of each child of a floating or planar joint. The result has the
 /// same reference frame as these poses.
+///
+/// # Panics
+/// If there are fewer positions than drivable joints.
 pub fn link_poses(description: &RobotDescription, positions: &[f64], standing: impl Fn(LinkId) -> Pose) -> Vec<Pose> {
     let follows = mimic_relations(description);
     let mut poses = vec![Pose::identity(); description.links.len()];

@@ -10,11 +10,11 @@ use std::f64::consts::{PI, TAU};
 /// Inverse-kinematics solver of a [`Chain`]. Solves can be repeated and allocate no memory.
 ///
 /// A solve descends by damped least squares within the limits. It starts from the initial positions, then from random
-/// positions, until one start reaches the target. Random starts are uniform within the limits; for joints that rotate,
-/// at most half a turn from the middle. Without limits they are uniform about the initial position. The error is
-/// weighted as if the chain's [`reach`](Chain::reach) were two radians. Among positions that differ by full turns and
-/// are within the limits, the result is the one nearest to the posture, or to the initial positions if there is no
-/// posture.
+/// positions, until one start reaches the target. Random starts are uniform within the limits; for revolute joints, at
+/// most half a turn from the middle of their limits. Without limits they are uniform about the initial position. The
+/// error is weighted as if the chain's [`reach`](Chain::reach) were two radians. Among positions that differ by full
+/// turns and are within the limits, the result is the one nearest to the posture, or to the initial positions if there
+/// is no posture.
 ///
 /// A solve takes at most `num_seeds * max_iterations` steps, and some more to refine the result. A target that is not
 /// reached uses all starts.
@@ -53,8 +53,8 @@ impl IkSolver {
     /// upper) \[rad or m\]. Limits may be infinite. [`Chain::reduced`] fixes variables that must not move.
     ///
     /// # Errors
-    /// A variable of the chain does not move its frame, the length of `limits` differs from the number of variables, a
-    /// lower limit exceeds the upper one, or `cfg` is invalid.
+    /// The chain has no variable, or one that does not move its frame. The length of `limits` differs from the number
+    /// of variables, a lower limit exceeds the upper one, or `cfg` is invalid.
     pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
         let joints = limits.len();
         if chain.variables() > joints {

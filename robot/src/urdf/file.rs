@@ -39,9 +39,9 @@ pub struct LinkMetadata {
     pub inertial: Option<SourceLocation>,
     /// Values of an incomplete inertial element; `inertial` is then `None`.
     pub partial_inertial: Option<PartialInertial>,
-    /// Metadata of each visual, parallel to the visuals of the model.
+    /// Metadata of each visual, in the order of the link's visuals in [`UrdfFile::robot`].
     pub visuals: Vec<VisualMetadata>,
-    /// Location of each collision element, parallel to the collisions of the model.
+    /// Location of each collision element, in the order of the link's collisions in [`UrdfFile::robot`].
     pub collisions: Vec<SourceLocation>,
 }
 

@@ -12,7 +12,7 @@ use roxmltree::Node;
 const EXAMPLE: &str = "an <inertial> needs <mass value=\"1\"/> and <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
                        iyz=\"0\" izz=\"0.01\"/>; without mass properties leave the whole <inertial> out";
 
-/// Reads mass properties. Complete ones are appended to `xml`; partial ones are returned.
+/// Reads mass properties. Complete ones are appended to `xml`, with the result `None`; partial ones are returned.
 pub(super) fn read_inertial(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -55,7 +55,7 @@ pub(super) fn read_inertial(
     Ok(None)
 }
 
-/// Makes a required element optional. `missing` keeps the first error about a missing element.
+/// Makes a required element optional: `None` if it is missing. `missing` keeps the first error about a missing element.
 fn optional_element<T>(found: Result<T, UrdfError>, missing: &mut Option<UrdfError>) -> Result<Option<T>, UrdfError> {
     match found {
         Ok(element) => Ok(Some(element)),

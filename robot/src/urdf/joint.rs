@@ -235,7 +235,8 @@ fn read_calibration(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &
     Ok(())
 }
 
-/// Reads the followed joint. A mimic on a joint that does not move along one axis is ignored with a warning.
+/// Reads the followed joint; `None` without a `<mimic>`. A mimic on a joint without a single degree of freedom is
+/// ignored with a warning.
 fn read_mimic(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,

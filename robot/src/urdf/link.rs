@@ -234,8 +234,8 @@ pub(super) fn read_origin(
     Ok(())
 }
 
-/// Reads position, and roll, pitch, yaw of the origin of `node`. A quaternion (URDF 1.1) is converted to roll, pitch,
-/// yaw.
+/// Reads position, and roll, pitch, yaw of the origin of `node`; `None` without an `<origin>`. A quaternion (URDF 1.1)
+/// is converted to roll, pitch, yaw.
 pub(super) fn read_pose(
     reader: &Reader<'_>,
     node: Node<'_, '_>,
@@ -257,7 +257,8 @@ pub(super) fn read_pose(
     Ok(Some([xyz.unwrap_or_default(), rpy.unwrap_or_default()]))
 }
 
-/// Reads the shape of `node`. Returns `false` for a shape of size 0, which the caller leaves out.
+/// Reads the shape of `node`. In lenient reading, returns `false` for a shape of size 0 and for a visual without a
+/// shape, which the caller leaves out.
 fn read_geometry(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -354,7 +355,7 @@ fn read_mesh(
     Ok(())
 }
 
-/// Reads the scale of a mesh. In lenient reading, a single number applies to all axes.
+/// Reads the scale of a mesh; `None` without the attribute. In lenient reading, a single number applies to all axes.
 fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64; 3]>, UrdfError> {
     let error = match reader.numbers::<3>(mesh, "scale") {
         Ok(scale) => return Ok(scale),
@@ -381,7 +382,7 @@ fn read_size(
     check_size(reader, shape, owner, name, &[size], "must be positive, in meters")
 }
 
-/// Checks sizes. Negative sizes are errors; sizes of 0 give `false`.
+/// Checks sizes. Negative sizes are errors; sizes of 0 give `false`, or an error in strict reading.
 fn check_size(
     reader: &mut Reader<'_>,
     shape: Node<'_, '_>,

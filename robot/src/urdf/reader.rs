@@ -63,8 +63,8 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// The text with commas replaced by spaces if that gives `count` numbers. Commas must stand beside spaces, or the
-    /// text must have no spaces: `0,5 0 0` has a decimal comma.
+    /// The text with commas replaced by spaces if that gives `count` numbers (2 or more); otherwise `None`, as in
+    /// strict reading. Commas must stand beside spaces, or the text must have no spaces: `0,5 0 0` has a decimal comma.
     fn without_commas(&self, node: Node<'_, '_>, attribute: &str, text: &str, count: usize) -> Option<String> {
         let beside_space = |word: &str| word.trim_matches(',').contains(',');
         if self.strictness == Strictness::Strict || !text.contains(',') {
@@ -104,8 +104,8 @@ impl<'i> Reader<'i> {
         Ok(())
     }
 
-    /// Returns the first child called `name`. Further ones are ignored with a warning, or are an error in strict
-    /// reading.
+    /// Returns the first child called `name`; `None` without one. Further ones are ignored with a warning, or are an
+    /// error in strict reading.
     pub(super) fn first_child<'a, 'input>(
         &mut self,
         node: Node<'a, 'input>,
@@ -139,7 +139,7 @@ impl<'i> Reader<'i> {
         self.elements(node).filter(move |n| n.tag_name().name() == name)
     }
 
-    /// Returns the child called `name`, which may occur once.
+    /// Returns the child called `name`, which may occur once; `None` without one.
     pub(super) fn child<'a, 'input>(
         &self,
         node: Node<'a, 'input>,
@@ -180,7 +180,7 @@ impl<'i> Reader<'i> {
         })
     }
 
-    /// Returns the text of an attribute. Xacro expressions and control characters are errors.
+    /// Returns the text of an attribute; `None` without it. Xacro expressions and control characters are errors.
     pub(super) fn text<'a>(&self, node: Node<'a, '_>, attribute: &str) -> Result<Option<&'a str>, UrdfError> {
         let Some(text) = node.attribute(attribute) else { return Ok(None) };
         if text.contains("${") || text.contains("$(") {
@@ -218,7 +218,7 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// Reads exactly `N` finite numbers.
+    /// Reads exactly `N` finite numbers; `None` without the attribute.
     pub(super) fn numbers<const N: usize>(
         &self,
         node: Node<'_, '_>,
@@ -259,7 +259,7 @@ impl<'i> Reader<'i> {
         Ok(Some(numbers))
     }
 
-    /// Reads one finite number.
+    /// Reads one finite number; `None` without the attribute.
     pub(super) fn number(&self, node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>, UrdfError> {
         Ok(self.numbers::<1>(node, attribute)?.map(|[n]| n))
     }
@@ -281,7 +281,7 @@ impl<'i> Reader<'i> {
         })
     }
 
-    /// Reads one finite number that must not be negative.
+    /// Reads one finite number that must not be negative; `None` without the attribute.
     pub(super) fn non_negative(
         &self,
         node: Node<'_, '_>,

@@ -39,7 +39,7 @@ pub(super) struct JointEdge {
     /// Name of the parent link, with the location of the element that names it.
     pub(super) parent: NamedElement,
     pub(super) child: NamedElement,
-    /// Name of the followed joint, with the location of the element that names it.
+    /// Name of the followed joint, with the location of the element that names it; `None` without a mimic.
     pub(super) mimic: Option<NamedElement>,
     /// Name of the joint type.
     pub(super) kind: &'static str,

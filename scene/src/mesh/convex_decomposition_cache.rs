@@ -16,7 +16,8 @@ impl HullCache {
     /// Pieces are cached like the hulls of [`hull_of_file`](Self::hull_of_file).
     ///
     /// # Errors
-    /// The file cannot be read, a scale is 0 or not finite, a configuration is out of range, or the mesh has no hull.
+    /// The file cannot be read, a scale is 0 or not finite, or a configuration is out of range. Also if the mesh has no
+    /// hull, or more than 50000 triangles.
     pub fn decomposition_of_file(
         &self,
         path: &Path,

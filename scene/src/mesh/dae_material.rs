@@ -34,7 +34,8 @@ impl<'a, 'i> Binding<'a, 'i> {
 }
 
 impl<'a, 'i> Dae<'a, 'i> {
-    /// Material of a primitive, and the texture coordinate set of its diffuse texture, if the file names one.
+    /// Material of a primitive, `None` if the file does not define one, and the texture coordinate set of its diffuse
+    /// texture, if the file names one.
     pub(super) fn material_of(
         &mut self,
         primitive: Node<'a, 'i>,
@@ -118,7 +119,8 @@ fn parameter<'a, 'i>(effect: Node<'a, 'i>, sid: &str) -> Option<Node<'a, 'i>> {
     effect.descendants().find(|n| n.tag_name().name() == "newparam" && n.attribute("sid") == Some(sid))
 }
 
-/// Element with the base color: `<diffuse>` of the shading model, or `<emission>` of a constant one; `None` without it.
+/// Element with the base color: `<diffuse>` of the shading model, or its `<emission>` without a `<diffuse>`; `None`
+/// without both.
 fn diffuse<'a, 'i>(effect: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
     let profile = child(effect, "profile_COMMON")?;
     let technique = child(profile, "technique")?;

@@ -46,7 +46,7 @@ impl<'a> Gltf<'a> {
         self.optional(value, key, at)?.ok_or_else(|| self.ctx.invalid(at, format!("{key:?} is missing")))
     }
 
-    /// An optional whole number. Any other value is an error.
+    /// An optional whole number, `None` if the key is missing. Any other value is an error.
     pub(super) fn optional(&self, value: &Value, key: &str, at: &str) -> Result<Option<usize>, MeshError> {
         let Some(found) = value.get(key) else { return Ok(None) };
         let number = found.as_u64().and_then(|n| usize::try_from(n).ok());
@@ -215,7 +215,7 @@ fn component(b: &[u8], component: u64, normalized: bool) -> f64 {
     if normalized { (value / largest).max(-1.0) } else { value }
 }
 
-/// Standard base64 with or without padding; white space is skipped.
+/// Decodes standard base64 with or without padding; white space is skipped. `None` for other characters.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut held) = (0u32, 0);

@@ -32,8 +32,8 @@ pub struct HullCfg {
     pub max_vertices: usize,
     /// Largest distance of an omitted point from the hull, as a fraction of the diagonal of the bounding box.
     ///
-    /// At least 0, which acts as 1e-8 (less than `f32` resolves). The default 1e-4 is 0.03 mm on a link of 0.3 m: below
-    /// the tolerances of robot parts, above the noise of a tessellated cylinder.
+    /// At least 0, which acts as 1e-8 (less than `f32` resolves), and less than 1. The default 1e-4 is 0.03 mm on a
+    /// link of 0.3 m: below the tolerances of robot parts, above the noise of a tessellated cylinder.
     pub tolerance: f64,
     /// Thickness of the hull of a flat point set \[m\], half on each side of its plane (in a convex decomposition: all
     /// of it behind the front). Flat means thinner than the tolerance. With `None`, a flat point set is an error.

@@ -26,7 +26,7 @@ pub enum HullError {
         /// Accepted values.
         expected: &'static str,
     },
-    /// The thickness of prisms is not positive.
+    /// The thickness of prisms is not positive and finite.
     #[error("the thickness of prisms is {value} m; expected a length above 0")]
     InvalidThickness {
         /// The thickness \[m\].

@@ -56,10 +56,10 @@ pub use write::{write_binary_stl, write_obj};
 pub struct TriMesh {
     /// Vertex positions \[m\].
     pub positions: Vec<[f32; 3]>,
-    /// Vertex normals; of unit length in meshes from [`load`].
+    /// Vertex normals, of unit length in meshes from [`load`]; `None` without normals.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA). Coordinates outside of 0..=1
-    /// repeat the image.
+    /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA); `None` without them.
+    /// Coordinates outside of 0..=1 repeat the image.
     pub uvs: Option<Vec<[f32; 2]>>,
     /// Vertex indices of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -85,7 +85,7 @@ pub struct MeshMaterial {
     pub name: String,
     /// Base color rgba in 0..=1, a display color (sRGB, not linear). It multiplies the texture.
     pub rgba: [f32; 4],
-    /// Base color texture.
+    /// Base color texture; `None` for a uniform color.
     pub texture: Option<TextureSource>,
 }
 

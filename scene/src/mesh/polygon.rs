@@ -2,7 +2,8 @@
 
 use earcut::Earcut;
 
-/// Cuts a polygon into triangles (indices into `points`) with the winding of the polygon.
+/// Cuts a polygon into triangles (indices into `points`) with the winding of the polygon. Fewer than three points give
+/// no triangle.
 ///
 /// A convex polygon becomes a fan from its first corner. A concave polygon is cut by ear clipping; corners on a straight
 /// edge may be left out. A polygon without area is cut as a fan.

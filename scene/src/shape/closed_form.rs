@@ -14,7 +14,7 @@ pub struct Intersection {
     pub normal: V3,
 }
 
-/// A part of a shape, in the frame of the shape. The shape is the convex hull of its parts.
+/// A part of a shape, in the frame of the shape. The convex hull of all parts is the convex hull of the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HullPart {
     /// A point \[m\].
@@ -47,7 +47,7 @@ pub trait ClosedForm {
     /// Calls `add` for each part. The shape is the convex hull of its parts.
     fn hull(&self, add: &mut dyn FnMut(HullPart));
 
-    /// Returns the nearest intersection at a distance from 0 to `limit` \[m\], both included.
+    /// Returns the nearest intersection at a distance from 0 to `limit` \[m\], both included; `None` without one.
     ///
     /// A ray that begins inside of a solid intersects it at its exit. A plane is intersected from +z only.
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection>;

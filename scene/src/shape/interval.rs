@@ -2,7 +2,8 @@
 
 use crate::vector::{V3, add_scaled, dot};
 
-/// Distances at which a ray enters and leaves a convex body. The interval is empty if `leave` is less than `enter`.
+/// Distances at which a ray enters and leaves a convex body, in multiples of the length of its direction. The interval
+/// is empty if `leave` is less than `enter`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interval {
     pub(super) enter: f64,

@@ -116,7 +116,7 @@ impl Shape {
     /// Triangulates the surface, counter-clockwise seen from outside, with about `segments` (clamped to 3..=1024) edges
     /// around a circle. Meshes and height fields return their own triangles.
     ///
-    /// Infinite planes become 200 m wide.
+    /// A plane becomes 200 m long along an infinite axis.
     pub fn tessellate(&self, segments: usize) -> TriMesh {
         match self.geometry() {
             ShapeKind::ClosedForm(shape) => shape.tessellate(segments.clamp(3, 1024)),
@@ -212,7 +212,8 @@ impl Shape {
         }
     }
 
-    /// Area sampling of a shape that is made of triangles; `None` if paths find its light by chance only.
+    /// Area sampling of a mesh; `None` for height fields, whose light paths find by chance only, and for shapes with a
+    /// closed form.
     pub fn triangle_sampling(&self) -> Option<TriangleSampling> {
         match self.geometry() {
             ShapeKind::ClosedForm(_) => None,

@@ -303,7 +303,8 @@ impl RenderMesh {
         &self.positions
     }
 
-    /// Unit normals, one per vertex, in the frame of the mesh; 0 for vertices of triangles without an area.
+    /// Unit normals, one per vertex, in the frame of the mesh; 0 for a triangle without an area in a mesh without
+    /// normals of its own.
     pub fn normals(&self) -> &[[f32; 3]] {
         &self.normals
     }

@@ -10,7 +10,7 @@ pub trait Triangulated {
     /// Prepared triangles.
     fn mesh(&self) -> &Arc<RenderMesh>;
 
-    /// Sizes that must be positive and finite.
+    /// Sizes \[m\] that must be positive and finite.
     fn sizes(&self) -> Vec<f32>;
 
     /// Area sampling of the surface, for shapes that emit light.

@@ -4,8 +4,8 @@ use kinetoscope_mujoco::Data;
 use kinetoscope_scene::Contact;
 use nalgebra::{Matrix3, Vector3};
 
-/// Writes all contacts with a solved force to `contacts`. Contacts without constraint rows, within the margin only, are
-/// left out.
+/// Replaces `contacts` by all contacts with constraint rows, whose forces are solved. `owners` has the body-axis index
+/// of each geom, `None` for the world. Contacts within the margin only have no constraint rows and are left out.
 pub(super) fn capture(owners: &[Option<u32>], data: &Data, contacts: &mut Vec<Contact>) {
     contacts.clear();
     for (index, contact) in data.contact().iter().enumerate() {

@@ -22,8 +22,8 @@ pub trait DriveMode: std::fmt::Debug + Sync {
     /// Name in configuration files, as in EmbodiChain.
     fn name(&self) -> &'static str;
 
-    /// Factor from stiffness and damping to the gains of [`PdGains`], in torque units; `None` for the drive type
-    /// without a drive.
+    /// Factor that converts stiffness and damping to the torque units of [`PdGains`]; `None` for the drive type without
+    /// a drive.
     fn gain_scale(&self, joint: &JointInfo) -> Option<f64>;
 
     /// True if [`gain_scale`](Self::gain_scale) uses [`JointInfo::effective_inertia`]. For other modes, this inertia

@@ -138,7 +138,7 @@ pub(crate) fn step_and_gather(
     gather_rows(simulation, substeps, requires, state);
 }
 
-/// Fills everything that needs no `mjData`: steps, times, and contacts in the order of the environments.
+/// Fills the arrays that need no `mjData`: steps, times, and, if required, contacts in the order of the environments.
 fn gather_rows(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
     gather_steps(simulation, substeps, state);
     if requires.contains(StateFields::CONTACTS) {

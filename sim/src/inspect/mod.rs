@@ -42,8 +42,8 @@ const MIMIC_TOLERANCE: f64 = 1e-6;
 pub struct InspectCfg {
     /// The URDF files; empty if `mjcf` is set.
     pub urdf: UrdfCfg,
-    /// The MJCF file of an MJCF robot ([`RobotCfg::mjcf`]), instead of URDF files. A body with several joints has a
-    /// massless link behind each joint but the last.
+    /// The MJCF file of the robot ([`RobotCfg::mjcf`]), instead of URDF files. For a body with several joints, the
+    /// report has a massless link between consecutive joints.
     pub mjcf: Option<MjcfFile>,
     /// True for a floating base: its six degrees of freedom are part of the dynamics. Default false: a fixed base.
     pub floating_base: bool,

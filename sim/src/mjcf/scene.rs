@@ -75,7 +75,8 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
 }
 
 /// Adds a rigid object: a body named by its uid, with the geom `uid/shape` (and `uid/shape1`... for several collision
-/// shapes) and the joint `uid/free`. An object with visual meshes has geoms named `uid/visual` as well.
+/// shapes). A dynamic object has the joint `uid/free`. An object from a mesh file also has visual geoms: `uid/visual`
+/// in a simulation, `uid/visual0`, `uid/visual1`... in an export.
 pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &MjcfDialect<'_>) {
     let cfg = object.cfg();
     let MassProperties { mass, com, axes, moments } = *object.mass_properties();

@@ -155,8 +155,8 @@ impl Robot<'_> {
     /// `env_ids` (`None` for all environments), or one for all of them. Quaternions are normalized.
     ///
     /// The search covers the joints of the control part that `tip` names, or all joints of the robot, within the limits
-    /// that the robot was added with (joints' own, narrowed by their followers'). Tighter limits of
-    /// [`set_qpos_limits`](crate::RobotMut::set_qpos_limits) are ignored: a solution may be outside of
+    /// at the time the robot was added: those of each joint, narrowed by the limits of its mimic followers. Tighter
+    /// limits of [`set_qpos_limits`](crate::RobotMut::set_qpos_limits) are ignored: a solution may be outside of
     /// [`qpos_limits`](Self::qpos_limits), and `set_qpos_target` would clamp it. Other joints keep their current
     /// positions in the environment. The search starts from `initial` \[rad or m\], with rows and columns as in
     /// [`compute_fk`](Self::compute_fk), or from the current positions. [`IkSolver`] runs on the calling thread.
@@ -166,14 +166,15 @@ impl Robot<'_> {
     /// Randomized properties have no effect here: no [`Property`](crate::Property) moves a joint or a link's frame, and
     /// masses and sizes are not used.
     ///
-    /// Nearby targets may have distant solutions. At a singularity (a stretched arm, two collinear axes, or parallel
-    /// axes beside another pair), a small part of a path may need a quarter turn of a joint. Or it may have no solution
-    /// nearby: beyond a limit, or on the side to which the arm does not bend. A random start may then lead to another
-    /// posture of the arm. To follow a path, solve in small steps from the previous positions and compare the results
-    /// with them. With one start ([`num_seeds`](IkCfg::num_seeds) 1) no other posture is tried.
+    /// Nearby targets may have distant solutions. Near a singularity (a stretched arm, two collinear axes, or parallel
+    /// axes beside another pair), a small step along a path may need a quarter turn of a joint. A nearby solution may
+    /// also not exist: it may be beyond a limit, or need the arm to bend to the other side. A random start may then
+    /// lead to another posture of the arm. To follow a path, solve in small steps from the previous positions and
+    /// compare the results with them. With one start ([`num_seeds`](IkCfg::num_seeds) 1) no other posture is tried.
     ///
-    /// The same target and initial positions give bit-identical results in any environment and in any batch, wherever
-    /// the robot's root is, up to the rounding of the target's pose in the frame of the root.
+    /// For equal target poses in the root frame, equal initial positions, and equal positions of the other joints,
+    /// results are bit-identical in any environment and any batch. A different root pose changes only the rounding of
+    /// the target pose in the root frame.
     ///
     /// ```
     /// use ndarray::array;

@@ -65,7 +65,7 @@ impl MeshCollision {
         }
     }
 
-    /// Returns the convex collision shapes of a mesh file. `mesh` has its scaled triangles.
+    /// Returns the convex collision shapes of the mesh file `path`. `mesh` is the same file, already scaled by `scale`.
     pub(super) fn shapes(
         &self,
         uid: &str,

@@ -62,15 +62,15 @@ pub struct RigidObjectCfg {
     /// Angular damping \[N m s/rad\]: the torque `-angular_damping w` against the angular velocity. Both dampings must
     /// be 0 for an object that is not dynamic.
     pub angular_damping: f64,
-    /// Coefficient of restitution, 0.14 to 1: the fraction of the velocity that is left after a bounce. `None` for
+    /// Coefficient of restitution, 0.14 to 1: ratio of the normal velocities after and before an impact. `None` for
     /// MuJoCo's soft contacts, which leave about 0.1.
     ///
     /// MuJoCo has no restitution: this value turns the contact into a spring and a damper (`solref` below 0) for about
     /// ten steps. Meanwhile a body that arrives at speed v \[m/s\] sinks in by up to `3.2 v dt`, so bouncing balls need
-    /// a small time step. The instant within the step at which the surfaces meet changes the coefficient: by -0.08 to
-    /// 0.04 below 0.3, by -0.06 to 0.04 at 0.5, by -0.02 to 0.03 at 0.8, and by 0.003 at 1. The coefficient applies to
-    /// an impact through the center of mass. Of two such surfaces the smaller coefficient applies; against a surface
-    /// without a coefficient, this one applies.
+    /// a small time step. The actual coefficient depends on the instant of impact within the time step. It deviates by
+    /// -0.08 to 0.04 below 0.3, by -0.06 to 0.04 at 0.5, by -0.02 to 0.03 at 0.8, and by 0.003 at 1. The coefficient
+    /// applies to an impact through the center of mass. Between two surfaces with coefficients, the smaller coefficient
+    /// applies. Against a surface without one, this coefficient applies.
     pub restitution: Option<f64>,
     /// Contact margin \[m\]: distance at which contact forces begin, as if the shape were larger by it. MuJoCo 2.2.2
     /// uses the larger margin of the two surfaces, 4.x their sum.

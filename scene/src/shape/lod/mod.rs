@@ -30,7 +30,7 @@ use simplify::Surface;
 pub struct LodLevel {
     /// Bound on the distance between both surfaces \[m\]: every point of each has a point of the other within it.
     pub error: f32,
-    /// The coarser mesh, which has no levels itself.
+    /// The coarser mesh; levels of its own are not used.
     pub mesh: RenderMesh,
 }
 

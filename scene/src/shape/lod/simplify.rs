@@ -21,7 +21,7 @@ pub(super) struct Surface<'a> {
     /// Triangles around each vertex, with the vertex's corner in each: `around[start[v]..start[v + 1]]`.
     start: Vec<u32>,
     around: Vec<(u32, u8)>,
-    /// Smallest known bound of a triangle after a collapse of each vertex \[m\].
+    /// Smallest known bound of a collapse of each vertex \[m\]; 0 if unknown, infinite if no collapse is possible.
     min_error: Vec<f32>,
 }
 

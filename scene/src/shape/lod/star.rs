@@ -99,7 +99,8 @@ impl Star {
         self.sort_triangles(surface, vertex) && self.project(surface, vertex)
     }
 
-    /// Sorts the triangles around the vertex.
+    /// Sorts the triangles around the vertex. Returns `false` if they are not one closed ring of 3 to [`MAX_VALENCE`]
+    /// triangles.
     fn sort_triangles(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         let around = surface.around(vertex);
         let count = around.len();
@@ -127,7 +128,7 @@ impl Star {
         ends[count - 1] == self.ring[0]
     }
 
-    /// Projects the triangles along their mean normal.
+    /// Projects the triangles along their mean normal. Returns `false` if they then overlap or degenerate.
     fn project(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         let count = self.count;
         let middle = surface.position(vertex);

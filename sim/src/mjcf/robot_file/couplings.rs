@@ -80,8 +80,8 @@ pub(super) fn of_joints(
     couplings
 }
 
-/// Joint at the end of the mimic chain of `joint`, or `joint` itself, and the ratio of the chain. `None` if a joint of
-/// the chain has a coupling that is not a mimic.
+/// Joint at the end of the mimic chain of `joint`, or `joint` itself, and the product of the multipliers of the chain.
+/// `None` if a joint of the chain has a coupling that is not a mimic.
 pub(super) fn mimic_root(couplings: &[Option<Coupling>], mut joint: usize) -> Option<(usize, f64)> {
     let mut ratio = 1.0;
     loop {
