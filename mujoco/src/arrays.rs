@@ -201,7 +201,7 @@ model_arrays! {
     tendon_solimp_lim: f64, "Impedance of limits, (ntendon, mjNIMP).";
     tendon_solref_fri: f64, "Reference of friction, (ntendon, mjNREF).";
     tendon_solimp_fri: f64, "Impedance of friction, (ntendon, mjNIMP).";
-    tendon_range: f64, "Limits \\[m\\], (ntendon, 2).";
+    tendon_range: f64, "Limits \\[m, in fixed tendons the unit of the sum\\], (ntendon, 2).";
     tendon_margin: f64, "Distances at which limits act \\[m\\], (ntendon,).";
     tendon_stiffness: f64, "Stiffness of springs, (ntendon,).";
     tendon_damping: f64, "Viscous damping, (ntendon,).";
@@ -259,7 +259,7 @@ data_arrays! {
     ctrl: f64, "Control inputs, (nu,).";
     qfrc_applied: f64, "Applied generalized forces, (nv,).";
     xfrc_applied: f64, "Applied force and torque on each body, in world axes at its center of mass, (nbody, 6).";
-    actuator_force: f64, "Force of each actuator, (nu,).";
+    actuator_force: f64, "Force of each actuator, (nu,); on 4.x of each actuator output.";
     qfrc_actuator: f64, "Actuator forces, (nv,).";
     qfrc_bias: f64, "Generalized force for zero acceleration without other forces (Coriolis, centrifugal, gravity), (nv,).";
     qfrc_constraint: f64, "Constraint forces, (nv,).";
@@ -292,7 +292,7 @@ data_arrays! {
     sensordata: f64, "Readings of MuJoCo's own sensors, (nsensordata,).";
     ten_wrapadr: i32, "First point of each tendon's path in `wrap_xpos`, (ntendon,).";
     ten_wrapnum: i32, "Number of points of each tendon's path, (ntendon,).";
-    ten_length: f64, "Lengths of tendons \\[m\\], (ntendon,).";
+    ten_length: f64, "Lengths of tendons \\[m; fixed tendons: weighted sum of joint positions\\], (ntendon,).";
     wrap_obj: i32, "Geom that each point of a path lies on, -1 at a site, -2 at a pulley, (nwrap, 2).";
     wrap_xpos: f64, "Points of paths \\[m\\], (nwrap, 6): two points in each row.";
 }

@@ -99,7 +99,7 @@ macro_rules! copied_arrays {
                     array.copy_from_slice(mine);
                     values = rest;
                 )*
-                debug_assert!(values.is_empty());
+                assert!(values.is_empty(), "the state is of another model: {} numbers too many", values.len());
             }
         }
     };
@@ -192,7 +192,7 @@ impl IntegrationState {
     }
 
     /// Copies the state into `data`, whose model must have the same sizes; its buffers may be larger. Does nothing with
-    /// an empty state. Too few numbers panic; too many are detected by debug builds only. Derived quantities are not
+    /// an empty state. Another number of values panics. Derived quantities are not
     /// updated.
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
@@ -224,8 +224,7 @@ impl JointInputs {
         self.save_arrays(data);
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Too few numbers panic; too many are
-    /// detected by debug builds only.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Another number of values panics.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
     }
@@ -267,8 +266,7 @@ impl BodyInputs {
         }
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes. Too few numbers panic; too many are
-    /// detected by debug builds only.
+    /// Copies the inputs into `data`, whose model must have the same sizes. Another number of values panics.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
@@ -289,7 +287,7 @@ impl SolvedState {
     }
 
     /// Copies the results into `data`, whose model must have the same sizes; its buffers may be larger. Does nothing if
-    /// no results were saved. Too few numbers panic; too many are detected by debug builds only.
+    /// no results were saved. Another number of values panics.
     pub fn restore(&self, data: &mut Data) {
         if !self.values.is_empty() {
             self.restore_arrays(data, &self.values);
@@ -390,8 +388,8 @@ impl UserInputs {
         self.equals_arrays(data)
     }
 
-    /// Copies the inputs into `data`, whose model must have the same sizes; its buffers may be larger. Too few numbers,
-    /// such as of inputs that were never saved, panic; too many are detected by debug builds only.
+    /// Copies the inputs into `data`, whose model must have the same sizes; its buffers may be larger. Another number of
+    /// values, such as of inputs that were never saved, panics.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
@@ -403,6 +401,19 @@ impl UserInputs {
 mod tests {
     use super::*;
     use crate as mj;
+
+    /// A state of a larger model was restored shifted in builds without debug assertions.
+    #[test]
+    #[should_panic(expected = "the state is of another model")]
+    fn states_of_other_models() {
+        let of = |joints: &str| {
+            let body = format!(r#"<mujoco><worldbody><body>{joints}<geom size="0.1"/></body></worldbody></mujoco>"#);
+            Data::new(&mj::compile(&body, &[]).expect("compiles").into_model()).expect("small")
+        };
+        let mut state = IntegrationState::default();
+        state.save(&of(r#"<joint axis="1 0 0"/><joint axis="0 1 0"/>"#));
+        state.restore(&mut of(r#"<joint axis="1 0 0"/>"#));
+    }
 
     /// A forward pass changes no more than [`UnnormalizedQuats`] keeps, on 2.2.2 and on 4.x.
     #[test]

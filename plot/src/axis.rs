@@ -50,10 +50,13 @@ impl Axis {
     }
 
     fn linear_ticks(&self) -> Vec<(f64, String)> {
-        let step = self.tick_step();
-        // The step is at most five times the wanted distance, and the range at least twice: a tenth is always enough.
-        let steps = [step, 0.5 * step, 0.2 * step, 0.1 * step];
-        let step = steps.into_iter().find(|step| self.multiples(*step).len() >= 2).unwrap_or(steps[3]);
+        let widest = self.tick_step();
+        let power = 10.0_f64.powf(widest.log10().round());
+        // The step is at most 5 times the wanted distance, and the range at least twice: a tenth is always enough.
+        let steps = [5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05].map(|k| k * power).into_iter();
+        let smaller = steps.filter(|step| *step < 0.9 * widest);
+        let step = std::iter::once(widest).chain(smaller).find(|step| self.multiples(*step).len() >= 2);
+        let step = step.unwrap_or(widest);
         self.multiples(step).into_iter().map(|tick| (tick, self.label(tick, step))).collect()
     }
 

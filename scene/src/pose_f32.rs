@@ -99,7 +99,10 @@ impl PoseF32 {
         self.translation.iter().all(|t| t.is_finite())
             && near(dot(r[0], r[0]), 1.)
             && near(dot(r[1], r[1]), 1.)
+            && near(dot(r[2], r[2]), 1.)
             && near(dot(r[0], r[1]), 0.)
+            && near(dot(r[0], r[2]), 0.)
+            && near(dot(r[1], r[2]), 0.)
             && near(dot(cross, r[2]), 1.)
     }
 }
@@ -169,6 +172,7 @@ mod tests {
             ("mirror", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
             ("scaled", [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]]),
             ("sheared", [[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+            ("sheared in the last row", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0, 0.0, 1.0]]),
             ("no number", [[f32::NAN; 3]; 3]),
         ] {
             assert!(!PoseF32 { rotation, ..PoseF32::IDENTITY }.is_rigid(), "{what}");

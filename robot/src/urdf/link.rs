@@ -51,11 +51,15 @@ pub(super) struct Materials {
 }
 
 impl Materials {
-    /// Reads the top-level materials. A name may be repeated with equal values.
+    /// Reads the top-level materials. A name may be repeated with equal values, or without values.
     pub(super) fn define(&mut self, reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> {
         for node in reader.named(root, "material") {
             let name = reader.required_text(node, "name", "robot", "<material name=\"grey\">")?;
             let look = read_material_values(reader, node, &format!("material \"{name}\""))?;
+            if look.rgba.is_none() && look.texture.is_none() {
+                // Another definition of the name, later or inside of a visual, has the values.
+                continue;
+            }
             let source = reader.source(node);
             match self.defined.get(name) {
                 Some((first, _)) if *first == look => continue,
@@ -70,10 +74,8 @@ impl Materials {
                 None => {}
             }
             write_material(&mut self.xml, name, &look);
-            if look.rgba.is_some() || look.texture.is_some() {
-                self.top_level.insert(name.to_owned());
-                self.defined.insert(name.to_owned(), (look, source));
-            }
+            self.top_level.insert(name.to_owned());
+            self.defined.insert(name.to_owned(), (look, source));
         }
         Ok(())
     }

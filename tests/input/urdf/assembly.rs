@@ -83,6 +83,27 @@ fn clashes(diagnostics: &[Diagnostic]) -> Vec<String> {
     diagnostics.iter().filter(|d| d.kind == DiagnosticKind::NameClash).map(ToString::to_string).collect()
 }
 
+/// Root cause: a material without values at the top of a file was a definition. It hid a later one at the top or in
+/// another visual, and was refused after one.
+#[test]
+fn materials_without_values() {
+    let files = TempFiles::default();
+    let empty = "<material name=\"a\"/>";
+    let red = "<material name=\"a\"><color rgba=\"1 0 0 1\"/></material>";
+    let visual = |material: &str| format!("<visual><geometry><sphere radius=\"1\"/></geometry>{material}</visual>");
+    for (top, visuals) in [
+        (format!("{empty}{red}"), visual(empty)),
+        (format!("{red}{empty}"), visual(empty)),
+        (empty.to_string(), visual(red) + &visual(empty)),
+    ] {
+        let text = format!("<robot name=\"m\">{top}<link name=\"a\">{visuals}</link></robot>");
+        let (robot, diagnostics) = merged(&UrdfCfg::single(files.write("materials.urdf", &text)));
+        let colors: Vec<_> = robot.links[0].visuals.iter().map(|v| v.material.as_ref().and_then(|m| m.rgba)).collect();
+        assert!(colors.iter().all(|color| *color == Some([1.0, 0.0, 0.0, 1.0])), "{text}: {colors:?}");
+        assert!(diagnostics.is_empty(), "{text}: {diagnostics:?}");
+    }
+}
+
 /// The caller sets the file name of each mesh and texture.
 #[test]
 fn file_names() {
