@@ -15,7 +15,7 @@ fn validate(texts: &[String]) -> Vec<bool> {
     let files = TempFiles::default();
     let schema = SceneCfg::json_schema(&EntityTypes::default());
     let task = serde_json::json!({ "schema": schema, "texts": texts });
-    let task = files.write("task.json", &task.to_string());
+    let task = files.write("task.json", task.to_string());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/api/scene/validate_schema.py");
     let valid: Vec<bool> = serde_json::from_value(read_json(&python_readers(), &script, &task)).unwrap();
     assert_eq!(valid.len(), texts.len());
