@@ -1,12 +1,30 @@
 //! Finds MuJoCo, checks that its version is supported (2.2.2 or 4.x), and generates the bindings.
 //!
 //! Search order: `MUJOCO_DIR` (a folder with `include/mujoco/mujoco.h` and `libmujoco.so*`, as in the PyPI wheel), then
-//! the system's include folders (Debian's `libmujoco-dev`).
+//! with the feature `download` the PyPI wheel itself, otherwise the system's include folders (Debian's `libmujoco-dev`).
+//!
+//! On docs.rs, where MuJoCo is missing, the committed declarations of 2.2.2 are used and nothing is linked.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::{env, fs};
+
+/// The three lines of the error without MuJoCo.
+const NOT_FOUND: &str = "MuJoCo was not found: install it (Debian 12: apt-get install libmujoco-dev, version 2.2.2),\n\
+                         or set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so* of MuJoCo 2.2.2 or 4.x,\n\
+                         or enable the feature `download` of kinetoscope, which gets MuJoCo 4.0.1 from PyPI by pip";
+
+/// Version of MuJoCo that the feature `download` gets.
+const DOWNLOADED: &str = "4.0.1";
+
+/// Architecture, platform tag and SHA-256 of the wheels of [`DOWNLOADED`]. Headers and library are the same in the wheels
+/// of all Python versions, of which these are for 3.11.
+const WHEELS: [(&str, &str, &str); 2] = [
+    ("x86_64", "manylinux_2_28_x86_64", "be28c0c7587347ef996b4de0487264e9da296282082b092bae211a9163e9aed6"),
+    ("aarch64", "manylinux_2_28_aarch64", "52d934614a56f7d75dcfc2bd8bb72f058b465ecc19a0583a56df242f9505bdb6"),
+];
 
 const SUPPORTED: &str = "supported versions: MuJoCo 2.2.2 (Debian 12: apt-get install libmujoco-dev) and MuJoCo 4.x \
                          (set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so*, for example the unpacked \
@@ -15,9 +33,20 @@ const SUPPORTED: &str = "supported versions: MuJoCo 2.2.2 (Debian 12: apt-get in
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DIR");
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed=DOCS_RS");
     println!("cargo::rustc-check-cfg=cfg(mj4)");
-    let installation = Installation::find().unwrap_or_else(|message| {
-        println!("cargo::error={message}");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    if env::var_os("DOCS_RS").is_some() {
+        println!("cargo::rerun-if-changed=docs_rs");
+        println!("cargo::metadata=version_header=222");
+        for file in ["bindings.rs", "fields.rs"] {
+            let declared = Path::new("docs_rs").join(format!("{file}.txt"));
+            fs::copy(declared, out.join(file)).expect("the committed declarations are readable");
+        }
+        return;
+    }
+    let installation = Installation::find(&out).unwrap_or_else(|message| {
+        message.lines().for_each(|line| println!("cargo::error={line}"));
         std::process::exit(1);
     });
     println!("cargo::rerun-if-changed={}", installation.header("mujoco.h").display());
@@ -27,7 +56,6 @@ fn main() {
     }
     installation.link();
 
-    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     write_bindings(&installation, &out.join("bindings.rs"));
     write_fields(&installation, &out.join("fields.rs"));
 }
@@ -40,8 +68,11 @@ struct Installation {
 }
 
 impl Installation {
-    fn find() -> Result<Self, String> {
-        let (include, library) = match env::var_os("MUJOCO_DIR").map(PathBuf::from) {
+    fn find(out: &Path) -> Result<Self, String> {
+        let given = env::var_os("MUJOCO_DIR").map(PathBuf::from);
+        let wants_download = given.is_none() && env::var_os("CARGO_FEATURE_DOWNLOAD").is_some();
+        let folder = if wants_download { Some(download(out)?) } else { given };
+        let (include, library) = match folder {
             Some(dir) => {
                 let dir =
                     fs::canonicalize(&dir).map_err(|e| format!("MUJOCO_DIR={}: {e}; {SUPPORTED}", dir.display()))?;
@@ -55,9 +86,7 @@ impl Installation {
                     .iter()
                     .map(PathBuf::from)
                     .find(|dir| dir.join("mujoco/mujoco.h").exists())
-                    .ok_or_else(|| {
-                        format!("MuJoCo's headers were not found in the system's include folders; {SUPPORTED}")
-                    })?;
+                    .ok_or(NOT_FOUND)?;
                 (include, None)
             }
         };
@@ -102,6 +131,53 @@ impl Installation {
         println!("cargo::rustc-link-search=native={}", out.display());
         println!("cargo::rustc-link-lib=dylib:+verbatim={name}");
     }
+}
+
+/// Gets the wheel with MuJoCo by pip, which compares its hash, and unpacks it below `out`.
+fn download(out: &Path) -> Result<PathBuf, String> {
+    let unpacked = out.join("wheel").join("mujoco");
+    if unpacked.join(format!("libmujoco.so.{DOWNLOADED}")).is_file() {
+        return Ok(unpacked);
+    }
+    let target = |variable: &str| env::var(variable).unwrap_or_default();
+    let (arch, os) = (target("CARGO_CFG_TARGET_ARCH"), target("CARGO_CFG_TARGET_OS"));
+    let wheel = WHEELS.iter().find(|(name, ..)| *name == arch).filter(|_| os == "linux");
+    let Some((_, platform, hash)) = wheel else {
+        return Err(format!("the feature `download` has no MuJoCo for {arch} {os}; set MUJOCO_DIR instead"));
+    };
+    let failed = |error: std::io::Error| format!("{}: {error}", out.display());
+    let (requirements, wheels, scratch) = (out.join("wheel.txt"), out.join("wheels"), out.join("wheel.tmp"));
+    for folder in [&wheels, &scratch] {
+        if folder.exists() {
+            fs::remove_dir_all(folder).map_err(failed)?;
+        }
+    }
+    fs::write(&requirements, format!("mujoco-core=={DOWNLOADED} --hash=sha256:{hash}\n")).map_err(failed)?;
+    let mut pip = Command::new("python3");
+    pip.args(["-m", "pip", "download", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"])
+        .args(["--only-binary=:all:", "--python-version", "3.11", "--platform", platform, "--require-hashes"])
+        .arg("--requirement")
+        .arg(&requirements)
+        .arg("--dest")
+        .arg(&wheels);
+    run(&mut pip)?;
+    let wheel = fs::read_dir(&wheels).map_err(failed)?.flatten().next();
+    let wheel = wheel.ok_or("pip downloaded no wheel of mujoco-core")?.path();
+    run(Command::new("python3").args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&scratch))?;
+    // Renamed at the end: a folder of that name is complete.
+    fs::rename(&scratch, out.join("wheel")).map_err(failed)?;
+    Ok(unpacked)
+}
+
+/// Runs a command; its messages are part of the error.
+fn run(command: &mut Command) -> Result<(), String> {
+    let name =
+        format!("{} -m {}", command.get_program().display(), command.get_args().nth(1).unwrap_or_default().display());
+    let output = command.output().map_err(|e| format!("{name}: {e} (the feature `download` needs Python with pip)"))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    Err(format!("{name} failed: {}", String::from_utf8_lossy(&output.stderr).trim()))
 }
 
 fn find_library(dir: &Path) -> Option<PathBuf> {

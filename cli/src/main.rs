@@ -5,11 +5,14 @@ mod bench;
 mod channel_image;
 mod check;
 mod command_status;
+mod completions;
 mod convert;
+mod events;
 mod excerpt;
 mod field_names;
 mod file_kind;
 mod interrupt;
+mod man;
 mod model;
 mod plot;
 mod progress;
@@ -17,6 +20,8 @@ mod recover;
 mod render;
 mod replay;
 mod scene_report;
+mod schema;
+mod text_output;
 mod view;
 
 use clap::{Parser, Subcommand};
@@ -44,6 +49,8 @@ Examples:
   kinetoscope plot run.mcap                     list the topics; with --topic, --field and --out: plot values
   kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
   kinetoscope recover run.mcap                  complete the file of an interrupted recording
+  kinetoscope schema -o scene.schema.json       completion and checks of scene files in editors
+  kinetoscope completions bash                  completion of this command in a shell; man: its manual page
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or aborted.
 FILE: URDF files, an MJCF file, or a scene file (TOML, YAML, JSON). A relative path that does not exist is looked up in
@@ -60,6 +67,9 @@ enum Command {
     Plot(plot::Args),
     Replay(replay::Args),
     Recover(recover::Args),
+    Schema(schema::Args),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 fn main() -> ExitCode {
@@ -71,6 +81,7 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    events::print_to_stderr();
     let result = match &args.command {
         Command::Check(args) => check::run(args),
         Command::Convert(args) => convert::run(args),
@@ -80,6 +91,9 @@ fn main() -> ExitCode {
         Command::Plot(args) => plot::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Recover(args) => recover::run(args),
+        Command::Schema(args) => schema::run(args),
+        Command::Completions(args) => completions::run(args),
+        Command::Man(args) => man::run(args),
     };
     match result {
         Ok(CommandStatus::Done) => ExitCode::SUCCESS,

@@ -341,8 +341,18 @@ pub(crate) fn alternating_eyes(num_envs: usize) -> Vec<[f64; 3]> {
     (0..num_envs).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect()
 }
 
+/// Prints events of the libraries to the standard error stream. `RUST_LOG` selects them (`RUST_LOG=kinetoscope_sim=info`);
+/// without it, only errors are printed.
+pub(crate) fn print_events() {
+    use tracing_subscriber::EnvFilter;
+    use tracing_subscriber::filter::LevelFilter;
+    let filter = EnvFilter::builder().with_default_directive(LevelFilter::ERROR.into()).from_env_lossy();
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+}
+
 /// Runs an example. An error is printed and gives exit code 2.
 pub(crate) fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
+    print_events();
     match example() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -26,12 +26,24 @@ unsafe extern "C-unwind" fn on_error(message: *const c_char) {
     }
     // MuJoCo exits the process when a handler returns. Every engine call of this crate is guarded, so a message that
     // arrives here is a bug of this crate. Aborting is safer than unwinding through unknown frames.
-    eprintln!("kinetoscope: MuJoCo error outside a guarded call: {text}");
+    tracing::error!(target: "kinetoscope_mujoco", "MuJoCo error outside a guarded call: {text}");
     std::process::abort();
 }
 
-/// Warnings are counted in `mjData.warning`; the handler keeps MuJoCo from writing to the console and to a log file.
-unsafe extern "C-unwind" fn on_warning(_message: *const c_char) {}
+/// Passes a warning on as an event. The handler keeps MuJoCo from writing to the console and to a log file.
+///
+/// `mjData.warning` counts warnings. Most of them are handled by the caller, which repeats the step with larger buffers
+/// or ends the environment, so the text alone is for debugging.
+unsafe extern "C-unwind" fn on_warning(message: *const c_char) {
+    // A panic of a subscriber must not unwind into MuJoCo's frames.
+    let _ = catch_unwind(|| {
+        if tracing::enabled!(target: "kinetoscope_mujoco", tracing::Level::DEBUG) {
+            // SAFETY: MuJoCo passes a NUL-terminated message that lives until this handler ends.
+            let text = unsafe { CStr::from_ptr(message) }.to_string_lossy();
+            tracing::debug!(target: "kinetoscope_mujoco", "{text}");
+        }
+    });
+}
 
 /// Replaces MuJoCo's process-wide error and warning handlers. Called once, from `check_version`.
 pub(super) fn install_handlers() {

@@ -4,10 +4,12 @@ use crate::format::Format;
 use crate::overview::OverviewCfg;
 use crate::topic::Topic;
 use kinetoscope_sim::EnvId;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Configuration of a recorder.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct RecorderCfg {
     /// Output file; a folder for [`Format::Images`] and [`Format::LeRobot`].
     pub path: PathBuf,
@@ -27,6 +29,7 @@ pub struct RecorderCfg {
     /// streams of that camera. A name without a recorded stream is an error. The last entry that matches a stream
     /// applies. A sensor with a period is recorded at these steps: its last measurement, if it is new. Task results are
     /// always recorded when they are published. LeRobot datasets have a single frame rate: any entry is an error.
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub stream_periods: Vec<(String, u64)>,
     /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. If all packets
     /// wait to be written, the simulation waits. A pool larger than 16 GiB is an error.

@@ -2,10 +2,12 @@
 
 use crate::error::{RecordError, Result};
 use crate::stream::{StreamKind, StreamSchema};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// File format of a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Format {
     /// MCAP file of ROS 2 messages, for Foxglove and Rerun. After the process is killed, [`recover`](crate::recover)

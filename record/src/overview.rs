@@ -8,9 +8,11 @@ use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::camera_fit::CameraFit;
 use kinetoscope_sensors::camera::look_at_pose;
 use kinetoscope_sim::{OffscreenScene, SimulationManager};
+use serde::{Deserialize, Serialize};
 
 /// Size, rate and viewpoint of the overview image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct OverviewCfg {
     /// Width and height \[pixels\].
     pub size: [usize; 2],

@@ -407,8 +407,23 @@ impl Recorder {
                 let packet = self.empty.recv().ok();
                 self.summary.waits += 1;
                 self.summary.wait_time += start.elapsed();
+                self.report_wait();
                 packet
             }
+        }
+    }
+
+    /// Emits an event about the first wait, the second, the fourth and so on: a slow disk makes every step wait.
+    fn report_wait(&self) {
+        let (waits, seconds) = (self.summary.waits, self.summary.wait_time.as_secs_f64());
+        if waits.is_power_of_two() {
+            tracing::warn!(
+                target: "kinetoscope_record",
+                path = %self.cfg.path.display(),
+                waits,
+                seconds,
+                "the simulation waits for the recorder"
+            );
         }
     }
 

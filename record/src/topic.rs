@@ -1,7 +1,10 @@
 //! Recorded topics.
 
+use serde::{Deserialize, Serialize};
+
 /// A selection of what is recorded, by name.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Topic {
     /// All topics below that exist when the recording begins and that the format supports, with the exceptions noted at

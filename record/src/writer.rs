@@ -113,7 +113,10 @@ pub(crate) fn run(
         }
         if let Err(error) = &result {
             dirty = false;
-            reason.get_or_init(|| error.to_string());
+            reason.get_or_init(|| {
+                tracing::error!(target: "kinetoscope_record", %error, "the recording stopped");
+                error.to_string()
+            });
             failed.store(true, Ordering::Relaxed);
         }
     }

@@ -158,7 +158,12 @@ impl Batch {
         let mut chunks = Vec::with_capacity(count);
         for first in (0..num_envs).step_by(chunk_size) {
             let size = chunk_size.min(num_envs - first);
-            let rows = (0..size).map(|_| Box::new(template.clone())).collect();
+            let row = |k: usize| {
+                let mut row = Box::new(template.clone());
+                row.cold.env = Some(first + k);
+                row
+            };
+            let rows = (0..size).map(row).collect();
             chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new() }));
         }
         let threads = threads.min(count);

@@ -1,9 +1,10 @@
 //! Handles of environments and entities.
 
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 
 /// Index of an environment of this process, from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct EnvId(pub usize);
 
 /// Handle of a robot, valid for the manager that created it. A passive articulation has such a handle too.

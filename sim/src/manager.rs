@@ -222,7 +222,7 @@ impl SimulationManager {
         self.simulation = simulation;
         mj::trim_heap();
         self.entities = contents;
-        self.diagnostics.extend(diagnostics);
+        self.add_diagnostics(diagnostics);
         if !self.sensors.is_empty() {
             let context = self.sensor_context(self.sensors.requires());
             self.sensors.rebuild(&mut self.simulation, &context);
@@ -304,8 +304,17 @@ impl SimulationManager {
     /// with a diagnostic.
     pub(crate) fn visual_scene(&mut self) -> Arc<VisualScene> {
         let visible = self.simulation.build_visual_scene(&self.cfg, &self.entities, &mut self.visuals);
-        self.diagnostics.extend(self.visuals.take_diagnostics());
+        let diagnostics = self.visuals.take_diagnostics();
+        self.add_diagnostics(diagnostics);
         visible
+    }
+
+    /// Adds diagnostics, each of which is also an event.
+    fn add_diagnostics(&mut self, diagnostics: Vec<Diagnostic>) {
+        for diagnostic in &diagnostics {
+            tracing::warn!(target: "kinetoscope_sim", kind = diagnostic.kind.name(), "{diagnostic}");
+        }
+        self.diagnostics.extend(diagnostics);
     }
 
     /// Render scene of an environment with its own sizes or colors; `EnvScene(None)` for the shared scene.

@@ -50,6 +50,8 @@ pub struct EnvRow {
 /// Fields that a successful step does not touch.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ColdState {
+    /// Index of the environment in its batch, for events; `None` outside of a batch.
+    pub(crate) env: Option<usize>,
     pub(crate) warnings: WarningCounts,
     /// Quantities captured in the last step for which sensors needed them.
     pub(crate) captured: CapturedStep,

@@ -1,9 +1,11 @@
 //! Lengths of steps and episodes.
 
 use crate::error::{EnvError, Result};
+use serde::{Deserialize, Serialize};
 
 /// Configuration of a task: lengths of steps and episodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct EnvCfg {
     /// Physics steps in one step of the task.
     pub decimation: u32,

@@ -13,6 +13,7 @@
 //! | [`svg`] | reading of SVG plots |
 //! | [`urdf`] | URDF snippets |
 //! | [`wait`] | waiting for other threads or processes |
+//! | `events` (feature `events`) | events of the libraries |
 //! | `scenes` (feature `scenes`) | scenes to render |
 //! | `x_server` (feature `x_server`) | an X server without a screen |
 //! | `worlds` (feature `worlds`) | simulations, robots, objects and cameras |
@@ -24,6 +25,8 @@
 
 pub mod bits;
 pub mod error_tables;
+#[cfg(feature = "events")]
+pub mod events;
 pub mod image_check;
 pub mod opencv;
 pub mod process;

@@ -4,6 +4,7 @@
 
 mod articulations;
 mod batch;
+mod configurations;
 mod drives;
 mod environments;
 mod kinematics;

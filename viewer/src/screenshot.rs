@@ -8,11 +8,13 @@ use crate::scene_view::{
 use kinetoscope_render::{RenderError, View};
 use kinetoscope_scene::AtomicFile;
 use kinetoscope_sim::SimulationManager;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Settings of a screenshot.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ScreenshotCfg {
     /// Image size: pixels per row, rows.
     pub size: [usize; 2],

@@ -8,7 +8,7 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, python_cfg, python_package,
+    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, package, python_cfg, python_package,
     python_simulation, site, source_check, spelling, wheel,
 };
 use serde_json::json;
@@ -90,6 +90,13 @@ const STAGES: &[Stage] = &[
         when: When::Always,
         run: |c| docs_check::run(c.repo),
     },
+    Stage {
+        name: "package",
+        what: "packages for crates.io",
+        // It asks the registry.
+        when: When::Full,
+        run: |c| package::run(c.repo, &c.debian()?),
+    },
     Stage { name: "clippy", what: "lints", when: When::Always, run: |c| clippy(&c.debian()?, &["--workspace"]) },
     Stage { name: "unit", what: "unit tests, MuJoCo 2.2.2", when: When::Quick, run: unit_tests },
     Stage {
@@ -99,6 +106,12 @@ const STAGES: &[Stage] = &[
         run: |c| python_cfg::check(&c.debian()?),
     },
     Stage { name: "rustdoc", what: "documentation", when: When::Full, run: rustdoc },
+    Stage {
+        name: "docs-rs",
+        what: "documentation without MuJoCo, as on docs.rs",
+        when: When::Full,
+        run: |c| package::docs_rs(c.repo, &c.debian()?),
+    },
     Stage { name: "demo", what: "the README's first command", when: When::Full, run: demo },
     Stage { name: "test", what: "the README's second command, MuJoCo 2.2.2", when: When::Full, run: readme_test },
     Stage {

@@ -28,6 +28,7 @@ mod language;
 mod mutate;
 mod mutations;
 mod own_time;
+mod package;
 mod physics_page;
 mod physics_report;
 mod progress;

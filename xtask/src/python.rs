@@ -14,9 +14,16 @@ pub(crate) const VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 /// message.
 pub(crate) const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 
-/// Python packages that read our recordings.
-const READERS: &[&str] =
-    &["numpy==2.4.6", "mcap==1.6.0", "mcap-ros2-support==0.6.0", "pillow==13.0.0", "av==18.1.0", "pyarrow==26.0.1"];
+/// Python packages that read our recordings, and one that validates scene files.
+const READERS: &[&str] = &[
+    "numpy==2.4.6",
+    "mcap==1.6.0",
+    "mcap-ros2-support==0.6.0",
+    "pillow==13.0.0",
+    "av==18.1.0",
+    "pyarrow==26.0.1",
+    "jsonschema==4.26.0",
+];
 
 /// The version of the spelling checker. Other versions have other word lists.
 const TYPOS_VERSION: &str = "1.52.0";
@@ -76,8 +83,9 @@ pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
 pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
     let venv = repo.target.join("readers-venv");
     let python = venv.join("bin/python");
-    let is_ready =
-        || Cmd::new(&python).args(["-c", "import numpy, mcap, mcap_ros2, PIL, av, pyarrow"]).quiet().succeeds();
+    let is_ready = || {
+        Cmd::new(&python).args(["-c", "import numpy, mcap, mcap_ros2, PIL, av, pyarrow, jsonschema"]).quiet().succeeds()
+    };
     if is_ready() {
         return Some(python);
     }

@@ -145,6 +145,7 @@ pub(crate) enum Requirement {
     Chromium,
     Xvfb,
     Readelf,
+    Groff,
 }
 
 impl Requirement {
@@ -160,6 +161,7 @@ impl Requirement {
             Self::Chromium => &["chromium"],
             Self::Xvfb => &["xvfb"],
             Self::Readelf => &["binutils"],
+            Self::Groff => &["groff-base"],
         }
     }
 
@@ -179,6 +181,7 @@ impl Requirement {
             }
             Self::Chromium => "Chromium (the page of the browser view is tested in it)",
             Self::Readelf => "readelf (a MuJoCo of another version than the headers is tested with it)",
+            Self::Groff => "groff (the manual pages are checked with it)",
             Self::Xvfb => "Xvfb, an X server without a screen (the window is tested on it)",
         }
     }
@@ -217,6 +220,7 @@ impl Machine {
                     && self.library_folders().iter().any(|dir| dir.join("libmujoco.so").exists())
             }
             Requirement::Xvfb => self.search_path.iter().any(|dir| dir.join("Xvfb").is_file()),
+            Requirement::Groff => self.search_path.iter().any(|dir| dir.join("groff").is_file()),
             Requirement::Readelf => self.search_path.iter().any(|dir| dir.join("readelf").is_file()),
             Requirement::Models => self.root.join("usr/share/mujoco/model/humanoid/humanoid.xml").exists(),
             Requirement::Pip | Requirement::Venv => (self.python_has)(need),

@@ -42,7 +42,7 @@ const NEEDS_VENDOR_ROBOTS: SkippedTests = SkippedTests {
 pub(crate) fn version_dependent_packages() -> [&'static str; 8] {
     [
         "--package",
-        "mujoco-sys",
+        "kinetoscope-mujoco-sys",
         "--package",
         "kinetoscope-mujoco",
         "--package",
@@ -60,18 +60,19 @@ pub(crate) fn run(repo: &Repo, args: &TestArgs) -> XtaskResult {
 }
 
 pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> XtaskResult {
-    const NEEDS: [Requirement; 7] = [
+    const NEEDS: [Requirement; 8] = [
         Requirement::Xvfb,
         Requirement::Chromium,
         Requirement::Models,
         Requirement::Readelf,
+        Requirement::Groff,
         Requirement::Pip,
         Requirement::Venv,
         Requirement::OsMesa,
     ];
     // Images are compared with MuJoCo's own renderer only if both use the same MuJoCo version.
     let with_renderer = args.mujoco == Some(MujocoVersion::Wheel);
-    let needs = if with_renderer { &NEEDS[..] } else { &NEEDS[..6] };
+    let needs = if with_renderer { &NEEDS[..] } else { &NEEDS[..7] };
     let ready = setup::prepare(repo, Requirements { version: args.mujoco, extras: needs })?;
     let mut left_out = vec![if with_renderer { NEEDS_MUJOCO_2 } else { NEEDS_MUJOCO_4 }];
     // A variable left over from a bless must not turn the tests into a rewrite of the golden files.

@@ -3,10 +3,12 @@
 
 mod browser;
 mod commands;
+mod events;
 mod plots;
 mod recording_page;
 mod replays;
 mod serve;
+mod shells;
 mod support;
 mod tutorials;
 mod view;

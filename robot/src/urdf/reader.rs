@@ -341,16 +341,5 @@ pub(super) fn format_numbers(numbers: &[f64]) -> String {
 
 /// Appends ` name="text"` with the special characters of XML escaped.
 pub(super) fn write_attribute(out: &mut String, name: &str, text: &str) {
-    let _ = write!(out, " {name}=\"");
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&apos;"),
-            c => out.push(c),
-        }
-    }
-    out.push('"');
+    let _ = write!(out, " {name}=\"{}\"", quick_xml::escape::escape(text));
 }

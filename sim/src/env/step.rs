@@ -62,6 +62,7 @@ impl SimEnv {
             match classify_step(done, &raised) {
                 StepOutcome::Succeeded => {
                     if raised != WarningCounts::default() {
+                        self.report_warnings(&raised);
                         self.row.cold.warnings.add(&raised);
                     }
                     self.row.drives.finish_step(efforts);
@@ -248,7 +249,7 @@ impl SimEnv {
                     reason
                 }
             };
-            let (current, before) = (self.current_motion(), self.row.diverged.take());
+            let (current, before) = (self.current_motion(), self.row.diverged.clone());
             self.mark_diverged(reason, good.unwrap_or(&current));
             if good.is_none() && before.is_some() {
                 self.row.diverged = before;
@@ -311,7 +312,17 @@ impl SimEnv {
         self.stage = Stage::Raw;
         self.held = 0;
         self.buffer_growths += 1;
+        let bytes = self.data.bytes();
+        tracing::info!(target: "kinetoscope_sim", env = self.row.cold.env, ?what, bytes, "a buffer of MuJoCo was doubled");
         Ok(())
+    }
+
+    /// Emits an event for each of MuJoCo's warnings in `raised` that the environment has for the first time.
+    fn report_warnings(&self, raised: &WarningCounts) {
+        let (env, counts) = (self.row.cold.env, &self.row.cold.warnings);
+        for warning in Warning::ALL.into_iter().filter(|&kind| raised.get(kind) > 0 && counts.get(kind) == 0) {
+            tracing::warn!(target: "kinetoscope_sim", env, warning = warning.name(), "MuJoCo warned in an environment");
+        }
     }
 
     /// Restores the state that the row has.
@@ -330,6 +341,10 @@ impl SimEnv {
 
     /// Marks the environment as diverged and restores `good`, the last valid state, without a forward pass.
     fn mark_diverged(&mut self, reason: Divergence, good: &IntegrationState) {
+        if self.row.diverged.is_none() {
+            let (env, step) = (self.row.cold.env, self.row.steps);
+            tracing::warn!(target: "kinetoscope_sim", env, step, %reason, "an environment diverged");
+        }
         self.row.diverged = Some(Box::new(EnvStatus::Diverged { step: self.row.steps, reason }));
         self.row.cold.captured.clear();
         self.data.reset();

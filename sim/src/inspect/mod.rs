@@ -28,6 +28,7 @@ use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::mesh::load;
 use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
@@ -38,7 +39,8 @@ const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 const MIMIC_TOLERANCE: f64 = 1e-6;
 
 /// Robot files and position to inspect.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct InspectCfg {
     /// The URDF files; empty if `mjcf` is set.
     pub urdf: UrdfCfg,
@@ -49,6 +51,7 @@ pub struct InspectCfg {
     pub floating_base: bool,
     /// Positions \[rad or m\] by joint name. Joints without a position are at 0, or at `ref` of an MJCF file. Joints
     /// that follow others (mimic joints, or curves of an MJCF file) have the implied position.
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub qpos: Vec<(String, f64)>,
 }
 

@@ -23,13 +23,13 @@ use toml::de::{DeTable, DeValue};
 const SECTIONS: [&str; 3] = ["simulation", "entities", EXCLUSIONS];
 
 /// Key of the collision exclusions.
-const EXCLUSIONS: &str = "exclude_collisions";
+pub(super) const EXCLUSIONS: &str = "exclude_collisions";
 
 /// Constructor of a set of defaults.
-type Preset = fn() -> SimulationManagerCfg;
+pub(super) type Preset = fn() -> SimulationManagerCfg;
 
 /// Sets of defaults by their name in files.
-const PRESETS: [(&str, Preset); 3] = [
+pub(super) const PRESETS: [(&str, Preset); 3] = [
     ("default", SimulationManagerCfg::default),
     ("manipulation", SimulationManagerCfg::manipulation),
     ("legged", SimulationManagerCfg::legged),

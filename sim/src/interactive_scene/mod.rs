@@ -7,6 +7,7 @@ mod entity;
 mod exclusion;
 mod file;
 mod lookup;
+mod schema;
 mod types;
 mod value;
 mod yaml;

@@ -2,6 +2,7 @@
 //! `kinetoscope-sensors`.
 
 use super::entity::{AnySensorCfg, EntityCfg};
+use super::schema;
 use super::value::{Value, ValueError};
 use crate::objects::articulation::ArticulationCfg;
 use crate::objects::mjcf_part_data::MjcfPartCfg;
@@ -36,6 +37,8 @@ pub struct EntityTypes {
 pub(super) struct EntityType {
     pub(super) name: String,
     pub(super) read: fn(Value<'_>) -> Result<EntityCfg, ValueError>,
+    /// JSON Schema of the table without `type`.
+    pub(super) schema: fn() -> serde_json::Value,
     /// Returns `None` for entities of other types.
     pub(super) write: fn(&EntityCfg) -> Option<Result<toml::Table, toml::ser::Error>>,
 }
@@ -84,6 +87,14 @@ impl EntityTypes {
         let entry = EntityType {
             name,
             read: |value| K::Cfg::deserialize(value).map(Into::into),
+            schema: || {
+                let mut schema = schema::of::<K::Cfg>();
+                if let Some(properties) = schema["properties"].as_object_mut().filter(|_| !K::IS_SENSOR) {
+                    // The name of the entity is the key of its table.
+                    properties.remove("uid");
+                }
+                schema
+            },
             write: |entity| K::from_entity(entity).map(toml::Table::try_from),
         };
         self.entries.retain(|other| other.name != entry.name);
@@ -92,6 +103,11 @@ impl EntityTypes {
 
     pub(super) fn get(&self, name: &str) -> Option<&EntityType> {
         self.entries.iter().find(|entry| entry.name == name)
+    }
+
+    /// Names of the types with the JSON Schemas of their tables, without `type`.
+    pub(super) fn schemas(&self) -> impl Iterator<Item = (&str, serde_json::Value)> {
+        self.entries.iter().map(|entry| (entry.name.as_str(), (entry.schema)()))
     }
 
     /// Returns the type name and the TOML table of an entity, or `None` for an unknown type.
@@ -115,6 +131,9 @@ impl SensorTypeVisitor for WithBuiltInSensors {
 /// An entity type that can be read and recognized among entities.
 trait EntityKind {
     type Cfg: Serialize + DeserializeOwned + Into<EntityCfg>;
+
+    /// True for sensors, which have no `uid` of their own.
+    const IS_SENSOR: bool = false;
 
     fn from_entity(entity: &EntityCfg) -> Option<&Self::Cfg>;
 }
@@ -180,6 +199,8 @@ struct SensorKind<C>(std::marker::PhantomData<C>);
 
 impl<C: AnySensorCfg + Serialize + DeserializeOwned> EntityKind for SensorKind<C> {
     type Cfg = C;
+
+    const IS_SENSOR: bool = true;
 
     fn from_entity(entity: &EntityCfg) -> Option<&C> {
         let EntityCfg::Sensor(sensor) = entity else { return None };

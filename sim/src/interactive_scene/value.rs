@@ -93,7 +93,16 @@ impl<'de> Deserializer<'de> for Value<'de> {
             DeValue::Datetime(when) => {
                 Err(de::Error::custom(format!("unexpected date `{when}`; scene files have no dates")))
             }
-            DeValue::Array(array) => visitor.visit_seq(ArrayItems(array.into_iter())),
+            DeValue::Array(array) => {
+                let (length, mut items) = (array.len(), ArrayItems(array.into_iter()));
+                visitor.visit_seq(&mut items).and_then(|value| match items.0.len() {
+                    0 => Ok(value),
+                    rest => {
+                        let expected = format!("an array of length {}", length - rest);
+                        Err(de::Error::invalid_length(length, &expected.as_str()))
+                    }
+                })
+            }
             DeValue::Table(table) => visitor.visit_map(TableEntries::new(table)),
         };
         read.map_err(|error| error.at(&span))

@@ -69,6 +69,8 @@ fn kinds() {
     let rows: Rows<'_> = &[
         (3, "[entities.c]\n# first\ntype = \"camara\"", "\"c\"|`camera`|`ray_caster`"),
         (2, "\n[entities.c]\nwidth = 2", "\"c\"|type|`camera`"),
+        // Regression: numbers beyond the length of an array were ignored.
+        (3, "@rigid_object\nshape.box.size = [1, 1, 1, 2]", "invalid length 4|an array of length 3"),
         (3, "@ray_caster\npattern.gird.resolution = 0.1", "gird|`grid`"),
         (2, "[simulation]\npreset = \"walking\"", "`legged`|`manipulation`"),
         (3, "@camera\nchannels = [\n\"rgb\",\n\"deph\"]", "deph|depth"),

@@ -7,4 +7,5 @@ mod mistakes;
 mod quadruped;
 mod reset;
 mod round_trip;
+mod schema;
 mod terrain;

@@ -32,7 +32,7 @@ entities:
 "#;
 
 /// Entities of every type, with numbers that need all their digits.
-fn every_kind() -> SceneCfg {
+pub(crate) fn every_kind() -> SceneCfg {
     let third = 1.0 / 3.0;
     let noise = NoiseCfg { std: third, bias_std: 1e-300, ..Default::default() };
     let sampling = SamplingCfg { noise: [("lin_acc_b".to_string(), noise)].into(), ..SamplingCfg::every(0.02) };

@@ -10,7 +10,7 @@ use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCa
 use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::worlds::{look_at, object};
 
-const FILE: &str = r#"
+pub(crate) const FILE: &str = r#"
 [simulation]
 num_envs = 2
 seed = 3

@@ -15,6 +15,7 @@ pub use view_controller::{Play, PlayError, PlaybackSource, ViewController};
 
 use crate::scene_view::EnvSelection;
 use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// A request of a viewer to the simulation. Commands run between two steps, on the simulation's thread.
@@ -89,7 +90,8 @@ impl Command {
 }
 
 /// Speed of simulated time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Speed {
     /// As fast as the machine can step.
     #[default]

@@ -4,10 +4,12 @@ use super::snapshot::Snapshot;
 use kinetoscope_render::View;
 use kinetoscope_scene::camera_fit::{CameraFit, DEFAULT_FILL, DEFAULT_REACH, PosedScene};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// An orbit camera that turns about a target point, pans, zooms and flies. The world's +z points up in the image; the
 /// camera never rolls.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct OrbitCamera {
     /// Target point in the center of the image, in the frame of the overview \[m\].
     pub target: [f64; 3],

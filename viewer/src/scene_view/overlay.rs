@@ -14,9 +14,11 @@ use kinetoscope_scene::Contact;
 use kinetoscope_scene::Marker;
 use kinetoscope_sim::JointAxis;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// Selection of the drawn overlays and geom groups; true is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Overlays {
     /// Debug markers of the sensors that enable them (`debug_vis`).
     pub sensors: bool,

@@ -6,10 +6,12 @@ use kinetoscope_robot::description::{Joint, JointKind};
 use kinetoscope_scene::Contact;
 use kinetoscope_scene::{Marker, RenderScene};
 use kinetoscope_sim::{EnvId, EnvVisualState, JointIndex, MaskId, RobotId, SimulationManager, Viewpoint};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Selection of environments.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum EnvSelection {
     /// All environments, side by side in their grid.
     #[default]

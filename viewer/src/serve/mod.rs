@@ -40,6 +40,7 @@ pub use error::ServeError;
 use crate::control::{RecordButton, SnapshotRequest, Speed, ViewerExt};
 use access_policy::AccessPolicy;
 use kinetoscope_sim::{Observer, ObserverId, SimEvent, SimulationManager};
+use serde::{Deserialize, Serialize};
 use server::{Server, ServerContext};
 use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
@@ -47,7 +48,8 @@ use token::Token;
 use viewer_session::ViewerHub;
 
 /// Settings of the browser view.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ServeCfg {
     /// Maximum number of simultaneous viewers. Further viewers are refused with status 503 (Service Unavailable).
     pub max_viewers: usize,
@@ -59,7 +61,8 @@ pub struct ServeCfg {
     /// Speed of simulated time until a viewer changes it, and again 10 s after the last viewer has left. `None` keeps
     /// the current speed: that set by a window, otherwise as fast as the machine can step.
     pub speed: Option<Speed>,
-    /// Record button of the simulation. `None` keeps the button that another view has set, if any.
+    /// Record button of the simulation. `None` keeps the button that another view has set, if any. Not part of files.
+    #[serde(skip)]
     pub record_button: Option<RecordButton>,
 }
 
@@ -135,6 +138,7 @@ impl Serve for SimulationManager {
         let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
         let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
         let token_query = token.as_ref().map_or_else(String::new, |token| format!("?token={}", token.as_str()));
+        let has_token = token.is_some();
         let url = format!("http://{}/{token_query}", address::reachable_address(address));
         // Requests two snapshots per second. A new viewer thus starts with a state at most half a second old, even if
         // the program does not step then.
@@ -144,6 +148,8 @@ impl Serve for SimulationManager {
         button.into_iter().for_each(|button| self.set_record_button(button));
         let context = server.context();
         let host = self.observers_mut().add(ServerObserver(server));
+        // The URL stays out of the event: logs are read by more people than may control the simulation.
+        tracing::info!(target: "kinetoscope_viewer", %address, has_token, "serving a browser view");
         Ok(ServerHandle { url, address, context, host })
     }
 }

@@ -3,11 +3,13 @@
 use super::x11::{DisplayError, WindowEvent, XWindow};
 use super::{Closed, POLL_INTERVAL, Window, WindowError, WindowState, spawn_window};
 use crate::scene_view::Canvas;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 /// Settings of an [`ImageWindow`].
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ImageWindowCfg {
     /// Text of the title bar.
     pub title: String,

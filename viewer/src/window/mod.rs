@@ -20,13 +20,15 @@ pub use key_bindings::Key;
 use crate::control::{Command, RecordButton, SnapshotRequest, Speed, Viewer, ViewerExt};
 use crate::scene_view::Canvas;
 use kinetoscope_sim::SimulationManager;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 use x11::{DisplayError, WindowEvent, XWindow};
 
 /// Settings of a simulation window.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct WindowCfg {
     /// Text of the title bar.
     pub title: String,
@@ -39,7 +41,8 @@ pub struct WindowCfg {
     /// Maximum number of rendering threads. `None` uses every core. Half of them, but at least one, render while
     /// physics needs all available time ([`App::new`]).
     pub threads: Option<usize>,
-    /// Record button of the simulation. `None` keeps the button that another view has set, if any.
+    /// Record button of the simulation. `None` keeps the button that another view has set, if any. Not part of files.
+    #[serde(skip)]
     pub record_button: Option<RecordButton>,
 }
 
@@ -245,7 +248,11 @@ fn spawn_window<T: Send + 'static>(
         if opened.send(Ok(())).is_err() {
             return;
         }
-        let closed = run(screen, state, &shared).unwrap_or_else(|failure| Closed::DisplayLost(failure.to_string()));
+        let closed = run(screen, state, &shared).unwrap_or_else(|failure| {
+            let reason = failure.to_string();
+            tracing::warn!(target: "kinetoscope_viewer", reason, "the window lost its display");
+            Closed::DisplayLost(reason)
+        });
         ending.report(closed);
     };
     let thread = std::thread::Builder::new().name("kinetoscope-window".into());

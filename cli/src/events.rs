@@ -1,0 +1,15 @@
+//! Output of the libraries' events.
+
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
+
+/// Prints events of the libraries to the standard error stream. `RUST_LOG` selects them (`RUST_LOG=kinetoscope_sim=debug`);
+/// without it, only errors are printed, because the command itself reports warnings.
+pub(crate) fn print_to_stderr() {
+    let errors = || EnvFilter::builder().with_default_directive(LevelFilter::ERROR.into());
+    let filter = errors().from_env().unwrap_or_else(|error| {
+        eprintln!("warning: RUST_LOG: {error}; only errors are logged");
+        errors().parse_lossy("")
+    });
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+}

@@ -1,0 +1,86 @@
+//! Configurations beside scene files: written to TOML and read back, with the names of files.
+
+use kinetoscope::prelude::*;
+use kinetoscope::record::{Format, OverviewCfg, RecorderCfg, Topic};
+use kinetoscope::sim::Shard;
+use kinetoscope::sim::inspect::InspectCfg;
+use kinetoscope::tasks::EnvCfg;
+use kinetoscope::viewer::{
+    EnvSelection, ImageWindowCfg, OrbitCamera, Overlays, ScreenshotCfg, ServeCfg, Speed, WindowCfg,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+
+/// Asserts that `text` is `cfg`, that both survive a round trip, that an empty text is the default, and that unknown
+/// keys are errors.
+#[track_caller]
+fn check<C: Debug + Default + PartialEq + Serialize + DeserializeOwned>(text: &str, cfg: &C) {
+    assert_eq!(&toml::from_str::<C>(text).unwrap(), cfg, "{text}");
+    let written = toml::to_string(cfg).unwrap();
+    assert_eq!(&toml::from_str::<C>(&written).unwrap(), cfg, "{written}");
+    assert_eq!(toml::from_str::<C>("").unwrap(), C::default());
+    let error = toml::from_str::<C>(&format!("nonsense = 1\n{text}")).unwrap_err().to_string();
+    assert!(error.contains("nonsense"), "{error}");
+}
+
+#[test]
+fn recorder() {
+    let text = r#"
+        path = "run.npz"
+        format = "lerobot"
+        topics = ["everything", "engine_states", { joint_states = "arm" }, { channel = { sensor = "eye", channel = "rgb" } }]
+        envs = [2, 0]
+        stream_periods = { camera = 30, "arm/link_poses" = 2 }
+        [overview]
+        size = [64, 48]
+        eye = [1, 2, 3.5]
+    "#;
+    let cfg = RecorderCfg {
+        format: Some(Format::LeRobot),
+        topics: vec![
+            Topic::Everything,
+            Topic::EngineStates,
+            Topic::JointStates("arm".into()),
+            Topic::channel("eye", "rgb"),
+        ],
+        envs: Some(vec![EnvId(2), EnvId(0)]),
+        stream_periods: vec![("camera".into(), 30), ("arm/link_poses".into(), 2)],
+        overview: OverviewCfg { size: [64, 48], eye: Some([1.0, 2.0, 3.5]), ..OverviewCfg::default() },
+        ..RecorderCfg::new("run.npz")
+    };
+    check(text, &cfg);
+    for (format, name) in [
+        (Format::Mcap, "mcap"),
+        (Format::Npz, "npz"),
+        (Format::Images, "images"),
+        (Format::Gif, "gif"),
+        (Format::Mp4, "mp4"),
+    ] {
+        check(&format!("format = \"{name}\""), &RecorderCfg { format: Some(format), ..RecorderCfg::default() });
+    }
+}
+
+#[test]
+fn views() {
+    let window = WindowCfg { size: [640, 480], speed: Some(Speed::Factor(0.5)), ..WindowCfg::default() };
+    check("size = [640, 480]\nspeed.factor = 0.5", &window);
+    check("title = \"depth\"", &ImageWindowCfg { title: "depth".into(), ..ImageWindowCfg::default() });
+    let serve = ServeCfg { max_viewers: 2, speed: Some(Speed::Unlimited), ..ServeCfg::default() };
+    check("max_viewers = 2\nspeed = \"unlimited\"", &serve);
+    let camera = Some(OrbitCamera { distance: 5.0, ..OrbitCamera::default() });
+    let overlays = Overlays { contacts: true, ..Overlays::default() };
+    let shot = ScreenshotCfg { camera, envs: EnvSelection::One(3), overlays, ..ScreenshotCfg::default() };
+    check("camera.distance = 5\nenvs.one = 3\noverlays.contacts = true", &shot);
+}
+
+#[test]
+fn tasks_and_files() {
+    check("decimation = 4\nepisode_steps = 500", &EnvCfg { decimation: 4, episode_steps: Some(500) });
+    let qpos = vec![("shoulder".into(), 0.5)];
+    check(
+        "floating_base = true\nqpos.shoulder = 0.5",
+        &InspectCfg { floating_base: true, qpos, ..InspectCfg::default() },
+    );
+    check("rank = 1\nworld = 4", &Shard { rank: 1, world: 4 });
+}
