@@ -1,5 +1,6 @@
 //! The batch of environments of a task: [`Env`].
 
+use crate::autoreset::AutoresetMode;
 use crate::builder::Terms;
 use crate::cfg::EnvCfg;
 use crate::context::{TaskState, TermContext};
@@ -26,8 +27,9 @@ use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 /// 6. Reset the environments whose episode ended to the initial state, draw new commands, run the [`EventMode::Reset`]
 ///    events, and observe these environments again.
 ///
-/// An episode thus begins in the step in which the previous one ends (Gymnasium's `AutoresetMode.SAME_STEP`). No step
-/// is spent on a reset alone.
+/// This is the order of [`AutoresetMode::SameStep`], in which no step is spent on a reset alone. In
+/// [`AutoresetMode::NextStep`], point 6 comes before point 5, in the environments whose episode ended in the step before.
+/// In [`AutoresetMode::Disabled`] there is no point 6.
 pub struct Env {
     state: TaskState,
     cfg: EnvCfg,
@@ -49,12 +51,22 @@ struct EpisodeState {
     key: EpisodeKey,
     /// Number of the next episode.
     next_episode: u64,
-    /// True while the environment has an episode.
-    is_active: bool,
+    phase: Phase,
     /// Noise generator of each observation term.
     noise_rngs: Vec<KeyedRng>,
     /// Episode step at which each event is due next; unused for events without an interval.
     next_event_steps: Vec<u64>,
+}
+
+/// Phase of an environment between two steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The environment was never reset, or its last reset or the last step failed.
+    NoEpisode,
+    /// Its episode goes on.
+    Running,
+    /// Its episode ended, and no other one has begun.
+    Ended,
 }
 
 impl std::fmt::Debug for Env {
@@ -145,7 +157,7 @@ impl Env {
             EpisodeState {
                 key,
                 next_episode: 0,
-                is_active: false,
+                phase: Phase::NoEpisode,
                 noise_rngs: Vec::new(),
                 next_event_steps: vec![0; terms.events.len()],
             }
@@ -194,7 +206,7 @@ impl Env {
         let envs: Vec<usize> = (0..n).filter(|&env| mask.is_none_or(|mask| mask[env])).collect();
         for &env in &envs {
             let row = &mut self.episodes[env];
-            row.is_active = false;
+            row.phase = Phase::NoEpisode;
             if let Some(seed) = seed {
                 row.key.seed = seed;
                 row.next_episode = 0;
@@ -202,7 +214,7 @@ impl Env {
         }
         self.begin_episodes(&envs)?;
         self.observations = self.observe(&envs)?;
-        envs.iter().for_each(|&env| self.episodes[env].is_active = true);
+        envs.iter().for_each(|&env| self.episodes[env].phase = Phase::Running);
         Ok(self.observations.clone())
     }
 
@@ -216,16 +228,22 @@ impl Env {
     ///
     /// # Errors
     /// - The actions have another shape or are not finite, or an environment has no episode. Nothing was done then.
+    ///   Actions that [`AutoresetMode::NextStep`] ignores may be any number.
     /// - A term fails, or returns an array of another shape or a number that is not finite. The step is then incomplete
     ///   and every environment has to be reset.
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
         let actions = self.clamp_actions(actions.into())?;
-        if let Some(env) = self.episodes.iter().position(|row| !row.is_active) {
+        if let Some(env) = self.episodes.iter().position(|row| row.phase == Phase::NoEpisode) {
             return Err(EnvError::ResetFirst { env });
+        }
+        if self.cfg.autoreset == AutoresetMode::Disabled
+            && let Some(env) = self.episodes.iter().position(|row| row.phase == Phase::Ended)
+        {
+            return Err(EnvError::EpisodeEnded { env });
         }
         let step = self.advance(actions);
         if step.is_err() {
-            self.episodes.iter_mut().for_each(|row| row.is_active = false);
+            self.episodes.iter_mut().for_each(|row| row.phase = Phase::NoEpisode);
         }
         step
     }
@@ -241,14 +259,21 @@ impl Env {
                 meaning: "environments, columns of the action space",
             });
         }
-        if let Some(((env, k), &value)) = actions.indexed_iter().find(|(_, value)| !value.is_finite()) {
+        let is_wrong = |env: usize, value: f64| !value.is_finite() && self.episodes[env].phase != Phase::Ended;
+        if let Some(((env, k), &value)) = actions.indexed_iter().find(|((env, _), value)| is_wrong(*env, **value)) {
             let column = self.action_space.names()[k].clone();
             return Err(EnvError::NotFinite { what: "the action".into(), env, column, value });
         }
-        Ok(Array2::from_shape_fn(actions.dim(), |(env, k)| self.action_space.clamp(k, actions[(env, k)])))
+        let used =
+            |env: usize, k: usize| if self.episodes[env].phase == Phase::Ended { 0.0 } else { actions[(env, k)] };
+        Ok(Array2::from_shape_fn(actions.dim(), |(env, k)| self.action_space.clamp(k, used(env, k))))
     }
 
     fn advance(&mut self, actions: Array2<f64>) -> Result<Step> {
+        let n = self.num_envs();
+        // Environments that only begin an episode in this step, in the mode `NextStep`. They take part in the physics
+        // steps like the others, and are reset afterwards.
+        let beginning: Vec<usize> = (0..n).filter(|&env| self.episodes[env].phase == Phase::Ended).collect();
         self.state.previous_actions = std::mem::replace(&mut self.state.actions, actions);
         self.apply_actions()?;
         self.state.episode_steps.iter_mut().for_each(|steps| *steps += 1);
@@ -260,11 +285,9 @@ impl Env {
         let result =
             StepResult { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
         result.publish(&mut self.state.sim)?;
-        let going_on: Vec<usize> = (0..self.num_envs()).filter(|&env| reasons[env].is_none()).collect();
+        let is_running = |env: &usize| self.episodes[*env].phase == Phase::Running && reasons[*env].is_none();
+        let going_on: Vec<usize> = (0..n).filter(is_running).collect();
         self.run_interval_events(&going_on)?;
-        let all: Vec<usize> = (0..self.num_envs()).collect();
-        let final_observations = self.observe(&all)?;
-        self.observations = final_observations.clone();
         let mut ended: Vec<EndedEpisode> = Vec::new();
         for (env, reason) in reasons.into_iter().enumerate() {
             if let Some(reason) = reason {
@@ -272,10 +295,17 @@ impl Env {
                 ended.push(EndedEpisode { env: EnvId(env), reason, steps, reward_sums });
             }
         }
-        if !ended.is_empty() {
+        self.begin_episodes(&beginning)?;
+        let all: Vec<usize> = (0..n).collect();
+        let final_observations = self.observe(&all)?;
+        self.observations = final_observations.clone();
+        beginning.iter().for_each(|&env| self.episodes[env].phase = Phase::Running);
+        ended.iter().for_each(|ended| self.episodes[ended.env.0].phase = Phase::Ended);
+        if self.cfg.autoreset == AutoresetMode::SameStep && !ended.is_empty() {
             let envs: Vec<usize> = ended.iter().map(|ended| ended.env.0).collect();
             self.begin_episodes(&envs)?;
             self.observations = self.observe(&envs)?;
+            envs.iter().for_each(|&env| self.episodes[env].phase = Phase::Running);
         }
         Ok(Step {
             observations: self.observations.clone(),
@@ -316,7 +346,8 @@ impl Env {
         Ok(())
     }
 
-    /// Finds the episodes that end: terminated, truncated, and the first reason of each.
+    /// Finds the episodes that end: terminated, truncated, and the first reason of each. No episode ends in an
+    /// environment that only begins one in this step.
     #[expect(clippy::type_complexity, reason = "three columns of a step")]
     fn check_terminations(&self) -> Result<(Array1<bool>, Array1<bool>, Vec<Option<EndReason>>)> {
         let n = self.num_envs();
@@ -346,14 +377,19 @@ impl Env {
                 reasons[env].get_or_insert(EndReason::TimeLimit);
             }
         }
+        for env in (0..n).filter(|&env| self.episodes[env].phase == Phase::Ended) {
+            (terminated[env], truncated[env], reasons[env]) = (false, false, None);
+        }
         Ok((terminated, truncated, reasons))
     }
 
-    /// Computes the weighted reward terms, shape (N, reward terms).
+    /// Computes the weighted reward terms, shape (N, reward terms); 0 in environments that only begin an episode in
+    /// this step.
     fn compute_rewards(&self) -> Result<Array2<f64>> {
         let mut table = Array2::zeros((self.num_envs(), self.terms.rewards.len()));
+        let is_counted = |env: usize| self.episodes[env].phase == Phase::Running;
         for (mut column, term) in table.columns_mut().into_iter().zip(&self.terms.rewards) {
-            column.assign(&term.rewards(&self.context())?);
+            column.assign(&term.rewards(&self.context(), is_counted)?);
         }
         Ok(table)
     }

@@ -149,6 +149,16 @@ pub enum EnvError {
         /// The value.
         value: f64,
     },
+    /// An environment whose episode has ended was stepped without a reset, in the mode
+    /// [`AutoresetMode::Disabled`](crate::AutoresetMode::Disabled).
+    #[error(
+        "the episode of environment {env} has ended, and automatic resets are disabled: reset it by a mask before the \
+         next step"
+    )]
+    EpisodeEnded {
+        /// The environment.
+        env: usize,
+    },
     /// An environment without an episode was stepped: it was never reset, or its last reset or the last step failed.
     #[error(
         "environment {env} has no episode: call `reset(None, ..)` before the first step, and after a step that failed"

@@ -17,7 +17,8 @@
 //! | [`EpisodeRng`] | random numbers of one environment, episode and term |
 //! | [`fn@check`] | tests an implementation of [`VectorEnv`] |
 //!
-//! An environment whose episode ends begins the next one in the same step; [`Env`] documents the order of a step.
+//! An environment whose episode ends begins the next one in the same step, in the next one, or when it is reset
+//! ([`AutoresetMode`]). [`Env`] documents the order of a step.
 //!
 //! The random numbers of a task are keyed by its seed, the global index of the environment, the number of the episode
 //! and the name of the term. The same keys give the same bits for any number of environments, threads and processes.
@@ -67,6 +68,7 @@
 #![forbid(unsafe_code)]
 
 mod action;
+mod autoreset;
 mod builder;
 mod cfg;
 mod check;
@@ -86,6 +88,7 @@ pub mod terms;
 mod vector;
 
 pub use action::ActionTerm;
+pub use autoreset::AutoresetMode;
 pub use builder::EnvBuilder;
 pub use cfg::EnvCfg;
 pub use check::{Finding, RunDifference, check};

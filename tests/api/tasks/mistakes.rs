@@ -41,8 +41,8 @@ fn building() {
     let two_a = ObservationTerm::new("twice", ["a", "a"], |now| Ok(Array2::ones((now.num_envs(), 2))));
     let fails = EventTerm::new("e", EventMode::Startup, |_, _| Err("no idea".into()));
     let rows = [
-        (cart(1, EnvCfg { decimation: 0, episode_steps: None }), "Config { field: \"decimation\""),
-        (cart(1, EnvCfg { decimation: 1, episode_steps: Some(0) }), "Config { field: \"episode_steps\""),
+        (cart(1, EnvCfg { decimation: 0, ..EnvCfg::default() }), "Config { field: \"decimation\""),
+        (cart(1, EnvCfg { episode_steps: Some(0), ..EnvCfg::default() }), "Config { field: \"episode_steps\""),
         (empty().observation(ones("one")), "NoTerm { kind: Action"),
         (empty().action(idle()), "NoTerm { kind: Observation"),
         (builder().action(idle()), "RepeatedTerm { kind: Action"),

@@ -1,5 +1,6 @@
 //! Tasks, compared with loops over the plain API, with closed forms, and with themselves in other batches.
 
+mod autoreset;
 mod batches;
 mod bundled;
 mod cart_pole;
