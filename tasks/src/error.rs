@@ -19,9 +19,11 @@ pub enum TermKind {
     Action,
     /// [`CommandTerm`](crate::CommandTerm).
     Command,
+    /// [`CurriculumTerm`](crate::CurriculumTerm).
+    Curriculum,
     /// [`EventTerm`](crate::EventTerm).
     Event,
-    /// [`ObservationTerm`](crate::ObservationTerm).
+    /// [`ObservationTerm`](crate::ObservationTerm) or [`ImageTerm`](crate::ImageTerm).
     Observation,
     /// [`RewardTerm`](crate::RewardTerm).
     Reward,
@@ -41,6 +43,7 @@ impl fmt::Display for TermKind {
         f.write_str(match self {
             Self::Action => "action",
             Self::Command => "command",
+            Self::Curriculum => "curriculum",
             Self::Event => "event",
             Self::Observation => "observation",
             Self::Reward => "reward",
@@ -114,6 +117,26 @@ pub enum EnvError {
         /// Error of the function.
         #[source]
         error: TermError,
+    },
+    /// The function of a term panicked.
+    #[error("the {kind} term {name:?} panicked: {message}")]
+    TermPanic {
+        /// Kind of the term.
+        kind: TermKind,
+        /// Its name.
+        name: String,
+        /// Message of the panic.
+        message: String,
+    },
+    /// The images of a term have another type of components than its space.
+    #[error("{what} has components of type {found:?}; expected {expected:?}")]
+    Element {
+        /// The images.
+        what: String,
+        /// Type given.
+        found: crate::ImageElement,
+        /// Type of the space.
+        expected: crate::ImageElement,
     },
     /// There is no such name.
     #[error("unknown {what} {name:?}; known names: {}", .candidates.join(", "))]

@@ -10,8 +10,10 @@
 //! |---|---|
 //! | [`VectorEnv`] | interface for learning code: spaces, `reset`, `step`, as in Gymnasium |
 //! | [`Env`], [`EnvBuilder`], [`EnvCfg`] | the implementation of [`VectorEnv`] with a simulation and terms |
-//! | [`ActionTerm`], [`CommandTerm`], [`EventTerm`] | write to the simulation: actions, goals, resets, pushes |
-//! | [`ObservationTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`TermContext`] |
+//! | [`ActionTerm`], [`EventTerm`] | write to the simulation: actions, resets, pushes |
+//! | [`ObservationTerm`], [`ImageTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`TermContext`] |
+//! | [`CommandTerm`], [`CurriculumTerm`] | numbers of each environment: goals of an episode, levels of difficulty |
+//! | [`ObservationGroup`] | observations for one network: numbers of both precisions, and images |
 //! | [`mod@terms`] | ready-made terms for robots |
 //! | [`Space`], [`Step`] | named columns with bounds; the result of a step |
 //! | [`EpisodeRng`] | random numbers of one environment, episode and term |
@@ -74,15 +76,20 @@ mod cfg;
 mod check;
 mod command;
 mod context;
+mod curriculum;
 mod environment;
 mod episode_rng;
 mod error;
 mod event;
+mod group;
+mod guard;
+mod image;
 mod observation;
 mod reset_monitor;
 mod reward;
 mod space;
 mod step;
+mod stepping;
 mod termination;
 pub mod terms;
 mod vector;
@@ -93,11 +100,14 @@ pub use builder::EnvBuilder;
 pub use cfg::EnvCfg;
 pub use check::{Finding, RunDifference, check};
 pub use command::CommandTerm;
-pub use context::TermContext;
+pub use context::{EventContext, TermContext};
+pub use curriculum::CurriculumTerm;
 pub use environment::Env;
 pub use episode_rng::{EpisodeRng, env_ids};
 pub use error::{EnvError, Result, TermError, TermKind, TermResult};
 pub use event::{EventMode, EventTerm};
+pub use group::{ObservationGroup, POLICY_GROUP};
+pub use image::{ImageBatch, ImageElement, ImageSpace, ImageTerm};
 pub use observation::{Noise, ObservationTerm};
 pub use reward::RewardTerm;
 pub use space::Space;

@@ -37,7 +37,7 @@ impl RewardTerm {
 
     /// Computes the weighted rewards of all environments, shape (N,); 0 where `is_counted` is false.
     pub(crate) fn rewards(&self, now: &TermContext<'_>, is_counted: impl Fn(usize) -> bool) -> Result<Array1<f64>> {
-        let mut rewards = now.check_per_env(TermKind::Reward, &self.name, (self.reward)(now))?;
+        let mut rewards = now.compute_per_env(TermKind::Reward, &self.name, || (self.reward)(now))?;
         rewards.indexed_iter_mut().for_each(|(env, value)| {
             *value = if is_counted(env) { self.weight * *value } else { 0.0 };
         });
