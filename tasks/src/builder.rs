@@ -10,6 +10,7 @@ use crate::event::EventTerm;
 use crate::group::{Group, POLICY_GROUP};
 use crate::image::ImageTerm;
 use crate::observation::ObservationTerm;
+use crate::registry::TaskColumns;
 use crate::reward::RewardTerm;
 use crate::space::Space;
 use crate::termination::TerminationTerm;
@@ -128,6 +129,13 @@ impl EnvBuilder {
     pub fn termination(mut self, term: TerminationTerm) -> Self {
         self.terms.terminations.push(term);
         self
+    }
+
+    /// Columns of the terms that were added.
+    pub(crate) fn columns(&self) -> TaskColumns {
+        let actions = self.terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
+        let commands = self.terms.commands.iter().map(|term| (term.name.clone(), term.columns.clone())).collect();
+        TaskColumns { actions: Space::concatenate(actions).names().to_vec(), commands }
     }
 
     /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup)

@@ -138,6 +138,23 @@ pub enum EnvError {
         /// Type of the space.
         expected: crate::ImageElement,
     },
+    /// A task as text is invalid.
+    #[error("{place}: {error}")]
+    TaskText {
+        /// The term or key, such as `rewards.upright`.
+        place: String,
+        /// The mistake, with the expected keys or values.
+        error: String,
+    },
+    /// A term of a task as text cannot be created.
+    #[error("{place}: {error}")]
+    TaskTerm {
+        /// The term, such as `rewards.upright`.
+        place: String,
+        /// The mistake.
+        #[source]
+        error: Box<EnvError>,
+    },
     /// There is no such name.
     #[error("unknown {what} {name:?}; known names: {}", .candidates.join(", "))]
     UnknownName {

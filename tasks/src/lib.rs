@@ -15,6 +15,7 @@
 //! | [`CommandTerm`], [`CurriculumTerm`] | numbers of each environment: goals of an episode, levels of difficulty |
 //! | [`ObservationGroup`] | observations for one network: numbers of both precisions, and images |
 //! | [`mod@terms`] | ready-made terms for robots |
+//! | [`TaskCfg`], [`TermRegistry`] | tasks as text, whose terms are named by their type |
 //! | [`Space`], [`Step`] | named columns with bounds; the result of a step |
 //! | [`EpisodeRng`] | random numbers of one environment, episode and term |
 //! | [`fn@check`] | tests an implementation of [`VectorEnv`] |
@@ -85,11 +86,13 @@ mod group;
 mod guard;
 mod image;
 mod observation;
+mod registry;
 mod reset_monitor;
 mod reward;
 mod space;
 mod step;
 mod stepping;
+mod task_cfg;
 mod termination;
 pub mod terms;
 mod vector;
@@ -109,8 +112,10 @@ pub use event::{EventMode, EventTerm};
 pub use group::{ObservationGroup, POLICY_GROUP};
 pub use image::{ImageBatch, ImageElement, ImageSpace, ImageTerm};
 pub use observation::{Noise, ObservationTerm};
+pub use registry::{TermArgs, TermRegistry};
 pub use reward::RewardTerm;
 pub use space::Space;
 pub use step::{EndReason, EndedEpisode, Step, StepInfo};
+pub use task_cfg::TaskCfg;
 pub use termination::TerminationTerm;
 pub use vector::VectorEnv;

@@ -25,6 +25,8 @@ terms! {
     uniform_velocity: uniform_velocity, UniformVelocityCfg;
 }
 
+mod named;
+
 use crate::action::ActionTerm;
 use crate::context::TermContext;
 use crate::error::{Result, TermResult};
