@@ -188,7 +188,7 @@ pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<E
     let distance = move |now: &TermContext<'_>| -> TermResult<Array1<f64>> {
         Ok(apart(now)?.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum::<f64>().sqrt()))
     };
-    Ok(EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
+    Ok(EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE), ..EnvCfg::default() })
         .action(turns)
         .command(CommandTerm::new("target", ["x", "y", "z"], move |episode_rng| {
             // The target is the same for all compared policies, and changes with every episode.

@@ -1,6 +1,7 @@
 //! Action terms.
 
-use crate::error::TermResult;
+use crate::error::{Result, TermKind, TermResult};
+use crate::guard::guard;
 use crate::space::Space;
 use kinetoscope_sim::SimulationManager;
 use ndarray::ArrayView2;
@@ -13,7 +14,7 @@ pub struct ActionTerm {
     pub(crate) name: String,
     pub(crate) space: Space,
     pub(crate) every_physics_step: bool,
-    pub(crate) apply: Apply,
+    apply: Apply,
 }
 
 impl ActionTerm {
@@ -28,6 +29,11 @@ impl ActionTerm {
         apply: impl Fn(&mut SimulationManager, ArrayView2<'_, f64>) -> TermResult + Send + 'static,
     ) -> Self {
         Self { name: name.into(), space, every_physics_step: false, apply: Box::new(apply) }
+    }
+
+    /// Applies the columns of the term.
+    pub(crate) fn apply(&self, sim: &mut SimulationManager, columns: ArrayView2<'_, f64>) -> Result<()> {
+        guard(TermKind::Action, &self.name, || (self.apply)(sim, columns))
     }
 
     /// Calls `apply` with the same actions before every physics step of a step, for a control law that reads the state.

@@ -3,10 +3,14 @@
 use crate::action::ActionTerm;
 use crate::cfg::EnvCfg;
 use crate::command::CommandTerm;
+use crate::curriculum::CurriculumTerm;
 use crate::environment::Env;
 use crate::error::{EnvError, Result, TermKind};
 use crate::event::EventTerm;
+use crate::group::{Group, POLICY_GROUP};
+use crate::image::ImageTerm;
 use crate::observation::ObservationTerm;
+use crate::registry::TaskColumns;
 use crate::reward::RewardTerm;
 use crate::space::Space;
 use crate::termination::TerminationTerm;
@@ -21,14 +25,30 @@ pub struct EnvBuilder {
 }
 
 /// The terms of a task.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Terms {
     pub(crate) actions: Vec<ActionTerm>,
     pub(crate) commands: Vec<CommandTerm>,
+    pub(crate) curricula: Vec<CurriculumTerm>,
     pub(crate) events: Vec<EventTerm>,
-    pub(crate) observations: Vec<ObservationTerm>,
+    /// The first one is the group of the policy.
+    pub(crate) groups: Vec<Group>,
     pub(crate) rewards: Vec<RewardTerm>,
     pub(crate) terminations: Vec<TerminationTerm>,
+}
+
+impl Default for Terms {
+    fn default() -> Self {
+        Self {
+            actions: Vec::new(),
+            commands: Vec::new(),
+            curricula: Vec::new(),
+            events: Vec::new(),
+            groups: vec![Group::new(POLICY_GROUP)],
+            rewards: Vec::new(),
+            terminations: Vec::new(),
+        }
+    }
 }
 
 impl EnvBuilder {
@@ -63,10 +83,37 @@ impl EnvBuilder {
         self
     }
 
-    /// Adds an observation term: columns of the observations.
+    /// Adds a curriculum term: a number for each environment.
     #[must_use]
-    pub fn observation(mut self, term: ObservationTerm) -> Self {
-        self.terms.observations.push(term);
+    pub fn curriculum(mut self, term: CurriculumTerm) -> Self {
+        self.terms.curricula.push(term);
+        self
+    }
+
+    /// Adds an observation term to the group [`POLICY_GROUP`]: columns of
+    /// [`Step::observations`](crate::Step::observations).
+    #[must_use]
+    pub fn observation(self, term: ObservationTerm) -> Self {
+        self.observation_in(POLICY_GROUP, term)
+    }
+
+    /// Adds an observation term to a group, such as `critic`. Read the observations of a group with [`Env::group`].
+    #[must_use]
+    pub fn observation_in(mut self, group: &str, term: ObservationTerm) -> Self {
+        self.terms.group(group).terms.push(term);
+        self
+    }
+
+    /// Adds images to the group [`POLICY_GROUP`]. Read the images of a group with [`Env::group`].
+    #[must_use]
+    pub fn image(self, term: ImageTerm) -> Self {
+        self.image_in(POLICY_GROUP, term)
+    }
+
+    /// Adds images to a group.
+    #[must_use]
+    pub fn image_in(mut self, group: &str, term: ImageTerm) -> Self {
+        self.terms.group(group).images.push(term);
         self
     }
 
@@ -84,40 +131,66 @@ impl EnvBuilder {
         self
     }
 
+    /// Columns of the terms that were added.
+    pub(crate) fn columns(&self) -> TaskColumns {
+        let actions = self.terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
+        let commands = self.terms.commands.iter().map(|term| (term.name.clone(), term.columns.clone())).collect();
+        TaskColumns { actions: Space::concatenate(actions).names().to_vec(), commands }
+    }
+
     /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup)
     /// events. No episode begins: call [`Env::reset`] first.
     ///
     /// # Errors
-    /// - There is no action or observation column.
-    /// - Two terms of one kind have the same name, or a name is empty or contains a slash.
+    /// - There is no action column, or the group [`POLICY_GROUP`] has neither a column nor images.
+    /// - Two terms of one kind or of one group have the same name, or a name is empty or contains a slash.
     /// - Two columns of a term have the same name.
     /// - A number is out of range, or an event fails.
     pub fn build(self) -> Result<Env> {
-        let Self { sim, cfg, terms } = self;
+        let Self { sim, cfg, mut terms } = self;
         cfg.check()?;
         terms.check()?;
-        let observation_spaces =
-            terms.observations.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
-        let observations = terms.observations.iter().map(|term| term.name.as_str()).zip(&observation_spaces);
+        for group in &mut terms.groups {
+            let spaces = group.terms.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
+            group.space = Space::concatenate(group.terms.iter().map(|term| term.name.as_str()).zip(&spaces));
+        }
         let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
-        let spaces = [Space::concatenate(observations), Space::concatenate(actions)];
-        Env::new(sim, cfg, terms, spaces)
+        let action_space = Space::concatenate(actions);
+        Env::new(sim, cfg, terms, action_space)
     }
 }
 
 impl Terms {
+    /// Returns the group called `name`, which is added if it is new.
+    fn group(&mut self, name: &str) -> &mut Group {
+        let index = self.groups.iter().position(|group| group.name == name).unwrap_or_else(|| {
+            self.groups.push(Group::new(name));
+            self.groups.len() - 1
+        });
+        &mut self.groups[index]
+    }
+
     fn check(&self) -> Result<()> {
         let missing = |kind| Err(EnvError::NoTerm { kind });
         if self.actions.iter().all(|term| term.space.is_empty()) {
             return missing(TermKind::Action);
         }
-        if self.observations.iter().all(|term| term.columns.is_empty()) {
+        if self.groups[0].images.is_empty() && self.groups[0].terms.iter().all(|term| term.columns.is_empty()) {
             return missing(TermKind::Observation);
         }
         distinct(TermKind::Action, self.actions.iter().map(|term| &term.name))?;
         distinct(TermKind::Command, self.commands.iter().map(|term| &term.name))?;
         distinct(TermKind::Event, self.events.iter().map(|term| &term.name))?;
-        distinct(TermKind::Observation, self.observations.iter().map(|term| &term.name))?;
+        distinct(TermKind::Curriculum, self.curricula.iter().map(|term| &term.name))?;
+        for group in &self.groups {
+            if group.name.is_empty() || group.name.contains('/') {
+                let (field, value) = ("the name of an observation group".into(), format!("{:?}", group.name));
+                return Err(EnvError::Config { field, value, expected: "it must not be empty or contain a slash" });
+            }
+            let columns = group.terms.iter().map(|term| &term.name);
+            distinct(TermKind::Observation, columns.chain(group.images.iter().map(|term| &term.name)))?;
+            group.images.iter().try_for_each(ImageTerm::check)?;
+        }
         distinct(TermKind::Reward, self.rewards.iter().map(|term| &term.name))?;
         distinct(TermKind::Termination, self.terminations.iter().map(|term| &term.name))?;
         self.commands.iter().try_for_each(CommandTerm::check)?;

@@ -1,9 +1,10 @@
-//! Lengths of steps and episodes.
+//! Lengths of steps and episodes, and the mode of automatic resets.
 
+use crate::autoreset::AutoresetMode;
 use crate::error::{EnvError, Result};
 use serde::{Deserialize, Serialize};
 
-/// Configuration of a task: lengths of steps and episodes.
+/// Configuration of a task: lengths of steps and episodes, and the mode of automatic resets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnvCfg {
@@ -11,12 +12,15 @@ pub struct EnvCfg {
     pub decimation: u32,
     /// Steps of the task after which an episode is truncated; `None` for no limit.
     pub episode_steps: Option<u64>,
+    /// Time at which an environment whose episode ended begins the next one.
+    pub autoreset: AutoresetMode,
 }
 
 impl Default for EnvCfg {
-    /// One physics step in a step of the task, and episodes without a limit.
+    /// One physics step in a step of the task, episodes without a limit, and resets in the step in which an episode
+    /// ends.
     fn default() -> Self {
-        Self { decimation: 1, episode_steps: None }
+        Self { decimation: 1, episode_steps: None, autoreset: AutoresetMode::SameStep }
     }
 }
 

@@ -1,5 +1,6 @@
 //! A conformance test of [`VectorEnv`] implementations.
 
+use crate::autoreset::AutoresetMode;
 use crate::space::Space;
 use crate::step::Step;
 use crate::vector::VectorEnv;
@@ -60,7 +61,9 @@ pub enum Finding {
         /// The reward.
         value: f64,
     },
-    /// The final observation of an episode that goes on differs from the observation of the same step.
+    /// The final observation differs from the observation of the same step, although the environment did not begin an
+    /// episode after it: the episode goes on, or the mode is not
+    /// [`AutoresetMode::SameStep`](crate::AutoresetMode::SameStep).
     FinalObservation {
         /// Time: `step 12`.
         when: String,
@@ -74,6 +77,18 @@ pub enum Finding {
         when: String,
         /// The environment.
         env: usize,
+    },
+    /// In the step after the end of an episode, which only begins the next one
+    /// ([`AutoresetMode::NextStep`](crate::AutoresetMode::NextStep)), there is a reward, or another end.
+    BeginningStep {
+        /// Time: `step 12`.
+        when: String,
+        /// The environment.
+        env: usize,
+        /// The reward; it must be 0.
+        reward: f64,
+        /// True if an end was reported.
+        ended: bool,
     },
     /// Two runs with the same seed and actions differ.
     NotReproducible(RunDifference),
@@ -125,12 +140,17 @@ impl fmt::Display for Finding {
             }
             Self::FinalObservation { when, env } => write!(
                 f,
-                "{when}, environment {env}: the episode goes on, but final_observations differ from observations"
+                "{when}, environment {env}: no episode began after it, but final_observations differ from observations"
             ),
             Self::NoAutoReset { when, env } => write!(
                 f,
                 "{when}, environment {env}: the episode ended and no new one began; observations must be the first ones of the \
                  next episode"
+            ),
+            Self::BeginningStep { when, env, reward, ended } => write!(
+                f,
+                "{when}, environment {env}: the step after an end only begins an episode, so its reward must be 0 and no \
+                 episode can end in it; the reward is {reward}, ended is {ended}"
             ),
             Self::NotReproducible(apart) => write!(f, "the same seed and actions give different results: {apart}"),
             Self::MaskedReset(apart) => write!(f, "a reset of other environments changed this one: {apart}"),
@@ -147,7 +167,8 @@ impl fmt::Display for Finding {
 /// after these steps are not tested. The test covers:
 ///
 /// - shapes, observations within their space, finite rewards;
-/// - final observations, and the automatic reset in the step in which an episode ends;
+/// - final observations, and the automatic reset at the time of [`VectorEnv::autoreset_mode`]; if resets are disabled,
+///   an error for a step without the reset;
 /// - the same bits for the same seed; without them, the next three tests are skipped;
 /// - resets by mask that leave other environments unchanged, if there are two or more environments;
 /// - environments that do not influence each other, if there are two or more environments;
@@ -275,7 +296,9 @@ fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Ve
     }
     check_bounds(&initial_observations, &seen, "after the reset", found);
     let mut run = Rollout { initial_observations, steps: Vec::new() };
+    let mode = env.autoreset_mode();
     let mut watch = vec![AutoResetMonitor::default(); n];
+    let mut over = vec![false; n];
     for step in 0..STEPS {
         let when = format!("step {step}");
         if plan.reset_odd && step == STEPS / 2 {
@@ -285,10 +308,20 @@ fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Ve
             if !has_shape("the observation array of a reset by mask", given.shape(), &[n, seen.len()], found) {
                 return None;
             }
+            over.iter_mut().zip(&mask).for_each(|(over, reset)| *over &= !reset);
             // The rows of environments that were not reset repeat their last observations.
             if let Some(last) = run.steps.last_mut() {
                 last.observations = given;
             }
+        }
+        if mode == AutoresetMode::Disabled && over.contains(&true) {
+            let when = "a reset of ended episodes";
+            if env.step(plan.actions(&acted, n, step).view()).is_ok() {
+                let what = "a step of an environment whose episode has ended";
+                push_first_of_kind(found, Finding::MissingError { what });
+                return None;
+            }
+            env.reset(Some(&over), None).map_err(|error| report_error(when, &error, found)).ok()?;
         }
         let actions = plan.actions(&acted, n, step);
         let done = env.step(actions.view()).map_err(|error| report_error(&when, &error, found)).ok()?;
@@ -317,9 +350,17 @@ fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Ve
             if !ended && !same {
                 push_first_of_kind(found, Finding::FinalObservation { when: when.clone(), env });
             }
-            if watch[env].update(ended, same) {
+            if mode == AutoresetMode::SameStep && watch[env].update(ended, same) {
                 push_first_of_kind(found, Finding::NoAutoReset { when: when.clone(), env });
             }
+            if mode != AutoresetMode::SameStep && ended && !same {
+                push_first_of_kind(found, Finding::FinalObservation { when: when.clone(), env });
+            }
+            if mode == AutoresetMode::NextStep && over[env] && (ended || rewards[env] != 0.0) {
+                let when = when.clone();
+                push_first_of_kind(found, Finding::BeginningStep { when, env, reward: rewards[env], ended });
+            }
+            over[env] = ended;
         }
         run.steps.push(StepOutput { observations, rewards, ends: [terminated, truncated] });
     }

@@ -1,8 +1,9 @@
 //! The context that is passed to terms.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
+use crate::guard::guard;
 use kinetoscope_sim::SimulationManager;
-use ndarray::{Array1, Array2, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 
 /// Read access to the simulation and the task state of all environments, for the functions of terms.
 #[derive(Clone, Copy, Debug)]
@@ -20,13 +21,72 @@ pub(crate) struct TaskState {
     pub(crate) previous_actions: Array2<f64>,
     /// Number of task steps of each episode so far.
     pub(crate) episode_steps: Vec<u64>,
-    /// Name and values of each command term.
-    pub(crate) commands: Vec<(String, Array2<f64>)>,
+    /// Numbers of each command term.
+    pub(crate) commands: Vec<CommandState>,
+    /// Name and numbers of each curriculum term, shape (N,).
+    pub(crate) curricula: Vec<(String, Array1<f64>)>,
+}
+
+/// Numbers of a command term.
+#[derive(Debug)]
+pub(crate) struct CommandState {
+    pub(crate) name: String,
+    /// Drawn numbers, shape (N, drawn numbers).
+    pub(crate) drawn: Array2<f64>,
+    /// Values that other terms read, shape (N, columns).
+    pub(crate) values: Array2<f64>,
 }
 
 impl TaskState {
     pub(crate) fn context(&self) -> TermContext<'_> {
         TermContext { state: self }
+    }
+
+    fn command(&self, name: &str) -> Result<ArrayView2<'_, f64>> {
+        let found = self.commands.iter().find(|command| command.name == name);
+        let names = || self.commands.iter().map(|command| command.name.as_str());
+        found.map(|command| command.values.view()).ok_or_else(|| EnvError::unknown("command", name, names()))
+    }
+
+    fn curriculum(&self, name: &str) -> Result<ArrayView1<'_, f64>> {
+        let found = self.curricula.iter().find(|(of, _)| of == name);
+        let names = || self.curricula.iter().map(|(of, _)| of.as_str());
+        found.map(|(_, values)| values.view()).ok_or_else(|| EnvError::unknown("curriculum", name, names()))
+    }
+}
+
+/// Access of an event to the simulation, which it changes, and to the state of the task, which it reads.
+#[derive(Debug)]
+pub struct EventContext<'e> {
+    pub(crate) state: &'e mut TaskState,
+}
+
+impl EventContext<'_> {
+    /// Read access to the simulation.
+    pub fn sim(&self) -> &SimulationManager {
+        &self.state.sim
+    }
+
+    /// The simulation, to change it in the environments of the event.
+    pub fn sim_mut(&mut self) -> &mut SimulationManager {
+        &mut self.state.sim
+    }
+
+    /// Values of the command term called `name`, shape (N, columns of the term). A reset event gets the new numbers of
+    /// the episode; those of a [derived](crate::CommandTerm::derived) command are still the old ones.
+    ///
+    /// # Errors
+    /// There is no command term of this name; the error lists the existing ones, the nearest first.
+    pub fn command(&self, name: &str) -> Result<ArrayView2<'_, f64>> {
+        self.state.command(name)
+    }
+
+    /// Numbers of the curriculum term called `name`, shape (N,).
+    ///
+    /// # Errors
+    /// There is no curriculum term of this name; the error lists the existing ones, the nearest first.
+    pub fn curriculum(&self, name: &str) -> Result<ArrayView1<'_, f64>> {
+        self.state.curriculum(name)
     }
 }
 
@@ -64,21 +124,25 @@ impl<'e> TermContext<'e> {
     /// # Errors
     /// There is no command term of this name; the error lists the existing ones, the nearest first.
     pub fn command(&self, name: &str) -> Result<ArrayView2<'e, f64>> {
-        let commands = &self.state.commands;
-        let found = commands.iter().find(|(of, _)| of == name);
-        found
-            .map(|(_, values)| values.view())
-            .ok_or_else(|| EnvError::unknown("command", name, commands.iter().map(|(of, _)| of.as_str())))
+        self.state.command(name)
     }
 
-    /// Checks the result of a term's function, which must have shape (N,).
-    pub(crate) fn check_per_env<T>(
+    /// Numbers of the curriculum term called `name`, shape (N,).
+    ///
+    /// # Errors
+    /// There is no curriculum term of this name; the error lists the existing ones, the nearest first.
+    pub fn curriculum(&self, name: &str) -> Result<ArrayView1<'e, f64>> {
+        self.state.curriculum(name)
+    }
+
+    /// Calls a term's function and checks its result, which must have shape (N,).
+    pub(crate) fn compute_per_env<T>(
         &self,
         kind: TermKind,
         name: &str,
-        given: TermResult<Array1<T>>,
+        compute: impl FnOnce() -> TermResult<Array1<T>>,
     ) -> Result<Array1<T>> {
-        let given = given.map_err(|error| EnvError::term(kind, name, error))?;
+        let given = guard(kind, name, compute)?;
         if given.len() == self.num_envs() {
             return Ok(given);
         }

@@ -2,16 +2,16 @@
 
 use crate::builder::Terms;
 use crate::cfg::EnvCfg;
-use crate::context::{TaskState, TermContext};
-use crate::episode_rng::{EpisodeKey, EpisodeRng};
-use crate::error::{EnvError, Result, TermKind};
+use crate::command::CommandTerm;
+use crate::context::{CommandState, TaskState, TermContext};
+use crate::episode_rng::EpisodeKey;
+use crate::error::{EnvError, Result};
 use crate::event::EventMode;
+use crate::group::{GroupBuffers, ObservationGroup};
 use crate::reset_monitor::ResetMonitor;
 use crate::space::Space;
-use crate::step::{EndReason, EndedEpisode, Step, StepInfo};
-use kinetoscope_scene::KeyedRng;
-use kinetoscope_sim::{EnvId, ObserverId, SimulationManager, StepResult};
-use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
+use kinetoscope_sim::{ObserverId, SimulationManager};
+use ndarray::{Array1, Array2, ArrayView2};
 
 /// A batch of environments with a task, made of terms by an [`EnvBuilder`](crate::EnvBuilder).
 ///
@@ -20,41 +20,52 @@ use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 ///
 /// 1. Clamp the actions to their bounds, apply them, and do [`EnvCfg::decimation`] physics steps.
 /// 2. Count the step, and find the episodes that end and the reason of each.
-/// 3. Compute the rewards. Publish rewards and ends to the observers of the simulation ([`StepResult`]).
-/// 4. Run the due [`EventMode::Interval`] events in environments whose episode goes on.
-/// 5. Compute the observations, which include the final ones of the episodes that ended.
+/// 3. Compute the rewards. Publish rewards and ends to the observers of the simulation ([`StepResult`](kinetoscope_sim::StepResult)).
+/// 4. Run the due [`EventMode::Interval`] events and draw the due commands in environments whose episode goes on. Update
+///    the curricula of environments whose episode ended.
+/// 5. Compute derived commands and the observations, which include the final ones of the episodes that ended.
 /// 6. Reset the environments whose episode ended to the initial state, draw new commands, run the [`EventMode::Reset`]
 ///    events, and observe these environments again.
 ///
-/// An episode thus begins in the step in which the previous one ends (Gymnasium's `AutoresetMode.SAME_STEP`). No step
-/// is spent on a reset alone.
+/// This is the order of [`AutoresetMode::SameStep`](crate::AutoresetMode::SameStep), in which no step is spent on a reset alone. In
+/// [`AutoresetMode::NextStep`](crate::AutoresetMode::NextStep), point 6 comes before point 5, in the environments whose episode ended in the step before.
+/// In [`AutoresetMode::Disabled`](crate::AutoresetMode::Disabled) there is no point 6.
 pub struct Env {
-    state: TaskState,
-    cfg: EnvCfg,
-    terms: Terms,
-    observation_space: Space,
-    action_space: Space,
-    episodes: Vec<EpisodeState>,
+    pub(crate) state: TaskState,
+    pub(crate) cfg: EnvCfg,
+    pub(crate) terms: Terms,
+    pub(crate) action_space: Space,
+    pub(crate) episodes: Vec<EpisodeState>,
     /// Sums of the weighted rewards of each episode, shape (N, reward terms).
-    reward_sums: Array2<f64>,
-    /// The latest observations, shape (N, observation columns).
-    observations: Array2<f64>,
+    pub(crate) reward_sums: Array2<f64>,
+    /// The latest observations of each group.
+    pub(crate) buffers: Vec<GroupBuffers>,
     /// Records which environments were reset, with its id in the simulation.
-    reset_monitor: (ResetMonitor, ObserverId<ResetMonitor>),
+    pub(crate) reset_monitor: (ResetMonitor, ObserverId<ResetMonitor>),
 }
 
 /// State of one environment outside the simulation.
 #[derive(Debug)]
-struct EpisodeState {
-    key: EpisodeKey,
+pub(crate) struct EpisodeState {
+    pub(crate) key: EpisodeKey,
     /// Number of the next episode.
-    next_episode: u64,
-    /// True while the environment has an episode.
-    is_active: bool,
-    /// Noise generator of each observation term.
-    noise_rngs: Vec<KeyedRng>,
+    pub(crate) next_episode: u64,
+    pub(crate) phase: Phase,
+    /// Episode step at which each command is drawn next.
+    pub(crate) next_command_steps: Vec<u64>,
     /// Episode step at which each event is due next; unused for events without an interval.
-    next_event_steps: Vec<u64>,
+    pub(crate) next_event_steps: Vec<u64>,
+}
+
+/// Phase of an environment between two steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// The environment was never reset, or its last reset or the last step failed.
+    NoEpisode,
+    /// Its episode goes on.
+    Running,
+    /// Its episode ended, and no other one has begun.
+    Ended,
 }
 
 impl std::fmt::Debug for Env {
@@ -74,7 +85,7 @@ impl Env {
     /// The simulation, to serve, record or change it between steps.
     ///
     /// The next step starts from a state that is written here. If the simulation is reset here or by a viewer, the next
-    /// step ends the episode ([`EndReason::Reset`]) and begins a new one. To begin a new episode at once, call
+    /// step ends the episode ([`EndReason::Reset`](crate::EndReason::Reset)) and begins a new one. To begin a new episode at once, call
     /// [`reset`](Self::reset).
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.state.sim
@@ -111,10 +122,10 @@ impl Env {
         f64::from(self.cfg.decimation) * self.state.sim.cfg().physics_dt
     }
 
-    /// Columns of the observations, named `term/column`, with the bounds of the clip after scaling. Columns of a term
-    /// without a clip are unbounded.
+    /// Columns of the observations in the group [`POLICY_GROUP`](crate::POLICY_GROUP), named `term/column`, with the
+    /// bounds of the clip after scaling. Columns of a term without a clip are unbounded.
     pub fn observation_space(&self) -> &Space {
-        &self.observation_space
+        &self.terms.groups[0].space
     }
 
     /// Columns of the actions, named `term/column`, with the bounds to which actions are clamped.
@@ -127,46 +138,92 @@ impl Env {
         self.terms.rewards.iter().map(|term| term.name.as_str()).collect()
     }
 
-    /// The latest observations, with noise, clip and scale, shape (N, columns of
-    /// [`observation_space`](Self::observation_space)); zeros before the first reset.
+    /// The observation group called `name`, with its latest observations and images.
+    ///
+    /// # Errors
+    /// There is no such group; the error lists the existing ones.
+    pub fn group(&self, name: &str) -> Result<ObservationGroup<'_>> {
+        let names = || self.terms.groups.iter().map(|group| group.name.as_str());
+        let index = names().position(|of| of == name);
+        let index = index.ok_or_else(|| EnvError::unknown("observation group", name, names()))?;
+        Ok(ObservationGroup::new(&self.terms.groups[index], &self.buffers[index]))
+    }
+
+    /// The observation groups, [`POLICY_GROUP`](crate::POLICY_GROUP) first, then in the order in which they were added.
+    pub fn groups(&self) -> impl Iterator<Item = ObservationGroup<'_>> {
+        self.terms.groups.iter().zip(&self.buffers).map(|(group, buffers)| ObservationGroup::new(group, buffers))
+    }
+
+    /// Names of the curriculum terms, in the order in which they were added.
+    pub fn curriculum_names(&self) -> Vec<&str> {
+        self.terms.curricula.iter().map(|term| term.name.as_str()).collect()
+    }
+
+    /// Sets the numbers of the curriculum term called `name`, shape (N,): those that
+    /// [`TermContext::curriculum`] returned in an earlier run, to continue it. They take effect at the next resets.
+    ///
+    /// # Errors
+    /// There is no such term, the array has another length than N, or a number is not finite. Nothing is changed then.
+    pub fn set_curriculum(&mut self, name: &str, values: &[f64]) -> Result<()> {
+        let n = self.num_envs();
+        self.state.context().curriculum(name)?;
+        if values.len() != n {
+            let (what, found, expected) = (format!("the curriculum {name:?}"), vec![values.len()], vec![n]);
+            return Err(EnvError::Shape { what, found, expected, meaning: "environments" });
+        }
+        for (term, (_, own)) in self.terms.curricula.iter().zip(&mut self.state.curricula) {
+            if term.name == name {
+                values.iter().enumerate().try_for_each(|(env, &value)| term.check(env, value).map(drop))?;
+                own.iter_mut().zip(values).for_each(|(own, value)| *own = *value);
+            }
+        }
+        Ok(())
+    }
+
+    /// The latest observations in the group [`POLICY_GROUP`](crate::POLICY_GROUP), with noise, clip and scale, shape (N,
+    /// columns of [`observation_space`](Self::observation_space)); zeros before the first reset.
     pub fn observations(&self) -> ArrayView2<'_, f64> {
-        self.observations.view()
+        self.buffers[0].values().view()
     }
 }
 
-/// Resets and steps.
+/// Resets.
 impl Env {
-    /// Creates the environments from checked terms. `spaces` are those of the observations and of the actions.
-    pub(crate) fn new(mut sim: SimulationManager, cfg: EnvCfg, terms: Terms, spaces: [Space; 2]) -> Result<Self> {
-        let [observation_space, action_space] = spaces;
+    /// Creates the environments from checked terms.
+    pub(crate) fn new(mut sim: SimulationManager, cfg: EnvCfg, terms: Terms, action_space: Space) -> Result<Self> {
         let (n, seed, first) = (sim.num_envs(), sim.cfg().seed, sim.cfg().first_env());
         let row = |env: usize| {
             let key = EpisodeKey { seed, global_env: first + env, episode: 0 };
             EpisodeState {
                 key,
                 next_episode: 0,
-                is_active: false,
-                noise_rngs: Vec::new(),
+                phase: Phase::NoEpisode,
+                next_command_steps: vec![u64::MAX; terms.commands.len()],
                 next_event_steps: vec![0; terms.events.len()],
             }
         };
         let actions = Array2::zeros((n, action_space.len()));
-        let commands = terms.commands.iter();
-        let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
+        let command = |term: &CommandTerm| CommandState {
+            name: term.name.clone(),
+            drawn: Array2::zeros((n, term.drawn)),
+            values: Array2::zeros((n, term.columns.len())),
+        };
+        let commands = terms.commands.iter().map(command).collect();
+        let curricula = terms.curricula.iter().map(|term| (term.name.clone(), Array1::zeros(n))).collect();
         let previous_actions = actions.clone();
         let watch = ResetMonitor::new(n);
         let mut env = Self {
             reset_monitor: (watch.clone(), sim.observers_mut().add(watch)),
             episodes: (0..n).map(row).collect(),
             reward_sums: Array2::zeros((n, terms.rewards.len())),
-            observations: Array2::zeros((n, observation_space.len())),
-            state: TaskState { sim, actions, previous_actions, episode_steps: vec![0; n], commands },
+            buffers: terms.groups.iter().map(|group| GroupBuffers::new(group, n)).collect(),
+            state: TaskState { sim, actions, previous_actions, episode_steps: vec![0; n], commands, curricula },
             cfg,
             terms,
-            observation_space,
             action_space,
         };
         let all: Vec<usize> = (0..n).collect();
+        env.begin_curricula(&all)?;
         env.run_events(&all, |when| when == EventMode::Startup, |event| format!("event/{event}"))?;
         Ok(env)
     }
@@ -175,8 +232,8 @@ impl Env {
     /// environments, shape (N, columns of [`observation_space`](Self::observation_space)).
     ///
     /// Other environments continue their episodes unchanged. With a `seed`, the random numbers of the reset
-    /// environments restart: the same seed gives the same episodes. Without a seed they continue, as at the automatic
-    /// resets. The initial seed is the simulation's. The noise of sensors and of
+    /// environments and their curricula restart: the same seed gives the same episodes. Without a seed they continue, as
+    /// at the automatic resets. The initial seed is the simulation's. The noise of sensors and of
     /// [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) depends on the simulation's seed only.
     ///
     /// Properties such as masses and gains keep the values that events gave them. An event that changes a property at a
@@ -194,266 +251,19 @@ impl Env {
         let envs: Vec<usize> = (0..n).filter(|&env| mask.is_none_or(|mask| mask[env])).collect();
         for &env in &envs {
             let row = &mut self.episodes[env];
-            row.is_active = false;
+            row.phase = Phase::NoEpisode;
             if let Some(seed) = seed {
                 row.key.seed = seed;
                 row.next_episode = 0;
             }
         }
+        if seed.is_some() {
+            self.begin_curricula(&envs)?;
+        }
         self.begin_episodes(&envs)?;
-        self.observations = self.observe(&envs)?;
-        envs.iter().for_each(|&env| self.episodes[env].is_active = true);
-        Ok(self.observations.clone())
+        self.observe(&envs)?;
+        self.buffers.iter_mut().for_each(|buffers| buffers.set_final(false));
+        envs.iter().for_each(|&env| self.episodes[env].phase = Phase::Running);
+        Ok(self.buffers[0].values().clone())
     }
-
-    /// Does one step in all environments.
-    ///
-    /// `actions` has shape (N, columns of [`action_space`](Self::action_space)). Actions beyond their bounds are
-    /// clamped.
-    ///
-    /// If the physics of an environment diverges, its episode terminates with [`EndReason::Diverged`]. Its final
-    /// observation and reward are those of its last good state. Other environments are not affected.
-    ///
-    /// # Errors
-    /// - The actions have another shape or are not finite, or an environment has no episode. Nothing was done then.
-    /// - A term fails, or returns an array of another shape or a number that is not finite. The step is then incomplete
-    ///   and every environment has to be reset.
-    pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
-        let actions = self.clamp_actions(actions.into())?;
-        if let Some(env) = self.episodes.iter().position(|row| !row.is_active) {
-            return Err(EnvError::ResetFirst { env });
-        }
-        let step = self.advance(actions);
-        if step.is_err() {
-            self.episodes.iter_mut().for_each(|row| row.is_active = false);
-        }
-        step
-    }
-
-    fn clamp_actions(&self, actions: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
-        let (found, expected) = (actions.shape().to_vec(), vec![self.num_envs(), self.action_space.len()]);
-        if found != expected {
-            let what = "the action array".into();
-            return Err(EnvError::Shape {
-                what,
-                found,
-                expected,
-                meaning: "environments, columns of the action space",
-            });
-        }
-        if let Some(((env, k), &value)) = actions.indexed_iter().find(|(_, value)| !value.is_finite()) {
-            let column = self.action_space.names()[k].clone();
-            return Err(EnvError::NotFinite { what: "the action".into(), env, column, value });
-        }
-        Ok(Array2::from_shape_fn(actions.dim(), |(env, k)| self.action_space.clamp(k, actions[(env, k)])))
-    }
-
-    fn advance(&mut self, actions: Array2<f64>) -> Result<Step> {
-        self.state.previous_actions = std::mem::replace(&mut self.state.actions, actions);
-        self.apply_actions()?;
-        self.state.episode_steps.iter_mut().for_each(|steps| *steps += 1);
-        let (terminated, truncated, reasons) = self.check_terminations()?;
-        let reward_terms = self.compute_rewards()?;
-        self.reward_sums += &reward_terms;
-        // Sums in the order of the terms.
-        let rewards = reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward));
-        let result =
-            StepResult { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
-        result.publish(&mut self.state.sim)?;
-        let going_on: Vec<usize> = (0..self.num_envs()).filter(|&env| reasons[env].is_none()).collect();
-        self.run_interval_events(&going_on)?;
-        let all: Vec<usize> = (0..self.num_envs()).collect();
-        let final_observations = self.observe(&all)?;
-        self.observations = final_observations.clone();
-        let mut ended: Vec<EndedEpisode> = Vec::new();
-        for (env, reason) in reasons.into_iter().enumerate() {
-            if let Some(reason) = reason {
-                let (steps, reward_sums) = (self.state.episode_steps[env], self.reward_sums.row(env).to_vec());
-                ended.push(EndedEpisode { env: EnvId(env), reason, steps, reward_sums });
-            }
-        }
-        if !ended.is_empty() {
-            let envs: Vec<usize> = ended.iter().map(|ended| ended.env.0).collect();
-            self.begin_episodes(&envs)?;
-            self.observations = self.observe(&envs)?;
-        }
-        Ok(Step {
-            observations: self.observations.clone(),
-            final_observations,
-            rewards,
-            terminated,
-            truncated,
-            info: StepInfo { reward_terms, ended },
-        })
-    }
-
-    /// Applies the actions and does the physics steps.
-    fn apply_actions(&mut self) -> Result<()> {
-        let apply = |present: &mut TaskState, again: bool| -> Result<()> {
-            let mut first = 0;
-            for term in &self.terms.actions {
-                let end = first + term.space.len();
-                if !again || term.every_physics_step {
-                    let columns = present.actions.slice_axis(Axis(1), Slice::from(first..end));
-                    let applied = (term.apply)(&mut present.sim, columns);
-                    applied.map_err(|e| EnvError::term(TermKind::Action, &term.name, e))?;
-                }
-                first = end;
-            }
-            Ok(())
-        };
-        let present = &mut self.state;
-        apply(present, false)?;
-        if self.terms.actions.iter().any(|term| term.every_physics_step) {
-            present.sim.update(1);
-            for _ in 1..self.cfg.decimation {
-                apply(present, true)?;
-                present.sim.update(1);
-            }
-        } else {
-            present.sim.update(self.cfg.decimation);
-        }
-        Ok(())
-    }
-
-    /// Finds the episodes that end: terminated, truncated, and the first reason of each.
-    #[expect(clippy::type_complexity, reason = "three columns of a step")]
-    fn check_terminations(&self) -> Result<(Array1<bool>, Array1<bool>, Vec<Option<EndReason>>)> {
-        let n = self.num_envs();
-        let (mut terminated, mut truncated) = (Array1::from_elem(n, false), Array1::from_elem(n, false));
-        let mut reasons: Vec<Option<EndReason>> = vec![None; n];
-        for diverged in self.state.sim.diverged() {
-            terminated[diverged.env.0] = true;
-            reasons[diverged.env.0] = Some(EndReason::Diverged(diverged.to_string()));
-        }
-        for env in (0..n).filter(|&env| self.reset_monitor.0.was_reset(env)) {
-            truncated[env] = true;
-            reasons[env].get_or_insert(EndReason::Reset);
-        }
-        for term in &self.terms.terminations {
-            for (env, _) in term.evaluate(&self.context())?.indexed_iter().filter(|(_, ends)| **ends) {
-                if term.truncates {
-                    truncated[env] = true
-                } else {
-                    terminated[env] = true
-                }
-                reasons[env].get_or_insert_with(|| EndReason::Term(term.name.clone()));
-            }
-        }
-        for (env, steps) in self.state.episode_steps.iter().enumerate() {
-            if self.cfg.episode_steps.is_some_and(|limit| *steps >= limit) {
-                truncated[env] = true;
-                reasons[env].get_or_insert(EndReason::TimeLimit);
-            }
-        }
-        Ok((terminated, truncated, reasons))
-    }
-
-    /// Computes the weighted reward terms, shape (N, reward terms).
-    fn compute_rewards(&self) -> Result<Array2<f64>> {
-        let mut table = Array2::zeros((self.num_envs(), self.terms.rewards.len()));
-        for (mut column, term) in table.columns_mut().into_iter().zip(&self.terms.rewards) {
-            column.assign(&term.rewards(&self.context())?);
-        }
-        Ok(table)
-    }
-
-    /// Returns the latest observations, computed anew in `envs`.
-    fn observe(&mut self, envs: &[usize]) -> Result<Array2<f64>> {
-        let mut seen = self.observations.clone();
-        let mut first = 0;
-        for (k, term) in self.terms.observations.iter().enumerate() {
-            let values = term.compute(&self.state.context())?;
-            for &env in envs {
-                for (column, &value) in values.row(env).iter().enumerate() {
-                    let value = term.process(value, &mut self.episodes[env].noise_rngs[k]);
-                    if !value.is_finite() {
-                        let what = TermKind::Observation.result_label(&term.name);
-                        let column = term.columns[column].clone();
-                        return Err(EnvError::NotFinite { what, env, column, value });
-                    }
-                    seen[(env, first + column)] = value;
-                }
-            }
-            first += term.columns.len();
-        }
-        Ok(seen)
-    }
-
-    /// Begins an episode in each of `envs`.
-    fn begin_episodes(&mut self, envs: &[usize]) -> Result<()> {
-        if envs.is_empty() {
-            return Ok(());
-        }
-        let ids: Vec<EnvId> = envs.iter().map(|&env| EnvId(env)).collect();
-        self.state.sim.reset(Some(&ids))?;
-        for &env in envs {
-            let row = &mut self.episodes[env];
-            row.key.episode = row.next_episode;
-            row.next_episode += 1;
-            let noise = |name: &String| row.key.rng(&format!("observation/{name}"));
-            row.noise_rngs = self.terms.observations.iter().map(|term| noise(&term.name)).collect();
-            for (next, event) in row.next_event_steps.iter_mut().zip(&self.terms.events) {
-                if let EventMode::Interval { steps } = event.mode {
-                    *next = draw_interval(row.key, env, &event.name, 0, steps);
-                }
-            }
-            for (term, (name, values)) in self.terms.commands.iter().zip(&mut self.state.commands) {
-                let drawn = term.sample(&mut row.key.episode_rng(env, &format!("command/{name}")))?;
-                values.row_mut(env).iter_mut().zip(drawn).for_each(|(to, from)| *to = from);
-            }
-            self.state.episode_steps[env] = 0;
-            self.state.actions.row_mut(env).fill(0.0);
-            self.state.previous_actions.row_mut(env).fill(0.0);
-            self.reward_sums.row_mut(env).fill(0.0);
-        }
-        self.run_events(envs, |when| when == EventMode::Reset, |event| format!("event/{event}"))?;
-        // The monitor also saw the resets of this function, which do not end an episode.
-        envs.iter().for_each(|&env| self.reset_monitor.0.clear(env));
-        Ok(())
-    }
-
-    /// Runs the events that are `due` in `envs`, each with random numbers keyed by `name(event)`.
-    fn run_events(
-        &mut self,
-        envs: &[usize],
-        due: impl Fn(EventMode) -> bool,
-        name: impl Fn(&str) -> String,
-    ) -> Result<()> {
-        for event in self.terms.events.iter().filter(|event| due(event.mode)) {
-            let what = name(&event.name);
-            let mut episode_rngs: Vec<EpisodeRng> =
-                envs.iter().map(|&env| self.episodes[env].key.episode_rng(env, &what)).collect();
-            (event.apply)(&mut self.state.sim, &mut episode_rngs)
-                .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
-        }
-        Ok(())
-    }
-
-    /// Runs the interval events that are due at the present step of the episodes in `envs`.
-    fn run_interval_events(&mut self, envs: &[usize]) -> Result<()> {
-        for (k, event) in self.terms.events.iter().enumerate() {
-            let EventMode::Interval { steps } = event.mode else { continue };
-            let mut episode_rngs = Vec::new();
-            for &env in envs {
-                let (row, now) = (&mut self.episodes[env], self.state.episode_steps[env]);
-                if row.next_event_steps[k] == now {
-                    row.next_event_steps[k] = now.saturating_add(draw_interval(row.key, env, &event.name, now, steps));
-                    episode_rngs.push(row.key.episode_rng(env, &format!("event/{}/{now}", event.name)));
-                }
-            }
-            if !episode_rngs.is_empty() {
-                (event.apply)(&mut self.state.sim, &mut episode_rngs)
-                    .map_err(|e| EnvError::term(TermKind::Event, &event.name, e))?;
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Number of steps from step `now` until an interval event is due again, uniform in `low..=high`.
-fn draw_interval(key: EpisodeKey, env: usize, event: &str, now: u64, [low, high]: [u64; 2]) -> u64 {
-    let share = key.episode_rng(env, &format!("interval/{event}/{now}")).uniform();
-    // Rounding may make the product of a share below 1 the whole width.
-    low + ((share * (high - low + 1) as f64) as u64).min(high - low)
 }

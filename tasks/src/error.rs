@@ -19,9 +19,11 @@ pub enum TermKind {
     Action,
     /// [`CommandTerm`](crate::CommandTerm).
     Command,
+    /// [`CurriculumTerm`](crate::CurriculumTerm).
+    Curriculum,
     /// [`EventTerm`](crate::EventTerm).
     Event,
-    /// [`ObservationTerm`](crate::ObservationTerm).
+    /// [`ObservationTerm`](crate::ObservationTerm) or [`ImageTerm`](crate::ImageTerm).
     Observation,
     /// [`RewardTerm`](crate::RewardTerm).
     Reward,
@@ -41,6 +43,7 @@ impl fmt::Display for TermKind {
         f.write_str(match self {
             Self::Action => "action",
             Self::Command => "command",
+            Self::Curriculum => "curriculum",
             Self::Event => "event",
             Self::Observation => "observation",
             Self::Reward => "reward",
@@ -115,6 +118,43 @@ pub enum EnvError {
         #[source]
         error: TermError,
     },
+    /// The function of a term panicked.
+    #[error("the {kind} term {name:?} panicked: {message}")]
+    TermPanic {
+        /// Kind of the term.
+        kind: TermKind,
+        /// Its name.
+        name: String,
+        /// Message of the panic.
+        message: String,
+    },
+    /// The images of a term have another type of components than its space.
+    #[error("{what} has components of type {found:?}; expected {expected:?}")]
+    Element {
+        /// The images.
+        what: String,
+        /// Type given.
+        found: crate::ImageElement,
+        /// Type of the space.
+        expected: crate::ImageElement,
+    },
+    /// A task as text is invalid.
+    #[error("{place}: {error}")]
+    TaskText {
+        /// The term or key, such as `rewards.upright`.
+        place: String,
+        /// The mistake, with the expected keys or values.
+        error: String,
+    },
+    /// A term of a task as text cannot be created.
+    #[error("{place}: {error}")]
+    TaskTerm {
+        /// The term, such as `rewards.upright`.
+        place: String,
+        /// The mistake.
+        #[source]
+        error: Box<EnvError>,
+    },
     /// There is no such name.
     #[error("unknown {what} {name:?}; known names: {}", .candidates.join(", "))]
     UnknownName {
@@ -148,6 +188,16 @@ pub enum EnvError {
         column: String,
         /// The value.
         value: f64,
+    },
+    /// An environment whose episode has ended was stepped without a reset, in the mode
+    /// [`AutoresetMode::Disabled`](crate::AutoresetMode::Disabled).
+    #[error(
+        "the episode of environment {env} has ended, and automatic resets are disabled: reset it by a mask before the \
+         next step"
+    )]
+    EpisodeEnded {
+        /// The environment.
+        env: usize,
     },
     /// An environment without an episode was stepped: it was never reset, or its last reset or the last step failed.
     #[error(

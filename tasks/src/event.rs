@@ -1,11 +1,13 @@
 //! Event terms: random initial states, property changes, pushes.
 
+use crate::context::{EventContext, TaskState};
 use crate::episode_rng::EpisodeRng;
-use crate::error::{EnvError, Result, TermResult};
+use crate::error::{EnvError, Result, TermKind, TermResult};
+use crate::guard::guard;
 use kinetoscope_sim::SimulationManager;
 use std::fmt;
 
-type ApplyEvent = Box<dyn Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send>;
+type ApplyEvent = Box<dyn Fn(&mut EventContext<'_>, &mut [EpisodeRng]) -> TermResult + Send>;
 
 /// Time at which an event happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,7 +36,7 @@ pub enum EventMode {
 pub struct EventTerm {
     pub(crate) name: String,
     pub(crate) mode: EventMode,
-    pub(crate) apply: ApplyEvent,
+    apply: ApplyEvent,
 }
 
 impl EventTerm {
@@ -45,7 +47,22 @@ impl EventTerm {
         mode: EventMode,
         act: impl Fn(&mut SimulationManager, &mut [EpisodeRng]) -> TermResult + Send + 'static,
     ) -> Self {
+        Self::with_context(name, mode, move |now, rngs| act(now.sim_mut(), rngs))
+    }
+
+    /// Creates an event that reads commands or curricula of the task besides the simulation. `act` is called as in
+    /// [`new`](Self::new).
+    pub fn with_context(
+        name: impl Into<String>,
+        mode: EventMode,
+        act: impl Fn(&mut EventContext<'_>, &mut [EpisodeRng]) -> TermResult + Send + 'static,
+    ) -> Self {
         Self { name: name.into(), mode, apply: Box::new(act) }
+    }
+
+    /// Applies the event in the environments of `rngs`.
+    pub(crate) fn apply(&self, state: &mut TaskState, rngs: &mut [EpisodeRng]) -> Result<()> {
+        guard(TermKind::Event, &self.name, || (self.apply)(&mut EventContext { state }, rngs))
     }
 
     /// Creates an event that happens when an episode begins ([`EventMode::Reset`]).

@@ -10,14 +10,18 @@
 //! |---|---|
 //! | [`VectorEnv`] | interface for learning code: spaces, `reset`, `step`, as in Gymnasium |
 //! | [`Env`], [`EnvBuilder`], [`EnvCfg`] | the implementation of [`VectorEnv`] with a simulation and terms |
-//! | [`ActionTerm`], [`CommandTerm`], [`EventTerm`] | write to the simulation: actions, goals, resets, pushes |
-//! | [`ObservationTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`TermContext`] |
+//! | [`ActionTerm`], [`EventTerm`] | write to the simulation: actions, resets, pushes |
+//! | [`ObservationTerm`], [`ImageTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`TermContext`] |
+//! | [`CommandTerm`], [`CurriculumTerm`] | numbers of each environment: goals of an episode, levels of difficulty |
+//! | [`ObservationGroup`] | observations for one network: numbers of both precisions, and images |
 //! | [`mod@terms`] | ready-made terms for robots |
+//! | [`TaskCfg`], [`TermRegistry`] | tasks as text, whose terms are named by their type |
 //! | [`Space`], [`Step`] | named columns with bounds; the result of a step |
 //! | [`EpisodeRng`] | random numbers of one environment, episode and term |
 //! | [`fn@check`] | tests an implementation of [`VectorEnv`] |
 //!
-//! An environment whose episode ends begins the next one in the same step; [`Env`] documents the order of a step.
+//! An environment whose episode ends begins the next one in the same step, in the next one, or when it is reset
+//! ([`AutoresetMode`]). [`Env`] documents the order of a step.
 //!
 //! The random numbers of a task are keyed by its seed, the global index of the environment, the number of the episode
 //! and the name of the term. The same keys give the same bits for any number of environments, threads and processes.
@@ -67,37 +71,51 @@
 #![forbid(unsafe_code)]
 
 mod action;
+mod autoreset;
 mod builder;
 mod cfg;
 mod check;
 mod command;
 mod context;
+mod curriculum;
 mod environment;
 mod episode_rng;
 mod error;
 mod event;
+mod group;
+mod guard;
+mod image;
 mod observation;
+mod registry;
 mod reset_monitor;
 mod reward;
 mod space;
 mod step;
+mod stepping;
+mod task_cfg;
 mod termination;
 pub mod terms;
 mod vector;
 
 pub use action::ActionTerm;
+pub use autoreset::AutoresetMode;
 pub use builder::EnvBuilder;
 pub use cfg::EnvCfg;
 pub use check::{Finding, RunDifference, check};
 pub use command::CommandTerm;
-pub use context::TermContext;
+pub use context::{EventContext, TermContext};
+pub use curriculum::CurriculumTerm;
 pub use environment::Env;
 pub use episode_rng::{EpisodeRng, env_ids};
 pub use error::{EnvError, Result, TermError, TermKind, TermResult};
 pub use event::{EventMode, EventTerm};
+pub use group::{ObservationGroup, POLICY_GROUP};
+pub use image::{ImageBatch, ImageElement, ImageSpace, ImageTerm};
 pub use observation::{Noise, ObservationTerm};
+pub use registry::{TermArgs, TermRegistry};
 pub use reward::RewardTerm;
 pub use space::Space;
 pub use step::{EndReason, EndedEpisode, Step, StepInfo};
+pub use task_cfg::TaskCfg;
 pub use termination::TerminationTerm;
 pub use vector::VectorEnv;

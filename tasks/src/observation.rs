@@ -2,6 +2,7 @@
 
 use crate::context::TermContext;
 use crate::error::{EnvError, Result, TermKind, TermResult};
+use crate::guard::guard;
 use crate::space::Space;
 use kinetoscope_scene::KeyedRng;
 use ndarray::Array2;
@@ -112,7 +113,7 @@ impl ObservationTerm {
 
     /// Computes the raw values of all environments, shape (N, columns).
     pub(crate) fn compute(&self, now: &TermContext<'_>) -> Result<Array2<f64>> {
-        let rows = (self.observe)(now).map_err(|e| EnvError::term(TermKind::Observation, &self.name, e))?;
+        let rows = guard(TermKind::Observation, &self.name, || (self.observe)(now))?;
         let expected = vec![now.num_envs(), self.columns.len()];
         if rows.shape() == expected {
             return Ok(rows);
@@ -122,9 +123,23 @@ impl ObservationTerm {
     }
 
     /// Applies noise, clip and scale to a raw value.
-    pub(crate) fn process(&self, value: f64, random: &mut KeyedRng) -> f64 {
-        let noisy = self.noise.map_or(value, |noise| value + noise.sample(random));
+    pub(crate) fn process(&self, value: f64, random: Option<&mut KeyedRng>) -> f64 {
+        let noisy = match (self.noise, random) {
+            (Some(noise), Some(random)) => value + noise.sample(random),
+            _ => value,
+        };
         self.scale * noisy.clamp(self.clip[0], self.clip[1])
+    }
+
+    /// True if values have noise.
+    pub(crate) fn has_noise(&self) -> bool {
+        self.noise.is_some()
+    }
+
+    /// Error for a processed value that is not finite.
+    pub(crate) fn not_finite(&self, env: usize, column: usize, value: f64) -> EnvError {
+        let (what, column) = (TermKind::Observation.result_label(&self.name), self.columns[column].clone());
+        EnvError::NotFinite { what, env, column, value }
     }
 }
 

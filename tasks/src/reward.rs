@@ -35,10 +35,12 @@ impl RewardTerm {
         Err(EnvError::Config { field, value: self.weight.to_string(), expected: "it must be finite" })
     }
 
-    /// Computes the weighted rewards of all environments, shape (N,).
-    pub(crate) fn rewards(&self, now: &TermContext<'_>) -> Result<Array1<f64>> {
-        let mut rewards = now.check_per_env(TermKind::Reward, &self.name, (self.reward)(now))?;
-        rewards.mapv_inplace(|value| self.weight * value);
+    /// Computes the weighted rewards of all environments, shape (N,); 0 where `is_counted` is false.
+    pub(crate) fn rewards(&self, now: &TermContext<'_>, is_counted: impl Fn(usize) -> bool) -> Result<Array1<f64>> {
+        let mut rewards = now.compute_per_env(TermKind::Reward, &self.name, || (self.reward)(now))?;
+        rewards.indexed_iter_mut().for_each(|(env, value)| {
+            *value = if is_counted(env) { self.weight * *value } else { 0.0 };
+        });
         if let Some((env, &value)) = rewards.indexed_iter().find(|(_, value)| !value.is_finite()) {
             let what = TermKind::Reward.result_label(&self.name);
             return Err(EnvError::NotFinite { what, env, column: self.name.clone(), value });

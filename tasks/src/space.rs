@@ -17,7 +17,7 @@ impl Space {
     /// # Errors
     /// The bounds of a column contain no finite number, or two columns have the same name.
     pub fn new<N: Into<String>>(columns: impl IntoIterator<Item = (N, [f64; 2])>) -> Result<Self> {
-        let mut space = Self { names: Vec::new(), low: Vec::new(), high: Vec::new() };
+        let mut space = Self::empty();
         for (name, [low, high]) in columns {
             let column = name.into();
             let holds_a_number = low <= high && low < f64::INFINITY && high > f64::NEG_INFINITY;
@@ -40,6 +40,11 @@ impl Space {
     /// The same as [`new`](Self::new).
     pub fn uniform<N: Into<String>>(names: impl IntoIterator<Item = N>, bounds: [f64; 2]) -> Result<Self> {
         Self::new(names.into_iter().map(|name| (name, bounds)))
+    }
+
+    /// A space without columns.
+    pub(crate) fn empty() -> Self {
+        Self { names: Vec::new(), low: Vec::new(), high: Vec::new() }
     }
 
     /// Number of columns.
@@ -90,7 +95,7 @@ impl Space {
 
     /// Concatenates the columns of several terms, named `term/column`.
     pub(crate) fn concatenate<'s>(spaces: impl Iterator<Item = (&'s str, &'s Self)>) -> Self {
-        let mut all = Self { names: Vec::new(), low: Vec::new(), high: Vec::new() };
+        let mut all = Self::empty();
         for (term, part) in spaces {
             all.names.extend(part.names.iter().map(|name| format!("{term}/{name}")));
             all.low.extend(&part.low);

@@ -8,10 +8,12 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step<I = StepInfo> {
     /// Present observations, shape (N, columns of [`observation_space`](crate::VectorEnv::observation_space)). In an
-    /// environment whose episode ended in this step, the first observation of the next episode.
+    /// environment whose episode ended in this step, the first observation of the next episode if the mode is
+    /// [`AutoresetMode::SameStep`](crate::AutoresetMode::SameStep), else the last one of the ended episode.
     pub observations: Array2<f64>,
     /// Observations that the actions led to, same shape. In an environment whose episode ended, its last observation;
-    /// elsewhere equal to `observations`.
+    /// elsewhere equal to `observations`. They differ from `observations` in the mode
+    /// [`AutoresetMode::SameStep`](crate::AutoresetMode::SameStep) only.
     pub final_observations: Array2<f64>,
     /// Rewards of this step, shape (N,). In an environment whose episode ended, the last reward of that episode.
     pub rewards: Array1<f64>,
@@ -31,7 +33,7 @@ pub struct StepInfo {
     /// Weighted rewards of each term, shape (N, reward terms), in the order of
     /// [`Env::reward_names`](crate::Env::reward_names). The sum of a row is the reward of that environment.
     pub reward_terms: Array2<f64>,
-    /// The episodes that ended in this step, in the order of environments.
+    /// The episodes that ended in this step, in the order of environments: Gymnasium's `final_info`.
     pub ended: Vec<EndedEpisode>,
 }
 

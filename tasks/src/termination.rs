@@ -37,7 +37,7 @@ impl TerminationTerm {
 
     /// Evaluates the term for all environments, shape (N,).
     pub(crate) fn evaluate(&self, now: &TermContext<'_>) -> Result<Array1<bool>> {
-        now.check_per_env(TermKind::Termination, &self.name, (self.condition)(now))
+        now.compute_per_env(TermKind::Termination, &self.name, || (self.condition)(now))
     }
 }
 

@@ -12,15 +12,20 @@ terms! {
     bad_orientation: bad_orientation;
     base_below: root_height_below_minimum;
     base_motion: base_lin_vel, base_ang_vel, projected_gravity;
+    camera_images: camera_rgb, camera_depth, camera_mask;
     flat_orientation: flat_orientation;
     illegal_contact: illegal_contact;
     joint_effort_squares: joint_torques_l2;
     joint_out_of_limits: joint_out_of_limits;
     reset_joints_by_offset: reset_joints_by_offset;
     reset_root_uniform: reset_root_uniform, RootRanges;
+    terrain_levels: reset_root_on_terrain, terrain_levels, TerrainLevelsCfg;
     time_out: time_out;
     track_lin_vel: track_lin_vel;
+    uniform_velocity: uniform_velocity, UniformVelocityCfg;
 }
+
+mod named;
 
 use crate::action::ActionTerm;
 use crate::context::TermContext;

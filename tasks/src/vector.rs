@@ -1,5 +1,6 @@
 //! The interface between learning code and batches of environments: [`VectorEnv`].
 
+use crate::autoreset::AutoresetMode;
 use crate::environment::Env;
 use crate::error::EnvError;
 use crate::space::Space;
@@ -33,8 +34,8 @@ use ndarray::{Array2, ArrayView2};
 ///
 /// - The spaces and the number of environments, N, never change.
 /// - The caller resets all environments before the first [`step`](Self::step).
-/// - An environment whose episode ends begins the next one in the same step (Gymnasium's `AutoresetMode.SAME_STEP`).
-///   The last observation of the old episode is in [`Step::final_observations`].
+/// - An environment whose episode ends begins the next one as [`autoreset_mode`](Self::autoreset_mode) says. The last
+///   observation of the old episode is in [`Step::final_observations`].
 /// - An episode that is reset from outside is truncated. Its final observation is that of the state after the reset
 ///   ([`EndReason::Reset`](crate::EndReason::Reset) if the implementation reports reasons).
 /// - Observations are finite. Actions beyond their bounds are clamped.
@@ -56,6 +57,12 @@ pub trait VectorEnv {
     /// Columns of the actions.
     fn action_space(&self) -> &Space;
 
+    /// Time at which an environment whose episode ended begins the next one, the same in all steps. The default is
+    /// [`AutoresetMode::SameStep`].
+    fn autoreset_mode(&self) -> AutoresetMode {
+        AutoresetMode::SameStep
+    }
+
     /// Begins new episodes where `mask` is true (everywhere if it is `None`), and returns the observations of all
     /// environments, shape (N, columns of [`observation_space`](Self::observation_space)). With a `seed`, the random
     /// numbers of these environments restart. Other environments are unchanged.
@@ -67,7 +74,8 @@ pub trait VectorEnv {
     /// Does one step in all environments. `actions` has shape (N, columns of [`action_space`](Self::action_space)).
     ///
     /// # Errors
-    /// The actions have another shape or are not finite, an environment was never reset, or the implementation fails.
+    /// The actions have another shape or are not finite, an environment was never reset, its episode ended and automatic
+    /// resets are disabled, or the implementation fails.
     fn step(&mut self, actions: ArrayView2<'_, f64>) -> Result<Step<Self::Info>, Self::Error>;
 }
 
@@ -85,6 +93,10 @@ impl VectorEnv for Env {
 
     fn action_space(&self) -> &Space {
         Self::action_space(self)
+    }
+
+    fn autoreset_mode(&self) -> AutoresetMode {
+        self.cfg().autoreset
     }
 
     fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {

@@ -21,7 +21,7 @@ fn task() -> Env {
     let mut sim = simulation(ENVS);
     let cart = sim.add_robot(passive(mjcf_robot("cart", cart))).unwrap();
     let push = kinetoscope_tasks::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
-    EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
+    EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE), ..EnvCfg::default() })
         .action(ActionTerm::new("push", push, move |sim, forces| {
             Ok(sim.robot_mut(cart).set_qf_target(forces, None, None)?)
         }))

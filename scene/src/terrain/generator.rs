@@ -1,60 +1,75 @@
 //! [`TerrainGenerator`]: any generator, as named in configuration files.
 
-use super::{PyramidStairs, RoughTerrain, Slope, TerrainError};
+use super::{
+    Boxes, DiscreteObstacles, Flat, Gap, PyramidSlope, PyramidStairs, RoughTerrain, Slope, SteppingStones,
+    TerrainError, TerrainGrid, Waves,
+};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// A terrain generator. In a file, it is a table with its name: `rough = { seed = 7 }`, `slope = {}`,
-/// `pyramid_stairs = { tread = 0.3 }`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-#[non_exhaustive]
-pub enum TerrainGenerator {
+/// Declares the generators: the variant, its name in files, and its type.
+macro_rules! generators {
+    ($($(#[$doc:meta])* $Variant:ident, $name:literal, $Type:ident, $heights:expr, $size:expr;)*) => {
+        /// A terrain generator. In a file, it is a table with its name: `rough = { seed = 7 }`, `slope = {}`,
+        /// `pyramid_stairs = { tread = 0.3 }`.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case", deny_unknown_fields)]
+        #[non_exhaustive]
+        pub enum TerrainGenerator {
+            $($(#[$doc])* $Variant($Type),)*
+        }
+
+        impl TerrainGenerator {
+            /// Names of the generators in files.
+            pub const NAMES: &'static [&'static str] = &[$($name),*];
+
+            /// Heights \[m\], rows along y, columns along x, from the negative ends.
+            ///
+            /// # Errors
+            /// Those of the generator.
+            pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
+                match self {
+                    $(Self::$Variant(of) => { let heights: fn(&$Type) -> _ = $heights; heights(of) })*
+                }
+            }
+
+            /// Lengths along x and y \[m\].
+            pub fn size(&self) -> [f64; 2] {
+                match self {
+                    $(Self::$Variant(of) => { let size: fn(&$Type) -> [f64; 2] = $size; size(of) })*
+                }
+            }
+        }
+
+        $(impl From<$Type> for TerrainGenerator {
+            fn from(of: $Type) -> Self {
+                Self::$Variant(of)
+            }
+        })*
+    };
+}
+
+generators! {
     /// Random heights.
-    Rough(RoughTerrain),
+    Rough, "rough", RoughTerrain, |of| of.heights(), |of| of.size;
     /// An inclined plane.
-    Slope(Slope),
+    Slope, "slope", Slope, |of| of.heights(), |of| of.size;
     /// Stairs around a platform.
-    PyramidStairs(PyramidStairs),
-}
-
-impl TerrainGenerator {
-    /// Heights \[m\], rows along y, columns along x, from the negative ends.
-    ///
-    /// # Errors
-    /// Those of the generator.
-    pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
-        match self {
-            Self::Rough(rough) => rough.heights(),
-            Self::Slope(slope) => slope.heights(),
-            Self::PyramidStairs(stairs) => stairs.heights(),
-        }
-    }
-
-    /// Lengths along x and y \[m\].
-    pub fn size(&self) -> [f64; 2] {
-        match self {
-            Self::Rough(rough) => rough.size,
-            Self::Slope(slope) => slope.size,
-            Self::PyramidStairs(stairs) => stairs.size,
-        }
-    }
-}
-
-impl From<RoughTerrain> for TerrainGenerator {
-    fn from(rough: RoughTerrain) -> Self {
-        Self::Rough(rough)
-    }
-}
-
-impl From<Slope> for TerrainGenerator {
-    fn from(slope: Slope) -> Self {
-        Self::Slope(slope)
-    }
-}
-
-impl From<PyramidStairs> for TerrainGenerator {
-    fn from(stairs: PyramidStairs) -> Self {
-        Self::PyramidStairs(stairs)
-    }
+    PyramidStairs, "pyramid_stairs", PyramidStairs, |of| of.heights(), |of| of.size;
+    /// Flat ground.
+    Flat, "flat", Flat, |of| of.heights(), |of| of.size;
+    /// Slopes around a platform.
+    PyramidSlope, "pyramid_slope", PyramidSlope, |of| of.heights(), |of| of.size;
+    /// Boxes with random heights.
+    Boxes, "boxes", Boxes, |of| of.heights(), |of| of.size;
+    /// Stones over a deep ground.
+    SteppingStones, "stepping_stones", SteppingStones, |of| of.heights(), |of| of.size;
+    /// A trench around a platform.
+    Gap, "gap", Gap, |of| of.heights(), |of| of.size;
+    /// Waves along x and y.
+    Waves, "waves", Waves, |of| of.heights(), |of| of.size;
+    /// Separate obstacles on flat ground.
+    DiscreteObstacles, "discrete_obstacles", DiscreteObstacles, |of| of.heights(), |of| of.size;
+    /// Tiles of several types, in rows of increasing difficulty.
+    Grid, "grid", TerrainGrid, |of| of.heights(), |of| of.size();
 }

@@ -3,15 +3,36 @@
 //! Each generator returns an array of heights \[m\] over a regular grid: rows along y, columns along x, both starting
 //! at the negative end. Generators are independent of MuJoCo; `kinetoscope_sim::TerrainCfg` takes their result.
 
+mod boxes;
+mod flat;
+mod gap;
 mod generator;
+mod grid;
+mod obstacles;
+mod pyramid_slope;
 mod rough;
 mod slope;
 mod stairs;
+mod stepping_stones;
+mod tile;
+mod waves;
 
+pub use boxes::Boxes;
+pub use flat::Flat;
+pub use gap::Gap;
 pub use generator::TerrainGenerator;
+pub use grid::{TerrainGrid, TileShare};
+pub use obstacles::DiscreteObstacles;
+pub use pyramid_slope::PyramidSlope;
 pub use rough::RoughTerrain;
 pub use slope::Slope;
 pub use stairs::PyramidStairs;
+pub use stepping_stones::SteppingStones;
+pub use tile::{
+    BoxesTile, GapTile, ObstaclesTile, RoughTile, SlopeTile, StairsTile, SteppingStonesTile, TerrainTile, TileCfg,
+    WavesTile,
+};
+pub use waves::Waves;
 
 use thiserror::Error;
 
@@ -61,6 +82,24 @@ pub enum TerrainError {
         /// Number of points along y.
         rows: f64,
     },
+    /// A tile of a grid is invalid.
+    #[error("terrain grid, row {row}, column {column} ({tile}): {error}")]
+    Tile {
+        /// Row of the tile.
+        row: usize,
+        /// Column of the tile.
+        column: usize,
+        /// Name of its type.
+        tile: &'static str,
+        /// Error of its generator.
+        error: Box<TerrainError>,
+    },
+    /// A grid has no tiles.
+    #[error("terrain grid: {field} is empty; name at least one type of tile with a share above 0")]
+    NoTiles {
+        /// Name of the field.
+        field: &'static str,
+    },
     /// The range contains no multiple of the step.
     #[error(
         "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; widen the range, for \
@@ -106,6 +145,57 @@ fn grid_size(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize;
         }
     }
     Ok([columns as usize, rows as usize])
+}
+
+/// Checks that a platform at the center fits into a field, and returns the shorter side of the field.
+fn check_platform(terrain: &'static str, size: [f64; 2], platform: f64) -> Result<f64, TerrainError> {
+    positive(terrain, "platform", platform)?;
+    let smaller = size[0].min(size[1]);
+    if platform > smaller {
+        let expected = "it must fit into the field";
+        return Err(TerrainError::Number { terrain, field: "platform", value: platform, expected });
+    }
+    Ok(smaller)
+}
+
+/// Checks that both ends of a range are finite and in order.
+fn check_range(terrain: &'static str, field: &'static str, range: [f64; 2]) -> Result<[f64; 2], TerrainError> {
+    finite(terrain, field, range[0])?;
+    finite(terrain, field, range[1])?;
+    if range[0] > range[1] {
+        let expected = "the first number must be at most the second one";
+        return Err(TerrainError::Number { terrain, field, value: range[0], expected });
+    }
+    Ok(range)
+}
+
+/// Number of cells in a length, rounded, at least `least`.
+fn whole_cells(
+    terrain: &'static str,
+    field: &'static str,
+    length: f64,
+    cell: f64,
+    least: usize,
+) -> Result<usize, TerrainError> {
+    positive(terrain, field, length)?;
+    let cells = (length / cell).round().min(MAX_POINTS as f64) as usize;
+    if cells < least {
+        let expected = if least == 1 { "it must be at least one cell" } else { "it must be at least two cells" };
+        return Err(TerrainError::Number { terrain, field, value: length, expected });
+    }
+    Ok(cells)
+}
+
+/// Distance of a point (row, column) from the rim of a field with `points` rows and columns \[m\].
+fn from_rim(at: [usize; 2], points: [usize; 2], cell: f64) -> f64 {
+    let distance = |k: usize, n: usize| k.min(n - 1 - k) as f64 * cell;
+    distance(at[0], points[0]).min(distance(at[1], points[1]))
+}
+
+/// Larger one of the distances along x and y of a point (row, column) from the center of the field \[m\].
+fn from_center(at: [usize; 2], points: [usize; 2], cell: f64) -> f64 {
+    let distance = |k: usize, n: usize| (k as f64 - 0.5 * (n - 1) as f64).abs() * cell;
+    distance(at[0], points[0]).max(distance(at[1], points[1]))
 }
 
 #[cfg(test)]

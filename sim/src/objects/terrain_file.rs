@@ -93,10 +93,10 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
         let mut keys = KeyTracker { map: &mut map, any: false };
         let generator = TerrainGenerator::deserialize(MapAccessDeserializer::new(&mut keys));
         if !keys.any {
-            return Err(A::Error::custom(
-                "`heights` names no generator; use `rough`, `slope` or `pyramid_stairs`, such as \
-                 { rough = { seed = 7 } }",
-            ));
+            return Err(A::Error::custom(format_args!(
+                "`heights` names no generator, such as {{ rough = {{ seed = 7 }} }}; known generators: {}",
+                TerrainGenerator::NAMES.join(", ")
+            )));
         }
         let generator = generator?;
         match map.next_key::<IgnoredAny>()? {

@@ -1,6 +1,7 @@
 //! Random initial joint states.
 
 use super::find_joints;
+use crate::episode_rng::env_ids;
 use crate::error::Result;
 use crate::event::EventTerm;
 use kinetoscope_sim::{RobotId, SimulationManager};
@@ -27,16 +28,19 @@ pub fn reset_joints_by_offset(
     let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(EventTerm::on_reset(name, move |sim, rngs| {
         let starts = sim.robot(robot).default_qpos();
-        for rng in rngs {
-            let env = rng.env();
-            let mut drawn =
-                |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| rng.uniform_range(low, high));
-            let (mut at, moving) = (drawn(positions), drawn(velocities));
-            at.indexed_iter_mut().for_each(|((_, k), x)| *x += starts[(env.0, joints[k].0)]);
-            // Written positions are clamped to the limits.
-            sim.robot_mut(robot).write_qpos(&at, Some(&joints), Some(&[env]))?;
-            sim.robot_mut(robot).write_qvel(&moving, Some(&joints), Some(&[env]))?;
+        let size = (rngs.len(), joints.len());
+        let (mut at, mut moving) = (Array2::zeros(size), Array2::zeros(size));
+        for (k, rng) in rngs.iter_mut().enumerate() {
+            let env = rng.env().0;
+            let (from, [low, high]) = (joints.iter().map(|joint| starts[(env, joint.0)]), positions);
+            at.row_mut(k).iter_mut().zip(from).for_each(|(to, from)| *to = rng.uniform_range(low, high) + from);
+            let [low, high] = velocities;
+            moving.row_mut(k).iter_mut().for_each(|to| *to = rng.uniform_range(low, high));
         }
+        let envs = env_ids(rngs);
+        // Written positions are clamped to the limits.
+        sim.robot_mut(robot).write_qpos(&at, Some(&joints), Some(&envs))?;
+        sim.robot_mut(robot).write_qvel(&moving, Some(&joints), Some(&envs))?;
         Ok(())
     }))
 }

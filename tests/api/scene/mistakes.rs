@@ -76,7 +76,7 @@ fn kinds() {
         (3, "@camera\nchannels = [\n\"rgb\",\n\"deph\"]", "deph|depth"),
         (2, "[simulation]\nintegrator = \"eular\"", "eular|`euler`"),
         // A terrain without a generator, with two generators, with an unknown generator.
-        (3, "@terrain\nheights = {}", "names no generator|`rough`|`slope`|`pyramid_stairs`"),
+        (3, "@terrain\nheights = {}", "names no generator|rough|slope|pyramid_stairs|stepping_stones|grid"),
         (3, "@terrain\nheights = { rough = {}, slope = {} }", "names two generators"),
         (3, "@terrain\nheights = { slope = {}, rough = {} }", "names two generators"),
         (3, "@terrain\nheights.hills = {}", "hills|`rough`"),

@@ -4,8 +4,8 @@ use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::WrenchFrame;
 use kinetoscope::tasks::{
-    ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventMode, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
-    TerminationTerm, terms,
+    ActionTerm, AutoresetMode, CommandTerm, Env, EnvBuilder, EnvCfg, EventMode, EventTerm, Noise, ObservationTerm,
+    RewardTerm, Space, TerminationTerm, terms,
 };
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
@@ -51,12 +51,17 @@ pub(crate) fn cart_env(num_envs: usize, episode_steps: Option<u64>) -> Env {
 
 /// A task with every kind of term: a pole on a cart with noise, commands, pushes, randomized masses and random starts.
 pub(crate) fn all_terms_task(cfg: SimulationManagerCfg) -> Env {
+    all_terms_task_in(cfg, AutoresetMode::SameStep)
+}
+
+/// The same task with a mode of automatic resets.
+pub(crate) fn all_terms_task_in(cfg: SimulationManagerCfg, autoreset: AutoresetMode) -> Env {
     let (sim, robot) = world(cfg, true);
     let push = terms::joint_efforts(&sim, "push", robot, &["slide"], 10.0).unwrap();
     let positions = terms::joint_pos_rel(&sim, "positions", robot, &[".*"]).unwrap();
     let velocities = terms::joint_vel(&sim, "velocities", robot, &["hinge", "slide"]).unwrap();
     let pole = sim.robot(robot).link_id("pole").unwrap();
-    EnvBuilder::new(sim, EnvCfg { decimation: 2, episode_steps: Some(40) })
+    EnvBuilder::new(sim, EnvCfg { decimation: 2, episode_steps: Some(40), autoreset })
         .action(push)
         .command(CommandTerm::new("goal", ["x"], |rng| [rng.uniform_range(-0.5, 0.5)]))
         .event(EventTerm::new("masses", EventMode::Startup, |sim, rng| {

@@ -83,30 +83,31 @@ fn loop_by_hand() {
     let (sim, robot) = world(cfg(num_envs, 2), true);
     let slide = sim.robot(robot).joint_id("slide").unwrap();
     let space = Space::uniform(["force"], [-BOUND, BOUND]).unwrap();
-    let mut env = EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(LIMIT) })
-        .action(ActionTerm::new("push", space, move |sim, forces| {
-            Ok(sim.robot_mut(robot).set_qf_target(forces, Some(&[slide]), None)?)
-        }))
-        .observation(ObservationTerm::new("state", ["x", "angle", "v", "spin"], move |now| {
-            Ok(observe(now.sim(), robot))
-        }))
-        .reward(RewardTerm::new("alive", 1.0, |now| Ok(Array1::ones(now.num_envs()))))
-        .reward(RewardTerm::new("middle", -0.25, move |now| {
-            Ok(now.sim().robot(robot).qpos().column(0).mapv(|x| x * x))
-        }))
-        .reward(RewardTerm::new("effort", -0.01, |now| Ok(now.actions().column(0).mapv(|force| force * force))))
-        .termination(TerminationTerm::new("fell", move |now| {
-            Ok(now.sim().robot(robot).qpos().column(1).mapv(|angle| angle.abs() > FALLEN))
-        }))
-        .event(EventTerm::on_reset("start", move |sim, rng| {
-            for die in rng {
-                let start = start(die.seed(), die.global_env(), die.episode());
-                sim.robot_mut(robot).write_qpos(&start, None, Some(&[die.env()]))?;
-            }
-            Ok(())
-        }))
-        .build()
-        .unwrap();
+    let mut env =
+        EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(LIMIT), ..EnvCfg::default() })
+            .action(ActionTerm::new("push", space, move |sim, forces| {
+                Ok(sim.robot_mut(robot).set_qf_target(forces, Some(&[slide]), None)?)
+            }))
+            .observation(ObservationTerm::new("state", ["x", "angle", "v", "spin"], move |now| {
+                Ok(observe(now.sim(), robot))
+            }))
+            .reward(RewardTerm::new("alive", 1.0, |now| Ok(Array1::ones(now.num_envs()))))
+            .reward(RewardTerm::new("middle", -0.25, move |now| {
+                Ok(now.sim().robot(robot).qpos().column(0).mapv(|x| x * x))
+            }))
+            .reward(RewardTerm::new("effort", -0.01, |now| Ok(now.actions().column(0).mapv(|force| force * force))))
+            .termination(TerminationTerm::new("fell", move |now| {
+                Ok(now.sim().robot(robot).qpos().column(1).mapv(|angle| angle.abs() > FALLEN))
+            }))
+            .event(EventTerm::on_reset("start", move |sim, rng| {
+                for die in rng {
+                    let start = start(die.seed(), die.global_env(), die.episode());
+                    sim.robot_mut(robot).write_qpos(&start, None, Some(&[die.env()]))?;
+                }
+                Ok(())
+            }))
+            .build()
+            .unwrap();
     assert_eq!(env.observation_space().names(), ["state/x", "state/angle", "state/v", "state/spin"]);
     assert_eq!((env.action_space().low(), env.action_space().high()), (&[-BOUND][..], &[BOUND][..]));
     assert_eq!(env.step_dt(), 0.02);

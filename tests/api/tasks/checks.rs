@@ -3,7 +3,7 @@
 use super::bundled::{all_terms_task, cart_env, cart_task, cfg, world};
 use super::vector_env::Carts;
 use kinetoscope::ndarray::{Array2, ArrayView2, s};
-use kinetoscope::tasks::{Env, EnvCfg, EnvError, Finding, Space, Step, StepInfo, VectorEnv, check};
+use kinetoscope::tasks::{AutoresetMode, Env, EnvCfg, EnvError, Finding, Space, Step, StepInfo, VectorEnv, check};
 
 #[test]
 fn good_tasks() {
@@ -35,6 +35,10 @@ pub(super) enum Fault {
     AcceptsWrongMask,
     MaskedResetFails,
     OutOfBoundsFails,
+    /// A reward in a step that only begins an episode.
+    RewardAtBeginning,
+    /// Environments whose episode ended are reset by the next step, although automatic resets are disabled.
+    StepsEndedEpisodes,
 }
 
 /// A valid task with a fault added.
@@ -78,6 +82,10 @@ impl VectorEnv for Broken {
         self.inner.action_space()
     }
 
+    fn autoreset_mode(&self) -> AutoresetMode {
+        self.inner.cfg().autoreset
+    }
+
     fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, EnvError> {
         (self.resets, self.ended_observations) = (self.resets + 1, None);
         if self.fault == Fault::MaskedResetFails && mask.is_some_and(|mask| mask.len() == self.num_envs()) {
@@ -105,6 +113,9 @@ impl VectorEnv for Broken {
         if self.fault == Fault::OutOfBoundsFails && actions.iter().any(|action| *action > high) {
             return Err(EnvError::ResetFirst { env: 2 });
         }
+        if self.fault == Fault::StepsEndedEpisodes && self.ended_observations.take().is_some() {
+            self.inner.reset(None, None)?;
+        }
         let mut step = self.inner.step(actions)?;
         match self.fault {
             Fault::NeighborDependent => {
@@ -114,6 +125,14 @@ impl VectorEnv for Broken {
             Fault::ActionsNotClamped => step.rewards += &actions.column(0),
             Fault::WrongFinalObservations => step.final_observations.fill(0.0),
             Fault::NanReward => step.rewards[2] = f64::NAN,
+            Fault::RewardAtBeginning => {
+                let begins = self.ended_observations.take().is_some();
+                step.rewards.iter_mut().for_each(|reward| *reward += f64::from(u8::from(begins)));
+                self.ended_observations = step.truncated[0].then(|| step.observations.clone());
+            }
+            Fault::StepsEndedEpisodes => {
+                self.ended_observations = step.truncated[0].then(|| step.observations.clone());
+            }
             Fault::NeverRestarts if self.ended_observations.is_some() || step.truncated.iter().any(|over| *over) => {
                 // The environment stays at the end of its episode and reports that end in every step.
                 let over = self.ended_observations.get_or_insert_with(|| step.final_observations.clone()).clone();

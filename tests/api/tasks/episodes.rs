@@ -267,7 +267,7 @@ fn reset_by_task() {
 fn free_cart(num_envs: usize) -> Env {
     let (sim, robot) = world(cfg(num_envs, 2), false);
     let space = Space::uniform(["force"], [-1e308, 1e308]).unwrap();
-    EnvBuilder::new(sim, EnvCfg { decimation: 3, episode_steps: Some(50) })
+    EnvBuilder::new(sim, EnvCfg { decimation: 3, episode_steps: Some(50), ..EnvCfg::default() })
         .action(ActionTerm::new("push", space, move |sim, forces| {
             Ok(sim.robot_mut(robot).set_qf_target(forces, None, None)?)
         }))

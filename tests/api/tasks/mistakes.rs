@@ -41,8 +41,8 @@ fn building() {
     let two_a = ObservationTerm::new("twice", ["a", "a"], |now| Ok(Array2::ones((now.num_envs(), 2))));
     let fails = EventTerm::new("e", EventMode::Startup, |_, _| Err("no idea".into()));
     let rows = [
-        (cart(1, EnvCfg { decimation: 0, episode_steps: None }), "Config { field: \"decimation\""),
-        (cart(1, EnvCfg { decimation: 1, episode_steps: Some(0) }), "Config { field: \"episode_steps\""),
+        (cart(1, EnvCfg { decimation: 0, ..EnvCfg::default() }), "Config { field: \"decimation\""),
+        (cart(1, EnvCfg { episode_steps: Some(0), ..EnvCfg::default() }), "Config { field: \"episode_steps\""),
         (empty().observation(ones("one")), "NoTerm { kind: Action"),
         (empty().action(idle()), "NoTerm { kind: Observation"),
         (builder().action(idle()), "RepeatedTerm { kind: Action"),
@@ -157,4 +157,41 @@ fn terms_in_steps() {
     let bad = CommandTerm::new("goal", ["x"], |_| [f64::NAN]);
     let error = builder().command(bad).build().unwrap().reset(None, None).unwrap_err();
     assert!(matches!(&error, EnvError::NotFinite { column, .. } if column == "x"), "{error}");
+}
+
+/// A panic in a term is an error that names the term. A reset recovers.
+#[test]
+fn panics() {
+    let observation = ObservationTerm::new("o", ["x"], |now| {
+        assert!(now.episode_steps()[0] < 2, "too late");
+        Ok(Array2::zeros((now.num_envs(), 1)))
+    });
+    let action = ActionTerm::new("a", Space::uniform(["a"], [0.0, 1.0]).unwrap(), |_, _| panic!("an action"));
+    let index = RewardTerm::new("r", 1.0, |now| Ok(Array1::from_elem(2, now.actions()[(7, 0)])));
+    for (task, kind, name, message) in [
+        (builder().observation(observation), TermKind::Observation, "o", "too late"),
+        (builder().action(action), TermKind::Action, "a", "an action"),
+        (builder().reward(index), TermKind::Reward, "r", "out of bounds"),
+        (builder().termination(TerminationTerm::new("t", |_| panic!("an end"))), TermKind::Termination, "t", "an end"),
+        (
+            builder().event(EventTerm::new("e", EventMode::Interval { steps: [2, 2] }, |_, _| panic!("a push"))),
+            TermKind::Event,
+            "e",
+            "a push",
+        ),
+    ] {
+        let mut env = task.build().unwrap();
+        for _ in 0..2 {
+            env.reset(None, None).unwrap();
+            let actions = Array2::zeros((2, env.action_space().len()));
+            let error = (0..2).find_map(|_| env.step(&actions).err()).unwrap();
+            let EnvError::TermPanic { kind: of, name: found, message: text } = &error else { panic!("{error}") };
+            assert_eq!((*of, found.as_str()), (kind, name));
+            assert!(text.contains(message), "{text}");
+            assert!(matches!(env.step(&actions), Err(EnvError::ResetFirst { env: 0 })));
+        }
+    }
+    let command = CommandTerm::new("c", ["x"], |rng| [[1.0][usize::from(rng.uniform() < 2.0)]]);
+    let error = builder().command(command).build().unwrap().reset(None, None).unwrap_err();
+    assert!(error.to_string().starts_with("the command term \"c\" panicked: index out of bounds"), "{error}");
 }

@@ -107,7 +107,7 @@ fn accelerometer() {
     let imu = sim.add_sensor("imu", ImuCfg::on("cart/cart")).unwrap();
     let feels =
         ObservationTerm::new("feels", ["x", "y", "z"], move |now| Ok(now.sim().sensor(imu)?.lin_acc_b().to_owned()));
-    let cfg = EnvCfg { decimation: 3, episode_steps: Some(5) };
+    let cfg = EnvCfg { decimation: 3, episode_steps: Some(5), ..EnvCfg::default() };
     let mut env = cart_task(sim, robot, cfg).observation(feels.scaled(0.5)).build().unwrap();
     let exact = |seen: &Array2<f64>, forces: [f64; 3], what: &str| {
         for (e, force) in forces.into_iter().enumerate() {

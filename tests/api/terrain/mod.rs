@@ -1,6 +1,8 @@
 //! Terrain in a simulation: heights measured by rays, against the array and against `mj_ray`; objects at rest on it;
 //! exports; and invalid terrains.
 
+mod grid;
+
 use kinetoscope::mujoco::{BUILD_VERSION, SupportedVersion, compile_file};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;

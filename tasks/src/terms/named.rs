@@ -1,0 +1,225 @@
+//! The ready-made terms by name: the default [`TermRegistry`].
+
+use super::*;
+use crate::error::Result as EnvResult;
+use crate::registry::{TermArgs, TermRegistry};
+use kinetoscope_scene::terrain::TerrainGrid;
+use kinetoscope_sensors::ContactSensor;
+use kinetoscope_sensors::camera::Camera;
+use serde::Deserialize;
+
+/// Declares the parameters of terms in files: their keys, and the defaults of keys that may be left out.
+macro_rules! params {
+    ($($Name:ident { $($field:ident: $Type:ty $(= $default:literal)?),* $(,)? })*) => {$(
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct $Name {
+            $($(#[serde(default = $default)])? $field: $Type,)*
+        }
+    )*};
+}
+
+params! {
+    Nothing {}
+    OfRobot { robot: Option<String> }
+    OfJoints { robot: Option<String>, joints: Vec<String> = "every_joint" }
+    Efforts { robot: Option<String>, joints: Vec<String> = "every_joint", bound: f64 }
+    Steps { robot: Option<String>, joints: Vec<String> = "every_joint", step: f64 }
+    OfCommand { command: String }
+    Tracking { robot: Option<String>, command: String, std: f64 }
+    Angle { robot: Option<String>, angle: f64 }
+    Height { robot: Option<String>, height: f64 }
+    Force { sensor: String, force: f64 }
+    Limit { steps: u64 }
+    OfCamera { camera: String }
+    Depth { camera: String, range: [f32; 2] }
+    JointRanges { robot: Option<String>, joints: Vec<String> = "every_joint", positions: [f64; 2], velocities: [f64; 2] = "zero" }
+    Root { robot: Option<String>, position: [[f64; 2]; 3] = "zeros", rpy: [[f64; 2]; 3] = "zeros", linear: [[f64; 2]; 3] = "zeros", angular: [[f64; 2]; 3] = "zeros" }
+    OnTerrain { robot: Option<String>, grid: TerrainGrid, curriculum: String, position: [[f64; 2]; 3] = "zeros", rpy: [[f64; 2]; 3] = "zeros", linear: [[f64; 2]; 3] = "zeros", angular: [[f64; 2]; 3] = "zeros" }
+    Levels { robot: Option<String>, grid: TerrainGrid, max_initial_level: Option<usize>, command: Option<String>, episode_seconds: f64 = "episode_seconds" }
+    Velocity {
+        robot: Option<String>,
+        lin_vel_x: [f64; 2],
+        lin_vel_y: [f64; 2],
+        ang_vel_z: [f64; 2],
+        heading: Option<[f64; 2]>,
+        rel_heading_envs: f64 = "one",
+        heading_stiffness: f64 = "one",
+        rel_standing_envs: f64 = "no",
+        resampling_time: Option<[f64; 2]>,
+    }
+}
+
+fn every_joint() -> Vec<String> {
+    vec![".*".into()]
+}
+
+fn zero() -> [f64; 2] {
+    [0.0; 2]
+}
+
+fn zeros() -> [[f64; 2]; 3] {
+    [[0.0; 2]; 3]
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn no() -> f64 {
+    0.0
+}
+
+fn episode_seconds() -> f64 {
+    TerrainLevelsCfg::default().episode_seconds
+}
+
+/// Creates a term of joints: `make` gets the robot and the patterns.
+fn joints<T>(
+    args: &TermArgs<'_>,
+    make: impl FnOnce(&SimulationManager, &str, RobotId, &[&str]) -> EnvResult<T>,
+) -> EnvResult<T> {
+    let OfJoints { robot, joints } = args.params()?;
+    make(args.sim(), args.name(), args.robot(robot.as_deref())?, &patterns(&joints))
+}
+
+fn patterns(joints: &[String]) -> Vec<&str> {
+    joints.iter().map(String::as_str).collect()
+}
+
+/// Creates a term of a robot.
+fn of_robot<T>(args: &TermArgs<'_>, make: impl FnOnce(&str, RobotId) -> T) -> EnvResult<T> {
+    let OfRobot { robot } = args.params()?;
+    Ok(make(args.name(), args.robot(robot.as_deref())?))
+}
+
+impl Default for TermRegistry {
+    /// The ready-made terms of [`terms`](mod@crate::terms), by the names of their functions.
+    fn default() -> Self {
+        let mut all = Self::empty();
+        actions_and_commands(&mut all);
+        observations(&mut all);
+        rewards_and_terminations(&mut all);
+        events_and_curricula(&mut all);
+        all
+    }
+}
+
+fn actions_and_commands(all: &mut TermRegistry) {
+    all.add_action("joint_efforts", |args| {
+        let Efforts { robot, joints, bound } = args.params()?;
+        joint_efforts(args.sim(), args.name(), args.robot(robot.as_deref())?, &patterns(&joints), bound)
+    });
+    all.add_action("relative_joint_positions", |args| {
+        let Steps { robot, joints, step } = args.params()?;
+        relative_joint_positions(args.sim(), args.name(), args.robot(robot.as_deref())?, &patterns(&joints), step)
+    });
+    all.add_command("uniform_velocity", |args| {
+        let of: Velocity = args.params()?;
+        let cfg = UniformVelocityCfg {
+            lin_vel_x: of.lin_vel_x,
+            lin_vel_y: of.lin_vel_y,
+            ang_vel_z: of.ang_vel_z,
+            heading: of.heading,
+            rel_heading_envs: of.rel_heading_envs,
+            heading_stiffness: of.heading_stiffness,
+            rel_standing_envs: of.rel_standing_envs,
+            resampling_time: of.resampling_time,
+        };
+        uniform_velocity(args.name(), args.robot(of.robot.as_deref())?, cfg)
+    });
+}
+
+fn observations(all: &mut TermRegistry) {
+    all.add_observation("joint_pos_rel", |args| joints(args, joint_pos_rel));
+    all.add_observation("joint_vel", |args| joints(args, joint_vel));
+    all.add_observation("base_lin_vel", |args| of_robot(args, base_lin_vel));
+    all.add_observation("base_ang_vel", |args| of_robot(args, base_ang_vel));
+    all.add_observation("projected_gravity", |args| of_robot(args, projected_gravity));
+    all.add_observation("last_action", |args| {
+        args.params::<Nothing>()?;
+        Ok(last_action(args.name(), args.action_columns().to_vec()))
+    });
+    all.add_observation("generated_commands", |args| {
+        let OfCommand { command } = args.params()?;
+        let columns = args.command_columns(&command)?.to_vec();
+        Ok(generated_commands(args.name(), command, columns))
+    });
+    all.add_image("camera_rgb", |args| {
+        let OfCamera { camera } = args.params()?;
+        camera_rgb(args.sim(), args.name(), args.sensor::<Camera>(&camera)?)
+    });
+    all.add_image("camera_depth", |args| {
+        let Depth { camera, range } = args.params()?;
+        camera_depth(args.sim(), args.name(), args.sensor::<Camera>(&camera)?, range)
+    });
+    all.add_image("camera_mask", |args| {
+        let OfCamera { camera } = args.params()?;
+        camera_mask(args.sim(), args.name(), args.sensor::<Camera>(&camera)?)
+    });
+}
+
+fn rewards_and_terminations(all: &mut TermRegistry) {
+    all.add_reward("is_alive", |args| {
+        args.params::<Nothing>()?;
+        Ok(is_alive(args.name(), args.weight()))
+    });
+    all.add_reward("action_rate", |args| {
+        args.params::<Nothing>()?;
+        Ok(action_rate(args.name(), args.weight()))
+    });
+    all.add_reward("flat_orientation", |args| {
+        of_robot(args, |name, robot| flat_orientation(name, args.weight(), robot))
+    });
+    all.add_reward("joint_torques_l2", |args| {
+        joints(args, |sim, name, robot, patterns| joint_torques_l2(sim, name, args.weight(), robot, patterns))
+    });
+    all.add_reward("track_lin_vel", |args| {
+        let Tracking { robot, command, std } = args.params()?;
+        args.command_columns(&command)?;
+        Ok(track_lin_vel(args.name(), args.weight(), args.robot(robot.as_deref())?, command, std))
+    });
+    all.add_termination("bad_orientation", |args| {
+        let Angle { robot, angle } = args.params()?;
+        Ok(bad_orientation(args.name(), args.robot(robot.as_deref())?, angle))
+    });
+    all.add_termination("root_height_below_minimum", |args| {
+        let Height { robot, height } = args.params()?;
+        Ok(root_height_below_minimum(args.name(), args.robot(robot.as_deref())?, height))
+    });
+    all.add_termination("illegal_contact", |args| {
+        let Force { sensor, force } = args.params()?;
+        Ok(illegal_contact(args.name(), args.sensor::<ContactSensor>(&sensor)?, force))
+    });
+    all.add_termination("joint_out_of_limits", |args| joints(args, joint_out_of_limits));
+    all.add_termination("time_out", |args| {
+        let Limit { steps } = args.params()?;
+        Ok(time_out(args.name(), steps))
+    });
+}
+
+fn events_and_curricula(all: &mut TermRegistry) {
+    all.add_event("reset_joints_by_offset", |args| {
+        let JointRanges { robot, joints, positions, velocities } = args.params()?;
+        let robot = args.robot(robot.as_deref())?;
+        reset_joints_by_offset(args.sim(), args.name(), robot, &patterns(&joints), positions, velocities)
+    });
+    all.add_event("reset_root_uniform", |args| {
+        let Root { robot, position, rpy, linear, angular } = args.params()?;
+        let ranges = RootRanges { position, rpy, linear, angular };
+        Ok(reset_root_uniform(args.name(), args.robot(robot.as_deref())?, ranges))
+    });
+    all.add_event("reset_root_on_terrain", |args| {
+        let OnTerrain { robot, grid, curriculum, position, rpy, linear, angular } = args.params()?;
+        let ranges = RootRanges { position, rpy, linear, angular };
+        reset_root_on_terrain(args.name(), args.robot(robot.as_deref())?, &grid, curriculum, ranges)
+    });
+    all.add_curriculum("terrain_levels", |args| {
+        let Levels { robot, grid, max_initial_level, command, episode_seconds } = args.params()?;
+        if let Some(command) = &command {
+            args.command_columns(command)?;
+        }
+        let cfg = TerrainLevelsCfg { max_initial_level, command, episode_seconds };
+        terrain_levels(args.name(), args.robot(robot.as_deref())?, &grid, cfg)
+    });
+}
