@@ -163,9 +163,12 @@ def test_destroyed_simulations(arm_sim):
     cam = sim.add_sensor("camera", ks.CameraCfg(width=8, height=8))
     sim.destroy()
     sim.destroy()
-    for use in (sim.update, lambda: arm.qpos, lambda: cam["color"], lambda: arm.set_qpos_target(START), lambda: repr(arm)):
+    for use in (sim.update, lambda: arm.qpos, lambda: cam["color"], lambda: arm.set_qpos_target(START)):
         with pytest.raises(ks.DestroyedError):
             use()
+    # Debuggers and notebooks show values at any time.
+    for value, name in ((sim, "SimulationManager"), (arm, "Robot"), (cam, "Sensor")):
+        assert repr(value) == f"<{name} of a simulation that is destroyed>"
     with ks.SimulationManager() as other:
         other.update()
     with pytest.raises(ks.DestroyedError):
@@ -342,6 +345,19 @@ def test_threads_share_a_simulation(arm_sim):
 
 def resident() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_text_of_a_simulation_in_use(arm_sim):
+    """A debugger does not wait for a call of another thread."""
+    sim, arm = arm_sim
+    thread = threading.Thread(target=sim.rollout, args=(np.zeros((2, 20_000, 6)),))
+    thread.start()
+    time.sleep(0.05)
+    texts = [repr(sim), repr(arm)]
+    assert thread.is_alive()
+    thread.join()
+    assert texts == ["<SimulationManager of a simulation that is in use>", "<Robot of a simulation that is in use>"]
+    assert "2 envs" in repr(sim) and "6 joints" in repr(arm)
 
 
 def test_created_and_destroyed_simulations_leave_no_memory():

@@ -84,6 +84,31 @@ impl EnvBuilder {
         self
     }
 
+    /// Checks the configuration and the terms, as [`build`](Self::build) does.
+    ///
+    /// # Errors
+    /// The errors of [`build`](Self::build), except those of events.
+    pub fn check(&self) -> Result<()> {
+        self.spaces().map(drop)
+    }
+
+    /// Returns the simulation, for example if [`check`](Self::check) found an error.
+    pub fn into_sim(self) -> SimulationManager {
+        self.sim
+    }
+
+    /// Spaces of the observations and of the actions, of checked terms.
+    fn spaces(&self) -> Result<[Space; 2]> {
+        let Self { cfg, terms, .. } = self;
+        cfg.check()?;
+        terms.check()?;
+        let observation_spaces =
+            terms.observations.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
+        let observations = terms.observations.iter().map(|term| term.name.as_str()).zip(&observation_spaces);
+        let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
+        Ok([Space::concatenate(observations), Space::concatenate(actions)])
+    }
+
     /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup)
     /// events. No episode begins: call [`Env::reset`] first.
     ///
@@ -93,14 +118,8 @@ impl EnvBuilder {
     /// - Two columns of a term have the same name.
     /// - A number is out of range, or an event fails.
     pub fn build(self) -> Result<Env> {
+        let spaces = self.spaces()?;
         let Self { sim, cfg, terms } = self;
-        cfg.check()?;
-        terms.check()?;
-        let observation_spaces =
-            terms.observations.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
-        let observations = terms.observations.iter().map(|term| term.name.as_str()).zip(&observation_spaces);
-        let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
-        let spaces = [Space::concatenate(observations), Space::concatenate(actions)];
         Env::new(sim, cfg, terms, spaces)
     }
 }
