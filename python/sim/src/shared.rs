@@ -149,7 +149,7 @@ impl Shared {
     pub(crate) fn start_task(
         &self,
         py: Python<'_>,
-        make: impl FnOnce(SimulationManager) -> Result<Env, (Failure, Option<SimulationManager>)> + Send,
+        make: impl FnOnce(SimulationManager) -> Result<Env, (Failure, Option<Box<SimulationManager>>)> + Send,
     ) -> PyResult<()> {
         let locked = || {
             let mut guard = self.lock()?;
@@ -168,7 +168,7 @@ impl Shared {
                         Ok(())
                     }
                     Err((failure, sim)) => {
-                        *guard = sim.map(|sim| Simulated::Alone(Box::new(sim)));
+                        *guard = sim.map(Simulated::Alone);
                         Err(failure)
                     }
                 },

@@ -296,18 +296,18 @@ fn builder(
     shared: &Shared,
     sim: SimulationManager,
     cfg: &TaskCfg,
-) -> Result<EnvBuilder, (Failure, Option<SimulationManager>)> {
+) -> Result<EnvBuilder, (Failure, Option<Box<SimulationManager>>)> {
     let lengths = EnvCfg { decimation: cfg.decimation, episode_steps: cfg.episode_steps };
     let mut builder = EnvBuilder::new(sim, lengths);
     match add_terms(shared, &builder, cfg) {
-        Err(failure) => Err((failure, Some(builder.into_sim()))),
+        Err(failure) => Err((failure, Some(Box::new(builder.into_sim())))),
         Ok(terms) => {
             for term in terms {
                 builder = term(builder);
             }
             match builder.check() {
                 Ok(()) => Ok(builder),
-                Err(error) => Err((error.into(), Some(builder.into_sim()))),
+                Err(error) => Err((error.into(), Some(Box::new(builder.into_sim())))),
             }
         }
     }
