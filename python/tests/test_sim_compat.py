@@ -325,8 +325,8 @@ def test_stereo_and_contacts_of_embodichain():
     np.testing.assert_allclose(pairs["position"][valid][:, 2], 0.2, atol=0.01)
     chosen = any_of.filter_by_user_ids([upper.native.mask_id], env_ids=[1])
     assert np.asarray(chosen["impulse"]).sum() == pytest.approx(2 * 9.81 * 0.01, rel=0.02)
-    with pytest.raises(ValueError, match="there is no 'uper'; known: .*upper"):
-        sim.add_sensor(ContactSensorCfg(rigid_uid_list=["uper"]))
+    with pytest.raises(ValueError, match="there is no 'upper2'; known: .*upper"):
+        sim.add_sensor(ContactSensorCfg(rigid_uid_list=["upper2"]))
     with pytest.raises(NotImplementedError, match="left_to_right_rot"):
         sim.add_sensor(StereoCameraCfg(left_to_right_rot=(0, 0, 1)))
     sim.destroy()
