@@ -11,6 +11,23 @@ use std::time::Duration;
 /// Environment variable with a python that can import mujoco 4; set by `cargo xtask bench`.
 const PYTHON: &str = "KINETOSCOPE_PYTHON4";
 
+/// Environment variable with a python that can import this project's package `kinetoscope`; set by `cargo xtask bench`.
+const PACKAGE: &str = "KINETOSCOPE_PYTHON_PACKAGE";
+
+/// The python with this project's package; `None` with a message if no such Python is named, or if this build is for
+/// another MuJoCo version than the package.
+pub(crate) fn python_with_package() -> Option<OsString> {
+    if BUILD_VERSION != SupportedVersion::V4 {
+        eprintln!("  left out: the Python package is for MuJoCo 4, and this build is for 2.2.2");
+        return None;
+    }
+    let python = std::env::var_os(PACKAGE);
+    if python.is_none() {
+        eprintln!("  left out: {PACKAGE} is not set to a Python that can import kinetoscope");
+    }
+    python
+}
+
 /// The python of the baselines; `None` with a message if there is no such python, or if this build is for another
 /// MuJoCo version.
 pub(crate) fn python(baselines: &str) -> Option<OsString> {

@@ -13,6 +13,7 @@ mod memory;
 mod models;
 mod mujoco_batch;
 mod other_load;
+mod python;
 mod randomize;
 mod rays;
 mod record;
@@ -42,6 +43,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("contacts", contacts::run),
     ("ik", ik::run),
     ("randomize", randomize::run),
+    ("python", python::run),
     ("startup", startup::run),
     ("memory", memory::run),
 ];
@@ -53,7 +55,7 @@ type Bench = fn(&Settings) -> BenchResult<Vec<Row>>;
 #[command(name = "kinetoscope-benches")]
 struct Args {
     /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, ik, randomize,
-    /// startup, memory
+    /// python, startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

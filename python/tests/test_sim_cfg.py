@@ -3,6 +3,7 @@
 import ast
 import dataclasses
 import inspect
+import re
 import tomllib
 from pathlib import Path
 
@@ -108,6 +109,15 @@ def test_defaults_are_those_of_rust(cls):
     for field in dataclasses.fields(cls):
         if getattr(default, field.name) is None:
             assert any(table.get(field.name, False) is False for table in own), field.name
+
+
+@pytest.mark.parametrize("name", ["IkCfg", "NullSpacePosture", "Randomization"])
+def test_defaults_of_arguments_are_those_of_rust(name):
+    """Configurations of calls, which scene files do not have. All fields of RandomizationTerm are required."""
+    required = {"NullSpacePosture": {"rest": []}}.get(name, {})
+    cls = getattr(ks, name)
+    assert tomllib.loads(_sim._default_fields(name)) == all_fields(cls(**required))
+    assert ELSEWHERE == {"IkCfg", "NullSpacePosture", "Randomization", "RandomizationTerm"}
 
 
 def tables(value):
@@ -226,14 +236,43 @@ def test_values_of_other_types():
             ks.to_toml({"entities": {"x": wrong}})
 
 
+MODULES = sorted(Path(cfg.__file__).parent.glob("*.py"))
+
+
 def test_classes_are_documented():
-    tree = ast.parse(Path(cfg.__file__).read_text())
-    for node in tree.body:
-        if isinstance(node, ast.ClassDef):
-            assert ast.get_docstring(node), node.name
-            for at, item in enumerate(node.body):
-                if isinstance(item, ast.AnnAssign) and not item.target.id.startswith("_"):
-                    after = node.body[at + 1]
-                    assert isinstance(after, ast.Expr), f"{node.name}.{item.target.id}"
-    text = Path(cfg.__file__).read_text()
-    assert "](" not in text and "[`" not in text
+    classes = 0
+    for path in MODULES:
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef):
+                classes += 1
+                assert ast.get_docstring(node), node.name
+                for at, item in enumerate(node.body):
+                    if isinstance(item, ast.AnnAssign) and not item.target.id.startswith("_"):
+                        after = node.body[at + 1]
+                        assert isinstance(after, ast.Expr), f"{node.name}.{item.target.id}"
+    assert classes == len([value for value in vars(cfg).values() if inspect.isclass(value)])
+
+
+# Notation and names of Rust.
+RUST = re.compile(r"\]\(|\[`|(?<!``cv)::(?!``)|\.into\(\)|\bSome\b|\bVec<|``\w*Mut\b|\bf32\b|\bf64\b|\busize\b|: None``")
+
+
+def test_documentation_has_the_words_of_python():
+    for path in MODULES:
+        text = path.read_text()
+        lines = text.split("\n")
+        assert len(lines) <= 800, path.name
+        found = [line for line in lines if RUST.search(line)]
+        assert not found, (path.name, found)
+        # No line of a text is longer than those of programs.
+        assert not [line for line in lines if len(line) > 120 and '"""' in line], path.name
+    # A control: such notation is found.
+    for wrong in ("``Extrinsics::convention``", "a [link](target)", "``100.0.into()``", "``RobotMut``", "less than ``f32``"):
+        assert RUST.search(wrong), wrong
+    assert not RUST.search("``cv::fisheye`` and ``package://`` and ``xmlns:``")
+    # Names in code with a dot are attributes or fields.
+    names = set(re.findall(r"``([A-Z]\w+)\.(\w+)``", "".join(path.read_text() for path in MODULES)))
+    assert len(names) > 10
+    for owner, name in names:
+        cls = getattr(ks, owner)
+        assert hasattr(cls, name) or name in getattr(cls, "__dataclass_fields__", {}), f"{owner}.{name}"

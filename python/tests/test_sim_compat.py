@@ -22,6 +22,13 @@ from kinetoscope.compat._tensors import torch as installed_torch
 from kinetoscope.compat.configclass import configclass
 
 TENSORS = ["numpy"] if installed_torch is None else ["numpy", "torch"]
+# Set where torch cannot be installed, so that its tests are left out by name.
+WITHOUT_TORCH = "KINETOSCOPE_TESTS_WITHOUT_TORCH"
+
+
+def test_torch_is_installed_or_left_out_by_name():
+    """Without torch, half of these tests do not exist."""
+    assert (installed_torch is None) == (os.environ.get(WITHOUT_TORCH) == "1"), f"install torch, or set {WITHOUT_TORCH}=1"
 
 
 def run(name, tensors, flags, steps, **variables):
@@ -128,22 +135,31 @@ def test_add_sensors_on_robot(tensors, envs):
 
 
 @pytest.mark.needs_seeds
-def test_under_a_display(display):
-    """Windows open where there is a display and the script is not headless."""
-    for name, flags in (("create_robot.py", []), ("add_sensors_on_robot.py", []), ("create_sensor.py", [])):
-        result = run(name, "numpy", flags, 40, DISPLAY=display)
-        assert result.returncode == 0, result.stderr
-        assert "no window" not in result.stderr
+@pytest.mark.parametrize("tensors", TENSORS)
+@pytest.mark.parametrize(
+    ("name", "envs"),
+    # With four environments, create_sensor.py fails, as above.
+    [("create_robot.py", 1), ("create_robot.py", 4), ("add_sensors_on_robot.py", 1), ("add_sensors_on_robot.py", 4), ("create_sensor.py", 1)],
+)
+def test_under_a_display(name, envs, tensors, display):
+    """Windows open where there is a display and the script is not headless. A control: without a display, none opens."""
+    flags = ["--num_envs", str(envs)]
+    result = run(name, tensors, flags, 40, DISPLAY=display)
+    assert result.returncode == 0, result.stderr
+    assert "no window" not in result.stderr
+    result = run(name, tensors, flags, 5)
+    assert result.returncode == 0 and "no window" in result.stderr
 
+
+@pytest.mark.needs_seeds
+def test_windows_run_in_real_time(display):
     def seconds(steps, **variables):
         started = time.perf_counter()
         assert run("create_robot.py", "numpy", [] if variables else ["--headless"], steps, **variables).returncode == 0
         return time.perf_counter() - started
 
-    # The window runs in real time: 500 more steps of 10 ms take 5 s more, apart from the start. Without a window, less.
+    # 500 more steps of 10 ms take 5 s more, apart from the start. Without a window, less.
     assert seconds(540, DISPLAY=display) - seconds(40, DISPLAY=display) > 4.5 > seconds(540) - seconds(40)
-    result = run("create_robot.py", "numpy", [], 5)
-    assert result.returncode == 0 and "no window" in result.stderr
 
 
 def test_targets_and_states_of_embodichain():
@@ -191,8 +207,6 @@ def test_targets_and_states_of_embodichain():
     np.testing.assert_allclose(np.asarray(robot.get_qpos(name="arm")), 0.25)
     with pytest.raises(ValueError, match="1 rows for 3 environments"):
         robot.set_qpos([0.0] * 6, joint_ids=arm)
-    with pytest.raises(NotImplementedError, match="init_qpos"):
-        sim.add_robot(RobotCfg(fpath=hand, init_qpos=[0.0] * 11))
     with pytest.raises(NotImplementedError, match="profiler"):
         SimulationManager(SimulationManagerCfg(profiler={}))
     cube = sim.add_rigid_object(RigidObjectCfg(uid="cube", shape=CubeCfg(size=[0.05] * 3), init_pos=[1.2, -0.2, 0.1]))
@@ -210,6 +224,111 @@ def test_targets_and_states_of_embodichain():
     ok, found = robot.compute_ik(robot.compute_fk(np.full((3, 6), 0.3), "arm"), name="arm")
     assert np.asarray(ok).all() and tuple(found.shape) == (3, 6)
     assert not sim.is_use_gpu_physics and str(sim.device) == "cpu"
+    sim.destroy()
+
+
+def test_images_of_attached_cameras_of_embodichain():
+    """A camera on a link has OpenGL axes: it looks along -z of the link, from its position in the link."""
+    from kinetoscope.compat.embodichain.lab.sim import SimulationManager, SimulationManagerCfg
+    from kinetoscope.compat.embodichain.lab.sim.cfg import RigidObjectCfg, RobotCfg
+    from kinetoscope.compat.embodichain.lab.sim.sensors import CameraCfg
+    from kinetoscope.compat.embodichain.lab.sim.shapes import CubeCfg
+
+    def camera(parent, pos, quat):
+        extrinsics = CameraCfg.ExtrinsicsCfg(parent=parent, pos=pos, quat=quat)
+        intrinsics = (40, 40, 16, 12)
+        return CameraCfg(width=32, height=24, intrinsics=intrinsics, extrinsics=extrinsics, enable_depth=True, enable_mask=True)
+
+    sim = SimulationManager(SimulationManagerCfg(num_envs=2))
+    start = [0.3, 0.4, -1.2, 0.5, -0.6, 0.2]
+    robot = sim.add_robot(RobotCfg(uid="r", fpath=ks.asset("sr5/SR5.urdf"), init_qpos=start))
+    np.testing.assert_allclose(np.asarray(robot.get_qpos()), [start] * 2, rtol=1e-6)
+    held = sim.add_sensor(camera("ee_link", [0.3, 0.0, 0.9], [1, 0, 0, 0]))
+    turned = sim.add_sensor(camera("ee_link", [0.0, 0.0, 0.1], [0, 1, 0, 0]))
+    # Kinematic cubes with edges of 0.1 m, 0.6 m in front of each camera, with the rotation of the link.
+    link = _poses.to_matrix(robot.native.link_pose("ee_link")[0])
+    places = {}
+    # The arm is behind the flange, at negative z of the link. A half turn about x maps -z to z.
+    for name, place in (("held", [0.3, 0, 0.3]), ("turned", [0, 0, 0.7])):
+        pose = link.copy()
+        pose[:3, 3] = (link @ [*place, 1])[:3]
+        cfg = RigidObjectCfg(uid=name, shape=CubeCfg(size=[0.1] * 3), body_type="kinematic", init_local_pose=pose)
+        places[name] = sim.add_rigid_object(cfg)
+    for name, sensor in (("held", held), ("turned", turned)):
+        sensor.update()
+        data = {key: np.asarray(value) for key, value in sensor.get_data().items()}
+        np.testing.assert_allclose(data["depth"][:, 12, 16], 0.55, atol=1e-4)
+        assert (data["mask"][:, 12, 16] == places[name].native.mask_id).all(), name
+    # A control: with the axes of ROS, the camera would look the other way.
+    flipped = sim.native.add_sensor("flipped", {"type": "camera", "width": 32, "height": 24, "extrinsics": {
+        "parent": "r/ee_link", "convention": "ros", "placement": {"pose": {"pos": [0.3, 0.0, 0.9]}}}, "channels": ["mask"]})  # fmt: skip
+    assert (flipped["mask"][:, 12, 16] != places["held"].native.mask_id).all()
+    # The initial positions are those of a reset, too.
+    robot.set_qpos(np.zeros((2, 6)), target=False)
+    robot.reset()
+    np.testing.assert_allclose(np.asarray(robot.get_qpos()), [start] * 2, rtol=1e-6)
+    np.testing.assert_allclose(np.asarray(robot.get_qpos(target=True)), [start] * 2, rtol=1e-6)
+    sim.reset_objects_state()
+    np.testing.assert_allclose(np.asarray(robot.get_qpos()), [start] * 2, rtol=1e-6)
+    with pytest.raises(ks.ConfigError, match="init_qpos has 2 values; the joints are JOINT1"):
+        sim.add_robot(RobotCfg(uid="s", fpath=ks.asset("sr5/SR5.urdf"), init_qpos=[0.0, 0.0]))
+    sim.destroy()
+
+
+def test_stereo_and_contacts_of_embodichain():
+    from kinetoscope.compat.embodichain.lab.sim import SimulationManager, SimulationManagerCfg
+    from kinetoscope.compat.embodichain.lab.sim.cfg import RigidBodyAttributesCfg, RigidObjectCfg
+    from kinetoscope.compat.embodichain.lab.sim.sensors import ContactSensorCfg, StereoCameraCfg
+    from kinetoscope.compat.embodichain.lab.sim.shapes import CubeCfg
+
+    sim = SimulationManager(SimulationManagerCfg(num_envs=2))
+    attrs = RigidBodyAttributesCfg(mass=2.0, linear_damping=0.0, angular_damping=0.0)
+    lower, upper = (
+        sim.add_rigid_object(RigidObjectCfg(uid=uid, shape=CubeCfg(size=[0.2] * 3), init_pos=[0, 0, z], attrs=attrs))
+        for uid, z in (("lower", 0.1), ("upper", 0.3))
+    )
+    extrinsics = StereoCameraCfg.ExtrinsicsCfg(eye=(0, 0, 2.0), target=(0, 0, 0), up=(0, 1, 0))
+    stereo = sim.add_sensor(
+        StereoCameraCfg(
+            width=64, height=48, intrinsics=(80, 80, 32, 24), intrinsics_right=(80, 80, 32, 24), extrinsics=extrinsics,
+            left_to_right_pos=(0.1, 0, 0), enable_depth=True, enable_disparity=True, enable_mask=True,
+        )  # fmt: skip
+    )
+    assert stereo.uid == "stereocamera_0"
+    both = sim.add_sensor(ContactSensorCfg(rigid_uid_list=["lower", "upper"]))
+    any_of = sim.add_sensor(ContactSensorCfg(rigid_uid_list=["lower"], filter_need_both_actor=False, max_contacts_per_env=16))
+    sim.update(step=200)
+    stereo.update()
+    data = {name: np.asarray(values) for name, values in stereo.get_data().items()}
+    assert data["depth"].shape == data["mask_right"].shape == data["disparity"].shape == (2, 48, 64, 1)
+    assert data["color"].shape == data["color_right"].shape == (2, 48, 64, 4)
+    # The top of the upper cube is 1.6 m below the cameras: 80 x 0.1 / 1.6 = 5 pixels.
+    np.testing.assert_allclose(data["disparity"][:, 24, 32], 5.0, rtol=1e-2)
+    columns = [np.flatnonzero(data[name][0, 24, :, 0] == upper.native.mask_id) for name in ("mask", "mask_right")]
+    assert columns[0].mean() - columns[1].mean() == pytest.approx(5.0, abs=0.6)
+    left, right = (np.asarray(pose) for pose in stereo.get_left_right_arena_pose())
+    np.testing.assert_allclose((left + right)[:, :3, 3] / 2, [[0, 0, 2]] * 2, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm((right - left)[:, :3, 3], axis=1), 0.1, rtol=1e-5)
+
+    both.update()
+    any_of.update()
+    pairs, grounded = ({n: np.asarray(v) for n, v in sensor.get_data().items()} for sensor in (both, any_of))
+    assert pairs["position"].shape == (2, 64, 3) and grounded["impulse"].shape == (2, 16) and pairs["user_ids"].shape == (2, 64, 2)
+    # Newton: the lower cube carries the upper one, 2 kg, and the ground both.
+    carried = (pairs["impulse"] * pairs["is_valid"]).sum(axis=1)
+    np.testing.assert_allclose(carried, 2 * 9.81 * 0.01, rtol=0.02)
+    np.testing.assert_allclose(grounded["impulse"].sum(axis=1), (2 + 4) * 9.81 * 0.01, rtol=0.02)
+    valid = pairs["is_valid"]
+    assert (np.diff(valid.astype(int), axis=1) <= 0).all() and valid.any(axis=1).all()
+    assert {tuple(sorted(ids)) for ids in pairs["user_ids"][valid].tolist()} == {tuple(sorted((lower.native.mask_id, upper.native.mask_id)))}
+    np.testing.assert_allclose(np.abs(pairs["normal"][valid]), [[0, 0, 1]] * valid.sum(), atol=1e-3)
+    np.testing.assert_allclose(pairs["position"][valid][:, 2], 0.2, atol=0.01)
+    chosen = any_of.filter_by_user_ids([upper.native.mask_id], env_ids=[1])
+    assert np.asarray(chosen["impulse"]).sum() == pytest.approx(2 * 9.81 * 0.01, rel=0.02)
+    with pytest.raises(ValueError, match="there is no 'upper2'; known: .*upper"):
+        sim.add_sensor(ContactSensorCfg(rigid_uid_list=["upper2"]))
+    with pytest.raises(NotImplementedError, match="left_to_right_rot"):
+        sim.add_sensor(StereoCameraCfg(left_to_right_rot=(0, 0, 1)))
     sim.destroy()
 
 
@@ -347,6 +466,163 @@ def test_scenes_of_isaac_take_attributes_of_the_object():
         isaac_scene(ground=AssetBaseCfg(prim_path="/World/g", spawn=sim_utils.GroundPlaneCfg(size=(1.0, 1.0))))
     with pytest.raises(AttributeError, match="enable_dpeth"):
         camera.enable_dpeth = True
+
+
+def test_initial_velocities_and_centers_of_mass_of_isaac():
+    """Velocities of the root are those of its center of mass, as in Orbit."""
+    from kinetoscope.compat.isaaclab.orbit_assets.anymal import ANYMAL_C_CFG
+
+    start = ANYMAL_C_CFG.init_state.replace(
+        pos=(0.0, 0.0, 2.0), lin_vel=(0.5, 0.0, 1.0), ang_vel=(0.0, 0.0, 2.0), joint_vel={".*HAA": 0.3, ".*FE": -0.2}
+    )
+    scene = isaac_scene(ANYMAL_C_CFG.replace(prim_path="{ENV_REGEX_NS}/Robot", init_state=start))
+    robot = scene["robot"]
+    names = robot.joint_names
+    expected = [0.3 if name.endswith("HAA") else -0.2 for name in names]
+    np.testing.assert_allclose(np.asarray(robot.data.default_joint_vel), [expected] * 2)
+    np.testing.assert_allclose(robot.native.qvel, [expected] * 2, atol=1e-9)
+    velocity = [0.5, 0, 1, 0, 0, 2]
+    np.testing.assert_allclose(np.asarray(robot.data.default_root_state)[:, 7:], [velocity] * 2)
+    np.testing.assert_allclose(np.asarray(robot.data.root_vel_w), [velocity] * 2, atol=1e-6)
+    # Judge: v(com) = v(origin) + w x r, with r from the origin to the center of mass. A control: they differ.
+    scene.native.set_property("center_of_mass", "robot/base", [[0.1, 0.05, 0.02]] * 2)
+    robot.write_start()
+    np.testing.assert_allclose(np.asarray(robot.data.root_vel_w), [velocity] * 2, atol=1e-6)
+    arm = robot.native.root_com_position - robot.native.root_pose[:, :3]
+    origin = robot.native.root_velocity
+    assert np.abs(arm).max() > 0.05
+    moved = origin[:, :3] + np.cross(origin[:, 3:], arm)
+    np.testing.assert_allclose(np.asarray(robot.data.root_lin_vel_w), moved, atol=1e-6)
+    turn = np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+    states = np.asarray(robot.data.root_state_w).copy()
+    states[:, 3:7] = turn
+    robot.write_root_state_to_sim(states)
+    np.testing.assert_allclose(np.asarray(robot.data.root_state_w), states, atol=1e-5)
+    # A quarter turn about z: x of the world is -y of the body.
+    np.testing.assert_allclose(np.asarray(robot.data.root_lin_vel_b), [[0, -0.5, 1.0]] * 2, atol=1e-5)
+    with pytest.raises(ks.ConfigError, match=r"joint_vel.*HIP"):
+        isaac_scene(ANYMAL_C_CFG.replace(init_state=start.replace(joint_vel={".*HIP": 1.0})))
+
+
+def test_rigid_objects_frames_and_imus_of_isaac():
+    from kinetoscope.compat.isaaclab import sim as sim_utils
+    from kinetoscope.compat.isaaclab.assets import AssetBaseCfg, RigidObjectCfg
+    from kinetoscope.compat.isaaclab.sensors import (
+        CameraCfg,
+        ContactSensorCfg,
+        FrameTransformerCfg,
+        ImuCfg,
+        OffsetCfg,
+        RayCasterCfg,
+        patterns,
+    )
+
+    def ball(**fields):
+        spawn = sim_utils.SphereCfg(
+            radius=0.25,
+            rigid_props=sim_utils.RigidBodyPropertiesCfg(),
+            mass_props=sim_utils.MassPropertiesCfg(mass=0.5),
+            collision_props=sim_utils.CollisionPropertiesCfg(),
+            visual_material=sim_utils.PreviewSurfaceCfg(diffuse_color=(0.0, 0.0, 1.0)),
+        )
+        state = RigidObjectCfg.InitialStateCfg(pos=(0.5, 0.0, 1.0), lin_vel=(0.0, 0.2, 0.0))
+        return RigidObjectCfg(prim_path="{ENV_REGEX_NS}/Ball", spawn=spawn.replace(**fields), init_state=state)
+
+    foot = OffsetCfg(pos=(0.0, 0.0, 0.1), rot=(np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
+    scene = isaac_scene(
+        ground=AssetBaseCfg(prim_path="/World/g", spawn=sim_utils.GroundPlaneCfg()),
+        ball=ball(),
+        contact=ContactSensorCfg(prim_path="{ENV_REGEX_NS}/Ball", track_air_time=True),
+        feet=ContactSensorCfg(prim_path="{ENV_REGEX_NS}/Robot/.*_FOOT"),
+        frames=FrameTransformerCfg(
+            prim_path="{ENV_REGEX_NS}/Robot/base",
+            source_frame_offset=OffsetCfg(pos=(0.1, 0.0, 0.0)),
+            target_frames=[
+                FrameTransformerCfg.FrameCfg(prim_path="{ENV_REGEX_NS}/Robot/LF_FOOT", name="foot", offset=foot),
+                FrameTransformerCfg.FrameCfg(prim_path="{ENV_REGEX_NS}/Robot/.*H_FOOT"),
+            ],
+        ),
+        imu=ImuCfg(prim_path="{ENV_REGEX_NS}/Ball", offset=OffsetCfg(pos=(0.1, 0.0, 0.0))),
+        rays=RayCasterCfg(
+            prim_path="{ENV_REGEX_NS}/Ball", attach_yaw_only=True, mesh_prim_paths=["/World/g"],
+            pattern_cfg=patterns.GridPatternCfg(resolution=0.1, size=[0.2, 0.2]),
+        ),  # fmt: skip
+        cam=CameraCfg(prim_path="{ENV_REGEX_NS}/Robot/base/cam", width=8, height=6, data_types=["normals"]),
+    )
+    assert scene.keys() == ["robot", "ball", "contact", "feet", "frames", "imu", "rays", "cam", "ground"]
+    body, origins = scene["ball"], np.asarray(scene.env_origins)
+    assert (body.num_instances, body.num_bodies, body.body_names) == (2, 1, ["Ball"])
+    assert body.find_bodies("B.*") == ([0], ["Ball"])
+    with pytest.raises(ValueError, match="Box"):
+        body.find_bodies("Box")
+    assert body.native.nominal_mass == 0.5
+    start = np.asarray(body.data.default_root_state)
+    np.testing.assert_allclose(np.asarray(body.data.root_pos_w), origins + [0.5, 0, 1], atol=1e-6)
+    np.testing.assert_allclose(np.asarray(body.data.root_vel_w), start[:, 7:], atol=1e-6)
+    # Free fall for 0.1 s: v = g t, and an accelerometer with the bias of gravity measures 0.
+    scene.native.update(19)
+    # An IMU measures the state at which the last step computes its accelerations.
+    before = np.asarray(body.data.root_state_w)
+    scene.native.update(1)
+    np.testing.assert_allclose(np.asarray(body.data.root_lin_vel_w), [[0, 0.2, -0.981]] * 2, atol=1e-5)
+    imu = scene["imu"].data
+    np.testing.assert_allclose(np.asarray(imu.lin_acc_b), 0, atol=1e-4)
+    np.testing.assert_allclose(np.asarray(imu.pos_w), before[:, :3] + [0.1, 0, 0], atol=1e-5)
+    np.testing.assert_allclose(np.asarray(imu.lin_vel_b), before[:, 7:10], atol=1e-5)
+    hits = np.asarray(scene["rays"].data.ray_hits_w)
+    assert hits.shape == (2, 9, 3)
+    np.testing.assert_allclose(hits[..., 2], 0, atol=1e-6)
+    np.testing.assert_allclose(hits.mean(axis=1)[:, :2], np.asarray(body.data.root_pos_w)[:, :2], atol=1e-5)
+    # Times of contact: the ball is in the air, then lands and comes to rest.
+    sensor = scene["contact"]
+    assert not np.asarray(sensor.compute_first_contact(0.5)).any()
+    assert np.asarray(sensor.compute_first_air(0.5)).all() and not np.asarray(sensor.compute_first_air(0.05)).any()
+    landed = 0
+    for _ in range(200):
+        scene.native.update(1)
+        landed += np.asarray(sensor.compute_first_contact(0.005)).astype(int)
+    # It may bounce, but is found at each landing only.
+    assert (landed >= 1).all() and (landed < 40).all()
+    with pytest.raises(RuntimeError, match="track_air_time"):
+        scene["feet"].compute_first_air(0.1)
+    feet = scene["feet"]
+    assert feet.find_bodies(["RH.*", "LF.*"], preserve_order=True) == ([3, 0], ["RH_FOOT", "LF_FOOT"])
+    assert feet.find_bodies(".*") == ([0, 1, 2, 3], feet.body_names)
+    with pytest.raises(ValueError, match="HIP"):
+        feet.find_bodies("HIP")
+    # Frames: the judge is matrices.
+    data = scene["frames"].data
+    assert data.target_frame_names == ["foot", "LH_FOOT", "RH_FOOT"]
+    native = scene["robot"].native
+    source = _poses.to_matrix(native.root_pose) @ _poses.to_matrix([0.1, 0, 0, 1, 0, 0, 0])
+    target = _poses.to_matrix(native.link_pose("LF_FOOT")) @ _poses.to_matrix([*foot.pos, *foot.rot])
+    relative = np.linalg.inv(source) @ target
+    np.testing.assert_allclose(np.asarray(data.target_pos_source)[:, 0], relative[:, :3, 3], atol=1e-5)
+    np.testing.assert_allclose(np.asarray(data.target_pos_w)[:, 0], origins + target[:, :3, 3], atol=1e-5)
+    quat = np.concatenate([np.zeros((2, 3)), np.asarray(data.target_quat_source)[:, 0]], axis=1)
+    np.testing.assert_allclose(_poses.to_matrix(quat)[:, :3, :3], relative[:, :3, :3], atol=1e-5)
+    # Orbit's normals have four numbers.
+    assert np.asarray(scene["cam"].data.output["normals"]).shape == (2, 6, 8, 4)
+    # A push for one step: dv = F dt / m.
+    before = body.native.velocity.copy()
+    body.write_root_pose_to_sim(start[:, :7] + np.concatenate([origins, np.zeros((2, 4))], axis=1))
+    body.write_root_velocity_to_sim(np.zeros((2, 6)))
+    body.set_external_force_and_torque(np.full((1, 1, 3), [3.0, 0, 0]), np.zeros((1, 1, 3)), env_ids=[1])
+    scene.native.update(1)
+    np.testing.assert_allclose(body.native.velocity[:, 0], [0, 3 * 0.005 / 0.5], atol=1e-6)
+    body.reset()
+    scene.native.update(1)
+    np.testing.assert_allclose(body.native.velocity[:, 0], [0, 3 * 0.005 / 0.5], atol=1e-6)
+    assert (before != body.native.velocity).any()
+    for fields, name in (
+        ({"rigid_props": sim_utils.RigidBodyPropertiesCfg(disable_gravity=True)}, "disable_gravity"),
+        ({"collision_props": sim_utils.CollisionPropertiesCfg(rest_offset=0.1)}, "rest_offset"),
+        ({"physics_material": sim_utils.RigidBodyMaterialCfg(static_friction=0.9)}, "static_friction"),
+    ):
+        with pytest.raises(NotImplementedError, match=name):
+            isaac_scene(ball=ball(**fields))
+    with pytest.raises(ks.ConfigError, match="rigid_props"):
+        isaac_scene(ball=ball(rigid_props=None))
 
 
 def test_settings_of_embodichain_without_a_meaning_are_refused():

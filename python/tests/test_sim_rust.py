@@ -13,13 +13,14 @@ import pytest
 import kinetoscope as ks
 
 
-def replay(*arguments):
-    command = os.environ.get("KINETOSCOPE_CLI")
-    if not command or not Path(command).is_file():
+def command(*arguments):
+    """Runs the command ``kinetoscope``."""
+    program = os.environ.get("KINETOSCOPE_CLI")
+    if not program or not Path(program).is_file():
         pytest.fail("set KINETOSCOPE_CLI to the command kinetoscope, built for the MuJoCo of the package")
     folder = Path(__import__("importlib.util").util.find_spec("mujoco").submodule_search_locations[0])
     environment = {**os.environ, "LD_LIBRARY_PATH": str(folder)}
-    return subprocess.run([command, "replay", *arguments], capture_output=True, text=True, timeout=120, env=environment, check=False)
+    return subprocess.run([program, *arguments], capture_output=True, text=True, timeout=120, env=environment, check=False)
 
 
 def test_states_are_those_of_rust(tmp_path):
@@ -41,11 +42,36 @@ def test_states_are_those_of_rust(tmp_path):
             sim["dog"].set_qpos_target(sim["dog"].default_qpos + rng.normal(size=(4, 12)) * 0.1)
             sim["arm"].set_qpos_target(rng.uniform(-0.5, 0.5, (4, 17)))
             sim.update(20)
-    result = replay(tmp_path / "run.npz", "--verify", "--scene", tmp_path / "scene.toml")
+    result = command("replay", tmp_path / "run.npz", "--verify", "--scene", tmp_path / "scene.toml")
     assert result.returncode == 0, result.stdout + result.stderr
     assert "200 steps" in result.stdout, result.stdout
     # A control: a heavier cube is found.
     scene["entities"]["cube"].mass = 5.0
     scene["entities"]["cube"].init_pose = [2.5, 0.3, 0.31, 1, 0, 0, 0]
     (tmp_path / "other.toml").write_text(ks.to_toml(scene))
-    assert replay(tmp_path / "run.npz", "--verify", "--scene", tmp_path / "other.toml").returncode == 1
+    assert command("replay", tmp_path / "run.npz", "--verify", "--scene", tmp_path / "other.toml").returncode == 1
+
+
+def test_images_are_those_of_rust(tmp_path):
+    """Screenshots of two states of a recording, by Python and by the command: the files are equal."""
+    sim = ks.SimulationManager(num_envs=2, threads=2)
+    arm = sim.add_robot(ks.bundled_robot("sr5_with_hand", uid="arm"))
+    sim.add_rigid_object(uid="ball", shape=ks.ObjectShape.sphere(radius=0.1), init_pose=[0.5, 0.4, 0.8, 1, 0, 0, 0])
+    path = tmp_path / "run.npz"
+    with sim.record(path):
+        for _ in range(4):
+            arm.set_qpos_target(np.full((2, arm.dof), 0.3))
+            sim.update(10)
+    playback = ks.Playback(path)
+    times = [playback.times[0], playback.times[-1]]
+    images = []
+    for number, at in enumerate(times):
+        result = command("replay", path, "--out", tmp_path, "--at", f"{at:.6f}", "--width", "160", "--height", "120")
+        assert result.returncode in (0, 1), result.stderr
+        playback.seek(playback.frame_at(at))
+        own = tmp_path / f"own_{number}.png"
+        playback.sim.screenshot(own, size=[160, 120])
+        images.append(own.read_bytes())
+        assert images[-1] == (tmp_path / f"replay_{at:.3f}s.png").read_bytes()
+    # A control: the states look different.
+    assert images[0] != images[1]

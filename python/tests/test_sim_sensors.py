@@ -75,6 +75,9 @@ def test_unknown_channels_list_the_known_ones(scene):
         scene["camera"]["dept"]
     with pytest.raises(ks.UnknownNameError):
         scene["imu"].history("nothing")
+    # The error named "depth" as unknown, and then as known.
+    with pytest.raises(ks.UnknownNameError, match='channel "depth" of this sensor has no history'):
+        scene["ray_camera"].history("depth")
 
 
 def test_images(scene):

@@ -1,6 +1,7 @@
 //! Modes of automatic resets.
 
 use crate::error::{EnvError, Result};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
@@ -8,7 +9,8 @@ use std::str::FromStr;
 /// `AutoresetMode`.
 ///
 /// An episode has the same bits in all modes: only the calls that return its observations differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum AutoresetMode {
     /// The step after the end of an episode begins the next one, and does nothing else in this environment

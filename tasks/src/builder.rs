@@ -138,6 +138,33 @@ impl EnvBuilder {
         TaskColumns { actions: Space::concatenate(actions).names().to_vec(), commands }
     }
 
+    /// Checks the configuration and the terms, as [`build`](Self::build) does.
+    ///
+    /// # Errors
+    /// The errors of [`build`](Self::build), except those of events.
+    pub fn check(&self) -> Result<()> {
+        self.spaces().map(drop)
+    }
+
+    /// Returns the simulation, for example if [`check`](Self::check) found an error.
+    pub fn into_sim(self) -> SimulationManager {
+        self.sim
+    }
+
+    /// Spaces of the observation groups and of the actions, of checked terms.
+    fn spaces(&self) -> Result<(Vec<Space>, Space)> {
+        let Self { cfg, terms, .. } = self;
+        cfg.check()?;
+        terms.check()?;
+        let mut groups = Vec::new();
+        for group in &terms.groups {
+            let spaces = group.terms.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
+            groups.push(Space::concatenate(group.terms.iter().map(|term| term.name.as_str()).zip(&spaces)));
+        }
+        let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
+        Ok((groups, Space::concatenate(actions)))
+    }
+
     /// Checks the terms, builds the environments, and runs the [`EventMode::Startup`](crate::EventMode::Startup)
     /// events. No episode begins: call [`Env::reset`] first.
     ///
@@ -147,15 +174,11 @@ impl EnvBuilder {
     /// - Two columns of a term have the same name.
     /// - A number is out of range, or an event fails.
     pub fn build(self) -> Result<Env> {
+        let (groups, action_space) = self.spaces()?;
         let Self { sim, cfg, mut terms } = self;
-        cfg.check()?;
-        terms.check()?;
-        for group in &mut terms.groups {
-            let spaces = group.terms.iter().map(ObservationTerm::space).collect::<Result<Vec<Space>>>()?;
-            group.space = Space::concatenate(group.terms.iter().map(|term| term.name.as_str()).zip(&spaces));
+        for (group, space) in terms.groups.iter_mut().zip(groups) {
+            group.space = space;
         }
-        let actions = terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
-        let action_space = Space::concatenate(actions);
         Env::new(sim, cfg, terms, action_space)
     }
 }

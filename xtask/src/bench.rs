@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use crate::python::{self, Module};
+use crate::python_simulation;
 use crate::run::{Failure, Repo, XtaskResult};
 use crate::setup::{self, MujocoVersion, Requirement, Requirements};
 use crate::wheel;
@@ -11,6 +12,9 @@ use std::path::{Path, PathBuf};
 use std::{fs, thread};
 
 const RESULTS: &str = "benches/RESULTS.md";
+/// The benchmark of the Python package `kinetoscope`, and the variable with a Python that has the package.
+const PACKAGE_BENCH: &str = "python";
+const PACKAGE_VARIABLE: &str = "KINETOSCOPE_PYTHON_PACKAGE";
 /// Benchmarks with baselines for cameras.
 const CAMERA_BENCHES: [&str; 2] = ["camera", "trace"];
 /// Python packages of the camera baselines. Other versions are untested.
@@ -47,7 +51,12 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
     };
     let mut rows = Vec::new();
     let prepare = |line| setup::prepare(repo, Requirements { version: Some(line), extras: EXTRAS });
-    let both = [prepare(MujocoVersion::Debian)?, prepare(MujocoVersion::Wheel)?];
+    // The Python package is for one version of MuJoCo.
+    let versions = match args.name.as_deref() {
+        Some(PACKAGE_BENCH) => vec![(MujocoVersion::Wheel, wheel::VERSION)],
+        _ => vec![(MujocoVersion::Debian, "2.2.2"), (MujocoVersion::Wheel, wheel::VERSION)],
+    };
+    let prepared = versions.iter().map(|(version, _)| prepare(*version)).collect::<XtaskResult<Vec<_>>>()?;
     let python = python::with_mujoco(repo);
     if python.is_none() {
         eprintln!("note: Python baselines are skipped");
@@ -60,8 +69,10 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
             }
         }
     }
-    let mut progress = Progress::new(both.len());
-    for (ready, line) in both.into_iter().zip(["2.2.2", wheel::VERSION]) {
+    let wants_package = args.name.as_deref().is_none_or(|name| name == PACKAGE_BENCH);
+    let package = if wants_package { Some(python_simulation::bench_environment(repo)?) } else { None };
+    let mut progress = Progress::new(prepared.len());
+    for (ready, (_, line)) in prepared.into_iter().zip(versions) {
         progress.begin(&format!("{} on MuJoCo {line}", args.name.as_deref().unwrap_or("all benchmarks")));
         let file = repo.target.join("bench-rows.json");
         if file.exists() {
@@ -70,6 +81,9 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
         let mut cmd = ready.cargo();
         if let Some(python) = &python {
             cmd = cmd.env(python::VARIABLE, python);
+        }
+        if let Some(package) = &package {
+            cmd = cmd.env(PACKAGE_VARIABLE, package);
         }
         cmd.args(["run", "--release", "--package", "kinetoscope-benches", "--"])
             .args(&args.name)

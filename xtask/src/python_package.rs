@@ -2,12 +2,12 @@
 //! that it shares with the [package `kinetoscope`](python_simulation): maturin and virtual environments.
 
 use crate::python::{self, OPENGL};
-use crate::python_simulation::{self, BuildProfile};
+use crate::python_simulation;
 use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, Requirement};
 use crate::wheel;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 /// Folder of the package.
 const PACKAGE: &str = "python/render";
@@ -18,6 +18,15 @@ const PREFIX: &str = "kinetoscope_render-";
 /// The program that builds wheels from Rust.
 const MATURIN: &str = "maturin==1.16.0";
 
+/// A linker that knows the symbols of older C libraries, for [`WheelArgs::portable`].
+const ZIG: &str = "ziglang==0.15.1";
+
+/// The oldest glibc of portable wheels, as in the wheels of MuJoCo.
+const GLIBC: &str = "2.28";
+
+/// Lists paths of the build machine in a wheel, and symbols of a newer glibc.
+const WHEEL_CHECK: &str = "python/tests/wheel_paths.py";
+
 /// Versions of `mujoco` with which the package is tested, and the requirement of NumPy of each: releases before 3.0
 /// crash with NumPy 2.
 const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), (wheel::PYTHON_VERSION, "numpy>=2")];
@@ -27,16 +36,21 @@ pub(crate) struct WheelArgs {
     /// Also write a source distribution
     #[arg(long)]
     sdist: bool,
+    /// Link with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
+    #[arg(long)]
+    portable: bool,
 }
 
 /// `cargo xtask wheel`: builds the wheels of both packages into `wheels` of the target folder and prints their paths.
 ///
 /// # Errors
-/// Python cannot be set up, or the package does not compile.
+/// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
-    let built = build(repo, BuildProfile::Release)?;
-    println!("{}", built.display());
-    println!("{}", python_simulation::build(repo, BuildProfile::Release)?.display());
+    let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
+    for wheel in [build(repo, profile)?, python_simulation::build(repo, profile)?] {
+        check(repo, &wheel, profile)?;
+        println!("{}", wheel.display());
+    }
     if args.sdist {
         let maturin = maturin(repo)?;
         let package = repo.root.join(PACKAGE);
@@ -70,14 +84,83 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
 }
 
 /// Builds the wheel and returns its path.
-fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> {
-    let maturin = maturin(repo)?;
+pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> {
     let dir = wheels(repo);
     remove_wheels(&dir, PREFIX)?;
-    let package = repo.root.join(PACKAGE);
-    let build = Cmd::new(maturin).args(["build", "--locked", "--profile", profile.name(), "--out"]).arg(&dir);
-    build.current_dir(package).env("CARGO_TARGET_DIR", &repo.target).run()?;
+    let build = Cmd::new(maturin(repo)?).arg("build").env("CARGO_TARGET_DIR", &repo.target);
+    profile.configure(repo, build)?.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run()?;
     built_wheel(&dir, PREFIX)
+}
+
+/// Cargo profile of a wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BuildProfile {
+    /// For users of this distribution.
+    Release,
+    /// For users of any distribution with [`GLIBC`] or newer.
+    Portable,
+    /// For tests, which share the compiled crates of the other stages.
+    Test,
+}
+
+impl BuildProfile {
+    /// Adds the options of the profile to `maturin build`. Wheels for users contain no path of this machine.
+    ///
+    /// # Errors
+    /// The compiler does not print its folder, or zig cannot be installed.
+    pub(crate) fn configure(self, repo: &Repo, build: Cmd) -> XtaskResult<Cmd> {
+        let build = build.args(["--locked", "--profile", if self == Self::Test { "dev" } else { "release" }]);
+        if self == Self::Test {
+            return Ok(build);
+        }
+        // Crates that are compiled with these flags are of no use to other builds, so they have a folder of their own.
+        let target = repo.target.join("wheel-build");
+        let mut flags: Vec<String> = match (env::var("CARGO_ENCODED_RUSTFLAGS"), env::var("RUSTFLAGS")) {
+            (Ok(encoded), _) => encoded.split('\u{1f}').map(String::from).collect(),
+            (Err(_), Ok(plain)) => plain.split_whitespace().map(String::from).collect(),
+            _ => Vec::new(),
+        };
+        for (folder, name) in machine_folders(repo)? {
+            flags.push(format!("--remap-path-prefix={}={name}", folder.display()));
+        }
+        let flags = flags.join("\u{1f}");
+        let build = build.env("CARGO_TARGET_DIR", target).unprinted_env("CARGO_ENCODED_RUSTFLAGS", flags);
+        if self == Self::Release {
+            return Ok(build);
+        }
+        let python = maturin_python(repo);
+        if !Cmd::new(&python).args(["-c", "import ziglang"]).quiet().succeeds() {
+            python::pip_install(&python, &[ZIG])?;
+        }
+        let compatibility = format!("manylinux_{}", GLIBC.replace('.', "_"));
+        let build = build.args(["--zig", "--compatibility"]).arg(compatibility);
+        Ok(build.env("CARGO_ZIGBUILD_PYTHON_PATH", python))
+    }
+}
+
+/// Folders of this machine that the compiler would write into panic messages, and the names in their place. The last
+/// one that contains a file applies to it.
+fn machine_folders(repo: &Repo) -> XtaskResult<Vec<(PathBuf, &'static str)>> {
+    let printed = Cmd::new("rustc").args(["--print", "sysroot"]).output()?;
+    let sysroot = PathBuf::from(String::from_utf8_lossy(&printed).trim());
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
+    // The sources of the standard library, if they are installed, have the same name as without.
+    let library = sysroot.join("lib/rustlib/src/rust");
+    let mut folders = vec![(library, "/rustc"), (home, "/cargo")];
+    // An empty prefix would match every path.
+    folders.retain(|(folder, _)| folder.is_absolute());
+    folders.extend([(repo.root.clone(), "/kinetoscope"), (repo.target.clone(), "/target")]);
+    Ok(folders)
+}
+
+/// Fails if a wheel for users contains a path of this machine or, if it is portable, a symbol of a newer glibc.
+fn check(repo: &Repo, wheel: &Path, profile: BuildProfile) -> XtaskResult {
+    let mut check = Cmd::new("python3").arg(repo.root.join(WHEEL_CHECK)).arg(wheel);
+    for (folder, _) in machine_folders(repo)? {
+        check = check.arg(folder);
+    }
+    if profile == BuildProfile::Portable { check.args(["--glibc", GLIBC]) } else { check }.run()
 }
 
 /// The wheel whose name begins with `prefix`.
@@ -109,6 +192,11 @@ fn built_wheels(dir: &Path, prefix: &str) -> Vec<PathBuf> {
         name.starts_with(prefix) && name.ends_with(".whl")
     };
     fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path()).filter(is_ours).collect()
+}
+
+/// Python of the virtual environment of maturin.
+fn maturin_python(repo: &Repo) -> PathBuf {
+    repo.target.join("maturin-venv/bin/python")
 }
 
 /// Maturin in a virtual environment below the target folder.
@@ -163,5 +251,18 @@ mod tests {
         }
         assert_eq!(built_wheels(dir.path(), PREFIX), [dir.path().join("kinetoscope_render-1.whl")]);
         assert!(built_wheels(&dir.path().join("missing"), PREFIX).is_empty());
+    }
+
+    #[test]
+    fn folders_of_this_machine() {
+        let root = PathBuf::from("/checkout");
+        let repo = Repo { target: root.join("target"), root, metadata: serde_json::Value::Null };
+        let folders = machine_folders(&repo).expect("rustc prints its folder");
+        // The compiler applies the last prefix that fits: a folder inside another comes after it.
+        for (at, (folder, _)) in folders.iter().enumerate() {
+            assert!(folder.is_absolute());
+            assert!(folders[..at].iter().all(|(outer, _)| !outer.starts_with(folder) || outer == folder));
+        }
+        assert_eq!(folders.last(), Some(&(repo.target.clone(), "/target")));
     }
 }

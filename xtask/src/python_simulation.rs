@@ -1,12 +1,13 @@
 //! The Python package `kinetoscope`: its wheel, built for the MuJoCo of the wheel `mujoco-core`, and its tests in an
 //! environment of its own.
 
-use crate::python_package::{built_wheel, create, maturin, remove_wheels, wheels};
+use crate::python;
+use crate::python_package::{self, BuildProfile, built_wheel, create, maturin, remove_wheels, wheels};
 use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::wheel;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 /// Folder of the package.
 const PACKAGE: &str = "python/sim";
@@ -20,6 +21,10 @@ const ASSETS: &str = "python/sim/kinetoscope/assets";
 /// Scripts of other simulators that the compatibility layers run; tests that need them are skipped elsewhere.
 const SCRIPTS: &str = "../shared/seeds";
 
+/// Variable that adds torch to the environment of the tests: it is a download of several gigabytes. Without torch, the tests
+/// of tensors are left out by name.
+const WANTS_TORCH: &str = "KINETOSCOPE_TORCH";
+
 /// Packages of the tests. `create_sensor` of EmbodiChain calls a method that NumPy 2 does not have.
 const PACKAGES: [&str; 7] = [
     "numpy==1.26.4",
@@ -31,25 +36,6 @@ const PACKAGES: [&str; 7] = [
     "pillow==13.0.0",
 ];
 
-/// Cargo profile of a wheel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BuildProfile {
-    /// For users.
-    Release,
-    /// For tests, which share the compiled crates of the other stages.
-    Test,
-}
-
-impl BuildProfile {
-    /// Its name for cargo.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Release => "release",
-            Self::Test => "dev",
-        }
-    }
-}
-
 /// Builds the wheel and returns its path.
 ///
 /// # Errors
@@ -57,34 +43,41 @@ impl BuildProfile {
 pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> {
     let ready = prepare(repo)?;
     let (maturin, dir) = (maturin(repo)?, wheels(repo));
+    // The library of MuJoCo is not copied into the wheel: the package loads that of `mujoco-core`.
+    let build = profile.configure(repo, ready.program(maturin).args(["build", "--auditwheel", "skip"]))?;
     remove_wheels(&dir, PREFIX)?;
     let assets = repo.root.join(ASSETS);
     let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", assets.display()));
     let remove = || if assets.exists() { fs::remove_dir_all(&assets) } else { Ok(()) };
     remove().map_err(fail)?;
     copy(&repo.root.join("assets"), &assets).map_err(fail)?;
-    // The library of MuJoCo is not copied into the wheel: the package loads that of `mujoco-core`.
-    let build = ready.program(maturin).args(["build", "--locked", "--auditwheel", "skip", "--profile", profile.name()]);
     let built = build.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run();
     remove().map_err(fail)?;
     built?;
     built_wheel(&dir, PREFIX)
 }
 
-/// The stage `python-sim` of CI: builds the wheel, installs it in an environment, and runs the tests there.
+/// The stage `python-sim` of CI: builds the wheel and that of the renderer, installs both in an environment, and runs the
+/// tests there.
 ///
 /// # Errors
 /// A step fails.
 pub(crate) fn test(repo: &Repo) -> XtaskResult {
     let ready = prepare(repo)?;
     setup::try_to_have(Requirement::Xvfb);
-    let wheel = build(repo, BuildProfile::Test)?;
+    let wheels = [python_package::build(repo, BuildProfile::Test)?, build(repo, BuildProfile::Test)?];
     // The judge of the test that compares with Rust.
     ready.cargo().args(["build", "--package", "kinetoscope-cli"]).run()?;
     let python = environment(repo)?;
-    let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
-    Cmd::new(&python).args(install).arg("--force-reinstall").arg(&wheel).run()?;
+    install(&python, &wheels)?;
+    // The requirements of the wheels are those that are installed.
+    Cmd::new(&python).args(["-m", "pip", "--disable-pip-version-check", "check"]).run()?;
     let mut tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+    let has_torch = Cmd::new(&python).args(["-c", "import torch"]).quiet().succeeds();
+    if !has_torch {
+        println!("note: without torch, its tests are left out; {WANTS_TORCH}=1 installs it");
+        tests = tests.env("KINETOSCOPE_TESTS_WITHOUT_TORCH", "1");
+    }
     let scripts = repo.root.join(SCRIPTS);
     tests = if scripts.is_dir() {
         tests.env("KINETOSCOPE_SEEDS", scripts)
@@ -97,6 +90,27 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
         .env("KINETOSCOPE_CLI", ready.binary("kinetoscope"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .run()
+}
+
+/// A Python with the wheels for users, for benchmarks, below the target folder.
+///
+/// # Errors
+/// A wheel cannot be built or installed.
+pub(crate) fn bench_environment(repo: &Repo) -> XtaskResult<PathBuf> {
+    let wheels = [python_package::build(repo, BuildProfile::Release)?, build(repo, BuildProfile::Release)?];
+    let venv = repo.target.join("python-bench-venv");
+    let python = venv.join("bin/python");
+    if !Cmd::new(&python).args(["-c", "import mujoco, numpy"]).quiet().succeeds() {
+        create(&venv, &[&format!("mujoco-core=={}", wheel::VERSION), "numpy==2.4.6"])?;
+    }
+    install(&python, &wheels)?;
+    Ok(python)
+}
+
+/// Installs wheels without their requirements, which the environment has.
+fn install(python: &Path, wheels: &[PathBuf]) -> XtaskResult {
+    let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
+    Cmd::new(python).args(install).arg("--force-reinstall").args(wheels).run()
 }
 
 fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
@@ -112,6 +126,9 @@ fn environment(repo: &Repo) -> XtaskResult<PathBuf> {
     if !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);
         create(&venv, &[&[core.as_str()][..], &PACKAGES].concat())?;
+    }
+    if env::var_os(WANTS_TORCH).is_some() && !Cmd::new(&python).args(["-c", "import torch"]).quiet().succeeds() {
+        python::pip_install(&python, &["torch==2.15.0"])?;
     }
     if is_ready() { Ok(python) } else { Err(Failure::new("the packages of the tests cannot be imported")) }
 }

@@ -122,7 +122,14 @@ impl Cmd {
     }
 
     pub(crate) fn env(mut self, key: &str, value: impl AsRef<OsStr>) -> Self {
+        self.shown_env.retain(|(known, _)| known != key);
         self.shown_env.push((key.to_string(), value.as_ref().to_string_lossy().into_owned()));
+        self.inner.env(key, value);
+        self
+    }
+
+    /// Sets a variable whose value is no use in a command line.
+    pub(crate) fn unprinted_env(mut self, key: &str, value: impl AsRef<OsStr>) -> Self {
         self.inner.env(key, value);
         self
     }

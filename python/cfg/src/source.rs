@@ -103,11 +103,14 @@ fn doc(attributes: &[Attribute]) -> String {
         Some(text.value().strip_prefix(' ').map_or_else(|| text.value(), String::from))
     };
     let mut lines: Vec<String> = Vec::new();
-    let mut in_code = false;
+    // Formulas are kept, programs are not.
+    let mut code: Option<bool> = None;
     for line in attributes.iter().filter_map(line) {
-        if line.trim_start().starts_with("```") {
-            in_code = !in_code;
-        } else if !in_code {
+        if let Some(language) = line.trim_start().strip_prefix("```") {
+            code = if code.is_some() { None } else { Some(language == "text") };
+        } else if code == Some(true) {
+            lines.push(format!("    {}", line.trim_end()));
+        } else if code.is_none() {
             lines.push(line.trim_end().to_string());
         }
     }

@@ -31,12 +31,55 @@ pub(crate) struct Enum {
     pub(crate) name: &'static str,
 }
 
-/// An enumeration that a macro declares: its name and documentation, its variants with the class of their content.
+/// An enumeration that a macro declares: its module, its name and documentation, its variants with the class of their
+/// content.
 #[derive(Debug)]
 pub(crate) struct DeclaredEnum {
+    pub(crate) area: &'static str,
     pub(crate) name: &'static str,
     pub(crate) doc: &'static str,
     pub(crate) variants: &'static [(&'static str, Option<&'static str>)],
+}
+
+/// The modules of the package `cfg`, and the items of each in words. A module uses those before it.
+pub(crate) const AREAS: [(&str, &str); 9] = [
+    ("shapes", "shapes, surfaces and collision geometry"),
+    ("simulation", "simulations, the ground, lights and shards"),
+    ("robots", "robots, articulations, their files and drives"),
+    ("kinematics", "inverse kinematics"),
+    ("objects", "rigid objects, groups, terrains, MJCF parts and welds"),
+    ("sampling", "the rate, latency and noise of sensors"),
+    ("cameras", "cameras, lenses and renderers"),
+    ("sensors", "sensors other than cameras"),
+    ("randomization", "random properties of environments"),
+];
+
+/// The module of a type, by the source file of the type.
+pub(crate) fn area(file: &str) -> &'static str {
+    const PREFIXES: [(&str, &str); 16] = [
+        ("scene/src/mesh/", "shapes"),
+        ("sim/src/surface_cfg.rs", "shapes"),
+        ("sim/src/objects/shape.rs", "shapes"),
+        ("sim/src/objects/mesh_collision.rs", "shapes"),
+        ("robot/src/kinematics/", "kinematics"),
+        ("robot/", "robots"),
+        ("sim/src/drive/", "robots"),
+        ("sim/src/objects/robot_cfg.rs", "robots"),
+        ("sim/src/objects/articulation.rs", "robots"),
+        ("sim/src/objects/mjcf_file.rs", "robots"),
+        ("sim/src/randomization/", "randomization"),
+        ("sim/src/objects/", "objects"),
+        ("scene/src/terrain/", "objects"),
+        ("sensors/src/noise.rs", "sampling"),
+        ("sensors/src/sampling.rs", "sampling"),
+        ("sensors/src/camera/", "cameras"),
+    ];
+    let known = PREFIXES.iter().find(|(prefix, _)| file.starts_with(prefix)).map(|(_, area)| *area);
+    known.unwrap_or(match file.split('/').next() {
+        Some("render") => "cameras",
+        Some("sensors") => "sensors",
+        _ => "simulation",
+    })
 }
 
 fn table<T: Serialize>(value: &T) -> Table {
@@ -166,11 +209,13 @@ pub(crate) const ENUMS: &[Enum] = &[
 /// Enumerations that macros declare. The tests of the package read each variant.
 pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
     DeclaredEnum {
+        area: "robots",
         name: "DriveType",
         doc: "Meaning of stiffness and damping of drives.",
         variants: &[("force", None), ("acceleration", None), ("none", None)],
     },
     DeclaredEnum {
+        area: "objects",
         name: "TerrainGenerator",
         doc: "Generator of the heights of a terrain, which also defines its size.",
         variants: &[
@@ -180,6 +225,7 @@ pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
         ],
     },
     DeclaredEnum {
+        area: "sensors",
         name: "RayPattern",
         doc: "Starts and directions of the rays of a ray caster.",
         variants: &[

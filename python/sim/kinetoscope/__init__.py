@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ._preload import preload
 
@@ -31,6 +31,7 @@ from ._sim import (  # noqa: E402
     Server,
     SimulationManager,
     Snapshot,
+    Task,
     Terrain,
     Topic,
     Weld,
@@ -45,24 +46,32 @@ from .assets import asset, bundled_robot  # noqa: E402
 from .cfg import *  # noqa: E402, F403
 from .errors import *  # noqa: E402, F403
 
+if TYPE_CHECKING:
+    from kinetoscope_render import BatchRenderer, Renderer, patch_mujoco
+
+# Loaded at the first use: the renderer imports mujoco, which takes longer than all of this package.
+_RENDERER = ("BatchRenderer", "Renderer", "patch_mujoco")
+
 
 def __getattr__(name: str) -> Any:
-    """The renderer of the package kinetoscope-render, where it is installed."""
-    if name in ("Renderer", "BatchRenderer", "patch_mujoco"):
-        try:
-            render = importlib.import_module("kinetoscope_render")
-        except ImportError as error:
-            raise AttributeError(f"kinetoscope.{name} needs the package kinetoscope-render: {error}") from None
-        return getattr(render, name)
+    """The renderer of the package kinetoscope-render."""
+    if name in _RENDERER:
+        return getattr(importlib.import_module("kinetoscope_render"), name)
     raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_RENDERER})
+
+
 __all__ = [
+    "BatchRenderer",
     "IkResult",
     "MjcfPart",
     "Playback",
     "Recorder",
     "RecordingSummary",
+    "Renderer",
     "RigidObject",
     "RigidObjectGroup",
     "Robot",
@@ -70,6 +79,7 @@ __all__ = [
     "Server",
     "SimulationManager",
     "Snapshot",
+    "Task",
     "Terrain",
     "Topic",
     "Weld",
@@ -80,6 +90,7 @@ __all__ = [
     "cfg",
     "errors",
     "mujoco_version",
+    "patch_mujoco",
     "read_series",
     "recording_topics",
     "to_toml",

@@ -58,6 +58,9 @@ pub(crate) fn values<'s>(sensor: &'s dyn Sensor, name: &str, instant: Instant) -
     let any: &dyn Any = sensor;
     let unknown = || {
         let known = names(sensor);
+        if instant == Instant::History && known.iter().any(|known| known == name) {
+            return Failure::new(Class::UnknownName, format!("the channel {name:?} of this sensor has no history"));
+        }
         let candidates = closest_names(name, known.iter().map(String::as_str));
         let candidates: Vec<String> = candidates.into_iter().map(|name| format!("{name:?}")).collect();
         Failure::new(Class::UnknownName, format!("unknown channel {name:?}; known channels: {}", candidates.join(", ")))

@@ -17,6 +17,7 @@ mod sensor;
 mod shared;
 mod simulation;
 mod snapshot;
+mod task;
 mod values;
 mod viewer;
 
@@ -67,6 +68,19 @@ fn _default_uid(kind: &str) -> String {
     cfg::default_uid(kind)
 }
 
+/// Default of a configuration that is not part of scene files, as TOML.
+#[pyfunction]
+fn _default_fields(name: &str) -> PyResult<String> {
+    use kinetoscope::robot::kinematics::{IkCfg, NullSpacePosture};
+    let text = shared::guarded(|| match name {
+        "IkCfg" => Ok(toml::to_string(&IkCfg::default())?),
+        "NullSpacePosture" => Ok(toml::to_string(&NullSpacePosture::at(Vec::new()))?),
+        "Randomization" => Ok(toml::to_string(&kinetoscope::sim::Randomization::default())?),
+        other => Err(Failure::new(errors::Class::UnknownName, format!("no default of {other:?}"))),
+    });
+    Ok(text?)
+}
+
 /// Panics, to test that a panic becomes an ``InternalError``.
 #[pyfunction]
 fn _panic(simulation: &Bound<'_, simulation::Simulation>, write: bool) -> PyResult<()> {
@@ -91,6 +105,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<objects::Weld>()?;
     module.add_class::<sensor::Sensor>()?;
     module.add_class::<snapshot::Snapshot>()?;
+    module.add_class::<task::Task>()?;
     module.add_class::<recording::Topic>()?;
     module.add_class::<recording::Recorder>()?;
     module.add_class::<recording::RecordingSummary>()?;
@@ -105,6 +120,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(recording::recording_topics, module)?)?;
     module.add_function(wrap_pyfunction!(_set_assets, module)?)?;
     module.add_function(wrap_pyfunction!(_default_uid, module)?)?;
+    module.add_function(wrap_pyfunction!(_default_fields, module)?)?;
     module.add_function(wrap_pyfunction!(_panic, module)?)?;
     module.add("_NONE_IS_FALSE", cfg::NONE_IS_FALSE.to_vec())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -96,7 +96,7 @@ impl RigidObject {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "RigidObject", |sim| {
             let object = sim.rigid_object(self.id);
             let kind = match object.cfg().body_type {
                 BodyType::Dynamic => "dynamic",
@@ -155,7 +155,7 @@ impl RigidObjectGroup {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "RigidObjectGroup", |sim| {
             let group = sim.rigid_object_group(self.id);
             Ok(format!("<RigidObjectGroup {:?}: {} objects, {} envs>", group.uid(), group.len(), sim.num_envs()))
         })
@@ -203,7 +203,7 @@ impl Terrain {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "Terrain", |sim| {
             let terrain = sim.entities().terrain(self.id);
             let ((rows, columns), [low, high]) = (terrain.cfg().heights.dim(), terrain.height_range());
             Ok(format!("<Terrain {:?}: {rows} x {columns} points, {low:.3} to {high:.3} m>", terrain.uid()))
@@ -353,7 +353,7 @@ impl MjcfPart {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "MjcfPart", |sim| {
             let part = sim.mjcf_part(self.id);
             let (joints, bodies) = (part.joint_names().len(), part.body_names().len());
             Ok(format!("<MjcfPart {:?}: {bodies} bodies, {joints} joints, {} envs>", part.uid(), sim.num_envs()))
@@ -397,7 +397,7 @@ impl Weld {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "Weld", |sim| {
             let cfg = sim.weld(self.id).cfg();
             Ok(format!("<Weld {:?}: {} to {}>", cfg.uid, cfg.first, cfg.second))
         })

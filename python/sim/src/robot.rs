@@ -510,7 +510,7 @@ impl Robot {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "Robot", |sim| {
             let robot = sim.robot(self.id);
             let kind = if self.kind == "robot" { "Robot" } else { "Articulation" };
             let parts = robot.control_parts();

@@ -332,7 +332,7 @@ impl Sensor {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "Sensor", |sim| {
             let sensor = sim.entities().sensor_by_uid(&self.uid)?;
             Ok(format!("<Sensor {:?}: {}, channels {}>", self.uid, kind(sensor), names(sensor).join(", ")))
         })
@@ -378,7 +378,7 @@ impl Sensor {
     }
 }
 
-fn id_of<S: kinetoscope::sensors::Sensor>(sim: &SimulationManager, uid: &str) -> Option<SensorId<S>> {
+pub(crate) fn id_of<S: kinetoscope::sensors::Sensor>(sim: &SimulationManager, uid: &str) -> Option<SensorId<S>> {
     sim.entities().sensor_ids::<S>().into_iter().find(|(known, _)| known == uid).map(|(_, id)| id)
 }
 

@@ -5,6 +5,7 @@
 
 use crate::errors::{Class, Failure};
 use kinetoscope::sim::{MjcfId, RigidObjectGroupId, RigidObjectId, RobotId, SimulationManager, TerrainId, WeldId};
+use kinetoscope::tasks::Env;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,10 +23,33 @@ pub(crate) enum Entity {
     Sensor,
 }
 
+/// A simulation, alone or as the environments of a task.
+#[derive(Debug)]
+enum Simulated {
+    Alone(Box<SimulationManager>),
+    Task(Box<Env>),
+}
+
+impl Simulated {
+    fn sim(&self) -> &SimulationManager {
+        match self {
+            Self::Alone(sim) => sim,
+            Self::Task(env) => env.sim(),
+        }
+    }
+
+    fn sim_mut(&mut self) -> &mut SimulationManager {
+        match self {
+            Self::Alone(sim) => sim,
+            Self::Task(env) => env.sim_mut(),
+        }
+    }
+}
+
 /// A simulation, its entities by name, and the process that created it.
 pub(crate) struct Shared {
     /// `None` after `destroy`.
-    manager: Mutex<Option<SimulationManager>>,
+    manager: Mutex<Option<Simulated>>,
     entities: Mutex<Vec<(String, Entity)>>,
     num_envs: usize,
     process: u32,
@@ -39,7 +63,7 @@ impl Shared {
         let has_threads = AtomicBool::new(manager.cfg().num_threads() != 1);
         Arc::new(Self {
             num_envs: manager.num_envs(),
-            manager: Mutex::new(Some(manager)),
+            manager: Mutex::new(Some(Simulated::Alone(Box::new(manager)))),
             entities: Mutex::new(Vec::new()),
             process: std::process::id(),
             has_threads,
@@ -71,10 +95,32 @@ impl Shared {
     ) -> PyResult<T> {
         py.detach(|| {
             let guard = self.lock()?;
-            let sim = guard.as_ref().ok_or_else(destroyed)?;
+            let sim = guard.as_ref().ok_or_else(destroyed)?.sim();
             catch_unwind(AssertUnwindSafe(|| act(sim))).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
         })
         .map_err(Into::into)
+    }
+
+    /// Text of `repr`. Debuggers and notebooks ask for it at any time: it is no error that the simulation is gone, and a
+    /// running call of another thread is not waited for.
+    pub(crate) fn describe(
+        &self,
+        py: Python<'_>,
+        class: &str,
+        act: impl FnOnce(&SimulationManager) -> Result<String, Failure> + Send,
+    ) -> PyResult<String> {
+        let described = || {
+            let state = match self.manager.try_lock() {
+                Ok(guard) => match guard.as_ref() {
+                    Some(simulated) => return act(simulated.sim()),
+                    None => "destroyed",
+                },
+                Err(TryLockError::WouldBlock) => "in use",
+                Err(TryLockError::Poisoned(_)) => "broken",
+            };
+            Ok(format!("<{class} of a simulation that is {state}>"))
+        };
+        detached(py, described)
     }
 
     /// Changes the simulation without holding the interpreter. After a panic, later calls fail.
@@ -94,9 +140,65 @@ impl Shared {
         let locked = || {
             let mut guard = self.lock()?;
             // The guard is dropped while the panic unwinds, which poisons the lock.
-            act(guard.as_mut().ok_or_else(destroyed)?)
+            act(guard.as_mut().ok_or_else(destroyed)?.sim_mut())
         };
         catch_unwind(AssertUnwindSafe(locked)).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
+    }
+
+    /// Starts a task in the environments. `make` gives the simulation back if the task is invalid.
+    pub(crate) fn start_task(
+        &self,
+        py: Python<'_>,
+        make: impl FnOnce(SimulationManager) -> Result<Env, (Failure, Option<Box<SimulationManager>>)> + Send,
+    ) -> PyResult<()> {
+        let locked = || {
+            let mut guard = self.lock()?;
+            match guard.take() {
+                None => Err(destroyed()),
+                Some(Simulated::Task(env)) => {
+                    *guard = Some(Simulated::Task(env));
+                    Err(Failure::new(
+                        Class::Argument,
+                        "this simulation already has a task; end it with its method close",
+                    ))
+                }
+                Some(Simulated::Alone(sim)) => match make(*sim) {
+                    Ok(env) => {
+                        *guard = Some(Simulated::Task(Box::new(env)));
+                        Ok(())
+                    }
+                    Err((failure, sim)) => {
+                        *guard = sim.map(Simulated::Alone);
+                        Err(failure)
+                    }
+                },
+            }
+        };
+        detached(py, locked)
+    }
+
+    /// Uses the task without holding the interpreter. After a panic, later calls fail.
+    pub(crate) fn task<T: Send>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&mut Env) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        detached(py, || match self.lock()?.as_mut().ok_or_else(destroyed)? {
+            Simulated::Task(env) => act(env),
+            Simulated::Alone(_) => Err(Failure::new(Class::Destroyed, "the task was closed")),
+        })
+    }
+
+    /// Ends the task, if there is one; the simulation goes on alone.
+    pub(crate) fn end_task(&self, py: Python<'_>) -> PyResult<()> {
+        detached(py, || {
+            let mut guard = self.lock()?;
+            *guard = guard.take().map(|simulated| match simulated {
+                Simulated::Task(env) => Simulated::Alone(Box::new(env.into_sim())),
+                alone => alone,
+            });
+            Ok(())
+        })
     }
 
     /// Frees the simulation. Its Python objects raise `DestroyedError` from then on.
@@ -114,7 +216,7 @@ impl Shared {
         })
     }
 
-    fn lock(&self) -> Result<MutexGuard<'_, Option<SimulationManager>>, Failure> {
+    fn lock(&self) -> Result<MutexGuard<'_, Option<Simulated>>, Failure> {
         if std::process::id() == self.process {
             return self.manager.lock().map_err(|_| Failure::broken());
         }

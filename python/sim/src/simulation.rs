@@ -348,8 +348,9 @@ impl Simulation {
     ) -> PyResult<()> {
         let (env_ids, snapshot) = (envs(&self.shared, env_ids)?, &snapshot.get().inner);
         self.shared.write(py, |sim| {
+            // This includes the state.
             if properties {
-                sim.properties_mut().restore(snapshot, env_ids.as_deref())?;
+                return Ok(sim.properties_mut().restore(snapshot, env_ids.as_deref())?);
             }
             Ok(sim.restore(snapshot, env_ids.as_deref())?)
         })
@@ -488,7 +489,7 @@ impl Simulation {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let keys = self.shared.keys();
-        self.shared.read(py, |sim| {
+        self.shared.describe(py, "SimulationManager", |sim| {
             let names = if keys.is_empty() { "no entities".into() } else { keys.join(", ") };
             Ok(format!("<SimulationManager: {} envs, dt {} s, {names}>", sim.num_envs(), sim.cfg().physics_dt))
         })

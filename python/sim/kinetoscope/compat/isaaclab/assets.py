@@ -1,5 +1,5 @@
-"""Articulations, rigid objects and other assets of Isaac. Poses of data and writers are in the world frame, in which the
-environments stand side by side."""
+"""Articulations and other assets of Isaac. Poses of data and writers are in the world frame, in which the environments stand
+side by side; velocities of the root are those of its center of mass."""
 
 from __future__ import annotations
 
@@ -12,21 +12,13 @@ import numpy as np
 
 from ..._sim import Robot
 from ...errors import ConfigError
-from .. import unsupported
-from .._poses import to_world
+from .._poses import to_matrix, to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
+from .asset_base import AssetBaseCfg, ids_of
+from .rigid_object import RigidObject, RigidObjectCfg
 
-
-@configclass
-class AssetBaseCfg:
-    """An asset without state: the ground, or a light."""
-
-    prim_path: str = ""
-    spawn: Any = None
-    init_state: Any = None
-    collision_group: int = 0
-    debug_vis: bool = False
+__all__ = ["Articulation", "ArticulationCfg", "AssetBaseCfg", "RigidObject", "RigidObjectCfg"]
 
 
 @configclass
@@ -118,12 +110,6 @@ def drive_fields(cfg: ArticulationCfg) -> dict[str, Any]:
 def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
     """Fields of this package's robot."""
     start = cfg.init_state
-    unsupported(
-        "ArticulationCfg.InitialStateCfg",
-        lin_vel=any(start.lin_vel),
-        ang_vel=any(start.ang_vel),
-        joint_vel=any(start.joint_vel.values()),
-    )
     # The initial position of a joint that no pattern names is 0 here, too.
     joint_pos = {pattern: float(value) for pattern, value in start.joint_pos.items() if pattern != ".*" or value != 0}
     return {
@@ -141,12 +127,19 @@ def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
 class ArticulationData:
     """State of an articulation as tensors."""
 
-    def __init__(self, native: Robot, origins: Any) -> None:
+    def __init__(self, native: Robot, origins: Any, cfg: ArticulationCfg) -> None:
         self._native = native
         self._origins = origins
+        start = cfg.init_state
+        names = native.joint_names
+        velocities = joint_values(start.joint_vel, names, "init_state.joint_vel")
+        rows = native.default_qvel
+        rows[:] = [velocities.get(name, 0.0) for name in names]
+        states = native.default_root_state
+        states[:, 7:] = [*start.lin_vel, *start.ang_vel]
         self.default_joint_pos = tensor(native.default_qpos)
-        self.default_joint_vel = tensor(native.default_qvel)
-        self.default_root_state = tensor(native.default_root_state)
+        self.default_joint_vel = tensor(rows)
+        self.default_root_state = tensor(states)
 
     @property
     def joint_names(self) -> list[str]:
@@ -186,7 +179,8 @@ class ArticulationData:
 
     @property
     def root_state_w(self) -> Any:
-        return tensor(to_world(self._native.root_state, self._origins))
+        states = np.concatenate([self._native.root_pose, self._native.root_com_velocity], axis=1)
+        return tensor(to_world(states, self._origins))
 
     @property
     def root_pos_w(self) -> Any:
@@ -205,8 +199,13 @@ class ArticulationData:
         return self.root_state_w[:, 10:13]
 
     @property
+    def root_vel_w(self) -> Any:
+        return self.root_state_w[:, 7:13]
+
+    @property
     def root_lin_vel_b(self) -> Any:
-        return tensor(self._native.root_lin_vel_b)
+        axes = to_matrix(self._native.root_pose)[:, :3, :3]
+        return tensor(np.einsum("nij,ni->nj", axes, self._native.root_com_velocity[:, :3]))
 
     @property
     def root_ang_vel_b(self) -> Any:
@@ -240,7 +239,7 @@ class Articulation:
     def __init__(self, native: Robot, origins: Any, cfg: ArticulationCfg) -> None:
         self.native = native
         self.cfg = cfg
-        self.data = ArticulationData(native, origins)
+        self.data = ArticulationData(native, origins, cfg)
         self._origins = origins
         self._pending: dict[str, tuple[Any, Any, Any]] = {}
 
@@ -275,22 +274,25 @@ class Articulation:
 
     def _local(self, states: Any, env_ids: Any) -> Any:
         states = np.array(array(states), dtype=float)
-        chosen = _ids(env_ids, self.num_instances)
+        chosen = ids_of(env_ids, self.num_instances)
         states[:, :3] -= self._origins if chosen is None else self._origins[chosen]
         return states
 
     def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
         """Writes poses (world frame) and velocities of the root, shape (n, 13)."""
-        self.native.write_root_state(self._local(root_state, env_ids), _ids(env_ids, self.num_instances))
+        states = np.asarray(array(root_state), dtype=float)
+        self.write_root_pose_to_sim(states[:, :7], env_ids)
+        self.write_root_velocity_to_sim(states[:, 7:], env_ids)
 
     def write_root_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
-        self.native.write_root_pose(self._local(root_pose, env_ids), _ids(env_ids, self.num_instances))
+        self.native.write_root_pose(self._local(root_pose, env_ids), ids_of(env_ids, self.num_instances))
 
     def write_root_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
-        self.native.write_root_velocity(array(root_velocity), _ids(env_ids, self.num_instances))
+        """Writes velocities of the center of mass of the root, world axes, shape (n, 6)."""
+        self.native.write_root_com_velocity(array(root_velocity), ids_of(env_ids, self.num_instances))
 
     def write_joint_state_to_sim(self, position: Any, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
-        self.native.write_joint_state(array(position), array(velocity), _ids(joint_ids, self.num_joints), _ids(env_ids, self.num_instances))
+        self.native.write_joint_state(array(position), array(velocity), ids_of(joint_ids, self.num_joints), ids_of(env_ids, self.num_instances))
 
     def set_joint_position_target(self, target: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
         self._set("set_qpos_target", "qpos_target", target, joint_ids, env_ids)
@@ -304,7 +306,7 @@ class Articulation:
     def _set(self, writer: str, reader: str, target: Any, joint_ids: Any, env_ids: Any) -> None:
         """Changes the buffer of targets."""
         values = np.array(array(target), dtype=float)
-        joint_ids, env_ids = _ids(joint_ids, self.num_joints), _ids(env_ids, self.num_instances)
+        joint_ids, env_ids = ids_of(joint_ids, self.num_joints), ids_of(env_ids, self.num_instances)
         if joint_ids is None and env_ids is None:
             self._pending[writer] = values
             return
@@ -317,8 +319,8 @@ class Articulation:
 
     def set_external_force_and_torque(self, forces: Any, torques: Any, body_ids: Any = None, env_ids: Any = None) -> None:
         """Forces and torques on links, in the axes of the links, until they are set again."""
-        links = _ids(body_ids, self.num_bodies)
-        self.native.set_external_wrench(array(forces), array(torques), "link", links, _ids(env_ids, self.num_instances))
+        links = ids_of(body_ids, self.num_bodies)
+        self.native.set_external_wrench(array(forces), array(torques), "link", links, ids_of(env_ids, self.num_instances))
 
     def write_data_to_sim(self) -> None:
         """Writes the targets to the simulation."""
@@ -328,17 +330,18 @@ class Articulation:
 
     def reset(self, env_ids: Any = None) -> None:
         """Removes the external forces and torques. ``InteractiveScene.reset`` clears all buffers."""
-        chosen = _ids(env_ids, self.num_instances)
+        chosen = ids_of(env_ids, self.num_instances)
         none = np.zeros((self.num_instances if chosen is None else np.atleast_1d(chosen).size, self.num_bodies, 3))
         if len(none):
             self.native.set_external_wrench(none, none, "link", None, chosen)
 
+    def write_start(self) -> None:
+        """Writes the initial velocities, if there are any."""
+        start = self.cfg.init_state
+        if np.asarray(self.data.default_joint_vel).any():
+            self.native.write_qvel(np.asarray(self.data.default_joint_vel, dtype=float))
+        if any(start.lin_vel) or any(start.ang_vel):
+            self.write_root_velocity_to_sim(np.asarray(self.data.default_root_state)[:, 7:])
+
     def update(self, dt: float) -> None:
         """Does nothing: data is read from the simulation."""
-
-
-def _ids(values: Any, count: int) -> Any:
-    """Indices as an array; None for all of ``count``."""
-    if isinstance(values, slice):
-        return None if values == slice(None) else np.arange(count)[values]
-    return None if values is None else array(values)

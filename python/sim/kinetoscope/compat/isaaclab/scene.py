@@ -13,8 +13,22 @@ from ...errors import ConfigError
 from .. import unsupported
 from .._tensors import array, tensor
 from ..configclass import MISSING, configclass, fields_of
-from .assets import Articulation, ArticulationCfg, AssetBaseCfg, articulation_fields, joints_of_file
-from .sensors import Camera, CameraCfg, ContactSensor, ContactSensorCfg, RayCaster, RayCasterCfg, SensorBaseCfg
+from .asset_base import AssetBaseCfg
+from .assets import Articulation, ArticulationCfg, articulation_fields, joints_of_file
+from .rigid_object import RigidObject, RigidObjectCfg, object_fields
+from .sensors import (
+    Camera,
+    CameraCfg,
+    ContactSensor,
+    ContactSensorCfg,
+    FrameTransformer,
+    FrameTransformerCfg,
+    Imu,
+    ImuCfg,
+    RayCaster,
+    RayCasterCfg,
+    SensorBaseCfg,
+)
 from .sim import DistantLightCfg, DomeLightCfg, GroundPlaneCfg, SimulationContext
 
 # Intensity of Isaac's lights that counts as 1.
@@ -49,7 +63,7 @@ class InteractiveScene:
         self._uids = {
             entity.prim_path.rsplit("/", 1)[-1]: name
             for name, entity in entities.items()
-            if isinstance(entity, ArticulationCfg)
+            if isinstance(entity, ArticulationCfg | RigidObjectCfg)
         }
         self._grounds = {
             entity.prim_path
@@ -57,6 +71,7 @@ class InteractiveScene:
             if isinstance(entity, AssetBaseCfg) and isinstance(entity.spawn, GroundPlaneCfg)
         }
         self.articulations: dict[str, Articulation] = {}
+        self.rigid_objects: dict[str, RigidObject] = {}
         self.sensors: dict[str, Any] = {}
         self.extras: dict[str, Any] = {}
         for name, entity in entities.items():
@@ -67,14 +82,25 @@ class InteractiveScene:
                     # Their drives would be those of this package.
                     raise ConfigError(f"{name}: actuators do not know the joints {', '.join(sorted(unnamed))}")
                 self.articulations[name] = Articulation(robot, self._origins, entity)
+            elif isinstance(entity, RigidObjectCfg):
+                body = self.native.add_rigid_object(object_fields(name, entity))
+                self.rigid_objects[name] = RigidObject(body, self._origins, entity)
         for name, entity in entities.items():
             if isinstance(entity, SensorBaseCfg):
                 self.sensors[name] = self._sensor(name, entity)
-            elif isinstance(entity, AssetBaseCfg) and not isinstance(entity, ArticulationCfg):
+            elif isinstance(entity, ArticulationCfg | RigidObjectCfg):
+                continue
+            elif isinstance(entity, AssetBaseCfg):
                 self.extras[name] = entity
-            elif not isinstance(entity, ArticulationCfg):
+            else:
                 raise ValueError(f"{name}: unknown type of configuration {type(entity).__name__}")
+        # The state is complete once all entities are added.
+        for asset in self._assets():
+            asset.write_start()
         context.attach(self.native)
+
+    def _assets(self) -> list[Any]:
+        return [*self.articulations.values(), *self.rigid_objects.values()]
 
     def _simulation(self, context: SimulationContext, entities: dict[str, Any]) -> native.SimulationManagerCfg:
         spawned = [entity.spawn for entity in entities.values() if isinstance(entity, AssetBaseCfg)]
@@ -154,14 +180,11 @@ class InteractiveScene:
             }
             return RayCaster(self.native.add_sensor(name, fields), self._origins, cfg)
         if isinstance(cfg, ContactSensorCfg):
-            def pattern(path: str) -> str:
-                uid, *rest = self._path(path, name)
-                return "/".join([re.escape(uid), *rest])
-
+            filters = ["ground" if path in self._grounds else self._pattern(path, name) for path in cfg.filter_prim_paths_expr]
             fields = {
                 "type": "contact_sensor",
-                "bodies": [pattern(cfg.prim_path)],
-                "filters": ["ground" if path in self._grounds else pattern(path) for path in cfg.filter_prim_paths_expr],
+                "bodies": [self._pattern(cfg.prim_path, name)],
+                "filters": filters,
                 "track_pose": cfg.track_pose,
                 "track_air_time": cfg.track_air_time,
                 "force_threshold": float(cfg.force_threshold),
@@ -169,7 +192,41 @@ class InteractiveScene:
                 "debug_vis": cfg.debug_vis,
             }
             return ContactSensor(self.native.add_sensor(name, fields), self._origins, cfg)
+        if isinstance(cfg, FrameTransformerCfg):
+            targets = [
+                {
+                    "bodies": self._pattern(frame.prim_path, name),
+                    **({} if frame.name is None else {"name": frame.name}),
+                    "offset": [*numbers(frame.offset.pos), *numbers(frame.offset.rot)],
+                }
+                for frame in cfg.target_frames
+            ]
+            offset = cfg.source_frame_offset
+            fields = {
+                "type": "frame_transformer",
+                "source": "/".join(self._path(cfg.prim_path, name)),
+                "source_offset": [*numbers(offset.pos), *numbers(offset.rot)],
+                "targets": targets,
+                "sampling": sampling,
+                "debug_vis": cfg.debug_vis,
+            }
+            return FrameTransformer(self.native.add_sensor(name, fields), self._origins, cfg)
+        if isinstance(cfg, ImuCfg):
+            fields = {
+                "type": "imu",
+                "body": "/".join(self._path(cfg.prim_path, name)),
+                "offset": [*numbers(cfg.offset.pos), *numbers(cfg.offset.rot)],
+                "gravity_bias": numbers(cfg.gravity_bias),
+                "sampling": sampling,
+                "debug_vis": cfg.debug_vis,
+            }
+            return Imu(self.native.add_sensor(name, fields), self._origins, cfg)
         raise ValueError(f"{name}: unknown type of sensor {type(cfg).__name__}")
+
+    def _pattern(self, path: str, name: str) -> str:
+        """Pattern of the bodies of a path whose last part may be a pattern."""
+        uid, *rest = self._path(path, name)
+        return "/".join([re.escape(uid), *rest])
 
     @property
     def num_envs(self) -> int:
@@ -181,13 +238,13 @@ class InteractiveScene:
         return tensor(self._origins)
 
     def __getitem__(self, name: str) -> Any:
-        for entities in (self.articulations, self.sensors, self.extras):
+        for entities in (self.articulations, self.rigid_objects, self.sensors, self.extras):
             if name in entities:
                 return entities[name]
         raise KeyError(f"there is no entity {name!r}; known names: {', '.join(self.keys())}")
 
     def keys(self) -> list[str]:
-        return [*self.articulations, *self.sensors, *self.extras]
+        return [*self.articulations, *self.rigid_objects, *self.sensors, *self.extras]
 
     def reset(self, env_ids: Any = None) -> None:
         """Clears the buffers of entities and sensors. States do not change."""
@@ -195,8 +252,8 @@ class InteractiveScene:
 
     def write_data_to_sim(self) -> None:
         """Writes the targets of all articulations."""
-        for articulation in self.articulations.values():
-            articulation.write_data_to_sim()
+        for asset in self._assets():
+            asset.write_data_to_sim()
 
     def update(self, dt: float) -> None:
         """Does nothing: the simulation updates its sensors."""

@@ -1,7 +1,8 @@
-"""Sensors of Isaac: cameras, ray casters, contact sensors. Positions are in the world frame."""
+"""Sensors of Isaac: cameras, ray casters, contact sensors, frames, IMUs. Positions are in the world frame."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,11 @@ __all__ = [
     "CameraCfg",
     "ContactSensor",
     "ContactSensorCfg",
+    "FrameTransformer",
+    "FrameTransformerCfg",
+    "Imu",
+    "ImuCfg",
+    "OffsetCfg",
     "RayCaster",
     "RayCasterCfg",
     "SensorBaseCfg",
@@ -89,6 +95,43 @@ class ContactSensorCfg(SensorBaseCfg):
     filter_prim_paths_expr: Any = ()
 
 
+@configclass
+class OffsetCfg:
+    """Pose of a frame on its body: position [m], rotation w x y z."""
+
+    pos: Any = (0.0, 0.0, 0.0)
+    rot: Any = (1.0, 0.0, 0.0, 0.0)
+
+
+@configclass
+class FrameCfg:
+    """A target frame, or one on each body that the last part of the path matches. Its name is that of the body by default."""
+
+    prim_path: str = ""
+    name: str | None = None
+    offset: OffsetCfg = OffsetCfg()
+
+
+@configclass
+class FrameTransformerCfg(SensorBaseCfg):
+    """Poses of target frames in a source frame. The path is that of the body of the source."""
+
+    FrameCfg = FrameCfg
+
+    source_frame_offset: OffsetCfg = OffsetCfg()
+    target_frames: Any = ()
+
+
+@configclass
+class ImuCfg(SensorBaseCfg):
+    """An IMU. Its path is that of a body. ``gravity_bias`` is added to the acceleration, in world axes [m/s²]."""
+
+    OffsetCfg = OffsetCfg
+
+    offset: OffsetCfg = OffsetCfg()
+    gravity_bias: Any = (0.0, 0.0, 9.81)
+
+
 class _Sensor:
     """A sensor. ``native`` is the sensor of this package, which measures in every step at which it is due."""
 
@@ -120,8 +163,11 @@ class CameraData:
 
     @property
     def output(self) -> dict[str, Any]:
-        """Images by name, read now."""
-        return {name: tensor(self._sensor.native[name]) for name in self._sensor.cfg.data_types}
+        """Images by name, read now. As in Orbit, normals have a fourth number, which has no meaning."""
+        images = {name: self._sensor.native[name] for name in self._sensor.cfg.data_types}
+        if "normals" in images:
+            images["normals"] = np.pad(images["normals"], [(0, 0)] * 3 + [(0, 1)])
+        return {name: tensor(image) for name, image in images.items()}
 
     @property
     def image_shape(self) -> tuple[int, int]:
@@ -270,3 +316,135 @@ class ContactSensor(_Sensor):
     @property
     def num_bodies(self) -> int:
         return len(self.native.columns)
+
+    def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Indices and names of the bodies that match a pattern or a list of patterns, in the order of the bodies, or with
+        ``preserve_order`` in that of the patterns. Each pattern must match."""
+        patterns = [name_keys] if isinstance(name_keys, str) else list(name_keys)
+        found: list[int] = []
+        for pattern in patterns:
+            matched = [at for at, name in enumerate(self.body_names) if re.fullmatch(pattern, name)]
+            if not matched:
+                raise ValueError(f"no body matches {pattern!r}; bodies: {', '.join(self.body_names)}")
+            found += [at for at in matched if at not in found]
+        if not preserve_order:
+            found.sort()
+        return found, [self.body_names[at] for at in found]
+
+    def compute_first_contact(self, dt: float, abs_tol: float = 1.0e-8) -> Any:
+        """True for bodies that came into contact within the last ``dt`` seconds, shape (n, bodies)."""
+        return self._shorter("current_contact_time", dt + abs_tol)
+
+    def compute_first_air(self, dt: float, abs_tol: float = 1.0e-8) -> Any:
+        """True for bodies that lost contact within the last ``dt`` seconds, shape (n, bodies)."""
+        return self._shorter("current_air_time", dt + abs_tol)
+
+    def _shorter(self, channel: str, limit: float) -> Any:
+        if not self.cfg.track_air_time:
+            raise RuntimeError("the contact sensor has no times: set track_air_time in its configuration")
+        times = self.native[channel]
+        return tensor((times > 0) & (times < limit))
+
+
+class FrameTransformerData:
+    """Poses of frames. Rotations are w x y z."""
+
+    def __init__(self, sensor: FrameTransformer) -> None:
+        self._sensor = sensor
+
+    @property
+    def target_frame_names(self) -> list[str]:
+        """Names of the target frames, in the order of the configuration."""
+        return self._sensor.frame_names
+
+    def _channel(self, name: str) -> Any:
+        return tensor(self._sensor.native[name])
+
+    def _world(self, name: str) -> Any:
+        return tensor(to_world(self._sensor.native[name], self._sensor._origins))
+
+    @property
+    def source_pos_w(self) -> Any:
+        return self._world("source_pos_w")
+
+    @property
+    def source_quat_w(self) -> Any:
+        return self._channel("source_quat_w")
+
+    @property
+    def target_pos_w(self) -> Any:
+        """Positions [m], shape (n, frames, 3)."""
+        return self._world("target_pos_w")
+
+    @property
+    def target_quat_w(self) -> Any:
+        return self._channel("target_quat_w")
+
+    @property
+    def target_pos_source(self) -> Any:
+        """Positions in the source frame [m], shape (n, frames, 3)."""
+        return self._channel("target_pos_source")
+
+    @property
+    def target_quat_source(self) -> Any:
+        return self._channel("target_quat_source")
+
+
+class FrameTransformer(_Sensor):
+    """Poses of target frames in a source frame."""
+
+    @property
+    def data(self) -> FrameTransformerData:
+        return FrameTransformerData(self)
+
+    @property
+    def frame_names(self) -> list[str]:
+        """Names of the target frames: given names, or the last parts of the paths of the bodies."""
+        return [name.rsplit("/", 1)[-1] for name in self.native.columns]
+
+    @property
+    def num_bodies(self) -> int:
+        return len(self.native.columns)
+
+
+class ImuData:
+    """Measurements of an IMU: velocities and accelerations in its own axes."""
+
+    def __init__(self, sensor: Imu) -> None:
+        self._sensor = sensor
+
+    def _channel(self, name: str) -> Any:
+        return tensor(self._sensor.native[name])
+
+    @property
+    def pos_w(self) -> Any:
+        return tensor(to_world(self._sensor.native["pos_w"], self._sensor._origins))
+
+    @property
+    def quat_w(self) -> Any:
+        return self._channel("quat_w")
+
+    @property
+    def lin_vel_b(self) -> Any:
+        return self._channel("lin_vel_b")
+
+    @property
+    def ang_vel_b(self) -> Any:
+        return self._channel("ang_vel_b")
+
+    @property
+    def lin_acc_b(self) -> Any:
+        """Acceleration with the bias of gravity [m/s²], shape (n, 3)."""
+        return self._channel("lin_acc_b")
+
+    @property
+    def ang_acc_b(self) -> Any:
+        return self._channel("ang_acc_b")
+
+
+class Imu(_Sensor):
+    """An IMU."""
+
+    @property
+    def data(self) -> ImuData:
+        return ImuData(self)

@@ -7,6 +7,34 @@ from typing import Any, ClassVar
 
 from ...errors import ViewerError
 from ..configclass import configclass
+from .spawners import (
+    CollisionPropertiesCfg,
+    CuboidCfg,
+    CylinderCfg,
+    MassPropertiesCfg,
+    PreviewSurfaceCfg,
+    RigidBodyMaterialCfg,
+    RigidBodyPropertiesCfg,
+    SphereCfg,
+)
+
+__all__ = [
+    "CollisionPropertiesCfg",
+    "CuboidCfg",
+    "CylinderCfg",
+    "DistantLightCfg",
+    "DomeLightCfg",
+    "GroundPlaneCfg",
+    "MassPropertiesCfg",
+    "PinholeCameraCfg",
+    "PreviewSurfaceCfg",
+    "RigidBodyMaterialCfg",
+    "RigidBodyPropertiesCfg",
+    "SimulationCfg",
+    "SimulationContext",
+    "SphereCfg",
+    "UrdfFileCfg",
+]
 
 
 @configclass

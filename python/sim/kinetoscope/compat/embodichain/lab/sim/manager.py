@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,16 @@ from .cfg import (
     URDFCfg,
 )
 from .objects import Articulation, RigidObject, Robot
-from .sensors import Camera, CameraCfg, camera_cfg
+from .sensors import (
+    Camera,
+    CameraCfg,
+    ContactSensor,
+    ContactSensorCfg,
+    StereoCamera,
+    StereoCameraCfg,
+    camera_cfg,
+    stereo_cfg,
+)
 from .shapes import CubeCfg, MeshCfg, SphereCfg
 
 # Fields of RigidBodyAttributesCfg that only PhysX has.
@@ -143,6 +153,7 @@ class SimulationManager:
         fields = articulation_fields(cfg)
         fields["control_parts"] = {name: list(patterns) for name, patterns in (cfg.control_parts or {}).items()}
         fields["drive"] = drive(cfg.drive_pros)
+        fields |= self._start(cfg, fields)
         robot = self.native.add_robot(fields)
         lift_limits(robot, cfg.drive_pros, fields["control_parts"])
         return self._register(Robot(self, robot, cfg))
@@ -151,25 +162,48 @@ class SimulationManager:
         fields = articulation_fields(cfg)
         if cfg.drive_pros.drive_type != "none":
             fields["drive"] = drive(cfg.drive_pros)
+        fields |= self._start(cfg, fields)
         articulation = self.native.add_articulation(fields)
         if cfg.drive_pros.drive_type != "none":
             lift_limits(articulation, cfg.drive_pros, {})
         return self._register(Articulation(self, articulation, cfg))
+
+    @staticmethod
+    def _start(cfg: ArticulationCfg, fields: dict[str, Any]) -> dict[str, Any]:
+        """Initial joint positions by name. EmbodiChain's are in the order of the joints, which only the built robot has.
+        Joints that follow others need none."""
+        if cfg.init_qpos is None:
+            return {}
+        values = [float(x) for x in np.asarray(array(cfg.init_qpos)).ravel()]
+        with NativeSimulationManager(lights=[], ground=None) as probe:
+            robot = probe.add_robot({name: fields[name] for name in ("urdf", "fix_base")})
+            names, following = robot.joint_names, robot.mimic_joint_ids
+        if len(values) != len(names):
+            raise ConfigError(f"init_qpos has {len(values)} values; the joints are {', '.join(names)}")
+        own = {re.escape(name): value for at, (name, value) in enumerate(zip(names, values, strict=True)) if at not in following}
+        return {"init_qpos": own}
 
     def add_rigid_object(self, cfg: RigidObjectCfg) -> RigidObject:
         if cfg.uid is None:
             raise ConfigError("a rigid object needs a uid")
         return self._register(RigidObject(self, self.native.add_rigid_object(object_fields(cfg)), cfg))
 
-    def add_sensor(self, sensor_cfg: CameraCfg) -> Camera:
-        count = sum(isinstance(asset, Camera) for asset in self._assets.values())
-        uid = sensor_cfg.uid or f"camera_{count}"
-        fields = camera_cfg(sensor_cfg)
+    def add_sensor(self, sensor_cfg: CameraCfg | ContactSensorCfg) -> Any:
+        """Adds a camera, a pair of cameras, or a contact sensor. Bodies of a contact sensor must exist."""
+        kinds = ((StereoCameraCfg, StereoCamera), (CameraCfg, Camera), (ContactSensorCfg, ContactSensor))
+        kind = next((kind for cfg, kind in kinds if isinstance(sensor_cfg, cfg)), None)
+        if kind is None:
+            raise ConfigError(f"add_sensor: {type(sensor_cfg).__name__} is not the configuration of a sensor")
+        count = sum(type(asset) is kind for asset in self._assets.values())
+        uid = sensor_cfg.uid or f"{kind.__name__.lower()}_{count}"
+        if isinstance(sensor_cfg, ContactSensorCfg):
+            return self._register(ContactSensor(self, uid, sensor_cfg))
+        fields = stereo_cfg(sensor_cfg) if isinstance(sensor_cfg, StereoCameraCfg) else camera_cfg(sensor_cfg)
         render = self.cfg.render_cfg
         if render.renderer not in RENDERERS:
             raise ConfigError(f"RenderCfg.renderer is {render.renderer!r}; known names: {', '.join(RENDERERS)}")
-        fields["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
-        return self._register(Camera(self, self.native.add_sensor(uid, fields), sensor_cfg))
+        fields.get("camera", fields)["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
+        return self._register(kind(self, self.native.add_sensor(uid, fields), sensor_cfg))
 
     def add_light(self, cfg: LightCfg) -> None:
         """Adds a light, before anything else is added."""
@@ -276,7 +310,7 @@ def urdf(cfg: URDFCfg | None, fpath: str | None) -> Any:
 
 
 def articulation_fields(cfg: Any) -> dict[str, Any]:
-    unsupported("RobotCfg", init_qpos=cfg.init_qpos is not None, solver_cfg=getattr(cfg, "solver_cfg", None) is not None)
+    unsupported("RobotCfg", solver_cfg=getattr(cfg, "solver_cfg", None) is not None)
     files, stem = urdf(getattr(cfg, "urdf_cfg", None), cfg.fpath)
     return {
         "uid": cfg.uid or stem,

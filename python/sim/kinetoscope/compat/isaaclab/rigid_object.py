@@ -1,0 +1,160 @@
+"""Rigid objects of Isaac. Poses of data and writers are in the world frame."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from ..._sim import RigidObject as NativeRigidObject
+from .._poses import to_world
+from .._tensors import array, tensor
+from ..configclass import configclass
+from .asset_base import AssetBaseCfg, ids_of
+from .spawners import shape
+
+
+@configclass
+class RigidObjectInitialStateCfg:
+    """Initial state: position [m], rotation w x y z, velocities in world axes."""
+
+    pos: Any = (0.0, 0.0, 0.0)
+    rot: Any = (1.0, 0.0, 0.0, 0.0)
+    lin_vel: Any = (0.0, 0.0, 0.0)
+    ang_vel: Any = (0.0, 0.0, 0.0)
+
+
+@configclass
+class RigidObjectCfg(AssetBaseCfg):
+    """A rigid object: ``spawn`` is its shape."""
+
+    InitialStateCfg = RigidObjectInitialStateCfg
+
+    init_state: Any = RigidObjectInitialStateCfg()
+
+
+def object_fields(uid: str, cfg: RigidObjectCfg) -> dict[str, Any]:
+    """Fields of this package's rigid object."""
+    start = cfg.init_state
+    return {"uid": uid, "init_pose": [float(x) for x in (*start.pos, *start.rot)], **shape(cfg.spawn, uid)}
+
+
+class RigidObjectData:
+    """State of a rigid object as tensors."""
+
+    def __init__(self, native: NativeRigidObject, origins: Any, cfg: RigidObjectCfg) -> None:
+        self._native = native
+        self._origins = origins
+        start = cfg.init_state
+        row = np.array([*start.pos, *start.rot, *start.lin_vel, *start.ang_vel], dtype=float)
+        self.default_root_state = tensor(np.tile(row, (len(origins), 1)))
+
+    @property
+    def root_state_w(self) -> Any:
+        states = np.concatenate([self._native.pose, self._native.velocity], axis=1)
+        return tensor(to_world(states, self._origins))
+
+    @property
+    def root_pos_w(self) -> Any:
+        return self.root_state_w[:, :3]
+
+    @property
+    def root_quat_w(self) -> Any:
+        return self.root_state_w[:, 3:7]
+
+    @property
+    def root_vel_w(self) -> Any:
+        return self.root_state_w[:, 7:13]
+
+    @property
+    def root_lin_vel_w(self) -> Any:
+        return self.root_state_w[:, 7:10]
+
+    @property
+    def root_ang_vel_w(self) -> Any:
+        return self.root_state_w[:, 10:13]
+
+    @property
+    def body_state_w(self) -> Any:
+        return self.root_state_w[:, None]
+
+    @property
+    def body_pos_w(self) -> Any:
+        return self.body_state_w[..., :3]
+
+    @property
+    def body_quat_w(self) -> Any:
+        return self.body_state_w[..., 3:7]
+
+
+class RigidObject:
+    """A rigid object. ``native`` is the object of this package."""
+
+    def __init__(self, native: NativeRigidObject, origins: Any, cfg: RigidObjectCfg) -> None:
+        self.native = native
+        self.cfg = cfg
+        self.data = RigidObjectData(native, origins, cfg)
+        self._origins = origins
+
+    @property
+    def num_instances(self) -> int:
+        return len(self._origins)
+
+    @property
+    def num_bodies(self) -> int:
+        return 1
+
+    @property
+    def body_names(self) -> list[str]:
+        """The last part of the path."""
+        return [self.cfg.prim_path.rsplit("/", 1)[-1]]
+
+    def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:  # noqa: ARG002
+        """Index and name of the body, if a pattern matches."""
+        patterns = [name_keys] if isinstance(name_keys, str) else list(name_keys)
+        for pattern in patterns:
+            if not re.fullmatch(pattern, self.body_names[0]):
+                raise ValueError(f"no body matches {pattern!r}; bodies: {self.body_names[0]}")
+        return [0], self.body_names
+
+    def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
+        """Writes poses (world frame) and velocities, shape (n, 13)."""
+        states = np.array(array(root_state), dtype=float)
+        self.write_root_pose_to_sim(states[:, :7], env_ids)
+        self.write_root_velocity_to_sim(states[:, 7:], env_ids)
+
+    def write_root_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
+        poses = np.array(array(root_pose), dtype=float)
+        chosen = ids_of(env_ids, self.num_instances)
+        poses[:, :3] -= self._origins if chosen is None else self._origins[chosen]
+        self.native.write_pose(poses, chosen)
+
+    def write_root_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
+        self.native.write_velocity(array(root_velocity), ids_of(env_ids, self.num_instances))
+
+    def set_external_force_and_torque(self, forces: Any, torques: Any, body_ids: Any = None, env_ids: Any = None) -> None:
+        """A force and a torque in the axes of the object, shape (n, 1, 3), until they are set again."""
+        if body_ids is not None and not isinstance(body_ids, slice) and list(array(body_ids).ravel()) != [0]:
+            raise IndexError(f"body_ids is {body_ids}; there is one body")
+        force, torque = (np.asarray(array(values), dtype=float).reshape(-1, 3) for values in (forces, torques))
+        self.native.set_external_wrench(force, torque, "link", ids_of(env_ids, self.num_instances))
+
+    def write_data_to_sim(self) -> None:
+        """Does nothing: forces and torques act at once."""
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Removes the external force and torque."""
+        chosen = ids_of(env_ids, self.num_instances)
+        none = np.zeros((self.num_instances if chosen is None else np.atleast_1d(chosen).size, 3))
+        if len(none):
+            self.native.set_external_wrench(none, none, "link", chosen)
+
+    def write_start(self) -> None:
+        """Writes the initial velocity, if there is one."""
+        velocity = np.asarray(self.data.default_root_state)[:, 7:]
+        if velocity.any():
+            self.native.write_velocity(velocity)
+
+    def update(self, dt: float) -> None:
+        """Does nothing: data is read from the simulation."""

@@ -1,0 +1,205 @@
+"""Tasks for learning agents."""
+
+import numpy as np
+import pytest
+
+import kinetoscope as ks
+
+CART = """<mujoco><worldbody><body name="rail"><geom size="0.01" contype="0" conaffinity="0"/><body name="cart">
+<joint name="slide" type="slide" axis="1 0 0" limited="true" range="-1 1"/>
+<geom size="0.1" mass="2" contype="0" conaffinity="0"/></body></body></worldbody></mujoco>"""
+PUSH = {"type": "joint_efforts", "robot": "cart", "joints": ["slide"], "bound": 5.0}
+
+
+def cart_sim(num_envs=3):
+    sim = ks.SimulationManager(num_envs=num_envs, threads=1)
+    cart = sim.add_robot(ks.RobotCfg(uid="cart", mjcf=ks.MjcfFile(text=CART), drive={"drive_type": "none"}))
+    return sim, cart
+
+
+def task_cfg(**changes):
+    return {
+        "decimation": 2,
+        "actions": {"push": PUSH},
+        "observations": {
+            "place": {"type": "joint_pos_rel", "robot": "cart", "joints": [".*"]},
+            "speed": {"type": "joint_vel", "robot": "cart", "joints": [".*"], "scale": 10.0, "clip": [-1.0, 1.0]},
+            "last": {"type": "last_action"},
+        },
+        "rewards": {"alive": {"type": "is_alive", "weight": 1.0}, "rate": {"type": "action_rate", "weight": -0.5}},
+        **changes,
+    }
+
+
+def test_steps_are_those_of_the_simulation():
+    sim, cart = cart_sim()
+    task = ks.Task(sim, task_cfg())
+    assert task.action_space == (["push/slide"], [-5.0], [5.0])
+    names, low, high = task.observation_space
+    assert names == ["place/slide", "speed/slide", "last/push/slide"] and (low[1], high[1]) == (-10.0, 10.0)
+    assert task.num_envs == 3 and task.step_dt == pytest.approx(0.02) and task.reward_names == ["alive", "rate"]
+    observations, info = task.reset(seed=1)
+    assert observations.shape == (3, 3) and observations.dtype == np.float64 and info == {}
+    # Judge: the same steps by hand, in bits.
+    other, own = cart_sim()
+    pushes = np.array([[3.0], [-2.0], [9.0]])
+    previous = np.zeros_like(pushes)
+    for step in range(1, 11):
+        observations, rewards, terminated, truncated, info = task.step(pushes)
+        own.set_qf_target(np.clip(pushes, -5, 5))
+        other.update(2)
+        np.testing.assert_array_equal(observations[:, 0], own.qpos[:, 0])
+        np.testing.assert_array_equal(observations[:, 1], 10 * np.clip(own.qvel[:, 0], -1, 1))
+        clipped = np.clip(pushes, -5, 5)
+        np.testing.assert_array_equal(observations[:, 2:], clipped)
+        rate = -0.5 * (clipped - previous)[:, 0] ** 2
+        np.testing.assert_allclose(info["reward_terms"], np.stack([np.ones(3), rate], axis=1))
+        np.testing.assert_allclose(rewards, 1 + rate)
+        assert not terminated.any() and not truncated.any() and info["ended"] == []
+        np.testing.assert_array_equal(info["final_observations"], observations)
+        # Newton: v = F t / m.
+        np.testing.assert_allclose(cart.qvel, clipped * 0.02 * step / 2, rtol=1e-9)
+        previous = clipped
+    # The simulation is usable between steps.
+    assert task.sim["cart"].qpos.shape == (3, 1) and sim.time[0] == pytest.approx(0.2)
+
+
+def test_episodes():
+    cfg = task_cfg(
+        episode_steps=5,
+        commands={"goal": {"columns": {"x": [0.2, 0.4], "y": [7, 7]}}},
+        terminations={"away": {"type": "joint_out_of_limits", "robot": "cart", "joints": ["slide"]}},
+        events={"start": {"type": "reset_joints_by_offset", "robot": "cart", "joints": ["slide"], "positions": [-0.1, 0.1]}},
+    )
+    cfg["observations"] = {
+        "goal": {"type": "generated_commands", "command": "goal"},
+        "place": {"type": "joint_pos_rel", "robot": "cart", "joints": [".*"]},
+    }
+    task = ks.Task(cart_sim()[0], cfg)
+    first, _ = task.reset(seed=3)
+    assert ((first[:, 0] >= 0.2) & (first[:, 0] <= 0.4)).all() and (first[:, 1] == 7).all()
+    assert (np.abs(first[:, 2]) <= 0.1).all() and len(set(first[:, 2])) == 3
+    # The same seed gives the same episodes, another one does not.
+    assert (task.reset(seed=3)[0] == first).all() and (task.reset(seed=4)[0] != first).any()
+    started, _ = task.reset(seed=3)
+    for step in range(1, 6):
+        observations, _, terminated, truncated, info = task.step(np.zeros((3, 1)))
+        assert truncated.all() == (step == 5) and not terminated.any()
+    assert [ended["reason"] for ended in info["ended"]] == ["time limit"] * 3
+    assert [(ended["env"], ended["steps"]) for ended in info["ended"]] == [(0, 5), (1, 5), (2, 5)]
+    np.testing.assert_array_equal(info["ended"][1]["reward_sums"], [5.0, 0.0])
+    # The carts did not move; the next episodes start elsewhere.
+    np.testing.assert_array_equal(info["final_observations"], started)
+    assert (observations[:, 2] != started[:, 2]).all()
+    # A cart beyond the limit ends its episode; the others go on.
+    task.sim["cart"].write_qpos([[0.99]], env_ids=[1])
+    task.sim["cart"].write_qvel([[5.0]], env_ids=[1])
+    _, _, terminated, _, info = task.step(np.zeros((3, 1)))
+    assert terminated.tolist() == [False, True, False] and info["ended"][0]["reason"] == "away"
+    masked, _ = task.reset(mask=[True, False, False])
+    assert masked.shape == (3, 3)
+
+
+def test_terms_of_legged_robots():
+    sim = ks.SimulationManager(ks.SimulationManagerCfg.legged(num_envs=2, threads=1))
+    dog = sim.add_robot(ks.bundled_robot("quadruped", uid="dog"))
+    sim.add_sensor("base", ks.ContactSensorCfg(bodies=["dog/base"]))
+    robot = {"robot": "dog"}
+    task = ks.Task(
+        sim,
+        {
+            "decimation": 4,
+            "actions": {"legs": {"type": "relative_joint_positions", **robot, "joints": [".*"], "step": 0.01}},
+            "commands": {"velocity": {"columns": {"x": [0.5, 0.5], "y": [0, 0]}}},
+            "observations": {
+                "linear": {"type": "base_lin_vel", **robot},
+                "angular": {"type": "base_ang_vel", **robot},
+                "up": {"type": "projected_gravity", **robot, "noise": 0.01},
+            },
+            "rewards": {
+                "track": {"type": "track_lin_vel", "weight": 2.0, **robot, "command": "velocity", "std": 0.5},
+                "flat": {"type": "flat_orientation", "weight": -1.0, **robot},
+                "torques": {"type": "joint_torques_l2", "weight": -1e-4, **robot, "joints": [".*"]},
+            },
+            "terminations": {
+                "fallen": {"type": "bad_orientation", **robot, "angle": 1.0},
+                "low": {"type": "root_height_below_minimum", **robot, "height": 0.2},
+                "touch": {"type": "illegal_contact", "sensor": "base", "force": 1.0},
+                "time": {"type": "time_out", "steps": 8},
+            },
+            "events": {"start": {"type": "reset_root_uniform", **robot, "position": [[-1, 1], [-1, 1], [0, 0]]}},
+        },
+    )
+    task.reset(seed=1)
+    places = dog.root_pose[:, :2].copy()
+    assert (places[0] != places[1]).all() and np.abs(places).max() <= 1
+    before = dog.qpos_target
+    observations, rewards, *_, info = task.step(np.ones((2, 12)))
+    np.testing.assert_allclose(dog.qpos_target, before + 0.01, rtol=1e-12)
+    np.testing.assert_array_equal(observations[:, :6], np.concatenate([dog.root_lin_vel_b, dog.root_ang_vel_b], axis=1))
+    assert 0 < np.abs(observations[:, 6:] - dog.projected_gravity_b).max() < 0.06
+    error = ((dog.root_lin_vel_b[:, :2] - [0.5, 0]) ** 2).sum(axis=1)
+    np.testing.assert_allclose(info["reward_terms"][:, 0], 2 * np.exp(-error / 0.25), rtol=1e-12)
+    np.testing.assert_allclose(info["reward_terms"][:, 2], -1e-4 * (dog.qf**2).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(rewards, info["reward_terms"].sum(axis=1), rtol=1e-12)
+    for _ in range(7):
+        *_, truncated, info = task.step(np.zeros((2, 12)))
+    assert truncated.all() and [ended["reason"] for ended in info["ended"]] == ["time", "time"]
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "text"),
+    [
+        ({"actions": {"push": {**PUSH, "type": "joint_effort"}}}, ks.ConfigError, "actions.push.*joint_effort.*relative_joint_positions"),
+        ({"actions": {"push": {**PUSH, "bond": 1.0}}}, ks.ConfigError, "actions.push.*bond"),
+        ({"actions": {"push": {**PUSH, "robot": "crat"}}}, ks.UnknownNameError, 'unknown entity "crat".*"cart"'),
+        ({"actions": {"push": {**PUSH, "joints": ["slid"]}}}, ks.KinetoscopeError, "slide"),
+        ({"actions": {"push": {**PUSH, "bound": -1.0}}}, ks.ConfigError, "slide"),
+        ({"actions": {}}, ks.ConfigError, "action"),
+        ({"observations": {"x": {"type": "last_action", "sclae": 1.0}}}, ks.ConfigError, "observations.x.*sclae"),
+        ({"observations": {"x": {"type": "generated_commands", "command": "goal"}}}, ks.UnknownNameError, "goal"),
+        ({"observations": {"x": {"type": "last_action", "scale": 0.0}}}, ks.ConfigError, "scale"),
+        ({"commands": {"c": {"columns": {}}}}, ks.ConfigError, "commands.c: 0 columns"),
+        ({"terminations": {"t": {"type": "illegal_contact", "sensor": "s", "force": 1.0}}}, ks.UnknownNameError, "contact sensor"),
+        ({"decimation": 0}, ks.ConfigError, "decimation"),
+        ({"rewrads": {}}, ks.ConfigError, "rewrads"),
+    ],
+)
+def test_invalid_tasks(change, error, text):
+    sim, cart = cart_sim()
+    with pytest.raises(error, match=text):
+        ks.Task(sim, task_cfg(**change))
+    # The simulation is usable after an error, and for a valid task.
+    sim.update()
+    assert cart.qpos.shape == (3, 1)
+    ks.Task(sim, task_cfg()).reset()
+
+
+def test_use_of_tasks():
+    sim, cart = cart_sim()
+    task = ks.Task(sim, task_cfg())
+    with pytest.raises(ks.ArgumentError, match="reset"):
+        task.step(np.zeros((3, 1)))
+    task.reset()
+    with pytest.raises(ks.ArgumentError, match="already has a task"):
+        ks.Task(sim, task_cfg())
+    for wrong in (np.zeros((2, 1)), np.zeros((3, 2)), np.full((3, 1), np.nan)):
+        with pytest.raises(ks.ArgumentError):
+            task.step(wrong)
+    with pytest.raises(ks.ArgumentError, match="mask"):
+        task.reset(mask=[True])
+    assert "1 action and 3 observation columns, 3 envs" in repr(task)
+    task.step(np.ones((3, 1)))
+    moved = cart.qpos
+    task.close()
+    with pytest.raises(ks.DestroyedError, match="task was closed"):
+        task.reset()
+    assert repr(task) == "<Task: closed>"
+    # The simulation goes on where the task ended.
+    np.testing.assert_array_equal(cart.qpos, moved)
+    sim.update(3)
+    assert (cart.qpos != moved).all()
+    again = ks.Task(sim, task_cfg())
+    sim.destroy()
+    with pytest.raises(ks.DestroyedError):
+        again.reset()
