@@ -1,0 +1,135 @@
+//! Tests of batches.
+
+use super::*;
+use crate::env::EnvStatus;
+use kinetoscope_mujoco as mj;
+
+const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="j" type="hinge" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 1 0 0" size="0.1"/></body></worldbody></mujoco>"#;
+
+fn pendulums(envs: usize, threads: usize) -> Batch {
+    let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
+    let mut batch = Batch::new(&model, &Arc::default(), envs, threads, ThreadPool::new()).expect("small");
+    batch.run(|i, env| env.write(|data| data.qvel_mut()[0] = i as f64));
+    batch
+}
+
+/// A ball joint and a hinge with an activation, a falling box, and sensors of all stages.
+const MACHINE: &str = r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/>
+    <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
+      <body pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01"/><site name="tip" pos="0.1 0 0"/>
+        <geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
+    <body pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody>
+    <actuator><general joint="hinge" dyntype="filter" dynprm="0.2" gainprm="0.3"/></actuator>
+    <sensor><framepos objtype="site" objname="tip"/><gyro site="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
+
+fn bits(env: &SimEnv) -> Vec<u64> {
+    let data = env.data();
+    let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart(), data.ctrl()];
+    let solved = [data.qacc(), data.actuator_force(), data.qfrc_actuator(), data.qfrc_constraint()];
+    let computed = [data.sensordata(), data.xpos(), data.xquat(), data.cvel(), data.qfrc_bias(), data.efc_pos()];
+    let all = state.into_iter().chain(solved).chain(computed).flatten().map(|x| x.to_bits());
+    all.chain([data.contact().len() as u64, env.steps()]).collect()
+}
+
+/// A row that one of few threads takes, with reads in between, continues as an environment with an `mjData` of its
+/// own does.
+#[test]
+fn rows_and_persistent_data() {
+    const ENVS: usize = 7;
+    let model = mj::compile(MACHINE, &[]).expect("compiles").into_model();
+    let model = crate::env::with_small_buffers(&model);
+    let start = |i: usize, data: &mut mj::Data| {
+        data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
+        data.ctrl_mut()[0] = 0.3 * i as f64;
+    };
+    let mut alone: Vec<SimEnv> = (0..ENVS).map(|_| SimEnv::new(&model, &Arc::default()).expect("small")).collect();
+    alone.iter_mut().enumerate().for_each(|(i, env)| env.write(|data| start(i, data)));
+    let mut batch = Batch::new(&model, &Arc::default(), ENVS, 2, ThreadPool::new()).expect("small");
+    batch.run(|i, env| env.write(|data| start(i, data)));
+    for (block, count) in [1, 5, 1, 3, 20, 1, 40].into_iter().enumerate() {
+        for (i, env) in alone.iter_mut().enumerate() {
+            env.step(count);
+            if block == 3 && i % 2 == 0 {
+                env.write(|data| data.xfrc_applied_mut()[8] = 0.5);
+            }
+            if block == 4 && i == 3 {
+                env.write(|data| data.qvel_mut()[1] = f64::NAN);
+            }
+        }
+        batch.step(count);
+        if block == 3 {
+            (0..ENVS).step_by(2).for_each(|i| batch.write(i, |env| env.write(|d| d.xfrc_applied_mut()[8] = 0.5)));
+        }
+        if block == 4 {
+            batch.write(3, |env| env.write(|data| data.qvel_mut()[1] = f64::NAN));
+        }
+        for stage in [Stage::State, Stage::Kinematics, Stage::Forward] {
+            batch.for_each_at(stage, |_, _| ());
+        }
+        batch.for_each(|i, env| {
+            assert_eq!(bits(env), bits(&alone[i]), "environment {i} after block {block}");
+            assert_eq!((env.status(), env.warnings()), (alone[i].status(), alone[i].warnings()));
+        });
+    }
+    assert_eq!(alone.iter().filter(|env| *env.status() != EnvStatus::Running).count(), 1);
+    assert!(alone[0].data().contact().len() >= 4);
+    assert_ne!(bits(&alone[0]), bits(&alone[1]), "environments differ");
+    // Control: the last bit of an input is seen.
+    let mut other = SimEnv::new(&model, &Arc::default()).expect("small");
+    other.write(|data| start(0, data));
+    other.write(|data| data.ctrl_mut()[0] = f64::from_bits(1));
+    other.step(71);
+    assert_ne!(bits(&other), bits(&alone[0]));
+}
+
+#[test]
+fn refused_numbers() {
+    let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
+    let batch = |envs, threads| Batch::new(&model, &Arc::default(), envs, threads, ThreadPool::new());
+    assert!(matches!(batch(0, 1), Err(BatchError::NoEnvironments)));
+    assert!(matches!(batch(1, 0), Err(BatchError::NoThreads)));
+    let most = usize::MAX / 1000;
+    assert!(matches!(batch(most, 1), Err(BatchError::OutOfMemory { num_envs, .. }) if num_envs == most));
+}
+
+/// A job that panics returns the environment to the batch.
+#[test]
+fn panic_in_a_read() {
+    let batch = pendulums(3, 1);
+    let read = || batch.read(1, |_| panic!("expected"));
+    assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).is_err());
+    batch.for_each(|i, env| assert_eq!(env.data().qvel()[0], i as f64));
+}
+
+#[test]
+fn step_and_read() {
+    // Slow down the calling thread, which would otherwise process all chunks alone.
+    let caller = std::thread::current().id();
+    for (envs, threads) in [(1, 1), (3, 8), (37, 3)] {
+        let mut batch = pendulums(envs, threads);
+        let (mut qpos, mut qvel) = (vec![f64::NAN; envs], vec![f64::NAN; envs]);
+        batch.step_and_read(
+            7,
+            Stage::State,
+            move |env| {
+                if std::thread::current().id() == caller {
+                    std::thread::sleep(std::time::Duration::from_millis(1));
+                }
+                [env.data().qpos(), env.data().qvel()]
+            },
+            [&mut qpos, &mut qvel],
+        );
+        let mut other = pendulums(envs, 1);
+        other.step(7);
+        for b in [&batch, &other] {
+            b.for_each(|i, env| assert_eq!((env.data().qpos()[0], env.data().qvel()[0]), (qpos[i], qvel[i])));
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "5 numbers for 3 x 1")]
+fn wrong_size() {
+    pendulums(3, 1).step_and_read(1, Stage::State, |env| [env.data().qpos()], [&mut [0.0; 5]]);
+}
