@@ -9,17 +9,22 @@
 //! share, then helps with the remaining shares. The assignment of threads cannot change results, because a row contains
 //! everything that determines a step.
 
+mod bodies;
+mod reads;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use bodies::StoredBodies;
+
+use self::bodies::BodyCache;
+use crate::available_memory::available_memory;
 use crate::batch_error::BatchError;
 use crate::capture::CaptureRequest;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::{SimEnv, Stage};
 use crate::row::{EnvRow, StoredRow};
 use kinetoscope_exec::ThreadPool;
-use kinetoscope_mujoco::Model;
-use ndarray::{Array2, Array3, Axis, aview1};
+use kinetoscope_mujoco::{Data, Model};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -33,6 +38,8 @@ struct Chunk {
     rows: Vec<Box<EnvRow>>,
     /// Values read by [`Batch::step_and_read`], environment by environment.
     read_values: Vec<f64>,
+    /// Motion of bodies that was read.
+    bodies: BodyCache,
 }
 
 /// A chunk that a thread has locked.
@@ -151,8 +158,9 @@ impl Batch {
         let mut first = SimEnv::with_drives(model, DriveState::new(drives, model)).map_err(failed)?;
         let template = first.saved_row().clone();
         let bytes = template.bytes().saturating_mul(num_envs);
-        // The operating system refuses a block that exceeds its memory, while it grants many small ones.
-        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+        // One block of this size meets limits of the process, which Linux otherwise checks row by row.
+        let is_limited = Vec::<u8>::new().try_reserve_exact(bytes).is_err();
+        if is_limited || available_memory().is_some_and(|available| bytes > available) {
             return Err(BatchError::OutOfMemory { num_envs, bytes });
         }
         // Many chunks per thread balance environments of unequal cost.
@@ -162,7 +170,7 @@ impl Batch {
         for first in (0..num_envs).step_by(chunk_size) {
             let size = chunk_size.min(num_envs - first);
             let rows = (0..size).map(|_| Box::new(template.clone())).collect();
-            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new() }));
+            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new(), bodies: BodyCache::default() }));
         }
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
@@ -219,18 +227,6 @@ impl Batch {
                 env.advance(count, capture);
                 env.reach(stage);
                 visit(i, env);
-            });
-        });
-    }
-
-    /// Calls `visit` for every environment, in parallel and in any order, with the quantities that `stage` contains.
-    pub(crate) fn visit(&self, stage: Stage, visit: impl Fn(usize, &SimEnv) + Sync) {
-        self.run_chunks(|workspace, taken| {
-            let first = taken.first;
-            taken.for_each_row(|k, row| {
-                let lease = Lease::new(workspace, row, false);
-                lease.workspace.reach(stage);
-                visit(first + k, lease.workspace);
             });
         });
     }
@@ -358,12 +354,12 @@ impl Batch {
             let workspace = &mut *lock(&workspaces[slot]);
             if slot == 0 {
                 let then = &mut *lock(&then);
-                chunks.process_shares(slot, |taken| {
+                chunks.process_shares(&chunks.shares, slot, |taken| {
                     job(workspace, taken);
                     then(taken);
                 });
             } else {
-                chunks.process_shares(slot, |taken| job(workspace, taken));
+                chunks.process_shares(&chunks.shares, slot, |taken| job(workspace, taken));
             }
         });
     }
@@ -420,6 +416,28 @@ impl Batch {
         })
     }
 
+    /// Reads the `mjData` of environment `index`, with a forward pass done. Results of the last solve that rows do not
+    /// have are zero.
+    ///
+    /// `read` may read the same environment again: its row is back in the batch then.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn read_data<T>(&self, index: usize, read: impl FnOnce(&Data) -> T) -> T {
+        let version = self.with_row(index, |row| row.version);
+        self.with_workspace(version, |workspace| {
+            self.with_row(index, |row| Lease::new(workspace, row, false).workspace.reach(Stage::Forward));
+            workspace.clear_unsaved_results();
+            read(workspace.data())
+        })
+    }
+
+    /// Chunk size: environments `k * chunk_size` up to the next chunk are read and stepped by one thread at a time.
+    pub(crate) fn chunk_size(&self) -> usize {
+        self.chunks.chunk_size
+    }
+
     /// Reads all environments in order, with a forward pass done, on the calling thread.
     pub fn for_each(&self, read: impl FnMut(usize, &SimEnv)) {
         self.for_each_at(Stage::Forward, read);
@@ -430,15 +448,6 @@ impl Batch {
         (0..self.num_envs).for_each(|index| self.read_at(index, stage, |env| read(index, env)));
     }
 
-    /// Reads the rows of all environments in order, on the calling thread.
-    pub(crate) fn for_each_row(&self, mut read: impl FnMut(usize, StoredRow<'_>)) {
-        for (c, chunk) in self.chunks.chunks.iter().enumerate() {
-            for (i, row) in lock(chunk).rows.iter().enumerate() {
-                read(c * self.chunks.chunk_size + i, StoredRow { row, model: &self.model });
-            }
-        }
-    }
-
     /// Reads the row of environment `index`.
     ///
     /// # Panics
@@ -446,61 +455,6 @@ impl Batch {
     #[track_caller]
     pub(crate) fn read_row<T>(&self, index: usize, read: impl FnOnce(StoredRow<'_>) -> T) -> T {
         self.with_row(index, |row| read(StoredRow { row, model: &self.model }))
-    }
-
-    /// Reads K numbers that `stage` contains of each environment, shape (N, K).
-    pub(crate) fn gather_rows<const K: usize>(
-        &self,
-        stage: Stage,
-        mut read: impl FnMut(&SimEnv) -> [f64; K],
-    ) -> Array2<f64> {
-        let mut rows = Vec::with_capacity(self.num_envs);
-        self.for_each_at(stage, |_, env| rows.push(read(env)));
-        rows.into()
-    }
-
-    /// Reads a value of the row of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather_stored<I, T>(&self, items: &[I], read: impl Fn(&StoredRow<'_>, &I) -> T) -> Array2<T>
-    where
-        T: Copy + Default,
-    {
-        let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each_row(|env_id, row| {
-            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
-                *value = read(&row, item);
-            }
-        });
-        values
-    }
-
-    /// Reads a value that `stage` contains of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather<I, T>(&self, stage: Stage, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
-    where
-        T: Copy + Default,
-    {
-        let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each_at(stage, |env_id, env| {
-            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
-                *value = read(env, item);
-            }
-        });
-        values
-    }
-
-    /// Reads K numbers that `stage` contains of each environment and each of `items`, shape (N, items, K).
-    pub(crate) fn gather_rows_of<I, const K: usize>(
-        &self,
-        stage: Stage,
-        items: &[I],
-        read: impl Fn(&SimEnv, &I) -> [f64; K],
-    ) -> Array3<f64> {
-        let mut values = Array3::zeros((self.num_envs, items.len(), K));
-        self.for_each_at(stage, |env_id, env| {
-            for (mut row, item) in values.index_axis_mut(Axis(0), env_id).rows_mut().into_iter().zip(items) {
-                row.assign(&aview1(&read(env, item)));
-            }
-        });
-        values
     }
 
     /// Writes to environment `index`, with a forward pass done before.
@@ -540,17 +494,14 @@ impl Batch {
     fn with_row<T>(&self, index: usize, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
+        chunk.bodies.expect_changes();
         act(&mut chunk.rows[index % self.chunks.chunk_size])
     }
 
     /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
     /// and on which of them took an environment.
     pub fn buffer_growths(&self) -> u64 {
-        let growths = |workspace: &SimEnv| u64::from(workspace.buffer_growths());
-        let spare = lock(&self.spare_workspaces);
-        let initial = growths(&spare.origin);
-        let workspaces = self.workspaces.iter().map(|workspace| growths(&lock(workspace))).sum::<u64>();
-        self.earlier_growths + initial + workspaces + spare.workspaces.iter().map(growths).sum::<u64>()
+        self.earlier_growths + lock(&self.spare_workspaces).origin.buffer_growths()
     }
 
     /// Counts the growths of `old`, which this batch replaces, as growths of this batch.
@@ -562,6 +513,7 @@ impl Batch {
 impl LockedChunk<'_> {
     /// Calls `act` for every row of the chunk, with its index in the chunk.
     fn for_each_row(&mut self, mut act: impl FnMut(usize, &mut Box<EnvRow>)) {
+        self.chunk.bodies.expect_changes();
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
@@ -573,7 +525,8 @@ impl LockedChunk<'_> {
         steps: u32,
         mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>),
     ) {
-        let Chunk { rows, read_values } = &mut *self.chunk;
+        let Chunk { rows, read_values, bodies } = &mut *self.chunk;
+        bodies.expect_changes();
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
             if let Some(next) = rows.get(k + 1) {
@@ -595,9 +548,9 @@ impl Chunks {
         LockedChunk { first: c * self.chunk_size, chunk: lock(&self.chunks[c]) }
     }
 
-    /// Processes the share of `thread`, then the remaining chunks of the following shares.
-    fn process_shares(&self, thread: usize, mut job: impl FnMut(&mut LockedChunk)) {
-        let (before, from) = self.shares.split_at(thread);
+    /// Processes the share of `thread` among `shares`, then the remaining chunks of the following shares.
+    fn process_shares(&self, shares: &[Share], thread: usize, mut job: impl FnMut(&mut LockedChunk)) {
+        let (before, from) = shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
                 let c = share.next.fetch_add(1, Ordering::Relaxed);
