@@ -118,6 +118,12 @@ fn stage_of(simulation: &Simulation, requires: StateFields) -> Stage {
     }
 }
 
+/// Removes the elements of a list of rows and keeps its memory: the standard library collects in place.
+fn emptied<'b>(mut rows: Vec<Mutex<ChunkRows<'_>>>) -> Vec<Mutex<ChunkRows<'b>>> {
+    rows.clear();
+    rows.into_iter().filter_map(|_| None).collect()
+}
+
 /// Fills the arrays that `requires` names, which must be allocated, and steps and times, for the environments
 /// `chosen`. The list of contacts becomes that of the last capture of every environment.
 pub(crate) fn gather(
@@ -126,15 +132,16 @@ pub(crate) fn gather(
     substeps: u32,
     requires: StateFields,
     state: &mut SceneState,
+    memory: &mut GatherMemory,
 ) {
-    let filler = Filler::new(simulation, requires, state);
+    let filler = Filler::new(simulation, requires, state, memory);
     let all = chosen.len() == simulation.batch.num_envs();
     match filler.stage() {
         Some(stage) if all => simulation.batch.visit(stage, |i, env| filler.fill(i, env)),
         Some(stage) => simulation.batch.visit_in(chosen, stage, |i, env| filler.fill(i, env)),
         None => {}
     }
-    drop(filler);
+    filler.finish(memory);
     for &i in chosen {
         simulation.batch.read_row(i, |row| fill_clock(row, i, substeps, state));
     }
@@ -151,11 +158,12 @@ pub(crate) fn step_and_gather(
     capture: Option<&CaptureRequest>,
     requires: StateFields,
     state: &mut SceneState,
+    memory: &mut GatherMemory,
 ) {
-    let filler = Filler::new(simulation, requires, state);
+    let filler = Filler::new(simulation, requires, state, memory);
     let stage = filler.stage().unwrap_or(Stage::Raw);
     simulation.batch.step_and_visit(steps * substeps, capture, stage, |i, env| filler.fill(i, env));
-    drop(filler);
+    filler.finish(memory);
     gather_steps(simulation, substeps, state);
     gather_contacts(simulation, requires, state);
 }
@@ -167,6 +175,10 @@ fn gather_contacts(simulation: &Simulation, requires: StateFields, state: &mut S
     }
 }
 
+/// Memory of a gather that the next one uses again, so that steps allocate nothing.
+#[derive(Default)]
+pub(crate) struct GatherMemory(Vec<Mutex<ChunkRows<'static>>>);
+
 /// Fills rows of the arrays from several threads.
 struct Filler<'a> {
     simulation: &'a Simulation,
@@ -177,14 +189,25 @@ struct Filler<'a> {
 }
 
 impl<'a> Filler<'a> {
-    fn new(simulation: &'a Simulation, requires: StateFields, state: &'a mut SceneState) -> Self {
+    fn new(
+        simulation: &'a Simulation,
+        requires: StateFields,
+        state: &'a mut SceneState,
+        memory: &mut GatherMemory,
+    ) -> Self {
         let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
         if sees && state.own_scenes != simulation.env_scenes {
             state.own_scenes.clone_from(&simulation.env_scenes);
         }
         let chunk_size = simulation.batch.chunk_size();
-        let chunks = ChunkRows::split(state, chunk_size).into_iter().map(Mutex::new).collect();
+        let mut chunks = emptied(std::mem::take(&mut memory.0));
+        ChunkRows::split(state, chunk_size, &mut chunks);
         Self { simulation, requires, chunk_size, chunks }
+    }
+
+    /// Ends the borrow of the arrays.
+    fn finish(self, memory: &mut GatherMemory) {
+        memory.0 = emptied(self.chunks);
     }
 
     /// Part of a step that the data needs; `None` if no quantity is filled from it.

@@ -4,6 +4,7 @@ use crate::indexing::JointIndexing;
 use crate::simulation::Simulation;
 use kinetoscope_scene::{EnvScene, Light, PoseF32, PoseF64, SceneState};
 use ndarray::{Array, ArrayViewMut, ArrayViewMut2, ArrayViewMut3, Axis, RemoveAxis};
+use std::sync::{Mutex, PoisonError};
 
 /// Rows of consecutive environments in the arrays of a [`SceneState`]. Threads fill the rows of different chunks at the
 /// same time.
@@ -32,14 +33,13 @@ pub(super) struct ChunkRows<'a> {
 }
 
 impl<'a> ChunkRows<'a> {
-    /// Splits the arrays of `state` into chunks of `chunk_size` environments.
-    pub(super) fn split(state: &'a mut SceneState, chunk_size: usize) -> Vec<Self> {
-        let num_envs = state.num_envs();
-        let mut chunks: Vec<Self> =
-            (0..num_envs).step_by(chunk_size).map(|first| Self { first, ..Self::default() }).collect();
+    /// Splits the arrays of `state` into chunks of `chunk_size` environments, and fills the empty list `chunks`.
+    pub(super) fn split(state: &'a mut SceneState, chunk_size: usize, chunks: &mut Vec<Mutex<Self>>) {
+        let first = (0..state.num_envs()).step_by(chunk_size);
+        chunks.extend(first.map(|first| Mutex::new(Self { first, ..Self::default() })));
         macro_rules! assign {
             ($($name:ident),*) => {
-                $(split_array(&mut state.$name, chunk_size, &mut chunks, |rows| &mut rows.$name);)*
+                $(split_array(&mut state.$name, chunk_size, chunks, |rows| &mut rows.$name);)*
             };
         }
         assign!(body_poses, body_velocities, body_accelerations, force_poses, force_velocities, joint_wrenches);
@@ -48,26 +48,30 @@ impl<'a> ChunkRows<'a> {
         if let Some(visible) = &mut state.visible {
             let poses = visible.instance_poses.axis_chunks_iter_mut(Axis(0), chunk_size);
             let lights = visible.lights.axis_chunks_iter_mut(Axis(0), chunk_size);
-            for (rows, (poses, lights)) in chunks.iter_mut().zip(poses.zip(lights)) {
+            for (rows, (poses, lights)) in unlocked(chunks).zip(poses.zip(lights)) {
                 (rows.visible_poses, rows.visible_lights) = (Some(poses), Some(lights));
             }
-            for (rows, scenes) in chunks.iter_mut().zip(visible.scenes.chunks_mut(chunk_size)) {
+            for (rows, scenes) in unlocked(chunks).zip(visible.scenes.chunks_mut(chunk_size)) {
                 rows.visible_scenes = scenes;
             }
         }
-        chunks
     }
+}
+
+/// The chunks of a list that is borrowed mutably, so that no lock is needed.
+fn unlocked<'c, 'a>(chunks: &'c mut [Mutex<ChunkRows<'a>>]) -> impl Iterator<Item = &'c mut ChunkRows<'a>> {
+    chunks.iter_mut().map(|chunk| chunk.get_mut().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Gives each chunk its rows of an array.
 fn split_array<'a, T, D: RemoveAxis>(
     array: &'a mut Option<Array<T, D>>,
     chunk_size: usize,
-    chunks: &mut [ChunkRows<'a>],
+    chunks: &mut [Mutex<ChunkRows<'a>>],
     field: impl for<'c> Fn(&'c mut ChunkRows<'a>) -> &'c mut Option<ArrayViewMut<'a, T, D>>,
 ) {
     if let Some(array) = array {
-        for (chunk, rows) in chunks.iter_mut().zip(array.axis_chunks_iter_mut(Axis(0), chunk_size)) {
+        for (chunk, rows) in unlocked(chunks).zip(array.axis_chunks_iter_mut(Axis(0), chunk_size)) {
             *field(chunk) = Some(rows);
         }
     }
