@@ -203,6 +203,21 @@ impl Data {
         guarded(|| unsafe { mj::mj_step1(m, d) })
     }
 
+    /// Computes the part of [`step1`](Self::step1) that poses and velocities of bodies need: kinematics, centers of mass
+    /// and velocities (`cvel`). All other quantities stay.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn body_motion(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_kinematics(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_comPos(m, d) })?;
+        // SAFETY: as above.
+        guarded(|| unsafe { mj::mj_comVel(m, d) })
+    }
+
     /// Computes the part of [`step1`](Self::step1) that poses and velocities need: kinematics, centers of mass, cameras,
     /// lights, tendons and, on 4.x, flexes, then the velocities of bodies (`cvel`). All other quantities stay.
     ///

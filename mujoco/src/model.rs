@@ -226,7 +226,7 @@ impl Model {
 
     /// True if data of one model can be used with the other: both come from one compiled model, with equal buffer
     /// sizes.
-    pub(super) fn is_compatible_with(&self, other: &Self) -> bool {
+    pub fn is_compatible_with(&self, other: &Self) -> bool {
         let sizes = |m: &mj::mjModel| {
             #[cfg(mj4)]
             let stack = m.narena;

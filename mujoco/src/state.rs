@@ -295,6 +295,38 @@ impl SolvedState {
     }
 }
 
+/// Sets these `mjData` arrays to zero.
+macro_rules! cleared_arrays {
+    ($data:expr; $($array_mut:ident),* $(,)?) => {
+        let (m, d) = ($data.model().raw(), $data.raw_mut());
+        $(
+            // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
+            unsafe { arrays::$array_mut(m, d) }.fill(0.0);
+        )*
+    };
+}
+
+impl Data {
+    /// Sets results of the last solve that [`SolvedState`] does not contain to zero: `efc_force` (and with it the
+    /// [forces of contacts](Self::contact_force)), `cacc`, `cfrc_int`, `cfrc_ext`, `act_dot`, `qfrc_smooth`,
+    /// `qacc_smooth` and `qfrc_inverse`. Data that several environments use in turn may have those of another one.
+    ///
+    /// The next step overwrites all of them before it reads them.
+    pub fn clear_unsaved_results(&mut self) {
+        cleared_arrays!(
+            self;
+            efc_force_mut,
+            cacc_mut,
+            cfrc_int_mut,
+            cfrc_ext_mut,
+            act_dot_mut,
+            qfrc_smooth_mut,
+            qacc_smooth_mut,
+            qfrc_inverse_mut,
+        );
+    }
+}
+
 impl UnnormalizedQuats {
     /// Allocates storage for the quaternions that a forward pass over `model` normalizes; nothing to store on 4.x.
     pub fn new(model: &Model) -> Self {

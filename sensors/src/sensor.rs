@@ -75,7 +75,7 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
 
     /// Resets the environments `env_ids`. The current value is refreshed from `state`, taken after the reset, so
     /// outdated values are never read. This is not a measurement: the history is empty, and the first measurement falls
-    /// one period later.
+    /// one period later. Rows of other environments in `state` may be those of an earlier time.
     ///
     /// # Errors
     ///
@@ -83,7 +83,8 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
     /// Refreshes the current value of the environments `env_ids` after a write to their state, so outdated values are
-    /// never read. This is not a measurement: history, counts and schedule do not change.
+    /// never read. This is not a measurement: history, counts and schedule do not change. Rows of other environments in
+    /// `state` may be those of an earlier time.
     ///
     /// # Errors
     ///

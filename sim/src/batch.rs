@@ -9,14 +9,22 @@
 //! share, then helps with the remaining shares. The assignment of threads cannot change results, because a row contains
 //! everything that determines a step.
 
+mod bodies;
+mod reads;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use bodies::StoredBodies;
+
+use self::bodies::BodyCache;
+use crate::available_memory::available_memory;
 use crate::batch_error::BatchError;
 use crate::capture::CaptureRequest;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::{SimEnv, Stage};
 use crate::row::{EnvRow, StoredRow};
 use kinetoscope_exec::ThreadPool;
-use kinetoscope_mujoco::Model;
-use ndarray::{Array2, Array3, Axis, aview1};
+use kinetoscope_mujoco::{Data, Model};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -30,6 +38,8 @@ struct Chunk {
     rows: Vec<Box<EnvRow>>,
     /// Values read by [`Batch::step_and_read`], environment by environment.
     read_values: Vec<f64>,
+    /// Motion of bodies that was read.
+    bodies: BodyCache,
 }
 
 /// A chunk that a thread has locked.
@@ -148,8 +158,9 @@ impl Batch {
         let mut first = SimEnv::with_drives(model, DriveState::new(drives, model)).map_err(failed)?;
         let template = first.saved_row().clone();
         let bytes = template.bytes().saturating_mul(num_envs);
-        // The operating system refuses a block that exceeds its memory, while it grants many small ones.
-        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+        // One block of this size meets limits of the process, which Linux otherwise checks row by row.
+        let is_limited = Vec::<u8>::new().try_reserve_exact(bytes).is_err();
+        if is_limited || available_memory().is_some_and(|available| bytes > available) {
             return Err(BatchError::OutOfMemory { num_envs, bytes });
         }
         // Many chunks per thread balance environments of unequal cost.
@@ -164,7 +175,7 @@ impl Batch {
                 row
             };
             let rows = (0..size).map(row).collect();
-            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new() }));
+            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new(), bodies: BodyCache::default() }));
         }
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
@@ -221,18 +232,6 @@ impl Batch {
                 env.advance(count, capture);
                 env.reach(stage);
                 visit(i, env);
-            });
-        });
-    }
-
-    /// Calls `visit` for every environment, in parallel and in any order, with the quantities that `stage` contains.
-    pub(crate) fn visit(&self, stage: Stage, visit: impl Fn(usize, &SimEnv) + Sync) {
-        self.run_chunks(|workspace, taken| {
-            let first = taken.first;
-            taken.for_each_row(|k, row| {
-                let lease = Lease::new(workspace, row, false);
-                lease.workspace.reach(stage);
-                visit(first + k, lease.workspace);
             });
         });
     }
@@ -360,12 +359,12 @@ impl Batch {
             let workspace = &mut *lock(&workspaces[slot]);
             if slot == 0 {
                 let then = &mut *lock(&then);
-                chunks.process_shares(slot, |taken| {
+                chunks.process_shares(&chunks.shares, slot, |taken| {
                     job(workspace, taken);
                     then(taken);
                 });
             } else {
-                chunks.process_shares(slot, |taken| job(workspace, taken));
+                chunks.process_shares(&chunks.shares, slot, |taken| job(workspace, taken));
             }
         });
     }
@@ -422,6 +421,28 @@ impl Batch {
         })
     }
 
+    /// Reads the `mjData` of environment `index`, with a forward pass done. Results of the last solve that rows do not
+    /// have are zero.
+    ///
+    /// `read` may read the same environment again: its row is back in the batch then.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn read_data<T>(&self, index: usize, read: impl FnOnce(&Data) -> T) -> T {
+        let version = self.with_row(index, |row| row.version);
+        self.with_workspace(version, |workspace| {
+            self.with_row(index, |row| Lease::new(workspace, row, false).workspace.reach(Stage::Forward));
+            workspace.clear_unsaved_results();
+            read(workspace.data())
+        })
+    }
+
+    /// Chunk size: environments `k * chunk_size` up to the next chunk are read and stepped by one thread at a time.
+    pub(crate) fn chunk_size(&self) -> usize {
+        self.chunks.chunk_size
+    }
+
     /// Reads all environments in order, with a forward pass done, on the calling thread.
     pub fn for_each(&self, read: impl FnMut(usize, &SimEnv)) {
         self.for_each_at(Stage::Forward, read);
@@ -432,15 +453,6 @@ impl Batch {
         (0..self.num_envs).for_each(|index| self.read_at(index, stage, |env| read(index, env)));
     }
 
-    /// Reads the rows of all environments in order, on the calling thread.
-    pub(crate) fn for_each_row(&self, mut read: impl FnMut(usize, StoredRow<'_>)) {
-        for (c, chunk) in self.chunks.chunks.iter().enumerate() {
-            for (i, row) in lock(chunk).rows.iter().enumerate() {
-                read(c * self.chunks.chunk_size + i, StoredRow { row, model: &self.model });
-            }
-        }
-    }
-
     /// Reads the row of environment `index`.
     ///
     /// # Panics
@@ -448,61 +460,6 @@ impl Batch {
     #[track_caller]
     pub(crate) fn read_row<T>(&self, index: usize, read: impl FnOnce(StoredRow<'_>) -> T) -> T {
         self.with_row(index, |row| read(StoredRow { row, model: &self.model }))
-    }
-
-    /// Reads K numbers that `stage` contains of each environment, shape (N, K).
-    pub(crate) fn gather_rows<const K: usize>(
-        &self,
-        stage: Stage,
-        mut read: impl FnMut(&SimEnv) -> [f64; K],
-    ) -> Array2<f64> {
-        let mut rows = Vec::with_capacity(self.num_envs);
-        self.for_each_at(stage, |_, env| rows.push(read(env)));
-        rows.into()
-    }
-
-    /// Reads a value of the row of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather_stored<I, T>(&self, items: &[I], read: impl Fn(&StoredRow<'_>, &I) -> T) -> Array2<T>
-    where
-        T: Copy + Default,
-    {
-        let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each_row(|env_id, row| {
-            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
-                *value = read(&row, item);
-            }
-        });
-        values
-    }
-
-    /// Reads a value that `stage` contains of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather<I, T>(&self, stage: Stage, items: &[I], read: impl Fn(&SimEnv, &I) -> T) -> Array2<T>
-    where
-        T: Copy + Default,
-    {
-        let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each_at(stage, |env_id, env| {
-            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
-                *value = read(env, item);
-            }
-        });
-        values
-    }
-
-    /// Reads K numbers that `stage` contains of each environment and each of `items`, shape (N, items, K).
-    pub(crate) fn gather_rows_of<I, const K: usize>(
-        &self,
-        stage: Stage,
-        items: &[I],
-        read: impl Fn(&SimEnv, &I) -> [f64; K],
-    ) -> Array3<f64> {
-        let mut values = Array3::zeros((self.num_envs, items.len(), K));
-        self.for_each_at(stage, |env_id, env| {
-            for (mut row, item) in values.index_axis_mut(Axis(0), env_id).rows_mut().into_iter().zip(items) {
-                row.assign(&aview1(&read(env, item)));
-            }
-        });
-        values
     }
 
     /// Writes to environment `index`, with a forward pass done before.
@@ -542,17 +499,14 @@ impl Batch {
     fn with_row<T>(&self, index: usize, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
+        chunk.bodies.expect_changes();
         act(&mut chunk.rows[index % self.chunks.chunk_size])
     }
 
     /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
     /// and on which of them took an environment.
     pub fn buffer_growths(&self) -> u64 {
-        let growths = |workspace: &SimEnv| u64::from(workspace.buffer_growths());
-        let spare = lock(&self.spare_workspaces);
-        let initial = growths(&spare.origin);
-        let workspaces = self.workspaces.iter().map(|workspace| growths(&lock(workspace))).sum::<u64>();
-        self.earlier_growths + initial + workspaces + spare.workspaces.iter().map(growths).sum::<u64>()
+        self.earlier_growths + lock(&self.spare_workspaces).origin.buffer_growths()
     }
 
     /// Counts the growths of `old`, which this batch replaces, as growths of this batch.
@@ -564,6 +518,7 @@ impl Batch {
 impl LockedChunk<'_> {
     /// Calls `act` for every row of the chunk, with its index in the chunk.
     fn for_each_row(&mut self, mut act: impl FnMut(usize, &mut Box<EnvRow>)) {
+        self.chunk.bodies.expect_changes();
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
@@ -576,7 +531,8 @@ impl LockedChunk<'_> {
         steps: u32,
         mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>),
     ) {
-        let Chunk { rows, read_values } = &mut *self.chunk;
+        let Chunk { rows, read_values, bodies } = &mut *self.chunk;
+        bodies.expect_changes();
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
             if let Some(next) = rows.get(k + 1) {
@@ -598,9 +554,9 @@ impl Chunks {
         LockedChunk { first: c * self.chunk_size, chunk: lock(&self.chunks[c]) }
     }
 
-    /// Processes the share of `thread`, then the remaining chunks of the following shares.
-    fn process_shares(&self, thread: usize, mut job: impl FnMut(&mut LockedChunk)) {
-        let (before, from) = self.shares.split_at(thread);
+    /// Processes the share of `thread` among `shares`, then the remaining chunks of the following shares.
+    fn process_shares(&self, shares: &[Share], thread: usize, mut job: impl FnMut(&mut LockedChunk)) {
+        let (before, from) = shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
                 let c = share.next.fetch_add(1, Ordering::Relaxed);
@@ -610,142 +566,5 @@ impl Chunks {
                 job(&mut self.lock_chunk(c));
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::env::EnvStatus;
-    use kinetoscope_mujoco as mj;
-
-    const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="j" type="hinge" axis="0 1 0"/>
-        <geom type="capsule" fromto="0 0 0 1 0 0" size="0.1"/></body></worldbody></mujoco>"#;
-
-    fn pendulums(envs: usize, threads: usize) -> Batch {
-        let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
-        let mut batch = Batch::new(&model, &Arc::default(), envs, threads, ThreadPool::new()).expect("small");
-        batch.run(|i, env| env.write(|data| data.qvel_mut()[0] = i as f64));
-        batch
-    }
-
-    /// A ball joint and a hinge with an activation, a falling box, and sensors of all stages.
-    const MACHINE: &str = r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/>
-        <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
-          <body pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01"/><site name="tip" pos="0.1 0 0"/>
-            <geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
-        <body pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody>
-        <actuator><general joint="hinge" dyntype="filter" dynprm="0.2" gainprm="0.3"/></actuator>
-        <sensor><framepos objtype="site" objname="tip"/><gyro site="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
-
-    fn bits(env: &SimEnv) -> Vec<u64> {
-        let data = env.data();
-        let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart(), data.ctrl()];
-        let solved = [data.qacc(), data.actuator_force(), data.qfrc_actuator(), data.qfrc_constraint()];
-        let computed = [data.sensordata(), data.xpos(), data.xquat(), data.cvel(), data.qfrc_bias(), data.efc_pos()];
-        let all = state.into_iter().chain(solved).chain(computed).flatten().map(|x| x.to_bits());
-        all.chain([data.contact().len() as u64, env.steps()]).collect()
-    }
-
-    /// A row that one of few threads takes, with reads in between, continues as an environment with an `mjData` of its
-    /// own does.
-    #[test]
-    fn rows_and_persistent_data() {
-        const ENVS: usize = 7;
-        let model = mj::compile(MACHINE, &[]).expect("compiles").into_model();
-        let model = crate::env::with_small_buffers(&model);
-        let start = |i: usize, data: &mut mj::Data| {
-            data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
-            data.ctrl_mut()[0] = 0.3 * i as f64;
-        };
-        let mut alone: Vec<SimEnv> = (0..ENVS).map(|_| SimEnv::new(&model, &Arc::default()).expect("small")).collect();
-        alone.iter_mut().enumerate().for_each(|(i, env)| env.write(|data| start(i, data)));
-        let mut batch = Batch::new(&model, &Arc::default(), ENVS, 2, ThreadPool::new()).expect("small");
-        batch.run(|i, env| env.write(|data| start(i, data)));
-        for (block, count) in [1, 5, 1, 3, 20, 1, 40].into_iter().enumerate() {
-            for (i, env) in alone.iter_mut().enumerate() {
-                env.step(count);
-                if block == 3 && i % 2 == 0 {
-                    env.write(|data| data.xfrc_applied_mut()[8] = 0.5);
-                }
-                if block == 4 && i == 3 {
-                    env.write(|data| data.qvel_mut()[1] = f64::NAN);
-                }
-            }
-            batch.step(count);
-            if block == 3 {
-                (0..ENVS).step_by(2).for_each(|i| batch.write(i, |env| env.write(|d| d.xfrc_applied_mut()[8] = 0.5)));
-            }
-            if block == 4 {
-                batch.write(3, |env| env.write(|data| data.qvel_mut()[1] = f64::NAN));
-            }
-            for stage in [Stage::State, Stage::Kinematics, Stage::Forward] {
-                batch.for_each_at(stage, |_, _| ());
-            }
-            batch.for_each(|i, env| {
-                assert_eq!(bits(env), bits(&alone[i]), "environment {i} after block {block}");
-                assert_eq!((env.status(), env.warnings()), (alone[i].status(), alone[i].warnings()));
-            });
-        }
-        assert_eq!(alone.iter().filter(|env| *env.status() != EnvStatus::Running).count(), 1);
-        assert!(alone[0].data().contact().len() >= 4);
-        assert_ne!(bits(&alone[0]), bits(&alone[1]), "environments differ");
-        // Control: the last bit of an input is seen.
-        let mut other = SimEnv::new(&model, &Arc::default()).expect("small");
-        other.write(|data| start(0, data));
-        other.write(|data| data.ctrl_mut()[0] = f64::from_bits(1));
-        other.step(71);
-        assert_ne!(bits(&other), bits(&alone[0]));
-    }
-
-    #[test]
-    fn refused_numbers() {
-        let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
-        let batch = |envs, threads| Batch::new(&model, &Arc::default(), envs, threads, ThreadPool::new());
-        assert!(matches!(batch(0, 1), Err(BatchError::NoEnvironments)));
-        assert!(matches!(batch(1, 0), Err(BatchError::NoThreads)));
-        let most = usize::MAX / 1000;
-        assert!(matches!(batch(most, 1), Err(BatchError::OutOfMemory { num_envs, .. }) if num_envs == most));
-    }
-
-    /// A job that panics returns the environment to the batch.
-    #[test]
-    fn panic_in_a_read() {
-        let batch = pendulums(3, 1);
-        let read = || batch.read(1, |_| panic!("expected"));
-        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).is_err());
-        batch.for_each(|i, env| assert_eq!(env.data().qvel()[0], i as f64));
-    }
-
-    #[test]
-    fn step_and_read() {
-        // Slow down the calling thread, which would otherwise process all chunks alone.
-        let caller = std::thread::current().id();
-        for (envs, threads) in [(1, 1), (3, 8), (37, 3)] {
-            let mut batch = pendulums(envs, threads);
-            let (mut qpos, mut qvel) = (vec![f64::NAN; envs], vec![f64::NAN; envs]);
-            batch.step_and_read(
-                7,
-                Stage::State,
-                move |env| {
-                    if std::thread::current().id() == caller {
-                        std::thread::sleep(std::time::Duration::from_millis(1));
-                    }
-                    [env.data().qpos(), env.data().qvel()]
-                },
-                [&mut qpos, &mut qvel],
-            );
-            let mut other = pendulums(envs, 1);
-            other.step(7);
-            for b in [&batch, &other] {
-                b.for_each(|i, env| assert_eq!((env.data().qpos()[0], env.data().qvel()[0]), (qpos[i], qvel[i])));
-            }
-        }
-    }
-
-    #[test]
-    #[should_panic(expected = "5 numbers for 3 x 1")]
-    fn wrong_size() {
-        pendulums(3, 1).step_and_read(1, Stage::State, |env| [env.data().qpos()], [&mut [0.0; 5]]);
     }
 }

@@ -18,13 +18,49 @@ impl BodyFrame {
     }
 
     /// Pose of the frame in the environment.
-    pub(crate) fn pose(&self, data: &mj::Data) -> Pose {
+    pub(crate) fn pose(&self, data: &impl BodyArrays) -> Pose {
         body_pose(data, self.body) * self.body_from_frame
     }
 }
 
+/// MuJoCo's arrays of the motion of bodies, in an `mjData` or copied from one.
+pub(crate) trait BodyArrays {
+    fn xpos(&self) -> &[f64];
+    fn xquat(&self) -> &[f64];
+    fn xipos(&self) -> &[f64];
+    fn cvel(&self) -> &[f64];
+    fn subtree_com(&self) -> &[f64];
+    fn body_rootid(&self) -> &[i32];
+}
+
+impl BodyArrays for mj::Data {
+    fn xpos(&self) -> &[f64] {
+        self.xpos()
+    }
+
+    fn xquat(&self) -> &[f64] {
+        self.xquat()
+    }
+
+    fn xipos(&self) -> &[f64] {
+        self.xipos()
+    }
+
+    fn cvel(&self) -> &[f64] {
+        self.cvel()
+    }
+
+    fn subtree_com(&self) -> &[f64] {
+        self.subtree_com()
+    }
+
+    fn body_rootid(&self) -> &[i32] {
+        self.model().body_rootid()
+    }
+}
+
 /// Pose of a MuJoCo body in the environment.
-pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {
+pub(crate) fn body_pose(data: &impl BodyArrays, body: usize) -> Pose {
     let (p, q) = (&data.xpos()[3 * body..3 * body + 3], &data.xquat()[4 * body..4 * body + 4]);
     from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
 }

@@ -10,7 +10,7 @@ use crate::objects::terrain::Terrain;
 use crate::sensor_list::SensorId;
 use kinetoscope_mujoco::ObjectKind;
 use kinetoscope_sensors::Sensor;
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use std::sync::Arc;
 
 impl SimulationManager {
@@ -151,15 +151,17 @@ impl<'a> Entities<'a> {
     /// and (N, nv). [`state_names`](Self::state_names) names the columns.
     pub fn engine_states(&self) -> [Array2<f64>; 2] {
         let model = self.sim.simulation.batch.model();
-        let mut states =
-            [Array2::zeros((self.sim.num_envs(), model.nq())), Array2::zeros((self.sim.num_envs(), model.nv()))];
-        self.sim.simulation.batch.for_each_at(Stage::State, |index, env| {
-            let data = env.data();
-            for (table, numbers) in states.iter_mut().zip([data.qpos(), data.qvel()]) {
-                table.row_mut(index).iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
-            }
-        });
-        states
+        let (n, nq) = (self.sim.num_envs(), model.nq());
+        let mut states = Array2::zeros((n, nq + model.nv()));
+        if let Some(out) = states.as_slice_mut() {
+            self.sim.simulation.batch.read_all(Stage::State, out, |_, env, out| {
+                let (qpos, qvel) = out.split_at_mut(nq);
+                qpos.copy_from_slice(env.data().qpos());
+                qvel.copy_from_slice(env.data().qvel());
+            });
+        }
+        let (qpos, qvel) = states.view().split_at(Axis(1), nq);
+        [qpos.to_owned(), qvel.to_owned()]
     }
 
     /// Column names of the controls of a [rollout](SimulationManager::rollout): movable joints of all robots and

@@ -13,9 +13,12 @@ use crate::row::EnvRow;
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    Buffers, Data, EngineError, IntegrationState, Model, UnnormalizedQuats, UserInputs, Warning, WarningCounts, Weld,
+    Buffers, Data, EngineError, IntegrationState, Model, SolvedState, UnnormalizedQuats, UserInputs, Warning,
+    WarningCounts, Weld,
 };
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Status of an environment: running or diverged.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +66,8 @@ pub enum Stage {
     Raw,
     /// The state, with quaternions as they are after a forward pass.
     State,
+    /// Poses and velocities of bodies, and poses of geoms and sites.
+    Bodies,
     /// Poses and velocities of bodies, geoms, sites, cameras, lights and tendons.
     Kinematics,
     /// All of `mj_step1`.
@@ -81,7 +86,8 @@ pub struct SimEnv {
     stage: Stage,
     /// Quaternions before the last forward pass, above [`Stage::Raw`]; the rest of the state is in `data`.
     raw_quats: UnnormalizedQuats,
-    buffer_growths: u32,
+    /// Number of times a buffer was doubled, in all working memory of a batch.
+    buffer_growths: Arc<AtomicU64>,
     /// Version of the row of which `data` still holds everything, or 0; see [`EnvRow::version`].
     held: u64,
     /// Last version that this environment gave to a row. The upper bits differ between the environments of a batch.
@@ -120,7 +126,7 @@ impl SimEnv {
             row: Box::new(EnvRow::new(drives)),
             stage: Stage::Raw,
             raw_quats: UnnormalizedQuats::new(model),
-            buffer_growths: 0,
+            buffer_growths: Arc::default(),
             held: 0,
             last_version: 0,
         };
@@ -139,10 +145,15 @@ impl SimEnv {
             row: self.row.clone(),
             stage: Stage::Raw,
             raw_quats: self.raw_quats.clone(),
-            buffer_growths: 0,
+            buffer_growths: Arc::clone(&self.buffer_growths),
             held: 0,
-            last_version: (slot as u64) << SLOT_SHIFT,
+            last_version: Self::first_version(slot),
         })
+    }
+
+    /// The smallest version of the working memory with this slot.
+    pub(crate) fn first_version(slot: usize) -> u64 {
+        (slot as u64) << SLOT_SHIFT
     }
 
     /// Slot of the working memory that gave `version` to a row; 0 for a row that was never in use.
@@ -225,6 +236,11 @@ impl SimEnv {
         self.row.save_inputs(&self.data);
     }
 
+    /// Sets results of the last solve that the row does not have to zero.
+    pub(crate) fn clear_unsaved_results(&mut self) {
+        self.data.clear_unsaved_results();
+    }
+
     /// MuJoCo data: the state after the last step or the last write.
     pub fn data(&self) -> &Data {
         &self.data
@@ -256,6 +272,44 @@ impl SimEnv {
         good
     }
 
+    /// Lends the data to code that may call any function of MuJoCo, with a forward pass done. Then checks the state that
+    /// it wrote, as [`write_state`](Self::write_state) does. Results of the last solve that the row does not have are
+    /// zero. Nothing that the code leaves behind besides state, inputs and results of the solve reaches other
+    /// environments: neither another model, nor a failed call of MuJoCo.
+    ///
+    /// Returns `None` if the code exchanged the data for data of another scene or other buffer sizes; then nothing is
+    /// written.
+    ///
+    /// # Panics
+    /// `write` panics; then nothing is written.
+    pub(crate) fn lend<T>(&mut self, write: impl FnOnce(&mut Data) -> T) -> Option<T> {
+        self.reach(Stage::Forward);
+        self.data.clear_unsaved_results();
+        self.make_raw();
+        let before = SavedData::of(self);
+        let model = self.data.model().clone();
+        let written = catch_unwind(AssertUnwindSafe(|| write(&mut self.data)));
+        if !self.data.model().is_compatible_with(&model) {
+            // The data that this thread had is gone.
+            self.data = Data::new(&model).expect("MuJoCo allocated data of this model before");
+            before.restore(&mut self.data);
+            return written.map_or_else(|panic| resume_unwind(panic), |_| None);
+        }
+        self.data.set_model(model);
+        let raised = self.data.take_warnings();
+        let after = SavedData::of(self);
+        // Ends the effects of a failed call.
+        self.data.reset();
+        let written = written.unwrap_or_else(|panic| {
+            before.restore(&mut self.data);
+            resume_unwind(panic)
+        });
+        after.restore(&mut self.data);
+        self.row.solved_current = true;
+        self.accept_after(&before.motion, raised);
+        Some(written)
+    }
+
     /// Removes the normalization of quaternions. Derived quantities stay until the next forward pass.
     fn make_raw(&mut self) {
         if self.stage > Stage::Raw {
@@ -272,6 +326,7 @@ impl SimEnv {
         self.use_model(if welds.is_empty() { model } else { model.with_welds(welds) });
         self.row.solved_current = true;
         self.row.is_forward_counted = false;
+        self.row.is_pass_impossible = false;
         self.row.save_written(&self.data);
     }
 
@@ -452,9 +507,9 @@ impl SimEnv {
         }
     }
 
-    /// Number of times a buffer of this `mjData` was doubled since it was created.
-    pub fn buffer_growths(&self) -> u32 {
-        self.buffer_growths
+    /// Number of times a buffer was doubled: that of this `mjData`, or of all `mjData` of a batch.
+    pub fn buffer_growths(&self) -> u64 {
+        self.buffer_growths.load(Ordering::Relaxed)
     }
 }
 
@@ -479,6 +534,29 @@ impl EnvState {
             [state.motion.values().len(), inputs.len(), active.len(), state.drives.len()]
         };
         lengths(self) == lengths(other)
+    }
+}
+
+/// Everything of an `mjData` that a row keeps.
+struct SavedData {
+    motion: IntegrationState,
+    inputs: UserInputs,
+    solved: SolvedState,
+}
+
+impl SavedData {
+    /// Copies the data of `env`, whose quaternions are raw.
+    fn of(env: &SimEnv) -> Self {
+        let (mut inputs, mut solved) = (UserInputs::default(), SolvedState::default());
+        inputs.save(&env.data);
+        solved.save(&env.data);
+        Self { motion: env.current_motion(), inputs, solved }
+    }
+
+    fn restore(&self, data: &mut Data) {
+        self.inputs.restore(data);
+        self.motion.restore(data);
+        self.solved.restore(data);
     }
 }
 

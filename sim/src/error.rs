@@ -27,6 +27,16 @@ pub enum Error {
     /// The observer was removed, or is handling an event right now.
     #[error("this observer was removed, or is handling an event right now")]
     ObserverUnavailable,
+    /// A closure of [`with_mujoco`](crate::SceneViewMut::with_mujoco) exchanged the data for data of another model, for
+    /// instance with `std::mem::swap`.
+    #[error(
+        "environment {env}: the closure of with_mujoco exchanged the data for that of another model; the environment \
+         keeps its state; copy the arrays instead"
+    )]
+    ExchangedData {
+        /// Index of the environment.
+        env: usize,
+    },
     /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),

@@ -54,6 +54,7 @@
     )
 )]
 
+mod available_memory;
 #[cfg(not(feature = "internals"))]
 mod batch;
 #[cfg(feature = "internals")]

@@ -386,11 +386,18 @@ impl SimulationManager {
     /// Reads MuJoCo's model and data of one environment directly, for quantities outside this API. An environment with
     /// randomized properties has a model of its own.
     ///
+    /// The data is as after `mj_step1` in the current state: poses, velocities, contacts without forces, bias forces.
+    /// Of the results of the last solve, it has `qacc`, `qfrc_actuator`, `qfrc_constraint`, `actuator_force` and
+    /// `sensordata`. The others are 0, because environments do not keep them: `efc_force` (with
+    /// [`contact_force`](kinetoscope_mujoco::Data::contact_force)), `cacc`, `cfrc_int`, `cfrc_ext`, `act_dot`,
+    /// `qfrc_smooth`, `qacc_smooth` and `qfrc_inverse`. [`SceneViewMut::contacts`](crate::SceneViewMut::contacts) has
+    /// contacts with forces.
+    ///
     /// # Errors
     /// The environment does not exist.
     pub fn with_mujoco<T>(&self, env: EnvId, read: impl FnOnce(&mj::Model, &mj::Data) -> T) -> Result<T> {
         env_mask(Some(&[env]), self.num_envs())?;
-        Ok(self.simulation.batch.read(env.0, |env| read(env.data().model(), env.data())))
+        Ok(self.simulation.batch.read_data(env.0, |data| read(data.model(), data)))
     }
 
     /// Finds the robot or articulation `uid` among those that satisfy `wanted`.

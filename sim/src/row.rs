@@ -38,6 +38,9 @@ pub struct EnvRow {
     pub(crate) solved_current: bool,
     /// True if the warnings of the forward pass of the current state are counted.
     pub(crate) is_forward_counted: bool,
+    /// True if the forward pass of the current state fails in the largest buffers. Then readers get poses and
+    /// velocities, and no contacts.
+    pub(crate) is_pass_impossible: bool,
     /// External wrenches of the user; `None` without any.
     pub(crate) wrenches: Option<Box<Wrenches>>,
     /// Number that identifies this content of the row. A thread whose `mjData` still belongs to it does not restore it.
@@ -74,6 +77,7 @@ impl EnvRow {
             diverged: None,
             solved_current: true,
             is_forward_counted: false,
+            is_pass_impossible: false,
             wrenches: None,
             version: 0,
             inputs_are_edited: false,
@@ -89,15 +93,20 @@ impl EnvRow {
         self.drives.prefetch();
     }
 
-    /// Memory of a copy of this row that shares all shared arrays \[bytes\].
+    /// Memory that this row takes in a running batch without randomized properties \[bytes\]: with inputs of its own,
+    /// which environments get when their controls differ.
     pub(crate) fn bytes(&self) -> usize {
         // Header and padding of a block of the allocator.
         const BLOCK: usize = 16;
+        // The row, its cold state, state, results, joint inputs, inputs as of the last write, and three arrays of the
+        // drives.
+        const BLOCKS: usize = 9;
         let numbers = self.motion.values().len()
             + self.solved.values().len()
             + self.joint_inputs.values().len()
+            + self.written.values().0.len()
             + self.drives.own_numbers();
-        size_of::<Self>() + size_of::<ColdState>() + size_of::<f64>() * numbers + 7 * BLOCK
+        size_of::<Self>() + size_of::<ColdState>() + size_of::<f64>() * numbers + BLOCKS * BLOCK
     }
 
     /// Saves the inputs of `data` as those of the last write.

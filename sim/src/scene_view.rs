@@ -133,22 +133,30 @@ impl<'a> SceneViewMut<'a> {
         Self { sim }
     }
 
-    /// Writes MuJoCo's data of one environment directly, for quantities outside this API. Then `mj_step1` updates all
-    /// quantities that depend on positions and velocities; accelerations and constraint forces are updated by the next
-    /// step. A non-finite state is rejected: the state before the write is restored, and the environment is marked as
-    /// diverged.
+    /// Writes MuJoCo's data of one environment directly, for quantities outside this API. The closure may also call
+    /// functions of MuJoCo, such as a step.
+    ///
+    /// Environments share the data, so the environment keeps the following and nothing else: time, positions,
+    /// velocities, activations, warm start, inputs (controls, applied forces, mocap poses, user data, active flags of
+    /// equalities), and the results of the last solve that [`SimulationManager::with_mujoco`] lists. Everything else is
+    /// computed from these when it is needed, as in every write. A model set with
+    /// [`set_model`](kinetoscope_mujoco::Data::set_model) holds until the closure returns.
+    ///
+    /// A non-finite state is rejected, and so is a state after which MuJoCo warns of a bad position, velocity or
+    /// acceleration: the state before the write is restored, and the environment is marked as diverged. If the closure
+    /// panics, the state before is restored, too.
     ///
     /// Every step overwrites `qfrc_applied`, the controls of drives, and `xfrc_applied` of bodies with external
     /// wrenches or gravity compensation.
     ///
     /// # Errors
-    /// The environment does not exist.
+    /// The environment does not exist, or the closure exchanged the data for that of another model. Then nothing is
+    /// written.
     pub fn with_mujoco<T>(&mut self, env: EnvId, write: impl FnOnce(&mut mj::Data) -> T) -> Result<T> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let mut result = None;
-        self.sim.simulation.batch.write(env.0, |env| env.write_state(|data| result = Some(write(data))));
+        let written = self.sim.simulation.batch.write_at(env.0, Stage::Raw, |env| env.lend(write));
         self.sim.sensors.refresh(&[env.0], &mut self.sim.simulation);
-        Ok(result.expect("the closure was called"))
+        written.ok_or(Error::ExchangedData { env: env.0 })
     }
 
     /// Returns the visual scene. The first call builds it and reads the visual meshes; unreadable meshes are left out

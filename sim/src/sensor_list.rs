@@ -2,9 +2,9 @@
 
 use crate::capture::CaptureRequest;
 use crate::entity_set::check_uid_syntax;
-use crate::env::{EnvStatus, Stage};
+use crate::env::EnvStatus;
 use crate::error::{Error, Result};
-use crate::gather;
+use crate::gather::{self, GatherMemory};
 use crate::ids::EnvId;
 use crate::simulation::Simulation;
 use kinetoscope_scene::StateFields;
@@ -88,6 +88,7 @@ pub(crate) struct SensorList {
     manager: u64,
     entries: Vec<SensorEntry>,
     state: SceneState,
+    gather_memory: GatherMemory,
     /// Flags of the sensors that are due after the current block of physics steps.
     due: Vec<bool>,
     /// Physics steps of every environment since its last reset; [`kinetoscope_sensors::Phases::QUARANTINED`] for a
@@ -154,7 +155,7 @@ impl SensorList {
         let envs: Vec<usize> = (0..context.num_envs).collect();
         let mut state = gather::allocate(simulation, all);
         solve_and_capture(simulation, all, &envs);
-        gather::gather(simulation, self.substeps, all, &mut state);
+        gather::gather(simulation, &envs, self.substeps, all, &mut state, &mut self.gather_memory);
         if requires.contains(StateFields::MARKERS) {
             state.markers = Some(self.markers_except(simulation, None));
         }
@@ -172,7 +173,7 @@ impl SensorList {
         let envs: Vec<usize> = (0..context.num_envs).collect();
         self.state = gather::allocate(simulation, all);
         solve_and_capture(simulation, all, &envs);
-        gather::gather(simulation, self.substeps, all, &mut self.state);
+        gather::gather(simulation, &envs, self.substeps, all, &mut self.state, &mut self.gather_memory);
         for entry in &mut self.entries {
             let context = SensorContext { name: entry.uid.as_str().into(), rebuilt: true, ..context.clone() };
             let sensor = (entry.build)(&context);
@@ -225,8 +226,8 @@ impl SensorList {
         let requires = due.fold(StateFields::NONE, |all, (e, _)| all | e.requires);
         if self.due.contains(&true) {
             let capture = capture_request(simulation, requires);
-            let state = &mut self.state;
-            gather::step_and_gather(simulation, block, self.substeps, capture.as_ref(), requires, state);
+            let (state, memory) = (&mut self.state, &mut self.gather_memory);
+            gather::step_and_gather(simulation, block, self.substeps, capture.as_ref(), requires, state, memory);
         } else {
             simulation.batch.step(block * self.substeps);
         }
@@ -273,7 +274,7 @@ impl SensorList {
     fn gather_after_write(&mut self, simulation: &mut Simulation, env_ids: &[usize]) {
         let all = self.requires();
         solve_and_capture(simulation, all, env_ids);
-        gather::gather(simulation, self.substeps, all, &mut self.state);
+        gather::gather(simulation, env_ids, self.substeps, all, &mut self.state, &mut self.gather_memory);
     }
 
     /// Markers of the last measurements of all sensors with enabled markers, except the sensor at index `own`.
@@ -290,12 +291,12 @@ impl SensorList {
         if shown.is_empty() {
             return markers;
         }
-        simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
+        simulation.batch.read_bodies(&mut markers, |i, bodies, markers| {
             let pose = |body: usize| {
                 let frame = simulation.body_axis.bodies().get(body);
-                frame.map_or_else(Pose::identity, |frame| frame.pose(env.data()))
+                frame.map_or_else(Pose::identity, |frame| frame.pose(bodies))
             };
-            markers[i].extend(shown.iter().flat_map(|sensor| sensor.markers(i, &pose)));
+            markers[0].extend(shown.iter().flat_map(|sensor| sensor.markers(i, &pose)));
         });
         markers
     }

@@ -1,6 +1,6 @@
 //! Counts of warnings.
 
-use crate::env::EnvStatus;
+use crate::env::{EnvStatus, Stage};
 use crate::error::Result;
 use crate::ids::{EnvId, env_mask};
 use crate::manager::SimulationManager;
@@ -34,10 +34,15 @@ impl<'a> Warnings<'a> {
             count_by_name(self.sim.diagnostics()).into_iter().map(|(name, n)| (name.to_string(), n as u64)).collect();
         let mut mujoco = mj::WarningCounts::default();
         let mut diverged = 0;
-        self.sim.simulation.batch.for_each(|_, env| {
-            mujoco.add(env.warnings());
-            diverged += u64::from(*env.status() != EnvStatus::Running);
+        let mut of_envs = vec![(mj::WarningCounts::default(), false); self.sim.num_envs()];
+        // The forward pass of the current state may warn, too.
+        self.sim.simulation.batch.read_all(Stage::Forward, &mut of_envs, |_, env, of_env| {
+            of_env[0] = (*env.warnings(), *env.status() != EnvStatus::Running);
         });
+        for (warnings, is_diverged) in &of_envs {
+            mujoco.add(warnings);
+            diverged += u64::from(*is_diverged);
+        }
         for (warning, n) in mj::Warning::ALL.iter().zip(mujoco.0) {
             if n > 0 {
                 counts.insert(warning.name().into(), n);

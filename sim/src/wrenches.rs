@@ -5,6 +5,7 @@
 //! supported MuJoCo versions. `body_gravcomp` of 4.x is part of the model that all environments share, so it cannot
 //! differ per environment.
 
+use crate::body_pose::BodyArrays;
 use crate::mjcf::scene_names::MAX_ROBOTS;
 use kinetoscope_mujoco::Data;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -49,7 +50,7 @@ pub(crate) struct Wrenches {
 
 impl Wrench {
     /// Force and torque in world axes, for the current pose of the body.
-    pub(crate) fn in_world(&self, data: &Data) -> [Vector3<f64>; 2] {
+    pub(crate) fn in_world(&self, data: &impl BodyArrays) -> [Vector3<f64>; 2] {
         let Some(axes) = self.axes else { return [self.force, self.torque] };
         let q = &data.xquat()[4 * self.body..4 * self.body + 4];
         let turn = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])) * axes;

@@ -7,7 +7,7 @@
 //! added: the result is 0 at rest and gravity in free fall.
 
 use super::{BodyAxis, CapturedStep};
-use crate::body_pose::BodyFrame;
+use crate::body_pose::{BodyArrays, BodyFrame};
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
@@ -17,13 +17,13 @@ fn vector_at(values: &[f64], first: usize) -> Vector3<f64> {
 }
 
 /// Reference point of the spatial vectors of a body, in the environment \[m\].
-fn reference_point(data: &Data, body: usize) -> Vector3<f64> {
-    vector_at(data.subtree_com(), 3 * data.model().body_rootid()[body] as usize)
+fn reference_point(data: &impl BodyArrays, body: usize) -> Vector3<f64> {
+    vector_at(data.subtree_com(), 3 * data.body_rootid()[body] as usize)
 }
 
 /// Velocity of the point of `body` at `point` (in the environment \[m\]) and angular velocity of the body, in world
 /// axes.
-pub(crate) fn body_velocity(data: &Data, body: usize, point: &Vector3<f64>) -> [Vector3<f64>; 2] {
+pub(crate) fn body_velocity(data: &impl BodyArrays, body: usize, point: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let angular = vector_at(data.cvel(), 6 * body);
     [vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body))), angular]
 }

@@ -9,6 +9,7 @@ use kinetoscope_mujoco::{
 };
 use kinetoscope_scene::Contact;
 use std::cell::Cell;
+use std::sync::atomic::Ordering;
 
 /// Memory of one environment above which its buffers no longer grow \[bytes\].
 const MAX_ENV_BYTES: usize = 2 << 30;
@@ -159,15 +160,31 @@ impl SimEnv {
     /// Checks a state and inputs that were just written to `data`, without a forward pass. Restores `good` and marks the
     /// environment as diverged if a number is not finite or too large.
     pub(super) fn accept(&mut self, good: &IntegrationState) {
+        // Warnings belong to this environment: the next one that uses the data must not see them.
+        let raised = self.data.take_warnings();
+        self.accept_after(good, raised);
+    }
+
+    /// Checks a state as [`accept`](Self::accept) does, written by code in which MuJoCo gave the warnings `raised`. A
+    /// warning of divergence rejects the state: MuJoCo may have replaced it by the initial state.
+    pub(super) fn accept_after(&mut self, good: &IntegrationState, mut raised: WarningCounts) {
         self.held = 0;
         self.stage = Stage::Raw;
         self.row.is_forward_counted = false;
-        self.row.save_written(&self.data);
-        if self.data.has_bad_state() {
-            // MuJoCo itself names the fault.
-            let done = self.data.step1();
-            let raised = self.data.take_warnings();
-            self.row.cold.warnings.add(&raised);
+        self.row.is_pass_impossible = false;
+        let mut done = Ok(());
+        let mut bad = raised.diverged().is_some();
+        if !bad {
+            self.row.save_written(&self.data);
+            bad = self.data.has_bad_state();
+            if bad {
+                // MuJoCo itself names the fault.
+                done = self.data.step1();
+                raised.add(&self.data.take_warnings());
+            }
+        }
+        self.row.cold.warnings.add(&raised);
+        if bad {
             let reason = match (done, raised.diverged()) {
                 (_, Some(warning)) => Divergence::Warning(warning),
                 (Err(error), None) => Divergence::Engine(error),
@@ -183,14 +200,19 @@ impl SimEnv {
             return;
         }
         if stage == Stage::Forward {
+            if self.row.is_pass_impossible {
+                return self.replace_pass();
+            }
             return self.forward_or_freeze(None);
         }
         self.prepare_pass();
         match stage {
             Stage::Raw | Stage::Forward => {}
             Stage::State => self.data.normalize_quaternions(),
-            Stage::Kinematics => {
-                if self.data.poses_and_velocities().is_err() {
+            Stage::Bodies | Stage::Kinematics => {
+                let all = stage == Stage::Kinematics;
+                let done = if all { self.data.poses_and_velocities() } else { self.data.body_motion() };
+                if done.is_err() {
                     // The stack is too small. A whole forward pass grows it.
                     return self.forward_or_freeze(None);
                 }
@@ -256,11 +278,35 @@ impl SimEnv {
             }
             // Cannot fail for `good`: it had a forward pass before, with these or smaller buffers.
             self.prepare_pass();
-            let _ = self.data.step1();
-            self.data.take_warnings();
+            let done = self.data.step1();
+            let raised = self.data.take_warnings();
             self.stage = Stage::Forward;
+            if !matches!(classify_step(done, &raised), StepOutcome::Succeeded) {
+                self.row.is_pass_impossible = true;
+                self.replace_pass();
+            }
             return;
         }
+    }
+
+    /// Gives the data what it can have of a forward pass that fails: poses and velocities, without contacts and
+    /// constraints. The failed pass is not repeated, because it would grow the buffers of this thread up to their
+    /// limit, and MuJoCo requires a reset of the data after it.
+    fn replace_pass(&mut self) {
+        let state = self.current_motion();
+        let (mut inputs, mut solved) = (UserInputs::default(), SolvedState::default());
+        inputs.save(&self.data);
+        solved.save(&self.data);
+        self.data.reset();
+        inputs.restore(&mut self.data);
+        state.restore(&mut self.data);
+        solved.restore(&mut self.data);
+        self.stage = Stage::Raw;
+        self.prepare_pass();
+        // Needs no buffer that can overflow: the stack has room for a smaller pass than that of the initial state.
+        let _ = self.data.poses_and_velocities();
+        self.data.take_warnings();
+        self.stage = Stage::Forward;
     }
 
     /// Restores the state before the step, which the row has, with larger buffers and a forward pass done.
@@ -311,7 +357,7 @@ impl SimEnv {
         }
         self.stage = Stage::Raw;
         self.held = 0;
-        self.buffer_growths += 1;
+        self.buffer_growths.fetch_add(1, Ordering::Relaxed);
         let bytes = self.data.bytes();
         tracing::info!(target: "kinetoscope_sim", env = self.row.cold.env, ?what, bytes, "a buffer of MuJoCo was doubled");
         Ok(())

@@ -1,14 +1,13 @@
 //! Accelerations of links and objects, with the poses and velocities of the same time.
 
-use super::rows::fill_captured;
+use super::rows::{ChunkRows, fill_captured};
 use super::{poses, velocities};
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
-use kinetoscope_scene::SceneState;
 
 /// Fills `force_poses`, `force_velocities` and `body_accelerations` of environment `i`. If nothing was solved for this
 /// state, poses and velocities are the current ones, and accelerations are 0.
-pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     let solved = env.captured();
     if solved.poses.is_empty() {
         // Nothing was solved for this state, but its poses and velocities exist.

@@ -1,8 +1,8 @@
 //! Controls, forces and activations of drives and of the actuators of attached MJCF files.
 
+use super::rows::ChunkRows;
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
-use kinetoscope_scene::SceneState;
 
 /// Indices, in the drive table, of the drives of all robots, in the order of their joints.
 fn drives(simulation: &Simulation) -> impl Iterator<Item = usize> {
@@ -15,7 +15,7 @@ pub(super) fn count(simulation: &Simulation) -> usize {
 }
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     let (model, data) = (simulation.batch.model(), env.data());
     let of_drives = drives(simulation).map(|drive| [env.drives.position[drive], env.drives.effort[drive], 0.0]);
     let of_parts = simulation.mjcf_models.iter().flat_map(|part| part.actuators.iter().zip(&part.controls));
@@ -24,7 +24,7 @@ pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut 
         let activation = model.actuator_activation(actuator).next_back().map_or(0.0, |place| data.act()[place]);
         [data.ctrl()[control], data.actuator_force()[actuator], activation]
     });
-    let SceneState { actuator_controls, actuator_forces, actuator_activations, .. } = state;
+    let ChunkRows { actuator_controls, actuator_forces, actuator_activations, .. } = state;
     for (k, numbers) in of_drives.chain(of_parts).enumerate() {
         for (array, number) in [&mut *actuator_controls, actuator_forces, actuator_activations].into_iter().zip(numbers)
         {

@@ -1,13 +1,12 @@
 //! Efforts of joints.
 
-use super::rows::fill_joints;
+use super::rows::{ChunkRows, fill_joints};
 use crate::env::SimEnv;
 use crate::indexing::JointIndexing;
 use crate::simulation::Simulation;
-use kinetoscope_scene::SceneState;
 
 /// Fills the row of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     // A joint without a drive of this crate may have actuators of an MJCF file.
     let effort = |joint: &JointIndexing| match joint.drive {
         Some(drive) => env.drives.effort[drive],

@@ -1,11 +1,10 @@
 //! Forces and torques in joints.
 
-use super::rows::fill_captured;
+use super::rows::{ChunkRows, fill_captured};
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
-use kinetoscope_scene::SceneState;
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(_simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+pub(super) fn fill(_simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     fill_captured(&env.captured().wrenches, i, &mut state.joint_wrenches);
 }

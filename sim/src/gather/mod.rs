@@ -3,8 +3,10 @@
 mod contacts;
 mod rows;
 
+use self::rows::ChunkRows;
 use crate::capture::CaptureRequest;
 use crate::env::{EnvStatus, SimEnv, Stage};
+use crate::row::StoredRow;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::StateFields;
@@ -12,8 +14,9 @@ use kinetoscope_scene::{SceneState, StateDims};
 use kinetoscope_sensors::Phases;
 use std::sync::{Mutex, PoisonError};
 
-/// Fills the rows of one environment, given by index, in the arrays of a quantity.
-type Fill = fn(&Simulation, &SimEnv, usize, &mut SceneState);
+/// Fills the rows of one environment in the arrays of a quantity. The index counts from the first environment of the
+/// chunk.
+type Fill = fn(&Simulation, &SimEnv, usize, &mut ChunkRows<'_>);
 
 /// Takes the flags of all gathered quantities, each with the file that fills its arrays.
 macro_rules! gathered {
@@ -74,11 +77,14 @@ pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneS
 
 /// Writes physics steps since the last reset and times of all environments to `state`.
 pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
-    simulation.batch.for_each_row(|i, row| {
-        state.step[i] = row.steps() / u64::from(substeps);
-        state.time[i] = row.time();
-        state.force_time[i] = row.solved_time();
-    });
+    simulation.batch.for_each_row(|i, row| fill_clock(row, i, substeps, state));
+}
+
+/// Writes steps and times of environment `i`.
+fn fill_clock(row: StoredRow<'_>, i: usize, substeps: u32, state: &mut SceneState) {
+    state.step[i] = row.steps() / u64::from(substeps);
+    state.time[i] = row.time();
+    state.force_time[i] = row.solved_time();
 }
 
 /// Writes the physics steps since the last reset of every environment to `clocks`, for the schedules of sensors. A
@@ -112,13 +118,34 @@ fn stage_of(simulation: &Simulation, requires: StateFields) -> Stage {
     }
 }
 
-/// Fills the arrays that `requires` names, which must be allocated, and steps and times.
-pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
-    let filler = Filler::new(simulation, requires, state);
-    if let Some(stage) = filler.stage() {
-        simulation.batch.visit(stage, |i, env| filler.fill(i, env));
+/// Removes the elements of a list of rows and keeps its memory: the standard library collects in place.
+fn emptied<'b>(mut rows: Vec<Mutex<ChunkRows<'_>>>) -> Vec<Mutex<ChunkRows<'b>>> {
+    rows.clear();
+    rows.into_iter().filter_map(|_| None).collect()
+}
+
+/// Fills the arrays that `requires` names, which must be allocated, and steps and times, for the environments
+/// `chosen`. The list of contacts becomes that of the last capture of every environment.
+pub(crate) fn gather(
+    simulation: &Simulation,
+    chosen: &[usize],
+    substeps: u32,
+    requires: StateFields,
+    state: &mut SceneState,
+    memory: &mut GatherMemory,
+) {
+    let filler = Filler::new(simulation, requires, state, memory);
+    let all = chosen.len() == simulation.batch.num_envs();
+    match filler.stage() {
+        Some(stage) if all => simulation.batch.visit(stage, |i, env| filler.fill(i, env)),
+        Some(stage) => simulation.batch.visit_in(chosen, stage, |i, env| filler.fill(i, env)),
+        None => {}
     }
-    gather_rows(simulation, substeps, requires, state);
+    filler.finish(memory);
+    for &i in chosen {
+        simulation.batch.read_row(i, |row| fill_clock(row, i, substeps, state));
+    }
+    gather_contacts(simulation, requires, state);
 }
 
 /// Does `steps` physics steps and captures the quantities of `capture` in the last one. Then fills the arrays that
@@ -131,36 +158,56 @@ pub(crate) fn step_and_gather(
     capture: Option<&CaptureRequest>,
     requires: StateFields,
     state: &mut SceneState,
+    memory: &mut GatherMemory,
 ) {
-    let filler = Filler::new(simulation, requires, state);
+    let filler = Filler::new(simulation, requires, state, memory);
     let stage = filler.stage().unwrap_or(Stage::Raw);
     simulation.batch.step_and_visit(steps * substeps, capture, stage, |i, env| filler.fill(i, env));
-    gather_rows(simulation, substeps, requires, state);
+    filler.finish(memory);
+    gather_steps(simulation, substeps, state);
+    gather_contacts(simulation, requires, state);
 }
 
-/// Fills the arrays that need no `mjData`: steps, times, and, if required, contacts in the order of the environments.
-fn gather_rows(simulation: &Simulation, substeps: u32, requires: StateFields, state: &mut SceneState) {
-    gather_steps(simulation, substeps, state);
+/// Fills the contacts, in the order of the environments.
+fn gather_contacts(simulation: &Simulation, requires: StateFields, state: &mut SceneState) {
     if requires.contains(StateFields::CONTACTS) {
         simulation.batch.for_each_row(|i, row| contacts::fill(row.row, i, state));
     }
 }
 
+/// Memory of a gather that the next one uses again, so that steps allocate nothing.
+#[derive(Default)]
+pub(crate) struct GatherMemory(Vec<Mutex<ChunkRows<'static>>>);
+
 /// Fills rows of the arrays from several threads.
 struct Filler<'a> {
     simulation: &'a Simulation,
     requires: StateFields,
-    /// Copying takes little time beside a step, so threads rarely wait for each other.
-    state: Mutex<&'a mut SceneState>,
+    chunk_size: usize,
+    /// Rows of each chunk of environments. One thread at a time works on a chunk, so none waits.
+    chunks: Vec<Mutex<ChunkRows<'a>>>,
 }
 
 impl<'a> Filler<'a> {
-    fn new(simulation: &'a Simulation, requires: StateFields, state: &'a mut SceneState) -> Self {
+    fn new(
+        simulation: &'a Simulation,
+        requires: StateFields,
+        state: &'a mut SceneState,
+        memory: &mut GatherMemory,
+    ) -> Self {
         let sees = !requires.intersection(StateFields::VISIBLE | StateFields::INSTANCES).is_empty();
         if sees && state.own_scenes != simulation.env_scenes {
             state.own_scenes.clone_from(&simulation.env_scenes);
         }
-        Self { simulation, requires, state: Mutex::new(state) }
+        let chunk_size = simulation.batch.chunk_size();
+        let mut chunks = emptied(std::mem::take(&mut memory.0));
+        ChunkRows::split(state, chunk_size, &mut chunks);
+        Self { simulation, requires, chunk_size, chunks }
+    }
+
+    /// Ends the borrow of the arrays.
+    fn finish(self, memory: &mut GatherMemory) {
+        memory.0 = emptied(self.chunks);
     }
 
     /// Part of a step that the data needs; `None` if no quantity is filled from it.
@@ -171,9 +218,10 @@ impl<'a> Filler<'a> {
 
     fn fill(&self, i: usize, env: &SimEnv) {
         if QUANTITIES.iter().any(|(quantity, _)| self.requires.contains(*quantity)) {
-            let state = &mut **self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            let (chunk, k) = (i / self.chunk_size, i % self.chunk_size);
+            let rows = &mut *self.chunks[chunk].lock().unwrap_or_else(PoisonError::into_inner);
             for (_, fill) in QUANTITIES.iter().filter(|(quantity, _)| self.requires.contains(*quantity)) {
-                fill(self.simulation, env, i, state);
+                fill(self.simulation, env, k, rows);
             }
         }
     }

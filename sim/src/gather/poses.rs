@@ -1,18 +1,18 @@
 //! Poses of links and objects.
 
+use super::rows::ChunkRows;
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
-use kinetoscope_scene::SceneState;
 use kinetoscope_scene::pose::to_row;
-use ndarray::Array3;
+use ndarray::ArrayViewMut3;
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     rows(simulation, env, i, &mut state.body_poses);
 }
 
 /// Writes the current poses of environment `i` to `array`.
-pub(super) fn rows(simulation: &Simulation, env: &SimEnv, i: usize, array: &mut Option<Array3<f64>>) {
+pub(super) fn rows(simulation: &Simulation, env: &SimEnv, i: usize, array: &mut Option<ArrayViewMut3<'_, f64>>) {
     let Some(array) = array else { return };
     for (b, link) in simulation.body_axis.bodies().iter().enumerate() {
         for (k, value) in to_row(&link.pose(env.data())).into_iter().enumerate() {

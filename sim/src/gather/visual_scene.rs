@@ -1,9 +1,10 @@
 //! Poses, lights and deforming shapes for cameras.
 
+use super::rows::ChunkRows;
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
 use crate::visible::VisualScene;
-use kinetoscope_scene::{EnvScene, Light, PoseF32, SceneState, VisibleState};
+use kinetoscope_scene::{EnvScene, Light, PoseF32, VisibleState};
 use ndarray::Array2;
 
 /// Allocates the state that cameras read for a scene in `num_envs` environments.
@@ -16,15 +17,16 @@ pub(super) fn allocate(visible: &VisualScene, num_envs: usize) -> VisibleState {
 }
 
 /// Fills the rows of environment `i`.
-pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut SceneState) {
+pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     static SHARED_SCENE: EnvScene = EnvScene(None);
-    if let (Some(visible), Some(seen)) = (&simulation.visual_scene, &mut state.visible)
-        && let (Some(poses), Some(lights)) =
-            (seen.instance_poses.row_mut(i).as_slice_mut(), seen.lights.row_mut(i).as_slice_mut())
+    let index = state.first + i;
+    if let (Some(visible), Some(poses), Some(lights)) =
+        (&simulation.visual_scene, &mut state.visible_poses, &mut state.visible_lights)
+        && let (Some(poses), Some(lights)) = (poses.row_mut(i).into_slice(), lights.row_mut(i).into_slice())
     {
         visible.read_poses(env.data(), poses, lights);
-        if let Some(scene) = seen.scenes.get_mut(i) {
-            visible.update_shapes(env.data(), i, simulation.env_scenes.get(i).unwrap_or(&SHARED_SCENE), scene);
+        if let Some(scene) = state.visible_scenes.get_mut(i) {
+            visible.update_shapes(env.data(), index, simulation.env_scenes.get(index).unwrap_or(&SHARED_SCENE), scene);
         }
     }
 }

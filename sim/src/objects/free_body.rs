@@ -1,7 +1,8 @@
 //! Poses and velocities of bodies that are placed in the world: objects and root links of robots.
 
+use crate::batch::StoredBodies;
 use crate::body_pose::body_pose;
-use crate::env::{SimEnv, Stage};
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::BodyIndexing;
@@ -24,23 +25,23 @@ pub(super) struct FreeBody<'a> {
 impl FreeBody<'_> {
     /// Poses `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
     pub(super) fn poses(&self) -> Array2<f64> {
-        self.rows(|env| to_row(&body_pose(env.data(), self.index.body)))
+        self.rows(|bodies| to_row(&body_pose(bodies, self.index.body)))
     }
 
     /// Velocities of the frame, then angular velocities, in world axes, shape (N, 6); 0 for a body without a free
     /// joint.
     pub(super) fn velocities(&self) -> Array2<f64> {
-        self.rows(|env| {
+        self.rows(|bodies| {
             let Some((_, dof)) = self.index.free_joint else { return [0.0; 6] };
-            let v = &env.data().qvel()[dof..dof + 6];
+            let v = &bodies.qvel()[dof..dof + 6];
             // MuJoCo stores the angular velocity of a free joint in the axes of the body.
-            let angular = body_pose(env.data(), self.index.body).rotation * Vector3::new(v[3], v[4], v[5]);
+            let angular = body_pose(bodies, self.index.body).rotation * Vector3::new(v[3], v[4], v[5]);
             [v[0], v[1], v[2], angular.x, angular.y, angular.z]
         })
     }
 
-    fn rows<const K: usize>(&self, read: impl Fn(&SimEnv) -> [f64; K]) -> Array2<f64> {
-        self.simulation.batch.gather_rows(Stage::Kinematics, read)
+    fn rows<const K: usize>(&self, read: impl Fn(&StoredBodies<'_>) -> [f64; K] + Sync) -> Array2<f64> {
+        self.simulation.batch.body_rows(read)
     }
 }
 

@@ -154,7 +154,7 @@ impl<'a> MjcfPart<'a> {
         self.rows(Stage::Raw, &self.indices().actuators, |env, place| env.data().actuator_force()[place])
     }
 
-    fn rows(&self, stage: Stage, places: &[usize], read: impl Fn(&SimEnv, usize) -> f64) -> Array2<f64> {
+    fn rows(&self, stage: Stage, places: &[usize], read: impl Fn(&SimEnv, usize) -> f64 + Sync) -> Array2<f64> {
         self.simulation.batch.gather(stage, places, |env, &place| read(env, place))
     }
 
@@ -191,13 +191,7 @@ impl<'a> MjcfPart<'a> {
     }
 
     fn poses(&self, frame: &BodyFrame) -> Array2<f64> {
-        let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
-        self.simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
-            for (k, value) in to_row(&frame.pose(env.data())).into_iter().enumerate() {
-                poses[(i, k)] = value;
-            }
-        });
-        poses
+        self.simulation.batch.body_rows(|bodies| to_row(&frame.pose(bodies)))
     }
 }
 

@@ -3,7 +3,7 @@
 //! An environment whose object differs from the others gets a model of its own, which owns only the arrays that differ:
 //! see [`randomization`](crate::randomization), whose properties these are.
 
-use crate::env::{SimEnv, Stage};
+use crate::env::Stage;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
@@ -78,15 +78,13 @@ impl RigidObject<'_> {
     /// pose of the object \[N, N m\], shape (N, 6).
     #[doc(alias = "get_external_wrench")]
     pub fn external_wrench(&self) -> Array2<f64> {
-        let mut wrenches = Array2::zeros((self.simulation.batch.num_envs(), 6));
-        self.simulation.batch.for_each_at(Stage::Kinematics, |i, env: &SimEnv| {
-            for wrench in env.wrenches().list.iter().filter(|wrench| wrench.owner == (OBJECT_WRENCH_OWNER, self.index))
-            {
-                let [force, torque] = wrench.in_world(env.data());
-                force.iter().chain(&torque).enumerate().for_each(|(k, value)| wrenches[(i, k)] = *value);
-            }
-        });
-        wrenches
+        let owner = (OBJECT_WRENCH_OWNER, self.index);
+        self.simulation.batch.body_rows(|bodies| {
+            // An object has at most one wrench.
+            let wrench = bodies.wrenches().list.iter().find(|wrench| wrench.owner == owner);
+            let [f, t] = wrench.map_or([Vector3::zeros(); 2], |wrench| wrench.in_world(bodies));
+            [f.x, f.y, f.z, t.x, t.y, t.z]
+        })
     }
 
     /// Reads numbers of the body in each environment; returns `nominal` for an object that is not dynamic.

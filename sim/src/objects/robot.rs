@@ -223,7 +223,7 @@ impl<'a> Robot<'a> {
     pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
         let frame = self.indexing().links[link.0];
-        Ok(self.simulation.batch.gather_rows(Stage::Kinematics, |env| to_row(&frame.pose(env.data()))))
+        Ok(self.simulation.batch.body_rows(|bodies| to_row(&frame.pose(bodies))))
     }
 
     /// Reads a number of each joint, all with one degree of freedom, from the rows of all environments.

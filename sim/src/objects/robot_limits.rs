@@ -1,7 +1,6 @@
 //! Limits of a robot's joints: positions, speeds and efforts, per joint and per environment.
 
 use crate::drive::gains::Gains;
-use crate::env::Stage;
 
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
@@ -57,10 +56,15 @@ impl Robot<'_> {
 
     /// Computes two numbers from the range of each joint.
     fn range_limits(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
-        let joints: Vec<_> = self.indexing().joints.iter().zip(self.data.plans()).collect();
-        self.simulation.batch.gather_rows_of(Stage::Raw, &joints, |env, (joint, plan)| {
-            of(joint.drive.map_or(plan.target_range, |drive| env.drives.ranges[drive]))
-        })
+        let joints = &self.indexing().joints;
+        let mut limits = Array3::zeros((self.simulation.batch.num_envs(), joints.len(), 2));
+        self.simulation.batch.for_each_row(|i, env| {
+            for (j, (joint, plan)) in joints.iter().zip(self.data.plans()).enumerate() {
+                let [low, high] = of(joint.drive.map_or(plan.target_range, |drive| env.drives.ranges[drive]));
+                (limits[(i, j, 0)], limits[(i, j, 1)]) = (low, high);
+            }
+        });
+        limits
     }
 }
 

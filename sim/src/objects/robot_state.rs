@@ -1,8 +1,8 @@
 //! Names, targets, accelerations, and states of the root and the links of a robot.
 
-use crate::body_pose::{BodyFrame, body_pose};
+use crate::batch::StoredBodies;
+use crate::body_pose::{BodyArrays, BodyFrame, body_pose};
 use crate::capture::body_velocity;
-use crate::env::{SimEnv, Stage};
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::indexing::RobotIndexing;
@@ -145,7 +145,7 @@ impl Robot<'_> {
     /// Center of mass of the root link and of the links fixed to it, in the environment \[m\], shape (N, 3).
     #[doc(alias = "get_root_com_position")]
     pub fn root_com_position(&self) -> Array2<f64> {
-        self.rows(|env, robot| root_center_of_mass(env, robot).into())
+        self.rows(|bodies, robot| root_center_of_mass(bodies, robot).into())
     }
 
     /// Velocity of the center of mass of the root link and of the links fixed to it, then its angular velocity, in
@@ -153,8 +153,8 @@ impl Robot<'_> {
     /// velocity of the link's frame.
     #[doc(alias = "get_root_com_velocity")]
     pub fn root_com_velocity(&self) -> Array2<f64> {
-        self.rows(|env, robot| {
-            let [v, w] = body_velocity(env.data(), robot.root.body, &root_center_of_mass(env, robot));
+        self.rows(|bodies, robot| {
+            let [v, w] = body_velocity(bodies, robot.root.body, &root_center_of_mass(bodies, robot));
             [v.x, v.y, v.z, w.x, w.y, w.z]
         })
     }
@@ -163,22 +163,22 @@ impl Robot<'_> {
     /// would measure it.
     #[doc(alias = "get_root_lin_vel_b")]
     pub fn root_lin_vel_b(&self) -> Array2<f64> {
-        self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[0])
+        self.in_root_axes(|bodies, robot, root| body_velocity(bodies, robot.root.body, &root.translation.vector)[0])
     }
 
     /// Angular velocity of the root link in its own axes \[rad/s\], shape (N, 3), as an ideal gyroscope would measure
     /// it.
     #[doc(alias = "get_root_ang_vel_b")]
     pub fn root_ang_vel_b(&self) -> Array2<f64> {
-        self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[1])
+        self.in_root_axes(|bodies, robot, root| body_velocity(bodies, robot.root.body, &root.translation.vector)[1])
     }
 
     /// Direction of gravity in the axes of the root link, a unit vector, shape (N, 3): (0, 0, -1) for an upright root;
     /// 0 without gravity.
     #[doc(alias = "get_projected_gravity_b")]
     pub fn projected_gravity_b(&self) -> Array2<f64> {
-        self.in_root_axes(|env, _, _| {
-            let gravity = Vector3::from(env.data().model().gravity());
+        self.in_root_axes(|bodies, _, _| {
+            let gravity = Vector3::from(bodies.own_model().gravity());
             gravity.try_normalize(0.0).unwrap_or_else(Vector3::zeros)
         })
     }
@@ -186,22 +186,26 @@ impl Robot<'_> {
     /// Heading of the root link \[rad\], shape (N,): the angle about the world's z of its x axis, from -π to π.
     #[doc(alias = "get_root_heading")]
     pub fn root_heading(&self) -> Array1<f64> {
-        let headings = self.rows(|env, robot| {
-            let forward = body_pose(env.data(), robot.root.body).rotation * Vector3::x();
+        let headings = self.rows(|bodies, robot| {
+            let forward = body_pose(bodies, robot.root.body).rotation * Vector3::x();
             [forward.y.atan2(forward.x)]
         });
         headings.index_axis(Axis(1), 0).to_owned()
     }
 
-    fn in_root_axes(&self, of: impl Fn(&SimEnv, &RobotIndexing, &Pose) -> Vector3<f64>) -> Array2<f64> {
-        self.rows(|env, robot| {
-            let root = body_pose(env.data(), robot.root.body);
-            root.rotation.inverse_transform_vector(&of(env, robot, &root)).into()
+    fn in_root_axes(
+        &self,
+        of: impl Fn(&StoredBodies<'_>, &RobotIndexing, &Pose) -> Vector3<f64> + Sync,
+    ) -> Array2<f64> {
+        self.rows(|bodies, robot| {
+            let root = body_pose(bodies, robot.root.body);
+            root.rotation.inverse_transform_vector(&of(bodies, robot, &root)).into()
         })
     }
 
-    fn rows<const K: usize>(&self, read: impl Fn(&SimEnv, &RobotIndexing) -> [f64; K]) -> Array2<f64> {
-        self.simulation.batch.gather_rows(Stage::Kinematics, |env| read(env, self.indexing()))
+    fn rows<const K: usize>(&self, read: impl Fn(&StoredBodies<'_>, &RobotIndexing) -> [f64; K] + Sync) -> Array2<f64> {
+        let robot = self.indexing();
+        self.simulation.batch.body_rows(|bodies| read(bodies, robot))
     }
 }
 
@@ -211,7 +215,7 @@ impl Robot<'_> {
     /// qx, qy, qz]` in the environment \[m\], shape (N, links, 7).
     #[doc(alias = "get_link_poses")]
     pub fn link_poses(&self) -> Array3<f64> {
-        self.of_links(|env, link| to_row(&link.pose(env.data())))
+        self.of_links(|bodies, link| to_row(&link.pose(bodies)))
     }
 
     /// Linear velocities of the origins of all link frames, then angular velocities, in world axes \[m/s, rad/s\],
@@ -228,21 +232,21 @@ impl Robot<'_> {
     /// The link does not exist; the error lists the nearest names.
     pub fn link_velocity(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
-        Ok(self.rows(|env, robot| link_velocity(env, &robot.links[link.0])))
+        Ok(self.rows(|bodies, robot| link_velocity(bodies, &robot.links[link.0])))
     }
 
-    fn of_links<const K: usize>(&self, read: impl Fn(&SimEnv, &BodyFrame) -> [f64; K]) -> Array3<f64> {
-        self.simulation.batch.gather_rows_of(Stage::Kinematics, &self.indexing().links, read)
+    fn of_links<const K: usize>(&self, read: impl Fn(&StoredBodies<'_>, &BodyFrame) -> [f64; K] + Sync) -> Array3<f64> {
+        self.simulation.batch.body_rows_of(&self.indexing().links, read)
     }
 }
 
-fn link_velocity(env: &SimEnv, link: &BodyFrame) -> [f64; 6] {
-    let [v, w] = body_velocity(env.data(), link.body, &link.pose(env.data()).translation.vector);
+fn link_velocity(bodies: &StoredBodies<'_>, link: &BodyFrame) -> [f64; 6] {
+    let [v, w] = body_velocity(bodies, link.body, &link.pose(bodies).translation.vector);
     [v.x, v.y, v.z, w.x, w.y, w.z]
 }
 
-fn root_center_of_mass(env: &SimEnv, robot: &RobotIndexing) -> Vector3<f64> {
-    Vector3::from_column_slice(&env.data().xipos()[3 * robot.root.body..3 * robot.root.body + 3])
+fn root_center_of_mass(bodies: &StoredBodies<'_>, robot: &RobotIndexing) -> Vector3<f64> {
+    Vector3::from_column_slice(&bodies.xipos()[3 * robot.root.body..3 * robot.root.body + 3])
 }
 
 impl RobotMut<'_> {

@@ -18,16 +18,16 @@ impl Robot<'_> {
     pub fn external_wrenches(&self) -> Array3<f64> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
         let mut wrenches = Array3::zeros((n, links, 6));
-        self.simulation.batch.for_each_at(Stage::Kinematics, |i, env| {
-            for wrench in
-                env.wrenches().list.iter().filter(|wrench| wrench.owner.0 == self.index() && wrench.owner.1 < links)
-            {
-                let [force, torque] = wrench.in_world(env.data());
-                for (k, value) in force.iter().chain(&torque).enumerate() {
-                    wrenches[(i, wrench.owner.1, k)] = *value;
+        if let Some(out) = wrenches.as_slice_mut() {
+            self.simulation.batch.read_bodies(out, |_, bodies, out| {
+                let mine = |wrench: &&Wrench| wrench.owner.0 == self.index() && wrench.owner.1 < links;
+                for wrench in bodies.wrenches().list.iter().filter(mine) {
+                    let [force, torque] = wrench.in_world(bodies);
+                    let out = &mut out[6 * wrench.owner.1..6 * wrench.owner.1 + 6];
+                    out.iter_mut().zip(force.iter().chain(&torque)).for_each(|(to, from)| *to = *from);
                 }
-            }
-        });
+            });
+        }
         wrenches
     }
 

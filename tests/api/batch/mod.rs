@@ -7,5 +7,6 @@ mod processes;
 mod quarantine;
 mod recompile;
 mod sample_models;
+mod shared_data;
 mod support;
 mod version;

@@ -7,10 +7,11 @@ use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{EnvStatus, SimEnv};
-use kinetoscope_testkit::process::{is_child, run, text};
-use kinetoscope_testkit::urdf::TempFiles;
-use kinetoscope_testkit::worlds::arm_and_hand;
+use kinetoscope_testkit::process::{command, is_child, run, text};
+use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
+use kinetoscope_testkit::worlds::{arm_and_hand, text_robot};
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 
 /// A pile of boxes with too little memory for the solver: MuJoCo stops in the middle of a step with `mju_error`.
@@ -139,6 +140,47 @@ fn scenario_everything_goes_wrong() {
 fn resident() -> usize {
     let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
     statm.split_whitespace().nth(1).unwrap().parse::<usize>().unwrap() * 4096
+}
+
+/// More environments than fit into a limited address space are an error, not an abort, and the simulation goes on.
+/// Linux grants single rows as long as its own memory suffices, so the sum is checked before any row is made.
+#[test]
+fn too_many_environments() {
+    let child = command(module_path!(), "scenario_limited_memory");
+    let variables = child.get_envs().filter_map(|(name, value)| Some((name, value?)));
+    let output = Command::new("sh")
+        .args(["-c", "ulimit -v 1800000 && exec \"$0\" \"$@\""])
+        .arg(child.get_program())
+        .args(child.get_args())
+        .envs(variables)
+        .output()
+        .unwrap();
+    let all = format!("{}\n{}", text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success() && all.contains("300000 environments need"), "{all}");
+}
+
+#[test]
+#[ignore = "runs in a process of its own"]
+fn scenario_limited_memory() {
+    if !is_child() {
+        return;
+    }
+    const ENVS: usize = 300_000;
+    let mut sim = sim(cfg(ENVS, 1));
+    let chain: String = (0..60)
+        .map(|k| {
+            let parent = if k == 0 { "base".into() } else { format!("l{}", k - 1) };
+            joint(&format!("j{k}"), "continuous", [&parent, &format!("l{k}")], [0.0, 0.0, 0.1], "0 1 0", "")
+                + &link(&format!("l{k}"), 1.0, 0.01, [0.0; 3], "")
+        })
+        .collect();
+    let files = TempFiles::default();
+    let chain = text_robot(&files, "chain", &robot("chain", &format!("<link name=\"base\"/>{chain}")));
+    let error = sim.add_robot(chain).unwrap_err().to_string();
+    println!("{error}");
+    assert!(error.contains("MiB of memory, which is not available"), "{error}");
+    sim.update(1);
+    assert_eq!(sim.time().len(), ENVS);
 }
 
 fn threads() -> usize {
