@@ -53,8 +53,8 @@ pub struct TextureArrays<'a> {
     pub height: usize,
     /// Bytes per pixel.
     pub channels: usize,
-    /// True if the file of the image says that it is sRGB (3.3.3 and later). MuJoCo's renderer converts such an image to
-    /// linear light, and uses all others as they are.
+    /// True if the file of the image says that it is sRGB (3.3.3 and later). MuJoCo's renderer converts such an image of
+    /// two dimensions to linear light, and uses all others as they are.
     pub is_srgb: bool,
     /// Pixels, row by row from the top left.
     pub pixels: &'a [u8],

@@ -64,6 +64,15 @@ const GEOM: GeomLayout = GeomLayout {
     shininess: 128,
     reflectance: 132,
     soft: SoftTypes { skin: Some(106), flex: Some(105) },
+    decor: DecorTypes {
+        sdf: Some(8),
+        arrow: Some(100),
+        arrow1: None,
+        arrow2: None,
+        line: Some(103),
+        line_box: Some(104),
+        triangle: None,
+    },
 };
 
 const LIGHT: LightLayout = LightLayout {
@@ -294,6 +303,7 @@ fn invalid_layouts_and_memory() {
 fn cameras() {
     let half = (0.5f64 * 0.8).tan() * 0.01;
     let camera = MjvCamera {
+        orthographic: false,
         position: [1.0, 2.0, 3.0],
         forward: [1.0, 0.0, 0.0],
         up: [0.0, 0.0, 1.0],
