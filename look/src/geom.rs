@@ -88,6 +88,19 @@ pub fn shape_from_size(kind: i32, size: &[f64]) -> Option<Shape> {
     })
 }
 
+/// Cosine between the normals of a vertex and a triangle below which the triangle is flat. Source: MuJoCo's classic
+/// renderer.
+const CREASE: f32 = 0.8;
+
+/// Unit normal of a triangle; up for one without area.
+fn face_normal(positions: &[[f32; 3]], corners: [i32; 3]) -> [f32; 3] {
+    let [a, b, c] = corners.map(|i| positions.get(i as usize).copied().unwrap_or_default());
+    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let length = n.iter().map(|x| x * x).sum::<f32>().sqrt();
+    if length > 0.0 && length.is_finite() { n.map(|x| x / length) } else { [0.0, 0.0, 1.0] }
+}
+
 /// Triangles with a vertex for each combination of position and texture coordinates. Normals are recomputed, smooth up
 /// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated. With `has_normals`, they
 /// are those of the model.
@@ -102,14 +115,20 @@ fn render_mesh(model: &impl VisualModel, mesh: usize, has_normals: bool) -> Rend
     };
     for (face, corners) in arrays.faces.iter().enumerate() {
         let texture_corners = arrays.face_texcoords.get(face);
+        let flat = face_normal(arrays.positions, *corners);
         let triangle = [0, 1, 2].map(|k| {
             let (position, texcoord) = (corners[k], texture_corners.map_or(-1, |t| t[k]));
             let texcoord = if out.uvs.is_some() { texcoord } else { -1 };
-            let normal = if has_normals { arrays.face_normals[face][k] } else { -1 };
-            *vertices.entry([position, texcoord, normal]).or_insert_with(|| {
+            let index = if has_normals { arrays.face_normals[face][k] } else { -1 };
+            let normal = arrays.normals.get(index as usize).copied().unwrap_or(flat);
+            // In MuJoCo's renderer, triangles without texture coordinates are flat beyond a crease.
+            let is_crease = arrays.texcoords.is_none() && (0..3).map(|i| normal[i] * flat[i]).sum::<f32>() < CREASE;
+            let (normal, key) = if is_crease { (flat, -2 - face as i32) } else { (normal, index) };
+            let key = if has_normals { key } else { -1 };
+            *vertices.entry([position, texcoord, key]).or_insert_with(|| {
                 out.positions.push(arrays.positions.get(position as usize).copied().unwrap_or_default());
                 if let Some(normals) = &mut out.normals {
-                    normals.push(arrays.normals.get(normal as usize).copied().unwrap_or([0.0, 0.0, 1.0]));
+                    normals.push(normal);
                 }
                 if let (Some(uvs), Some(all)) = (&mut out.uvs, arrays.texcoords) {
                     let [u, v] = all.get(texcoord as usize).copied().unwrap_or_default();

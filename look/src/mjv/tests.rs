@@ -200,15 +200,22 @@ fn shared_scenes() {
     assert_eq!(green.scene.instances()[0].material.rgba, [0.0, 1.0, 0.0, 1.0]);
 }
 
-/// A finite plane has a back, turned around x; an infinite plane has none.
+/// A plane has a back, turned around x, of 0.3 times the opacity, which is drawn twice.
+///
+/// Regression: backs were opaque, and infinite planes had none.
 #[test]
 fn backs_of_planes() {
     let rows = [geom(0, -1, [2.0, 3.0, 0.1], 0), geom(0, -1, [0.0; 3], 1)].concat();
     let frame = reader().read(&memory(&rows), Background::default()).expect("whole structures");
-    assert_eq!(frame.scene.instances().iter().map(|plane| plane.mask_id).collect::<Vec<_>>(), [1, 1, 2]);
-    assert_eq!(frame.poses[0].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
-    assert_eq!(frame.poses[1].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, 1.0]);
-    assert_eq!(frame.poses[0].rotate([1.0, 0.0, 0.0]), frame.poses[1].rotate([1.0, 0.0, 0.0]));
+    let instances = frame.scene.instances();
+    assert_eq!(instances.iter().map(|plane| plane.mask_id).collect::<Vec<_>>(), [1, 1, 2, 2]);
+    for (front, back) in [(0, 1), (2, 3)] {
+        assert_eq!(frame.poses[front].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, 1.0]);
+        assert_eq!(frame.poses[back].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
+        assert_eq!(frame.poses[front].rotate([1.0, 0.0, 0.0]), frame.poses[back].rotate([1.0, 0.0, 0.0]));
+        let opacity = [front, back].map(|k| instances[k].material.rgba[3]);
+        assert!(opacity[0] == 1.0 && (opacity[1] - (1.0 - 0.7 * 0.7)).abs() < 1e-6, "{opacity:?}");
+    }
     assert!(frame.poses.iter().all(kinetoscope_scene::PoseF32::is_rigid));
 }
 
