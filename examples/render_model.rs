@@ -258,7 +258,7 @@ fn view(args: &Args, still: &OffscreenScene) -> launcher::Result<(View, Pose, f6
     let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
     let [near, far] = free.clip.map(|x| x as f32);
     let (width, height, world_from_camera) = (args.width, args.height, PoseF32::from(&pose));
-    let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera };
+    let view = View { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera };
     view.validate()?;
     Ok((view, pose, radians))
 }

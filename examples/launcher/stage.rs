@@ -28,7 +28,7 @@ pub(crate) fn write(
     let pixels = Intrinsics::Fovy { radians: 45f64.to_radians() }.to_pixels(width, height)?;
     let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
     let world_from_camera = PoseF32::from(&pose);
-    let view = View { width, height, fx, fy, cx, cy, near: 0.05, far: 500.0, world_from_camera };
+    let view = View { parallel: false, width, height, fx, fy, cx, cy, near: 0.05, far: 500.0, world_from_camera };
     let mut frame = Frame::new(width, height, Channels { color: true, ..Channels::default() });
     let mut job = [(stage.render_request(&view), frame.as_mut())];
     let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };

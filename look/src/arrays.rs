@@ -55,7 +55,7 @@ pub struct TextureArrays<'a> {
     pub channels: usize,
     /// True if the color space of the compiled texture is sRGB (`tex_colorspace`, MuJoCo 3.3.3 and later): by the
     /// attribute `colorspace` of `<texture>`, or with `auto` by the image file. MuJoCo's renderer converts such an
-    /// image to linear light. It uses all others as they are.
+    /// image of two dimensions to linear light. It uses all others as they are.
     pub is_srgb: bool,
     /// Pixels, row by row from the top left.
     pub pixels: &'a [u8],

@@ -13,12 +13,19 @@ pub struct GeomShapes<M> {
     model: M,
     meshes: HashMap<usize, Arc<RenderMesh>>,
     fields: HashMap<usize, Option<HeightField>>,
+    has_model_normals: bool,
 }
 
 impl<M: VisualModel> GeomShapes<M> {
     /// Prepares no shape yet.
     pub fn new(model: M) -> Self {
-        Self { model, meshes: HashMap::new(), fields: HashMap::new() }
+        Self { model, meshes: HashMap::new(), fields: HashMap::new(), has_model_normals: false }
+    }
+
+    /// Uses the normals of the model for meshes that have some, as MuJoCo's renderer does.
+    #[must_use]
+    pub fn with_model_normals(self) -> Self {
+        Self { has_model_normals: true, ..self }
     }
 
     /// Shape of a geom of MuJoCo's type number `kind`, with these sizes \[m\] and the index of its mesh or height field.
@@ -44,8 +51,8 @@ impl<M: VisualModel> GeomShapes<M> {
     }
 
     fn mesh(&mut self, mesh: usize) -> Option<Arc<RenderMesh>> {
-        let model = &self.model;
-        let mesh = self.meshes.entry(mesh).or_insert_with(|| Arc::new(render_mesh(model, mesh)));
+        let (model, normals) = (&self.model, self.has_model_normals);
+        let mesh = self.meshes.entry(mesh).or_insert_with(|| Arc::new(render_mesh(model, mesh, normals)));
         (!mesh.triangles().is_empty()).then(|| Arc::clone(mesh))
     }
 
@@ -81,19 +88,48 @@ pub fn shape_from_size(kind: i32, size: &[f64]) -> Option<Shape> {
     })
 }
 
+/// Cosine between the normals of a vertex and a triangle below which the triangle is flat. Source: MuJoCo's classic
+/// renderer.
+const CREASE: f32 = 0.8;
+
+/// Unit normal of a triangle; up for one without area.
+fn face_normal(positions: &[[f32; 3]], corners: [i32; 3]) -> [f32; 3] {
+    let [a, b, c] = corners.map(|i| positions.get(i as usize).copied().unwrap_or_default());
+    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let length = n.iter().map(|x| x * x).sum::<f32>().sqrt();
+    if length > 0.0 && length.is_finite() { n.map(|x| x / length) } else { [0.0, 0.0, 1.0] }
+}
+
 /// Triangles with a vertex for each combination of position and texture coordinates. Normals are recomputed, smooth up
-/// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated.
-fn render_mesh(model: &impl VisualModel, mesh: usize) -> RenderMesh {
+/// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated. With `has_normals`, they
+/// are those of the model.
+fn render_mesh(model: &impl VisualModel, mesh: usize, has_normals: bool) -> RenderMesh {
     let arrays = model.mesh(mesh);
-    let mut vertices: HashMap<(i32, i32), u32> = HashMap::new();
-    let mut out = TriMesh { uvs: arrays.texcoords.map(|_| Vec::new()), ..TriMesh::default() };
+    let has_normals = has_normals && arrays.face_normals.len() == arrays.faces.len() && !arrays.normals.is_empty();
+    let mut vertices: HashMap<[i32; 3], u32> = HashMap::new();
+    let mut out = TriMesh {
+        uvs: arrays.texcoords.map(|_| Vec::new()),
+        normals: has_normals.then(Vec::new),
+        ..TriMesh::default()
+    };
     for (face, corners) in arrays.faces.iter().enumerate() {
         let texture_corners = arrays.face_texcoords.get(face);
+        let flat = face_normal(arrays.positions, *corners);
         let triangle = [0, 1, 2].map(|k| {
             let (position, texcoord) = (corners[k], texture_corners.map_or(-1, |t| t[k]));
             let texcoord = if out.uvs.is_some() { texcoord } else { -1 };
-            *vertices.entry((position, texcoord)).or_insert_with(|| {
+            let index = if has_normals { arrays.face_normals[face][k] } else { -1 };
+            let normal = arrays.normals.get(index as usize).copied().unwrap_or(flat);
+            // In MuJoCo's renderer, triangles without texture coordinates are flat beyond a crease.
+            let is_crease = arrays.texcoords.is_none() && (0..3).map(|i| normal[i] * flat[i]).sum::<f32>() < CREASE;
+            let (normal, key) = if is_crease { (flat, -2 - face as i32) } else { (normal, index) };
+            let key = if has_normals { key } else { -1 };
+            *vertices.entry([position, texcoord, key]).or_insert_with(|| {
                 out.positions.push(arrays.positions.get(position as usize).copied().unwrap_or_default());
+                if let Some(normals) = &mut out.normals {
+                    normals.push(normal);
+                }
                 if let (Some(uvs), Some(all)) = (&mut out.uvs, arrays.texcoords) {
                     let [u, v] = all.get(texcoord as usize).copied().unwrap_or_default();
                     // MuJoCo's v axis points down the image.
@@ -105,6 +141,6 @@ fn render_mesh(model: &impl VisualModel, mesh: usize) -> RenderMesh {
         out.triangles.push(triangle);
     }
     let mut mesh = TriMesh::from_triangles(out.positions, out.triangles);
-    mesh.uvs = out.uvs;
+    (mesh.uvs, mesh.normals) = (out.uvs, out.normals);
     RenderMesh::new(&mesh, RenderMesh::DEFAULT_CREASE_ANGLE)
 }

@@ -143,8 +143,9 @@ fn image(
         _ => Vec::new(),
     };
     let (channels, pixels) = if colors.is_empty() { (arrays.channels, arrays.pixels) } else { (3, &colors[..]) };
-    // MuJoCo's renderer decodes these bytes, and shows the result as a display color.
-    let decoded: Vec<u8> = if arrays.is_srgb && space == LightingSpace::Display {
+    // MuJoCo's renderer decodes the bytes of two-dimensional textures, and shows the result as a display color.
+    let is_decoded = arrays.is_srgb && kind == TextureKind::TwoD && space == LightingSpace::Display;
+    let decoded: Vec<u8> = if is_decoded {
         let table: [u8; 256] = std::array::from_fn(|k| (255.0 * decode_srgb(k as f32 / 255.0)).round() as u8);
         pixels.iter().map(|&byte| table[usize::from(byte)]).collect()
     } else {

@@ -84,7 +84,8 @@ impl OverviewRenderer {
             Intrinsics::Fovy { radians: FOVY }.to_pixels(width, height).map_err(|error| wrong(error.to_string()))?;
         let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
         let [near, far] = CLIP;
-        let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(&pose) };
+        let view =
+            View { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(&pose) };
         let raster = RasterCfg { samples: 4, ..RasterCfg::default() };
         Ok(Self { view, rasterizer: ParallelRenderer::new(raster, sim.threads()) })
     }

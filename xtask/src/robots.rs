@@ -40,6 +40,12 @@ pub(crate) fn obtain(repo: &Repo) -> XtaskResult<Robots> {
     Ok(Robots::FromPyPi(folder))
 }
 
+/// The folder of robots next to the repository, or that of the environment variable; `None` without both.
+pub(crate) fn local(repo: &Repo) -> Option<PathBuf> {
+    let named = std::env::var_os(VARIABLE).map(PathBuf::from);
+    named.or_else(|| Some(repo.root.join(LOCAL_FOLDER))).filter(|folder| folder.is_dir())
+}
+
 /// Downloads into a scratch folder and renames it once it is complete.
 fn download(target: &Path, folder: &Path) -> XtaskResult {
     let pip = wheel::pip().ok_or_else(|| Failure::new("real robots are downloaded with pip, which is missing"))?;

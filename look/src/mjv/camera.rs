@@ -5,6 +5,8 @@ use kinetoscope_scene::PoseF32;
 /// Camera of MuJoCo's visualizer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MjvCamera {
+    /// True for parallel rays: then the frustum is the visible part of any plane across them.
+    pub orthographic: bool,
     /// Position in the world \[m\].
     pub position: [f64; 3],
     /// Viewing direction.
@@ -35,7 +37,8 @@ pub struct MjvCameraError {
 
 impl MjvCamera {
     /// Returns the focal lengths and the principal point, fx, fy, cx, cy \[pixels\], for an image of `width` x
-    /// `height`. The top left corner of the image is (0, 0), pixel centers are at half pixels.
+    /// `height`. The top left corner of the image is (0, 0), pixel centers are at half pixels. For an
+    /// orthographic camera, fx and fy are pixels per meter.
     ///
     /// # Errors
     /// The frustum is empty, or `near` is not above 0.
@@ -43,10 +46,11 @@ impl MjvCamera {
         let (width, height) = (width as f64, height as f64);
         let side = self.top - self.bottom;
         let half_width = if self.half_width > 0.0 { self.half_width } else { 0.5 * side * width / height };
-        let fx = 0.5 * width * self.near / half_width;
-        let fy = height * self.near / side;
-        let cx = 0.5 * width - self.center * fx / self.near;
-        let cy = self.top * fy / self.near;
+        let depth = if self.orthographic { 1.0 } else { self.near };
+        let fx = 0.5 * width * depth / half_width;
+        let fy = height * depth / side;
+        let cx = 0.5 * width - self.center * fx / depth;
+        let cy = self.top * fy / depth;
         let numbers = [fx, fy, cx, cy].map(|x| x as f32);
         if side > 0.0 && self.near > 0.0 && numbers.iter().all(|x| x.is_finite()) {
             Ok(numbers)

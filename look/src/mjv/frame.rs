@@ -6,8 +6,8 @@ use std::sync::Arc;
 /// Background of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Background {
-    /// True to draw the first skybox of the model; without it, and in fog, the background has the color of the fog, or
-    /// is black.
+    /// True to draw the first skybox of the model, which has the color of the fog in fog; without it, the background is
+    /// black.
     pub skybox: bool,
     /// Haze at the end of infinite planes; `None` for a sharp end.
     pub horizon: Option<HorizonHaze>,

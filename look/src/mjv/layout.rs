@@ -36,6 +36,26 @@ pub struct SoftTypes {
     pub flex: Option<i32>,
 }
 
+/// Numbers of the types of signed distance fields and of decoration in `mjvGeom`, which differ between versions of
+/// MuJoCo; `None` for types that a version lacks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DecorTypes {
+    /// Signed distance field, which is drawn as its mesh.
+    pub sdf: Option<i32>,
+    /// Arrow.
+    pub arrow: Option<i32>,
+    /// Arrow whose head is as wide as its shaft.
+    pub arrow1: Option<i32>,
+    /// Arrow in both directions.
+    pub arrow2: Option<i32>,
+    /// Line.
+    pub line: Option<i32>,
+    /// Edges of a box.
+    pub line_box: Option<i32>,
+    /// Triangle.
+    pub triangle: Option<i32>,
+}
+
 /// Byte offsets of the fields of `mjvGeom`, and the size of the structure. Each field is a 4-byte number or an array of
 /// 4-byte numbers. Optional fields exist in some versions of MuJoCo only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +100,8 @@ pub struct GeomLayout {
     pub reflectance: usize,
     /// Numbers of the types of skins and flexes.
     pub soft: SoftTypes,
+    /// Numbers of the types of signed distance fields and of decoration.
+    pub decor: DecorTypes,
 }
 
 impl GeomLayout {

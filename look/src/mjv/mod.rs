@@ -7,6 +7,7 @@
 //! as long as only poses change, and the poses.
 
 mod camera;
+mod decor;
 mod frame;
 mod layout;
 mod reader;
@@ -16,8 +17,9 @@ mod tests;
 mod texture_rule;
 
 pub use camera::{MjvCamera, MjvCameraError};
+pub use decor::LineView;
 pub use frame::{Background, MjvFrame, MjvObject};
-pub use layout::{GeomLayout, LayoutError, LightLayout, SoftTypes};
+pub use layout::{DecorTypes, GeomLayout, LayoutError, LightLayout, SoftTypes};
 pub use reader::MjvReader;
 pub use soft::{MjvMemory, SkinFaces};
 pub use texture_rule::TextureRule;

@@ -1,19 +1,36 @@
 //! Conversion of the memory of `mjvGeom` and `mjvLight` to scenes.
 
+use super::decor::{Decor, line_mesh, strips};
 use super::frame::{Background, MjvFrame, MjvObject};
 use super::layout::{GeomLayout, LayoutError, LightLayout, floats, int};
 use super::soft::{MjvMemory, SkinFaces, SoftBody};
 use super::texture_rule::{TextureRule, moved_texture, plane_shift, wrapped_mesh};
 use crate::{GeomShapes, GeomType, LightType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
-use kinetoscope_scene::shape::{Capsule, Mesh, Plane, RenderMesh, Shape};
+use kinetoscope_scene::shape::{Capsule, Mesh, RenderMesh, Shape};
 use kinetoscope_scene::{
-    Headlight, Hemisphere, Instance, Light, LightingSpace, Material, PoseF32, RenderScene, Sky, Texture, TextureKind,
+    Headlight, Hemisphere, Instance, Light, LightingSpace, Marker, Material, OpenGlRules, PoseF32, RenderScene, Sky,
+    Texture, TextureKind,
 };
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Ambient light of scenes without lights in MuJoCo's renderer.
 const AMBIENT_WITHOUT_LIGHTS: [f32; 3] = [0.3; 3];
+
+/// Number of lights of OpenGL: later ones are not drawn.
+const MAX_LIGHTS: usize = 8;
+
+/// Opacity from which a geom is opaque. Source: MuJoCo's classic renderer, as for the following numbers.
+const OPAQUE: f32 = 0.995;
+
+/// Factor of the opacity of planes from behind.
+const BACK_OF_PLANE: f32 = 0.3;
+
+/// Category of decoration (`mjCAT_DECOR`), which casts no shadow.
+const DECOR: i32 = 4;
+
+/// Opacity of lines: they are drawn after everything opaque, in the light of all lights.
+const LINE_OPACITY: f32 = 0.9999;
 
 /// Reader of the scenes of one model. Meshes and textures are prepared once.
 #[derive(Debug)]
@@ -26,6 +43,12 @@ pub struct MjvReader<M> {
     geoms: GeomLayout,
     lights: LightLayout,
     texture_rule: TextureRule,
+    rules: Option<OpenGlRules>,
+    decor_casts_no_shadows: bool,
+    /// Arrows by type and size.
+    arrows: HashMap<(i32, [u32; 3]), Arc<RenderMesh>>,
+    /// Images of one pixel by color.
+    colors: HashMap<[u32; 3], Arc<Texture>>,
     /// Meshes with scaled texture coordinates.
     wrapped: HashMap<WrappedKey, Arc<RenderMesh>>,
     /// Textures by address of the original, and pixels by which they are moved.
@@ -53,6 +76,8 @@ struct LastScene {
     rows: Vec<InstanceRow>,
     /// Instances whose vertices move.
     soft: Vec<(usize, SoftBody)>,
+    /// Instances of lines, with their geoms.
+    lines: Vec<(usize, u32, Decor)>,
 }
 
 /// Geom that an instance shows.
@@ -73,6 +98,8 @@ struct GeomLook {
     texid: i32,
     texuniform: i32,
     texrepeat: [u32; 2],
+    is_decor: bool,
+    decor: Option<Decor>,
     size: [u32; 3],
     rgba: [u32; 4],
     /// Emission, specular, shininess, reflectance.
@@ -96,6 +123,8 @@ impl GeomLook {
             texid: number(layout.texid),
             texuniform: number(layout.texuniform),
             texrepeat: layout.texrepeat.map_or([0; 2], |at| [bits(at), bits(at + 4)]),
+            is_decor: int(row, layout.category) == DECOR,
+            decor: Decor::of(int(row, layout.kind), &layout.decor),
             size: [0, 4, 8].map(|k| bits(layout.size + k)),
             rgba: [0, 4, 8, 12].map(|k| bits(layout.rgba + k)),
             shading: [layout.emission, layout.specular, layout.shininess, layout.reflectance].map(bits),
@@ -122,7 +151,7 @@ impl<M: VisualModel> MjvReader<M> {
                 .ok()
         });
         Ok(Self {
-            shapes: GeomShapes::new(model),
+            shapes: GeomShapes::new(model).with_model_normals(),
             materials,
             sky,
             skins,
@@ -130,6 +159,10 @@ impl<M: VisualModel> MjvReader<M> {
             geoms,
             lights,
             texture_rule: TextureRule::default(),
+            rules: None,
+            decor_casts_no_shadows: true,
+            arrows: HashMap::new(),
+            colors: HashMap::new(),
             wrapped: HashMap::new(),
             moved: HashMap::new(),
             last: None,
@@ -140,6 +173,18 @@ impl<M: VisualModel> MjvReader<M> {
     #[must_use]
     pub fn with_texture_rule(self, texture_rule: TextureRule) -> Self {
         Self { texture_rule, last: None, ..self }
+    }
+
+    /// Sets rules of MuJoCo's OpenGL renderer.
+    #[must_use]
+    pub fn with_opengl_rules(self, rules: OpenGlRules) -> Self {
+        Self { rules: Some(rules), last: None, ..self }
+    }
+
+    /// Sets if decoration casts shadows, which it does not by default; lines never do.
+    #[must_use]
+    pub fn with_shadows_of_decor(self, casts: bool) -> Self {
+        Self { decor_casts_no_shadows: !casts, last: None, ..self }
     }
 
     /// True if the model has a skybox.
@@ -169,18 +214,22 @@ impl<M: VisualModel> MjvReader<M> {
         };
         let lights: Vec<Light> = lights
             .chunks_exact(self.lights.stride)
-            .map(|row| {
+            .enumerate()
+            .map(|(index, row)| {
                 let light = self.lights.read(row);
                 let position = light.position;
                 let direction = if light.is_headlight { memory.forward } else { light.direction };
                 let light = scene_light(&light.values, LightingSpace::Display);
                 // MuJoCo's renderer leaves out lights of all other types.
-                Light { position, direction, active: light.active && is_drawn(row), ..light }
+                Light { position, direction, active: light.active && is_drawn(row) && index < MAX_LIGHTS, ..light }
             })
             .collect();
         for row in memory.lights.chunks_exact(light_layout.stride).filter(|row| !is_drawn(row)) {
             let kind = light_layout.kind.map_or(0, |at| int(row, at));
             self.omit(format!("lights of type {kind} are not rendered: only directional and spot lights are"));
+        }
+        if lights.len() > MAX_LIGHTS {
+            self.omit(format!("lights after the first {MAX_LIGHTS} are not rendered, as in OpenGL"));
         }
         let last = self.last.take();
         let looks = rows().map(|row| GeomLook::read(row, &layout, &self.skins, memory));
@@ -190,29 +239,38 @@ impl<M: VisualModel> MjvReader<M> {
             let same_lights = last.lights == lights.len() && last.is_lit == is_lit;
             last.background == background && same_lights && last.looks == looks
         };
-        let last = match last {
+        let mut last = match last {
             Some(last) if is_same(&last) => last,
             _ => self.build(looks, background, &lights, memory),
         };
         let mut poses: Vec<PoseF32> =
             last.rows.iter().map(|row| row.pose(&geoms[row.geom as usize * layout.stride..], &layout)).collect();
-        for &(instance, _) in &last.soft {
-            // Vertices of skins and flexes are in the world.
+        // Vertices of skins, flexes and lines are in the world.
+        for instance in last.soft.iter().map(|(k, _)| *k).chain(last.lines.iter().map(|(k, ..)| *k)) {
             poses[instance] = PoseF32::IDENTITY;
         }
-        let deformed = |scene: &Arc<RenderScene>| {
-            if last.soft.is_empty() {
-                return Arc::clone(scene);
-            }
-            let mut scene = (**scene).clone();
-            for &(instance, body) in &last.soft {
-                let [positions, normals] = body.vertices(&self.skins, memory);
-                if positions.iter().flatten().all(|x| x.is_finite()) && !positions.is_empty() {
-                    scene.deform(instance, |mesh| mesh.deform(positions, normals));
+        let strip = |&(instance, geom, decor): &(usize, u32, Decor)| {
+            let row = &geoms[geom as usize * layout.stride..];
+            let pose = InstanceRow { geom, is_back: false }.pose(row, &layout);
+            let view = memory.lines.unwrap_or_default();
+            (instance, strips(decor, floats(row, layout.size), &view, |point| pose.apply(point)))
+        };
+        let lines: Vec<_> = last.lines.iter().map(strip).collect();
+        if !last.soft.is_empty() || !last.lines.is_empty() {
+            // Copied only if an earlier frame is still in use.
+            for scene in std::iter::once(&mut last.scene).chain(&mut last.segment_scene) {
+                let scene = Arc::make_mut(scene);
+                for &(instance, body) in &last.soft {
+                    let [positions, normals] = body.vertices(&self.skins, memory);
+                    if positions.iter().flatten().all(|x| x.is_finite()) && !positions.is_empty() {
+                        scene.deform(instance, |mesh| mesh.deform(positions, normals));
+                    }
+                }
+                for (instance, [positions, normals]) in &lines {
+                    scene.deform(*instance, |mesh| mesh.deform(positions, normals));
                 }
             }
-            Arc::new(scene)
-        };
+        }
         let object = |row: &[u8]| {
             let segment = int(row, layout.segid);
             if segment < 0 {
@@ -221,8 +279,8 @@ impl<M: VisualModel> MjvReader<M> {
             MjvObject { id: int(row, layout.objid), kind: int(row, layout.objtype), segment }
         };
         let frame = MjvFrame {
-            scene: deformed(&last.scene),
-            segment_scene: last.segment_scene.as_ref().map(deformed),
+            scene: Arc::clone(&last.scene),
+            segment_scene: last.segment_scene.clone(),
             poses,
             lights,
             objects: std::iter::once(MjvObject::NONE).chain(rows().map(object)).collect(),
@@ -238,23 +296,26 @@ impl<M: VisualModel> MjvReader<M> {
         lights: &[Light],
         memory: &MjvMemory<'_>,
     ) -> LastScene {
-        let (mut instances, mut rows, mut soft) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut instances, mut rows, mut soft, mut lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, look) in looks.iter().enumerate() {
             match self.instance(look, index as i32 + 1, memory) {
                 Ok(instance) => {
                     soft.extend(look.soft.map(|(body, _)| (instances.len(), body)));
                     let geom = index as u32;
-                    // Finite planes are visible from behind in MuJoCo's renderer.
-                    if let Shape::Plane(Plane { half: [x, y] }) = instance.shape
-                        && x > 0.0
-                        && y > 0.0
-                    {
-                        let material = Material { reflectance: 0.0, ..instance.material.clone() };
-                        instances.push(Instance { material, ..instance.clone() });
-                        rows.push(InstanceRow { geom, is_back: true });
-                    }
+                    lines.extend(
+                        look.decor.filter(|decor| decor.lines() > 0).map(|decor| (instances.len(), geom, decor)),
+                    );
+                    let back = matches!(instance.shape, Shape::Plane(_)).then(|| instance.clone());
                     instances.push(instance);
                     rows.push(InstanceRow { geom, is_back: false });
+                    // Planes are visible from behind in MuJoCo's renderer, but transparent.
+                    if let Some(back) = back {
+                        let [r, g, b, _] = back.material.rgba;
+                        let opacity = drawn_twice(BACK_OF_PLANE * f32::from_bits(look.rgba[3]));
+                        let material = Material { reflectance: 0.0, rgba: [r, g, b, opacity], ..back.material };
+                        instances.push(Instance { material, group: OpenGlRules::BACK_GROUP, ..back });
+                        rows.push(InstanceRow { geom, is_back: true });
+                    }
                 }
                 Err(reason) => self.omit(format!("geoms of type {} are not rendered: {reason}", look.kind)),
             }
@@ -267,12 +328,21 @@ impl<M: VisualModel> MjvReader<M> {
             };
             instances.iter().zip(&rows).map(hide).collect::<Vec<_>>()
         });
-        let scene = self.scene(instances, background, lights).unwrap_or_else(|| {
+        let scales = self.cube_scales(&instances, &rows, &looks);
+        let scaled = |mut scene: RenderScene| {
+            for &(instance, scale) in &scales {
+                scene.set_texture_scale(instance, scale);
+            }
+            scene
+        };
+        let scene = self.scene(instances, background, lights).map(scaled).unwrap_or_else(|| {
             rows.clear();
             soft.clear();
+            lines.clear();
             RenderScene::empty()
         });
-        let segment_scene = segment_instances.and_then(|instances| self.scene(instances, background, lights));
+        let segment_scene =
+            segment_instances.and_then(|instances| self.scene(instances, background, lights)).map(scaled);
         LastScene {
             looks,
             background,
@@ -282,7 +352,34 @@ impl<M: VisualModel> MjvReader<M> {
             segment_scene: segment_scene.map(Arc::new),
             rows,
             soft,
+            lines,
         }
+    }
+
+    /// Scales of cube textures where they are not those of [`RenderScene`]: in OpenGL, the texture of a mesh is on a cube
+    /// of half length 1 m, and the sizes of a geom are factors with `texuniform`.
+    fn cube_scales(&self, instances: &[Instance], rows: &[InstanceRow], looks: &[GeomLook]) -> Vec<(usize, [f32; 3])> {
+        let mut scales = Vec::new();
+        for (index, (instance, row)) in instances.iter().zip(rows).enumerate() {
+            let is_cube = instance.material.texture.as_ref().is_some_and(|t| t.kind() == TextureKind::Cube);
+            let is_mesh = instance.mesh().is_some();
+            if !is_cube || !(is_mesh || instance.material.tex_uniform) {
+                continue;
+            }
+            let [lo, hi] = instance.shape.aabb();
+            let size = looks[row.geom as usize].size.map(f32::from_bits);
+            let scale = [0, 1, 2].map(|k| {
+                let half = 0.5 * (hi[k] - lo[k]);
+                let own = if is_mesh || !(half > 0.0 && half.is_finite()) { 1.0 } else { 1.0 / half };
+                if instance.material.tex_uniform { own * size[k] } else { own }
+            });
+            // Only the direction matters. The renderer expects the surface of a cube of half length 1.
+            let reach = (0..3).map(|k| scale[k] * lo[k].abs().max(hi[k].abs())).fold(0.0, f32::max);
+            if reach > 0.0 && reach.is_finite() {
+                scales.push((index, scale.map(|x| x / reach)));
+            }
+        }
+        scales
     }
 
     /// Scene with the lighting of MuJoCo's renderer. The headlight is one of its lights.
@@ -300,8 +397,11 @@ impl<M: VisualModel> MjvReader<M> {
         let ambient = if lights.iter().any(|light| light.active) { [0.0; 3] } else { AMBIENT_WITHOUT_LIGHTS };
         scene.ambient = Hemisphere { sky: ambient, ground: ambient };
         scene.lighting_space = LightingSpace::Display;
-        // The background is behind all fog.
-        scene.sky = Sky::uniform(background.fog.and_then(|fog| fog.color).unwrap_or([0.0; 3]));
+        scene.opengl = self.rules;
+        // The skybox is behind all fog; without one, the background is black.
+        let has_sky = background.skybox && self.sky.is_some();
+        let fog = background.fog.filter(|_| has_sky).and_then(|fog| fog.color);
+        scene.sky = Sky::uniform(fog.unwrap_or([0.0; 3]));
         scene.skybox = self.sky.clone().filter(|_| background.skybox && background.fog.is_none());
         scene.horizon = background.horizon.filter(|_| background.fog.is_none());
         scene.haze = background.fog;
@@ -340,7 +440,22 @@ impl<M: VisualModel> MjvReader<M> {
             }
             texture => (shape, texture),
         };
-        let rgba = look.rgba.map(|x| f32::from_bits(x).clamp(0.0, 1.0));
+        let mut rgba = look.rgba.map(|x| f32::from_bits(x).clamp(0.0, 1.0));
+        rgba[3] = if rgba[3] >= OPAQUE { 1.0 } else { drawn_twice(rgba[3]) };
+        if look.decor.is_some_and(|decor| decor.lines() > 0) {
+            // Lines have their color in any light: light of at least 1, on an image of this color.
+            let texture = self.one_color([rgba[0], rgba[1], rgba[2]]);
+            let rgba = [1.0, 1.0, 1.0, rgba[3].min(LINE_OPACITY)];
+            let material = Material { rgba, texture, emission: 1.0, specular: 0.0, ..Material::default() };
+            let visible = rgba[3] > 0.0 && memory.lines.is_some();
+            let instance = Instance {
+                visible,
+                is_deformable: true,
+                group: Marker::GROUP,
+                ..Instance::new(shape, material, mask_id)
+            };
+            return Ok(instance);
+        }
         let material = Material {
             rgba,
             texture,
@@ -353,7 +468,8 @@ impl<M: VisualModel> MjvReader<M> {
             ..Material::default()
         };
         let (visible, is_deformable) = (rgba[3] > 0.0, look.soft.is_some());
-        let instance = Instance { visible, is_deformable, ..Instance::new(shape, material, mask_id) };
+        let group = if look.is_decor && self.decor_casts_no_shadows { Marker::GROUP } else { 0 };
+        let instance = Instance { visible, is_deformable, group, ..Instance::new(shape, material, mask_id) };
         instance.validate().map_err(|error| error.to_string())?;
         Ok(instance)
     }
@@ -409,21 +525,51 @@ impl<M: VisualModel> MjvReader<M> {
             };
         }
         let size = look.size.map(f32::from_bits);
-        let data = match GeomType::from_id(look.kind) {
+        if let Some(decor) = look.decor {
+            let new = || decor.mesh(size).unwrap_or_else(|| line_mesh(decor));
+            if decor.lines() > 0 {
+                return Ok(Mesh { mesh: Arc::new(new()) }.into());
+            }
+            if self.arrows.len() > MAX_WRAPPED {
+                self.arrows.clear();
+            }
+            if !(size.iter().all(|x| x.is_finite()) && size[0] > 0.0 && size[1] > 0.0) {
+                return Err("a size is not positive".into());
+            }
+            let mesh = self.arrows.entry((look.kind, look.size)).or_insert_with(|| Arc::new(new()));
+            return Ok(Mesh { mesh: Arc::clone(mesh) }.into());
+        }
+        let is_sdf = self.geoms.decor.sdf == Some(look.kind);
+        let kind = if is_sdf { GeomType::Mesh as i32 } else { look.kind };
+        let data = match GeomType::from_id(kind) {
             // Meshes have two ids each: 2 k for mesh k, and 2 k + 1 for its convex hull.
             Some(GeomType::Mesh) => look.dataid.div_euclid(2),
             Some(_) => look.dataid,
             None => return Err("neither shapes nor skins nor flexes".into()),
         };
         // The visualizer has the half length of capsules and cylinders at the end.
-        let size = match GeomType::from_id(look.kind) {
+        let size = match GeomType::from_id(kind) {
             Some(GeomType::Capsule) if size[2] <= 0.0 => {
                 return Ok(Capsule { radius: size[0], half_length: 1e-6 * size[0] }.into());
             }
             Some(GeomType::Capsule | GeomType::Cylinder) => [size[0], size[2], 0.0],
             _ => size,
         };
-        self.shapes.get(look.kind, &size.map(f64::from), data).map_err(str::to_string)
+        self.shapes.get(kind, &size.map(f64::from), data).map_err(str::to_string)
+    }
+
+    /// An image of one pixel.
+    fn one_color(&mut self, rgb: [f32; 3]) -> Option<Arc<Texture>> {
+        if self.colors.len() > MAX_WRAPPED {
+            self.colors.clear();
+        }
+        let key = rgb.map(f32::to_bits);
+        if !self.colors.contains_key(&key) {
+            let bytes = rgb.map(|c| (255.0 * c).round() as u8);
+            let texture = Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, 1, 1, 3, &bytes).ok()?;
+            self.colors.insert(key, Arc::new(texture));
+        }
+        self.colors.get(&key).cloned()
     }
 
     fn omit(&mut self, message: String) {
@@ -431,6 +577,13 @@ impl<M: VisualModel> MjvReader<M> {
             self.omitted.push(message);
         }
     }
+}
+
+/// Opacity of a transparent geom: MuJoCo's renderer draws it from the front to the back, and again from the back to the
+/// front.
+fn drawn_twice(opacity: f32) -> f32 {
+    let passes = 1.0 - opacity.clamp(0.0, 1.0);
+    1.0 - passes * passes
 }
 
 impl InstanceRow {

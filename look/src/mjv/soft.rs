@@ -1,5 +1,6 @@
 //! Skins and flexes: meshes whose vertices MuJoCo's visualizer computes.
 
+use super::decor::LineView;
 use super::layout::SoftTypes;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::RenderMesh;
@@ -26,6 +27,8 @@ pub struct MjvMemory<'a> {
     pub lights: &'a [u8],
     /// Viewing direction of the camera, which is the direction of the headlight.
     pub forward: [f32; 3],
+    /// View in which lines have their width; `None` for scenes without lines.
+    pub lines: Option<LineView>,
     /// Positions of the vertices of all skins (`skinvert`).
     pub skin_positions: &'a [[f32; 3]],
     /// Normals of the vertices of all skins (`skinnormal`).

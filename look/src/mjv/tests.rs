@@ -64,6 +64,15 @@ const GEOM: GeomLayout = GeomLayout {
     shininess: 128,
     reflectance: 132,
     soft: SoftTypes { skin: Some(106), flex: Some(105) },
+    decor: DecorTypes {
+        sdf: Some(8),
+        arrow: Some(100),
+        arrow1: None,
+        arrow2: None,
+        line: Some(103),
+        line_box: Some(104),
+        triangle: None,
+    },
 };
 
 const LIGHT: LightLayout = LightLayout {
@@ -191,15 +200,22 @@ fn shared_scenes() {
     assert_eq!(green.scene.instances()[0].material.rgba, [0.0, 1.0, 0.0, 1.0]);
 }
 
-/// A finite plane has a back, turned around x; an infinite plane has none.
+/// A plane has a back, turned around x, of 0.3 times the opacity, which is drawn twice.
+///
+/// Regression: backs were opaque, and infinite planes had none.
 #[test]
 fn backs_of_planes() {
     let rows = [geom(0, -1, [2.0, 3.0, 0.1], 0), geom(0, -1, [0.0; 3], 1)].concat();
     let frame = reader().read(&memory(&rows), Background::default()).expect("whole structures");
-    assert_eq!(frame.scene.instances().iter().map(|plane| plane.mask_id).collect::<Vec<_>>(), [1, 1, 2]);
-    assert_eq!(frame.poses[0].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
-    assert_eq!(frame.poses[1].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, 1.0]);
-    assert_eq!(frame.poses[0].rotate([1.0, 0.0, 0.0]), frame.poses[1].rotate([1.0, 0.0, 0.0]));
+    let instances = frame.scene.instances();
+    assert_eq!(instances.iter().map(|plane| plane.mask_id).collect::<Vec<_>>(), [1, 1, 2, 2]);
+    for (front, back) in [(0, 1), (2, 3)] {
+        assert_eq!(frame.poses[front].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, 1.0]);
+        assert_eq!(frame.poses[back].rotate([0.0, 0.0, 1.0]), [0.0, 0.0, -1.0]);
+        assert_eq!(frame.poses[front].rotate([1.0, 0.0, 0.0]), frame.poses[back].rotate([1.0, 0.0, 0.0]));
+        let opacity = [front, back].map(|k| instances[k].material.rgba[3]);
+        assert!(opacity[0] == 1.0 && (opacity[1] - (1.0 - 0.7 * 0.7)).abs() < 1e-6, "{opacity:?}");
+    }
     assert!(frame.poses.iter().all(kinetoscope_scene::PoseF32::is_rigid));
 }
 
@@ -294,6 +310,7 @@ fn invalid_layouts_and_memory() {
 fn cameras() {
     let half = (0.5f64 * 0.8).tan() * 0.01;
     let camera = MjvCamera {
+        orthographic: false,
         position: [1.0, 2.0, 3.0],
         forward: [1.0, 0.0, 0.0],
         up: [0.0, 0.0, 1.0],

@@ -1,113 +1,77 @@
-"""Compares images with those of the installed `mujoco.Renderer`: python agreement.py [--images FOLDER] MODEL.xml ...
+"""Compares images with those of the installed `mujoco.Renderer`.
 
-Prints a row for each model and camera: PSNR of color with the default flags and without shadows and reflections, the
-fraction of pixels whose bytes differ by at most 4, equal segmentation inside silhouettes, and errors of depth. Then the
-medians over models. With --images, writes MuJoCo's image, ours and four times their difference.
+python agreement.py [--images FOLDER] [--size HEIGHT WIDTH] MODEL.xml ...   rows of these models
+python agreement.py --write                                                 all models of tests/models.py: agreement.json
+python agreement.py --page                                                  the tables of docs/python-render.md
+
+Rows have PSNR of color with the default flags and without shadows and reflections, the fraction of pixels whose bytes
+differ by at most 4, equal segmentation inside silhouettes, and the median relative difference of depth there.
 """
 
 import argparse
+import dataclasses
+import json
 import os
 import pathlib
+import sys
+import time
 
-os.environ.setdefault("MUJOCO_GL", "osmesa")
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tests"))
 
-import mujoco  # noqa: E402
-import numpy as np  # noqa: E402
+import page  # noqa: E402
 
-import kinetoscope_render as kr  # noqa: E402
-
-
-def images(cls, model, data, camera, size):
-    renderer = cls(model, *size)
-    renderer.update_scene(data, camera)
-    rgb = renderer.render().copy()
-    renderer.enable_depth_rendering()
-    depth = renderer.render().copy()
-    renderer.disable_depth_rendering()
-    renderer.enable_segmentation_rendering()
-    ids = renderer.render().copy()
-    renderer.disable_segmentation_rendering()
-    for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-        renderer.scene.flags[int(flag)] = 0
-    plain = renderer.render().copy()
-    if hasattr(renderer, "close"):
-        renderer.close()
-    return rgb, plain, depth, ids
+SIZE = (240, 320)
 
 
-def psnr(a, b):
-    mse = ((a.astype(float) - b) ** 2).mean()
-    return min(99.0, 10 * np.log10(255**2 / max(mse, 1e-12)))
+def compare(named, size, folder):
+    """Rows of models by name and view."""
+    import comparison
+    import models
 
-
-def compare(path, folder):
-    """Rows (PSNR, PSNR without effects, near, segmentation, depth) of a model; empty if it does not load."""
-    name = f"{path.parent.name}/{path.name}"
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        print(f"{name}: does not load: {str(error).splitlines()[0][:80]}")
-        return []
-    data = mujoco.MjData(model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    size = min(240, model.vis.global_.offheight), min(320, model.vis.global_.offwidth)
-    rows = []
-    for camera in [-1, *range(min(2, model.ncam))]:
-        try:
-            ours = images(kr.Renderer, model, data, camera, size)
-        except NotImplementedError as error:
-            print(f"{name} camera {camera}: {error}")
+    rows = {}
+    for name, path in named.items():
+        model = models.load(path)
+        if model is None:
+            print(f"{name}: does not load")
             continue
-        theirs = images(mujoco.Renderer, model, data, camera, size)
-        same = (theirs[3] == ours[3]).all(-1)
-        key = theirs[3][..., 0].astype(np.int64) * 1000 + theirs[3][..., 1]
-        inside = np.ones(key.shape, bool)
-        for y in (-1, 0, 1):
-            for x in (-1, 0, 1):
-                inside &= np.roll(np.roll(key, y, 0), x, 1) == key
-        hit = same & inside & (theirs[2] < 0.99 * model.vis.map.zfar * model.stat.extent)
-        error = np.abs(theirs[2] - ours[2])[hit] / theirs[2][hit] if hit.any() else np.zeros(1)
-        near = (np.abs(theirs[0].astype(int) - ours[0]).max(-1) <= 4).mean()
-        row = (
-            psnr(theirs[0], ours[0]), psnr(theirs[1], ours[1]), near,
-            same[inside].mean() if inside.any() else 1.0, float(np.median(error)),
-        )
-        rows.append(row)
-        print(f"{name:44} camera {camera:2}  PSNR {row[0]:5.1f} plain {row[1]:5.1f}  within 4 {row[2]:.3f}  "
-              f"segmentation {row[3]:.5f}  depth {row[4]:.1e}", flush=True)
-        if folder:
-            from PIL import Image
-
-            difference = np.clip(4 * np.abs(theirs[0].astype(int) - ours[0]), 0, 255).astype(np.uint8)
-            Image.fromarray(np.concatenate([theirs[0], ours[0], difference], 1)).save(
-                folder / f"{path.parent.name}-{path.stem}.{camera}.png"
-            )
+        start = time.perf_counter()
+        for view, row in comparison.compare_model(model, size, folder, name).items():
+            rows.setdefault(name, {})[view] = dataclasses.asdict(row)
+            print(f"{name:42} {view:9} PSNR {row.psnr:5.1f} plain {row.plain:5.1f}  within 4 {row.near:.3f}  "
+                  f"segmentation {row.segmentation:.5f}  depth {row.depth:.1e}  {time.perf_counter() - start:.1f} s",
+                  flush=True)
     return rows
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("models", nargs="+", type=pathlib.Path)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("models", nargs="*", type=pathlib.Path)
     parser.add_argument("--images", type=pathlib.Path)
+    parser.add_argument("--size", type=int, nargs=2, default=SIZE)
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--page", action="store_true")
     args = parser.parse_args()
+    if args.page:
+        page.write()
+        return
     if args.images:
         args.images.mkdir(parents=True, exist_ok=True)
-    models = [rows for rows in (compare(path, args.images) for path in args.models) if rows]
-    views = np.array([row for rows in models for row in rows])
-    if not len(views):
-        return
-    worst = np.array([np.min(np.array(rows)[:, :4], axis=0) for rows in models])
-    print(f"\n{len(models)} models, {len(views)} views, mujoco {mujoco.__version__}")
-    for k, name in enumerate(("PSNR", "PSNR plain", "within 4", "segmentation")):
-        quartiles = np.percentile(views[:, k], [0, 10, 25, 50])
-        print(f"{name:13} minimum {quartiles[0]:.4g}, 10 % {quartiles[1]:.4g}, 25 % {quartiles[2]:.4g}, "
-              f"median {quartiles[3]:.4g}; median of the worst view of each model {np.median(worst[:, k]):.4g}")
-    print(f"PSNR: {(views[:, 0] >= 40).mean():.2f} of views at 40 dB and more, {(views[:, 0] >= 30).mean():.2f} at 30")
-    print(f"segmentation: {(views[:, 3] >= 0.999).mean():.2f} of views at 0.999 and more")
-    print(f"depth: median of medians {np.median(views[:, 4]):.1e}, {(views[:, 4] < 1e-6).mean():.2f} of views below 1e-6")
+    import mujoco
+
+    if args.models:
+        named = {f"{path.parent.name}/{path.stem}": path for path in args.models}
+    else:
+        import models
+
+        named = models.paths()
+    rows = compare(named, tuple(args.size), args.images)
+    result = {"mujoco": mujoco.__version__, "size": list(args.size), "models": rows}
+    if args.write:
+        page.RESULT.write_text(json.dumps(page.rounded(result), indent=1) + "\n")
+    print("\n".join(page.summary(result)))
 
 
 if __name__ == "__main__":
+    os.environ.setdefault("MUJOCO_GL", "osmesa")
     main()

@@ -16,11 +16,11 @@ _MODEL = """<mujoco>
 
 def doctor() -> int:
     """Prints versions, renders a test frame and lists what `patch_mujoco` replaces. Returns the exit code."""
-    start = time.perf_counter()
     import numpy as np
 
     print(f"python      {platform.python_version()} on {platform.platform()}")
     print(f"numpy       {np.__version__}")
+    start = time.perf_counter()
     try:
         import mujoco
     except ImportError as error:
@@ -49,7 +49,7 @@ def doctor() -> int:
     if set(np.unique(ids)) != {0, 1} and set(np.unique(ids)) != {-1, 0, 1} or rgb.std() < 5:
         print(f"test frame  wrong: ids {np.unique(ids)}, mean color {rgb.mean():.1f}")
         return 1
-    print(f"test frame  160 x 120, mean color {rgb.mean():.1f}, {seconds:.2f} s from the start of imports")
+    print(f"test frame  160 x 120, mean color {rgb.mean():.1f}, {seconds:.2f} s from the import of mujoco on")
     print("patch_mujoco() replaces:")
     for name in kr.patch_mujoco():
         print(f"  {name}")

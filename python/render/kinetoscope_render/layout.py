@@ -23,8 +23,14 @@ _GEOM_ARRAYS = ("size", "pos", "mat", "rgba", "texrepeat")
 _GEOM_OPTIONAL = ("matid", "texid", "texuniform", "texrepeat")
 _LIGHT_NUMBERS = ("id", "type", "directional", "cutoff", "exponent", "headlight", "castshadow")
 _LIGHT_ARRAYS = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
+_SIZES = {
+    "size": 3, "pos": 3, "mat": 9, "rgba": 4, "texrepeat": 2, "dir": 3, "attenuation": 3, "ambient": 3, "diffuse": 3,
+}
 _LIGHT_OPTIONAL = ("id", "type", "directional")
-_SOFT = ("mjGEOM_SKIN", "mjGEOM_FLEX")
+_TYPES = (
+    "mjGEOM_SKIN", "mjGEOM_FLEX", "mjGEOM_SDF", "mjGEOM_ARROW", "mjGEOM_ARROW1", "mjGEOM_ARROW2", "mjGEOM_LINE",
+    "mjGEOM_LINEBOX", "mjGEOM_TRIANGLE",
+)
 # Values of which all bytes differ.
 _INTEGERS = (0x5A5B5C5D, 0x25242322)
 _FLOATS = struct.unpack("=ff", struct.pack("=II", *_INTEGERS))
@@ -43,7 +49,14 @@ class Layouts:
 
 
 def _address(structure: Any, field: str) -> int:
-    return getattr(structure, field).__array_interface__["data"][0]
+    array = getattr(structure, field)
+    size = _SIZES.get(field)
+    is_valid = isinstance(array, np.ndarray) and array.dtype == np.float32 and array.flags.c_contiguous
+    if not is_valid or size is not None and array.size != size:
+        raise LayoutError(
+            f"the field {field!r} of mujoco {mujoco.__version__} is not an array of {size} single-precision numbers"
+        )
+    return array.__array_interface__["data"][0]
 
 
 def _memory(address: int, size: int) -> np.ndarray:
@@ -100,6 +113,39 @@ def _measure(
     return {**fields, "stride": stride}
 
 
+def _check(name: str, structure: Any, start: int, fields: dict[str, int]) -> None:
+    """Writes a structure through its attributes, and compares its memory.
+
+    Raises:
+        LayoutError: A field is at another place.
+    """
+    memory = _memory(start, fields["stride"])
+    for index, (field, offset) in enumerate(fields.items()):
+        if field == "stride":
+            continue
+        old = getattr(structure, field)
+        if isinstance(old, np.ndarray):
+            old = old.copy()
+            values = np.arange(old.size, dtype=np.float32) + index + 0.5
+            getattr(structure, field)[:] = values.reshape(old.shape)
+            found = memory[offset : offset + 4 * old.size].view(np.float32).tolist()
+            expected = values.tolist()
+            getattr(structure, field)[:] = old
+        else:
+            is_float = isinstance(old, float)
+            expected = [index + 0.5 if is_float else 1]
+            setattr(structure, field, expected[0])
+            width = 1 if isinstance(old, bool) or field in ("directional", "headlight", "castshadow") else 4
+            block = memory[offset : offset + width]
+            found = block.view(np.float32 if is_float else np.int32 if width == 4 else np.uint8).tolist()
+            setattr(structure, field, old)
+        if found != expected:
+            raise LayoutError(
+                f"the field {field!r} of {name} of mujoco {mujoco.__version__} is not at byte {offset}: it reads "
+                f"{found} instead of {expected}"
+            )
+
+
 @functools.lru_cache(maxsize=1)
 def layouts() -> Layouts:
     """Layouts of the installed `mujoco`.
@@ -111,9 +157,11 @@ def layouts() -> Layouts:
     scene = mujoco.MjvScene(model, 8)
     geom = _measure("mjvGeom", scene.geoms, _GEOM_NUMBERS, _GEOM_ARRAYS, _GEOM_OPTIONAL)
     light = _measure("mjvLight", scene.lights, _LIGHT_NUMBERS, _LIGHT_ARRAYS, _LIGHT_OPTIONAL)
+    for name, structures, fields in (("mjvGeom", scene.geoms, geom), ("mjvLight", scene.lights, light)):
+        _check(name, structures[1], _address(structures[1], "pos") - fields["pos"], fields)
     if "type" not in light and "directional" not in light:
         raise LayoutError(f"mjvLight of mujoco {mujoco.__version__} has neither 'type' nor 'directional'")
-    geom.update({name: int(getattr(mujoco.mjtGeom, name)) for name in _SOFT if hasattr(mujoco.mjtGeom, name)})
+    geom.update({name: int(getattr(mujoco.mjtGeom, name)) for name in _TYPES if hasattr(mujoco.mjtGeom, name)})
     return Layouts(geom=geom, light=light)
 
 

@@ -8,12 +8,12 @@ import mujoco
 import numpy as np
 
 _FLOAT32 = (
-    "mesh_vert", "mesh_texcoord", "hfield_data", "mat_rgba", "mat_texrepeat", "mat_emission", "mat_specular",
+    "mesh_vert", "mesh_normal", "mesh_texcoord", "hfield_data", "mat_rgba", "mat_texrepeat", "mat_emission", "mat_specular",
     "mat_shininess", "mat_reflectance", "skin_texcoord",
 )
-_INT32 = ("skin_face", "mesh_face", "mesh_facetexcoord", "tex_type", "mat_texuniform")
+_INT32 = ("skin_face", "mesh_face", "mesh_facenormal", "mesh_facetexcoord", "tex_type", "mat_texuniform")
 _INT64 = (
-    "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_texcoordadr", "hfield_nrow", "hfield_ncol",
+    "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_normaladr", "mesh_normalnum", "mesh_texcoordadr", "hfield_nrow", "hfield_ncol",
     "hfield_adr", "tex_width", "tex_height", "tex_adr", "skin_vertadr", "skin_vertnum", "skin_faceadr", "skin_facenum",
     "skin_texcoordadr",
 )

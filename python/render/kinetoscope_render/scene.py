@@ -28,6 +28,8 @@ _SIZES = (
 _MAX_THREADS = 1024
 # True for versions whose spheres, boxes, ... have texture coordinates.
 _WRAPS_TEXTURES = tuple(int(part) for part in mujoco.__version__.split(".")[:2]) >= (3, 12)
+# True for versions in which decoration casts no shadows.
+_DECOR_IS_LIGHT = hasattr(mujoco.mjtGeom, "mjGEOM_FLEX")
 
 
 def default_threads() -> int:
@@ -129,11 +131,15 @@ class SceneCapture:
         self.scene = mujoco.MjvScene(model, max_geom)
         self.option = mujoco.MjvOption()
         self._geoms, self._lights = scene_memory(self.scene)
-        self._new_frames = lambda arrays: _render.FrameList(
-            arrays, found.geom, found.light, threads, samples, _WRAPS_TEXTURES
-        )
-        self.frames = self._new_frames(model_arrays(model))
         visual, extent = model.vis, model.stat.extent
+        # Like MuJoCo's context, these keep their values from the beginning.
+        self._shadows = [float(extent * visual.map.shadowclip), float(visual.map.shadowscale)]
+        self._has_shadows = visual.quality.shadowsize > 0
+        self._line_width = float(getattr(visual.global_, "linewidth", 1.0))
+        self.frames = _render.FrameList(
+            model_arrays(model), found.geom, found.light, threads, samples, _WRAPS_TEXTURES, self._shadows,
+            not _DECOR_IS_LIGHT
+        )
         self._haze = [*map(float, visual.rgba.haze[:3]), float(visual.map.haze)]
         self._fog = [*map(float, visual.rgba.fog[:3])]
         self._fog += [float(visual.map.fogstart * extent), float(visual.map.fogend * extent)]
@@ -164,8 +170,8 @@ class SceneCapture:
             self._geoms, self._lights = scene_memory(scene)
 
     def reload(self, model: mujoco.MjModel) -> None:
-        """Copies meshes, textures and materials again."""
-        self.frames = self._new_frames(model_arrays(model))
+        """Copies meshes, textures and materials again. Captured frames stay as they are."""
+        self.frames.reload(model_arrays(model))
 
     def update(self, data: mujoco.MjData, camera: Any, option: Optional["mujoco.MjvOption"]) -> None:
         """Updates the scene to a state."""
@@ -205,8 +211,7 @@ class SceneCapture:
         if scene.enabletransform:
             raise NotImplementedError("scene.enabletransform is not supported")
         left, right = scene.camera
-        if getattr(left, "orthographic", 0):
-            raise NotImplementedError("orthographic cameras are not supported")
+        orthographic = float(bool(getattr(left, "orthographic", 0)))
 
         # The cameras of a stereo pair are averaged, as in MuJoCo's images.
         def mean(field: str) -> float:
@@ -216,9 +221,10 @@ class SceneCapture:
         vectors = [0.5 * (getattr(left, field) + getattr(right, field)) for field in ("pos", "forward", "up")]
         far = mean("frustum_far")
         frustum = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near")
-        camera = [*np.concatenate(vectors).tolist(), *map(mean, frustum), far]
+        camera = [*np.concatenate(vectors).tolist(), *map(mean, frustum), far, orthographic, self._line_width]
         on = [float(flags[_FLAGS[name]]) for name in ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")]
         effects = [bool(flags[_FLAGS[name]]) for name in ("mjRND_SHADOW", "mjRND_REFLECTION")]
+        effects[0] = effects[0] and self._has_shadows
         self.frames.capture(
             self._geoms[: scene.ngeom], self._lights[: scene.nlight], camera, [*on, *self._haze, *self._fog, far],
             effects, [width, height], self._soft(),

@@ -37,10 +37,14 @@ class MjrContext:
         self._capture: Optional[SceneCapture] = None
         self._size = (0, 0)
         self._flags: tuple[bool, bool] = (False, False)
+        self._range = (0.0, 1.0)
+        self._orthographic = False
         self.offWidth = self.offHeight = 0
         self.offSamples = 0
         self.currentBuffer = int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN)
         self.readDepthMap = 0
+        # Model whose textures, meshes or height fields changed since the last image.
+        self._changed: Any = None
         if model is not None:
             self._capture = SceneCapture(model, 1, None, None)
             visual = model.vis
@@ -90,12 +94,16 @@ def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
     if segment and not id_color:
         raise NotImplementedError("scene.flags[mjRND_SEGMENT] without mjRND_IDCOLOR (random colors) is not supported")
     with capture.exclusive():
+        if con._changed is not None:
+            capture.reload(con._changed)
+            con._changed = None
         capture.use_scene(scn)
         capture.frames.clear()
         capture.capture(height, width, colors=False)
     con._size, con._flags = (height, width), (segment, id_color)
     camera = scn.camera[0]
     con._range = float(camera.frustum_near), float(camera.frustum_far)
+    con._orthographic = bool(getattr(camera, "orthographic", False))
 
 
 @_for_our_context
@@ -129,7 +137,8 @@ def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None
     if depth is not None:
         near, far = con._range
         metric = wanted["depth"].reshape(height, width).astype(np.float64)
-        from_far = near * (far - metric) / (metric * (far - near))
+        nearness = 1.0 if con._orthographic else near / metric
+        from_far = nearness * (far - metric) / (far - near)
         zero_far = getattr(mujoco, "mjtDepthMap", None) is not None and int(con.readDepthMap) == int(
             mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         )
@@ -156,23 +165,26 @@ def mjr_resizeOffscreen(width: int, height: int, con: MjrContext) -> None:
 
 @_for_our_context
 def mjr_uploadTexture(m: Any, con: MjrContext, texid: int) -> None:
-    """Copies the textures of a model again."""
+    """Copies the textures of a model again before the next image."""
     del texid
-    con._open().reload(m)
+    con._open()
+    con._changed = m
 
 
 @_for_our_context
 def mjr_uploadMesh(m: Any, con: MjrContext, meshid: int) -> None:
-    """Copies the meshes of a model again."""
+    """Copies the meshes of a model again before the next image."""
     del meshid
-    con._open().reload(m)
+    con._open()
+    con._changed = m
 
 
 @_for_our_context
 def mjr_uploadHField(m: Any, con: MjrContext, hfieldid: int) -> None:
-    """Copies the height fields of a model again."""
+    """Copies the height fields of a model again before the next image."""
     del hfieldid
-    con._open().reload(m)
+    con._open()
+    con._changed = m
 
 
 @_for_our_context

@@ -4,10 +4,12 @@ use crate::layout::{geom_layout, light_layout};
 use crate::model_arrays::ModelArrays;
 use crate::panic::catch;
 use kinetoscope_look::horizon_haze;
-use kinetoscope_look::mjv::{Background, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader, TextureRule};
+use kinetoscope_look::mjv::{
+    Background, GeomLayout, LightLayout, LineView, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader, TextureRule,
+};
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest, ToneCurve, View};
-use kinetoscope_scene::Haze;
+use kinetoscope_scene::{Haze, OpenGlRules};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -24,6 +26,7 @@ const SCRATCH_BYTES: usize = 64 << 20;
 #[pyclass(module = "kinetoscope_render._render")]
 pub(crate) struct FrameList {
     reader: MjvReader<ModelArrays>,
+    kind: ReaderKind,
     /// Present until the list is dropped.
     renderer: Option<ParallelRenderer>,
     /// Process that started the renderer's threads: a forked process has none of them.
@@ -33,6 +36,29 @@ pub(crate) struct FrameList {
     frames: Vec<CapturedFrame>,
     rgba: Vec<u8>,
     mask: Vec<i32>,
+}
+
+/// All that a reader needs besides the model.
+#[derive(Clone, Copy)]
+struct ReaderKind {
+    geoms: GeomLayout,
+    lights: LightLayout,
+    textures: TextureRule,
+    rules: OpenGlRules,
+    decor_casts: bool,
+}
+
+impl ReaderKind {
+    fn reader(&self, arrays: &Bound<'_, PyDict>) -> PyResult<MjvReader<ModelArrays>> {
+        let model = ModelArrays::from_dict(arrays)?;
+        model.validate()?;
+        let skins = model.skins();
+        let reader = MjvReader::new(model, skins, self.geoms, self.lights).map_err(invalid)?;
+        Ok(reader
+            .with_texture_rule(self.textures)
+            .with_opengl_rules(self.rules)
+            .with_shadows_of_decor(self.decor_casts))
+    }
 }
 
 /// A captured frame.
@@ -85,7 +111,9 @@ fn background(numbers: [f64; 13], has_skybox: bool) -> Background {
 #[pymethods]
 impl FrameList {
     /// Copies the arrays of a model. `arrays` has the names of `MjModel`; the layouts have the places of fields.
-    /// `wraps_textures` is true for versions of MuJoCo whose shapes have texture coordinates.
+    /// `wraps_textures` is true for versions of MuJoCo whose shapes have texture coordinates. `shadows` are half the side
+    /// of the square in which directional lights cast shadows \[m\], and the fraction of the angle in which spots do; decoration
+    /// casts shadows if `decor_casts` is true.
     #[new]
     fn new(
         arrays: &Bound<'_, PyDict>,
@@ -94,20 +122,29 @@ impl FrameList {
         threads: usize,
         samples: u8,
         wraps_textures: bool,
+        shadows: [f64; 2],
+        decor_casts: bool,
     ) -> PyResult<Self> {
         catch(|| {
-            let model = ModelArrays::from_dict(arrays)?;
-            model.validate()?;
-            let skins = model.skins();
+            let textures = if wraps_textures { TextureRule::Wrapped } else { TextureRule::Projected };
+            let [shadow_clip, shadow_scale] = shadows.map(|x| x as f32);
+            let rules = OpenGlRules { shadow_clip, shadow_scale };
             let (geoms, lights) = (geom_layout(geom_fields)?, light_layout(light_fields)?);
-            let reader = MjvReader::new(model, skins, geoms, lights).map_err(invalid)?;
-            let rule = if wraps_textures { TextureRule::Wrapped } else { TextureRule::Projected };
-            let reader = reader.with_texture_rule(rule);
+            let kind = ReaderKind { geoms, lights, textures, rules, decor_casts };
+            let reader = kind.reader(arrays)?;
             let cfg = RasterCfg { samples, tone: ToneCurve::Clip, groups: u32::MAX, ..RasterCfg::default() };
             let renderer = Some(ParallelRenderer::new(cfg, threads));
             let process = std::process::id();
             let (frames, rgba, mask) = (Vec::new(), Vec::new(), Vec::new());
-            Ok(Self { reader, renderer, process, cfg, threads, frames, rgba, mask })
+            Ok(Self { reader, kind, renderer, process, cfg, threads, frames, rgba, mask })
+        })
+    }
+
+    /// Copies the arrays of the model again. Captured frames stay as they are.
+    fn reload(&mut self, arrays: &Bound<'_, PyDict>) -> PyResult<()> {
+        catch(|| {
+            self.reader = self.kind.reader(arrays)?;
+            Ok(())
         })
     }
 
@@ -127,22 +164,25 @@ impl FrameList {
     }
 
     /// Captures a scene: the memory of its geoms (N, stride) and lights (L, stride), its camera (position, forward, up,
-    /// center, half width, bottom, top, near, far), its visual options, and the vertices of its skins and flexes.
+    /// center, half width, bottom, top, near, far, 1 if it is orthographic, width of lines \[pixels\]), its visual options, and the vertices of its skins and flexes.
     #[pyo3(signature = (geoms, lights, camera, options, effects, size, soft=None))]
     #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn capture(
         &mut self,
         geoms: PyReadonlyArray2<'_, u8>,
         lights: PyReadonlyArray2<'_, u8>,
-        camera: [f64; 15],
+        camera: [f64; 17],
         options: [f64; 13],
         effects: [bool; 2],
         size: [usize; 2],
         soft: Option<SoftArrays<'_>>,
     ) -> PyResult<()> {
         catch(|| {
-            let [px, py, pz, fx, fy, fz, ux, uy, uz, center, half_width, bottom, top, near, far] = camera;
+            let [px, py, pz, fx, fy, fz, ux, uy, uz, center, half_width, bottom, top, near, far, parallel, line] =
+                camera;
+            let parallel = parallel != 0.0;
             let camera = MjvCamera {
+                orthographic: parallel,
                 position: [px, py, pz],
                 forward: [fx, fy, fz],
                 up: [ux, uy, uz],
@@ -156,12 +196,20 @@ impl FrameList {
             let [width, height] = size;
             let [fx, fy, cx, cy] = camera.intrinsics(width, height).map_err(invalid)?;
             let world_from_camera = camera.world_from_camera().map_err(invalid)?;
-            let view = View { width, height, fx, fy, cx, cy, near: near as f32, far: far as f32, world_from_camera };
+            let (near, far) = (near as f32, far as f32);
+            let view = View { parallel, width, height, fx, fy, cx, cy, near, far, world_from_camera };
             view.validate().map_err(invalid)?;
             let background = background(options, self.reader.has_skybox());
             let (geoms, lights) = (geoms.as_slice().map_err(invalid)?, lights.as_slice().map_err(invalid)?);
             let forward = camera.forward.map(|x| x as f32);
-            let mut memory = MjvMemory { geoms, lights, forward, ..MjvMemory::default() };
+            let lines = LineView {
+                position: world_from_camera.translation,
+                forward: world_from_camera.rotation.map(|row| row[2]),
+                width: line as f32 / fy,
+                near,
+                parallel,
+            };
+            let mut memory = MjvMemory { geoms, lights, forward, lines: Some(lines), ..MjvMemory::default() };
             if let Some((floats, integers)) = &soft {
                 let [skin_positions, skin_normals, flex_positions, flex_normals, flex_texcoords] = floats;
                 let [first_faces, faces] = integers;

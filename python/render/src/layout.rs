@@ -1,6 +1,6 @@
 //! Layouts of MuJoCo's structures, from dictionaries of Python.
 
-use kinetoscope_look::mjv::{GeomLayout, LightLayout, SoftTypes};
+use kinetoscope_look::mjv::{DecorTypes, GeomLayout, LightLayout, SoftTypes};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -30,6 +30,15 @@ pub(crate) fn geom_layout(fields: &Bound<'_, PyDict>) -> PyResult<GeomLayout> {
         shininess: get("shininess")?,
         reflectance: get("reflectance")?,
         soft: SoftTypes { skin: optional(fields, "mjGEOM_SKIN")?, flex: optional(fields, "mjGEOM_FLEX")? },
+        decor: DecorTypes {
+            sdf: optional(fields, "mjGEOM_SDF")?,
+            arrow: optional(fields, "mjGEOM_ARROW")?,
+            arrow1: optional(fields, "mjGEOM_ARROW1")?,
+            arrow2: optional(fields, "mjGEOM_ARROW2")?,
+            line: optional(fields, "mjGEOM_LINE")?,
+            line_box: optional(fields, "mjGEOM_LINEBOX")?,
+            triangle: optional(fields, "mjGEOM_TRIANGLE")?,
+        },
     })
 }
 

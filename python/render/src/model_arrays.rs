@@ -36,6 +36,10 @@ arrays! {
     mesh_facenum: i64,
     mesh_texcoordadr: i64,
     mesh_texcoordnum: i64,
+    mesh_normal: f32,
+    mesh_facenormal: i32,
+    mesh_normaladr: i64,
+    mesh_normalnum: i64,
     hfield_size: f64,
     hfield_nrow: i64,
     hfield_ncol: i64,
@@ -138,10 +142,14 @@ impl VisualModel for ModelArrays {
         let texcoords = checked_slice(self.mesh_texcoord.as_chunks().0, texcoord, texcoords);
         MeshArrays {
             positions: checked_slice(self.mesh_vert.as_chunks().0, vertex, vertices),
-            normals: &[],
+            normals: checked_slice(
+                self.mesh_normal.as_chunks().0,
+                rows(&self.mesh_normaladr),
+                rows(&self.mesh_normalnum),
+            ),
             texcoords: (has_texcoords && !texcoords.is_empty()).then_some(texcoords),
             faces: triangles,
-            face_normals: &[],
+            face_normals: checked_slice(self.mesh_facenormal.as_chunks().0, face, faces),
             face_texcoords: if corners.is_empty() { triangles } else { corners },
         }
     }

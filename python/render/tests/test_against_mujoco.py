@@ -1,8 +1,10 @@
 """Images against those of MuJoCo's own renderer of the installed version."""
 
+import comparison
 import mujoco
 import numpy as np
 import pytest
+from comparison import inside, psnr
 from conftest import CLOTH, MESHES, SHAPES, load, version
 
 import kinetoscope_render as kr
@@ -23,31 +25,9 @@ if version() >= (3, 0):
 def images(cls, model, data, camera):
     """Color, depth and segmentation."""
     renderer = cls(model, *SIZE)
-    renderer.update_scene(data, camera)
-    rgb = renderer.render().copy()
-    renderer.enable_depth_rendering()
-    depth = renderer.render().copy()
-    renderer.enable_segmentation_rendering()
-    renderer.disable_depth_rendering()
-    ids = renderer.render().copy()
-    if hasattr(renderer, "close"):
-        renderer.close()
-    return rgb, depth, ids
-
-
-def psnr(a, b):
-    mse = np.mean((a.astype(float) - b.astype(float)) ** 2)
-    return 10 * np.log10(255**2 / max(mse, 1e-9))
-
-
-def inside(ids):
-    """Pixels whose eight neighbors show the same object."""
-    key = ids[..., 0].astype(np.int64) * 1000 + ids[..., 1]
-    same = np.ones(key.shape, bool)
-    for y in (-1, 0, 1):
-        for x in (-1, 0, 1):
-            same &= np.roll(np.roll(key, y, 0), x, 1) == key
-    return same
+    found = comparison.images(renderer, data, camera)
+    comparison.close(renderer)
+    return found.rgb, found.depth, found.ids
 
 
 @pytest.mark.parametrize(("name", "xml", "camera", "least"), CASES, ids=lambda value: str(value)[:8])

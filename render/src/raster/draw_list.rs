@@ -6,7 +6,7 @@ use crate::lens::rays::LensRays;
 use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use kinetoscope_scene::shape::Cluster;
-use kinetoscope_scene::shape::RenderMesh;
+use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{Instance, LightingSpace, Marker, PoseF32, RenderScene};
 
 /// A primitive or a cluster that may be visible.
@@ -149,13 +149,21 @@ impl DrawList {
             let [lo, hi] = instance.shape.aabb();
             let local = projection.local(pose);
             let t = local.instance_from_camera.translation;
-            let margin = if projection.parallel { f32::NEG_INFINITY } else { 2.0 * projection.near };
-            let outside = (0..3).any(|k| t[k] < lo[k] - margin || t[k] > hi[k] + margin);
             let camera_from_instance = projection.world_from_camera.inverse_times(pose);
+            let outside = if projection.parallel {
+                // Lights without a near plane have all casters in front.
+                !projection.is_camera && projection.near == 0.0
+                    || is_in_front(projection, &camera_from_instance, lo, hi)
+            } else {
+                let margin = 2.0 * projection.near;
+                (0..3).any(|k| t[k] < lo[k] - margin || t[k] > hi[k] + margin)
+            };
             let placed = PlacedInstance { camera_from_instance, local, outside, level: 0, error: 0.0 };
             self.placed.push(placed);
             let layer = keep(instance);
-            if layer == Layer::Hidden {
+            if layer == Layer::Hidden
+                || matches!(instance.shape, Shape::Plane(_)) && is_seen_from_below(projection, &local)
+            {
                 continue;
             }
             let center = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
@@ -206,6 +214,19 @@ impl DrawList {
             order.then((a.instance, a.cluster).cmp(&(b.instance, b.cluster)))
         });
     }
+}
+
+/// True if the camera sees the back of a plane, which is invisible.
+fn is_seen_from_below(projection: &Projection, camera: &LocalCamera) -> bool {
+    let pose = &camera.instance_from_camera;
+    if projection.parallel { pose.rotation[2][2] >= 0.0 } else { pose.translation[2] <= 0.0 }
+}
+
+/// True if a box is in front of the near plane.
+fn is_in_front(projection: &Projection, camera_from_instance: &PoseF32, lo: [f32; 3], hi: [f32; 3]) -> bool {
+    let forward = camera_from_instance.rotation[2];
+    let nearest = |k: usize| (forward[k] * lo[k]).min(forward[k] * hi[k]);
+    camera_from_instance.translation[2] + nearest(0) + nearest(1) + nearest(2) > 2.0 * projection.near
 }
 
 /// True if all triangles of a cluster are certainly back-facing; false for a cluster that is not closed.

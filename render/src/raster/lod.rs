@@ -51,6 +51,7 @@ mod tests {
     fn half_a_pixel() {
         let bounds = [[-0.1, -0.2, -0.3], [0.3, 0.2, 0.1]];
         let view = View {
+            parallel: false,
             width: 320,
             height: 200,
             fx: 250.0,

@@ -4,7 +4,6 @@ use super::group::{Colors, SamplePositions, resolve};
 use super::multisample::{EdgeSamples, blend};
 use super::prepared_frame::PreparedFrame;
 use super::shadow::ShadowBand;
-use super::tone::encode;
 use crate::frame::{FrameMut, PixelGroup, Stage};
 use crate::geometry::bvh::TraversalStack;
 use crate::raster::tile::{BLOCK, Tile};
@@ -198,16 +197,16 @@ impl RasterScratch {
                 );
             }
         }
-        let (curve, exposure) = (plan.tone, plan.exposure);
+        let (curve, exposure, space) = (plan.tone, plan.exposure, context.shade.lighting.blend);
         for (block, row, at) in groups(tile, size) {
             s.vectorize(
                 #[inline(always)]
                 || {
                     let [r, g, b] = &colors[block * 4 + row];
                     // Written out: a closure that is called three times is compiled without the instruction set.
-                    let r = encode(s, curve, load(s, r) * exposure).to_int();
-                    let g = encode(s, curve, load(s, g) * exposure).to_int() * (1 << 8);
-                    let b = encode(s, curve, load(s, b) * exposure).to_int() * (1 << 16);
+                    let r = space.encode(s, curve, load(s, r) * exposure).to_int();
+                    let g = space.encode(s, curve, load(s, g) * exposure).to_int() * (1 << 8);
+                    let b = space.encode(s, curve, load(s, b) * exposure).to_int() * (1 << 16);
                     let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
                     let rgba: [i32; LANES] = rgba.array();
                     for (to, from) in pixels.color.iter_mut().zip(rgba) {

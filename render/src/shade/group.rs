@@ -119,9 +119,9 @@ fn resolve_lanes<S: Simd>(
 ) {
     let projection = context.projection;
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-    let direction = match bent {
-        None => projection.world_directions(s, u, v),
-        Some(ray) => ray.rotate(&projection.world_from_camera.rotation),
+    let (origin, direction) = match bent {
+        None => projection.world_rays(s, u, v),
+        Some(ray) => (V3::splat(s, [0.0; 3]), ray.rotate(&projection.world_from_camera.rotation)),
     };
     let mut length = direction.dot(direction).sqrt();
     if bent.is_some() {
@@ -131,7 +131,7 @@ fn resolve_lanes<S: Simd>(
     // Positions along forward rays are depths, along all others distances.
     let forward = context.lens.is_none_or(LensRays::is_forward);
     let ray = bent.map(|ray| LensRayLanes { direction: ray, forward });
-    let rays = CameraRays { uv, lens_rays: ray, direction };
+    let rays = CameraRays { uv, lens_rays: ray, origin, direction };
     let view = if colors.is_some() || context.albedo { direction.scale(1.0 / length) } else { direction };
     let nothing = splat_u(s, NO_ID);
     let missed = ids.simd_eq(nothing);
@@ -141,7 +141,13 @@ fn resolve_lanes<S: Simd>(
     let mut color = none;
     let mut mask = splat_i(s, 0);
     if colors.is_some() && missed.any_true() {
-        color = sky(s, context.shade.lighting, view, context.shade.pixel);
+        let toward = if projection.parallel {
+            // The sky of MuJoCo's renderer is at this fraction of the far plane.
+            direction.scale(splat(s, 0.7 * projection.far)).add(origin).unit(s)
+        } else {
+            view
+        };
+        color = sky(s, context.shade.lighting, toward, context.shade.pixel.angle());
         if let Some(horizon) = &context.shade.lighting.ground_haze {
             color = horizon.over_sky(s, view, color);
         }
@@ -192,7 +198,7 @@ fn resolve_lanes<S: Simd>(
                 seen = mirrors.reflect(s, context, &source, samples, here);
             }
             if let Some(horizon) = lighting.ground_haze.as_ref().filter(|horizon| horizon.ground == last) {
-                seen = horizon.over_ground(s, view, seen, || sky(s, lighting, view, pixel));
+                seen = horizon.over_ground(s, view, seen, || sky(s, lighting, view, pixel.angle()));
             }
             color = V3::select(here, seen, color);
         }

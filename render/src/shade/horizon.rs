@@ -5,7 +5,7 @@
 //! camera has the height 1, the lower cone goes from opaque at (1, 0) to clear at (1 - w², -w) for a width w, and the
 //! upper one to clear at (1 + w, 1).
 
-use super::tone::{decode_bytes, to_bytes};
+use super::tone::BlendSpace;
 use crate::simd::{F, M, Simd, V3, max, select, splat, sqrt_or_zero};
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32, RenderScene};
@@ -21,6 +21,7 @@ pub(crate) struct Horizon {
     /// Color, 0..=255.
     color: [f32; 3],
     width: f32,
+    blend: BlendSpace,
 }
 
 impl Horizon {
@@ -42,7 +43,8 @@ impl Horizon {
         let color = haze.color.map(|c| 255.0 * c.clamp(0.0, 1.0));
         let width = haze.width.clamp(0.0, 1.0);
         let usable = height > 0.0 && radius > 0.0 && radius.is_finite() && width.is_finite();
-        usable.then_some(Self { ground, up, radius, color, width })
+        let blend = BlendSpace { is_display: scene.opengl.is_some() };
+        usable.then_some(Self { ground, up, radius, color, width, blend })
     }
 
     /// Opacity of the haze in a direction (unit), and the directions beyond the end of the ground.
@@ -64,8 +66,8 @@ impl Horizon {
         let mix = {
             #[inline(always)]
             |color: F<S>, haze: f32| {
-                let color = to_bytes(s, color);
-                decode_bytes(color + (splat(s, haze) - color) * opacity)
+                let color = self.blend.to_bytes(s, color);
+                self.blend.from_bytes(color + (splat(s, haze) - color) * opacity)
             }
         };
         let [r, g, b] = self.color;

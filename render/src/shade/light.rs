@@ -5,9 +5,9 @@ use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{InstanceSurface, Surface};
 use super::texture::{self, MipRule};
-use super::tone;
+use super::tone::{self, BlendSpace};
 use crate::simd::{F, M, Simd, V3, abs, max, min, select, splat, sqrt_or_zero};
-use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, RenderScene, Texture};
+use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, OpenGlRules, RenderScene, Texture};
 use std::sync::Arc;
 
 /// Largest number of lights.
@@ -37,6 +37,8 @@ pub(crate) struct Lighting {
     skybox: Option<Arc<Texture>>,
     /// Rule of texture sampling.
     mip_rule: MipRule,
+    /// Space of all colors.
+    pub(crate) blend: BlendSpace,
     haze: Option<[f32; 3]>,
     /// Haze at the end of the ground, if the scene has any.
     pub(crate) ground_haze: Option<Horizon>,
@@ -52,8 +54,34 @@ pub(crate) struct ShadeContext<'a> {
     pub(crate) shadows: &'a [ShadowMap],
     /// Shadow rays, used instead of shadow maps; `None` for shadow maps.
     pub(crate) shadow_rays: Option<ShadowRays<'a>>,
-    /// Width of a pixel at depth 1 (for lenses whose rays do not all go forward, at distance 1).
-    pub(crate) pixel: f32,
+    pub(crate) pixel: PixelWidth,
+    /// Position from which highlights are seen, for a camera with parallel rays in MuJoCo's OpenGL renderer; `None` for
+    /// the direction of the rays.
+    pub(crate) eye: Option<[f32; 3]>,
+    /// False for reflections in MuJoCo's OpenGL renderer.
+    pub(crate) receives_shadows: bool,
+}
+
+/// Width of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PixelWidth {
+    /// Width at depth 1 (for lenses whose rays do not all go forward, at distance 1), or at any depth \[m\].
+    pub(crate) width: f32,
+    /// True if rays are parallel: the width is the same at any depth.
+    pub(crate) parallel: bool,
+}
+
+impl PixelWidth {
+    /// Width at a depth \[m\].
+    #[inline(always)]
+    fn at<S: Simd>(self, s: S, depth: F<S>) -> F<S> {
+        if self.parallel { splat(s, self.width) } else { depth * self.width }
+    }
+
+    /// Width at depth 1, 0 if rays are parallel.
+    pub(crate) fn angle(self) -> f32 {
+        if self.parallel { 0.0 } else { self.width }
+    }
 }
 
 /// Viewing rays of the shaded surfaces.
@@ -132,11 +160,13 @@ impl Lighting {
         shadow: impl Fn(usize) -> Option<usize>,
     ) {
         let sky = scene.sky;
+        let blend = BlendSpace { is_display: scene.opengl.is_some() };
+        self.blend = blend;
         (self.zenith, self.horizon, self.nadir) =
-            (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
+            (blend.from_srgb(sky.zenith), blend.from_srgb(sky.horizon), blend.from_srgb(sky.nadir));
         self.skybox.clone_from(&scene.skybox);
-        self.mip_rule = MipRule::of(scene.lighting_space);
-        self.haze = scene.haze.and_then(|h| h.color).map(tone::decode);
+        self.mip_rule = MipRule::of(scene);
+        self.haze = scene.haze.and_then(|h| h.color).map(|color| blend.from_srgb(color));
         self.lights.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
             let (cutoff_cos, exponent) = match light.kind {
@@ -239,11 +269,17 @@ fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
     result
 }
 
+/// 1 from one half on, else 0.
+#[inline(always)]
+fn whole<S: Simd>(s: S, x: F<S>) -> F<S> {
+    select(x.simd_ge(splat(s, 0.5)), splat(s, 1.0), splat(s, 0.0))
+}
+
 /// Sky color in a direction (unit). `pixel` is the width of a pixel at depth 1.
 #[inline(always)]
 pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f32) -> V3<S> {
     if let Some(image) = &lighting.skybox {
-        return skybox(s, image, lighting.mip_rule, direction, pixel);
+        return skybox(s, image, lighting, direction, pixel);
     }
     let k = sqrt_or_zero(s, min(abs(direction.z), splat(s, 1.0)));
     let up = direction.z.simd_gt(splat(s, 0.0));
@@ -259,22 +295,23 @@ pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f
 
 /// Skybox color in a direction: a cube map whose y is up.
 #[inline(never)]
-fn skybox<S: Simd>(s: S, image: &Texture, rule: MipRule, direction: V3<S>, pixel: f32) -> V3<S> {
+fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>, pixel: f32) -> V3<S> {
     s.vectorize(
         #[inline(always)]
         || {
             let all = direction.z.simd_eq(direction.z);
             let turned = V3 { x: direction.x, y: direction.z, z: -direction.y };
+            let (rule, blend) = (lighting.mip_rule, lighting.blend);
             let footprint = match rule {
                 MipRule::Sharp => splat(s, pixel),
                 // Away from the middle of a face, a pixel is wider on it, by the square of the distance to the face.
-                MipRule::OpenGl => {
+                MipRule::OpenGl | MipRule::OpenGlFaces => {
                     let nearest = max(max(abs(turned.x), abs(turned.y)), abs(turned.z));
                     splat(s, pixel) / max(nearest * nearest, splat(s, 1e-3))
                 }
             };
             let [r, g, b] = texture::sample_cube(s, image, rule, turned, footprint, all);
-            V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
+            V3 { x: blend.from_bytes(r), y: blend.from_bytes(g), z: blend.from_bytes(b) }
         },
     )
 }
@@ -290,10 +327,12 @@ pub(crate) fn shade<S: Simd>(
     tint: f32,
     lanes: M<S>,
 ) -> V3<S> {
-    let ShadeContext { scene, lighting, shadows, shadow_rays, pixel } = *context;
+    let ShadeContext { scene, lighting, shadows, shadow_rays, pixel, eye, receives_shadows } = *context;
     let ViewRays { direction: view, distance } = rays;
     let material = &source.instance.material;
     let display = scene.lighting_space == LightingSpace::Display;
+    // In OpenGL, transparent surfaces are drawn at last, in the light of all lights.
+    let receives_shadows = receives_shadows && (scene.opengl.is_none() || material.rgba[3] >= 1.0);
     let base = if display {
         let [r, g, b, _] = material.rgba;
         V3::splat(s, [r, g, b])
@@ -303,6 +342,8 @@ pub(crate) fn shade<S: Simd>(
     let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
     let zero = splat(s, 0.0);
     let n = at.shading_normal;
+    let is_back = scene.opengl.is_some() && source.instance.group == OpenGlRules::BACK_GROUP;
+    let n = if is_back { n.scale(splat(s, -1.0)) } else { n };
     // Ambient light: interpolated between ground and sky by the normal's height.
     let up = n.z * 0.5 + 0.5;
     let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
@@ -342,28 +383,44 @@ pub(crate) fn shade<S: Simd>(
         let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
         let facing = max(n.dot(to), zero);
         let mut lit = strength;
-        if let Some(map) = prepared.shadow.and_then(|k| shadows.get(k)) {
-            let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
+        let mut ambient_light = strength;
+        // The ambient light of a light with shadows matters on its dark side, too.
+        let matters = {
+            #[inline(always)]
+            || {
+                let has_ambient = scene.opengl.is_some() && light.ambient != [0.0; 3];
+                lanes & if has_ambient { strength } else { facing * strength }.simd_gt(splat(s, 1e-4))
+            }
+        };
+        if let Some(map) = prepared.shadow.filter(|_| receives_shadows).and_then(|k| shadows.get(k)) {
+            let matters = matters();
             if matters.any_true() {
-                lit = lit * map.visibility(s, at.position, at.normal, source.placed.error, matters);
+                let seen = map.visibility(s, at.position, at.normal, source.placed.error, matters);
+                let seen = if scene.opengl.is_some() { whole(s, seen) } else { seen };
+                (lit, ambient_light) = (lit * seen, ambient_light * seen);
             }
         }
-        if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
-            let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
+        if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow && receives_shadows) {
+            let matters = matters();
             if matters.any_true() {
-                lit = lit * rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters);
+                let seen = rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters);
+                (lit, ambient_light) = (lit * seen, ambient_light * seen);
             }
         }
+        let own_pass = prepared.own_pass && receives_shadows;
         let mut pass_gloss = [zero, zero, zero];
-        let gloss = if prepared.own_pass { &mut pass_gloss } else { &mut gloss };
-        if !prepared.own_pass {
+        let gloss = if own_pass { &mut pass_gloss } else { &mut gloss };
+        if !own_pass {
             for (k, diffuse) in diffuse.iter_mut().enumerate() {
                 *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
             }
         }
         if shiny.is_visible(light.specular) {
             // The cosine between the normal and the half vector, compared before its root is taken.
-            let half = to.sub(view);
+            let half = to.sub(match eye {
+                None => view,
+                Some(eye) => at.position.sub(V3::splat(s, eye)).unit(s),
+            });
             let (along, square) = (n.dot(half), half.dot(half));
             let bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
             let seen = lanes & bright & along.simd_gt(zero) & facing.simd_gt(zero);
@@ -375,15 +432,22 @@ pub(crate) fn shade<S: Simd>(
                 }
             }
         }
-        if prepared.own_pass {
+        if own_pass {
+            let (bright, one) = (facing * lit, splat(s, 1.0));
+            if scene.opengl.is_some() {
+                let [r, g, b] = [0, 1, 2].map(|k| bright * light.diffuse[k] + ambient_light * light.ambient[k]);
+                passes.x += min(base.x * r + pass_gloss[0], one);
+                passes.y += min(base.y * g + pass_gloss[1], one);
+                passes.z += min(base.z * b + pass_gloss[2], one);
+                continue;
+            }
             // Ambient light has no shadow, and belongs to the first pass.
             for (k, diffuse) in diffuse.iter_mut().enumerate() {
                 *diffuse += strength * light.ambient[k];
             }
-            let bright = facing * lit;
-            passes.x += min(base.x * bright * light.diffuse[0] + pass_gloss[0], splat(s, 1.0));
-            passes.y += min(base.y * bright * light.diffuse[1] + pass_gloss[1], splat(s, 1.0));
-            passes.z += min(base.z * bright * light.diffuse[2] + pass_gloss[2], splat(s, 1.0));
+            passes.x += min(base.x * bright * light.diffuse[0] + pass_gloss[0], one);
+            passes.y += min(base.y * bright * light.diffuse[1] + pass_gloss[1], one);
+            passes.z += min(base.z * bright * light.diffuse[2] + pass_gloss[2], one);
         }
     }
     let one = splat(s, 1.0);
@@ -408,10 +472,11 @@ pub(crate) fn shade<S: Simd>(
         };
         let most = splat(s, 255.0);
         let (r, g, b) = (min(r, most), min(g, most), min(b, most));
-        V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
+        let blend = lighting.blend;
+        V3 { x: blend.from_bytes(r), y: blend.from_bytes(g), z: blend.from_bytes(b) }
     } else if material.metallic > 0.0 {
         // Mirrored light, tinted by the metal's color, and emission; without a traced mirror, the sky is mirrored.
-        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel);
+        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel.angle());
         let metal = V3 {
             x: base.x * (mirrored.x + gloss[0] + material.emission),
             y: base.y * (mirrored.y + gloss[1] + material.emission),
@@ -423,12 +488,15 @@ pub(crate) fn shade<S: Simd>(
         plain(gloss)
     };
     if let Some(haze) = scene.haze {
+        // OpenGL's fog depends on the depth.
+        let distance = if scene.opengl.is_some() { at.t } else { distance };
         let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
         let k = min(max(k, zero), splat(s, 1.0));
-        let k = k * k * (3.0 - k * 2.0);
+        // OpenGL's fog is linear.
+        let k = if scene.opengl.is_some() { k } else { k * k * (3.0 - k * 2.0) };
         let behind = match lighting.haze {
             Some(c) => V3::splat(s, c),
-            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }, pixel),
+            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }, pixel.angle()),
         };
         color = color.scale(1.0 - k).add(behind.scale(k));
     }
@@ -442,7 +510,7 @@ pub(crate) fn albedo<S: Simd>(
     source: &InstanceSurface<'_>,
     at: &Surface<S>,
     view: V3<S>,
-    pixel: f32,
+    pixel: PixelWidth,
     lanes: M<S>,
 ) -> V3<S> {
     let flat = source.color;
@@ -463,7 +531,7 @@ fn texels<S: Simd>(
     rule: MipRule,
     at: &Surface<S>,
     view: V3<S>,
-    pixel: f32,
+    pixel: PixelWidth,
     lanes: M<S>,
 ) -> Option<[F<S>; 3]> {
     let instance = source.instance;
@@ -472,8 +540,8 @@ fn texels<S: Simd>(
     // OpenGL.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
     let width = match rule {
-        MipRule::Sharp => at.t * pixel / sqrt_or_zero(s, slant),
-        MipRule::OpenGl => at.t * pixel / slant,
+        MipRule::Sharp => pixel.at(s, at.t) / sqrt_or_zero(s, slant),
+        MipRule::OpenGl | MipRule::OpenGlFaces => pixel.at(s, at.t) / slant,
     };
     let scale = source.texture_scale;
     Some(if texture::is_cube(image) {
@@ -482,8 +550,12 @@ fn texels<S: Simd>(
             y: at.local_position.y * scale[1],
             z: at.local_position.z * scale[2],
         };
-        let largest = scale.iter().copied().fold(0.0, f32::max);
-        texture::sample_cube(s, image, rule, direction, width * largest, lanes)
+        let footprint = if rule == MipRule::OpenGlFaces {
+            texture::face_footprint(s, direction, scale, width)
+        } else {
+            width * scale.iter().copied().fold(0.0, f32::max)
+        };
+        texture::sample_cube(s, image, rule, direction, footprint, lanes)
     } else {
         let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
         let (uv, density) = if has_uvs {

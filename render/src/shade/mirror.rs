@@ -2,10 +2,10 @@
 //! mirror seen in a mirror shows its own color.
 
 use super::group::{Colors, ShadingContext};
-use super::light::{ViewRays, shade, sky};
+use super::light::{ShadeContext, ViewRays, shade, sky};
 use super::shadow_rays::{SurfacePoints, arrays, lanes_of};
 use super::surface::{InstanceSurface, Surface, SurfacePointLanes};
-use super::tone::{decode_bytes, to_bytes};
+use super::tone::BlendSpace;
 use crate::geometry::bvh::TraversalStack;
 use crate::geometry::interpolation::interpolate_triangle;
 use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
@@ -231,11 +231,16 @@ impl Mirrors<'_> {
                         return color;
                     }
                     let hit = lanes & mask(s, hit_lanes);
+                    let blend = context.shade.lighting.blend;
                     // Written out: a closure that is called three times is compiled without the instruction set.
-                    let lit = V3 { x: add(s, color.x, sum.x), y: add(s, color.y, sum.y), z: add(s, color.z, sum.z) };
+                    let lit = V3 {
+                        x: add(s, blend, color.x, sum.x),
+                        y: add(s, blend, color.y, sum.y),
+                        z: add(s, blend, color.z, sum.z),
+                    };
                     return V3::select(hit, lit, color);
                 }
-                let beyond = sky(s, context.shade.lighting, mirrored_view, context.shade.pixel);
+                let beyond = sky(s, context.shade.lighting, mirrored_view, context.shade.pixel.angle());
                 let mirrored = sum.add(beyond.scale(load(s, &left)));
                 V3::select(lanes, color.scale(splat(s, 1.0 - r)).add(mirrored.scale(splat(s, r))), color)
             },
@@ -256,6 +261,8 @@ impl Mirrors<'_> {
     ) -> u64 {
         let (scene, mut at) = (context.shade.scene, SurfaceLanes::EMPTY);
         let display = scene.lighting_space == LightingSpace::Display;
+        let blend = context.shade.lighting.blend;
+        let lit = ShadeContext { receives_shadows: scene.opengl.is_none(), ..context.shade };
         let mut hit_lanes = 0;
         for _ in 0..MAX_PASSES {
             let mut hits = [None; LANES];
@@ -294,10 +301,9 @@ impl Mirrors<'_> {
                 let here = at.surface(s, distance / length);
                 let [x, y, z] = &directions;
                 let direction = V3 { x: load(s, x), y: load(s, y), z: load(s, z) };
-                let seen =
-                    shade(s, &context.shade, &source, &here, ViewRays { direction, distance }, tint, mask(s, bits));
+                let seen = shade(s, &lit, &source, &here, ViewRays { direction, distance }, tint, mask(s, bits));
                 let seen = if display {
-                    V3 { x: to_bytes(s, seen.x), y: to_bytes(s, seen.y), z: to_bytes(s, seen.z) }
+                    V3 { x: blend.to_bytes(s, seen.x), y: blend.to_bytes(s, seen.y), z: blend.to_bytes(s, seen.z) }
                 } else {
                     seen
                 };
@@ -359,6 +365,6 @@ fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
 
 /// Linear light of a sum of linear light and of sRGB bytes, clamped at white.
 #[inline(always)]
-fn add<S: Simd>(s: S, light: F<S>, byte: F<S>) -> F<S> {
-    decode_bytes(min(max(to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
+fn add<S: Simd>(s: S, blend: BlendSpace, light: F<S>, byte: F<S>) -> F<S> {
+    blend.from_bytes(min(max(blend.to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
 }

@@ -22,6 +22,8 @@ pub(crate) struct MotionVectors {
 enum PreviousProjection {
     /// fx, fy, cx, cy \[pixels\].
     Pinhole([f32; 4]),
+    /// Pixels per meter along x and y, and the pixel on the axis, of an orthographic camera.
+    Parallel([f32; 4]),
     Lens(Optics),
 }
 
@@ -58,7 +60,9 @@ impl MotionVectors {
         }
         let numbers = |view: &View| [view.fx, view.fy, view.cx, view.cy];
         let (then, now) = (numbers(view), numbers(render_request.view));
-        let same = then == now && view.world_from_camera == render_request.view.world_from_camera;
+        let same = then == now
+            && view.parallel == render_request.view.parallel
+            && view.world_from_camera == render_request.view.world_from_camera;
         self.list.extend(poses.iter().zip(render_request.poses).map(|(before, now)| InstanceMotion {
             is_static: same && before == now,
             camera_from_instance: view.world_from_camera.inverse_times(before),
@@ -68,11 +72,10 @@ impl MotionVectors {
             let [fx, fy, cx, cy] = then.map(f64::from);
             if then == now { *rays.optics() } else { rays.optics().with_pixels(PixelIntrinsics { fx, fy, cx, cy }) }
         };
-        self.previous = Some(
-            render_request
-                .lens
-                .map_or(PreviousProjection::Pinhole(then), |rays| PreviousProjection::Lens(behind(rays))),
-        );
+        self.previous = Some(render_request.lens.map_or(
+            if view.parallel { PreviousProjection::Parallel(then) } else { PreviousProjection::Pinhole(then) },
+            |rays| PreviousProjection::Lens(behind(rays)),
+        ));
         Ok(())
     }
 
@@ -105,6 +108,7 @@ impl MotionVectors {
                 let down = v - (there.y * nearness * fy + cy);
                 [select(ahead, right, unknown), select(ahead, down, unknown)]
             }
+            PreviousProjection::Parallel([fx, fy, cx, cy]) => [u - (there.x * fx + cx), v - (there.y * fy + cy)],
             PreviousProjection::Lens(optics) => {
                 let [x, y, z]: [[f32; LANES]; 3] = [there.x, there.y, there.z].map(|axis| axis.array());
                 let [u, v]: [[f32; LANES]; 2] = [u, v].map(|axis| axis.array());

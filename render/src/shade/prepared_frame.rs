@@ -3,7 +3,7 @@
 use super::MAX_BAND_SAMPLES;
 use super::group::ShadingContext;
 use super::horizon::Horizon;
-use super::light::{Lighting, MAX_LIGHTS, ShadeContext};
+use super::light::{Lighting, MAX_LIGHTS, PixelWidth, ShadeContext};
 use super::mirror::{self, Mirrors, ReflectionBounds};
 use super::motion_vectors::MotionVectors;
 use super::shadow::{ShadowBand, ShadowMap};
@@ -23,7 +23,7 @@ use crate::request::RenderRequest;
 use crate::shutter::Shutter;
 use crate::trace::RayTracer;
 use crate::visibility::{Projection, RenderError, View};
-use kinetoscope_scene::{Instance, LightingSpace, PoseF32};
+use kinetoscope_scene::{Instance, Light, LightingSpace, PoseF32};
 use std::cell::RefCell;
 
 /// Largest number of lights with a shadow map.
@@ -130,6 +130,9 @@ impl PreparedFrame {
             return Err(RenderError::ExposureCompensation { stops: exposure_compensation as f32 });
         }
         renderer.validate()?;
+        if view.parallel && (render_request.lens.is_some() || renderer.traces_visibility(false)) {
+            return Err(RenderError::Orthographic { renderer: renderer.name() });
+        }
         check_occlusion(cfg, renderer)?;
         if poses.len() != scene.instances().len() {
             return Err(RenderError::PoseCount { expected: scene.instances().len(), found: poses.len() });
@@ -161,7 +164,7 @@ impl PreparedFrame {
         self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded && cfg.reflections);
         let casts_rays = self.shadow_rays || self.occlusion_rays > 0 || self.first_mirror.is_some();
         if shaded {
-            self.prepare_lights(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, render_request);
+            self.prepare_lights(cfg, render_request);
         }
         self.planes = if multisampled { SAMPLES.len() } else { 1 };
         self.traces_visibility = renderer.traces_visibility(render_request.lens.is_some());
@@ -189,13 +192,18 @@ impl PreparedFrame {
         let lights = lights.unwrap_or(&scene.lights);
         // Index of the light of each shadow map.
         let mut maps: [Option<usize>; MAX_SHADOWS] = [None; MAX_SHADOWS];
-        if cfg.shadows {
+        if cfg.shadows && !self.shadow_rays {
             let side = shadow_side(cfg, view);
             let light_sources = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
             let mut views = [None; MAX_LIGHTS];
             let mut casting = [0; MAX_LIGHTS];
             let light_sources = light_sources.filter(|(_, l)| l.cast_shadow);
-            let light_sources = light_sources.filter_map(|(k, light)| Some((k, LightView::from_light(light)?)));
+            let limits = |light: &LightView, of: &Light| match scene.opengl {
+                Some(rules) => light.limited(of, &rules, [view.near, view.far]),
+                None => Some(*light),
+            };
+            let light_sources =
+                light_sources.filter_map(|(k, light)| Some((k, limits(&LightView::from_light(light)?, light)?)));
             for ((k, light_view), (view, of)) in light_sources.zip(views.iter_mut().zip(&mut casting)) {
                 (*view, *of) = (Some(light_view), k);
             }
@@ -223,7 +231,9 @@ impl PreparedFrame {
         let shadow = |k| maps.iter().position(|light| *light == Some(k));
         self.lighting.prepare(scene, lights, forward, cfg.shadows, shadow);
         let shown = |i: &Instance| Layer::for_instance(i, cfg.groups) != Layer::Hidden;
-        self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
+        let has_horizon = !view.parallel;
+        self.lighting.ground_haze =
+            if has_horizon { Horizon::of(scene, poses, view.world_from_camera.translation, shown) } else { None };
     }
 
     /// True if there are shadow maps to render.
@@ -283,9 +293,15 @@ impl PreparedFrame {
                 lighting: &self.lighting,
                 shadows: &self.shadows[..self.map_count],
                 shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
-                pixel: render_request
-                    .lens
-                    .map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel_spacing() as f32),
+                pixel: PixelWidth {
+                    width: render_request
+                        .lens
+                        .map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel_spacing() as f32),
+                    parallel: projection.parallel,
+                },
+                eye: (projection.parallel && render_request.scene.opengl.is_some())
+                    .then_some(projection.world_from_camera.translation),
+                receives_shadows: true,
             },
             mirrors,
             surface,

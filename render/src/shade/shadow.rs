@@ -21,6 +21,8 @@ pub(crate) struct ShadowMap {
     side: usize,
     /// Rotation from the world's axes to the light's.
     light_from_world: [[f32; 3]; 3],
+    /// Range of x and y in which the light casts shadows, see [`LightView::limits`].
+    limits: Option<[[f32; 2]; 2]>,
     /// Width of a texel on a surface \[m\]: at any depth, or at depth 1 for a spot.
     texel: f32,
     /// Nearness at each texel, row by row: the taps of a point are contiguous in four rows.
@@ -58,6 +60,7 @@ impl ShadowMap {
     pub(crate) fn empty() -> Self {
         let projection = Projection {
             parallel: true,
+            is_camera: false,
             width: BLOCK,
             height: BLOCK,
             fx: 1.0,
@@ -73,6 +76,7 @@ impl ShadowMap {
             list: DrawList::default(),
             side: 0,
             light_from_world: PoseF32::IDENTITY.rotation,
+            limits: None,
             texel: 1.0,
             nearness: Vec::new(),
             range: Vec::new(),
@@ -110,6 +114,7 @@ impl ShadowMap {
         self.texel = 1.0 / projection.fx;
         self.light_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
+        self.limits = light.limits(&projection);
         self.list.build(
             &projection,
             None,
@@ -193,12 +198,18 @@ impl ShadowMap {
             let inverse = 1.0 / c.z;
             (c.x * inverse * p.fx, c.y * inverse * p.fy, inverse * (1.0 / (1.0 - self.texel * 0.3)))
         };
+        let mut inside = c.z.simd_gt(splat(s, p.near));
+        if let Some([lo, hi]) = self.limits {
+            inside &= x.simd_ge(splat(s, lo[0] * p.fx))
+                & x.simd_le(splat(s, hi[0] * p.fx))
+                & y.simd_ge(splat(s, lo[1] * p.fy))
+                & y.simd_le(splat(s, hi[1] * p.fy));
+        }
         let (x, y) = (x + (p.cx - 0.5), y + (p.cy - 0.5));
-        let inside = x.simd_gt(splat(s, 2.0))
+        inside &= x.simd_gt(splat(s, 2.0))
             & y.simd_gt(splat(s, 2.0))
             & x.simd_lt(splat(s, p.width as f32 - 3.0))
-            & y.simd_lt(splat(s, p.height as f32 - 3.0))
-            & c.z.simd_gt(splat(s, p.near));
+            & y.simd_lt(splat(s, p.height as f32 - 3.0));
         let wanted = inside & lanes;
         let bits = wanted.to_bitmask();
         if bits == 0 {

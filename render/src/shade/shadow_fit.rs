@@ -3,7 +3,7 @@
 use super::light::unit;
 use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene};
+use kinetoscope_scene::{Instance, Light, LightKind, OpenGlRules, PoseF32, RenderScene};
 
 /// Margin around the covered part, in texels: for the taps around a point and for its offset along the normal.
 const MARGIN: f32 = 6.0;
@@ -65,6 +65,8 @@ pub(super) struct LightView {
     pub(super) rotation: [[f32; 3]; 3],
     /// Range that the light can reach.
     cone: Extent,
+    /// True if shadows end at this range: then the map covers no more.
+    clips: bool,
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -88,7 +90,9 @@ impl LightView {
     pub(super) fn from_light(light: &Light) -> Option<Self> {
         let rotation = frame_along(unit(light.direction));
         match light.kind {
-            LightKind::Directional => Some(Self { parallel: true, position: [0.0; 3], rotation, cone: Extent::ALL }),
+            LightKind::Directional => {
+                Some(Self { parallel: true, position: [0.0; 3], rotation, cone: Extent::ALL, clips: false })
+            }
             LightKind::Spot { cutoff_deg, .. } => {
                 let finite = light.position.iter().all(|x| x.is_finite());
                 if !finite || cutoff_deg.is_nan() || cutoff_deg <= 0.0 {
@@ -96,10 +100,32 @@ impl LightView {
                 }
                 let half = f64::from(cutoff_deg.min(SPOT_CUTOFF) + 1.0).to_radians().tan() as f32;
                 let cone = Extent { lo: [-half, -half, SPOT_NEAR], hi: [half, half, f32::INFINITY] };
-                Some(Self { parallel: false, position: light.position, rotation, cone })
+                Some(Self { parallel: false, position: light.position, rotation, cone, clips: false })
             }
             LightKind::Point => None,
         }
+    }
+
+    /// The view with the limits of MuJoCo's OpenGL renderer: the square around a directional light, the part of a spot's
+    /// cone, and the depths of the camera \[m\]. `None` if nothing is left.
+    pub(super) fn limited(&self, light: &Light, rules: &OpenGlRules, [near, far]: [f32; 2]) -> Option<Self> {
+        let half = match light.kind {
+            LightKind::Spot { cutoff_deg, .. } => {
+                // OpenGL's field of view is at most 160 degrees.
+                let angle = (cutoff_deg * rules.shadow_scale).min(80.0);
+                f64::from(angle).to_radians().tan() as f32
+            }
+            _ => rules.shadow_clip,
+        };
+        let position = light.position;
+        if !(half > 0.0 && half.is_finite() && position.iter().all(|x| x.is_finite())) {
+            return None;
+        }
+        let bounds = Extent {
+            lo: [-half, -half, near.max(if self.parallel { f32::MIN } else { SPOT_NEAR })],
+            hi: [half, half, far],
+        };
+        Some(Self { position, cone: bounds.intersection(&self.cone), clips: true, ..*self })
     }
 
     fn axis(&self, k: usize) -> [f32; 3] {
@@ -134,6 +160,15 @@ impl LightView {
         self.hull(&corners(lo, hi).map(|p| pose.apply(p)), margin)
     }
 
+    /// Range of x and y in which the light casts shadows, in the frame of the map's projection, \[m\] or slopes; `None`
+    /// for a light without limits.
+    pub(super) fn limits(&self, projection: &Projection) -> Option<[[f32; 2]; 2]> {
+        let d = [0, 1, 2].map(|k| projection.world_from_camera.translation[k] - self.position[k]);
+        let offset = [0, 1].map(|k| if self.parallel { dot(self.axis(k), d) } else { 0.0 });
+        let Extent { lo, hi } = self.cone;
+        self.clips.then(|| [lo, hi].map(|bound| [bound[0] - offset[0], bound[1] - offset[1]]))
+    }
+
     /// Projection of the map over the casters that can shade the receivers, and true if planes are among these casters;
     /// `None` without such casters.
     pub(super) fn fit(
@@ -149,7 +184,8 @@ impl LightView {
         let things = || scene.instances().iter().zip(poses);
         for (instance, pose) in things().filter(|(i, _)| casts(i) && !matches!(i.shape, Shape::Plane(_))) {
             let one = self.of_box(instance, pose, MAX_LOD_ERROR).shading(&receivers);
-            if !one.is_empty() {
+            let in_range = !self.clips || one.hi[2] >= self.cone.lo[2];
+            if in_range && !one.is_empty() {
                 all.union(&one);
             }
         }
@@ -190,13 +226,14 @@ impl LightView {
         }
         let square = Projection {
             parallel: self.parallel,
+            is_camera: false,
             width: side,
             height: side,
             fx: scale,
             fy: scale,
             cx: middle - scale * center[0],
             cy: middle - scale * center[1],
-            near: SPOT_NEAR,
+            near: if self.clips { self.cone.lo[2] } else { SPOT_NEAR },
             far: 1000.0,
             world_from_camera: PoseF32 { rotation: self.rotation, translation: self.position },
         };
@@ -205,12 +242,13 @@ impl LightView {
         }
         let depth = (all.hi[2] - all.lo[2]).max(1e-3);
         let start = [center[0], center[1], all.lo[2] - 0.01 * depth - 1e-3];
-        let translation = [0, 1, 2].map(|k| dot(self.rotation[k], start));
+        let translation = [0, 1, 2].map(|k| self.position[k] + dot(self.rotation[k], start));
+        let near = if self.clips { (self.cone.lo[2] - start[2]).max(0.0) } else { 0.0 };
         Some((
             Projection {
                 cx: middle,
                 cy: middle,
-                near: 0.0,
+                near,
                 // Receivers behind all casters are still compared.
                 far: 1.1 * depth + 2e-3,
                 world_from_camera: PoseF32 { rotation: self.rotation, translation },
@@ -290,19 +328,22 @@ pub(super) fn visible_extents<const N: usize>(
 ) -> [Extent; N] {
     let Projection { width, height, fx, fy, cx, cy, near, far, .. } = *projection;
     let (w, h) = (width as f32, height as f32);
+    let is_parallel = projection.parallel;
+    let side = |x: f32, y: f32, c: f32| if is_parallel { [x, y, 0.0, c] } else { [x, y, c, 0.0] };
     // Positive inside, for points of the optical frame.
     let frustum = [
         [0.0, 0.0, 1.0, -near],
         [0.0, 0.0, -1.0, far],
-        [fx, 0.0, cx, 0.0],
-        [-fx, 0.0, w - cx, 0.0],
-        [0.0, fy, cy, 0.0],
-        [0.0, -fy, h - cy, 0.0],
+        side(fx, 0.0, cx),
+        side(-fx, 0.0, w - cx),
+        side(0.0, fy, cy),
+        side(0.0, -fy, h - cy),
     ];
     let frustum_corners: [[f32; 3]; 8] = std::array::from_fn(|c| {
         let z = if c & 4 == 0 { near } else { far };
         let (u, v) = (if c & 1 == 0 { 0.0 } else { w }, if c & 2 == 0 { 0.0 } else { h });
-        [(u - cx) / fx * z, (v - cy) / fy * z, z]
+        let k = if is_parallel { 1.0 } else { z };
+        [(u - cx) / fx * k, (v - cy) / fy * k, z]
     });
     let reach = frustum_corners[4..].iter().map(|p| dot(*p, *p).sqrt()).fold(0.0, f32::max);
     let mut out = [Extent::EMPTY; N];

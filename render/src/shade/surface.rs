@@ -74,6 +74,8 @@ pub(crate) struct CameraRays<S: Simd> {
     pub(crate) uv: [F<S>; 2],
     /// Rays through a lens; `None` for a pinhole.
     pub(crate) lens_rays: Option<LensRayLanes<S>>,
+    /// Origins relative to the camera, world frame \[m\]; 0 unless the rays are parallel.
+    pub(crate) origin: V3<S>,
     /// Directions in the world frame.
     pub(crate) direction: V3<S>,
 }
@@ -89,7 +91,7 @@ pub(crate) fn surface<S: Simd>(
     lanes: M<S>,
     rays: CameraRays<S>,
 ) -> Surface<S> {
-    let CameraRays { uv: [u, v], lens_rays, direction } = rays;
+    let CameraRays { uv: [u, v], lens_rays, origin, direction } = rays;
     let camera = &source.placed.local.instance_from_camera;
     let (o, d) = match lens_rays {
         None => projection.rays(s, &source.placed.local, u, v),
@@ -122,7 +124,8 @@ pub(crate) fn surface<S: Simd>(
     let world = source.world_from_instance;
     let local_position = o.add(d.scale(t));
     // From the camera outward, as for the depth: both agree to the last digits.
-    let position = direction.scale(t).add(V3::splat(s, projection.world_from_camera.translation));
+    let eye = V3::splat(s, projection.world_from_camera.translation);
+    let position = direction.scale(t).add(if projection.parallel { eye.add(origin) } else { eye });
     Surface {
         t,
         normal: normal.scale(flip).rotate(&world.rotation),

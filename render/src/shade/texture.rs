@@ -7,7 +7,7 @@
 //! averaged in linear light.
 
 use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
-use kinetoscope_scene::{LightingSpace, MipLevel, Texture, TextureKind};
+use kinetoscope_scene::{LightingSpace, MipLevel, RenderScene, Texture, TextureKind};
 
 /// Adding and subtracting this rounds to an integer (below 2^22).
 const ROUND: f32 = 12_582_912.0;
@@ -20,12 +20,18 @@ pub(crate) enum MipRule {
     Sharp,
     /// Two levels, as OpenGL's `GL_LINEAR_MIPMAP_LINEAR`.
     OpenGl,
+    /// The same, and the width of a pixel on a cube texture is that on its face.
+    OpenGlFaces,
 }
 
 impl MipRule {
-    /// Rule of a lighting space: MuJoCo's renderer has OpenGL's rule.
-    pub(crate) fn of(space: LightingSpace) -> Self {
-        if space == LightingSpace::Display { Self::OpenGl } else { Self::Sharp }
+    /// Rule of a scene: MuJoCo's renderer has OpenGL's rule.
+    pub(crate) fn of(scene: &RenderScene) -> Self {
+        match scene.lighting_space {
+            LightingSpace::Linear => Self::Sharp,
+            LightingSpace::Display if scene.opengl.is_none() => Self::OpenGl,
+            LightingSpace::Display => Self::OpenGlFaces,
+        }
     }
 }
 
@@ -120,6 +126,19 @@ pub(crate) fn sample_cube<S: Simd>(
     )
 }
 
+/// Width on a cube of half length 1 of pixels that are `width` wide on a surface, in directions that are points of the
+/// surface times `scale`: that on the face of the cube.
+#[inline(always)]
+pub(crate) fn face_footprint<S: Simd>(s: S, d: V3<S>, scale: [f32; 3], width: F<S>) -> F<S> {
+    let (x, y, z) = (abs(d.x), abs(d.y), abs(d.z));
+    let by_x = x.simd_ge(y) & x.simd_ge(z);
+    let by_y = !by_x & y.simd_ge(z);
+    let major = select(by_x, x, select(by_y, y, z));
+    let [on_x, on_y, on_z] = [scale[1].max(scale[2]), scale[0].max(scale[2]), scale[0].max(scale[1])];
+    let across = select(by_x, splat(s, on_x), select(by_y, splat(s, on_y), splat(s, on_z)));
+    width * across / max(major, splat(s, 1e-6))
+}
+
 /// Interpolates the colors of `at` between the mip levels for pixels `texels` wide.
 ///
 /// Neighboring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
@@ -150,7 +169,7 @@ fn sample_levels<S: Simd>(
             _ if last => zero,
             MipRule::Sharp => min(max(texels * (4.0 / width) - 7.0, zero), one),
             // The binary logarithm of 1..=2, with an error of 0.009.
-            MipRule::OpenGl => {
+            MipRule::OpenGl | MipRule::OpenGlFaces => {
                 let x = min(max(texels * (1.0 / width) - 1.0, zero), one);
                 x * (x * -0.3465 + 1.3465)
             }

@@ -90,6 +90,38 @@ pub(crate) fn to_bytes<S: Simd>(s: S, x: F<S>) -> F<S> {
     to_srgb(s, min(max(x, splat(s, 0.0)), splat(s, 1.0))) - 0.5
 }
 
+/// Space of the colors that are added up and blended: linear light, or display colors in 0..=1, as in MuJoCo's OpenGL
+/// renderer.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BlendSpace {
+    pub(crate) is_display: bool,
+}
+
+impl BlendSpace {
+    /// From sRGB bytes (0..=255).
+    #[inline(always)]
+    pub(crate) fn from_bytes<S: Simd>(self, x: F<S>) -> F<S> {
+        if self.is_display { x * (1.0 / 255.0) } else { decode_bytes(x) }
+    }
+
+    /// To sRGB bytes, 0..=255, not rounded.
+    #[inline(always)]
+    pub(crate) fn to_bytes<S: Simd>(self, s: S, x: F<S>) -> F<S> {
+        if self.is_display { min(max(x, splat(s, 0.0)), splat(s, 1.0)) * 255.0 } else { to_bytes(s, x) }
+    }
+
+    /// From an sRGB color.
+    pub(crate) fn from_srgb(self, c: [f32; 3]) -> [f32; 3] {
+        if self.is_display { c } else { decode(c) }
+    }
+
+    /// As [`encode`].
+    #[inline(always)]
+    pub(crate) fn encode<S: Simd>(self, s: S, curve: ToneCurve, x: F<S>) -> F<S> {
+        if self.is_display { self.to_bytes(s, x) + 0.5 } else { encode(s, curve, x) }
+    }
+}
+
 /// Converts an sRGB color to linear light.
 pub(crate) fn decode(c: [f32; 3]) -> [f32; 3] {
     c.map(kinetoscope_scene::decode_srgb)

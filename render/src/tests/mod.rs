@@ -11,6 +11,8 @@ mod lenses;
 mod lighting;
 mod lod;
 mod mirrors;
+mod opengl;
+mod orthographic;
 mod progress;
 mod reference;
 mod robots;

@@ -108,6 +108,12 @@ pub enum RenderError {
         /// Name of the renderer.
         renderer: &'static str,
     },
+    /// The camera is orthographic, but the renderer or the lens is not.
+    #[error("orthographic cameras need renderer: Raster or Hybrid, without a lens; the renderer is {renderer}")]
+    Orthographic {
+        /// Name of the renderer.
+        renderer: &'static str,
+    },
     /// A feature needs path tracing, but the renderer has none.
     #[error("{what} needs path tracing, which the renderer {renderer} does not support; use renderer: RayTraced")]
     NeedsPathTracing {

@@ -9,6 +9,8 @@ use kinetoscope_scene::PoseF32;
 pub(crate) struct Projection {
     /// True if rays are parallel; `fx` and `fy` are pixels per meter then.
     pub(crate) parallel: bool,
+    /// True for cameras, which see nothing beyond `far`; false for lights.
+    pub(crate) is_camera: bool,
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) fx: f32,
@@ -22,8 +24,8 @@ pub(crate) struct Projection {
 
 impl From<&View> for Projection {
     fn from(v: &View) -> Self {
-        let View { width, height, fx, fy, cx, cy, near, far, world_from_camera } = *v;
-        Self { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera }
+        let View { parallel, width, height, fx, fy, cx, cy, near, far, world_from_camera } = *v;
+        Self { parallel, is_camera: true, width, height, fx, fy, cx, cy, near, far, world_from_camera }
     }
 }
 
@@ -43,7 +45,11 @@ impl Projection {
     /// Surfaces with a nearness up to this are beyond the far plane.
     pub(crate) fn farthest(&self) -> f32 {
         // The next smaller number, so that the far plane itself is visible.
-        if self.parallel { f32::MIN } else { (1.0 / self.far).next_down() }
+        match (self.parallel, self.is_camera) {
+            (true, true) => self.nearness(self.far).next_down(),
+            (true, false) => f32::MIN,
+            (false, _) => (1.0 / self.far).next_down(),
+        }
     }
 
     /// Largest visible nearness, at the near plane.
@@ -74,9 +80,22 @@ impl Projection {
         }
     }
 
-    /// Directions of the rays in the world frame, scaled such that the parameter is the depth. Not for parallel rays.
+    /// Rays in the world frame: origins relative to the camera, and directions scaled such that the parameter is the
+    /// depth.
     #[inline(always)]
-    pub(crate) fn world_directions<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
+    pub(crate) fn world_rays<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> (V3<S>, V3<S>) {
+        let none = V3::splat(s, [0.0; 3]);
+        if !self.parallel {
+            return (none, self.world_directions(s, u, v));
+        }
+        let r = &self.world_from_camera.rotation;
+        let across = V3 { x: (u - self.cx) * (1.0 / self.fx), y: (v - self.cy) * (1.0 / self.fy), z: splat(s, 0.0) };
+        (across.rotate(r), V3::splat(s, [r[0][2], r[1][2], r[2][2]]))
+    }
+
+    /// Directions of the rays of a pinhole in the world frame, scaled such that the parameter is the depth.
+    #[inline(always)]
+    fn world_directions<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
         let c = V3 { x: (u - self.cx) * (1.0 / self.fx), y: (v - self.cy) * (1.0 / self.fy), z: splat(s, 1.0) };
         c.rotate(&self.world_from_camera.rotation)
     }

@@ -1,14 +1,18 @@
-//! A pinhole camera with its pose.
+//! A camera with its pose.
 
 use super::RenderError;
 use kinetoscope_scene::PoseF32;
 
-/// A pinhole camera without distortion, with its pose.
+/// A pinhole camera without distortion, or an orthographic camera, with its pose.
 ///
 /// The axes are ROS's optical ones: x to the right of the image, y down, z forward. The ray of pixel (u, v) goes
 /// through (u + 0.5, v + 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
+    /// True for an orthographic camera: rays are parallel to the optical axis, `fx` and `fy` are pixels per meter, and
+    /// (`cx`, `cy`) is the pixel on the axis. Supported by [`Renderer::Raster`](crate::renderer::Renderer::Raster) and
+    /// [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid), without a lens.
+    pub parallel: bool,
     /// Pixels per row.
     pub width: usize,
     /// Rows.
@@ -60,6 +64,7 @@ impl View {
         let rotation = [0, 1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
         let f = 0.5 * size[1] as f32 / (0.5 * f64::from(fovy)).tan() as f32;
         let view = Self {
+            parallel: false,
             width: size[0],
             height: size[1],
             fx: f,
@@ -80,7 +85,7 @@ impl View {
     ///
     /// The error of the first invalid number.
     pub fn validate(&self) -> Result<(), RenderError> {
-        let Self { width, height, fx, fy, cx, cy, near, far, world_from_camera } = *self;
+        let Self { parallel: _, width, height, fx, fy, cx, cy, near, far, world_from_camera } = *self;
         if width == 0 || height == 0 || width.max(height) > Self::MAX_SIDE {
             return Err(RenderError::Size { width, height, limit: Self::MAX_SIDE });
         }

@@ -96,7 +96,7 @@ impl ViewTemplate {
     pub(super) fn view(&self, pixels: &PixelIntrinsics, world_from_camera: PoseF32) -> View {
         let Self { width, height, near, far } = *self;
         let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
-        View { width, height, fx, fy, cx, cy, near, far, world_from_camera }
+        View { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera }
     }
 }
 

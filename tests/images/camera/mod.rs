@@ -23,5 +23,5 @@ fn view([width, height]: [usize; 2], radians: f64, pose: &Pose, clip: [f64; 2]) 
     let pixels = Intrinsics::Fovy { radians }.to_pixels(width, height).unwrap();
     let [fx, fy, cx, cy] = [pixels.fx, pixels.fy, pixels.cx, pixels.cy].map(|x| x as f32);
     let [near, far] = clip.map(|c| c as f32);
-    View { width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(pose) }
+    View { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera: PoseF32::from(pose) }
 }

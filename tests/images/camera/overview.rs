@@ -23,7 +23,18 @@ fn balls(num_envs: usize) -> SimulationManager {
 fn above() -> View {
     let pose = look_at_pose([0.0, 0.0, 12.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
     let (world_from_camera, [width, height]) = (PoseF32::from(&pose), SIZE);
-    View { width, height, fx: 500.0, fy: 500.0, cx: 200.0, cy: 200.0, near: 0.1, far: 50.0, world_from_camera }
+    View {
+        parallel: false,
+        width,
+        height,
+        fx: 500.0,
+        fy: 500.0,
+        cx: 200.0,
+        cy: 200.0,
+        near: 0.1,
+        far: 50.0,
+        world_from_camera,
+    }
 }
 
 /// Mask and position image from above.

@@ -94,7 +94,7 @@ fn ray_caster_views(camera: &RayCasterCamera, envs: usize) -> Vec<Option<CameraV
         let row: [f64; 7] = std::array::from_fn(|k| poses[(env, k)]);
         let world_from_camera = PoseF32::from(&row.iter().all(|x| x.is_finite()).then(|| from_row(&row))?);
         let [fx, fy, cx, cy] = [(0, 0), (1, 1), (0, 2), (1, 2)].map(|(row, column)| lenses[(env, row, column)] as f32);
-        let view = View { width, height, fx, fy, cx, cy, near, far, world_from_camera };
+        let view = View { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera };
         view.validate().ok()?;
         Some(CameraView { view, lens: Lens::default(), markers: Vec::new() })
     };

@@ -168,7 +168,18 @@ impl OrbitCamera {
 fn origin_view([width, height]: [usize; 2]) -> View {
     let [cx, cy] = [0.5 * width as f32, 0.5 * height as f32];
     let world_from_camera = kinetoscope_scene::PoseF32::IDENTITY;
-    View { width, height, fx: cy.max(1.0), fy: cy.max(1.0), cx, cy, near: 0.01, far: 100.0, world_from_camera }
+    View {
+        parallel: false,
+        width,
+        height,
+        fx: cy.max(1.0),
+        fy: cy.max(1.0),
+        cx,
+        cy,
+        near: 0.01,
+        far: 100.0,
+        world_from_camera,
+    }
 }
 
 /// Projects a world point to pixel coordinates; `None` if it is nearer than the near plane or behind the camera.

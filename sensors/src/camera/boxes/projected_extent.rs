@@ -223,6 +223,7 @@ mod tests {
     /// An image so wide that only the infinite plane reaches its edges.
     fn view() -> View {
         View {
+            parallel: false,
             width: 8640,
             height: 8480,
             fx: 500.0,

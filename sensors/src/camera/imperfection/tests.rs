@@ -16,7 +16,18 @@ const SIDE: usize = 200;
 fn view(size: [usize; 2], f: f32) -> View {
     let [cx, cy] = size.map(|side| 0.5 * side as f32);
     let world_from_camera = PoseF32::IDENTITY;
-    View { width: size[0], height: size[1], fx: f, fy: f, cx, cy, near: 0.01, far: 100.0, world_from_camera }
+    View {
+        parallel: false,
+        width: size[0],
+        height: size[1],
+        fx: f,
+        fy: f,
+        cx,
+        cy,
+        near: 0.01,
+        far: 100.0,
+        world_from_camera,
+    }
 }
 
 fn pinhole<'a>(view: &'a View, rng_key: &'a RngKey) -> ImageContext<'a> {
