@@ -18,6 +18,7 @@ mod randomize;
 mod rays;
 mod record;
 mod row;
+mod scale;
 mod settings;
 mod startup;
 mod step;
@@ -46,6 +47,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("python", python::run),
     ("startup", startup::run),
     ("memory", memory::run),
+    ("scale", scale::run),
 ];
 
 type Bench = fn(&Settings) -> BenchResult<Vec<Row>>;
@@ -55,7 +57,7 @@ type Bench = fn(&Settings) -> BenchResult<Vec<Row>>;
 #[command(name = "kinetoscope-benches")]
 struct Args {
     /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, ik, randomize,
-    /// python, startup, memory
+    /// python, startup, memory, scale
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

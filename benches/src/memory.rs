@@ -1,4 +1,4 @@
-//! Memory per additional environment, relative to one `mjData`: the growth of resident memory from 64 to 1024
+//! Memory per additional environment, with a limit and beside one `mjData`: the growth of resident memory from 64 to 1024
 //! environments. Each count runs in a separate process and takes a few steps, because untouched memory is not resident.
 
 use crate::models::{Case, drive_sr5, sr5};
@@ -12,9 +12,9 @@ const MANY: usize = 1024;
 /// Target: memory of an additional environment \[KiB\].
 const LIMIT: f64 = 8.0;
 const STEPS: u32 = 20;
-const HUMANOID: &str = "humanoid";
+pub(crate) const HUMANOID: &str = "humanoid";
 const SR5: &str = "SR5 + hand";
-const OURS: &str = "ours";
+pub(crate) const OURS: &str = "ours";
 const BARE: &str = "bare";
 
 pub(crate) fn run(_: &Settings) -> BenchResult<Vec<Row>> {
@@ -35,16 +35,17 @@ pub(crate) fn run(_: &Settings) -> BenchResult<Vec<Row>> {
 
 /// Memory per additional environment \[KiB\].
 fn growth(side: &str, case: &str) -> BenchResult<f64> {
-    let resident = |envs: usize| -> BenchResult<f64> {
-        let output =
-            Command::new(std::env::current_exe()?).args(["--memory-of", side, case, &envs.to_string()]).output()?;
-        let text = String::from_utf8(output.stdout)?;
-        text.trim().parse().map_err(|_| {
-            format!("a process that holds {envs} environments failed: {}", String::from_utf8_lossy(&output.stderr))
-                .into()
-        })
-    };
-    Ok((resident(MANY)? - resident(FEW)?) / (MANY - FEW) as f64 / 1024.0)
+    Ok((resident(side, case, MANY)? - resident(side, case, FEW)?) / (MANY - FEW) as f64 / 1024.0)
+}
+
+/// Resident memory of a process that holds `envs` environments \[bytes\].
+pub(crate) fn resident(side: &str, case: &str, envs: usize) -> BenchResult<f64> {
+    let output =
+        Command::new(std::env::current_exe()?).args(["--memory-of", side, case, &envs.to_string()]).output()?;
+    let text = String::from_utf8(output.stdout)?;
+    text.trim().parse().map_err(|_| {
+        format!("a process that holds {envs} environments failed: {}", String::from_utf8_lossy(&output.stderr)).into()
+    })
 }
 
 /// The measured process: creates environments, steps them, prints the resident memory \[bytes\].

@@ -4,7 +4,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::record::{Format, OverviewCfg, RecorderCfg, Topic};
 use kinetoscope::sim::Shard;
 use kinetoscope::sim::inspect::InspectCfg;
-use kinetoscope::tasks::EnvCfg;
+use kinetoscope::tasks::{AutoresetMode, EnvCfg};
 use kinetoscope::viewer::{
     EnvSelection, ImageWindowCfg, OrbitCamera, Overlays, ScreenshotCfg, ServeCfg, Speed, WindowCfg,
 };
@@ -76,7 +76,9 @@ fn views() {
 
 #[test]
 fn tasks_and_files() {
-    check("decimation = 4\nepisode_steps = 500", &EnvCfg { decimation: 4, episode_steps: Some(500) });
+    let autoreset = AutoresetMode::NextStep;
+    let task = EnvCfg { decimation: 4, episode_steps: Some(500), autoreset };
+    check("decimation = 4\nepisode_steps = 500\nautoreset = \"next_step\"", &task);
     let qpos = vec![("shoulder".into(), 0.5)];
     check(
         "floating_base = true\nqpos.shoulder = 0.5",

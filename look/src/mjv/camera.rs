@@ -28,11 +28,11 @@ pub struct MjvCamera {
 }
 
 /// Error of a camera whose axes are parallel, or whose frustum is empty.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("the camera has no valid frustum or axes: {camera:?}")]
 pub struct MjvCameraError {
     /// The camera.
-    pub camera: MjvCamera,
+    pub camera: Box<MjvCamera>,
 }
 
 impl MjvCamera {
@@ -55,7 +55,7 @@ impl MjvCamera {
         if side > 0.0 && self.near > 0.0 && numbers.iter().all(|x| x.is_finite()) {
             Ok(numbers)
         } else {
-            Err(MjvCameraError { camera: *self })
+            Err(self.error())
         }
     }
 
@@ -65,11 +65,14 @@ impl MjvCamera {
     /// The viewing direction is 0 or parallel to the upward direction.
     pub fn world_from_camera(&self) -> Result<PoseF32, MjvCameraError> {
         let [z, up] = [self.forward, self.up].map(nalgebra::Vector3::from);
-        let error = MjvCameraError { camera: *self };
-        let z = z.try_normalize(1e-12).ok_or(error)?;
-        let x = z.cross(&up).try_normalize(1e-9).ok_or(error)?;
+        let z = z.try_normalize(1e-12).ok_or_else(|| self.error())?;
+        let x = z.cross(&up).try_normalize(1e-9).ok_or_else(|| self.error())?;
         let y = z.cross(&x);
         let rotation = [0, 1, 2].map(|k| [x[k] as f32, y[k] as f32, z[k] as f32]);
         Ok(PoseF32 { rotation, translation: self.position.map(|x| x as f32) })
+    }
+
+    fn error(&self) -> MjvCameraError {
+        MjvCameraError { camera: Box::new(*self) }
     }
 }

@@ -564,12 +564,12 @@ impl<M: VisualModel> MjvReader<M> {
             self.colors.clear();
         }
         let key = rgb.map(f32::to_bits);
-        if !self.colors.contains_key(&key) {
-            let bytes = rgb.map(|c| (255.0 * c).round() as u8);
-            let texture = Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, 1, 1, 3, &bytes).ok()?;
-            self.colors.insert(key, Arc::new(texture));
+        if let Some(known) = self.colors.get(&key) {
+            return Some(Arc::clone(known));
         }
-        self.colors.get(&key).cloned()
+        let bytes = rgb.map(|c| (255.0 * c).round() as u8);
+        let texture = Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, 1, 1, 3, &bytes).ok()?;
+        Some(Arc::clone(self.colors.entry(key).or_insert(Arc::new(texture))))
     }
 
     fn omit(&mut self, message: String) {

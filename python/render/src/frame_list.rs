@@ -115,6 +115,7 @@ impl FrameList {
     /// of the square in which directional lights cast shadows \[m\], and the fraction of the angle in which spots do; decoration
     /// casts shadows if `decor_casts` is true.
     #[new]
+    #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn new(
         arrays: &Bound<'_, PyDict>,
         geom_fields: &Bound<'_, PyDict>,

@@ -12,8 +12,8 @@ use kinetoscope::sensors::ContactSensor;
 use kinetoscope::sim::{RobotId, SimulationManager};
 use kinetoscope::tasks::terms::{self, RootRanges};
 use kinetoscope::tasks::{
-    ActionTerm, CommandTerm, EnvBuilder, EnvCfg, EnvError, EpisodeRng, EventTerm, Noise, ObservationTerm, RewardTerm,
-    Space, TerminationTerm,
+    ActionTerm, AutoresetMode, CommandTerm, EnvBuilder, EnvCfg, EnvError, EpisodeRng, EventTerm, Noise,
+    ObservationTerm, RewardTerm, Space, TerminationTerm,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -24,7 +24,8 @@ use toml::{Table, Value};
 
 /// A task for learning agents in the environments of a simulation.
 ///
-/// ``cfg`` is a dict: ``decimation`` (physics steps in a step), ``episode_steps`` (limit of an episode), and the terms
+/// ``cfg`` is a dict: ``decimation`` (physics steps in a step), ``episode_steps`` (limit of an episode), ``autoreset``
+/// ("next_step", "same_step" or "disabled", as in Gymnasium), and the terms
 /// ``actions``, ``commands``, ``observations``, ``rewards``, ``terminations`` and ``events``, dicts by name whose
 /// ``type`` is the name of a ready-made term of Rust. The simulation is usable between steps; ``close`` ends the task.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -38,6 +39,7 @@ pub(crate) struct Task {
 struct TaskCfg {
     decimation: u32,
     episode_steps: Option<u64>,
+    autoreset: AutoresetMode,
     actions: Table,
     commands: Table,
     observations: Table,
@@ -48,11 +50,12 @@ struct TaskCfg {
 
 impl Default for TaskCfg {
     fn default() -> Self {
-        let EnvCfg { decimation, episode_steps } = EnvCfg::default();
+        let EnvCfg { decimation, episode_steps, autoreset } = EnvCfg::default();
         let none = Table::new;
         Self {
             decimation,
             episode_steps,
+            autoreset,
             actions: none(),
             commands: none(),
             observations: none(),
@@ -297,7 +300,7 @@ fn builder(
     sim: SimulationManager,
     cfg: &TaskCfg,
 ) -> Result<EnvBuilder, (Failure, Option<Box<SimulationManager>>)> {
-    let lengths = EnvCfg { decimation: cfg.decimation, episode_steps: cfg.episode_steps };
+    let lengths = EnvCfg { decimation: cfg.decimation, episode_steps: cfg.episode_steps, autoreset: cfg.autoreset };
     let mut builder = EnvBuilder::new(sim, lengths);
     match add_terms(shared, &builder, cfg) {
         Err(failure) => Err((failure, Some(Box::new(builder.into_sim())))),
@@ -429,8 +432,8 @@ impl Task {
     }
 
     /// One step with actions, shape (num_envs, columns). Returns observations, rewards, terminated, truncated and a dict
-    /// of ``final_observations``, ``reward_terms`` (num_envs, terms) and ``ended`` (episodes that ended: dicts). An
-    /// environment whose episode ends begins the next one in the same step.
+    /// of ``final_observations``, ``reward_terms`` (num_envs, terms) and ``ended`` (episodes that ended: dicts). By
+    /// default, an environment whose episode ends begins the next one in the same step (``autoreset``).
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'_, PyAny>) -> PyResult<StepResult<'py>> {
         let actions = array::<Ix2>(actions, "step, actions")?;
         let step = self.shared.task(py, |env| Ok(env.step(&actions)?))?;

@@ -242,7 +242,8 @@ fn two_publishers() {
     let fields = |path: &Path, topic: &str| Recording::open(path).unwrap().topic(topic, None).unwrap().fields.clone();
     let mut expected: Vec<String> = names.iter().flat_map(|topic| fields(&path, topic)).collect();
     let mut found = fields(&other, "/joint_states");
-    (expected.sort(), found.sort());
+    expected.sort();
+    found.sort();
     expected.dedup();
     assert!(names.len() > 1, "{names:?}");
     assert_eq!(found, expected);

@@ -67,7 +67,7 @@ impl Horizon {
             #[inline(always)]
             |color: F<S>, haze: f32| {
                 let color = self.blend.to_bytes(s, color);
-                self.blend.from_bytes(color + (splat(s, haze) - color) * opacity)
+                self.blend.color_of_bytes(color + (splat(s, haze) - color) * opacity)
             }
         };
         let [r, g, b] = self.color;

@@ -163,10 +163,10 @@ impl Lighting {
         let blend = BlendSpace { is_display: scene.opengl.is_some() };
         self.blend = blend;
         (self.zenith, self.horizon, self.nadir) =
-            (blend.from_srgb(sky.zenith), blend.from_srgb(sky.horizon), blend.from_srgb(sky.nadir));
+            (blend.color_of_srgb(sky.zenith), blend.color_of_srgb(sky.horizon), blend.color_of_srgb(sky.nadir));
         self.skybox.clone_from(&scene.skybox);
         self.mip_rule = MipRule::of(scene);
-        self.haze = scene.haze.and_then(|h| h.color).map(|color| blend.from_srgb(color));
+        self.haze = scene.haze.and_then(|h| h.color).map(|color| blend.color_of_srgb(color));
         self.lights.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
             let (cutoff_cos, exponent) = match light.kind {
@@ -311,7 +311,7 @@ fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>,
                 }
             };
             let [r, g, b] = texture::sample_cube(s, image, rule, turned, footprint, all);
-            V3 { x: blend.from_bytes(r), y: blend.from_bytes(g), z: blend.from_bytes(b) }
+            V3 { x: blend.color_of_bytes(r), y: blend.color_of_bytes(g), z: blend.color_of_bytes(b) }
         },
     )
 }
@@ -473,7 +473,7 @@ pub(crate) fn shade<S: Simd>(
         let most = splat(s, 255.0);
         let (r, g, b) = (min(r, most), min(g, most), min(b, most));
         let blend = lighting.blend;
-        V3 { x: blend.from_bytes(r), y: blend.from_bytes(g), z: blend.from_bytes(b) }
+        V3 { x: blend.color_of_bytes(r), y: blend.color_of_bytes(g), z: blend.color_of_bytes(b) }
     } else if material.metallic > 0.0 {
         // Mirrored light, tinted by the metal's color, and emission; without a traced mirror, the sky is mirrored.
         let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel.angle());

@@ -366,5 +366,5 @@ fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
 /// Linear light of a sum of linear light and of sRGB bytes, clamped at white.
 #[inline(always)]
 fn add<S: Simd>(s: S, blend: BlendSpace, light: F<S>, byte: F<S>) -> F<S> {
-    blend.from_bytes(min(max(blend.to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
+    blend.color_of_bytes(min(max(blend.to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
 }

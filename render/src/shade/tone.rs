@@ -100,7 +100,7 @@ pub(crate) struct BlendSpace {
 impl BlendSpace {
     /// From sRGB bytes (0..=255).
     #[inline(always)]
-    pub(crate) fn from_bytes<S: Simd>(self, x: F<S>) -> F<S> {
+    pub(crate) fn color_of_bytes<S: Simd>(self, x: F<S>) -> F<S> {
         if self.is_display { x * (1.0 / 255.0) } else { decode_bytes(x) }
     }
 
@@ -111,7 +111,7 @@ impl BlendSpace {
     }
 
     /// From an sRGB color.
-    pub(crate) fn from_srgb(self, c: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn color_of_srgb(self, c: [f32; 3]) -> [f32; 3] {
         if self.is_display { c } else { decode(c) }
     }
 

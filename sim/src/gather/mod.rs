@@ -119,6 +119,7 @@ fn stage_of(simulation: &Simulation, requires: StateFields) -> Stage {
 }
 
 /// Removes the elements of a list of rows and keeps its memory: the standard library collects in place.
+#[expect(clippy::unnecessary_filter_map, reason = "a filter cannot change the lifetime in the element type")]
 fn emptied<'b>(mut rows: Vec<Mutex<ChunkRows<'_>>>) -> Vec<Mutex<ChunkRows<'b>>> {
     rows.clear();
     rows.into_iter().filter_map(|_| None).collect()

@@ -53,7 +53,8 @@ pub fn terrain_levels(name: &str, robot: RobotId, grid: &TerrainGrid, cfg: Terra
     }
     let highest = cfg.max_initial_level.unwrap_or(rows - 1);
     let grid = grid.clone();
-    let draw = |rng: &mut crate::EpisodeRng, count: usize| ((rng.uniform() * count as f64) as usize).min(count - 1) as f64;
+    let draw =
+        |rng: &mut crate::EpisodeRng, count: usize| ((rng.uniform() * count as f64) as usize).min(count - 1) as f64;
     Ok(CurriculumTerm::new(
         name,
         move |rng| draw(rng, highest + 1),

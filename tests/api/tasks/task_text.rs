@@ -2,7 +2,6 @@
 
 use super::bundled::{cfg, world};
 use kinetoscope::ndarray::{Array2, Axis};
-use kinetoscope::prelude::*;
 use kinetoscope::tasks::{
     AutoresetMode, Env, EnvBuilder, EnvCfg, EnvError, Noise, RewardTerm, TaskCfg, TermKind, TermRegistry, terms,
 };
@@ -164,8 +163,11 @@ fn own_types() {
     let robot = env.sim().entities().robot_id("cart").unwrap();
     let expected = 2.0 * (env.sim().robot(robot).qpos()[(1, 0)] + 5.0);
     assert!((step.info.reward_terms[(1, 0)] - expected).abs() < 1e-12);
-    let error =
-        EnvBuilder::from_cfg(env.into_sim(), &TaskCfg::from_toml(&text.replace("offset = 5", "ofset = 5")).unwrap(), &registry);
+    let error = EnvBuilder::from_cfg(
+        env.into_sim(),
+        &TaskCfg::from_toml(&text.replace("offset = 5", "ofset = 5")).unwrap(),
+        &registry,
+    );
     assert!(error.map(drop).unwrap_err().to_string().contains("rewards.alive"));
 }
 
