@@ -131,6 +131,13 @@ pub(crate) fn structs() -> Vec<Struct> {
         "scene/src/terrain/rough.rs" RoughTerrain = new::<scene::terrain::RoughTerrain>(), RoughTerrain;
         "scene/src/terrain/slope.rs" SlopeTerrain = new::<scene::terrain::Slope>(), Slope;
         "scene/src/terrain/stairs.rs" PyramidStairsTerrain = new::<scene::terrain::PyramidStairs>(), PyramidStairs;
+        "scene/src/terrain/flat.rs" FlatTerrain = new::<scene::terrain::Flat>(), Flat;
+        "scene/src/terrain/pyramid_slope.rs" PyramidSlopeTerrain = new::<scene::terrain::PyramidSlope>(), PyramidSlope;
+        "scene/src/terrain/boxes.rs" BoxesTerrain = new::<scene::terrain::Boxes>(), Boxes;
+        "scene/src/terrain/stepping_stones.rs" SteppingStonesTerrain = new::<scene::terrain::SteppingStones>(), SteppingStones;
+        "scene/src/terrain/gap.rs" GapTerrain = new::<scene::terrain::Gap>(), Gap;
+        "scene/src/terrain/waves.rs" WavesTerrain = new::<scene::terrain::Waves>(), Waves;
+        "scene/src/terrain/obstacles.rs" DiscreteObstaclesTerrain = new::<scene::terrain::DiscreteObstacles>(), DiscreteObstacles;
         "sim/src/objects/terrain.rs" TerrainCfg = new::<sim::TerrainCfg>(), TerrainCfg, "terrain";
         "sim/src/objects/mjcf_part_data.rs" MjcfPartCfg = new::<sim::MjcfPartCfg>(), MjcfPartCfg, "mjcf";
         "sim/src/objects/weld_data.rs" WeldCfg = new::<sim::WeldCfg>(), WeldCfg, "weld";
@@ -222,6 +229,13 @@ pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
             ("rough", Some("RoughTerrain")),
             ("slope", Some("SlopeTerrain")),
             ("pyramid_stairs", Some("PyramidStairsTerrain")),
+            ("flat", Some("FlatTerrain")),
+            ("pyramid_slope", Some("PyramidSlopeTerrain")),
+            ("boxes", Some("BoxesTerrain")),
+            ("stepping_stones", Some("SteppingStonesTerrain")),
+            ("gap", Some("GapTerrain")),
+            ("waves", Some("WavesTerrain")),
+            ("discrete_obstacles", Some("DiscreteObstaclesTerrain")),
         ],
     },
     DeclaredEnum {

@@ -471,9 +471,9 @@ class CameraCfg:
 
     noise: Mapping[str, NoiseCfg | Mapping[str, Any]] = field(default_factory=dict)
     """Noise by channel name, for ``color``, ``depth`` and ``distance``, independent at every pixel. Noise of ``depth``
-    and ``distance`` is in [m]: depth stays from ``near`` to ``far``, distance stays at least ``near``, and misses
-    stay misses. Noise of ``color`` is in steps of its 8 bits, independent for red, green and blue; results are
-    rounded to bytes.
+    and ``distance`` is in [m]: depth stays from ``near`` to ``far`` (from -``far`` to ``far`` if rays of the lens do
+    not all go forward), distance stays at least ``near``, and misses stay misses. Noise of ``color`` is in steps of
+    its 8 bits, independent for red, green and blue; results are rounded to bytes.
 
     The random numbers depend only on the seed of the simulation, the environment, the camera name, the image index
     and the pixel. They are computed from these keys, so laziness, the time of reading and the number of threads do

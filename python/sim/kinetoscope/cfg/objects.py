@@ -43,6 +43,34 @@ class TerrainGenerator:
     def pyramid_stairs(value: str | Mapping[str, Any]) -> dict[str, Any]:
         return {"pyramid_stairs": value}
 
+    @staticmethod
+    def flat(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"flat": value}
+
+    @staticmethod
+    def pyramid_slope(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"pyramid_slope": value}
+
+    @staticmethod
+    def boxes(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"boxes": value}
+
+    @staticmethod
+    def stepping_stones(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"stepping_stones": value}
+
+    @staticmethod
+    def gap(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"gap": value}
+
+    @staticmethod
+    def waves(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"waves": value}
+
+    @staticmethod
+    def discrete_obstacles(value: str | Mapping[str, Any]) -> dict[str, Any]:
+        return {"discrete_obstacles": value}
+
 
 @dataclass(kw_only=True, slots=True)
 class RigidObjectCfg:
@@ -92,15 +120,15 @@ class RigidObjectCfg:
     """
 
     restitution: float | None = None
-    """Coefficient of restitution, 0.14 to 1: the fraction of the velocity that is left after a bounce. ``None`` for
+    """Coefficient of restitution, 0.14 to 1: ratio of the normal velocities after and before an impact. ``None`` for
     MuJoCo's soft contacts, which leave about 0.1.
 
     MuJoCo has no restitution: this value turns the contact into a spring and a damper (``solref`` below 0) for about
     ten steps. Meanwhile a body that arrives at speed v [m/s] sinks in by up to ``3.2 v dt``, so bouncing balls need a
-    small time step. The instant within the step at which the surfaces meet changes the coefficient: by -0.08 to 0.04
-    below 0.3, by -0.06 to 0.04 at 0.5, by -0.02 to 0.03 at 0.8, and by 0.003 at 1. The coefficient applies to an impact
-    through the center of mass. Of two such surfaces the smaller coefficient applies; against a surface without a
-    coefficient, this one applies.
+    small time step. The actual coefficient depends on the instant of impact within the time step. It deviates by -0.08
+    to 0.04 below 0.3, by -0.06 to 0.04 at 0.5, by -0.02 to 0.03 at 0.8, and by 0.003 at 1. The coefficient applies to
+    an impact through the center of mass. Between two surfaces with coefficients, the smaller coefficient applies.
+    Against a surface without one, this coefficient applies.
     """
 
     contact_margin: float = 0.0
@@ -195,6 +223,171 @@ class PyramidStairsTerrain:
 
     platform: float = 1.6
     """Smallest side of the platform [m]. The platform is larger if the rest is not a whole number of treads."""
+
+
+@dataclass(kw_only=True, slots=True)
+class FlatTerrain:
+    """Flat ground at height 0, as a height field."""
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 1.0
+    """Distance of neighboring points [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class PyramidSlopeTerrain:
+    """Slopes from all four sides up (or down) to a platform at the center, which is square if the field is.
+
+    At a distance d from the rim, the height is ``gradient`` min(d, (s - ``platform``) / 2), where s is the shorter
+    side.
+    """
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    gradient: float = 0.2
+    """Rise per meter: the tangent of the angle; negative slopes lead down."""
+
+    platform: float = 2.0
+    """Shorter side of the platform [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class BoxesTerrain:
+    """A grid of square boxes with independent random heights, and a platform of height 0 at the center.
+
+    Isaac's name is random grid. A height field has no vertical walls: the walls between two boxes are inclined over one
+    cell.
+    """
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    side: float = 0.5
+    """Side of a box [m], with the wall to the next one; rounded to whole cells, at least 2."""
+
+    range: Sequence[float] = (-0.1, 0.1)
+    """Lowest and highest height [m], uniformly distributed."""
+
+    platform: float = 2.0
+    """Side of the platform [m]."""
+
+    seed: int = 0
+    """Seed. Equal seeds give the same heights, bit for bit, on every machine."""
+
+
+@dataclass(kw_only=True, slots=True)
+class SteppingStonesTerrain:
+    """A grid of square stones over a deep ground, and a platform of height 0 at the center. Each stone has its own
+    random height.
+
+    A height field has no vertical walls: the walls of a stone are inclined over one cell, outside the stone.
+    """
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    stone: float = 0.4
+    """Side of a stone [m], rounded to whole cells, at least 1."""
+
+    distance: float = 0.2
+    """Gap between two stones [m], rounded to whole cells, at least 2."""
+
+    depth: float = 1.0
+    """Depth of the ground between the stones [m]."""
+
+    range: Sequence[float] = (0.0, 0.0)
+    """Lowest and highest height of the stones [m], uniformly distributed."""
+
+    platform: float = 2.0
+    """Side of the platform [m]."""
+
+    seed: int = 0
+    """Seed. Equal seeds give the same heights, bit for bit, on every machine."""
+
+
+@dataclass(kw_only=True, slots=True)
+class GapTerrain:
+    """A square trench around a platform at the center: the robot on the platform has to step across.
+
+    A height field has no vertical walls, so each wall of the trench is inclined over one cell, inside the trench.
+    """
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    width: float = 0.4
+    """Width of the trench [m], rounded to whole cells, at least 2."""
+
+    depth: float = 1.0
+    """Depth of the trench [m]."""
+
+    platform: float = 2.0
+    """Shorter side of the platform [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class WavesTerrain:
+    """Waves along x and y: the height is ``amplitude`` (sin(2 pi ``waves`` x / length) + sin(2 pi ``waves`` y / width))
+    / 2, with x and y from the negative ends.
+    """
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    amplitude: float = 0.1
+    """Largest height above and below 0 [m]."""
+
+    waves: float = 4.0
+    """Number of waves along each side."""
+
+
+@dataclass(kw_only=True, slots=True)
+class DiscreteObstaclesTerrain:
+    """Rectangular obstacles at random places on flat ground, and a free platform at the center. Where obstacles
+    overlap, the later one replaces the earlier one.
+
+    Isaac's name is discrete obstacles. A height field has no vertical walls: the walls of an obstacle are inclined
+    over one cell, outside the obstacle.
+    """
+
+    size: Sequence[float] = (8.0, 8.0)
+    """Lengths along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    count: int = 40
+    """Number of obstacles."""
+
+    sides: Sequence[float] = (0.3, 1.0)
+    """Shortest and longest side of an obstacle [m], uniformly distributed."""
+
+    range: Sequence[float] = (0.05, 0.2)
+    """Lowest and highest height of an obstacle [m], uniformly distributed; negative heights are holes."""
+
+    platform: float = 2.0
+    """Side of the platform [m]."""
+
+    seed: int = 0
+    """Seed. Equal seeds give the same heights, bit for bit, on every machine."""
 
 
 @dataclass(kw_only=True, slots=True)

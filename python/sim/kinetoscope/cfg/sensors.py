@@ -221,9 +221,9 @@ class RayCasterCfg:
     """
 
     sampling: SamplingCfg | Mapping[str, Any] = field(default_factory=SamplingCfg)
-    """Rate, history, latency and noise. The channels are ``distances``, ``normals``, ``ids``, ``pos_w`` and ``quat_w``,
-    of which only ``distances`` can have noise. Points lie on the ray at the noisy distance, which is clamped to the
-    range from 0 to ``max_distance``; misses stay misses.
+    """Rate, history, latency, dropout and noise. The channels are ``distances``, ``normals``, ``ids``, ``pos_w`` and
+    ``quat_w``, of which only ``distances`` can have noise. Points lie on the ray at the noisy distance, which is
+    clamped to the range from 0 to ``max_distance``; misses stay misses.
     """
 
     debug_vis: bool = False

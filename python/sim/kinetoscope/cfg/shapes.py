@@ -170,8 +170,8 @@ class HullCfg:
     tolerance: float = 0.0001
     """Largest distance of an omitted point from the hull, as a fraction of the diagonal of the bounding box.
 
-    At least 0, which acts as 1e-8 (less than single precision resolves). The default 1e-4 is 0.03 mm on a link of 0.3
-    m: below the tolerances of robot parts, above the noise of a tessellated cylinder.
+    At least 0, which acts as 1e-8 (less than single precision resolves), and less than 1. The default 1e-4 is 0.03 mm
+    on a link of 0.3 m: below the tolerances of robot parts, above the noise of a tessellated cylinder.
     """
 
     min_thickness: float | None = 0.001
