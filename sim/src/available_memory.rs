@@ -26,7 +26,7 @@ fn machine(root: &Path) -> Option<usize> {
     Some((of("MemAvailable:")? + of("SwapFree:").unwrap_or(0)).saturating_mul(1024))
 }
 
-/// What the limits of a control group and of the groups that contain it leave \[bytes\]. `group` is a line of
+/// Memory that the limits of a control group and of the groups that contain it leave \[bytes\]. `group` is a line of
 /// `/proc/self/cgroup`: `0::/path` for version 2, `4:memory:/path` for version 1.
 fn group_limits(root: &Path, group: &str) -> Vec<usize> {
     let mut parts = group.splitn(3, ':').skip(1);

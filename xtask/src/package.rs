@@ -33,7 +33,7 @@ fn published(metadata: &Value) -> Vec<&Value> {
     packages.filter(|package| package["publish"].is_null()).collect()
 }
 
-/// What is missing for the publication of a package.
+/// Missing requirements of the publication of a package.
 fn mistakes(package: &Value) -> Vec<String> {
     let name = package["name"].as_str().unwrap_or_default();
     let missing = ["description", "license", "readme", "rust_version"]

@@ -101,7 +101,7 @@ fn mistakes() {
         ("decimation", "decimatoin", &["decimatoin", "decimation"][..]),
         ("NEXT_STEP", "NEXT_STOP", &["autoreset mode", "NEXT_STOP", "next_step"]),
         ("decimation = 2", "decimation = 0", &["decimation is 0"]),
-        ("joint_efforts", "joint_eforts", &["actions.push", "type of action term", "joint_eforts", "joint_efforts"]),
+        ("joint_efforts", "joint_effordts", &["actions.push", "type of action term", "joint_effordts", "joint_efforts"]),
         ("robot = \"cart\"", "robot = \"card\"", &["actions.push", "robot", "card", "cart"]),
         ("joints = [\"slide\"]", "joints = [\"slidr\"]", &["actions.push", "slidr", "slide"]),
         ("bound = 10", "bond = 10", &["actions.push", "bond", "bound"]),
@@ -165,7 +165,7 @@ fn own_types() {
     assert!((step.info.reward_terms[(1, 0)] - expected).abs() < 1e-12);
     let error = EnvBuilder::from_cfg(
         env.into_sim(),
-        &TaskCfg::from_toml(&text.replace("offset = 5", "ofset = 5")).unwrap(),
+        &TaskCfg::from_toml(&text.replace("offset = 5", "offzet = 5")).unwrap(),
         &registry,
     );
     assert!(error.map(drop).unwrap_err().to_string().contains("rewards.alive"));

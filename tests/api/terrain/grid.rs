@@ -199,7 +199,7 @@ fn in_files() {
     assert_eq!(cfg.heights[(20 + 100, 20 + 60)], 0.0);
     for (from, to, says) in [
         ("stairs_up", "stair_up", "stairs_up"),
-        ("step_height", "step_hight", "step_height"),
+        ("step_height", "step_heigkt", "step_height"),
         ("rows = 2", "rows = 0", "rows is 0"),
         ("heights.grid", "heights.gird", "stepping_stones"),
     ] {
