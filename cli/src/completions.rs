@@ -18,7 +18,9 @@ const HELP: &str = "\
 Examples:
   kinetoscope completions bash > ~/.local/share/bash-completion/completions/kinetoscope
   kinetoscope completions zsh > ~/.zfunc/_kinetoscope           with fpath+=~/.zfunc before compinit in ~/.zshrc
-  kinetoscope completions fish > ~/.config/fish/completions/kinetoscope.fish";
+  kinetoscope completions fish > ~/.config/fish/completions/kinetoscope.fish
+
+Exit codes: 0 done; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let mut script = Vec::new();

@@ -18,7 +18,9 @@ pub(crate) struct Args {
 const HELP: &str = "\
 Examples:
   kinetoscope man | man -l -
-  kinetoscope man -o ~/.local/share/man/man1    then: man kinetoscope-view";
+  kinetoscope man -o ~/.local/share/man/man1    then: man kinetoscope-view
+
+Exit codes: 0 done; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if let Some(folder) = &args.out {

@@ -17,8 +17,12 @@ pub(crate) struct Args {
 const HELP: &str = "\
 Examples:
   kinetoscope schema -o scene.schema.json
+  kinetoscope schema | less
+
 The first line of a TOML file selects the schema (Even Better TOML, Taplo):  #:schema ./scene.schema.json
-The first line of a YAML file (yaml-language-server):  # yaml-language-server: $schema=./scene.schema.json";
+The first line of a YAML file (yaml-language-server):  # yaml-language-server: $schema=./scene.schema.json
+
+Exit codes: 0 done; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let schema = SceneCfg::json_schema(&EntityTypes::default());
