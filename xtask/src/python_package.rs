@@ -36,7 +36,7 @@ pub(crate) struct WheelArgs {
     /// Also write a source distribution
     #[arg(long)]
     sdist: bool,
-    /// Link with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
+    /// Link kinetoscope-render with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
     #[arg(long)]
     portable: bool,
 }
@@ -47,10 +47,13 @@ pub(crate) struct WheelArgs {
 /// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
     let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
-    for wheel in [build(repo, profile)?, python_simulation::build(repo, profile)?] {
-        check(repo, &wheel, profile)?;
-        println!("{}", wheel.display());
-    }
+    let wheel = build(repo, profile)?;
+    check(repo, &wheel, profile)?;
+    println!("{}", wheel.display());
+    // Zig does not find the library of MuJoCo by its versioned name, so this wheel needs the glibc of this machine.
+    let wheel = python_simulation::build(repo, BuildProfile::Release)?;
+    check(repo, &wheel, BuildProfile::Release)?;
+    println!("{}", wheel.display());
     if args.sdist {
         let maturin = maturin(repo)?;
         let package = repo.root.join(PACKAGE);
