@@ -164,8 +164,11 @@ fn own_types() {
     let robot = env.sim().entities().robot_id("cart").unwrap();
     let expected = 2.0 * (env.sim().robot(robot).qpos()[(1, 0)] + 5.0);
     assert!((step.info.reward_terms[(1, 0)] - expected).abs() < 1e-12);
-    let error =
-        EnvBuilder::from_cfg(env.into_sim(), &TaskCfg::from_toml(&text.replace("offset = 5", "ofset = 5")).unwrap(), &registry);
+    let error = EnvBuilder::from_cfg(
+        env.into_sim(),
+        &TaskCfg::from_toml(&text.replace("offset = 5", "ofset = 5")).unwrap(),
+        &registry,
+    );
     assert!(error.map(drop).unwrap_err().to_string().contains("rewards.alive"));
 }
 
