@@ -1,5 +1,6 @@
 //! Output of the libraries' events.
 
+use std::io::IsTerminal as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
 
@@ -11,5 +12,6 @@ pub(crate) fn print_to_stderr() {
         eprintln!("warning: RUST_LOG: {error}; only errors are logged");
         errors().parse_lossy("")
     });
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let ansi = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(ansi).with_writer(std::io::stderr).init();
 }

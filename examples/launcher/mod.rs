@@ -344,10 +344,12 @@ pub(crate) fn alternating_eyes(num_envs: usize) -> Vec<[f64; 3]> {
 /// Prints events of the libraries to the standard error stream. `RUST_LOG` selects them (`RUST_LOG=kinetoscope_sim=info`);
 /// without it, only errors are printed.
 pub(crate) fn print_events() {
+    use std::io::IsTerminal as _;
     use tracing_subscriber::EnvFilter;
     use tracing_subscriber::filter::LevelFilter;
     let filter = EnvFilter::builder().with_default_directive(LevelFilter::ERROR.into()).from_env_lossy();
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let ansi = std::io::stderr().is_terminal();
+    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(ansi).with_writer(std::io::stderr).init();
 }
 
 /// Runs an example. An error is printed and gives exit code 2.

@@ -200,6 +200,12 @@ def test_use_of_tasks():
     sim.update(3)
     assert (cart.qpos != moved).all()
     again = ks.Task(sim, task_cfg())
+    again.reset()
+    # The first task does not act on the second one.
+    with pytest.raises(ks.DestroyedError, match="task was closed"):
+        task.step(np.ones((3, 1)))
+    task.close()
+    again.step(np.ones((3, 1)))
     sim.destroy()
     with pytest.raises(ks.DestroyedError):
         again.reset()

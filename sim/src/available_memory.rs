@@ -30,10 +30,10 @@ fn machine(root: &Path) -> Option<usize> {
 /// `/proc/self/cgroup`: `0::/path` for version 2, `4:memory:/path` for version 1.
 fn group_limits(root: &Path, group: &str) -> Vec<usize> {
     let mut parts = group.splitn(3, ':').skip(1);
-    let (folder, limit, used, cache) = match parts.next() {
-        Some("") => ("sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
+    let (folder, limit, used, prefix) = match parts.next() {
+        Some("") => ("sys/fs/cgroup", "memory.max", "memory.current", ""),
         Some(controllers) if controllers.split(',').any(|controller| controller == "memory") => {
-            ("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+            ("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_")
         }
         _ => return Vec::new(),
     };
@@ -43,10 +43,15 @@ fn group_limits(root: &Path, group: &str) -> Vec<usize> {
     let left = |folder: &Path| {
         let number = |file: &str| std::fs::read_to_string(folder.join(file)).ok()?.trim().parse::<usize>().ok();
         let stat = std::fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
-        // Cached files give way to allocations.
-        let cached = stat.lines().find_map(|line| line.strip_prefix(cache)?.trim().parse::<usize>().ok());
+        // Cached files and caches of the kernel give way to allocations.
+        let of = |line: &str| {
+            let (key, value) = line.strip_prefix(prefix)?.split_once(' ')?;
+            let is_cache = ["inactive_file", "active_file", "slab_reclaimable"].contains(&key);
+            if is_cache { value.trim().parse::<usize>().ok() } else { None }
+        };
+        let cached: usize = stat.lines().filter_map(of).sum();
         // A group without a limit has the word `max`, or a number above any memory.
-        Some(number(limit)?.saturating_sub(number(used)?.saturating_sub(cached.unwrap_or(0))))
+        Some(number(limit)?.saturating_sub(number(used)?.saturating_sub(cached)))
     };
     folders.filter_map(|folder| left(&folder)).collect()
 }
@@ -82,18 +87,18 @@ mod tests {
         let outer = [
             ("sys/fs/cgroup/a/memory.max", "5000\n"),
             ("sys/fs/cgroup/a/memory.current", "4500\n"),
-            ("sys/fs/cgroup/a/memory.stat", "anon 1\ninactive_file 300\nfile 2\n"),
+            ("sys/fs/cgroup/a/memory.stat", "anon 1\ninactive_file 300\nactive_file 50\nslab_reclaimable 7\nfile 2\n"),
         ];
         let version2 = [&[MEMINFO, ("proc/self/cgroup", "0::/a/b\n"), inner][..], &outer].concat();
-        assert_eq!(system(&version2), Some(5000 - 4500 + 300));
+        assert_eq!(system(&version2), Some(5000 - 4500 + 357));
         let version1 = [
             MEMINFO,
             ("proc/self/cgroup", "5:cpu:/x\n4:blkio,memory:/x\n"),
             ("sys/fs/cgroup/memory/x/memory.limit_in_bytes", "7000\n"),
             ("sys/fs/cgroup/memory/x/memory.usage_in_bytes", "7200\n"),
-            ("sys/fs/cgroup/memory/x/memory.stat", "inactive_file 9\ntotal_inactive_file 500\n"),
+            ("sys/fs/cgroup/memory/x/memory.stat", "inactive_file 9\ntotal_inactive_file 500\ntotal_active_file 40\n"),
         ];
-        assert_eq!(system(&version1), Some(300));
+        assert_eq!(system(&version1), Some(340));
         // A group that is not visible limits nothing.
         assert_eq!(system(&[MEMINFO, ("proc/self/cgroup", "0::/../elsewhere\n")]), Some(8100 << 10));
     }

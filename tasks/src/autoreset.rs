@@ -8,7 +8,8 @@ use std::str::FromStr;
 /// Time at which an environment whose episode ended begins the next one: the three modes of Gymnasium's
 /// `AutoresetMode`.
 ///
-/// An episode has the same bits in all modes: only the calls that return its observations differ.
+/// An episode has the same bits in all modes, except for noise of sensors: the calls that return its observations differ,
+/// and [`NextStep`](Self::NextStep) does more physics steps, in which sensors draw noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

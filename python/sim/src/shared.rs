@@ -8,7 +8,7 @@ use kinetoscope::sim::{MjcfId, RigidObjectGroupId, RigidObjectId, RobotId, Simul
 use kinetoscope::tasks::Env;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// Handle of an entity.
@@ -27,21 +27,22 @@ pub(crate) enum Entity {
 #[derive(Debug)]
 enum Simulated {
     Alone(Box<SimulationManager>),
-    Task(Box<Env>),
+    /// A task with its number.
+    Task(Box<Env>, u64),
 }
 
 impl Simulated {
     fn sim(&self) -> &SimulationManager {
         match self {
             Self::Alone(sim) => sim,
-            Self::Task(env) => env.sim(),
+            Self::Task(env, _) => env.sim(),
         }
     }
 
     fn sim_mut(&mut self) -> &mut SimulationManager {
         match self {
             Self::Alone(sim) => sim,
-            Self::Task(env) => env.sim_mut(),
+            Self::Task(env, _) => env.sim_mut(),
         }
     }
 }
@@ -145,18 +146,20 @@ impl Shared {
         catch_unwind(AssertUnwindSafe(locked)).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
     }
 
-    /// Starts a task in the environments. `make` gives the simulation back if the task is invalid.
+    /// Starts a task in the environments, and returns its number. `make` gives the simulation back if the task is
+    /// invalid.
     pub(crate) fn start_task(
         &self,
         py: Python<'_>,
         make: impl FnOnce(SimulationManager) -> Result<Env, (Failure, Option<Box<SimulationManager>>)> + Send,
-    ) -> PyResult<()> {
+    ) -> PyResult<u64> {
+        static STARTED: AtomicU64 = AtomicU64::new(0);
         let locked = || {
             let mut guard = self.lock()?;
             match guard.take() {
                 None => Err(destroyed()),
-                Some(Simulated::Task(env)) => {
-                    *guard = Some(Simulated::Task(env));
+                Some(task @ Simulated::Task(..)) => {
+                    *guard = Some(task);
                     Err(Failure::new(
                         Class::Argument,
                         "this simulation already has a task; end it with its method close",
@@ -164,8 +167,9 @@ impl Shared {
                 }
                 Some(Simulated::Alone(sim)) => match make(*sim) {
                     Ok(env) => {
-                        *guard = Some(Simulated::Task(Box::new(env)));
-                        Ok(())
+                        let number = STARTED.fetch_add(1, Ordering::Relaxed);
+                        *guard = Some(Simulated::Task(Box::new(env), number));
+                        Ok(number)
                     }
                     Err((failure, sim)) => {
                         *guard = sim.map(Simulated::Alone);
@@ -177,25 +181,26 @@ impl Shared {
         detached(py, locked)
     }
 
-    /// Uses the task without holding the interpreter. After a panic, later calls fail.
+    /// Uses the task with this number without holding the interpreter. After a panic, later calls fail.
     pub(crate) fn task<T: Send>(
         &self,
         py: Python<'_>,
+        number: u64,
         act: impl FnOnce(&mut Env) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         detached(py, || match self.lock()?.as_mut().ok_or_else(destroyed)? {
-            Simulated::Task(env) => act(env),
-            Simulated::Alone(_) => Err(Failure::new(Class::Destroyed, "the task was closed")),
+            Simulated::Task(env, current) if *current == number => act(env),
+            Simulated::Task(..) | Simulated::Alone(_) => Err(Failure::new(Class::Destroyed, "the task was closed")),
         })
     }
 
-    /// Ends the task, if there is one; the simulation goes on alone.
-    pub(crate) fn end_task(&self, py: Python<'_>) -> PyResult<()> {
+    /// Ends the task with this number, if it has not ended; the simulation goes on alone.
+    pub(crate) fn end_task(&self, py: Python<'_>, number: u64) -> PyResult<()> {
         detached(py, || {
             let mut guard = self.lock()?;
             *guard = guard.take().map(|simulated| match simulated {
-                Simulated::Task(env) => Simulated::Alone(Box::new(env.into_sim())),
-                alone => alone,
+                Simulated::Task(env, current) if current == number => Simulated::Alone(Box::new(env.into_sim())),
+                other => other,
             });
             Ok(())
         })

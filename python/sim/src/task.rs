@@ -32,6 +32,8 @@ use toml::{Table, Value};
 #[derive(Debug)]
 pub(crate) struct Task {
     shared: Arc<Shared>,
+    /// Number of the task, which tells it from later ones of the simulation.
+    number: u64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -378,8 +380,9 @@ impl Task {
     fn new(py: Python<'_>, sim: &Bound<'_, Simulation>, cfg: &Bound<'_, PyAny>) -> PyResult<Self> {
         let cfg: TaskCfg = cfg::read("task", Some(cfg))?;
         let shared = sim.get().shared.clone();
-        shared.start_task(py, |sim| builder(&shared, sim, &cfg)?.build().map_err(|error| (error.into(), None)))?;
-        Ok(Self { shared })
+        let make = |sim| builder(&shared, sim, &cfg)?.build().map_err(|error| (error.into(), None));
+        let number = shared.start_task(py, make)?;
+        Ok(Self { shared, number })
     }
 
     /// The simulation, to serve, record or change it between steps.
@@ -397,25 +400,25 @@ impl Task {
     /// Duration of a step [s].
     #[getter]
     fn step_dt(&self, py: Python<'_>) -> PyResult<f64> {
-        self.shared.task(py, |env| Ok(env.step_dt()))
+        self.shared.task(py, self.number, |env| Ok(env.step_dt()))
     }
 
     /// Columns of the observations: names ``term/column``, lower and upper bounds.
     #[getter]
     fn observation_space(&self, py: Python<'_>) -> PyResult<(Vec<String>, Vec<f64>, Vec<f64>)> {
-        self.shared.task(py, |env| Ok(columns(env.observation_space())))
+        self.shared.task(py, self.number, |env| Ok(columns(env.observation_space())))
     }
 
     /// Columns of the actions: names ``term/column``, lower and upper bounds.
     #[getter]
     fn action_space(&self, py: Python<'_>) -> PyResult<(Vec<String>, Vec<f64>, Vec<f64>)> {
-        self.shared.task(py, |env| Ok(columns(env.action_space())))
+        self.shared.task(py, self.number, |env| Ok(columns(env.action_space())))
     }
 
     /// Names of the reward terms.
     #[getter]
     fn reward_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.shared.task(py, |env| Ok(env.reward_names().into_iter().map(String::from).collect()))
+        self.shared.task(py, self.number, |env| Ok(env.reward_names().into_iter().map(String::from).collect()))
     }
 
     /// Begins new episodes, in the environments of ``mask`` or in all. Returns the observations, shape (num_envs, columns),
@@ -427,7 +430,7 @@ impl Task {
         seed: Option<u64>,
         mask: Option<Vec<bool>>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyDict>)> {
-        let observations = self.shared.task(py, |env| Ok(env.reset(mask.as_deref(), seed)?))?;
+        let observations = self.shared.task(py, self.number, |env| Ok(env.reset(mask.as_deref(), seed)?))?;
         Ok((Values::from(observations).into_python(py), PyDict::new(py)))
     }
 
@@ -436,7 +439,7 @@ impl Task {
     /// default, an environment whose episode ends begins the next one in the same step (``autoreset``).
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'_, PyAny>) -> PyResult<StepResult<'py>> {
         let actions = array::<Ix2>(actions, "step, actions")?;
-        let step = self.shared.task(py, |env| Ok(env.step(&actions)?))?;
+        let step = self.shared.task(py, self.number, |env| Ok(env.step(&actions)?))?;
         let info = PyDict::new(py);
         info.set_item("final_observations", Values::from(step.final_observations).into_python(py))?;
         info.set_item("reward_terms", Values::from(step.info.reward_terms).into_python(py))?;
@@ -461,11 +464,11 @@ impl Task {
 
     /// Ends the task; its simulation goes on.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
-        self.shared.end_task(py)
+        self.shared.end_task(py, self.number)
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
-        let described = self.shared.task(py, |env| {
+        let described = self.shared.task(py, self.number, |env| {
             let (observations, actions) = (env.observation_space().len(), env.action_space().len());
             Ok(format!("<Task: {actions} action and {observations} observation columns, {} envs>", env.num_envs()))
         });

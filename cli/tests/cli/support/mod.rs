@@ -58,7 +58,7 @@ impl CommandFolder {
     pub(crate) fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinetoscope"));
         command.args(line.split_whitespace()).current_dir(self.0.folder()).stdin(Stdio::null());
-        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env("NO_COLOR", "1");
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG").env("NO_COLOR", "1");
         command
     }
 
