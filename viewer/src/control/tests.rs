@@ -495,7 +495,8 @@ fn recording_ends_with_viewer() {
     counter.lock().unwrap().set(&mut sim, false).unwrap();
     let viewer = sim.viewer(SnapshotRequest { rate: 1000.0, ..SnapshotRequest::default() });
     viewer.send(Command::Record(true));
-    step_until(&mut sim, |_| counted() == (true, 3, 2));
+    step_until(&mut sim, |_| run(&viewer).recording.is_some_and(|recording| recording.on));
+    assert_eq!(counted(), (true, 3, 2));
     counter.lock().unwrap().set(&mut sim, false).unwrap();
     step_until(&mut sim, |_| run(&viewer).recording.is_some_and(|recording| !recording.on));
     counter.lock().unwrap().set(&mut sim, true).unwrap();
