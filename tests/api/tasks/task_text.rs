@@ -101,7 +101,11 @@ fn mistakes() {
         ("decimation", "decimatoin", &["decimatoin", "decimation"][..]),
         ("NEXT_STEP", "NEXT_STOP", &["autoreset mode", "NEXT_STOP", "next_step"]),
         ("decimation = 2", "decimation = 0", &["decimation is 0"]),
-        ("joint_efforts", "joint_effordts", &["actions.push", "type of action term", "joint_effordts", "joint_efforts"]),
+        (
+            "joint_efforts",
+            "joint_effordts",
+            &["actions.push", "type of action term", "joint_effordts", "joint_efforts"],
+        ),
         ("robot = \"cart\"", "robot = \"card\"", &["actions.push", "robot", "card", "cart"]),
         ("joints = [\"slide\"]", "joints = [\"slidr\"]", &["actions.push", "slidr", "slide"]),
         ("bound = 10", "bond = 10", &["actions.push", "bond", "bound"]),
