@@ -84,22 +84,23 @@ pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
 pub(crate) fn test(repo: &Repo) -> XtaskResult {
     setup::try_to_have(Requirement::OsMesa);
     let wheel = build(repo, BuildProfile::Test)?;
-    let models = models(repo)?;
+    let (models, folder) = (models(repo)?, repo.root.join(PACKAGE).join("tests"));
     for (version, numpy) in TESTED {
         let python = environment(repo, version, numpy)?;
         let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
         Cmd::new(&python).args(install).arg("--force-reinstall").arg(&wheel).run()?;
         println!("kinetoscope-render with mujoco {version}");
         // No files of Python or pytest are left in the tree.
-        let mut tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+        let mut tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).arg(&folder);
         if version == wheel::PYTHON_VERSION {
             tests = tests.env(MODELS_VARIABLE, &models);
         }
-        if let Some(folder) = robots::local(repo) {
-            tests = tests.env(robots::VARIABLE, folder);
+        if let Some(robots) = robots::local(repo) {
+            tests = tests.env(robots::VARIABLE, robots);
         }
         tests
-            .current_dir(repo.root.join(PACKAGE).join("tests"))
+            // MuJoCo writes MUJOCO_LOG.TXT into this folder.
+            .current_dir(repo.target.join(format!("python-mujoco-{version}")))
             .env("MUJOCO_GL", "osmesa")
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .run()
