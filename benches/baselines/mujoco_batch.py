@@ -1,8 +1,8 @@
-"""Steps a `mujoco.batch.Batch` on command, for benches/src/mujoco_batch.rs.
+"""Steps a `mujoco.batch.Batch` or an `mjbatch.Batch` on command, for benches/src/mujoco_batch.rs.
 
-mujoco_batch.py JOB.json: the model file, what is set in the model, starts and number of threads. It then reads lines from
-standard input and answers each with one line: `restart`, `block K` (answers with the seconds that K steps took), `qpos`
-(answers with all positions as hexadecimal bytes).
+mujoco_batch.py JOB.json: the package, the model file, what is set in the model, starts and number of threads. It then
+reads lines from standard input and answers each with one line: `restart`, `block K` (answers with the seconds that K
+steps took), `qpos` (answers with all positions as hexadecimal bytes).
 """
 
 import json
@@ -10,12 +10,19 @@ import sys
 import time
 
 import mujoco
-import mujoco.batch
 import numpy as np
 
 
 def load(job):
-    model = mujoco.MjModel.from_xml_path(job["model"])
+    if job["reads_poses_and_forces"]:
+        # MuJoCo computes cfrc_ext in a step only if a sensor needs it.
+        spec = mujoco.MjSpec.from_file(job["model"])
+        spec.bodies[1].add_site(name="accelerometer")
+        sensor = mujoco.mjtSensor.mjSENS_ACCELEROMETER
+        spec.add_sensor(name="a", type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="accelerometer")
+        model = spec.compile()
+    else:
+        model = mujoco.MjModel.from_xml_path(job["model"])
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if not job["islands"]:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
@@ -25,13 +32,29 @@ def load(job):
     return model
 
 
+def make_batch(job):
+    """The batch, and the arguments of its steps."""
+    model = load(job)
+    if job["package"] == "mjbatch":
+        import mjbatch
+
+        return mjbatch.Batch(model, job["envs"], job["threads"]), {}
+    import mujoco.batch
+
+    # With poses, the fields after a step are those of the new state.
+    arguments = {"stage": mujoco.mjtStage.mjSTAGE_VEL.value} if job["reads_poses_and_forces"] else {}
+    return mujoco.batch.Batch(model, nsim=job["envs"], nthread=job["threads"]), arguments
+
+
 def main():
     with open(sys.argv[1]) as file:
         job = json.load(file)
-    batch = mujoco.batch.Batch(load(job), nsim=job["envs"], nthread=job["threads"])
+    batch, arguments = make_batch(job)
     starts = {name: np.array(rows) for name, rows in job["starts"].items()}
     # Views of the state rows: reading them back costs nothing.
     views = {name: batch.bind(name) for name in ["qpos", "qvel", *starts]}
+    derived = ["xpos", "xquat", "cfrc_ext"] if job["reads_poses_and_forces"] else []
+    views |= {name: batch.bind(name) for name in derived}
     for line in sys.stdin:
         command, *args = line.split()
         answer = "done"
@@ -41,7 +64,7 @@ def main():
         elif command == "block":
             begin = time.perf_counter()
             for _ in range(int(args[0])):
-                batch.step()
+                batch.step(**arguments)
             answer = repr(time.perf_counter() - begin)
         elif command == "qpos":
             answer = np.ascontiguousarray(views["qpos"]).tobytes().hex()

@@ -28,6 +28,21 @@ pub(crate) fn python_with_package() -> Option<OsString> {
     python
 }
 
+/// Environment variable with a python that can import mjbatch; set by `cargo xtask bench`.
+const MJBATCH: &str = "KINETOSCOPE_PYTHON_MJBATCH";
+
+/// The python with the package `mjbatch`; `None` with a message if no such Python is named, or if this build is for
+/// MuJoCo 2.2.2.
+pub(crate) fn python_with_mjbatch() -> Option<OsString> {
+    let python = std::env::var_os(MJBATCH).filter(|_| BUILD_VERSION == SupportedVersion::V4);
+    if python.is_none() {
+        eprintln!(
+            "  without mjbatch: {MJBATCH} is not set to a Python that can import mjbatch, or this is MuJoCo 2.2.2"
+        );
+    }
+    python
+}
+
 /// The python of the baselines; `None` with a message if there is no such python, or if this build is for another
 /// MuJoCo version.
 pub(crate) fn python(baselines: &str) -> Option<OsString> {

@@ -12,6 +12,7 @@ mod interleave;
 mod memory;
 mod models;
 mod mujoco_batch;
+mod mujoco_batch_reads;
 mod other_load;
 mod python;
 mod randomize;
@@ -19,6 +20,7 @@ mod rays;
 mod record;
 mod row;
 mod scale;
+mod sensor_rates;
 mod settings;
 mod startup;
 mod step;
@@ -42,6 +44,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("view", view::run),
     ("trace", trace::run),
     ("contacts", contacts::run),
+    ("sensors", sensor_rates::run),
     ("ik", ik::run),
     ("randomize", randomize::run),
     ("python", python::run),
@@ -56,8 +59,8 @@ type Bench = fn(&Settings) -> BenchResult<Vec<Row>>;
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, ik, randomize,
-    /// python, startup, memory, scale
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, sensors, ik,
+    /// randomize, python, startup, memory, scale
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

@@ -29,7 +29,7 @@ pub(crate) enum Loop {
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     /// Name in the results.
-    pub(crate) name: &'static str,
+    pub(crate) name: String,
     /// The model, with buffers large enough for every contact that occurs.
     pub(crate) model: Model,
     /// The calls of the bare loop.
@@ -82,12 +82,17 @@ impl Case {
     /// The bundled arm and hand without active drives: the same model as with drives, but no drive writes.
     pub(crate) fn sr5() -> BenchResult<Self> {
         let (sim, _) = sr5(1, 1)?;
-        Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.scene().mjcf().into()), Loop::Step21)
+        Self::of_simulation("SR5 + hand", &sim)
     }
 
-    fn new(name: &'static str, model: Model, mjcf: Option<String>, bare: Loop) -> BenchResult<Self> {
+    /// The model of a simulation.
+    pub(crate) fn of_simulation(name: impl Into<String>, sim: &SimulationManager) -> BenchResult<Self> {
+        Self::new(name, sim.batch().model().clone(), Some(sim.scene().mjcf().into()), Loop::Step21)
+    }
+
+    fn new(name: impl Into<String>, model: Model, mjcf: Option<String>, bare: Loop) -> BenchResult<Self> {
         let model = model.with_buffers(model.small_buffers());
-        let mut case = Self { name, states: trajectory(&model)?, model, bare, mjcf };
+        let mut case = Self { name: name.into(), states: trajectory(&model)?, model, bare, mjcf };
         // Buffers that no environment has to grow, so that both sides use the same memory.
         let mut batch = case.batch(STARTS, 1)?;
         batch.step(STEPS);
@@ -161,11 +166,17 @@ pub(crate) fn arm_with_hand(
         threads: Some(threads),
         ..SimulationManagerCfg::default()
     })?;
+    let robot = sim.add_robot(arm_and_hand_cfg(arm, joints)?)?;
+    Ok((sim, robot))
+}
+
+/// An arm from a file, with these joints, and the bundled hand on its flange.
+pub(crate) fn arm_and_hand_cfg(arm: &Path, joints: &str) -> BenchResult<RobotCfg> {
     let hand = ComponentCfg {
         transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
         ..ComponentCfg::new("hand", assets::path("revo1_left/revo1_left.urdf")?)
     };
-    let robot = sim.add_robot(RobotCfg {
+    Ok(RobotCfg {
         uid: "sr5".into(),
         urdf: UrdfCfg { components: vec![ComponentCfg::new("arm", arm), hand], ..UrdfCfg::default() },
         control_parts: vec![("arm".into(), vec![joints.into()]), ("hand".into(), vec!["LEFT_HAND_.*".into()])],
@@ -175,8 +186,7 @@ pub(crate) fn arm_with_hand(
             ..DriveCfg::default()
         },
         ..RobotCfg::default()
-    })?;
-    Ok((sim, robot))
+    })
 }
 
 /// Sets the targets of arm and hand to one of two poses, which differ in the wrist and in the opening of the hand.

@@ -1,9 +1,11 @@
-//! Batched stepping, compared with `mujoco.batch` from Python: the same model, states and threads, in turns. The two
-//! processes are started in both orders, half the time each: ratios are geometric means of the two, rates are means.
+//! Batched stepping, compared with `mujoco.batch` and with the package `mjbatch` from Python: the same model, states and
+//! threads, in turns. The two processes are started in both orders, half the time each: ratios are geometric means of
+//! the two, rates are means.
 
 use crate::baseline::{self, Process};
 use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{Case, STEPS};
+use crate::mujoco_batch_reads;
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
 use crate::step::Ours;
@@ -12,11 +14,12 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::time::Duration;
 
-const ENVS: [usize; 3] = [64, 1024, 4096];
-const THREADS: [usize; 2] = [1, 2];
+pub(crate) const ENVS: [usize; 3] = [64, 1024, 4096];
+pub(crate) const THREADS: [usize; 2] = [1, 2];
 
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let python = baseline::python("mujoco.batch");
+    let mjbatch = baseline::python_with_mjbatch();
     let mut rows = Vec::new();
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
@@ -29,25 +32,59 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
                 rows.push(row(envs as f64 / times.per_step(0)).without("mujoco.batch"));
                 continue;
             };
-            let times = in_both_orders(|order| {
-                let (mut ours, mut baseline) = order.create(ours, || Baseline::start(python, &case, envs, threads))?;
-                measure(plan(0.5), &mut [&mut ours, &mut baseline])
-            })?;
-            let rate = |side: usize| times.rate(side, envs);
-            rows.push(row(rate(0)).against("mujoco.batch", rate(1), times.ratio(0, 1)));
+            for (reads, python, name) in [
+                (Reads::State, Some(python), "mujoco.batch"),
+                (Reads::OtherPackage, mjbatch.as_ref(), "mjbatch on MuJoCo 3.14.0"),
+            ] {
+                let Some(python) = python else { continue };
+                let times = in_both_orders(|order| {
+                    let start = || Baseline::start(python, &case, (envs, threads), reads);
+                    let (mut ours, mut baseline) = order.create(ours, start)?;
+                    measure(plan(0.5), &mut [&mut ours, &mut baseline])
+                })?;
+                let rate = |side: usize| times.rate(side, envs);
+                rows.push(row(rate(0)).against(name, rate(1), times.ratio(0, 1)).with_target_ratio(1.0));
+            }
         }
     }
+    rows.extend(mujoco_batch_reads::run(settings)?);
     Ok(rows)
 }
 
-/// A Python process with a `mujoco.batch.Batch`.
-struct Baseline(Process);
+/// Program and quantities of a baseline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reads {
+    /// `mujoco.batch` with positions and velocities bound.
+    State,
+    /// `mujoco.batch` with poses of bodies and contact forces bound, too.
+    PosesAndForces,
+    /// The package `mjbatch` with positions and velocities bound. It has another version of MuJoCo, so its positions
+    /// are not compared.
+    OtherPackage,
+}
+
+/// A Python process with a batch.
+pub(crate) struct Baseline {
+    process: Process,
+    reads: Reads,
+}
 
 impl Baseline {
-    fn start(python: &OsString, case: &Case, envs: usize, threads: usize) -> BenchResult<Self> {
+    pub(crate) fn start(
+        python: &OsString,
+        case: &Case,
+        (envs, threads): (usize, usize),
+        reads: Reads,
+    ) -> BenchResult<Self> {
         let folder = tempfile::tempdir()?;
-        let job = job(case, envs, threads, folder.path())?;
-        let mut baseline = Self(Process::start(python, "mujoco_batch.py", &job, folder)?);
+        let mut job = job(case, envs, threads, folder.path())?;
+        job["reads_poses_and_forces"] = json!(reads == Reads::PosesAndForces);
+        job["package"] = json!(if reads == Reads::OtherPackage { "mjbatch" } else { "mujoco.batch" });
+        if reads == Reads::PosesAndForces {
+            // Our side has no controls.
+            job["starts"].as_object_mut().map(|starts| starts.remove("ctrl"));
+        }
+        let mut baseline = Self { process: Process::start(python, "mujoco_batch.py", &job, folder)?, reads };
         // The baseline answers once its memory is allocated.
         baseline.restart()?;
         Ok(baseline)
@@ -94,19 +131,22 @@ fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> BenchResult<s
 
 impl Contender for Baseline {
     fn restart(&mut self) -> BenchResult<()> {
-        self.0.request("restart").map(drop)
+        self.process.request("restart").map(drop)
     }
 
     fn block(&mut self, steps: u32) -> BenchResult<Duration> {
-        self.0.block(steps)
+        self.process.block(steps)
     }
 
     fn process(&self) -> Option<u32> {
-        Some(self.0.id())
+        Some(self.process.id())
     }
 
     fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
-        let bytes = self.0.bytes("qpos")?;
+        if self.reads == Reads::OtherPackage {
+            return Ok(None);
+        }
+        let bytes = self.process.bytes("qpos")?;
         Ok(Some(bytes.as_chunks::<8>().0.iter().map(|chunk| f64::from_le_bytes(*chunk)).collect()))
     }
 }

@@ -71,6 +71,8 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
     }
     let wants_package = args.name.as_deref().is_none_or(|name| name == PACKAGE_BENCH);
     let package = if wants_package { Some(python_simulation::bench_environment(repo)?) } else { None };
+    let wants_mjbatch = args.name.as_deref().is_none_or(|name| name == "mujoco-batch");
+    let mjbatch = if wants_mjbatch { python::with_mjbatch(repo) } else { None };
     let mut progress = Progress::new(prepared.len());
     for (ready, (_, line)) in prepared.into_iter().zip(versions) {
         progress.begin(&format!("{} on MuJoCo {line}", args.name.as_deref().unwrap_or("all benchmarks")));
@@ -84,6 +86,9 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> XtaskResult {
         }
         if let Some(package) = &package {
             cmd = cmd.env(PACKAGE_VARIABLE, package);
+        }
+        if let Some(mjbatch) = &mjbatch {
+            cmd = cmd.env(python::MJBATCH_VARIABLE, mjbatch);
         }
         cmd.args(["run", "--release", "--package", "kinetoscope-benches", "--"])
             .args(&args.name)

@@ -293,7 +293,8 @@ fn rustdoc(context: &Context<'_>) -> XtaskResult {
     cargo.args(["doc", "--no-deps"]).args(site::PUBLISHED).args(test::features(&["--workspace"])).run()?;
     // The packages without published documentation have internals in their links.
     let cargo = context.debian()?.cargo().env("RUSTDOCFLAGS", "-D warnings");
-    cargo.args(["doc", "--no-deps", "-p", "kinetoscope-benches", "-p", "kinetoscope-testkit", "-p", "xtask"]).run()
+    let packages = ["--package", "kinetoscope-benches", "--package", "kinetoscope-testkit", "--package", "xtask"];
+    cargo.args(["doc", "--no-deps"]).args(packages).args(test::SHARED_FEATURES).run()
 }
 
 fn demo(context: &Context<'_>) -> XtaskResult {

@@ -1,8 +1,9 @@
 //! Checks that all crates can be published: their manifests, the content of the packages, and the documentation as
 //! docs.rs builds it.
 
-use crate::run::{Repo, XtaskResult, no_findings};
+use crate::run::{Repo, XtaskResult, in_ci, no_findings};
 use crate::setup::Prepared;
+use crate::test;
 use serde_json::Value;
 
 /// Checks the manifests and makes all packages, without compiling them again.
@@ -19,11 +20,15 @@ pub(crate) fn run(repo: &Repo, ready: &Prepared) -> XtaskResult {
 
 /// Documents the facade as docs.rs does: without MuJoCo's headers, with the committed declarations.
 pub(crate) fn docs_rs(repo: &Repo, ready: &Prepared) -> XtaskResult {
-    let folder = repo.target.join("docs-rs");
-    let cargo = ready.cargo().env("DOCS_RS", "1").env("MUJOCO_DIR", folder.join("without-mujoco"));
+    // CI shares the compiled dependencies with other stages. Elsewhere, the pages would replace those of `cargo doc`.
+    let folder = if in_ci() { repo.target.clone() } else { repo.target.join("docs-rs") };
+    let cargo = ready.cargo().env("DOCS_RS", "1").env("MUJOCO_DIR", repo.target.join("without-mujoco"));
     let cargo = cargo.env("CARGO_TARGET_DIR", &folder).env("RUSTDOCFLAGS", "-D warnings");
+    let features = ["download", "lerobot", "relocated-assets"].map(|name| format!("kinetoscope/{name}"));
     cargo
-        .args(["doc", "--no-deps", "--package", "kinetoscope", "--features", "download,lerobot,relocated-assets"])
+        .args(["doc", "--no-deps", "--package", "kinetoscope"])
+        .args(test::SHARED_FEATURES)
+        .args(["--features", &features.join(",")])
         .run()
 }
 

@@ -10,6 +10,12 @@ use std::path::{Path, PathBuf};
 /// Environment variable with the python for benchmarks and tests; without it they skip the comparisons with a message.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 
+/// Environment variable with the python that has `mjbatch`; without it the benchmarks leave this baseline out.
+pub(crate) const MJBATCH_VARIABLE: &str = "KINETOSCOPE_PYTHON_MJBATCH";
+
+/// The package `mjbatch`, which requires this version of MuJoCo.
+const MJBATCH: &[&str] = &["mjbatch==0.1.4", "mujoco==3.14.0"];
+
 /// Environment variable with the python for the tests of recordings; without it they skip the comparisons with a
 /// message.
 pub(crate) const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
@@ -75,6 +81,23 @@ pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
         return Some(python);
     }
     eprintln!("note: no python with mujoco {} could be made", wheel::PYTHON_VERSION);
+    None
+}
+
+/// The python of another virtual environment below the target folder, with `mjbatch` and the MuJoCo that it requires;
+/// `None` with a note if it cannot be created.
+pub(crate) fn with_mjbatch(repo: &Repo) -> Option<PathBuf> {
+    let venv = repo.target.join("mjbatch-venv");
+    let python = venv.join("bin/python");
+    let is_ready = || Cmd::new(&python).args(["-c", "import mjbatch"]).quiet().succeeds();
+    if is_ready() {
+        return Some(python);
+    }
+    let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run();
+    if made.is_ok_and(|()| pip_install(&python, MJBATCH).is_ok()) && is_ready() {
+        return Some(python);
+    }
+    eprintln!("note: no python with {} could be made", MJBATCH.join(" "));
     None
 }
 

@@ -2,6 +2,9 @@
 
 use crate::run::{Repo, XtaskResult};
 use crate::setup::{self, MujocoVersion, Prepared, Requirements};
+use crate::test;
+
+const PACKAGE: &str = "kinetoscope-python-cfg";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct PythonCfgArgs {
@@ -21,9 +24,9 @@ pub(crate) fn check(ready: &Prepared) -> XtaskResult {
 }
 
 fn generate(ready: &Prepared, check: bool) -> XtaskResult {
-    let mut cargo = ready.cargo().args(["run", "--quiet", "--package", "kinetoscope-python-cfg"]);
-    if check {
-        cargo = cargo.args(["--", "--check"]);
-    }
-    cargo.run()
+    // With the features of the whole workspace, the tests use the same compiled crates.
+    let all = ["--workspace"];
+    ready.cargo().args(["build", "--quiet"]).args(all).args(test::features(&all)).args(["--bin", PACKAGE]).run()?;
+    let program = ready.program(ready.binary(PACKAGE));
+    if check { program.arg("--check").run() } else { program.run() }
 }
