@@ -30,7 +30,8 @@ pub(crate) struct EntitySet {
     pub(crate) collision_exclusions: Vec<[String; 2]>,
 }
 
-/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings.
+/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings: 1 to 64
+/// characters without slashes and control characters, and not `.` or `..`.
 pub(crate) fn check_uid_syntax(uid: &str) -> Result<()> {
     let forbidden = |c: char| c == '/' || c == '\\' || c.is_control();
     let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(forbidden) && uid != "." && uid != "..";
@@ -81,7 +82,7 @@ impl EntitySet {
     }
 
     /// Names of the bodies in the order of the body axis: links of all robots (`uid/link`), objects (`uid`), then
-    /// bodies and named sites of attached MJCF files (`uid/body`).
+    /// bodies and named sites of attached MJCF files (`uid/body`, `uid/site`).
     pub(crate) fn body_names(&self) -> Arc<[String]> {
         let links = self.robots.iter().flat_map(|r| {
             let links = r.description().named_links().iter();
@@ -104,7 +105,8 @@ impl EntitySet {
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
     }
 
-    /// Indices in [`body_names`](Self::body_names) of a body or site, or of all links of a robot; `None` for `world`.
+    /// Indices in [`body_names`](Self::body_names) of a body or site, or of all links of a robot or articulation;
+    /// `None` for `world`.
     ///
     /// # Errors
     /// The name is unknown.
