@@ -129,8 +129,8 @@ impl EntitySet {
 
     /// For every body in the order of [`body_names`](Self::body_names), the index of the body that moves it. For a
     /// robot, this is the nearest link, the link itself or one above it, that no fixed joint attaches to its parent. An
-    /// object is its own. For an attached MJCF file, it is the body that MuJoCo welds the frame to; a frame welded to
-    /// the world is its own.
+    /// object is its own. For an attached MJCF file, it is the body that MuJoCo welds the frame to. A frame that never
+    /// moves has its own body, or itself for a site of the file's world.
     pub(crate) fn moving_bodies(&self) -> Arc<[usize]> {
         let mut carriers = Vec::new();
         for robot in &self.robots {

@@ -52,7 +52,7 @@ pub(crate) struct VisualSubmesh {
 pub(crate) struct RobotMjcfCfg<'a> {
     /// Prefix of all names: `uid/link`.
     pub uid: &'a str,
-    /// Contact bits of all its geoms.
+    /// Contact bits of all its colliding geoms.
     pub contact: GeomRole,
     /// True if the root link is fixed in the world.
     pub fix_base: bool,
@@ -166,7 +166,7 @@ struct RobotWriter<'a, 'm> {
     plan_of: BTreeMap<JointId, &'a JointPlan>,
     /// Name of the free joint of the root link.
     free_joint: Option<String>,
-    /// Number of bodies above each body of this robot.
+    /// Number of bodies from the top of this robot to each of its bodies, both included.
     depth: BTreeMap<usize, usize>,
     /// Body and frame of each link.
     link_frames: Vec<Option<(usize, Pose)>>,

@@ -149,7 +149,7 @@ impl RobotData {
         self.role.label(self.uid())
     }
 
-    /// True if it was added as a robot, false for another articulation.
+    /// True if it was added as a robot, false for a passive articulation.
     pub(crate) fn is_robot(&self) -> bool {
         self.role == RobotKind::Robot
     }

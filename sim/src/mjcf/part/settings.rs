@@ -8,7 +8,7 @@ use kinetoscope_scene::source_location::SourceLocation;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Maximum number of included files; MuJoCo rejects a file that is included twice.
+/// Maximum number of files that are read, the top one included; MuJoCo rejects a file that is included twice.
 const MAX_INCLUDED_FILES: usize = 100;
 
 /// Prefix of the element name of a sensor.
@@ -60,8 +60,9 @@ fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<Top
     }
 }
 
-/// Warns about settings of a file that the scene overrides for all of its parts, and about sensors that are left out.
-/// `owner` names the part in the messages, such as `MJCF part "arm"`.
+/// Warns about everything of a file that the scene does not take over: options with other values than in `scene`,
+/// visual settings, statistics, custom fields, keyframes, skins, and the sensors `sensors_left_out`. `owner` names the
+/// part in the messages, such as `MJCF part "arm"`.
 pub(crate) fn setting_warnings(
     owner: &str,
     text: &str,
