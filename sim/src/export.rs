@@ -95,7 +95,7 @@ fn write_file(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).map_err(file_error(path))
 }
 
-/// Time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
+/// Largest time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
 const ARMATURE_STEP: f64 = 0.002;
 
 /// Adds `h kd` to the armature of the drives of a robot with mimic joints, if plain MuJoCo is otherwise unstable at the

@@ -261,10 +261,11 @@ impl SimulationManager {
         self.sensors.get(id)
     }
 
-    /// Returns a sensor for changes, for instance to the pose of a camera.
+    /// Returns a sensor for changes, for instance to the pose of a camera. A lazy sensor runs its pending measurement
+    /// first.
     ///
     /// # Errors
-    /// The sensor failed in an earlier step.
+    /// The sensor failed, in an earlier step or now.
     ///
     /// # Panics
     /// The handle belongs to another manager.

@@ -58,7 +58,8 @@ impl SceneCfg {
         if is_yaml { Self::from_yaml(&text, path, types) } else { Self::from_toml(&text, path, types) }
     }
 
-    /// Reads the text of a scene file. Paths in it are relative to the folder of `file`, which need not exist.
+    /// Reads the text of a scene file. Paths in it, except those of sensors, are relative to the folder of `file`,
+    /// which need not exist.
     ///
     /// # Errors
     /// [`Error::SceneFile`] with file and line: the text is not TOML, a key or an entity type is unknown (the message
