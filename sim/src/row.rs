@@ -34,8 +34,8 @@ pub struct EnvRow {
     pub(crate) steps: u64,
     /// Divergence status; `None` while the environment runs.
     pub(crate) diverged: Option<Box<EnvStatus>>,
-    /// False if forces and accelerations belong to the state before the last step. True after a write or reset, and
-    /// after a solve of the current state.
+    /// False if forces and accelerations belong to the state before the last step. True after a write, a reset or a
+    /// capture of the current state.
     pub(crate) solved_current: bool,
     /// True if the warnings of the forward pass of the current state are counted.
     pub(crate) is_forward_counted: bool,

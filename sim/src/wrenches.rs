@@ -25,7 +25,8 @@ pub enum WrenchFrame {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wrench {
     /// Owner of the wrench: index of the robot among robots and articulations, and index of the link in the robot. For
-    /// user forces, [`USER_FORCE_OWNER`] and the index of the body.
+    /// objects, a number above that of any robot, and the index of the object. For user forces, [`USER_FORCE_OWNER`]
+    /// and the index of the body on the body axis.
     pub(crate) owner: (usize, usize),
     /// Index of the body in the model (MuJoCo's body id).
     pub(crate) body: usize,
