@@ -30,8 +30,8 @@ pub(crate) struct EntitySet {
     pub(crate) collision_exclusions: Vec<[String; 2]>,
 }
 
-/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings: 1 to 64
-/// characters without slashes and control characters, and not `.` or `..`.
+/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings. It must have 1 to
+/// 64 characters without slashes and control characters, and not be `.` or `..`.
 pub(crate) fn check_uid_syntax(uid: &str) -> Result<()> {
     let forbidden = |c: char| c == '/' || c == '\\' || c.is_control();
     let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(forbidden) && uid != "." && uid != "..";

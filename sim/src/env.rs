@@ -248,7 +248,7 @@ impl SimEnv {
 
     /// Writes state or inputs, then runs `mj_step1`, which updates all quantities that depend on positions and
     /// velocities. Accelerations and forces keep the values of the last step. A state that is not finite, too large, or
-    /// fails in `mj_step1` is rejected: the state before the write is restored, and the environment is marked as
+    /// fails in `mj_step1` is rejected. Then the state before the write is restored, and the environment is marked as
     /// diverged. Every step overwrites `qfrc_applied` and the controls of drives from [`DriveState`].
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
         let good = self.change(change);

@@ -60,8 +60,8 @@ impl SimulationManager {
     /// Creates a simulation with the configured ground and lights, without other entities.
     ///
     /// # Errors
-    /// A number of the configuration is out of range, this MuJoCo version lacks the integrator, memory or threads
-    /// cannot be allocated, or the MuJoCo library differs from the version this program was built for.
+    /// A number of the configuration is out of range, or this MuJoCo version lacks the integrator. Memory or threads
+    /// cannot be allocated. The MuJoCo library differs from the version this program was built for.
     pub fn new(cfg: SimulationManagerCfg) -> Result<Self> {
         cfg.validate()?;
         mj::check_version()?;

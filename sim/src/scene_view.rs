@@ -143,8 +143,8 @@ impl<'a> SceneViewMut<'a> {
     /// [`set_model`](kinetoscope_mujoco::Data::set_model) holds until the closure returns.
     ///
     /// A state that is not finite or too large is rejected, and so is a state after which MuJoCo warns of a bad
-    /// position, velocity or acceleration: the state before the write is restored, and the environment is marked as
-    /// diverged. If the closure panics, the state before is restored, too.
+    /// position, velocity or acceleration. Then the state before the write is restored, and the environment is marked
+    /// as diverged. If the closure panics, the state before is restored, too.
     ///
     /// Every step overwrites `qfrc_applied`, the controls of drives, and `xfrc_applied` of bodies with external
     /// wrenches or gravity compensation.

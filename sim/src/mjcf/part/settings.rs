@@ -60,8 +60,8 @@ fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<Top
     }
 }
 
-/// Warns about everything of a file that the scene does not take over: options with other values than in `scene`,
-/// visual settings, statistics, custom fields, keyframes, skins, and the sensors `sensors_left_out`. `owner` names the
+/// Warns about everything of a file that the scene does not take over. These are options with other values than in
+/// `scene`, visual settings, statistics, custom fields, keyframes, skins, and `sensors_left_out`. `owner` names the
 /// part in the messages, such as `MJCF part "arm"`.
 pub(crate) fn setting_warnings(
     owner: &str,

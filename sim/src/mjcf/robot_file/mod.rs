@@ -223,8 +223,8 @@ impl MjcfRobotFile {
     }
 
     /// Passive properties of all joints as written to the document, and the joints whose damping B is part of the
-    /// solve. If drives are constraint rows (`rows`) and the integrator is not RK4, the document has no joint damping,
-    /// and the armature of joints with damping is raised by `h B`, with the time step h.
+    /// solve. If drives are constraint rows (`rows`) and the integrator is not RK4, the document has no joint damping.
+    /// Instead, the armature of joints with damping is raised by `h B`, with the time step h.
     fn passive(
         &self,
         cfg: &RobotMjcfCfg<'_>,
