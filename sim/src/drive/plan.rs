@@ -179,8 +179,9 @@ fn drive_setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Dr
     }
 }
 
-/// Position limits of a joint; a continuous joint has none, even if the file gives some. A single missing end is 0, the
-/// default of URDF. With both ends missing (or rejected with a warning), the joint is unlimited.
+/// Position limits of a joint \[rad or m\]; `None` for an unlimited joint. A continuous joint is unlimited, even if the
+/// file gives limits. A single missing end is 0, the default of URDF. With both ends missing (or rejected with a
+/// warning), the joint is unlimited.
 pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
     let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
     (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])

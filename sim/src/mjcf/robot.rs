@@ -164,11 +164,11 @@ struct RobotWriter<'a, 'm> {
     mjcf: &'m mut Mjcf,
     diagnostics: &'m mut Vec<Diagnostic>,
     plan_of: BTreeMap<JointId, &'a JointPlan>,
-    /// Name of the free joint of the root link.
+    /// Name of the free joint of the root link; `None` for a fixed base.
     free_joint: Option<String>,
     /// Number of bodies from the top of this robot to each of its bodies, both included.
     depth: BTreeMap<usize, usize>,
-    /// Body and frame of each link.
+    /// Body and frame of each link; `None` for a link that is not placed yet.
     link_frames: Vec<Option<(usize, Pose)>>,
     /// Links fused into each body.
     fused_links: BTreeMap<usize, Vec<LinkId>>,

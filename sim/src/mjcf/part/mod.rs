@@ -239,7 +239,7 @@ fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
     row(values, values.len() / count.max(1), index)
 }
 
-/// Converts an index of MuJoCo, which is -1 for no object.
+/// Converts an index of MuJoCo; `None` for -1, which stands for no object.
 fn mj_index(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }

@@ -10,7 +10,7 @@ use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::BTreeSet;
 
-/// Converts an index of MuJoCo, which is -1 for no object.
+/// Converts an index of MuJoCo; `None` for -1, which stands for no object.
 fn mj_index(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }
