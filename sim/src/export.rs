@@ -128,8 +128,8 @@ fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<
     (plans, heavier)
 }
 
-/// Adapts an export to plain MuJoCo, which lacks the drives of this crate. Returns a diagnostic if drives got
-/// additional armature.
+/// Adapts an export to plain MuJoCo, which lacks the drives of this crate: integrator, time step, comments, and a
+/// keyframe `start` with the initial state. Returns a diagnostic if drives got additional armature.
 fn prepare_for_plain_mujoco(
     mjcf: &mut Mjcf,
     robots: &[Arc<RobotData>],

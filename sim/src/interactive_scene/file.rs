@@ -218,7 +218,7 @@ impl<'a> Reader<'a> {
         Ok(entity)
     }
 
-    /// Sets the name of an entity, and makes its paths relative to the file.
+    /// Sets the name of an entity, and makes its paths relative to the file. Sensors have neither.
     fn set_name_and_paths(&self, entity: &mut EntityCfg, name: &str) {
         let uid = strip_env_prefix(name).to_owned();
         match entity {

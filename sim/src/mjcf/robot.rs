@@ -256,7 +256,7 @@ impl RobotWriter<'_, '_> {
         Ok(index)
     }
 
-    /// Adds the shapes of a link to its body.
+    /// Sets the body and the frame of a link, and adds its shapes to the body, in an export also a site.
     fn place(&mut self, link: LinkId, body: usize, body_from_link: Pose) {
         self.link_frames[link.0] = Some((body, body_from_link));
         self.fused_links.entry(body).or_default().push(link);
@@ -355,7 +355,8 @@ impl RobotWriter<'_, '_> {
         }
     }
 
-    /// MuJoCo joints of one URDF joint.
+    /// MuJoCo joints of one URDF joint: several for a planar joint, and for a floating joint below another body; empty
+    /// for a fixed joint.
     fn joints(&self, id: JointId, parent: usize) -> Vec<Joint> {
         let joint = self.description.joint(id);
         let name = self.name(&joint.name);

@@ -23,7 +23,7 @@ struct TopLevelElement {
     source: SourceLocation,
 }
 
-/// Collects the elements at the top of a file and of its included files, in order.
+/// Collects the elements at the top of a file and of its included files, and their sensors, in order.
 fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<TopLevelElement>, files: &mut usize) {
     *files += 1;
     let Ok(document) = roxmltree::Document::parse(text) else { return };
