@@ -439,7 +439,8 @@ pub enum Error {
         /// The missing quantities.
         missing: String,
     },
-    /// A sensor failed, in an earlier step or in the pending measurement of a lazy sensor now, and stopped.
+    /// A sensor failed and stopped: in an earlier step, when an added entity rebuilt it, or in its pending measurement
+    /// now.
     #[error("sensor {sensor:?} stopped: {fault}")]
     SensorFault {
         /// The sensor.
