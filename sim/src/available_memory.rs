@@ -9,14 +9,15 @@ pub(crate) fn available_memory() -> Option<usize> {
     of_system(Path::new("/"))
 }
 
-/// The same, for the files below `root`.
+/// As [`available_memory`], from the files below `root`.
 fn of_system(root: &Path) -> Option<usize> {
     let groups = std::fs::read_to_string(root.join("proc/self/cgroup")).unwrap_or_default();
     let limits = groups.lines().flat_map(|group| group_limits(root, group));
     machine(root).into_iter().chain(limits).min()
 }
 
-/// Available memory and free swap space of the machine \[bytes\]. Source: proc(5), `meminfo`, in KiB.
+/// Available memory and free swap space of the machine \[bytes\]. `None` without `meminfo`. Source: proc(5), `meminfo`,
+/// whose numbers are in KiB.
 fn machine(root: &Path) -> Option<usize> {
     let text = std::fs::read_to_string(root.join("proc/meminfo")).ok()?;
     let of = |key: &str| {

@@ -137,7 +137,7 @@ impl Batch {
     /// thread and threads of `pool`.
     ///
     /// # Errors
-    /// A number is zero, or memory or threads cannot be allocated.
+    /// A number is zero, the model keeps state that rows do not have, or memory or threads cannot be allocated.
     pub fn new(
         model: &Model,
         drives: &Arc<DriveTable>,

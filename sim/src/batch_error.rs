@@ -2,8 +2,8 @@
 
 use kinetoscope_mujoco::EngineError;
 
-/// An error of the number of environments or threads, from
-/// [`SimulationManager::new`](crate::SimulationManager::new).
+/// An error of creating the environments, from [`SimulationManager::new`](crate::SimulationManager::new) and from each
+/// method that adds an entity.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BatchError {

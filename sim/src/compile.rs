@@ -337,7 +337,9 @@ fn assign_geom_owners(
     visible::of_simulation(model, &owners, &visible::tendon_owners(model, contents))
 }
 
-/// Finds every joint and link in the compiled model, and replaces actuators of implicit drives by constraint rows.
+/// Finds every joint and link in the compiled model, replaces actuators of implicit drives by constraint rows, and
+/// makes those of explicit models effort sources. Returns the model, its drives, the indices of all robots, and the
+/// initial state.
 fn set_up_drives(
     mut compiled: mj::Compiled,
     contents: &EntitySet,

@@ -31,7 +31,7 @@ impl<'a> Entities<'a> {
         Self { sim }
     }
 
-    /// Handle of the robot `uid`.
+    /// Handle of the robot `uid`, which is not a passive articulation.
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.

@@ -30,7 +30,8 @@ pub(crate) struct EntitySet {
     pub(crate) collision_exclusions: Vec<[String; 2]>,
 }
 
-/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings.
+/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings. It must have 1 to
+/// 64 characters without slashes and control characters, and not be `.` or `..`.
 pub(crate) fn check_uid_syntax(uid: &str) -> Result<()> {
     let forbidden = |c: char| c == '/' || c == '\\' || c.is_control();
     let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(forbidden) && uid != "." && uid != "..";
@@ -81,7 +82,7 @@ impl EntitySet {
     }
 
     /// Names of the bodies in the order of the body axis: links of all robots (`uid/link`), objects (`uid`), then
-    /// bodies and named sites of attached MJCF files (`uid/body`).
+    /// bodies and named sites of attached MJCF files (`uid/body`, `uid/site`).
     pub(crate) fn body_names(&self) -> Arc<[String]> {
         let links = self.robots.iter().flat_map(|r| {
             let links = r.description().named_links().iter();
@@ -104,7 +105,8 @@ impl EntitySet {
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
     }
 
-    /// Indices in [`body_names`](Self::body_names) of a body or site, or of all links of a robot; `None` for `world`.
+    /// Indices in [`body_names`](Self::body_names) of a body or site, or of all links of a robot or articulation;
+    /// `None` for `world`.
     ///
     /// # Errors
     /// The name is unknown.
@@ -127,8 +129,8 @@ impl EntitySet {
 
     /// For every body in the order of [`body_names`](Self::body_names), the index of the body that moves it. For a
     /// robot, this is the nearest link, the link itself or one above it, that no fixed joint attaches to its parent. An
-    /// object is its own. For an attached MJCF file, it is the body that MuJoCo welds the frame to; a frame welded to
-    /// the world is its own.
+    /// object is its own. For an attached MJCF file, it is the body that MuJoCo welds the frame to. A frame that never
+    /// moves has its own body, or itself for a site of the file's world.
     pub(crate) fn moving_bodies(&self) -> Arc<[usize]> {
         let mut carriers = Vec::new();
         for robot in &self.robots {

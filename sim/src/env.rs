@@ -56,7 +56,7 @@ impl std::fmt::Display for Divergence {
     }
 }
 
-/// Position of the slot in a version of a row.
+/// Lowest bit of the slot in a version of a row.
 const SLOT_SHIFT: u32 = 44;
 
 /// Part of a step that the data of an environment contains for the current state.
@@ -247,9 +247,9 @@ impl SimEnv {
     }
 
     /// Writes state or inputs, then runs `mj_step1`, which updates all quantities that depend on positions and
-    /// velocities. Accelerations and forces keep the values of the last step. A non-finite state is rejected: the state
-    /// before the write is restored, and the environment is marked as diverged. Every step overwrites `qfrc_applied`
-    /// and the controls of drives from [`DriveState`].
+    /// velocities. Accelerations and forces keep the values of the last step. A state that is not finite, too large, or
+    /// fails in `mj_step1` is rejected. Then the state before the write is restored, and the environment is marked as
+    /// diverged. Every step overwrites `qfrc_applied` and the controls of drives from [`DriveState`].
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
         let good = self.change(change);
         self.forward(&good);
@@ -568,7 +568,7 @@ pub(crate) struct StateArrays {
     pub warmstart: Vec<f64>,
 }
 
-/// Counters and divergence of an environment.
+/// Steps since the last reset, warnings since the creation, and divergence of an environment.
 #[derive(Clone, Debug)]
 pub(crate) struct EnvStats {
     pub(crate) diverged: Option<Box<EnvStatus>>,

@@ -178,7 +178,7 @@ pub enum Error {
     /// A value of a configuration or an argument is invalid.
     #[error("{field} is {value}; {expected}")]
     Config {
-        /// Name of the field.
+        /// Name of the field or argument.
         field: &'static str,
         /// The value given.
         value: String,
@@ -439,7 +439,8 @@ pub enum Error {
         /// The missing quantities.
         missing: String,
     },
-    /// A sensor failed in an earlier step and stopped.
+    /// A sensor failed and stopped: in an earlier step, when an added entity rebuilt it, or in its pending measurement
+    /// now.
     #[error("sensor {sensor:?} stopped: {fault}")]
     SensorFault {
         /// The sensor.

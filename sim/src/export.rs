@@ -95,7 +95,7 @@ fn write_file(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).map_err(file_error(path))
 }
 
-/// Time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
+/// Largest time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
 const ARMATURE_STEP: f64 = 0.002;
 
 /// Adds `h kd` to the armature of the drives of a robot with mimic joints, if plain MuJoCo is otherwise unstable at the
@@ -128,8 +128,8 @@ fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<
     (plans, heavier)
 }
 
-/// Adapts an export to plain MuJoCo, which lacks the drives of this crate. Returns a diagnostic if drives got
-/// additional armature.
+/// Adapts an export to plain MuJoCo, which lacks the drives of this crate: integrator, time step, comments, and a
+/// keyframe `start` with the initial state. Returns a diagnostic if drives got additional armature.
 fn prepare_for_plain_mujoco(
     mjcf: &mut Mjcf,
     robots: &[Arc<RobotData>],

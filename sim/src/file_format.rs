@@ -52,7 +52,7 @@ impl<'de> Deserialize<'de> for PerJoint {
     }
 }
 
-/// Deserializes the MJCF of a robot from a file path or the table of [`MjcfFile`].
+/// Deserializes the MJCF of a robot from a file path or the table of [`MjcfFile`]; `None` for a null value.
 pub(crate) fn mjcf_file<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<MjcfFile>, D::Error> {
     struct FileOrTable;
 

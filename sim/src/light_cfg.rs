@@ -13,7 +13,8 @@ pub enum LightKindCfg {
     /// Parallel rays along the direction, such as sunlight.
     #[default]
     Directional,
-    /// Light in all directions from the position. The rasterizer computes no shadow for it.
+    /// Light in all directions from the position. The rasterizer's shadow maps have no shadows of it; ray-traced
+    /// shadows and path-traced images have them.
     Point,
     /// Light in a cone around the direction.
     Spot {
@@ -44,14 +45,14 @@ pub struct LightCfg {
     /// point lights and domes, but never zero.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub direction: Vector3<f64>,
-    /// Color, 0..=1.
+    /// RGB color (sRGB), 0..=1.
     pub color: [f64; 3],
-    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation: the intensity at distance d is 1 / (c + l d + q
-    /// d²). Unused by directional lights and domes.
+    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation: the intensity at distance d is divided by c + l d +
+    /// q d². Unused by directional lights and domes.
     pub attenuation: [f64; 3],
-    /// Size for soft shadows in ray-traced images: the radius of the light's disc \[m\]. For a directional light, the
-    /// radius at a distance of 1 m (the tangent of its angular radius, 0.00465 for the sun). 0 is a point, which casts
-    /// sharp shadows.
+    /// Size for soft shadows in path-traced images: the radius of the light's disc \[m\]. All other renderers ignore
+    /// it. For a directional light, the radius at a distance of 1 m (the tangent of its angular radius, 0.00465 for the
+    /// sun). 0 is a point, which casts sharp shadows.
     pub radius: f64,
     /// True if objects cast shadows in this light.
     pub cast_shadow: bool,

@@ -60,8 +60,8 @@ impl SimulationManager {
     /// Creates a simulation with the configured ground and lights, without other entities.
     ///
     /// # Errors
-    /// A number of the configuration is out of range, or the MuJoCo library differs from the version this program was
-    /// built for.
+    /// A number of the configuration is out of range, or this MuJoCo version lacks the integrator. Memory or threads
+    /// cannot be allocated. The MuJoCo library differs from the version this program was built for.
     pub fn new(cfg: SimulationManagerCfg) -> Result<Self> {
         cfg.validate()?;
         mj::check_version()?;
@@ -206,7 +206,7 @@ impl SimulationManager {
         if matches!(uid, "world" | "ground") { Err(Error::DuplicateUid(uid.into())) } else { Ok(()) }
     }
 
-    /// Compiles `entities` and replaces the simulation. On an error nothing changes.
+    /// Compiles `contents` and replaces the simulation. On an error nothing changes.
     pub(crate) fn recompile_with(&mut self, contents: EntitySet, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents, &self.pool)?;
         // Compiling repeats the earlier diagnostics of the robots: report only the new ones.
@@ -261,10 +261,11 @@ impl SimulationManager {
         self.sensors.get(id)
     }
 
-    /// Returns a sensor for changes, for instance to the pose of a camera.
+    /// Returns a sensor for changes, for instance to the pose of a camera. A lazy sensor runs its pending measurement
+    /// first.
     ///
     /// # Errors
-    /// The sensor failed in an earlier step.
+    /// The sensor failed, in an earlier step or now.
     ///
     /// # Panics
     /// The handle belongs to another manager.

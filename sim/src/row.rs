@@ -19,13 +19,13 @@ use std::sync::Arc;
 pub struct EnvRow {
     /// Targets, gains and efforts of the drives.
     pub drives: DriveState,
-    /// State of the environment, unless it is in working memory: then the state before the current step.
+    /// State of the environment. While it is in working memory, the state as last saved: during a step, that before it.
     pub(crate) motion: IntegrationState,
     /// Results of the last solve.
     pub(crate) solved: SolvedState,
-    /// Controls and applied joint forces as the last step used them.
+    /// Controls and applied joint forces as of the last save of this row, or as set in it since.
     pub(crate) joint_inputs: JointInputs,
-    /// Other inputs as the last step used them, shared until an environment has its own.
+    /// Other inputs as of the last save of this row, shared until an environment has its own.
     pub(crate) body_inputs: Arc<BodyInputs>,
     /// Inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
     pub(crate) written: Arc<UserInputs>,
@@ -34,7 +34,8 @@ pub struct EnvRow {
     pub(crate) steps: u64,
     /// Divergence status; `None` while the environment runs.
     pub(crate) diverged: Option<Box<EnvStatus>>,
-    /// True if forces and accelerations were solved for the current state, false if for the state before the last step.
+    /// False if forces and accelerations belong to the state before the last step. True after a write, a reset or a
+    /// capture of the current state.
     pub(crate) solved_current: bool,
     /// True if the warnings of the forward pass of the current state are counted.
     pub(crate) is_forward_counted: bool,
@@ -116,7 +117,7 @@ impl EnvRow {
         }
     }
 
-    /// Saves the inputs of `data` as those of the last step.
+    /// Saves the inputs of `data` in the row.
     pub(crate) fn save_inputs(&mut self, data: &Data) {
         self.joint_inputs.save(data);
         if !self.body_inputs.matches(data) {
@@ -124,7 +125,7 @@ impl EnvRow {
         }
     }
 
-    /// Restores the inputs of the last step.
+    /// Restores the inputs saved in the row.
     pub(crate) fn restore_inputs(&self, data: &mut Data) {
         self.joint_inputs.restore(data);
         self.body_inputs.restore(data);
@@ -153,7 +154,8 @@ impl EnvRow {
         &self.cold.captured
     }
 
-    /// Adds steps, warnings and divergence of `other`, whose state was copied to this environment.
+    /// Takes over the number of steps of `other`, whose state was copied to this environment, and adds its warnings.
+    /// Its divergence is taken over unless this environment diverged itself.
     pub(crate) fn add_stats(&mut self, other: &EnvStats) {
         self.steps = other.steps;
         self.cold.warnings.add(&other.warnings);
@@ -162,7 +164,7 @@ impl EnvRow {
         }
     }
 
-    /// Counters and divergence since the environment was created.
+    /// Steps since the last reset, warnings since the environment was created, and divergence status.
     pub(crate) fn stats(&self) -> EnvStats {
         EnvStats { diverged: self.diverged.clone(), steps: self.steps, warnings: self.cold.warnings }
     }

@@ -142,9 +142,9 @@ impl<'a> SceneViewMut<'a> {
     /// computed from these when it is needed, as in every write. A model set with
     /// [`set_model`](kinetoscope_mujoco::Data::set_model) holds until the closure returns.
     ///
-    /// A non-finite state is rejected, and so is a state after which MuJoCo warns of a bad position, velocity or
-    /// acceleration: the state before the write is restored, and the environment is marked as diverged. If the closure
-    /// panics, the state before is restored, too.
+    /// A state that is not finite or too large is rejected, and so is a state after which MuJoCo warns of a bad
+    /// position, velocity or acceleration. Then the state before the write is restored, and the environment is marked
+    /// as diverged. If the closure panics, the state before is restored, too.
     ///
     /// Every step overwrites `qfrc_applied`, the controls of drives, and `xfrc_applied` of bodies with external
     /// wrenches or gravity compensation.
@@ -211,8 +211,8 @@ impl<'a> SceneViewMut<'a> {
 
     /// Contacts of environments at the current time, with the forces that the engine solves for it: one list for each
     /// of `env_ids` (all environments for `None`). Bodies are indexed as in
-    /// [`body_names`](crate::Entities::body_names). A diverged environment has no contacts. Measurements of sensors and
-    /// later steps are not affected.
+    /// [`body_names`](crate::Entities::body_names). A diverged environment has no contacts, nor has one for which the
+    /// solve fails. Measurements of sensors and later steps are not affected.
     ///
     /// # Errors
     /// An environment does not exist.

@@ -356,7 +356,7 @@ impl SensorList {
         id.index
     }
 
-    /// Uids and handles of all sensors of type `S`.
+    /// Uids and handles of all sensors of type `S`, without failed sensors.
     pub(crate) fn ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
         let is = |entry: &SensorEntry| {
             let sensor = entry.slot.as_ref().ok().and_then(|slot| slot.sensor().ok());

@@ -130,10 +130,10 @@ impl Simulation {
         });
     }
 
-    /// Copies the state of every entity that `old` has too, matched by name: positions, velocities, warm start,
-    /// targets, controls, wrenches, attached welds, time. Forces of
-    /// [`set_point_forces`](crate::SceneViewMut::set_point_forces) end. Divergence is copied as well: a diverged
-    /// environment stays frozen until it is reset.
+    /// Copies the state of every entity that `old` has too: positions, velocities, warm start, targets, controls,
+    /// wrenches, attached welds, time. Joints and bodies are matched by name, everything else by insertion order.
+    /// Forces of [`set_point_forces`](crate::SceneViewMut::set_point_forces) end. Divergence is copied as well: a
+    /// diverged environment stays frozen until it is reset.
     pub(crate) fn transfer_state_from(&mut self, old: &Self) {
         let (old_model, model) = (old.batch.model(), self.batch.model());
         let mut qpos = Vec::new();

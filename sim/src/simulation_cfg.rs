@@ -92,7 +92,8 @@ impl Default for SimulationManagerCfg {
 }
 
 impl SimulationManagerCfg {
-    /// Preset for grasping: elliptic friction cones that do not slip.
+    /// Preset for grasping: elliptic friction cones with a tangential stiffness of ten times the default, so that
+    /// grasped objects hardly slip.
     pub fn manipulation() -> Self {
         Self { cone: FrictionCone::Elliptic, impratio: 10.0, ..Self::default() }
     }

@@ -37,7 +37,7 @@ pub struct SurfaceCfg {
     /// the GGX distribution is the square of the roughness.
     pub roughness: Option<f64>,
     /// Fraction of light that is refracted through the surface, as by glass, 0..=1. Only path-traced frames apply it,
-    /// and only to closed shapes; other renderers draw an opaque surface.
+    /// and only to closed shapes; other renderers draw the surface as with 0.
     pub transmission: Option<f64>,
     /// Index of refraction of the inside, 1..=10: 1.5 for glass, 1.33 for water.
     pub refractive_index: Option<f64>,

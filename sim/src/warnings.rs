@@ -64,8 +64,8 @@ impl<'a> Warnings<'a> {
         Ok(mj::Warning::ALL.iter().map(|w| (w.name(), counts.get(*w))).filter(|(_, n)| *n > 0).collect())
     }
 
-    /// Number of times contact and constraint buffers were doubled. Every thread has buffers of its own, so the number
-    /// depends on the number of threads and varies between runs; results of steps do not.
+    /// Number of times buffers of contacts, constraints or the solver's stack were doubled. Every thread has buffers of
+    /// its own, so the number depends on the number of threads and varies between runs; results of steps do not.
     pub fn buffer_growths(&self) -> u64 {
         self.sim.simulation.batch.buffer_growths()
     }

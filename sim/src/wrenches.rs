@@ -1,4 +1,5 @@
-//! External forces and torques on the bodies of one environment, and gravity compensation. Both stay until changed.
+//! External forces and torques on the bodies of one environment, and gravity compensation. Forces and torques stay
+//! until changed or until the environment is reset; gravity compensation stays until changed.
 //!
 //! MuJoCo applies `xfrc_applied` at the center of mass of a body, in world axes. A wrench in link axes turns with the
 //! link, so it is rewritten in every step. Gravity compensation is the force `-m g` at the center of mass, on both
@@ -24,7 +25,8 @@ pub enum WrenchFrame {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wrench {
     /// Owner of the wrench: index of the robot among robots and articulations, and index of the link in the robot. For
-    /// user forces, [`USER_FORCE_OWNER`] and the index of the body.
+    /// objects, a number above that of any robot, and the index of the object. For user forces, [`USER_FORCE_OWNER`]
+    /// and the index of the body on the body axis.
     pub(crate) owner: (usize, usize),
     /// Index of the body in the model (MuJoCo's body id).
     pub(crate) body: usize,
@@ -86,8 +88,9 @@ impl Wrenches {
         }
     }
 
-    /// Wrenches for another model; `body` maps old to new body indices. User forces
-    /// ([`set_user_wrench`](Self::set_user_wrench)) are dropped, because their owner index is invalid there.
+    /// Wrenches for another model; `body` maps old to new body indices. Wrenches and gravity compensation of bodies
+    /// without a new index are dropped. So are user forces ([`set_user_wrench`](Self::set_user_wrench)), because their
+    /// owner index is invalid there.
     pub(crate) fn remapped(&self, body: impl Fn(usize) -> Option<usize>) -> Self {
         let moved = |wrench: &Wrench| Some(Wrench { body: body(wrench.body)?, ..wrench.clone() });
         Self {
@@ -108,7 +111,7 @@ impl Wrenches {
         numbers
     }
 
-    /// Inverse of [`to_flat`](Self::to_flat); `None` for an invalid array.
+    /// Inverse of [`to_flat`](Self::to_flat); `None` for an array that is too short.
     pub(crate) fn from_flat(numbers: &[f64]) -> Option<Self> {
         let (&count, rest) = numbers.split_first()?;
         let (list, weightless) = rest.split_at_checked((count as usize).checked_mul(14)?)?;
@@ -123,7 +126,8 @@ impl Wrenches {
         Some(Self { list, gravity_compensated: weightless.iter().map(|&body| body as usize).collect() })
     }
 
-    /// Writes the wrenches to `data`. Bodies that are not listed here keep their `xfrc_applied`.
+    /// Writes the wrenches and the gravity compensation to `data`. Bodies that are not listed here keep their
+    /// `xfrc_applied`.
     pub(crate) fn apply(&self, data: &mut Data) {
         self.clear(data);
         for wrench in &self.list {

@@ -54,8 +54,8 @@ pub(crate) struct CapturedStep {
 }
 
 impl BodyAxis {
-    /// Creates the body axis of a compiled scene; `carriers` is
-    /// [`moving_bodies`](kinetoscope_sensors::SensorContext::moving_bodies).
+    /// Creates the body axis of a compiled scene: links of robots, objects, then frames of attached MJCF files.
+    /// `carriers` is [`moving_bodies`](kinetoscope_sensors::SensorContext::moving_bodies).
     pub(crate) fn new(
         model: &Model,
         robots: &[RobotIndexing],

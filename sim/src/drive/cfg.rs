@@ -94,17 +94,17 @@ pub(super) const DEFAULT_DAMPING: f64 = 1e3;
 /// defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGains {
-    /// Stiffness, if the configuration sets one.
+    /// Stiffness in the unit of the drive type, if the configuration sets one.
     pub stiffness: Option<f64>,
-    /// Damping, if the configuration sets one.
+    /// Damping in the unit of the drive type, if the configuration sets one.
     pub damping: Option<f64>,
-    /// Effort limit, if the configuration sets one.
+    /// Effort limit \[N m or N\], if the configuration sets one.
     pub max_effort: Option<f64>,
-    /// Velocity limit, if the configuration sets one.
+    /// Velocity limit \[rad/s or m/s\], if the configuration sets one.
     pub max_velocity: Option<f64>,
-    /// Dry friction, if the configuration sets one.
+    /// Dry friction \[N m or N\], if the configuration sets one.
     pub friction: Option<f64>,
-    /// Rotor inertia, if the configuration sets one.
+    /// Rotor inertia \[kg m² or kg\], if the configuration sets one.
     pub armature: Option<f64>,
     /// Explicit actuator model, if the configuration names one.
     pub actuator: Option<ActuatorModel>,

@@ -32,7 +32,8 @@ fn has_gains(gains: &Gains) -> bool {
     gains.kp > 0.0 || gains.kd > 0.0
 }
 
-/// Rewrites the friction row of one drive. `row` counts the friction rows of degrees of freedom from 0.
+/// Rewrites the friction row of one drive, and sets its control to the position target. `row` counts the friction rows
+/// of degrees of freedom from 0. Without gains, the clamped feedforward effort is added to `qfrc_applied` instead.
 pub(super) fn apply(drive: &Drive, row: usize, gains: &Gains, target: &Target, data: &mut mj::Data) {
     let h = data.model().timestep();
     let (q, v) = (data.qpos()[drive.qpos], data.qvel()[drive.dof]);

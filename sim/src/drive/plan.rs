@@ -19,7 +19,7 @@ pub struct JointPlan {
     pub joint: JointId,
     /// Gains of its actuator; `None` for passive and mimic joints.
     pub actuator: Option<PdGains>,
-    /// Explicit actuator model; `None` for a joint with the robot's drive model.
+    /// Explicit actuator model; `None` for a joint with the robot's drive model, and for passive and mimic joints.
     pub model: Option<ActuatorModel>,
     /// Drive type, stiffness and damping, in the unit of the drive type: from the configuration, else the file, else
     /// defaults. The actuator's gains are computed from them. A joint that an MJCF file couples by a nonlinear
@@ -65,7 +65,7 @@ pub enum PlanError {
     InitialValue {
         /// The joint.
         joint: String,
-        /// The value given.
+        /// The position given or derived \[rad or m\].
         value: f64,
     },
     /// An actuator model does not fit its joint.
@@ -154,8 +154,8 @@ pub fn plan(
 }
 
 /// Returns the setting of a joint's drive: from the configuration, else the file, else EmbodiChain's defaults. A joint
-/// that is passive in its file is driven only if the configuration names it. A joint that a coupling moves is never
-/// driven.
+/// that is passive in its file is driven only if the configuration sets its stiffness, damping or actuator model. A
+/// joint that a coupling moves is never driven.
 fn drive_setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> DriveSetting {
     let of_file = joint.defaults.map_or(FileActuation::Unspecified, |file| file.drive);
     // The file's gains are in torque units. For a unit that needs the inertia, they cannot be converted here.
@@ -179,8 +179,9 @@ fn drive_setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Dr
     }
 }
 
-/// Position limits of a joint; a continuous joint has none, even if the file gives some. A single missing end is 0, the
-/// default of URDF. With both ends missing (or rejected with a warning), the joint is unlimited.
+/// Position limits of a joint \[rad or m\]; `None` for an unlimited joint. A continuous joint is unlimited, even if the
+/// file gives limits. A single missing end is 0, the default of URDF. With both ends missing (or rejected with a
+/// warning), the joint is unlimited.
 pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
     let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
     (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])

@@ -328,7 +328,7 @@ impl SimEnv {
     }
 
     /// Replaces the data by data with twice the buffer size of `what`, in the state that the row has, and with the same
-    /// results.
+    /// results. Data that is already larger than [`MAX_ENV_BYTES`] is an error.
     fn grow_buffers(&mut self, what: Overflow, kept: Inputs) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().enlarged(what);
         if self.data.bytes() > MAX_ENV_BYTES {

@@ -52,10 +52,10 @@ pub(crate) const AVAILABLE: StateFields = {
     all
 };
 
-/// Allocates a state with the arrays that `requires` names. The body axis has the links of all robots, then objects,
-/// then frames of attached MJCF files. The joint axis has the movable joints of all robots, then the joints of attached
-/// MJCF files with one degree of freedom. The actuator axis has the drives of all robots, then the actuators of
-/// attached MJCF files.
+/// Allocates a state with the arrays that `requires` names, without markers, and without those of the visual scene
+/// until that scene exists. The body axis has the links of all robots, then objects, then frames of attached MJCF
+/// files. The joint axis has the movable joints of all robots, then the joints of attached MJCF files with one degree
+/// of freedom. The actuator axis has the drives of all robots, then the actuators of attached MJCF files.
 pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneState {
     let visual_scene = simulation.visual_scene.as_ref();
     let lengths = StateDims {
@@ -125,8 +125,8 @@ fn emptied<'b>(mut rows: Vec<Mutex<ChunkRows<'_>>>) -> Vec<Mutex<ChunkRows<'b>>>
     rows.into_iter().filter_map(|_| None).collect()
 }
 
-/// Fills the arrays that `requires` names, which must be allocated, and steps and times, for the environments
-/// `chosen`. The list of contacts becomes that of the last capture of every environment.
+/// Fills the arrays that `requires` names, which must be allocated, and steps and times, for the environments `chosen`.
+/// If contacts are required, their list becomes that of the last capture of every environment.
 pub(crate) fn gather(
     simulation: &Simulation,
     chosen: &[usize],
@@ -169,7 +169,7 @@ pub(crate) fn step_and_gather(
     gather_contacts(simulation, requires, state);
 }
 
-/// Fills the contacts, in the order of the environments.
+/// Fills the contacts, if `requires` names them, in the order of the environments.
 fn gather_contacts(simulation: &Simulation, requires: StateFields, state: &mut SceneState) {
     if requires.contains(StateFields::CONTACTS) {
         simulation.batch.for_each_row(|i, row| contacts::fill(row.row, i, state));

@@ -9,7 +9,7 @@ use std::fmt;
 const WIDTH: usize = 120;
 /// Spaces between columns.
 const COLUMN_GAP: usize = 2;
-/// Minimum width of a shortened column, unless its heading is wider.
+/// Minimum width of a shortened column.
 const MIN_COLUMN_WIDTH: usize = 24;
 /// Number of tree levels that are drawn; for deeper links, the levels nearest to the root are cut off.
 const MAX_TREE_LEVELS: usize = 16;

@@ -58,7 +58,8 @@ impl SceneCfg {
         if is_yaml { Self::from_yaml(&text, path, types) } else { Self::from_toml(&text, path, types) }
     }
 
-    /// Reads the text of a scene file. Paths in it are relative to the folder of `file`, which need not exist.
+    /// Reads the text of a scene file. Paths in it, except those of sensors, are relative to the folder of `file`,
+    /// which need not exist.
     ///
     /// # Errors
     /// [`Error::SceneFile`] with file and line: the text is not TOML, a key or an entity type is unknown (the message
@@ -217,7 +218,7 @@ impl<'a> Reader<'a> {
         Ok(entity)
     }
 
-    /// Sets the name of an entity, and makes its paths relative to the file.
+    /// Sets the name of an entity, and makes its paths relative to the file. Sensors have neither.
     fn set_name_and_paths(&self, entity: &mut EntityCfg, name: &str) {
         let uid = strip_env_prefix(name).to_owned();
         match entity {

@@ -39,7 +39,8 @@ use std::path::Path;
 /// assert_eq!(cfg.keys().collect::<Vec<_>>(), ["cube", "touch"]);
 /// ```
 ///
-/// The same as a file, which [`from_file`](Self::from_file) reads; paths in it are relative to the file:
+/// The same as a file, which [`from_file`](Self::from_file) reads; paths in it, except those of sensors, are relative
+/// to the file:
 ///
 /// ```toml
 /// [simulation]               # fields of SimulationManagerCfg; preset = "legged" or "manipulation" sets defaults

@@ -136,7 +136,7 @@ enum Kind {
 /// Answer of a probe at its value.
 #[derive(Debug)]
 enum Reply {
-    /// None, after the type of the value is recorded.
+    /// An error that stops the deserializer, after the type of the value is recorded.
     Stop,
     Bool(bool),
     Integer,

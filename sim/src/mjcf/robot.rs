@@ -52,7 +52,7 @@ pub(crate) struct VisualSubmesh {
 pub(crate) struct RobotMjcfCfg<'a> {
     /// Prefix of all names: `uid/link`.
     pub uid: &'a str,
-    /// Contact bits of all its geoms.
+    /// Contact bits of all its colliding geoms.
     pub contact: GeomRole,
     /// True if the root link is fixed in the world.
     pub fix_base: bool,
@@ -164,11 +164,11 @@ struct RobotWriter<'a, 'm> {
     mjcf: &'m mut Mjcf,
     diagnostics: &'m mut Vec<Diagnostic>,
     plan_of: BTreeMap<JointId, &'a JointPlan>,
-    /// Name of the free joint of the root link.
+    /// Name of the free joint of the root link; `None` for a fixed base.
     free_joint: Option<String>,
-    /// Number of bodies above each body of this robot.
+    /// Number of bodies from the top of this robot to each of its bodies, both included.
     depth: BTreeMap<usize, usize>,
-    /// Body and frame of each link.
+    /// Body and frame of each link; `None` for a link that is not placed yet.
     link_frames: Vec<Option<(usize, Pose)>>,
     /// Links fused into each body.
     fused_links: BTreeMap<usize, Vec<LinkId>>,
@@ -256,7 +256,7 @@ impl RobotWriter<'_, '_> {
         Ok(index)
     }
 
-    /// Adds the shapes of a link to its body.
+    /// Sets the body and the frame of a link, and adds its shapes to the body, in an export also a site.
     fn place(&mut self, link: LinkId, body: usize, body_from_link: Pose) {
         self.link_frames[link.0] = Some((body, body_from_link));
         self.fused_links.entry(body).or_default().push(link);
@@ -355,7 +355,8 @@ impl RobotWriter<'_, '_> {
         }
     }
 
-    /// MuJoCo joints of one URDF joint.
+    /// MuJoCo joints of one URDF joint: several for a planar joint, and for a floating joint below another body; empty
+    /// for a fixed joint.
     fn joints(&self, id: JointId, parent: usize) -> Vec<Joint> {
         let joint = self.description.joint(id);
         let name = self.name(&joint.name);

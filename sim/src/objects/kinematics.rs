@@ -365,7 +365,7 @@ impl Robot<'_> {
     }
 
     /// Finds the column of a joint with a polynomial coupling that moves the end of the chain, and that is in `free` or
-    /// follows a joint in `free`.
+    /// follows a joint in `free`. `None` without such a joint.
     fn polynomial_follower(&self, chain: &Chain, free: &[usize]) -> Option<usize> {
         let (description, plans) = (self.description(), self.data.plans());
         let column_of = |joint: JointId| plans.iter().position(|plan| plan.joint == joint);

@@ -147,8 +147,9 @@ impl<'a> MjcfPart<'a> {
     }
 
     /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step, also
-    /// after a write. After a reset they are 0. If a sensor needs solved quantities, a write or a reset replaces them
-    /// by the forces in the new state.
+    /// after a write. [`SceneViewMut::contacts`](crate::SceneViewMut::contacts) solves the current state, so they are
+    /// those of the current state after it. After a reset they are 0. If a sensor needs solved quantities, a write or a
+    /// reset replaces them by the forces in the new state.
     #[doc(alias = "get_actuator_force")]
     pub fn actuator_force(&self) -> Array2<f64> {
         self.rows(Stage::Raw, &self.indices().actuators, |env, place| env.data().actuator_force()[place])

@@ -96,7 +96,8 @@ pub(crate) struct SensorFrame {
     pub(crate) body: usize,
     /// Pose of the frame in the body.
     pub(crate) body_from_frame: Pose,
-    /// Index of the frame of the moving body that carries this frame; the own index of a static frame.
+    /// Index of the frame of the moving body that carries this frame. For a frame that never moves, that of its own
+    /// body, or its own index for a site of the file's world.
     pub(crate) moving_frame: usize,
 }
 

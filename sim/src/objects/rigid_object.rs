@@ -95,8 +95,8 @@ impl<'a> RigidObjectMut<'a> {
     /// body that touches the object at its new pose is pushed out as in any contact.
     ///
     /// # Errors
-    /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;
-    /// then nothing is written.
+    /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero. A
+    /// pose of a static object that MuJoCo rejects. Then nothing is written.
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.body().write_poses("write_pose", poses.into(), env_ids)
     }

@@ -78,7 +78,7 @@ pub struct RigidObjectCfg {
     /// Initial pose in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// RGBA color in 0..=1; for a mesh, it applies where the file gives no color.
+    /// RGBA color (sRGB) in 0..=1; for a mesh, it applies where the file gives no color.
     pub rgba: [f64; 4],
     /// Surface properties besides the color, for rendering only.
     pub surface: SurfaceCfg,

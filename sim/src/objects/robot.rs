@@ -168,8 +168,8 @@ impl<'a> Robot<'a> {
         targets
     }
 
-    /// Sum of the link masses in the files, and of payloads \[kg\]. Randomized masses of environments are not included:
-    /// see [`properties`](crate::SimulationManager::properties).
+    /// Sum of the link masses in the files, of those completed from shapes, and of payloads \[kg\]. Randomized masses
+    /// of environments are not included: see [`properties`](crate::SimulationManager::properties).
     pub fn total_mass(&self) -> f64 {
         self.data.description.total_mass()
     }

@@ -149,7 +149,7 @@ impl RobotData {
         self.role.label(self.uid())
     }
 
-    /// True if it was added as a robot, false for another articulation.
+    /// True if it was added as a robot, false for a passive articulation.
     pub(crate) fn is_robot(&self) -> bool {
         self.role == RobotKind::Robot
     }
@@ -209,8 +209,9 @@ fn file_error(cfg: &RobotCfg, robot: EntityLabel, error: RobotFileError) -> Erro
     Error::RobotFile { robot, file: path.unwrap_or_default(), error: Box::new(error) }
 }
 
-/// Describes a robot from its files, with completed inertias and without payloads, and returns diagnostics about the
-/// files. With a `scene`, the diagnostics include settings of its MJCF file that differ from the scene's.
+/// Describes a robot from its files, with completed inertias and without payloads. Returns its MJCF file (`None` for a
+/// robot from URDF files), the description, and diagnostics about the files. With a `scene`, the diagnostics include
+/// settings of its MJCF file that differ from the scene's.
 pub(crate) fn describe_robot(
     cfg: &RobotCfg,
     named: &EntityLabel,

@@ -231,7 +231,8 @@ impl RobotMut<'_> {
     }
 
     /// Returns `(column, joint, drive)` for each of `joints` that is not a mimic joint: position in `joints`, index of
-    /// the joint, index of its drive. The gains of all these drives must be changeable.
+    /// the joint, index of its drive. A joint without a drive is an error, and so is a drive whose gains are in
+    /// MuJoCo's model.
     pub(super) fn changeable_drives(
         &self,
         argument: &'static str,

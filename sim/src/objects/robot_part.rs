@@ -33,7 +33,7 @@ impl RobotPartMut<'_> {
 
     /// Sets position targets \[rad or m\], clamped to [`qpos_limits`](crate::Robot::qpos_limits): rows for `env_ids`
     /// (`None` for all environments; a single row applies to all of them), a column for each joint of the part. Columns
-    /// of mimic joints are accepted and ignored.
+    /// of joints without a drive (passive and mimic joints) are accepted and ignored.
     ///
     /// # Errors
     /// Same errors as [`RobotMut::set_qpos_target`]; then nothing is set.

@@ -55,8 +55,9 @@ impl RobotMut<'_> {
     /// All joints without an implicit drive may have dry friction, those of passive articulations too. An implicit
     /// drive uses MuJoCo's friction constraint of the joint. Such a joint has dry friction only if the model has a
     /// friction tendon for it. The model has one if [`DriveCfg::friction`](crate::DriveCfg::friction) is set for the
-    /// robot (0 is enough), or if the file's `<dynamics friction="..">` is above 0. All other joints accept 0, the
-    /// value that they have, so the result of [`friction`](Robot::friction) can always be set.
+    /// robot (0 is enough), or if the file gives the joint friction above 0 (`<dynamics friction="..">`, or
+    /// `frictionloss` in MJCF). All other joints accept 0, the value that they have, so the result of
+    /// [`friction`](Robot::friction) can always be set.
     ///
     /// ```
     /// use ndarray::array;

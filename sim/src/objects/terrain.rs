@@ -51,7 +51,7 @@ pub struct TerrainCfg {
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); `None` for the simulation's
     /// default.
     pub friction: Option<[f64; 3]>,
-    /// RGBA color in 0..=1.
+    /// RGBA color (sRGB) in 0..=1.
     pub rgba: [f64; 4],
     /// Surface properties besides the color, for rendering only.
     pub surface: SurfaceCfg,

@@ -143,7 +143,8 @@ impl SimulationManager {
         Ok(())
     }
 
-    /// Index of the snapshot entry that each environment is restored from, if any.
+    /// Index of the snapshot entry that each environment is restored from; `None` for an environment that is not
+    /// restored.
     fn sources(&self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<Vec<Option<usize>>> {
         let taken = snapshot.env_ids();
         let envs = env_list(Some(env_ids.unwrap_or(&taken)), self.num_envs())?;

@@ -34,7 +34,7 @@ impl VisualScene {
         Ok(EnvScene(Some(Arc::new(self.scene.with_instances(instances)?))))
     }
 
-    /// Returns this scene with the shapes of `data`, in memory that is not shared.
+    /// Returns this scene with the shapes of `data`, in memory that is not shared; the same scene if no shape deforms.
     pub(super) fn with_shapes_of(self: &Arc<Self>, data: &Data) -> Arc<Self> {
         if !self.deforms() {
             return Arc::clone(self);

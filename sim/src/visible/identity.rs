@@ -86,7 +86,8 @@ impl DeformingElement {
 #[derive(Clone, Debug)]
 pub(super) struct ElementIdentity {
     pub(super) mask_id: i32,
-    /// Name: `uid/link`, the uid of an object, or the name of a geom of the world.
+    /// Name: `uid/link`, `uid/tendon` or the uid in a simulation. In a model without a simulation: that of the body, of
+    /// the geom or site of the world, or of the tendon, skin or flex.
     pub(super) name: Arc<str>,
     /// Index on the body axis of sensors; `None` for the world, and for a model without a simulation.
     pub(super) body: Option<u32>,
@@ -128,8 +129,8 @@ fn body_name(model: &Model, body: usize) -> String {
     model.name(ObjectKind::Body, body).unwrap_or_else(|| format!("body {body}"))
 }
 
-/// Assigns a mask id to each body, each geom of the world, tendon, skin and flex. With `sites`, bodies with sites only
-/// and sites of the world have mask ids as well.
+/// Assigns a mask id to each body with geoms, and to each visible tendon, skin and flex and each geom of the world.
+/// With `sites`, bodies with sites only and sites of the world have mask ids as well.
 pub(super) fn by_body(model: &Model, sites: bool) -> MaskIdMap {
     let mut table: Vec<MaskId> = Vec::new();
     let mut of_body = vec![0; model.nbody()];
@@ -198,7 +199,7 @@ pub(super) fn by_body(model: &Model, sites: bool) -> MaskIdMap {
     MaskIdMap { table: table.into(), of_geom, of_site, of_drawable }
 }
 
-/// Owner of a geom in a simulation.
+/// Owner of a geom or a tendon in a simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct ElementOwner {
     pub(crate) id: i32,

@@ -51,7 +51,7 @@ impl<'a> Lighting<'a> {
 }
 
 /// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns messages about
-/// image-based lights and skyboxes, which are not rendered.
+/// active image-based lights, which are not rendered, and about a skybox that cannot be rendered.
 pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Vec<String> {
     let mut left_out = Vec::new();
     let space = look.space();

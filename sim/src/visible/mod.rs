@@ -307,9 +307,9 @@ impl VisualScene {
         &self.ids
     }
 
-    /// One message for each element that is not rendered: unreadable textures, skyboxes and meshes, invalid geoms and
-    /// sites, signed distance fields, image-based lights, and rods of slider-cranks. If the scene has too many
-    /// triangles, one message says that the scene is not rendered.
+    /// One message for each element that is not rendered: unreadable textures, skyboxes and meshes, invalid geoms,
+    /// sites, tendons, skins and flexes, signed distance fields, image-based lights, and rods of slider-cranks. If the
+    /// scene has too many triangles, one message says that the scene is not rendered.
     pub fn omitted(&self) -> &[String] {
         &self.left_out
     }

@@ -16,7 +16,8 @@ pub(super) struct OverviewEnv<'a> {
     pub(super) markers: Vec<Marker>,
 }
 
-/// Repeats the instances of `visible` at every place, and adds markers; the ground is included once.
+/// Joins the instances of all `places`, moved to their origins, with their markers. The ground is included once and not
+/// moved. Everything else is that of `visible`.
 pub(super) fn side_by_side(visible: &VisualScene, places: &[OverviewEnv<'_>]) -> Result<(VisualScene, Vec<PoseF32>)> {
     let (mut instances, mut poses) = (Vec::new(), Vec::new());
     for (index, OverviewEnv { origin, scene, poses: own, markers }) in places.iter().enumerate() {

@@ -199,6 +199,7 @@ impl OffscreenScene {
     /// Viewpoint from which all rendered shapes, except the ground and shapes that surround the rest, fill an image of
     /// `size` pixels (width, height). The direction is that of [`free_camera`](Self::free_camera) for an MJCF file; it
     /// is from the front, the side and above for a simulation. The clipping planes leave room for other viewpoints.
+    /// Without such shapes, it is [`free_camera`](Self::free_camera).
     pub fn first_view(&self, size: [usize; 2]) -> FreeCamera {
         let FreeCamera { eye, target, fovy, clip: [near, far] } = self.free_camera;
         let [width, height] = size.map(|n| n.max(1) as f64);

@@ -75,7 +75,7 @@ impl VisualCache {
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::NothingToDraw, source, message));
     }
 
-    /// Parts that are rendered for a visual.
+    /// Parts that are rendered for a visual; empty for a mesh file that is missing or unreadable.
     pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<VisualPart> {
         let of = VisualOwner { name: format!("link {link:?}"), source: Some(visual.source.clone()) };
         let own = visual.material.as_ref().map(|m| {
@@ -123,7 +123,7 @@ impl VisualCache {
         }
     }
 
-    /// Parts that are rendered for a mesh object.
+    /// Parts that are rendered for an object from a mesh file; empty for other objects.
     pub(crate) fn object_parts(&mut self, object: &RigidObjectData) -> Vec<VisualPart> {
         let of = VisualOwner { name: format!("object {:?}", object.uid()), source: None };
         let Some((key, mesh)) = object.mesh_key().zip(object.mesh().and_then(|mesh| mesh.visual.as_ref())) else {

@@ -128,7 +128,7 @@ impl PartWriter<'_> {
     }
 }
 
-/// Color type for a number of channels of 8 bits.
+/// Color type for 1, 3 or 4 channels of 8 bits; `None` for any other number.
 fn color(channels: usize) -> Option<ExtendedColorType> {
     match channels {
         1 => Some(ExtendedColorType::L8),

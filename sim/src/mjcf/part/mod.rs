@@ -203,8 +203,8 @@ impl PartWriter<'_> {
         Ok(PartLines { omitted: self.left_out.into_inner(), ..lines })
     }
 
-    /// Returns true if the target is MuJoCo 4.x. Otherwise records that `property` of an element is left out, since
-    /// only models of 4.x have it.
+    /// Returns true if the target is MuJoCo 4.x. Otherwise records that the property `what` of an element is left out,
+    /// since only models of 4.x have it.
     fn supports_v4(&self, element: &'static str, index: usize, what: &str) -> bool {
         if self.target == SupportedVersion::V2 {
             let (name, property) = (self.names.of(element, index), what.into());
@@ -239,7 +239,7 @@ fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
     row(values, values.len() / count.max(1), index)
 }
 
-/// Converts an index of MuJoCo, which is -1 for no object.
+/// Converts an index of MuJoCo; `None` for -1, which stands for no object.
 fn mj_index(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }

@@ -27,7 +27,8 @@ pub struct PartNames {
     pub sensors: Vec<String>,
 }
 
-/// Names of the elements of one kind. An element without a name gets the kind and its index.
+/// Names of the elements of one kind. An element without a name gets the kind and its index, followed by underscores if
+/// another element has this name.
 fn of_kind(model: &Model, kind: ObjectKind, word: &str, count: usize) -> Vec<String> {
     let given: Vec<Option<String>> = (0..count).map(|i| model.name(kind, i)).collect();
     let mut taken: BTreeSet<String> = given.iter().flatten().cloned().collect();
@@ -66,7 +67,7 @@ impl PartNames {
         }
     }
 
-    /// Name of an element, by MJCF's keyword for its kind.
+    /// Name of an element, by MJCF's keyword for its kind; the index for any other keyword or an unknown index.
     pub(super) fn of(&self, element: &str, index: usize) -> String {
         let names = match element {
             "body" => &self.bodies,

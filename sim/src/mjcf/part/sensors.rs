@@ -20,7 +20,7 @@ pub(crate) fn unsupported_sensors(model: &Model, names: &PartNames) -> Vec<(usiz
     (0..model.nsensor()).filter_map(reason).collect()
 }
 
-/// Reason why a sensor cannot be written, if any.
+/// Reason why a sensor cannot be written; `None` if it can.
 fn unsupported_reason(m: &Model, s: usize) -> Option<String> {
     let code = m.sensor_type()[s];
     let Some(word) = mjcf_keywords::sensor(code) else {

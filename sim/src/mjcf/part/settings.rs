@@ -8,7 +8,7 @@ use kinetoscope_scene::source_location::SourceLocation;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Maximum number of included files; MuJoCo rejects a file that is included twice.
+/// Maximum number of files that are read, the top one included; MuJoCo rejects a file that is included twice.
 const MAX_INCLUDED_FILES: usize = 100;
 
 /// Prefix of the element name of a sensor.
@@ -23,7 +23,7 @@ struct TopLevelElement {
     source: SourceLocation,
 }
 
-/// Collects the elements at the top of a file and of its included files, in order.
+/// Collects the elements at the top of a file and of its included files, and their sensors, in order.
 fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<TopLevelElement>, files: &mut usize) {
     *files += 1;
     let Ok(document) = roxmltree::Document::parse(text) else { return };
@@ -60,8 +60,9 @@ fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<Top
     }
 }
 
-/// Warns about settings of a file that the scene overrides for all of its parts, and about sensors that are left out.
-/// `owner` names the part in the messages, such as `MJCF part "arm"`.
+/// Warns about everything of a file that the scene does not take over. These are options with other values than in
+/// `scene`, visual settings, statistics, custom fields, keyframes, skins, and `sensors_left_out`. `owner` names the
+/// part in the messages, such as `MJCF part "arm"`.
 pub(crate) fn setting_warnings(
     owner: &str,
     text: &str,

@@ -83,7 +83,7 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
     ActuatorLaw { stiffness, damping, force, unsupported }
 }
 
-/// Range of lengths of an actuator within the limits of the joints.
+/// Range of lengths of an actuator within the limits of the joints; infinite if a joint has no limits.
 fn lengths(model: &Model, gear: f64, path: &[(usize, f64)]) -> [f64; 2] {
     path.iter().fold([0.0; 2], |[low, high], &(joint, coefficient)| {
         if !model.jnt_limited(joint) {

@@ -223,8 +223,8 @@ impl MjcfRobotFile {
     }
 
     /// Passive properties of all joints as written to the document, and the joints whose damping B is part of the
-    /// solve. If drives are constraint rows (`rows`), the document has no joint damping, and the armature of joints
-    /// with damping is raised by `h B`, with the time step h.
+    /// solve. If drives are constraint rows (`rows`) and the integrator is not RK4, the document has no joint damping.
+    /// Instead, the armature of joints with damping is raised by `h B`, with the time step h.
     fn passive(
         &self,
         cfg: &RobotMjcfCfg<'_>,
@@ -265,7 +265,8 @@ impl MjcfRobotFile {
         (joints, damped)
     }
 
-    /// Mass properties of the bodies whose links carry mass beyond that of the file.
+    /// Mass properties of the bodies whose links carry another mass than in the file, and of a massless root body that
+    /// the file fixes and `fix_base: false` frees.
     fn overridden_inertials(
         &self,
         description: &RobotDescription,

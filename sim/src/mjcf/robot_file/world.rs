@@ -10,12 +10,13 @@ use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source_location::SourceLocation;
 use std::collections::BTreeSet;
 
-/// Converts an index of MuJoCo, which is -1 for no object.
+/// Converts an index of MuJoCo; `None` for -1, which stands for no object.
 fn mj_index(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }
 
-/// Warns about elements of the file's world. Rejects tendons and equalities that depend on its sites or geoms.
+/// Warns about elements of the file's world. Rejects tendons through its sites or around its geoms, and equalities of
+/// its sites.
 pub(super) fn check(
     owner: &str,
     model: &Model,
@@ -68,8 +69,8 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Sensors that a robot cannot have: those that no part can have, and those of actuators and of elements of the file's
-/// world.
+/// Sensors that a robot cannot have, with their indices in ascending order: those that no part can have, those of
+/// actuators and their forces, and those of elements of the file's world.
 pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, OmittedElement)> {
     let mut left_out = sensors_left_out(model, names);
     for sensor in 0..model.nsensor() {

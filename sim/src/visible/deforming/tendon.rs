@@ -11,7 +11,7 @@ use kinetoscope_mujoco::{Data, Model};
 #[derive(Clone, Debug)]
 pub(super) struct Tendon {
     tendon: usize,
-    /// Number of points of the longest path.
+    /// Largest possible number of points of the path.
     max_points: usize,
     /// True if it hangs like a string when it is slack.
     may_hang: bool,
@@ -36,7 +36,7 @@ impl Tendon {
         }
     }
 
-    /// Number of segments of the longest path.
+    /// Largest possible number of segments of the path.
     pub(super) fn max_segments(&self) -> usize {
         let hanging = if self.may_hang { catenary::SEGMENTS } else { 0 };
         self.max_points.saturating_sub(1).max(hanging)
