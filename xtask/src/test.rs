@@ -37,8 +37,8 @@ const NEEDS_VENDOR_ROBOTS: SkippedTests = SkippedTests {
     why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others",
 };
 
-/// Packages for the tests on the second MuJoCo version: packages with version-dependent code, and the integration
-/// tests.
+/// Cargo arguments that select the packages for the tests on the second MuJoCo version: packages with version-dependent
+/// code, and the integration tests.
 pub(crate) fn version_dependent_packages() -> [&'static str; 8] {
     [
         "--package",
@@ -113,7 +113,7 @@ fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[SkippedTests]) -> 
 /// Crates with the feature `lerobot`, which is off by default.
 const WITH_LEROBOT: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
 
-/// The features to test besides the default ones, for these packages.
+/// Cargo arguments for the features to test besides the default ones, for these packages.
 pub(crate) fn features(packages: &[&str]) -> Vec<String> {
     let feature = match packages {
         ["--workspace"] => "kinetoscope-cli/lerobot".to_string(),

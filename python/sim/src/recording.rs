@@ -67,7 +67,8 @@ macro_rules! plain_topics {
 }
 
 plain_topics! {
-    /// Everything that the format supports, except engine states.
+    /// Everything that the format supports, except engine states. The overview is included only in formats of images,
+    /// and only without a camera.
     everything => Everything,
     /// Times, positions and velocities of all joints in MuJoCo's order.
     engine_states => EngineStates,
