@@ -1,7 +1,7 @@
 //! One image of any MJCF or URDF file, in four channels.
 //!
 //! ```text
-//! cargo run --release --example render_model -- /usr/share/mujoco/model/humanoid.xml --out images
+//! cargo run --release --example render_model -- /usr/share/mujoco/model/humanoid/humanoid.xml --out images
 //! ```
 
 mod launcher;

@@ -140,7 +140,8 @@ const ARM: &str = "JOINT[1-6]";
 /// Pattern of the hand's joints.
 const HAND: &str = "LEFT_.*";
 
-/// Folder of this crate. A program for other machines must not contain the path of the machine that builds it.
+/// Folder of the assets of this crate; `None` with the feature `relocated-assets`: a program for other machines must
+/// not contain the path of the machine that builds it.
 fn shipped() -> Option<PathBuf> {
     #[cfg(feature = "relocated-assets")]
     return None;

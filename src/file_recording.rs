@@ -69,7 +69,7 @@ impl FileRecording {
     /// call.
     ///
     /// # Errors
-    /// As [`Record::finish_recording`], also for a recording that the button ended. The next call returns complete
+    /// As [`Record::finish_recording`], also for a recording that the button ended. A later call returns the complete
     /// recordings.
     pub fn finish(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<Vec<RecordingSummary>> {
         self.finish_current(sim)?;

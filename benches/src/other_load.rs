@@ -6,7 +6,7 @@ use std::fs;
 const TICK: f64 = 0.01;
 
 /// Processor time \[s\], of all cores together, used since boot by processes other than this one and the processes
-/// `ours`; `None` without /proc.
+/// `ours`; `None` without /proc, or if one of `ours` has ended.
 pub(crate) fn seconds(ours: &[u32]) -> Option<f64> {
     let busy = busy_ticks(&fs::read_to_string("/proc/stat").ok()?)?;
     let mut own = process_ticks(&fs::read_to_string("/proc/self/stat").ok()?)?;

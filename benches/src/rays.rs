@@ -97,8 +97,8 @@ impl Terrain {
     }
 }
 
-/// Hills with noise between 0 and 1. The first two samples are 0 and 1, because MuJoCo normalizes the field to that
-/// range.
+/// Hills with noise between 0 and 1. The first samples of the first two rows are 0 and 1, because MuJoCo normalizes the
+/// field to that range.
 fn rough(i: usize, j: usize) -> f64 {
     let mut hash = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     hash = (hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

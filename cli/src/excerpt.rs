@@ -58,13 +58,14 @@ fn render(level: Level<'_>, message: &str, kind: Option<&'static str>, colored: 
 struct SourceLocation<'m> {
     path: &'m str,
     line: usize,
-    /// The line itself.
+    /// The line, with spaces for tabs.
     text: String,
     /// Length of the location prefix in the message \[bytes\].
     prefix_length: usize,
 }
 
-/// Parses the location prefix `FILE:LINE: ` of a message. Returns `None` if the file or the line does not exist.
+/// Parses the location prefix `FILE:LINE: ` of a message. Returns `None` if the file or the line does not exist, or if
+/// the file is larger than [`MAX_FILE_SIZE`].
 fn parse_location(message: &str) -> Option<SourceLocation<'_>> {
     // A path may contain colons.
     let ends = message.match_indices(": ").map(|(at, _)| at);

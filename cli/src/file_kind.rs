@@ -71,7 +71,7 @@ impl FileKind {
     }
 }
 
-/// Returns the first bytes of a file.
+/// Returns the first 64 KiB of a file, fewer bytes if it is shorter, and none if it cannot be read.
 fn first_bytes(path: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
     if let Ok(file) = File::open(path) {

@@ -127,7 +127,7 @@ impl Setup {
         Self { options: FileOptions::read(path), ..self.clone() }
     }
 
-    /// Returns the configuration of a simulation with one robot.
+    /// Returns the configuration of a simulation with one robot, or with an MJCF file.
     fn cfg(&self) -> SimulationManagerCfg {
         let defaults = match self.options {
             None => SimulationManagerCfg::default(),
@@ -285,8 +285,8 @@ impl ModelArgs {
         Ok(model)
     }
 
-    /// Builds a robot, or a scene. Without a spawn height, a robot on a free base starts at the pose of the file,
-    /// raised if it would start below the ground.
+    /// Builds a robot, or a scene. Without a spawn height, a robot on a free base starts at the pose of the file; with
+    /// a ground, it is raised if it would start below it.
     fn mjcf(&self, setup: &Setup, path: &Path) -> Result<Model> {
         /// Tolerance for rounding \[m\].
         const SLACK: f64 = 1e-6;

@@ -31,8 +31,8 @@ impl<M: VisualModel> GeomShapes<M> {
     /// Shape of a geom of MuJoCo's type number `kind`, with these sizes \[m\] and the index of its mesh or height field.
     ///
     /// # Errors
-    /// The reason why it cannot be rendered: a signed distance field, a mesh without triangles, a height field with an
-    /// elevation that is negative or not finite.
+    /// The reason why it cannot be rendered: a type that [`GeomType`] lacks (such as a signed distance field), a mesh
+    /// without triangles, a height field with an elevation that is negative or not finite.
     ///
     /// # Panics
     /// There is no such mesh or height field, or fewer than three sizes.
@@ -102,8 +102,9 @@ fn face_normal(positions: &[[f32; 3]], corners: [i32; 3]) -> [f32; 3] {
 }
 
 /// Triangles with a vertex for each combination of position and texture coordinates. Normals are recomputed, smooth up
-/// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated. With `has_normals`, they
-/// are those of the model.
+/// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated. With `has_normals`,
+/// they are those of the model, if it has some for each triangle; meshes without texture coordinates then are flat
+/// beyond a crease.
 fn render_mesh(model: &impl VisualModel, mesh: usize, has_normals: bool) -> RenderMesh {
     let arrays = model.mesh(mesh);
     let has_normals = has_normals && arrays.face_normals.len() == arrays.faces.len() && !arrays.normals.is_empty();

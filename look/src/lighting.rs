@@ -7,7 +7,8 @@ use kinetoscope_scene::{Headlight, HorizonHaze, Light, LightKind, LightingSpace,
 /// renderer.
 const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
 
-/// Converts a light, without its pose. Colors of [`LightingSpace::Linear`] are converted to linear light.
+/// Converts a light, without its pose. An image light becomes inactive. Colors of [`LightingSpace::Linear`] are
+/// converted to linear light.
 pub fn scene_light(light: &LightValues, space: LightingSpace) -> Light {
     let color = |color: [f32; 3]| if space == LightingSpace::Display { color } else { linear_light(color) };
     let spot = LightKind::Spot { cutoff_deg: light.cutoff_deg.min(90.0), exponent: light.exponent };

@@ -68,12 +68,13 @@ impl ModelMaterials {
         }
     }
 
-    /// Material of an index of the model; `None` for -1.
+    /// Material of an index of the model; `None` for an index that the model lacks, such as -1.
     pub fn get(&self, material: i32) -> Option<&Material> {
         usize::try_from(material).ok().and_then(|m| self.materials.get(m))
     }
 
-    /// Image of an index of the model; `None` for -1, for a skybox and for a texture that cannot be rendered.
+    /// Image of an index of the model; `None` for an index that the model lacks, such as -1, for a skybox, and for a
+    /// texture that cannot be rendered.
     pub fn texture(&self, texture: i32) -> Option<&Arc<Texture>> {
         usize::try_from(texture).ok().and_then(|t| self.textures.get(t)?.as_ref())
     }
@@ -88,8 +89,8 @@ impl ModelMaterials {
     }
 }
 
-/// Color and opacity of an element with the color `own`, and the color of its material. A color of its own overrides
-/// that of the material, as in MuJoCo's viewer.
+/// Color and opacity of an element with the color `own`, and the color of its material. A color other than MuJoCo's
+/// default, (0.5, 0.5, 0.5, 1), overrides that of the material, as in MuJoCo's viewer.
 ///
 /// # Panics
 /// `own` has fewer than four numbers.

@@ -409,7 +409,10 @@ def isaac_scene(robot=None, **attributes):
 @pytest.mark.parametrize("explicit", [False, True])
 @pytest.mark.parametrize("case", GROUPS)
 def test_joints_without_an_actuator_have_no_drive(case, explicit):
-    """As in Orbit: a joint that no actuator names, or that has no gain, was driven with the gains of this package."""
+    """As in Orbit, a joint that no actuator names, or that has no gain, has no drive.
+
+    Regression: it was driven with the gains of this package.
+    """
     from kinetoscope.compat.isaaclab.actuators import IdealPDActuatorCfg, ImplicitActuatorCfg
     from kinetoscope.compat.isaaclab.orbit_assets.anymal import ANYMAL_C_CFG
 

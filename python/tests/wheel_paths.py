@@ -1,9 +1,9 @@
 """Traces of the machine that built a wheel: ``python wheel_paths.py WHEEL [FOLDER ...] [--glibc VERSION]``.
 
-Rust puts the paths of source files into panic messages. ``cargo xtask wheel`` compiles with ``--remap-path-prefix`` for the
-checkout, the folder of Cargo, the build folder, and the sources of the standard library. This command lists the paths that
-are left and then fails. Folders are further prefixes to search for. With ``--glibc``, it also fails for symbols of a newer
-glibc, which older distributions do not have.
+Rust puts the paths of source files into panic messages. ``cargo xtask wheel`` compiles with ``--remap-path-prefix`` for
+the checkout, the folder of Cargo, the build folder, and the sources of the standard library. This command lists the
+paths that are left, and fails if there are any. Folders are further prefixes to search for. With ``--glibc``, it also
+fails for symbols of a newer glibc, which older distributions do not have.
 """
 
 from __future__ import annotations

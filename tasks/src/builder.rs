@@ -131,7 +131,7 @@ impl EnvBuilder {
         self
     }
 
-    /// Columns of the terms that were added.
+    /// Columns of the action and command terms that were added so far.
     pub(crate) fn columns(&self) -> TaskColumns {
         let actions = self.terms.actions.iter().map(|term| (term.name.as_str(), &term.space));
         let commands = self.terms.commands.iter().map(|term| (term.name.clone(), term.columns.clone())).collect();
@@ -141,7 +141,7 @@ impl EnvBuilder {
     /// Checks the configuration and the terms, as [`build`](Self::build) does.
     ///
     /// # Errors
-    /// The errors of [`build`](Self::build), except those of events.
+    /// The errors of [`build`](Self::build), except those of events and of the initial numbers of curricula.
     pub fn check(&self) -> Result<()> {
         self.spaces().map(drop)
     }
@@ -151,7 +151,7 @@ impl EnvBuilder {
         self.sim
     }
 
-    /// Spaces of the observation groups and of the actions, of checked terms.
+    /// Checks the configuration and the terms, and returns the spaces of the observation groups and of the actions.
     fn spaces(&self) -> Result<(Vec<Space>, Space)> {
         let Self { cfg, terms, .. } = self;
         cfg.check()?;
@@ -172,7 +172,7 @@ impl EnvBuilder {
     /// - There is no action column, or the group [`POLICY_GROUP`] has neither a column nor images.
     /// - Two terms of one kind or of one group have the same name, or a name is empty or contains a slash.
     /// - Two columns of a term have the same name.
-    /// - A number is out of range, or an event fails.
+    /// - A number is out of range, or a startup event or the initial number of a curriculum term fails.
     pub fn build(self) -> Result<Env> {
         let (groups, action_space) = self.spaces()?;
         let Self { sim, cfg, mut terms } = self;

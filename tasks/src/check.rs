@@ -70,8 +70,8 @@ pub enum Finding {
         /// The environment.
         env: usize,
     },
-    /// An episode that ended was not followed by another one: it ends again in every step, with an unchanged
-    /// observation.
+    /// No episode began after an end in the mode [`AutoresetMode::SameStep`](crate::AutoresetMode::SameStep): three
+    /// consecutive steps end the episode, with `observations` equal to `final_observations`.
     NoAutoReset {
         /// Time of the third consecutive end: `step 12`.
         when: String,
@@ -164,7 +164,8 @@ impl fmt::Display for Finding {
 /// violation of each kind, and every invalid call that was accepted; the list is empty if no violation was found.
 ///
 /// Each of several runs resets the batch with `seed` and does 100 steps with random actions of that seed. Episode ends
-/// after these steps are not tested. The test covers:
+/// after these steps are not tested. If a call of the first run fails, or an array has the wrong shape, the other tests
+/// are skipped. The test covers:
 ///
 /// - shapes, observations within their space, finite rewards;
 /// - final observations, and the automatic reset at the time of [`VectorEnv::autoreset_mode`]; if resets are disabled,
@@ -284,8 +285,8 @@ struct StepOutput {
     ends: [Array1<bool>; 2],
 }
 
-/// Runs a plan, and adds violations within this run to `found`. Returns `None` if a call fails or an array has the
-/// wrong shape.
+/// Runs a plan, and adds violations within this run to `found`. Returns `None` if a call fails, an array has the wrong
+/// shape, or a step of an ended episode succeeds although automatic resets are disabled.
 fn rollout<E: VectorEnv + ?Sized>(env: &mut E, plan: &RunVariant, found: &mut Vec<Finding>) -> Option<Rollout> {
     let n = env.num_envs();
     let (seen, acted) = (env.observation_space().clone(), env.action_space().clone());
@@ -374,13 +375,13 @@ struct AutoResetMonitor {
     longest: usize,
     /// Number of task steps of the present episode.
     steps: usize,
-    /// Consecutive ends with an unchanged observation.
+    /// Consecutive steps that end the episode, with an observation equal to the final one.
     repeated_ends: usize,
 }
 
 impl AutoResetMonitor {
     /// Counts a step, and returns true if automatic resets are missing. `same` is true if the observation equals the
-    /// final one. Three ends in consecutive steps are no episodes if an earlier episode was longer than one step.
+    /// final one. They are after three such ends in consecutive steps if an earlier episode was longer than one step.
     fn update(&mut self, ended: bool, same: bool) -> bool {
         self.steps += 1;
         self.repeated_ends = match ended && same && (self.repeated_ends == 0 || self.steps == 1) {

@@ -29,7 +29,7 @@ pub struct CommandTerm {
 
 impl CommandTerm {
     /// Creates a term with named columns. `sample` returns the values for one episode of one environment. A value that
-    /// is not finite is an error of the reset or step that begins the episode.
+    /// is not finite is an error of the reset or step that draws it.
     pub fn new<const K: usize>(
         name: impl Into<String>,
         columns: [&str; K],
@@ -89,7 +89,7 @@ impl CommandTerm {
         }
     }
 
-    /// Number of steps until the next draw; `u64::MAX` without one.
+    /// Number of steps until the next draw; `u64::MAX` without [`resampled_every`](Self::resampled_every).
     pub(crate) fn steps_to_next_draw(&self, rng: &mut EpisodeRng, step_dt: f64) -> u64 {
         let Some([low, high]) = self.resampling else { return u64::MAX };
         // Times that are a whole number of steps up to rounding are that number.

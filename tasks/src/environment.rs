@@ -21,8 +21,8 @@ use ndarray::{Array1, Array2, ArrayView2};
 /// 1. Clamp the actions to their bounds, apply them, and do [`EnvCfg::decimation`] physics steps.
 /// 2. Count the step, and find the episodes that end and the reason of each.
 /// 3. Compute the rewards. Publish rewards and ends to the observers of the simulation ([`StepResult`](kinetoscope_sim::StepResult)).
-/// 4. Run the due [`EventMode::Interval`] events and draw the due commands in environments whose episode goes on. Update
-///    the curricula of environments whose episode ended.
+/// 4. Run the due [`EventMode::Interval`] events in environments whose episode goes on. Update the curricula of
+///    environments whose episode ended. Draw the due commands in the environments whose episode goes on.
 /// 5. Compute derived commands and the observations, which include the final ones of the episodes that ended.
 /// 6. Reset the environments whose episode ended to the initial state, draw new commands, run the [`EventMode::Reset`]
 ///    events, and observe these environments again.

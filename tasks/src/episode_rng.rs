@@ -6,7 +6,8 @@ use kinetoscope_sim::EnvId;
 /// A random number generator for one environment, one episode and one term.
 ///
 /// Its numbers depend only on the seed of the episode, the global index of the environment, the number of the episode
-/// since that seed was set, and the name of the term; for interval events, also on the step of the episode.
+/// since that seed was set, and the kind and name of the term; for interval events and commands that are drawn again,
+/// also on the step of the episode.
 #[derive(Clone, Debug)]
 pub struct EpisodeRng {
     env: EnvId,

@@ -59,7 +59,7 @@ pub enum EnvError {
     /// The simulation returned an error.
     #[error(transparent)]
     Sim(#[from] kinetoscope_sim::Error),
-    /// A number of the configuration or of a term is out of range.
+    /// A number of the configuration or of a term is out of range, or the name of an observation group is invalid.
     #[error("{field} is {value}; {expected}")]
     Config {
         /// The field.
@@ -83,7 +83,7 @@ pub enum EnvError {
         /// Its name.
         name: String,
     },
-    /// Two terms of one kind have the same name.
+    /// Two terms of one kind, or of one observation group, have the same name.
     #[error("there are two {kind} terms with the name {name:?}; give them different names")]
     RepeatedTerm {
         /// Their kind.

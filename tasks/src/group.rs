@@ -44,7 +44,7 @@ pub(crate) struct GroupBuffers {
     values: Array2<f64>,
     /// Observations that the last step led to, same shape.
     final_values: Array2<f64>,
-    /// Noise generator of each term in each environment; `None` for a term without noise.
+    /// Noise generators by environment, then by term; `None` for a term without noise.
     noise: Vec<Vec<Option<KeyedRng>>>,
     images: Vec<ImageBatch>,
     /// Images that the last step led to; `None` if they are those of `images`.
@@ -130,8 +130,8 @@ impl<'e> ObservationGroup<'e> {
         self.buffers.values.view()
     }
 
-    /// Observations that the last step led to, same shape. In an environment whose episode ended, its last
-    /// observation; elsewhere equal to [`observations`](Self::observations).
+    /// Observations that the last step led to, same shape. In an environment whose episode ended, its last observation;
+    /// elsewhere, and after a reset, equal to [`observations`](Self::observations).
     pub fn final_observations(&self) -> ArrayView2<'e, f64> {
         self.buffers.final_values.view()
     }
@@ -178,8 +178,8 @@ impl<'e> ObservationGroup<'e> {
         Ok(&self.buffers.images[self.image_index(name)?])
     }
 
-    /// Images that the last step led to. In an environment whose episode ended, its last image; elsewhere equal to
-    /// [`image`](Self::image).
+    /// Images that the last step led to. In an environment whose episode ended, its last image; elsewhere, and after a
+    /// reset, equal to [`image`](Self::image).
     ///
     /// # Errors
     /// The group has no such images; the error lists the existing ones.

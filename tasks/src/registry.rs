@@ -46,7 +46,7 @@ impl<'a> TermArgs<'a> {
         Self { sim, name, place, weight, table, columns }
     }
 
-    /// Columns of the action terms, named `term/column`; empty for an action term.
+    /// Columns of the action terms, named `term/column`; for an action term, those of the action terms before it.
     pub fn action_columns(&self) -> &'a [String] {
         &self.columns.actions
     }
@@ -54,7 +54,8 @@ impl<'a> TermArgs<'a> {
     /// Columns of the command term called `name`.
     ///
     /// # Errors
-    /// There is no such command term; the error lists the existing ones.
+    /// There is no such command term, or it is created after this term (action terms come before commands); the error
+    /// lists the existing ones.
     pub fn command_columns(&self, name: &str) -> Result<&'a [String]> {
         let commands = &self.columns.commands;
         let found = commands.iter().find(|(of, _)| of == name).map(|(_, columns)| columns.as_slice());
@@ -125,7 +126,7 @@ impl<'a> TermArgs<'a> {
         EnvError::TaskText { place: self.place.into(), error: error.to_string() }
     }
 
-    /// Adds the place of this term to an error.
+    /// Adds the place of this term to an error, unless it has a place.
     fn at(&self, error: EnvError) -> EnvError {
         at(self.place, error)
     }

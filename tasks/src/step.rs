@@ -69,7 +69,8 @@ pub enum EndReason {
     /// last good state until its reset.
     Diverged(String),
     /// The environment was reset from outside the task: by a viewer, or by the program through
-    /// [`Env::sim_mut`](crate::Env::sim_mut). The final observation and reward are those of the state after that reset.
+    /// [`Env::sim_mut`](crate::Env::sim_mut). The final observation and reward are those of the state after that reset
+    /// and the physics steps that followed.
     Reset,
     /// A termination term, by its name.
     Term(String),

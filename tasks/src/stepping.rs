@@ -21,8 +21,9 @@ impl Env {
     /// observation and reward are those of its last good state. Other environments are not affected.
     ///
     /// # Errors
-    /// - The actions have another shape or are not finite, or an environment has no episode. Nothing was done then.
-    ///   Actions that [`AutoresetMode::NextStep`] ignores may be any number.
+    /// - The actions have another shape or are not finite, an environment has no episode, or its episode ended in the
+    ///   mode [`AutoresetMode::Disabled`]. Nothing was done then. Actions that [`AutoresetMode::NextStep`] ignores may
+    ///   be any number.
     /// - A term fails, or returns an array of another shape or a number that is not finite. The step is then incomplete
     ///   and every environment has to be reset.
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
@@ -199,7 +200,7 @@ impl Env {
         groups.try_for_each(|(group, buffers)| buffers.observe(group, &now, envs))
     }
 
-    /// Begins an episode in each of `envs`.
+    /// Begins an episode in each of `envs`. The caller observes these environments, and sets their phase.
     pub(crate) fn begin_episodes(&mut self, envs: &[usize]) -> Result<()> {
         if envs.is_empty() {
             return Ok(());
@@ -282,7 +283,7 @@ impl Env {
         Ok(())
     }
 
-    /// Updates the curricula of environments whose episode ended.
+    /// Updates the curricula of environments whose episode ended, except by a reset from outside the task.
     fn advance_curricula(&mut self, ended: &[EndedEpisode]) -> Result<()> {
         let envs: Vec<usize> =
             ended.iter().filter(|ended| ended.reason != EndReason::Reset).map(|ended| ended.env.0).collect();

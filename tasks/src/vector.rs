@@ -30,7 +30,7 @@ use ndarray::{Array2, ArrayView2};
 /// }
 /// ```
 ///
-/// An implementation keeps this contract, which [`check`](fn@crate::check) tests:
+/// An implementation keeps this contract, most of which [`check`](fn@crate::check) tests:
 ///
 /// - The spaces and the number of environments, N, never change.
 /// - The caller resets all environments before the first [`step`](Self::step).

@@ -16,7 +16,7 @@ pub struct Collected {
     pub level: Level,
     /// Text of the event.
     pub message: String,
-    /// Values of all fields as text.
+    /// Values of all other fields as text.
     pub fields: BTreeMap<&'static str, String>,
 }
 

@@ -188,7 +188,7 @@ fn text<'a>(row: &'a Value, key: &str) -> XtaskResult<&'a str> {
     row[key].as_str().ok_or_else(|| Failure::new(format!("a row without the text `{key}`: {row}")))
 }
 
-/// Three significant digits; `-` without a number.
+/// Rounded number: whole from 100 on, with at most three decimals below; `-` without a number.
 fn number(value: &Value) -> String {
     match value.as_f64() {
         None => "-".to_string(),

@@ -7,7 +7,7 @@ use crate::source_check::files_below;
 use clap::Parser;
 
 const README: &str = "README.md";
-/// The two commands for new users; CI runs the second one literally.
+/// The two commands for new users. CI runs both as they are written.
 pub(crate) const README_COMMANDS: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
 pub(crate) const TEST_COMMAND: &str = "cargo xtask test";
 const NEEDED: [&str; 3] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md"];
@@ -60,7 +60,8 @@ fn chapters(summary: &str) -> Vec<String> {
     relative_links(summary).into_iter().map(|link| format!("docs/{link}")).collect()
 }
 
-/// Findings about blocks that rustdoc takes for Rust: pages that no doc test includes, and blocks without a language.
+/// Findings about blocks that rustdoc takes for Rust: pages that no doc test includes, blocks without a language, and
+/// ignored blocks.
 fn uncompiled_blocks(path: &str, page: &str, doc_tests: &str) -> Vec<String> {
     let mut findings = Vec::new();
     let mut in_block = false;

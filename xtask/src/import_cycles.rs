@@ -66,7 +66,8 @@ impl Crate {
         this
     }
 
-    /// The module and item of a written path, from the root of the crate; `None` for other crates.
+    /// The module and item of a written path, from the root of the crate; `None` for a path that begins with neither a
+    /// keyword nor a child module, such as one of another crate.
     fn resolve(&self, module: &Path, written: &[String]) -> Option<Path> {
         let mut base = module.clone();
         let mut rest = written;
@@ -158,7 +159,7 @@ fn module_of(path: &str) -> Path {
     parts
 }
 
-/// The code without its modules of unit tests.
+/// The code before its first module of unit tests.
 fn without_tests(code: &str) -> String {
     let mut from = 0;
     while let Some(at) = code[from..].find("#[cfg(test)]").map(|at| from + at) {

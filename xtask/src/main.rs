@@ -72,7 +72,7 @@ enum Task {
     /// The first run compiles mdbook into target/tools, which takes some minutes. Links between pages, to the API and to
     /// source files are checked.
     Docs(site::DocsArgs),
-    /// Build the wheel of the Python package kinetoscope-render into target/wheels
+    /// Build the wheels of the Python packages kinetoscope-render and kinetoscope into target/wheels
     Wheel(python_package::WheelArgs),
     /// Compare with the baselines; without a name also writes benches/RESULTS.md
     Bench(bench::BenchArgs),

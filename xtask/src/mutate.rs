@@ -204,8 +204,8 @@ fn verdict(passed: bool, said: &str, words: &[&str]) -> MutationResult {
     }
 }
 
-/// Updates `to` with the files below `from`. Unchanged files keep their time stamps, so that cargo builds only changed
-/// code.
+/// Updates `to` with the files below `from`, and removes other files from it. Unchanged files keep their time stamps,
+/// so that cargo builds only changed code.
 fn copy(from: &Path, to: &Path) -> XtaskResult {
     let wanted = files_below(from);
     for file in &wanted {

@@ -161,7 +161,7 @@ fn looks_like(a: &Series, b: &Series) -> bool {
 /// Writes the page.
 ///
 /// # Errors
-/// The MuJoCo versions differ and no law gives a reason.
+/// The MuJoCo versions differ and the law gives no reason, or a law gives a reason for a number that does not differ.
 pub(crate) fn page(runs: &[PhysicsRun]) -> XtaskResult<String> {
     let rows: Vec<&Row> = runs.iter().flat_map(|run| &run.rows).collect();
     let mut laws: Vec<(&str, &str)> = rows.iter().map(|row| (row.group.as_str(), row.law.as_str())).collect();

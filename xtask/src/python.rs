@@ -7,7 +7,8 @@ use crate::setup::{self, Requirement};
 use crate::wheel;
 use std::path::{Path, PathBuf};
 
-/// Environment variable with the python for benchmarks and tests; without it they skip the comparisons with a message.
+/// Environment variable with the python for benchmarks and tests. Without it, benchmarks skip the comparisons, and
+/// tests that need it fail.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 
 /// Environment variable with the python that has `mjbatch`; without it the benchmarks leave this baseline out.
@@ -16,8 +17,7 @@ pub(crate) const MJBATCH_VARIABLE: &str = "KINETOSCOPE_PYTHON_MJBATCH";
 /// The package `mjbatch`, which requires this version of MuJoCo.
 const MJBATCH: &[&str] = &["mjbatch==0.1.4", "mujoco==3.14.0"];
 
-/// Environment variable with the python for the tests of recordings; without it they skip the comparisons with a
-/// message.
+/// Environment variable with the python for the tests of recordings, which fail without it.
 pub(crate) const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 
 /// Python packages that read our recordings, and one that validates scene files.

@@ -8,7 +8,7 @@ const PACKAGE: &str = "kinetoscope-python-cfg";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct PythonCfgArgs {
-    /// Compare with the committed file; write nothing
+    /// Compare with the committed files; write nothing
     #[arg(long)]
     check: bool,
 }
@@ -18,7 +18,7 @@ pub(crate) fn run(repo: &Repo, args: &PythonCfgArgs) -> XtaskResult {
     generate(&ready, args.check)
 }
 
-/// Reports a difference between the committed file and the structs.
+/// Reports a difference between the committed files and the structs.
 pub(crate) fn check(ready: &Prepared) -> XtaskResult {
     generate(ready, true)
 }

@@ -48,7 +48,7 @@ const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), 
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct WheelArgs {
-    /// Also write a source distribution
+    /// Also write a source distribution of kinetoscope-render
     #[arg(long)]
     sdist: bool,
     /// Link kinetoscope-render with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
@@ -59,7 +59,8 @@ pub(crate) struct WheelArgs {
 /// `cargo xtask wheel`: builds the wheels of both packages into `wheels` of the target folder and prints their paths.
 ///
 /// # Errors
-/// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine.
+/// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine or, if it is
+/// portable, symbols of a newer glibc.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
     let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
     let wheel = build(repo, profile)?;

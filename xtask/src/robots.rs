@@ -40,7 +40,8 @@ pub(crate) fn obtain(repo: &Repo) -> XtaskResult<Robots> {
     Ok(Robots::FromPyPi(folder))
 }
 
-/// The folder of robots next to the repository, or that of the environment variable; `None` without both.
+/// The folder of robots that the environment variable names, or else the one next to the repository; `None` if it does
+/// not exist.
 pub(crate) fn local(repo: &Repo) -> Option<PathBuf> {
     let named = std::env::var_os(VARIABLE).map(PathBuf::from);
     named.or_else(|| Some(repo.root.join(LOCAL_FOLDER))).filter(|folder| folder.is_dir())

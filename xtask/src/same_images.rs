@@ -8,8 +8,8 @@ const DEPTH_TOLERANCE: f32 = 1e-4;
 /// Largest relative depth difference of neighboring pixels on one surface.
 const MAX_DEPTH_STEP: f32 = 0.1;
 
-/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes. If `different_lighting` is true, the renderers
-/// have different lighting, and the color images must differ.
+/// Checks that two folders have files of the same names, and the same `depth*.npy` and `mask*.npy` off silhouettes. If
+/// `different_lighting` is true, the renderers have different lighting, and the color images must differ.
 pub(crate) fn check(ours: &Path, other: &Path, different_lighting: bool) -> Result<(), String> {
     let names = |folder: &Path| -> Result<Vec<String>, String> {
         let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;

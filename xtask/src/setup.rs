@@ -119,7 +119,8 @@ pub(crate) fn prepare(repo: &Repo, wanted: Requirements) -> XtaskResult<Prepared
     Ok(Prepared { root: repo.root.clone(), target, choice })
 }
 
-/// Installs a package that newer distributions no longer have; prints a note if it is unavailable.
+/// Installs a requirement if it is missing; prints a note if it cannot be installed, such as a package that newer
+/// distributions no longer have.
 pub(crate) fn try_to_have(need: Requirement) {
     if let Err(failure) = install(&Machine::this(), &[need]) {
         eprintln!("note: {}", failure.message);
@@ -247,7 +248,8 @@ impl Machine {
             .collect()
     }
 
-    /// True if libclang is installed with clang's own `stddef.h`, without which no C header parses.
+    /// True if libclang is installed with clang's own `stddef.h`, without which no C header parses, or if
+    /// `LIBCLANG_PATH` is set.
     fn has_libclang(&self) -> bool {
         if self.libclang_path.is_some() {
             return true;
@@ -372,7 +374,8 @@ fn is_yes(answer: &str) -> bool {
     answer.ends_with('\n') && ["", "y", "yes"].contains(&answer.trim().to_ascii_lowercase().as_str())
 }
 
-/// The command prefix for root's rights without a password prompt: empty for root, otherwise `sudo -n`.
+/// The command prefix for root's rights without a password prompt: empty for root, otherwise `sudo -n`; `None` without
+/// such rights.
 fn as_root() -> Option<Vec<&'static str>> {
     let uid = Cmd::new("id").arg("-u").output().ok()?;
     if uid.trim_ascii() == b"0" {

@@ -50,8 +50,8 @@ pub(crate) const SHARED_FEATURES: [&str; 8] = [
     "kinetoscope-cli/lerobot",
 ];
 
-/// Packages for the tests on the second MuJoCo version: packages with version-dependent code, and the integration
-/// tests.
+/// Cargo arguments that select the packages for the tests on the second MuJoCo version: packages with version-dependent
+/// code, and the integration tests.
 ///
 /// The Python packages are for this version, so their lints count here. They have no Rust tests, but their dependencies
 /// have features that the whole workspace has: without them, cargo compiles a third of the crates again.
@@ -133,7 +133,7 @@ fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[SkippedTests]) -> 
 /// Crates with the feature `lerobot`, which is off by default.
 const WITH_LEROBOT: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
 
-/// The features to test besides the default ones, for these packages.
+/// Cargo arguments for the features to test besides the default ones, for these packages.
 pub(crate) fn features(packages: &[&str]) -> Vec<String> {
     let feature = match packages {
         ["--workspace"] => "kinetoscope-cli/lerobot".to_string(),

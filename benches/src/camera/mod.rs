@@ -229,7 +229,7 @@ fn large(settings: &Settings, baselines: &Baselines, scene: &Scene, wanted: [f64
     Ok(rows)
 }
 
-/// Stepping and rendering of environments on the whole machine.
+/// Stepping and rendering of environments on two threads.
 fn stepping(settings: &Settings, baselines: &Baselines, scene: &Scene) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for side in [64, 128, 256] {

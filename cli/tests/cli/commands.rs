@@ -328,7 +328,7 @@ fn empty_images() {
 /// Cause: steps were counted even for environments that had diverged and no longer stepped.
 #[test]
 fn bench_of_a_diverged_simulation() {
-    // 1e-9 kg m² under 1e8 N m: MuJoCo reports instability in the first steps.
+    // 1e-5 kg m² on a spring of -1e15 N m/rad: MuJoCo reports instability in the first steps.
     let wild = r#"<mujoco><worldbody><body name="a" pos="0 0 1"><joint name="j" axis="0 1 0" stiffness="-1e15"/>
       <geom size="0.01" pos="0.1 0 0" mass="0.001"/></body></worldbody></mujoco>"#;
     let shell = CommandFolder::with(&[("wild.xml", wild)]);
@@ -383,10 +383,10 @@ fn scenes() {
     }
 }
 
-/// For a newer file, MuJoCo 2.2.2 reports the required version with the line, even for an included file; MuJoCo 4 loads
-/// the file.
+/// For an MJCF file that needs a newer MuJoCo than 2.2.2, the error names the required version and the line, even of an
+/// included file; with MuJoCo 4, the file is loaded.
 ///
-/// Cause: its own message ("Schema violation") does not distinguish an old MuJoCo from an invalid file. For defaults
+/// Cause: MuJoCo's message ("Schema violation") does not distinguish an old MuJoCo from an invalid file. For defaults
 /// and included files, it reports line 0, or a line of an unnamed file.
 #[test]
 fn newer_mjcf() {

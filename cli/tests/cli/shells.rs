@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 const COMMANDS: [&str; 11] =
     ["check", "convert", "render", "view", "bench", "plot", "replay", "recover", "schema", "completions", "man"];
 
-/// Runs a program on a text and returns true if it succeeded without a message.
+/// Runs a program with a text as its input. Returns its messages unless it succeeds without one.
 fn accepts(program: &str, args: &[&str], text: &str) -> Result<(), String> {
     let mut command = Command::new(program);
     command.args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -66,7 +66,7 @@ impl Decor {
         }
     }
 
-    /// Mesh of an arrow or a triangle of this size, which has both sides; `None` for lines.
+    /// Mesh of an arrow or a triangle of this size; `None` for lines.
     pub(super) fn mesh(self, size: [f32; 3]) -> Option<RenderMesh> {
         let [x, y, z] = size.map(f64::from);
         let mut parts = Parts { mesh: TriMesh::default(), radii: [x, y] };

@@ -9,7 +9,7 @@ pub struct Background {
     /// True to draw the first skybox of the model, which has the color of the fog in fog; without it, the background is
     /// black.
     pub skybox: bool,
-    /// Haze at the end of infinite planes; `None` for a sharp end.
+    /// Haze at the end of infinite planes, ignored in fog; `None` for a sharp end.
     pub horizon: Option<HorizonHaze>,
     /// Fog over distant surfaces; `None` for clear air.
     pub fog: Option<Haze>,

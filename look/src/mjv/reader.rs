@@ -29,7 +29,7 @@ const BACK_OF_PLANE: f32 = 0.3;
 /// Category of decoration (`mjCAT_DECOR`), which casts no shadow.
 const DECOR: i32 = 4;
 
-/// Opacity of lines: they are drawn after everything opaque, in the light of all lights.
+/// Largest opacity of lines, so that they are drawn after all opaque surfaces.
 const LINE_OPACITY: f32 = 0.9999;
 
 /// Reader of the scenes of one model. Meshes and textures are prepared once.
@@ -45,7 +45,7 @@ pub struct MjvReader<M> {
     texture_rule: TextureRule,
     rules: Option<OpenGlRules>,
     decor_casts_no_shadows: bool,
-    /// Arrows by type and size.
+    /// Arrows and triangles by type and size.
     arrows: HashMap<(i32, [u32; 3]), Arc<RenderMesh>>,
     /// Images of one pixel by color.
     colors: HashMap<[u32; 3], Arc<Texture>>,
@@ -59,7 +59,7 @@ pub struct MjvReader<M> {
 /// Type, mesh, size and scale of the texture of a shape, as bits.
 type WrappedKey = (i32, i32, [u32; 3], [u32; 2]);
 
-/// Number of meshes after which those of former sizes are forgotten.
+/// Number of entries above which a cache of meshes or of one-pixel images is cleared.
 const MAX_WRAPPED: usize = 1000;
 
 /// The scene of the last frame, and all that it was made of.
@@ -192,7 +192,7 @@ impl<M: VisualModel> MjvReader<M> {
         self.sky.is_some()
     }
 
-    /// One message for each element that could not be rendered so far.
+    /// Messages about the elements that could not be rendered so far, each message once.
     pub fn omitted(&self) -> &[String] {
         &self.omitted
     }
@@ -382,7 +382,7 @@ impl<M: VisualModel> MjvReader<M> {
         scales
     }
 
-    /// Scene with the lighting of MuJoCo's renderer. The headlight is one of its lights.
+    /// Scene with the lighting of MuJoCo's renderer; `None` for invalid instances. The headlight is one of its lights.
     fn scene(&mut self, instances: Vec<Instance>, background: Background, lights: &[Light]) -> Option<RenderScene> {
         let mut scene = match RenderScene::new(instances) {
             Ok(scene) => scene,

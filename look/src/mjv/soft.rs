@@ -27,7 +27,7 @@ pub struct MjvMemory<'a> {
     pub lights: &'a [u8],
     /// Viewing direction of the camera, which is the direction of the headlight.
     pub forward: [f32; 3],
-    /// View in which lines have their width; `None` for scenes without lines.
+    /// View in which lines have their width; `None` hides lines.
     pub lines: Option<LineView>,
     /// Positions of the vertices of all skins (`skinvert`).
     pub skin_positions: &'a [[f32; 3]],

@@ -16,12 +16,13 @@ pub enum TextureRule {
     Wrapped,
 }
 
-/// Number of faces around a shape, and half the number from pole to pole.
+/// Number of faces around a round shape. From pole to pole, there are half as many.
 const SLICES: usize = 64;
 const STACKS: usize = SLICES / 2;
 
 /// A mesh of a round shape or a box with the texture coordinates of [`TextureRule::Wrapped`] times `scale`, or a mesh
-/// with its own texture coordinates times `scale`; `None` for other shapes.
+/// with its own texture coordinates times `scale`; `None` for other shapes, for meshes without texture coordinates, and
+/// for meshes whose scale is 1.
 pub(super) fn wrapped_mesh(shape: &Shape, scale: [f32; 2]) -> Option<RenderMesh> {
     if let Shape::Mesh(mesh) = shape {
         return scaled_mesh(&mesh.mesh, scale);

@@ -41,7 +41,7 @@ PerJoint: TypeAlias = float | Mapping[str, float]
 /// Everything that the text of a class needs.
 struct Context {
     structs: Vec<Struct>,
-    /// Python names of structs by their Rust names and files.
+    /// Python names of structs by their Rust names.
     classes: BTreeMap<&'static str, &'static str>,
     enums: Vec<&'static str>,
     /// Names of other classes in the module that is written.
@@ -259,7 +259,6 @@ impl Context {
         if let Some(kind) = known.entity {
             let _ = write!(text, "\n    _type: ClassVar[str] = \"{kind}\"\n");
         }
-        // The name of a sensor is an argument of add_sensor.
         for field in fields {
             let default = if field.optional {
                 format!(" = {}", self.default(&field.ty, known.default.get(&field.name)))

@@ -18,7 +18,7 @@ pub(crate) struct Struct {
     pub(crate) class: &'static str,
     /// Type in scene files, for entities.
     pub(crate) entity: Option<&'static str>,
-    /// Serialized default, or the optional fields of an example.
+    /// Serialized default, or an example of a struct without a default.
     pub(crate) default: Table,
     /// Names and values of other constructors.
     pub(crate) presets: Vec<(&'static str, Table)>,

@@ -64,7 +64,7 @@ def _memory(address: int, size: int) -> np.ndarray:
 
 
 def _changed_bytes(structure: Any, field: str, memory: np.ndarray) -> np.ndarray:
-    """Indices of the bytes of `memory` that hold a number."""
+    """Indices of the bytes of `memory` that hold the number `field` of a structure."""
     old = getattr(structure, field)
     values: tuple[Any, ...] = _FLOATS if isinstance(old, float) else _INTEGERS
     try:

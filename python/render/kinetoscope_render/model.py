@@ -43,7 +43,7 @@ def _texcoord_counts(model: mujoco.MjModel) -> np.ndarray:
 
 
 def model_arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """Flat arrays of meshes, height fields, textures and materials."""
+    """Flat arrays of meshes, height fields, textures, materials and skins."""
     arrays = {}
     for names, dtype in ((_FLOAT32, np.float32), (_INT32, np.int32), (_INT64, np.int64)):
         arrays.update({name: _flat(getattr(model, name), dtype) for name in names})

@@ -155,7 +155,7 @@ def patch_mujoco() -> list[str]:
     `mujoco.mjr_readPixels`, ...) and its OpenGL contexts are replaced. Gymnasium calls these; so do dm_control and
     robosuite, whose own OpenGL contexts are replaced too. Objects that exist already keep their renderer, and so do
     names imported earlier by `from mujoco import Renderer`. A second call changes nothing. Windows (`mujoco.viewer`,
-    `render_mode="human"`) are not replaced: they draw in their own process of OpenGL.
+    `render_mode="human"`) are not replaced: they draw with OpenGL.
 
     No library is imported for this: dm_control's context is replaced when the program imports it. If a replacement
     fails, all are undone, and the error is raised.

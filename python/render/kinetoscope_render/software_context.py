@@ -108,7 +108,10 @@ def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
 
 @_for_our_context
 def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None:
-    """Renders the captured scene, from the lowest row, into the given arrays: color, and OpenGL's depth in 0..=1."""
+    """Renders the captured scene, from the lowest row, into the given arrays: color, and OpenGL's depth in 0..=1.
+
+    With the flag `mjRND_SEGMENT`, colors are segmentation ids plus 1.
+    """
     capture, (height, width) = con._open(), _extent(viewport)
     if (height, width) != con._size:
         raise ValueError(f"the viewport is {width} x {height}, but the scene was rendered to "

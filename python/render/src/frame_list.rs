@@ -93,7 +93,7 @@ fn rows<'a, const N: usize>(array: &'a PyReadonlyArray1<'_, f32>) -> PyResult<&'
     Ok(array.as_slice().map_err(invalid)?.as_chunks().0)
 }
 
-/// Numbers of the visual options of a frame, in the order of Python's `scene.py`.
+/// Background of a frame, from the numbers of its visual options in the order of Python's `scene.py`.
 fn background(numbers: [f64; 13], has_skybox: bool) -> Background {
     let [skybox, haze, fog, haze_r, haze_g, haze_b, haze_width, fog_r, fog_g, fog_b, fog_start, fog_end, far] = numbers;
     let skybox = skybox != 0.0 && has_skybox;
@@ -165,7 +165,9 @@ impl FrameList {
     }
 
     /// Captures a scene: the memory of its geoms (N, stride) and lights (L, stride), its camera (position, forward, up,
-    /// center, half width, bottom, top, near, far, 1 if it is orthographic, width of lines \[pixels\]), its visual options, and the vertices of its skins and flexes.
+    /// center, half width, bottom, top, near, far, 1 if it is orthographic, width of lines \[pixels\]), its visual
+    /// options, its effects (shadows, reflections), the size of the image (width, height) \[pixels\], and the vertices
+    /// of its skins and flexes.
     #[pyo3(signature = (geoms, lights, camera, options, effects, size, soft=None))]
     #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn capture(
@@ -311,7 +313,7 @@ fn grow<T: Clone + Default>(scratch: &mut Vec<T>, length: usize) -> PyResult<()>
     Ok(())
 }
 
-/// Part of a slice of images, `components` numbers per pixel: those of frames `first..first + count`.
+/// Part of a slice of images with `each` numbers per frame: the images of the frames `first..first + count`.
 fn part<'a, T>(
     all: &'a mut Option<&mut [T]>,
     [first, count]: [usize; 2],

@@ -5,8 +5,8 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Layout of `mjvGeom`: `stride`, the byte offsets of fields by name, and the numbers of the types of skins and
-/// flexes.
+/// Layout of `mjvGeom`: `stride`, the byte offsets of fields by name, and the numbers of the types of skins, flexes,
+/// signed distance fields and decoration.
 pub(crate) fn geom_layout(fields: &Bound<'_, PyDict>) -> PyResult<GeomLayout> {
     let get = |name| required(fields, name);
     Ok(GeomLayout {

@@ -90,7 +90,7 @@ fn at<T: Copy + Default>(values: &[T], index: usize) -> T {
 }
 
 impl ModelArrays {
-    /// Checks that a mesh or height field exists.
+    /// Checks that the lengths of the arrays agree.
     ///
     /// # Errors
     /// `ValueError` for lengths that do not belong to one model.

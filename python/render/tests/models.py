@@ -48,7 +48,7 @@ _ROBOTS = ("rokae_description/urdf/SR5.urdf", "inspire_hand/DFQ_left_hand.urdf")
 
 
 def paths() -> dict[str, pathlib.Path]:
-    """Files of all models by name; empty without the folder."""
+    """Files of all models by name, from the folders that are set."""
     found = {}
     if os.environ.get(FOLDER):
         for package, (below, names) in _PACKAGES.items():

@@ -33,7 +33,7 @@ def test_shapes_and_types(shapes):
 
 
 def test_depth_of_a_plane():
-    """A camera 3 m above a plane that looks down sees it at a depth of 3 m everywhere; a ball of radius 0.5 at 2.5."""
+    """A camera that looks down from 3 m sees a plane at a depth of 3 m, and a ball of radius 0.5 at 2.5 m."""
     model, data = load("""<mujoco><worldbody><camera name="down" pos="0 0 3"/><geom type="plane" size="9 9 .1"/>
         <geom size=".5" pos="0 0 0"/></worldbody></mujoco>""")
     with kr.Renderer(model, 61, 61) as renderer:

@@ -22,7 +22,8 @@ def _fields() -> dict[str, dict[str, bool]]:
 
 def is_optional(kind: str, field: str) -> bool:
     """True if the field of a configuration may be None. ``kind`` is a type of scene files, ``"simulation"``, or ``""``
-    for a dict inside another, whose type is unknown: then the fields of this name in all classes count."""
+    for a dict inside another, whose type is unknown: then the fields of this name in all classes count. True for an
+    unknown field, whose name Rust refuses."""
     classes = _fields()
     if kind in classes:
         return classes[kind].get(field, True)

@@ -23,7 +23,8 @@ def asset(path: str | os.PathLike[str]) -> str:
 
 
 def bundled_robot(name: str, **fields: Any) -> RobotCfg:
-    """Configuration of a bundled robot: ``"quadruped"``, ``"sr5"``, ``"revo1_left"`` or ``"sr5_with_hand"``."""
+    """Configuration of a bundled robot: ``"quadruped"``, ``"sr5"``, ``"revo1_left"`` or ``"sr5_with_hand"``. Keyword
+    arguments replace its fields."""
     scene = tomllib.loads(_sim.bundled_robot(name))
     ((uid, entity),) = scene["entities"].items()
     entity.pop("type")

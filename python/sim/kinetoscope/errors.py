@@ -70,7 +70,7 @@ class ViewerError(KinetoscopeError, RuntimeError):
 
 
 class DestroyedError(KinetoscopeError, RuntimeError):
-    """The simulation was destroyed."""
+    """The simulation was destroyed, or the task was closed."""
 
 
 class ForeignHandleError(KinetoscopeError, ValueError):
@@ -78,7 +78,7 @@ class ForeignHandleError(KinetoscopeError, ValueError):
 
 
 class ForkError(KinetoscopeError, RuntimeError):
-    """A simulation with threads was used in a forked process."""
+    """A simulation that has threads, or was in use during the fork, was used in a forked process."""
 
 
 class InternalError(KinetoscopeError, RuntimeError):

@@ -48,7 +48,7 @@ def png(pixels: np.ndarray[Any, Any]) -> bytes:
 
 
 def to_image(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any] | None:
-    """Picture of one environment of an image channel, or None for values that are not an image."""
+    """Colors of an image channel in one environment, u8, or None for values that are not an image."""
     if values.dtype == np.uint8 and values.ndim == 3:
         return values
     if values.dtype == np.float32 and values.ndim == 3 and values.shape[2] == 3:

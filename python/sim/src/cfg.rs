@@ -43,7 +43,7 @@ fn none_value(py: Python<'_>, kind: &str, field: &str, path: &str) -> PyResult<O
 const MAX_DEPTH: usize = 64;
 
 /// Converts the fields of a configuration: of a dataclass, those that differ from their defaults; of a mapping, all.
-/// `kind` is the type of the configuration, [`SIMULATION`] or [`ANY`].
+/// `kind` is the type of the configuration: that of an entity in scene files, [`SIMULATION`] or [`ANY`].
 pub(crate) fn table(kind: &str, cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Table> {
     let mut table = match cfg.map(|cfg| value(cfg, kind, "", 0)).transpose()? {
         None | Some(None) => Table::new(),

@@ -31,7 +31,7 @@ fn asset_path(asset: PathBuf) -> PyResult<PathBuf> {
     Ok(shared::guarded(|| Ok(kinetoscope::assets::path(asset)?))?)
 }
 
-/// Names the folder of assets of the package.
+/// Names the folder of assets of the package. Returns false if another folder was named before, which stays.
 #[pyfunction]
 fn _set_assets(folder: PathBuf) -> bool {
     kinetoscope::assets::set_folder(folder)

@@ -32,7 +32,7 @@ arrays! { RigidObject, rigid_object:
     friction,
     /// Linear [N s/m] and angular damping [N m s/rad], shape (num_envs, 2).
     damping,
-    /// External force [N] and torque [N m], shape (num_envs, 6).
+    /// External force [N] and torque [N m], world axes, shape (num_envs, 6).
     external_wrench,
 }
 

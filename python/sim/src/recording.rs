@@ -67,7 +67,8 @@ macro_rules! plain_topics {
 }
 
 plain_topics! {
-    /// Everything that the format supports.
+    /// Everything that the format supports, except engine states. The overview is included only in formats of images,
+    /// and only without a camera.
     everything => Everything,
     /// Times, positions and velocities of all joints in MuJoCo's order.
     engine_states => EngineStates,
@@ -338,7 +339,7 @@ impl Playback {
         })
     }
 
-    /// Index of the last frame at or before a time [s].
+    /// Index of the last frame at or before a time [s]; 0 before the first.
     fn frame_at(&self, py: Python<'_>, time: f64) -> usize {
         py.detach(|| self.lock().frame_at(time))
     }

@@ -299,7 +299,7 @@ impl Robot {
         self.shared.read(py, |sim| Ok(sim.robot(self.id).joint_ids(part)?.into_iter().map(|joint| joint.0).collect()))
     }
 
-    /// Indices of the joints of a control part that follow no other joint.
+    /// Indices of the joints of a control part, or of the robot, that follow no other joint.
     #[pyo3(signature = (part=None))]
     fn active_joint_ids(&self, py: Python<'_>, part: Option<&str>) -> PyResult<Vec<usize>> {
         self.shared
@@ -554,7 +554,7 @@ pub(crate) struct IkResult {
     rotation_error: Py<PyAny>,
     /// Solver iterations, shape (num_envs,).
     iterations: Py<PyAny>,
-    /// Index of the successful start, shape (num_envs,); 0 is the start from the initial positions.
+    /// Index of the start that led to the result, shape (num_envs,); 0 is the start from the initial positions.
     seed: Py<PyAny>,
 }
 

@@ -297,7 +297,7 @@ impl std::fmt::Debug for Shared {
     }
 }
 
-/// Runs a call that needs no simulation without holding the interpreter. A panic becomes an `InternalError`.
+/// Runs a call without holding the interpreter. A panic becomes an `InternalError`.
 pub(crate) fn detached<T: Send>(py: Python<'_>, act: impl FnOnce() -> Result<T, Failure> + Send) -> PyResult<T> {
     py.detach(|| guarded(act)).map_err(Into::into)
 }

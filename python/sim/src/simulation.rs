@@ -285,7 +285,7 @@ impl Simulation {
         })
     }
 
-    /// Names of the bodies of contacts and body indices.
+    /// Names of all bodies, in the order in which sensors and viewers number them.
     #[getter]
     fn body_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         self.shared.read(py, |sim| Ok(sim.entities().body_names().to_vec()))

@@ -42,7 +42,7 @@ macro_rules! elements {
                 }
             }
 
-            /// Hands the memory of owned values over to NumPy.
+            /// Hands the memory of owned values over to NumPy. Borrowed values are copied.
             pub(crate) fn into_python(self, py: Python<'_>) -> Bound<'_, PyAny> {
                 match self {
                     $(Self::$Variant(array) => array.into_owned().into_pyarray(py).into_any(),)*

@@ -52,7 +52,7 @@ pub(crate) struct Window {
 
 #[pymethods]
 impl Window {
-    /// True until the user closes the window.
+    /// True while the window is open.
     #[getter]
     fn is_open(&self) -> bool {
         self.inner.is_open()
@@ -100,8 +100,8 @@ impl Simulation {
         Ok(Server { shared: Arc::clone(&self.shared), inner })
     }
 
-    /// Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor. Raises
-    /// ``ViewerError`` without a display.
+    /// Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor, or
+    /// None for no limit. Raises ``ViewerError`` without a display.
     #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None))]
     fn open_window(
         &self,

@@ -13,7 +13,8 @@ pub struct TerrainLevelsCfg {
     /// Highest row of the grid in which environments start, uniformly distributed from row 0; `None` for all rows.
     pub max_initial_level: Option<usize>,
     /// Command term with a target velocity in its first two columns \[m/s\]. An environment that walked less than half
-    /// of what its command asked for moves down; `None` for an environment that walked less than a quarter of a tile.
+    /// of what its command asked for moves down; `None` for an environment that walked less than a quarter of a tile's
+    /// length along x.
     pub command: Option<String>,
     /// Duration for which a command is followed \[s\]: the longest duration of an episode.
     pub episode_seconds: f64,
@@ -29,10 +30,10 @@ impl Default for TerrainLevelsCfg {
 /// Creates a curriculum with the row of a [`TerrainGrid`] in which each environment starts its episodes.
 /// [`reset_root_on_terrain`] puts a robot there.
 ///
-/// At the end of an episode, an environment whose robot is farther than half a tile (along x) from the center of its
-/// tile moves up a row. One that walked too little moves down ([`TerrainLevelsCfg::command`]), but not below row 0.
-/// Beyond the last row, it continues in a random one. Distances are horizontal. Isaac Lab's `terrain_levels_vel` has the
-/// same rules.
+/// At the end of an episode, an environment whose robot is farther from the center of its tile than half the length of
+/// a tile along x moves up a row. One that walked too little moves down ([`TerrainLevelsCfg::command`]), but not below
+/// row 0. Beyond the last row, it continues in a random one. Distances are horizontal. Isaac Lab's `terrain_levels_vel`
+/// has the same rules.
 ///
 /// # Errors
 /// A number is out of range.
@@ -94,6 +95,7 @@ fn column(grid: &TerrainGrid, global_env: usize) -> usize {
 /// Creates an event that puts the root link above the center of a tile when an episode begins. The row of the tile is
 /// the number of the curriculum term called `curriculum`, its column the global index of the environment modulo the
 /// number of columns. The default root pose and `ranges` are offsets from the highest point of the tile's platform.
+/// With a fixed base, or without that curriculum term, the event returns an error.
 ///
 /// The frame of the terrain must be that of the environment (the default [`init_pose`] of the terrain).
 ///

@@ -17,13 +17,14 @@ pub struct UniformVelocityCfg {
     pub ang_vel_z: [f64; 2],
     /// Target headings \[rad\], the angle about the world's z of the root link's x axis; `None` for drawn turning rates.
     pub heading: Option<[f64; 2]>,
-    /// Share of environments that get a heading, if there is one; the others get a drawn turning rate.
+    /// Share of commands that have a heading if [`heading`](Self::heading) is set; the others have a drawn turning
+    /// rate.
     pub rel_heading_envs: f64,
     /// Turning rate per heading error \[1/s\].
     pub heading_stiffness: f64,
-    /// Share of environments that have to stand still: their command is 0.
+    /// Share of commands that are 0, so that the robot has to stand still.
     pub rel_standing_envs: f64,
-    /// Time after which the command is drawn again \[s\]; `None` for one command per episode.
+    /// Range of the time after which the command is drawn again \[s\]; `None` for one command per episode.
     pub resampling_time: Option<[f64; 2]>,
 }
 

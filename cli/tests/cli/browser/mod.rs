@@ -49,8 +49,8 @@ fn assert_content(tab: &mut Tab<'_>) {
 
 /// Test functions that are defined in every page. `$` finds an element. `pixels` returns the bytes of a canvas and its
 /// size. `look` returns the number of colors, the share of pixels that are as red as the cube, and their center in
-/// fractions of the canvas. `hash` differs for different images. `columns` and `count` measure pixels with nearly the
-/// color of a plot's blue line.
+/// fractions of the canvas. `hash` differs for different images. `blue` returns the number of pixels with nearly the
+/// color of a plot's blue line, and the share of columns that contain one.
 const TOOLS: &str = "
 window.$ = (id) => document.getElementById(id);
 window.pixels = (id) => {

@@ -85,7 +85,7 @@ impl TestClient {
         })
     }
 
-    /// Waits for an image of the scene or of a camera sensor.
+    /// Waits for an image of the scene or of a camera sensor that satisfies `good`.
     #[track_caller]
     pub(crate) fn wait_image(&mut self, shows: &str, mut good: impl FnMut(&Value, &RgbImage) -> bool) -> RgbImage {
         self.wait(shows, |came| match came {

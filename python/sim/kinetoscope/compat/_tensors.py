@@ -20,7 +20,7 @@ except ImportError:
 
 def tensor(array: Any) -> Any:
     """A tensor of an array that no other object uses. Numbers in double precision become single precision, as the
-    other simulators have; all other arrays keep their memory."""
+    other simulators have, and ``uint64`` becomes ``int64``; all other arrays keep their memory."""
     array = np.asarray(array)
     if array.dtype == np.float64:
         array = array.astype(np.float32)

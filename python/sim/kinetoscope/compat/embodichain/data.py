@@ -14,7 +14,7 @@ BUNDLED = {
 
 
 def get_data_path(path: str) -> str:
-    """Path of a file: an existing path, a file below the folder ``EMBODICHAIN_DATA_ROOT``, or a bundled asset."""
+    """Path of a file: an absolute path as given, a file in the folder ``EMBODICHAIN_DATA_ROOT``, or a bundled asset."""
     if os.path.isabs(path):
         return path
     root = os.environ.get("EMBODICHAIN_DATA_ROOT")

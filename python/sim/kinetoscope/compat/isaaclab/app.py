@@ -38,7 +38,7 @@ class SimulationApp:
 class AppLauncher:
     """Reads the flags and makes the application."""
 
-    # Whether later simulations open a window.
+    # True if later simulations open no window.
     headless = True
 
     def __init__(self, launcher_args: argparse.Namespace | dict[str, Any] | None = None, **kwargs: Any) -> None:

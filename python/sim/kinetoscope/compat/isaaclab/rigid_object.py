@@ -111,7 +111,7 @@ class RigidObject:
         return [self.cfg.prim_path.rsplit("/", 1)[-1]]
 
     def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:  # noqa: ARG002
-        """Index and name of the body, if a pattern matches."""
+        """Index and name of the body, which each pattern must match."""
         patterns = [name_keys] if isinstance(name_keys, str) else list(name_keys)
         for pattern in patterns:
             if not re.fullmatch(pattern, self.body_names[0]):

@@ -224,7 +224,7 @@ class Robot(Articulation):
         return self.native.control_parts
 
     def get_joint_ids(self, name: str | None = None, remove_mimic: bool = False) -> list[int]:
-        """Indices of the joints of a control part, or of all joints."""
+        """Indices of the joints of a control part, or of all joints. ``remove_mimic`` leaves out mimic joints."""
         return self.native.active_joint_ids(name) if remove_mimic else self.native.joint_ids(name)
 
     def _chosen(self, joint_ids: Any, name: str | None) -> Any:

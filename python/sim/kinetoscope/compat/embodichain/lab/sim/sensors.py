@@ -134,7 +134,8 @@ class Camera:
         self._data = {name: tensor(self.native[name]) for name in channels(self.cfg)}
 
     def get_data(self) -> dict[str, Any]:
-        """Images of the last ``update``: color (n, h, w, 4), depth and mask (n, h, w), normal (n, h, w, 3)."""
+        """Images of the last ``update``: color (n, h, w, 4), depth and mask (n, h, w), normal and position
+        (n, h, w, 3)."""
         if not self._data:
             self.update()
         return self._data
@@ -211,7 +212,7 @@ class StereoCamera(Camera):
 
 
 class ContactSensor:
-    """Contacts of the listed bodies, sorted to the front of arrays of ``max_contacts_per_env`` rows."""
+    """Contacts of the listed bodies, at the front of arrays of ``max_contacts_per_env`` rows; others are left out."""
 
     def __init__(self, manager: Any, uid: str, cfg: ContactSensorCfg) -> None:
         self.manager = manager
