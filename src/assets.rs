@@ -17,7 +17,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Error of [`path`] and of the robots: an asset does not exist.
+/// Error of [`path`] and of the functions for robots: an asset was not found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetNotFound {
     /// Requested path.

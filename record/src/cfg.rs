@@ -44,7 +44,8 @@ pub struct RecorderCfg {
     /// without a recorded pose and shapes that deform are left out, and so are environments beyond the limit of 64 MiB
     /// for all messages. [`RecordingSummary::left_out`](crate::RecordingSummary::left_out) lists all of these.
     pub scene: bool,
-    /// Settings of the overview image, if it is recorded ([`Topic::Overview`]).
+    /// Settings of the overview image, for [`Topic::Overview`], and for [`Topic::Everything`] in formats of images
+    /// without a camera.
     pub overview: OverviewCfg,
     /// Description of the task in words, for all episodes of a LeRobot dataset. Other formats ignore it.
     pub task: String,

@@ -6,8 +6,8 @@ use crate::scene_file::{self, SCENE_ARCHIVE};
 use kinetoscope_sim::{MjcfId, MjcfPart, SimulationManager};
 use ndarray::Array2;
 
-/// Recorded motion in its scene. [`seek`](Self::seek) sets the simulation to one of the recorded
-/// [`times`](Self::times), by its index.
+/// Recorded motion in its scene. [`seek`](Self::seek) sets the positions of a simulation to a recorded time, by its
+/// index in [`times`](Self::times).
 ///
 /// The motion includes joints of robots, articulations and MJCF files, floating bases, free objects and kinematic
 /// objects. Sizes and colors that were changed per environment are not replayed.
@@ -131,7 +131,7 @@ impl Playback {
         &self.joints_without_data
     }
 
-    /// Index of the last recorded time that is not later than `time` \[s\]; 0 before the first.
+    /// Index of the last recorded time at or before `time` \[s\], with a tolerance of 1 ns; 0 before the first.
     pub fn frame_at(&self, time: f64) -> usize {
         self.times.partition_point(|frame| *frame <= time + 1e-9).saturating_sub(1)
     }

@@ -89,12 +89,12 @@ type SourceFn = fn(&SimulationManager, &str, &[usize]) -> Result<StreamSource>;
 ///
 /// Restores the initial state and properties, applies the recorded actions and resets, and compares joint states, poses
 /// of links and objects, and states of MJCF parts after every step, as far as they are recorded. The file must contain
-/// the targets of every robot and the controls of every MJCF part that move something, at every step
-/// ([`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) 1). If a step has several rows because of events,
-/// the first and the last are compared.
+/// the targets of every robot and articulation with joints, and the controls of every MJCF part with actuators, at
+/// every step ([`RecorderCfg::period_steps`](crate::RecorderCfg::period_steps) 1). If a step has several rows because
+/// of events, the first and the last are compared.
 ///
-/// External wrenches, welds and gains are not recorded. Like poses of kinematic objects, they are not repeated. The
-/// first difference shows when they mattered.
+/// External wrenches, welds and gains are not recorded. Neither they nor poses written to kinematic objects are
+/// replayed. If they changed the motion, the result has the first difference.
 ///
 /// # Errors
 /// The file is not a complete recording, lacks required targets, controls or steps, or is of another scene, another

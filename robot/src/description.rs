@@ -1,5 +1,6 @@
 //! Robot description: the merged links and joints as the files define them.
-//! [`complete`](crate::shape_inertia::complete) adds missing mass properties; all other repairs for MuJoCo come later.
+//! [`complete`](crate::shape_inertia::complete) adds missing mass properties. The MJCF writer repairs impossible
+//! inertias of fused bodies.
 //!
 //! The URDF and MJCF readers build it (`urdf::merge`, and `mjcf::robot_file` of the simulation crate). Dynamics,
 //! kinematics, the MJCF writer and the drives read it. Names are unique, elements keep the order of the files, and each

@@ -17,11 +17,11 @@ pub struct Step<I = StepInfo> {
     pub final_observations: Array2<f64>,
     /// Rewards of this step, shape (N,). In an environment whose episode ended, the last reward of that episode.
     pub rewards: Array1<f64>,
-    /// True if the episode reached its end in this step, shape (N,): no further reward is possible. In an
-    /// [`Env`](crate::Env), by a termination term or a diverged simulation.
+    /// True if the episode reached a terminal state in this step, shape (N,): no further reward is possible. In an
+    /// [`Env`](crate::Env), a termination term or a diverged simulation sets it.
     pub terminated: Array1<bool>,
-    /// True if the episode was cut off in this step, shape (N,). In an [`Env`](crate::Env), by the limit of steps, a
-    /// truncating term, or a reset from outside the task. `terminated` may be true as well.
+    /// True if the episode was cut off in this step, shape (N,). In an [`Env`](crate::Env), the limit of steps, a
+    /// truncating term, or a reset from outside the task sets it. `terminated` may be true as well.
     pub truncated: Array1<bool>,
     /// Additional results of the implementation.
     pub info: I,

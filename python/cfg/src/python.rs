@@ -89,7 +89,7 @@ pub(crate) fn modules(root: &Path) -> Result<Vec<(String, String)>, String> {
     Ok(files)
 }
 
-/// Imports of the standard library that a text needs.
+/// Python imports of the standard library that `text` needs, followed by a blank line.
 fn standard_imports(text: &str) -> String {
     let needed = |names: &[&str]| -> Vec<String> {
         names.iter().filter(|name| has_word(text, name)).map(ToString::to_string).collect()

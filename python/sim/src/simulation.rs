@@ -165,7 +165,8 @@ impl Simulation {
         self.add_entity(py, "weld", None, cfg::table("weld", cfg, fields)?)
     }
 
-    /// Adds a sensor under a name and returns its handle.
+    /// Adds a sensor under a name and returns its handle. ``cfg`` is a configuration such as ``CameraCfg``, or a dict
+    /// with ``type``.
     fn add_sensor(&self, py: Python<'_>, name: String, cfg: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         self.add(py, name, cfg)
     }

@@ -33,10 +33,10 @@ pub(crate) trait DatasetWriter: Send {
     /// Begins an episode in an environment, unless one is in progress. A frame follows.
     fn begin(&mut self, env: usize);
 
-    /// Adds a frame to the present episode of an environment.
+    /// Adds a frame to the current episode of an environment.
     fn add(&mut self, env: usize, frame: &EpisodeFrame<Self::Image>) -> WriteResult;
 
-    /// Ends the present episode of an environment, if there is one. Episodes are numbered in the order of their ends.
+    /// Ends the current episode of an environment, if there is one. Episodes are numbered in the order of their ends.
     fn end(&mut self, env: usize) -> WriteResult;
 
     /// Completes the dataset after the last episode and gives it its name; returns its size \[bytes\].
@@ -122,7 +122,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
         step.is_multiple_of(self.period_steps)
     }
 
-    /// Stores the new values of an environment.
+    /// Stores the new values of the environment with index `k` in `envs`.
     fn store_values(&mut self, k: usize, streams: &[StreamSchema], packet: &Packet) -> WriteResult {
         let EnvFrames { env, numbers, images, .. } = &mut self.envs[k];
         let outcome = self.features.result_stream;
@@ -146,7 +146,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
         Ok(())
     }
 
-    /// Frame of the present values, if all streams have a value; actions are filled in later.
+    /// Frame of the current values, if all streams have a value; actions are filled in later.
     fn present_frame(&self, k: usize) -> Option<EpisodeFrame<D::Image>> {
         let EnvFrames { numbers, images, .. } = &self.envs[k];
         let numbers = self.features.numbers.iter().map(|feature| feature.values(numbers));
@@ -182,7 +182,8 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
         }
     }
 
-    /// Ends the episode of an environment.
+    /// Ends the episode of the environment with index `k` in `envs`: adds the frame that waits for its result, and
+    /// drops the pending row.
     fn end_episode(&mut self, k: usize) -> WriteResult {
         // Results after the last frame are added to it, because the row after it is no frame.
         let EnvFrames { pending, awaiting_result, .. } = &mut self.envs[k];

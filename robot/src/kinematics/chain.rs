@@ -170,13 +170,13 @@ impl Chain {
         held
     }
 
-    /// Writes the chain that [`reduced`](Self::reduced) returns into an existing chain, without allocating.
-    /// `variable_of` gives the new index of each variable that stays free, and `None` for each variable that is fixed
-    /// at its value in `positions`.
+    /// Writes the chain that [`reduced`](Self::reduced) returns to `held`, and allocates only if `held` has too little
+    /// memory for its joints. `variable_of` gives the new index of each variable that stays free, and `None` for each
+    /// variable that is fixed at its value in `positions`.
     ///
     /// # Panics
-    /// If `variable_of` has fewer entries than the chain has [`variables`](Self::variables), or `positions` lacks a
-    /// fixed one.
+    /// If `variable_of` has fewer entries than the chain has [`variables`](Self::variables), or `positions` has no
+    /// value for a fixed variable.
     #[track_caller]
     pub fn reduce_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
         held.base = self.base;

@@ -86,8 +86,8 @@ pub fn terrain_levels(name: &str, robot: RobotId, grid: &TerrainGrid, cfg: Terra
     ))
 }
 
-/// Column of the grid for an environment: columns are dealt out in turn, so that the number of environments does not
-/// matter.
+/// Grid column of an environment: its global index modulo the number of columns. The column does not depend on the
+/// number of environments.
 fn column(grid: &TerrainGrid, global_env: usize) -> usize {
     global_env % grid.columns
 }

@@ -23,7 +23,8 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Creates the selection from an instance of an environment and a hit point in the overview.
+    /// Creates the selection from the index of an instance in an environment and a hit point in the frame of the
+    /// overview \[m\]; `None` if the environment or the instance does not exist.
     pub(super) fn new(snapshot: &Snapshot, env: usize, instance: usize, position: [f32; 3]) -> Option<Self> {
         let stage = snapshot.envs.get(env)?;
         let scene = snapshot.env_scene(stage)?;

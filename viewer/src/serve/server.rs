@@ -66,7 +66,7 @@ pub(super) struct Server {
 }
 
 impl Server {
-    /// Starts to accept connections.
+    /// Starts the thread that accepts connections, with at most `max_viewers` viewers.
     pub(super) fn start(
         listener: TcpListener,
         policy: AccessPolicy,

@@ -138,7 +138,7 @@ impl fmt::Debug for App {
 
 impl App {
     /// Creates the state of a window of `size` pixels with at most `threads` rendering threads. Half of the threads
-    /// render while physics needs all available time: at free speed, and for 5 s after physics fell behind the
+    /// render while physics needs all available time: at unlimited speed, and for 5 s after physics fell behind the
     /// requested speed.
     pub fn new(size: [usize; 2], threads: usize) -> Self {
         Self {

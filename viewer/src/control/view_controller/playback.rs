@@ -121,7 +121,7 @@ impl Playhead {
         self.playing &= self.frame + 1 < self.times.len();
     }
 
-    /// Advances by one frame after a snapshot was published at free speed.
+    /// Advances by one frame after a snapshot was published, if playing at [`Speed::Unlimited`].
     fn on_frame_published(&mut self) {
         if self.playing && self.speed == Speed::Unlimited {
             self.seek_frame(self.frame + 1);
