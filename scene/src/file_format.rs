@@ -5,6 +5,7 @@
 //! | pose | `[x, y, z, qw, qx, qy, qz]`, or `{ pos = [x, y, z], rpy_deg = [r, p, y] }`, or with `quat_wxyz` |
 //! | rotation | `[w, x, y, z]`, or `{ rpy_deg = [r, p, y] }` |
 //! | vector | `[x, y, z]` |
+//! | optional vector | `[x, y, z]`; the empty value of the format (null in JSON) for `None` |
 //! | list of pairs | a table that keeps its order |
 //! | optional value with a default | the value; `false` for `None` |
 

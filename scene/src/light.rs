@@ -186,6 +186,7 @@ pub struct Haze {
     /// horizon.
     pub color: Option<[f32; 3]>,
     /// Distance from the camera at which the haze begins \[m\]. The haze increases smoothly up to [`end`](Self::end).
+    /// With [`OpenGlRules`], the depth replaces the distance, and the haze increases linearly.
     pub start: f32,
     /// Distance from the camera beyond which only haze is visible \[m\].
     pub end: f32,

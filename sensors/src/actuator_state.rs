@@ -123,8 +123,9 @@ impl ActuatorState {
         self.sampler.values("controls")
     }
 
-    /// Forces of the actuators, shape \[num_envs, actuators\]: the effort of a drive \[N m or N\]; for an actuator of
-    /// an MJCF file, the force in the unit of the file, before the gear. Captured at [`Sampled::force_stamps`].
+    /// Forces of the actuators, shape \[num_envs, actuators\]. For a drive, the effort of the last step \[N m or N\]: 0
+    /// after a reset, unchanged by a write. For an actuator of an MJCF file, the force in the unit of the file, before
+    /// the gear. After a step, both belong to [`Sampled::force_stamps`].
     pub fn forces(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("forces")
     }

@@ -8,6 +8,7 @@ use super::MeshError;
 use super::error::{ReadContext, percent_decoded};
 use super::load::read;
 
+/// A glTF file that is read: its JSON and its buffers.
 pub(super) struct Gltf<'a> {
     pub(super) ctx: &'a ReadContext<'a>,
     pub(super) json: &'a Value,
@@ -41,7 +42,7 @@ impl<'a> Gltf<'a> {
         Self { ctx, json, buffers, bin }
     }
 
-    /// A required whole number.
+    /// Returns the whole number `key` of `value`; an error if it is missing. `at` names the element in errors.
     pub(super) fn number(&self, value: &Value, key: &str, at: &str) -> Result<usize, MeshError> {
         self.optional(value, key, at)?.ok_or_else(|| self.ctx.invalid(at, format!("{key:?} is missing")))
     }

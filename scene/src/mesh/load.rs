@@ -1,4 +1,4 @@
-//! List of mesh formats, and detection of a file's format.
+//! Loading of mesh files: list of formats, detection of the format, reading.
 
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<TriMesh, MeshError> {
     load_with(path, &MeshOptions::default())
 }
 
-/// Reads a mesh file as [`load`] does, with options.
+/// Same as [`load`], with `options`.
 ///
 /// # Errors
 /// As [`load`].

@@ -53,7 +53,7 @@ impl ClosedForm for Box {
         Some(Intersection { t, normal: [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }) })
     }
 
-    /// Index of the face: -x, +x, -y, +y, -z, +z.
+    /// Index of the face at the intersection, 0 to 5: -x, +x, -y, +y, -z, +z.
     fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
         let axis = intersection.normal.iter().position(|&n| n != 0.0).unwrap_or(2);
         2 * axis + usize::from(ray.at(intersection.t)[axis] >= 0.0)

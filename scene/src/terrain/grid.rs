@@ -153,7 +153,8 @@ impl TerrainGrid {
         Some([index(x, self.rows, self.tile_size[0])?, index(y, self.columns, self.tile_size[1])?])
     }
 
-    /// Type of the tiles of a column: the one whose share covers the middle of the column.
+    /// Type of the tiles of a column. The shares divide the width of the grid in the order of `tiles`; the middle of
+    /// the column selects the type.
     ///
     /// # Panics
     /// There are no tiles.

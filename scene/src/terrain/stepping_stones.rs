@@ -1,4 +1,4 @@
-//! Stones to step on.
+//! Stepping stones.
 
 use super::{TerrainError, check_platform, check_range, finite, from_center, grid_size, whole_cells};
 use crate::KeyedRng;

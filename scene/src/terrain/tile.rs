@@ -50,7 +50,7 @@ pub enum TerrainTile {
     DiscreteObstacles(ObstaclesTile),
 }
 
-/// Numbers of a rough tile. Pairs are \[easiest, hardest\].
+/// Parameters of a rough tile. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoughTile {
@@ -66,7 +66,7 @@ impl Default for RoughTile {
     }
 }
 
-/// Numbers of a tile of slopes. Pairs are \[easiest, hardest\].
+/// Parameters of a tile of slopes. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SlopeTile {
@@ -80,7 +80,7 @@ impl Default for SlopeTile {
     }
 }
 
-/// Numbers of a tile of stairs. Pairs are \[easiest, hardest\].
+/// Parameters of a tile of stairs. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StairsTile {
@@ -96,7 +96,7 @@ impl Default for StairsTile {
     }
 }
 
-/// Numbers of a tile of boxes. Pairs are \[easiest, hardest\].
+/// Parameters of a tile of boxes. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BoxesTile {
@@ -112,7 +112,7 @@ impl Default for BoxesTile {
     }
 }
 
-/// Numbers of a tile of stepping stones. Pairs are \[easiest, hardest\].
+/// Parameters of a tile of stepping stones. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SteppingStonesTile {
@@ -130,7 +130,7 @@ impl Default for SteppingStonesTile {
     }
 }
 
-/// Numbers of a tile with a trench. Pairs are \[easiest, hardest\].
+/// Parameters of a tile with a trench. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GapTile {
@@ -146,7 +146,7 @@ impl Default for GapTile {
     }
 }
 
-/// Numbers of a tile of waves. Pairs are \[easiest, hardest\].
+/// Parameters of a tile of waves. Pairs are \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WavesTile {
@@ -162,7 +162,7 @@ impl Default for WavesTile {
     }
 }
 
-/// Numbers of a tile of obstacles. The height is \[easiest, hardest\].
+/// Parameters of a tile of obstacles. The height is \[easiest, hardest\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ObstaclesTile {

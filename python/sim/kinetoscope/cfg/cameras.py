@@ -66,7 +66,7 @@ class Intrinsics:
 
 
 class Placement:
-    """Pose of a camera."""
+    """Pose of a camera in the frame of its parent, or of the environment for free cameras."""
 
     @staticmethod
     def pose(*, pos: Sequence[float] | None = None, rotation: Sequence[float] | Mapping[str, Sequence[float]] | None = None) -> dict[str, Any]:
@@ -211,9 +211,9 @@ class RasterCfg:
     occlusion_rays: int = 0
     """Rays per color sample for ambient occlusion, in ``"hybrid"`` only; 0 disables it. Path tracing ignores this
     number; with the other renderers, a number above 0 is an error. With ambient occlusion, ambient light is the part
-    of the light from all directions that is not occluded, as in ``"ray_traced"`` without bounces. It is exact where
-    flat surfaces are unoccluded (with smooth normals, parts of the mesh below a facet occlude it). Elsewhere it has
-    the noise of so many rays, which depends on the point only.
+    of the light from all directions that is not occluded, as in ``"ray_traced"`` without bounces. The result is
+    exact on unoccluded flat surfaces. (With smooth normals, the mesh below a facet may occlude it.) Elsewhere the
+    result has the noise of this number of rays, which depends only on the surface point.
     """
 
     tone: ToneCurve = "soft"
@@ -465,8 +465,8 @@ class CameraCfg:
     """
 
     dropout: float = 0.0
-    """Probability that an image is lost on its way, 0 to 1: the previous image stays, and the lost one is neither
-    counted nor in the history. The images of a reset or a write to the state are never lost.
+    """Probability that a scheduled image is lost, 0 to 1: the previous image stays, and the lost image is neither
+    counted nor added to the history. The images of a reset or a write to the state are never lost.
     """
 
     noise: Mapping[str, NoiseCfg | Mapping[str, Any]] = field(default_factory=dict)

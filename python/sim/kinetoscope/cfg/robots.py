@@ -313,7 +313,9 @@ class RobotCfg:
     """Drive properties."""
 
     fix_base: bool = True
-    """True if the root link is fixed in the environment."""
+    """True (default) if the root link is fixed in the environment, false for a free base. A free joint of an MJCF file
+    is left out or added accordingly.
+    """
 
     init_pose: Pose = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     """Pose of the root link in the environment; for an MJCF file, pose of the file's world, in which the root link is
@@ -377,7 +379,9 @@ class ArticulationCfg:
     """
 
     fix_base: bool = True
-    """True if the root link is fixed in the environment. A free root link can be placed in each environment."""
+    """True (default) if the root link is fixed in the environment. A free root link can be placed in each
+    environment.
+    """
 
     init_pose: Pose = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     """Pose of the root link in the environment; for an MJCF file, pose of the file's world."""
@@ -388,8 +392,9 @@ class ArticulationCfg:
     """
 
     drive: DriveCfg | Mapping[str, Any] | None = None
-    """Drives, such as the spring of a door closer (a stiffness, and a target at 0); ``None`` for passive joints.
-    Stiffness and damping that it does not set are those of ``DriveCfg()``, which are made for robots.
+    """Drives, such as the spring of a door closer (a stiffness, and a target at 0); ``None`` for passive joints. Unset
+    stiffness and damping are those of the actuators of an MJCF file, or else those of ``DriveCfg()``, which suit
+    robots: set both for a light mechanism.
     """
 
     friction: PerJoint | None = None

@@ -27,8 +27,8 @@ class NoiseCfg:
     """
 
     bias_walk: float = 0.0
-    """Random walk that is added to the bias: its standard deviation one second after the reset, in the unit of the
-    channel per sqrt(s). It grows with the square root of time.
+    """Random walk of the bias, in the unit of the channel per sqrt(s): ``t`` seconds after the reset, its standard
+    deviation is ``bias_walk`` times the square root of ``t``.
     """
 
     resolution: float = 0.0

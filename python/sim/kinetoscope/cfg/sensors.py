@@ -234,8 +234,8 @@ class RayCasterCfg:
 class RayCasterCameraCfg:
     """Configuration of a ray-caster camera: a pinhole camera that casts one ray through the center of every pixel.
 
-    Unlike ``CameraCfg``, it measures only the geometry of the chosen targets, and every number comes from an exact ray.
-    To see a whole scene, a ``CameraCfg`` is faster.
+    Unlike ``CameraCfg``, it measures only the geometry of the chosen targets, and every value comes from an exact ray.
+    For images of a whole scene, a ``CameraCfg`` is faster.
     """
 
     _type: ClassVar[str] = "ray_caster_camera"

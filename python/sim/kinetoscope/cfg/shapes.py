@@ -124,7 +124,7 @@ class ObjectShape:
 @dataclass(kw_only=True, slots=True)
 class SurfaceCfg:
     """Surface properties besides color and texture, for rendering only. ``None`` keeps the value of the file or model,
-    or MuJoCo's default where these give none.
+    or else MuJoCo's default.
     """
 
     emission: float | None = None

@@ -1,15 +1,15 @@
 //! Levels of detail: coarser versions of a mesh, with proven bounds on their distance from it.
 //!
-//! Collapses make a coarser version: a vertex moves onto a neighbor, and two triangles vanish. Seen along the mean
+//! Edge collapses make a coarser version: a vertex moves onto a neighbor, and two triangles vanish. Seen along the mean
 //! normal, the triangles around the vertex and those that replace them fill the same polygon. This is checked, so every
 //! point has a partner straight above or below. The difference in height is linear over the pieces into which the edges
 //! of both cut each other. It is largest at a corner of a piece, and all corners are evaluated. A triangle keeps the
 //! sum of these largest differences over the chain of collapses that led to it.
 //!
 //! The mesh and its coarser version are thus joined by a continuous one-to-one map that moves no point by more than
-//! [`LodLevel::error`]. Every point of each surface has a point of the other within that distance, sheets stay sheets, and
-//! closed surfaces stay closed. Source of the idea: Cohen, Manocha and Olano, Simplifying polygonal models using
-//! successive mappings, Visualization 1997.
+//! [`LodLevel::error`]. Every point of each surface has a point of the other within that distance, open surfaces stay
+//! open, and closed surfaces stay closed. Source of the idea: Cohen, Manocha and Olano, Simplifying polygonal models
+//! using successive mappings, Visualization 1997.
 //!
 //! Vertices do not move: a coarser version has some of the mesh's vertices, with their normals. A new triangle's own
 //! normal is within about 40° of the normals of its corners, so that creases stay in place. Borders of open meshes and
@@ -48,7 +48,7 @@ const MAX_TRIANGLE_RATIO: f64 = 0.8;
 /// bits, from unchanged positions.
 const ROUNDING_RATIO: f64 = 1e-7;
 
-/// False for a mesh without levels: it is small, collapses would distort its texture, or its vertices move.
+/// False for a mesh without levels: it is small, has texture coordinates, or its vertices move.
 pub(super) fn may_have_levels(mesh: &RenderMesh) -> bool {
     mesh.triangles().len() >= MIN_TRIANGLES && mesh.uvs().is_none() && !mesh.is_deformable()
 }
