@@ -53,9 +53,9 @@ impl Default for ImuCfg {
 
 /// Pose, velocities and accelerations of a frame that is fixed to a body, in all environments.
 ///
-/// All values refer to one instant, [`Sampled::force_stamps`]: the physics engine solves the acceleration of the state
-/// before a step during that step. The acceleration is the engine's own, not a difference of velocities, so neither the
-/// period nor a reset affects it.
+/// All values refer to one instant, [`Sampled::force_stamps`]. A physics step computes the acceleration for the state
+/// at its beginning, so after a step this instant is the beginning of that step. The acceleration is the engine's own,
+/// not a difference of velocities, so neither the period nor a reset affects it.
 #[derive(Clone, Debug)]
 pub struct Imu {
     /// Name of the body.
@@ -203,7 +203,7 @@ impl Imu {
         self.sampler.values("lin_vel_b")
     }
 
-    /// Angular velocity \[rad/s\] in the axes of the IMU, shape \[num_envs, 3\].
+    /// Angular velocity of the IMU in the environment \[rad/s\], in the axes of the IMU, shape \[num_envs, 3\].
     pub fn ang_vel_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("ang_vel_b")
     }

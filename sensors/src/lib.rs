@@ -14,8 +14,8 @@
 //! | `sensor`, `slot` | the traits of all sensors; owner of a lazy or eager sensor |
 //! | `sampling`, `schedule`, `history`, `delay`, `noise` | the sampler and its parts |
 //!
-//! A new sensor is one new file and one line in the list of numeric sensors below; `actuator_state` is the shortest
-//! example. The parts of a sensor, for the joint state:
+//! A new numeric sensor needs one new file and one line of the macro call `numeric_sensors!` in `lib.rs`;
+//! `actuator_state` is the shortest example. A joint state sensor without a simulation:
 //!
 //! ```
 //! use kinetoscope_scene::SceneState;
@@ -36,9 +36,9 @@
 //! assert_eq!(sensor.positions(), array![[0.5]]);
 //! # Ok::<(), kinetoscope_sensors::SensorError>(())
 //! ```
-//!
-//! Unsafe code is forbidden, which rules out ndarray's `s![]` (it expands to an `allow`): slice with `index_axis`,
-//! `split_at` and `slice_axis`.
+
+// This attribute rules out ndarray's `s![]`, which expands to an `allow`: slice with `index_axis`, `split_at` and
+// `slice_axis`.
 #![forbid(unsafe_code)]
 
 mod body_state;
@@ -99,7 +99,7 @@ numeric_sensors! {
     "mujoco_sensor" => mujoco_sensor::{MujocoSensorCfg, MujocoSensor},
 }
 
-/// Receiver of the sensor types that [`visit_sensor_types`] lists.
+/// Callback of [`visit_sensor_types`], which receives the configuration type of each built-in sensor.
 pub trait SensorTypeVisitor {
     /// Receives one configuration type, with its name in scene files.
     fn visit<C>(&mut self, name: &'static str)

@@ -23,8 +23,8 @@ pub struct NoiseCfg {
     /// Standard deviation of the bias at the reset, in the unit of the channel. Every reset samples a new bias, which
     /// stays constant unless it has a random walk.
     pub bias_std: f64,
-    /// Random walk that is added to the bias: its standard deviation one second after the reset, in the unit of the
-    /// channel per sqrt(s). It grows with the square root of time.
+    /// Random walk of the bias, in the unit of the channel per sqrt(s): `t` seconds after the reset, its standard
+    /// deviation is `bias_walk` times the square root of `t`.
     pub bias_walk: f64,
     /// Quantization step: values are rounded to multiples of this, in the unit of the channel; 0 for no rounding.
     pub resolution: f64,
@@ -45,7 +45,8 @@ impl NoiseCfg {
     }
 }
 
-/// Checks `dropout` and all noise parameters; returns the channels with noise.
+/// Checks `dropout` and all noise parameters. Returns columns, range and noise of each channel in `noise`, zero noise
+/// included.
 pub(crate) fn check<'a>(
     dropout: f64,
     noise: impl IntoIterator<Item = (&'a str, &'a NoiseCfg)>,

@@ -153,8 +153,8 @@ impl SensorSlot {
     ///
     /// # Errors
     ///
-    /// The error of the sensor. A panic of the sensor reaches the first reader; after that, the sensor counts as
-    /// failed.
+    /// The error of the sensor. If a measurement panics, the panic propagates to the first reader; later reads return
+    /// [`SensorError::Panicked`].
     pub fn sensor(&self) -> Result<&dyn Sensor, &SensorError> {
         // A sensor that panicked is lost: its state is unknown.
         let panicked = || Err(&SensorError::Panicked);

@@ -98,8 +98,8 @@ pub struct CameraCfg {
     /// Latency in physics steps, from the capture of an image until it can be read. The image keeps the stamp of its
     /// capture. All sensors see a write to the state of an environment at once: outdated values are never read.
     pub latency_steps: u32,
-    /// Probability that an image is lost on its way, 0 to 1: the previous image stays, and the lost one is neither
-    /// counted nor in the history. The images of a reset or a write to the state are never lost.
+    /// Probability that a scheduled image is lost, 0 to 1: the previous image stays, and the lost image is neither
+    /// counted nor added to the history. The images of a reset or a write to the state are never lost.
     pub dropout: f64,
     /// Noise by channel name, for `color`, `depth` and `distance`, independent at every pixel. Noise of `depth` and
     /// `distance` is in \[m\]: depth stays from `near` to `far` (from -`far` to `far` if rays of the lens do not all go

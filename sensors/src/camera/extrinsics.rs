@@ -59,7 +59,7 @@ pub struct Extrinsics {
     pub convention: CameraConvention,
 }
 
-/// Pose of a camera.
+/// Pose of a camera in the frame of its parent, or of the environment for free cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Placement {

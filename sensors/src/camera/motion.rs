@@ -145,7 +145,7 @@ impl Motion {
         }
     }
 
-    /// Closes the shutter of a row.
+    /// Drops the poses at shutter opening of a row.
     pub(super) fn close_shutter(&mut self, row: usize) {
         if let Some(shutter) = &mut self.shutter {
             shutter.open_poses[row].parent = None;

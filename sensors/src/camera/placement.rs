@@ -37,8 +37,8 @@ pub trait PlaceRows {
 
 /// Pose and intrinsics of a camera sensor in each environment, settable at any time.
 ///
-/// After a change, a [`Camera`](crate::camera::Camera) or a [`StereoCamera`](crate::camera::StereoCamera) shows the
-/// captured instant from the new pose at the next read. A [`RayCasterCamera`](crate::ray::RayCasterCamera) uses the new
+/// After a change, a [`Camera`](crate::camera::Camera) or a [`StereoCamera`](crate::camera::StereoCamera) renders the
+/// captured state from the new pose at the next read. A [`RayCasterCamera`](crate::ray::RayCasterCamera) uses the new
 /// pose from the next image on. A stereo camera is placed by the [origin](super::StereoOrigin) of its rig. Values
 /// persist over a reset, until [`restore`](Self::restore).
 pub trait CameraPlacement: PlaceRows {

@@ -393,7 +393,7 @@ impl Reader<'_> {
         Ok((shape, numbers))
     }
 
-    /// Reads a matrix of the expected shape, row by row.
+    /// Reads a matrix of the expected shape, in row-major order.
     fn matrix(&self, field: &str, node: &Node, expected: [usize; 2]) -> Result<Vec<f64>, CalibrationError> {
         let (shape, numbers) = self.numbers(field, node)?;
         if shape != expected {

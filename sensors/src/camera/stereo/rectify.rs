@@ -17,26 +17,27 @@ const MAX_AXIS_ROTATION: f64 = 80.0 * std::f64::consts::PI / 180.0;
 /// R and P.
 ///
 /// Both cameras get common axes, with x from the left camera to the right one. A point (x, y, z) of the rectified left
-/// frame is at `(u, v) = (f x / z + cx, f y / z + cy)` in the rectified left image. In the rectified right image it is
-/// `f b / z` farther left in the same row, with the baseline b.
+/// frame is at `(u, v) = (f x / z + cx, f y / z + cy)` in the rectified left image. In the rectified right image, the
+/// point is `f b / z` farther left in the same row, with the baseline b.
 ///
 /// Source: Bouguet's algorithm, as in OpenCV's `stereoRectify`. Each camera rotates by half of the angle between both,
 /// then both rotate by the smallest angle that aligns the baseline with x. The choice of f and the principal points is
 /// free, and differs from OpenCV:
 ///
 /// - f is the smaller fy of both cameras, for both image axes.
-/// - (cx, cy) are common, so points at infinity have no disparity. They keep the content at the raw principal points in
-///   place, on the mean of both cameras.
+/// - Both cameras get the same (cx, cy), so points at infinity have no disparity. (cx, cy) is the mean, over both
+///   cameras, of the principal point that keeps the content at the raw principal point in place.
 ///
 /// Lenses have no influence: R applies after a raw image is undistorted. Cameras that are parallel and side by side
-/// with the same fx, fy and cy need no rotation. Each of them keeps its fx, fy, cx and cy.
+/// with the same fx, fy and cy need no rotation. Each of them keeps its fx, fy, cx and cy; a difference of cx changes
+/// the disparity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rectification {
     /// R of the left and the right camera: from its optical frame to its rectified frame.
     pub rotations: [Matrix3<f64>; 2],
     /// P of the left and the right camera \[pixels\]: from points of the rectified *left* frame to the rectified
-    /// images, with the center of the first pixel at (0.5, 0.5). In [`CameraInfo`](crate::camera::CameraInfo) it is at
-    /// (0, 0).
+    /// images, with the center of the first pixel at (0.5, 0.5). In [`CameraInfo`](crate::camera::CameraInfo), the
+    /// center is at (0, 0), so cx and cy are 0.5 less.
     pub projections: [Matrix3x4<f64>; 2],
 }
 

@@ -22,8 +22,8 @@ const BYTES_PER_RAY: usize = 40 + 40 + 24;
 
 /// Configuration of a [`RayCasterCamera`]: a pinhole camera that casts one ray through the center of every pixel.
 ///
-/// Unlike [`CameraCfg`](crate::camera::CameraCfg), it measures only the geometry of the chosen targets, and every
-/// number comes from an exact ray. To see a whole scene, a [`CameraCfg`](crate::camera::CameraCfg) is faster.
+/// Unlike [`CameraCfg`](crate::camera::CameraCfg), it measures only the geometry of the chosen targets, and every value
+/// comes from an exact ray. For images of a whole scene, a [`CameraCfg`](crate::camera::CameraCfg) is faster.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCameraCfg {

@@ -1,4 +1,4 @@
-//! Point clouds of ray-caster cameras, with the same code as for [`Camera`](crate::camera::Camera).
+//! Point clouds of ray-caster cameras, as for [`Camera`](crate::camera::Camera).
 
 use super::sensor::RayCasterCamera;
 use crate::camera::PointFrame;

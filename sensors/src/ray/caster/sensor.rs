@@ -16,7 +16,7 @@ use std::fmt;
 /// Distances along rays that move with a body, in all environments; [`Sampled`] gives their stamps and counts.
 ///
 /// All values are in the frame of the environment, lengths in \[m\]. A ray without a hit has the distance +inf, the
-/// point (+inf, +inf, +inf), the normal 0 and the id 0. No value is ever NaN.
+/// point (+inf, +inf, +inf), the normal 0 and the id 0. No value is NaN after the first measurement or reset.
 #[derive(Clone, Debug)]
 pub struct RayCaster {
     path: String,
