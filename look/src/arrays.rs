@@ -77,7 +77,7 @@ pub struct MaterialValues {
     pub emission: f32,
     /// Strength of highlights, 0..=1.
     pub specular: f32,
-    /// Sharpness of highlights, 0..=1.
+    /// Sharpness of highlights, 0..=1: the exponent is 128 times this.
     pub shininess: f32,
     /// Mirror reflectance, 0..=1.
     pub reflectance: f32,
@@ -116,11 +116,11 @@ pub struct LightValues {
     pub cutoff_deg: f32,
     /// Exponent of a spotlight's falloff from its axis: 0 gives uniform light in the cone.
     pub exponent: f32,
-    /// Ambient color.
+    /// Ambient color, RGB as in the model.
     pub ambient: [f32; 3],
-    /// Diffuse color.
+    /// Diffuse color, RGB as in the model.
     pub diffuse: [f32; 3],
-    /// Specular color.
+    /// Specular color, RGB as in the model.
     pub specular: [f32; 3],
     /// Radius of the bulb \[m\] (4.x, 0.02 by default); 0 on 2.2.2.
     pub radius: f32,
@@ -131,10 +131,10 @@ pub struct LightValues {
 pub struct HeadlightValues {
     /// True if the headlight is on; true for "auto" of 4.x.
     pub active: bool,
-    /// Ambient color.
+    /// Ambient color, RGB as in the model.
     pub ambient: [f32; 3],
-    /// Diffuse color.
+    /// Diffuse color, RGB as in the model.
     pub diffuse: [f32; 3],
-    /// Specular color.
+    /// Specular color, RGB as in the model.
     pub specular: [f32; 3],
 }

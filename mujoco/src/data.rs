@@ -196,7 +196,7 @@ impl Data {
     /// bias forces.
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     pub fn step1(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -207,7 +207,7 @@ impl Data {
     /// and velocities (`cvel`). All other quantities stay.
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     pub fn body_motion(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -222,7 +222,7 @@ impl Data {
     /// lights, tendons and, on 4.x, flexes, then the velocities of bodies (`cvel`). All other quantities stay.
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     pub fn poses_and_velocities(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -263,7 +263,7 @@ impl Data {
     /// [`step1`](Self::step1) first. A model with the integrator RK4 is integrated with Euler's method here.
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     pub fn step2(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -273,7 +273,7 @@ impl Data {
     /// Runs one whole step (`mj_step`).
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     pub fn step(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -283,7 +283,7 @@ impl Data {
     /// Computes all quantities at the current state, without integration (`mj_forward`).
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     pub fn forward(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -297,7 +297,7 @@ impl Data {
     /// memory for `nv` numbers.
     ///
     /// # Errors
-    /// MuJoCo stopped (out of memory): reset or drop this data.
+    /// MuJoCo reported an error (out of memory): reset or drop this data.
     ///
     /// # Panics
     /// `qvel` does not have `nv` numbers.
@@ -321,7 +321,7 @@ impl Data {
     /// with the shape (nv, nv).
     ///
     /// # Errors
-    /// MuJoCo stopped.
+    /// MuJoCo reported an error (`mju_error`).
     pub fn mass_matrix(&self) -> Result<Vec<f64>, EngineError> {
         let nv = self.model.nv();
         let mut dense = vec![0.0; nv * nv];

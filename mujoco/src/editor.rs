@@ -208,7 +208,7 @@ impl ModelEditor {
     /// (`mj_setConst`).
     ///
     /// # Errors
-    /// MuJoCo stopped.
+    /// MuJoCo reported an error (`mju_error`).
     pub fn set_constants(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.copy.0.as_ptr(), self.scratch.0.as_ptr());
         // SAFETY: the copy and its data are alive, and `self` is borrowed mutably; an engine function (guarded).

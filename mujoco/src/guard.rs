@@ -1,8 +1,8 @@
 //! Conversion of MuJoCo's errors to values: the error handler unwinds out of C to [`guarded`].
 //!
-//! Only calls without C++ landing pads in their C frames may be guarded: in the 4.x wheel, unwinding through such a
-//! frame crashes. These are the engine functions (step, forward, makeData, ...). The XML and VFS functions report
-//! through buffers and are never guarded.
+//! A guarded call must have no C++ landing pads in its C frames: in the 4.x wheel, unwinding through a frame with
+//! landing pads crashes. Guarded are the engine functions (step, forward, makeData, ...). The XML and VFS functions
+//! report through buffers and are never guarded.
 
 use super::error::EngineError;
 use mujoco_sys as mj;

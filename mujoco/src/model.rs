@@ -364,7 +364,7 @@ impl Model {
         self.header().nsite as usize
     }
 
-    /// Number of equalities.
+    /// Number of equality constraints, active or not.
     pub fn neq(&self) -> usize {
         self.header().neq as usize
     }

@@ -63,7 +63,7 @@ impl<'a> SkinArrays<'a> {
     }
 }
 
-/// A deformable body of points, triangles or tetrahedra (4.x).
+/// A deformable body (flex, 4.x) of line segments, triangles or tetrahedra.
 #[derive(Clone, Copy, Debug)]
 pub struct FlexArrays<'a> {
     /// Number of dimensions: 1 for cables, 2 for cloth, 3 for solids.

@@ -23,7 +23,7 @@ pub struct Weld {
 const EQ_DATA_WIDTH: usize = mj::mjNEQDATA as usize;
 
 impl Model {
-    /// True if equality `index` exists and is a weld.
+    /// True if equality constraint `index` exists and is a weld.
     pub fn is_weld(&self, index: usize) -> bool {
         self.eq_type().get(index).is_some_and(|&kind| kind as u32 == mj::mjEQ_WELD)
     }

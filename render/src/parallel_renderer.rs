@@ -27,10 +27,10 @@ pub type RenderJob<'a> = (RenderRequest<'a>, FrameMut<'a>);
 /// Renders batches of frames on several threads; keeps the scratch memory of each thread. Images are bit-identical for
 /// any number of threads.
 ///
-/// In a large batch, one thread renders each frame. All threads together render the frames of a small batch (fewer than
-/// two frames per thread) and the last frames of a medium one (fewer than eight per thread), so that no thread is idle:
-/// first their visibility is prepared, then their shadow maps in parts, then bands of the images. Path tracing renders
-/// one frame after the other, each by all threads.
+/// In a large batch, each frame is rendered by one thread. All threads together render each frame of a small batch
+/// (fewer than two frames per thread), and the last frames of a medium batch (fewer than eight per thread): first the
+/// visibility, then parts of the shadow maps, then bands of the images. Path tracing renders one frame after the other,
+/// each by all threads.
 #[derive(Debug)]
 pub struct ParallelRenderer {
     renderers: Vec<ImageRenderer>,
@@ -108,8 +108,10 @@ impl ParallelRenderer {
         }
     }
 
-    /// Sets depth of field and exposure time: with `None`, everything is sharp; with [`Shutter::default`], an image
-    /// shows one instant. Other values need path tracing.
+    /// Sets the aperture (depth of field) and the shutter (exposure time, rolling shutter); `None` and
+    /// [`Shutter::default`] turn them off. Other values need path tracing: rendering returns
+    /// [`RenderError::NeedsPathTracing`] without it. Motion also needs the poses at shutter opening: see
+    /// [`render_samples`](Self::render_samples).
     pub fn set_exposure_optics(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
         for image_renderer in &mut self.renderers {
             (image_renderer.aperture, image_renderer.shutter) = (aperture, shutter);

@@ -79,7 +79,7 @@ pub enum Renderer {
 }
 
 impl Renderer {
-    /// Parameters for viewing: 64 paths of up to 4 bounces, denoised.
+    /// Path tracing with 64 paths per pixel, up to 4 bounces, denoised.
     pub const RAY_TRACED: Self = Self::RayTraced { samples: 64, max_bounces: 4, denoise: true, seed: 0 };
     /// Largest number of paths per pixel.
     pub const MAX_SAMPLES: u32 = 1 << 16;

@@ -28,9 +28,9 @@ pub struct RasterCfg {
     /// Rays per color sample for ambient occlusion, in [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0
     /// disables it. Path tracing ignores this number; with the other renderers, a number above 0 is an error. With
     /// ambient occlusion, ambient light is the part of [`RenderScene::ambient`] that is not occluded, as in
-    /// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) without bounces. It is exact where flat surfaces
-    /// are unoccluded (with smooth normals, parts of the mesh below a facet occlude it). Elsewhere it has the noise of
-    /// so many rays, which depends on the point only.
+    /// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) without bounces. The result is exact on unoccluded
+    /// flat surfaces. (With smooth normals, the mesh below a facet may occlude it.) Elsewhere the result has the noise of
+    /// this number of rays, which depends only on the surface point.
     pub occlusion_rays: u16,
     /// Tone curve from light to color bytes.
     pub tone: ToneCurve,

@@ -65,7 +65,8 @@ pub(crate) struct RowClock {
 }
 
 impl RowClock {
-    /// Instant at a fraction of a row's exposure: 0 is its end, 1 its beginning.
+    /// Instant of `row` at the fraction `part` of its exposure, counted backward: 0 is the end of the exposure, 1 its
+    /// beginning.
     pub(crate) fn at(&self, row: usize, part: f64) -> f64 {
         let before = self.last_row.saturating_sub(row) as f64 * self.row + part * self.exposure;
         (1.0 - before).max(0.0)

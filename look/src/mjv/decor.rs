@@ -163,14 +163,14 @@ pub(super) fn strips(
     [positions, normals]
 }
 
-/// Parts of an arrow, about z.
+/// Triangle mesh of an arrow along z, with the semi-axes `radii` along x and y.
 struct Parts {
     mesh: TriMesh,
     radii: [f64; 2],
 }
 
 impl Parts {
-    /// A closed cylinder between two heights.
+    /// Adds a closed elliptic cylinder between two heights.
     fn shaft(&mut self, [low, high]: [f64; 2]) {
         let rings = [self.ring(1.0, low), self.ring(1.0, high)];
         for k in 0..SLICES as u32 {
@@ -183,7 +183,7 @@ impl Parts {
         self.disk(rings[1], high, false);
     }
 
-    /// A closed cone, from the height of its base to that of its tip.
+    /// Adds a closed cone, from the height of its base to that of its tip.
     fn head(&mut self, radius: f64, [base, tip]: [f64; 2]) {
         let (ring, is_up) = (self.ring(radius, base), tip > base);
         self.disk(ring, tip, !is_up);

@@ -6,8 +6,8 @@ use std::sync::Arc;
 /// Background of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Background {
-    /// True to draw the first skybox of the model, which has the color of the fog in fog; without it, the background is
-    /// black.
+    /// True to draw the first skybox of the model, or, with `fog`, a background in the color of the fog. False draws a
+    /// black background.
     pub skybox: bool,
     /// Haze at the end of infinite planes, ignored in fog; `None` for a sharp end.
     pub horizon: Option<HorizonHaze>,
@@ -35,7 +35,7 @@ pub struct MjvFrame {
 pub struct MjvObject {
     /// Object id; -1 for the background and for geoms without a segmentation id.
     pub id: i32,
-    /// Object type (`mjtObj`); -1 like the id.
+    /// Object type (`mjtObj`); -1 for the background and for geoms without a segmentation id.
     pub kind: i32,
     /// Segmentation id; -1 for the background and for geoms without one.
     pub segment: i32,

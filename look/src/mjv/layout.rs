@@ -26,7 +26,7 @@ pub enum LayoutError {
     },
 }
 
-/// Numbers of the types of skins and flexes in `mjvGeom`, which differ between versions of MuJoCo; `None` for types that a
+/// Values of `mjvGeom.type` for skins and flexes. They differ between versions of MuJoCo; `None` for a type that the
 /// version lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SoftTypes {
@@ -36,8 +36,8 @@ pub struct SoftTypes {
     pub flex: Option<i32>,
 }
 
-/// Numbers of the types of signed distance fields and of decoration in `mjvGeom`, which differ between versions of
-/// MuJoCo; `None` for types that a version lacks.
+/// Values of `mjvGeom.type` for signed distance fields and decoration. They differ between versions of MuJoCo; `None`
+/// for a type that the version lacks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecorTypes {
     /// Signed distance field, which is drawn as its mesh.

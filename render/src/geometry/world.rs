@@ -78,8 +78,9 @@ struct PlacedTarget {
     radius: f64,
 }
 
-/// Fixed targets placed at their poses: pose and bounding sphere of each, and a BVH over them. The geometry stays in
-/// [`RayTargets`]. One instance can serve all environments with the same [`RayTargets`] and the same fixed poses.
+/// Fixed targets placed at their poses: pose and bounding sphere of each, and a BVH over more than four bounded
+/// targets. The geometry stays in [`RayTargets`]. One instance can serve all environments with the same [`RayTargets`]
+/// and the same fixed poses.
 #[derive(Clone, Debug, Default)]
 pub struct FixedTargets {
     placed: Vec<PlacedTarget>,

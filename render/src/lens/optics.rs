@@ -72,8 +72,8 @@ impl Optics {
         Some([x * by, y * by, z * by])
     }
 
-    /// Same as [`unproject`](Self::unproject), but scaled to z = 1 if all rays go [forward](Lens::is_forward): near and
-    /// far are multiples of this vector.
+    /// Same as [`unproject`](Self::unproject), but with z = 1 instead of length 1 for [forward](Lens::is_forward)
+    /// lenses. The points at the limits are this vector times `near` and `far`.
     pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])

@@ -4,7 +4,8 @@ use kinetoscope_scene::MipLevel;
 use kinetoscope_scene::Texture;
 use kinetoscope_scene::vector::V3;
 
-/// Linear color at (u, v), v upward, for a footprint in texture coordinates.
+/// Linear color of a repeating texture at (u, v), v upward. `footprint` is the width of the pixel footprint as a
+/// fraction of the longer side of the texture.
 pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
     let first = &texture.mip_levels()[0];
     let level = level(texture, footprint * f64::from(first.width().max(first.height())));

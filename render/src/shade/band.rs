@@ -1,4 +1,4 @@
-//! A band of an image: from the draw list to the pixels of all channels.
+//! Rendering of a band of an image: from the draw list to the pixels of all channels.
 
 use super::group::{Colors, SamplePositions, resolve};
 use super::multisample::{EdgeSamples, blend};

@@ -113,7 +113,8 @@ impl MortonOrder {
     }
 }
 
-/// Appends the starts of the groups of sorted keys, the first of which is at `first`. Crowded keys are sorted again.
+/// Appends the start of each group of the sorted `keys`, plus `first`, to `starts`. More than [`MAX_GROUP`] keys that
+/// differ in the lowest [`CROWDED_BITS`] bits only are sorted along a finer curve first.
 fn find_groups<S: Simd>(s: S, items: &[BuildItem], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let place = |key: u64| (key >> 32) as u32;
     // The first cell cannot join a group before it.
