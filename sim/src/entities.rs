@@ -31,7 +31,7 @@ impl<'a> Entities<'a> {
         Self { sim }
     }
 
-    /// Handle of the robot `uid`, which is not a passive articulation.
+    /// Handle of the robot `uid`, which is not an articulation.
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
@@ -58,7 +58,7 @@ impl<'a> Entities<'a> {
         })
     }
 
-    /// Handle of the attached MJCF file `uid`.
+    /// Handle of the MJCF part `uid`, an attached MJCF file.
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
@@ -71,7 +71,7 @@ impl<'a> Entities<'a> {
         })
     }
 
-    /// Handle of the passive articulation `uid`.
+    /// Handle of the articulation `uid`.
     ///
     /// # Errors
     /// The uid is unknown; the error lists the known uids.
@@ -79,7 +79,7 @@ impl<'a> Entities<'a> {
         self.sim.find_robot(uid, "articulation", |robot| !robot.is_robot()).map(ArticulationId)
     }
 
-    /// Uids of all robots, then of all passive articulations, each in insertion order.
+    /// Uids of all robots, then of all articulations, each in insertion order.
     pub fn articulated_uids(&self) -> Vec<&'a str> {
         let of = |robots: bool| self.sim.entities.robots.iter().filter(move |data| data.is_robot() == robots);
         of(true).chain(of(false)).map(|data| data.uid()).collect()

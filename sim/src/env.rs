@@ -1,4 +1,4 @@
-//! An environment in working memory: an `mjData`, a row, and the recovery from failed steps.
+//! A loaded environment: its `mjData`, its stored state (row), and the recovery from failed steps.
 //!
 //! A step is `mj_step1 -> drives -> mj_step2`, and `mj_step1 -> drives -> mj_step` with RK4. The forward pass `mj_step1`
 //! runs when a step or a read needs it: a state without reads between two steps gets one pass. A step that

@@ -441,7 +441,7 @@ impl SimulationManager {
         }
     }
 
-    /// Steps and updates the sensors, without observers.
+    /// Does `steps` physics steps and updates the sensors; does not notify observers.
     fn advance(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {

@@ -73,8 +73,8 @@ impl<'a> SceneView<'a> {
         self.sim.sensors.markers(&self.sim.simulation, None)
     }
 
-    /// As [`markers`](Self::markers), without those of one sensor: the markers that a camera with visible markers
-    /// renders.
+    /// Same as [`markers`](Self::markers), without the markers of the sensor `id`: a camera with `draw_markers` renders
+    /// these markers.
     ///
     /// # Panics
     /// The handle belongs to another manager.
@@ -209,10 +209,10 @@ impl<'a> SceneViewMut<'a> {
         Ok(self.sim.env_scene(env).0.clone().unwrap_or_else(|| Arc::clone(visible.scene())))
     }
 
-    /// Contacts of environments at the current time, with the forces that the engine solves for it: one list for each
-    /// of `env_ids` (all environments for `None`). Bodies are indexed as in
-    /// [`body_names`](crate::Entities::body_names). A diverged environment has no contacts, nor has one for which the
-    /// solve fails. Measurements of sensors and later steps are not affected.
+    /// Contacts of environments at the current time, with the forces that MuJoCo solves for that time: one list for
+    /// each of `env_ids` (all environments for `None`). Bodies are indexed as in
+    /// [`body_names`](crate::Entities::body_names). The list is empty for a diverged environment, and if the solve
+    /// fails. Measurements of sensors and later steps are not affected.
     ///
     /// # Errors
     /// An environment does not exist.

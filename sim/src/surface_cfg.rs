@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Surface properties besides color and texture, for rendering only. `None` keeps the value of the file or model, or
-/// MuJoCo's default where these give none.
+/// else MuJoCo's default.
 ///
 /// ```
 /// use kinetoscope_sim::{RigidObjectCfg, SimulationManager, SimulationManagerCfg, SurfaceCfg};
@@ -72,7 +72,7 @@ impl SurfaceCfg {
         Ok(surfaces.into_iter().enumerate().filter_map(|(index, surface)| Some((index, surface?))).collect())
     }
 
-    /// Checks every number.
+    /// Checks that every number that is set is in its range.
     ///
     /// # Errors
     /// A field is out of range; the first one is reported.

@@ -1,6 +1,6 @@
-//! Gains that override the nominal ones in one environment, randomized or set as environment properties. They are not
-//! part of the state: a snapshot holds the values below the override, and an environment that restores a snapshot keeps
-//! its own overrides.
+//! Overrides of drive gains in one environment, by randomization or environment properties. Overrides are not part of
+//! the state: a snapshot holds the values below the override, and an environment that restores a snapshot keeps its own
+//! overrides.
 
 use super::DriveType;
 use super::gains::{DriveSetting, Gains};
@@ -128,8 +128,8 @@ impl DriveState {
         self.overrides.set_if_changed(drive, drawn);
     }
 
-    /// Sets the stiffness of a drive, in the unit of its type, as a user does. Removes the override, even if both
-    /// values are equal.
+    /// Sets the stiffness of a drive in this environment, in the unit of the drive type, and removes its override, even
+    /// if both values are equal.
     pub(crate) fn set_stiffness(&mut self, drive: usize, value: f64) {
         self.update_setting(drive, |setting| setting.stiffness = value);
         self.clear_override(drive, GainKind::Stiffness);

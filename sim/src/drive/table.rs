@@ -42,7 +42,8 @@ pub struct Drive {
     pub range: [f64; 2],
 }
 
-/// All drives of a model, and the joints with damping inside the drive solve; shared by all environments.
+/// All drives of a model, and the degrees of freedom with viscous damping that [`implicit`] applies instead of MuJoCo.
+/// Shared by all environments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DriveTable {
     /// The drives, in the order in which they were added.
@@ -52,7 +53,7 @@ pub struct DriveTable {
     /// Degrees of freedom with viscous damping moved from the model to [`implicit`], and the coefficient \[N m s/rad or
     /// N s/m\].
     pub damped: Vec<(usize, f64)>,
-    /// Armature of each of these without the share of the implicit damping \[kg m² or kg\].
+    /// Armature of each degree of freedom in `damped` without the share of the implicit damping \[kg m² or kg\].
     pub undamped_armature: Vec<f64>,
 }
 

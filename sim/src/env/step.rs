@@ -309,7 +309,7 @@ impl SimEnv {
         self.stage = Stage::Forward;
     }
 
-    /// Restores the state before the step, which the row has, with larger buffers and a forward pass done.
+    /// Restores the state before the step, which is stored in the row, with larger buffers and a forward pass done.
     fn grow_and_restore(&mut self, mut what: Overflow) -> Result<(), Divergence> {
         loop {
             self.grow_buffers(what, Inputs::Written)?;
@@ -327,8 +327,8 @@ impl SimEnv {
         }
     }
 
-    /// Replaces the data by data with twice the buffer size of `what`, in the state that the row has, and with the same
-    /// results. Data that is already larger than [`MAX_ENV_BYTES`] is an error.
+    /// Replaces the data by data with twice the buffer size of `what`, in the state that is stored in the row, and with
+    /// the same results. Data that is already larger than [`MAX_ENV_BYTES`] is an error.
     fn grow_buffers(&mut self, what: Overflow, kept: Inputs) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().enlarged(what);
         if self.data.bytes() > MAX_ENV_BYTES {
@@ -371,14 +371,14 @@ impl SimEnv {
         }
     }
 
-    /// Restores the state that the row has.
+    /// Restores the state that is stored in the row.
     fn restore_saved(&mut self) {
         let motion = std::mem::take(&mut self.row.motion);
         self.restore_motion(&motion);
         self.row.motion = motion;
     }
 
-    /// Marks the environment as diverged and restores the state before the step, which the row has.
+    /// Restores the state before the step, which is stored in the row, and marks the environment as diverged.
     fn undo_step(&mut self, reason: Divergence) {
         let motion = std::mem::take(&mut self.row.motion);
         self.mark_diverged(reason, &motion);

@@ -24,7 +24,7 @@ use std::sync::Arc;
 pub enum EntityCfg {
     /// A robot.
     Robot(Box<RobotCfg>),
-    /// A passive articulation.
+    /// An articulation, passive by default.
     Articulation(Box<ArticulationCfg>),
     /// A rigid object.
     RigidObject(Box<RigidObjectCfg>),

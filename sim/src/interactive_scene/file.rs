@@ -272,7 +272,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Path relative to the folder of the scene file; an absolute path stays.
+    /// Joins a relative path with the folder of the scene file; returns an absolute path unchanged.
     fn resolve(&self, path: &Path) -> PathBuf {
         self.file.parent().map_or_else(|| path.into(), |folder| folder.join(path))
     }

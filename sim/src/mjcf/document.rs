@@ -1,7 +1,7 @@
 //! MJCF document as plain data: one struct per element, bodies in a flat list with parent indices.
 //!
-//! It holds what both supported MuJoCo versions have in common; [`super::write`](mod@super::write) handles the
-//! differences.
+//! The document has the elements that both supported MuJoCo versions have in common; [`super::write`](mod@super::write)
+//! handles the differences.
 
 use super::part::PartDocument;
 use crate::light_cfg::LightKindCfg;

@@ -68,10 +68,10 @@ pub(crate) struct RobotMjcfCfg<'a> {
     pub dialect: MjcfDialect<'a>,
 }
 
-/// Names of the robot's elements in the document.
+/// Elements of the robot in the document: names, link frames and damped joints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct RobotLayout {
-    /// Body and frame of every link, fused links included.
+    /// Body and frame of every link, fused links included, in the order of the description.
     pub links: Vec<LinkFrame>,
     /// Name of the free joint of the root link; `None` for a fixed base.
     pub free_joint: Option<String>,

@@ -29,7 +29,7 @@ pub struct ArticulationCfg {
     /// `None`, its actuators drive nothing; its springs, friction and equalities apply.
     #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
     pub mjcf: Option<MjcfFile>,
-    /// True if the root link is fixed in the environment. A free root link can be placed in each environment.
+    /// True (default) if the root link is fixed in the environment. A free root link can be placed in each environment.
     pub fix_base: bool,
     /// Pose of the root link in the environment; for an MJCF file, pose of the file's world.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
@@ -38,8 +38,9 @@ pub struct ArticulationCfg {
     /// initial positions are clamped to the joint limits; a mimic joint starts at the position that its driver implies.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
-    /// Drives, such as the spring of a door closer (a stiffness, and a target at 0); `None` for passive joints.
-    /// Stiffness and damping that it does not set are those of [`DriveCfg::default`], which are made for robots.
+    /// Drives, such as the spring of a door closer (a stiffness, and a target at 0); `None` for passive joints. Unset
+    /// stiffness and damping are those of the actuators of an MJCF file, or else those of [`DriveCfg::default`], which
+    /// suit robots: set both for a light mechanism.
     pub drive: Option<DriveCfg>,
     /// Dry friction \[N m or N\]. If unset, that of `drive`, or else that of the file. Setting it gives no joint a
     /// drive.

@@ -30,7 +30,7 @@ pub struct IkResult {
     /// Angle between the frame and its target \[rad\], shape (N,); also given where only the position had to be
     /// reached.
     pub rotation_error: Array1<f64>,
-    /// Number of solver iterations of all starts and of the refinement together, shape (N,).
+    /// Total number of solver iterations of all starts, the refinement and the null-space posture, shape (N,).
     pub iterations: Array1<u32>,
     /// Index of the start that led to the result, shape (N,): 0 is the start from the initial positions, others are
     /// random.

@@ -83,7 +83,8 @@ pub struct RobotCfg {
     pub control_parts: Vec<(String, Vec<String>)>,
     /// Drive properties.
     pub drive: DriveCfg,
-    /// True if the root link is fixed in the environment.
+    /// True (default) if the root link is fixed in the environment, false for a free base. A free joint of an MJCF file
+    /// is left out or added accordingly.
     pub fix_base: bool,
     /// Pose of the root link in the environment; for an MJCF file, pose of the file's world, in which the root link is
     /// placed as in the file.

@@ -24,8 +24,8 @@ pub struct Properties {
     pub(super) tables: Arc<PropertyTables>,
     /// Values in the order of [`Property::ALL`].
     pub(super) values: [Vec<f64>; Property::ALL.len()],
-    /// Gains that were randomized or set here, by property and element. They count as randomized even if they have the
-    /// same value.
+    /// Gains that this copy has randomized or set, by property and element; empty in a new copy. They count as
+    /// randomized even if they have the same value.
     changed_gains: BTreeSet<(Property, usize)>,
     /// True if all gains except those in `changed_gains` become nominal and are no longer randomized.
     pub(super) nominal_gains: bool,
@@ -53,7 +53,7 @@ impl Properties {
         Self { tables: Arc::clone(tables), values, changed_gains: BTreeSet::new(), nominal_gains: false }
     }
 
-    /// True if a gain was randomized or set here.
+    /// True if this copy has randomized or set the gain of an element; earlier randomizations do not count.
     pub(super) fn is_changed(&self, gain: Property, element: usize) -> bool {
         self.changed_gains.contains(&(gain, element))
     }

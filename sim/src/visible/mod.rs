@@ -302,7 +302,8 @@ impl VisualScene {
         }
     }
 
-    /// Elements that the values of the mask channel identify, one entry for each value.
+    /// Elements of the mask channel, in ascending order of [`MaskId::id`], the value in the channel. Values may have
+    /// gaps; the background, 0, has no entry.
     pub fn mask_ids(&self) -> &Arc<[MaskId]> {
         &self.ids
     }

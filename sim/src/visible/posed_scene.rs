@@ -162,7 +162,8 @@ impl OffscreenScene {
         &self.visual_scene
     }
 
-    /// Elements that the values of the mask channel identify, one entry for each value.
+    /// Elements of the mask channel, in ascending order of [`MaskId::id`], the value in the channel. Values may have
+    /// gaps; the background, 0, has no entry.
     pub fn mask_ids(&self) -> &[MaskId] {
         self.visual_scene.mask_ids()
     }
@@ -219,7 +220,7 @@ impl OffscreenScene {
         PosedScene { scene: self.visual_scene.scene(), poses: &self.poses, origin: [0.0; 3], reach: f32::INFINITY }
     }
 
-    /// Render request for the scene from `view`.
+    /// Render request for the scene from `view`, without a lens and without a previous frame.
     pub fn render_request<'a>(&'a self, view: &'a View) -> RenderRequest<'a> {
         RenderRequest {
             scene: self.visual_scene.scene(),

@@ -4,7 +4,7 @@ use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeSet;
 
 /// Names of a file's elements, without the part's uid: one entry per element, in MuJoCo's order. Names are unique
-/// within each kind.
+/// within each kind. An element without a name gets the kind and its index (`geom3`).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartNames {
     /// The first body is the world.
@@ -23,7 +23,6 @@ pub struct PartNames {
     pub equalities: Vec<String>,
     pub tendons: Vec<String>,
     pub actuators: Vec<String>,
-    /// MuJoCo's own sensors.
     pub sensors: Vec<String>,
 }
 

@@ -34,7 +34,8 @@ pub(super) struct Root {
     pub(super) is_world: bool,
 }
 
-/// Finds the root, and rejects features that robots do not support.
+/// Finds the only root body, and rejects features that robots do not support. If hinges or slides attach the root to
+/// the world, `fix_base` must be set.
 pub(super) fn root(
     model: &Model,
     names: &PartNames,
