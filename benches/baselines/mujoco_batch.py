@@ -17,6 +17,11 @@ def load(job):
     if job["reads_poses_and_forces"]:
         # MuJoCo computes cfrc_ext in a step only if a sensor needs it.
         spec = mujoco.MjSpec.from_file(job["model"])
+        # Images of textures are not beside the file.
+        for material in spec.materials:
+            material.textures = [""] * len(material.textures)
+        for texture in list(spec.textures):
+            spec.delete(texture)
         spec.bodies[1].add_site(name="accelerometer")
         sensor = mujoco.mjtSensor.mjSENS_ACCELEROMETER
         spec.add_sensor(name="a", type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="accelerometer")

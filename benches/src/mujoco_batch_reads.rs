@@ -13,7 +13,7 @@ use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::ContactSensor;
-use kinetoscope::sim::DriveType;
+use kinetoscope::sim::{DriveType, EntityCfg, MjcfId};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -21,15 +21,15 @@ use std::time::{Duration, Instant};
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let Some(python) = baseline::python("mujoco.batch with poses and contact forces") else { return Ok(Vec::new()) };
     let mut rows = Vec::new();
-    for robot in robots()? {
-        let (sim, ..) = simulation(&robot, 1, 1)?;
-        let case = Case::of_simulation(robot.uid.clone(), &sim)?;
+    for (name, entity) in entities()? {
+        let (sim, ..) = simulation(&entity, 1, 1)?;
+        let case = Case::of_simulation(name, &sim)?;
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
             let name = format!("{}, {envs} envs, poses and forces", case.name);
             eprintln!("  {name}");
             let times = in_both_orders(|order| {
                 let (mut ours, mut theirs) = order.create(
-                    || Ours::new(&case, &robot, envs, threads),
+                    || Ours::new(&case, &entity, envs, threads),
                     || Baseline::start(&python, &case, (envs, threads), Reads::PosesAndForces),
                 )?;
                 let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: STEPS };
@@ -46,48 +46,53 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     Ok(rows)
 }
 
-/// Robots without drives: Debian's humanoid, if it is installed, and the bundled arm and hand.
-fn robots() -> BenchResult<Vec<RobotCfg>> {
-    let mut robots = Vec::new();
-    let drive = || DriveCfg { drive_type: DriveType::None, ..DriveCfg::default() };
+/// Debian's humanoid, if it is installed, and the bundled arm and hand without drives.
+fn entities() -> BenchResult<Vec<(&'static str, EntityCfg)>> {
+    let mut entities = Vec::new();
     if Path::new(HUMANOID).exists() {
-        robots.push(RobotCfg {
-            uid: "humanoid".into(),
-            mjcf: Some(MjcfFile::new(HUMANOID)),
-            fix_base: false,
-            drive: drive(),
-            ..RobotCfg::default()
-        });
+        entities.push(("humanoid", MjcfPartCfg::file("humanoid", HUMANOID).into()));
     }
-    let arm = arm_and_hand_cfg(&assets::path("sr5/SR5.urdf")?, "JOINT[1-6]")?;
-    robots.push(RobotCfg { uid: "SR5 + hand".into(), drive: drive(), ..arm });
-    Ok(robots)
+    let drive = DriveCfg { drive_type: DriveType::None, ..DriveCfg::default() };
+    let robot = RobotCfg { drive, ..arm_and_hand_cfg(&assets::path("sr5/SR5.urdf")?, "JOINT[1-6]")? };
+    entities.push(("SR5 + hand", robot.into()));
+    Ok(entities)
+}
+
+/// The measured entity of a simulation.
+#[derive(Clone, Copy, Debug)]
+enum Entity {
+    Robot(RobotId),
+    Part(MjcfId),
 }
 
 fn simulation(
-    robot: &RobotCfg,
+    entity: &EntityCfg,
     envs: usize,
     threads: usize,
-) -> BenchResult<(SimulationManager, RobotId, SensorId<ContactSensor>)> {
+) -> BenchResult<(SimulationManager, Entity, SensorId<ContactSensor>)> {
     let cfg = SimulationManagerCfg { num_envs: envs, threads: Some(threads), ..SimulationManagerCfg::default() };
     let mut sim = SimulationManager::new(cfg)?;
-    let robot = sim.add_robot(robot.clone())?;
+    let entity = match entity {
+        EntityCfg::Robot(robot) => Entity::Robot(sim.add_robot((**robot).clone())?),
+        EntityCfg::Mjcf(part) => Entity::Part(sim.add_mjcf((**part).clone())?),
+        other => return Err(format!("no measurement of {other:?}").into()),
+    };
     let contacts = sim.add_sensor("contacts", ContactSensorCfg::for_bodies(".*"))?;
-    Ok((sim, robot, contacts))
+    Ok((sim, entity, contacts))
 }
 
 /// Our side: a simulation whose robot and contact sensor are read as users read them.
 struct Ours<'c> {
     case: &'c Case,
     sim: SimulationManager,
-    robot: RobotId,
+    entity: Entity,
     contacts: SensorId<ContactSensor>,
 }
 
 impl<'c> Ours<'c> {
-    fn new(case: &'c Case, robot: &RobotCfg, envs: usize, threads: usize) -> BenchResult<Self> {
-        let (sim, robot, contacts) = simulation(robot, envs, threads)?;
-        Ok(Self { case, sim, robot, contacts })
+    fn new(case: &'c Case, entity: &EntityCfg, envs: usize, threads: usize) -> BenchResult<Self> {
+        let (sim, entity, contacts) = simulation(entity, envs, threads)?;
+        Ok(Self { case, sim, entity, contacts })
     }
 
     fn envs(&self) -> impl Iterator<Item = EnvId> + use<> {
@@ -111,8 +116,16 @@ impl Contender for Ours<'_> {
         let start = Instant::now();
         for _ in 0..steps {
             self.sim.update(1);
-            let robot = self.sim.robot(self.robot);
-            black_box((robot.qpos(), robot.qvel(), robot.link_poses()));
+            match self.entity {
+                Entity::Robot(id) => {
+                    let robot = self.sim.robot(id);
+                    black_box((robot.qpos(), robot.qvel(), robot.link_poses()));
+                }
+                Entity::Part(id) => {
+                    let part = self.sim.mjcf_part(id);
+                    black_box((part.qpos(), part.qvel(), part.body_poses()));
+                }
+            }
             black_box(self.sim.sensor(self.contacts)?.net_forces_w());
         }
         Ok(start.elapsed())

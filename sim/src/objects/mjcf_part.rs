@@ -12,7 +12,7 @@ use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco::{Model, mjcf_keywords};
 use kinetoscope_scene::pose::{from_row, to_row};
-use ndarray::{Array2, ArrayView2, AsArray, Ix2};
+use ndarray::{Array2, Array3, ArrayView2, AsArray, Ix2};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -166,6 +166,13 @@ impl<'a> MjcfPart<'a> {
     pub fn body_pose(&self, name: &str) -> Result<Array2<f64>> {
         let body = self.find("body", name, self.body_names())? + 1;
         Ok(self.poses(&BodyFrame::of_body(self.indices().bodies[body])))
+    }
+
+    /// Poses of all bodies, in the order of [`body_names`](Self::body_names): rows `[x, y, z, qw, qx, qy, qz]` in the
+    /// environment \[m\], shape (N, bodies, 7).
+    pub fn body_poses(&self) -> Array3<f64> {
+        let frames: Vec<BodyFrame> = self.indices().bodies[1..].iter().map(|&body| BodyFrame::of_body(body)).collect();
+        self.simulation.batch.body_rows_of(&frames, |bodies, frame| to_row(&frame.pose(bodies)))
     }
 
     /// Pose of a site in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).

@@ -76,6 +76,12 @@ fn mocap_bodies() {
     assert_eq!(sim.sensor(id).unwrap().source_pos_w()[(1, 0)], 0.6, "seen at once");
     sim.update(1000);
     assert_eq!(at(&sim, "target", 1), [0.6, 0.4, 0.5, 1.0], "it stays");
+    let read = sim.mjcf_part(part);
+    let all = read.body_poses();
+    assert_eq!(all.dim(), (2, read.body_names().len(), 7));
+    for (body, name) in read.body_names().iter().enumerate() {
+        assert_eq!(all.index_axis(Axis(1), body), read.body_pose(name).unwrap(), "{name}");
+    }
     // The ball started at (0.5, 0.3, 0.3), with the target at (1, 1, 1): (-0.5, -0.7, -0.7) relative to the target.
     // Welds are soft: they sag slightly, and the tendon of the ball's neighbors does not touch it.
     for (env, x, y) in [(1, 0.1, -0.3), (0, 0.5, 0.3)] {
