@@ -35,9 +35,19 @@ impl Model {
     /// # Panics
     /// There is no such body.
     pub fn is_fixed(&self, body: usize) -> bool {
-        // MuJoCo counts mocap bodies and their descendants as welded to the world.
+        // MuJoCo 2.2.2 counts mocap bodies and their descendants as welded to the world.
         let is_mocap = |body: usize| self.body_mocapid()[self.body_rootid()[body] as usize] >= 0;
         self.body_weldid()[body] == 0 && !is_mocap(body)
+    }
+
+    /// True if no force moves a body: it is fixed to the world, or it is a mocap body or welded to one.
+    ///
+    /// # Panics
+    /// There is no such body.
+    pub fn is_held(&self, body: usize) -> bool {
+        let moving = self.body_weldid()[body] as usize;
+        // In MuJoCo 4, a mocap body moves by itself.
+        moving == 0 || self.body_mocapid()[moving] >= 0
     }
 
     /// Number of height fields.

@@ -115,7 +115,7 @@ impl<'a> SceneView<'a> {
                 linear: linear.into(),
                 angular: angular.into(),
                 carried_mass: data.model().body_subtreemass()[frame.body],
-                is_fixed: data.model().body_weldid()[frame.body] == 0,
+                is_fixed: data.model().is_held(frame.body),
             }
         }))
     }

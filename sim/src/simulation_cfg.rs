@@ -110,7 +110,7 @@ impl SimulationManagerCfg {
     /// Rows follow each other along -x, columns along +y. The center of the grid is the origin.
     pub fn env_origins(&self) -> Array2<f64> {
         let n = self.num_envs;
-        let rows = n.div_ceil(n.isqrt().max(1));
+        let rows = n.div_ceil(n.isqrt().max(1)).max(1);
         let cols = n.div_ceil(rows);
         let space = self.arena_space;
         let mut origins = Array2::zeros((n, 3));
@@ -144,12 +144,12 @@ impl SimulationManagerCfg {
             return fail("num_envs", &self.num_envs, "one process can hold at most 1048576 environments");
         }
         let Shard { rank, world } = self.shard;
-        if rank >= world || world.checked_mul(self.num_envs).is_none() {
-            return fail(
-                "shard",
-                &format!("rank {rank} of {world}"),
-                "the rank must be 0 to the number of processes - 1",
-            );
+        let shard = format!("rank {rank} of {world}");
+        if rank >= world {
+            return fail("shard", &shard, "the rank must be 0 to the number of processes - 1");
+        }
+        if world.checked_mul(self.num_envs).is_none() {
+            return fail("shard", &shard, "the environments of all processes must be fewer than 2^64");
         }
         if !positive(self.physics_dt) || self.physics_dt > 1.0 {
             return fail("physics_dt", &self.physics_dt, "it must be above 0 and at most 1 second, such as 0.01");

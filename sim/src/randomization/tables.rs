@@ -200,7 +200,7 @@ fn standing<'m>(
 /// Adds the bodies that can move and have a mass.
 fn bodies<'m>(model: &'m Model, table: &mut PropertyTable, values: impl Fn(usize) -> &'m [f64]) {
     for body in 1..model.nbody() {
-        if model.body_weldid()[body] != 0
+        if !model.is_held(body)
             && model.body_mass()[body] > 0.0
             && let Some(name) = model.name(ObjectKind::Body, body)
         {

@@ -90,3 +90,28 @@ fn body_motion() {
     assert!((last.carried_mass - 0.634).abs() < 1e-13, "{last:?}: link6 in the file");
     assert!(sim.scene().body_motion(EnvId(2), 0).is_err() && sim.scene().body_motion(EnvId(0), names.len()).is_err());
 }
+
+/// No force moves a kinematic object or a mocap body. MuJoCo 4 does not count mocap bodies as welded to the world, as
+/// 2.2.2 does, which made them movable.
+#[test]
+fn mocap_bodies() {
+    let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+    let held = RigidObjectCfg { body_type: BodyType::Kinematic, ..cube("held", 0.2, 2.0, [0.0, 0.0, 1.0]) };
+    sim.add_rigid_object(held).unwrap();
+    sim.add_rigid_object(cube("free", 0.2, 2.0, [1.0, 0.0, 1.0])).unwrap();
+    let text = r#"<mujoco><worldbody>
+        <body name="hand" mocap="true" pos="0 2 0.5"><geom size="0.05"/>
+          <body name="finger" pos="0.1 0 0"><geom size="0.02"/></body></body>
+        <body name="swing" pos="0 3 1"><joint axis="0 1 0"/><geom size="0.05" mass="1"/></body>
+        <body name="post" pos="0 4 1"><geom size="0.05" mass="1"/></body>
+      </worldbody></mujoco>"#;
+    sim.add_mjcf(MjcfPartCfg::text("part", text)).unwrap();
+    let names = sim.entities().body_names();
+    let held: Vec<&str> = (0..names.len())
+        .filter(|&body| sim.scene().body_motion(EnvId(0), body).unwrap().is_fixed)
+        .map(|body| names[body].as_str())
+        .collect();
+    assert_eq!(held, ["held", "part/hand", "part/finger", "part/post"]);
+    // Their masses have no effect, so they are no property.
+    assert_eq!(sim.properties().of(EnvId(0)).unwrap().names(Property::Mass), ["free", "part/swing"]);
+}

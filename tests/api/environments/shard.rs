@@ -62,11 +62,15 @@ fn twice_four() {
 
 #[test]
 fn refused() {
-    for (rank, world) in [(2, 2), (0, 0), (usize::MAX - 1, usize::MAX)] {
+    const RANK: &str = "the rank must be 0 to";
+    for (rank, world, expected) in [(2, 2, RANK), (0, 0, RANK), (usize::MAX - 1, usize::MAX, "fewer than 2^64")] {
         let shard = Shard { rank, world };
-        let refused = SimulationManager::new(SimulationManagerCfg { shard, ..cfg(4, 1) });
-        assert!(matches!(refused, Err(Error::Config { field: "shard", .. })), "{refused:?}");
+        let refused = SimulationManager::new(SimulationManagerCfg { shard, ..cfg(4, 1) }).unwrap_err();
+        assert!(matches!(refused, Error::Config { field: "shard", .. }), "{refused:?}");
+        assert!(refused.to_string().contains(expected), "{refused}");
     }
+    // A configuration without environments is refused later; its list of origins is empty.
+    assert_eq!(SimulationManagerCfg { num_envs: 0, ..cfg(4, 1) }.env_origins().dim(), (0, 3));
 }
 
 #[test]
