@@ -242,7 +242,7 @@ macro_rules! channels {
                 Channels { $($field: self.$field.is_some(),)* }
             }
 
-            /// Copies a row of a frame with the same channels and `width` to the first row here.
+            /// Copies a row of a frame with the same channels and `width` to the first row of these buffers.
             pub(crate) fn take_row(&mut self, from: &Frame, row: usize, width: usize) {
                 $(if let (Some(to), Some(from)) = (self.$field.as_deref_mut(), from.$field.as_deref()) {
                     let each = width * $Name::COMPONENTS;
@@ -266,7 +266,8 @@ macro_rules! channels {
                 false $(|| (self.$field.is_some() && $Name::STAGE == stage))*
             }
 
-            /// Writes those pixels of a group that are inside the image; its first pixel is at (x, y).
+            /// Writes the pixels of a group that are inside the image, in the channels of `stage`. `at` is the column
+            /// and row of the first pixel of the group, `size` the width and height of the image.
             #[inline(always)]
             pub(crate) fn write(&mut self, stage: Stage, group: &PixelGroup, at: [usize; 2], size: [usize; 2]) {
                 $(if $Name::STAGE == stage && let Some(buffer) = &mut self.$field {

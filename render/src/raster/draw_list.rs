@@ -222,7 +222,7 @@ fn is_seen_from_below(projection: &Projection, camera: &LocalCamera) -> bool {
     if projection.parallel { pose.rotation[2][2] >= 0.0 } else { pose.translation[2] <= 0.0 }
 }
 
-/// True if a box is in front of the near plane.
+/// True if a whole box is deeper than twice the near limit.
 fn is_in_front(projection: &Projection, camera_from_instance: &PoseF32, lo: [f32; 3], hi: [f32; 3]) -> bool {
     let forward = camera_from_instance.rotation[2];
     let nearest = |k: usize| (forward[k] * lo[k]).min(forward[k] * hi[k]);

@@ -316,7 +316,8 @@ fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>,
     )
 }
 
-/// Linear color of a surface. `tint` multiplies the color of the surface, but not its highlights.
+/// Color of a surface, in the [`BlendSpace`] of the frame. `tint` multiplies the color of the surface, but not its
+/// highlights.
 #[inline(always)]
 pub(crate) fn shade<S: Simd>(
     s: S,

@@ -367,7 +367,7 @@ fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     }
 }
 
-/// Number of triangles of all meshes, at their level of detail.
+/// Number of triangles of all meshes; with levels of detail, of the rendered meshes at their levels.
 fn triangle_count(cfg: RasterCfg, render_request: &RenderRequest<'_>) -> usize {
     let RenderRequest { scene, poses, view, .. } = *render_request;
     if !cfg.lod {

@@ -111,7 +111,7 @@ impl Builder {
     }
 }
 
-/// Vector scaled to unit length; `None` for a zero or non-finite vector.
+/// Vector scaled to unit length; `None` for a vector that is not finite or not longer than 1e-20.
 pub(super) fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
     let v = v.map(f64::from);
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();

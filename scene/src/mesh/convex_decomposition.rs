@@ -156,7 +156,7 @@ struct SourceSurface {
 }
 
 impl SourceSurface {
-    /// True if a point is in the solid.
+    /// True if a point is in the solid; false for an open surface.
     fn contains(&self, p: V3) -> bool {
         self.all.as_ref().is_some_and(|all| winding_number(all, p) > 0.5)
     }

@@ -215,7 +215,7 @@ fn component(b: &[u8], component: u64, normalized: bool) -> f64 {
     if normalized { (value / largest).max(-1.0) } else { value }
 }
 
-/// Decodes standard base64 with or without padding; white space is skipped. `None` for other characters.
+/// Decodes standard base64 up to the padding, if any; white space is skipped. `None` for other characters.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut held) = (0u32, 0);

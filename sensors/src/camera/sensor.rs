@@ -240,7 +240,7 @@ impl Camera {
     }
 
     /// Time of the shown frames \[s\] since the last reset of the environment, shape (N): that of their capture, or of
-    /// a later write to the state.
+    /// a later write to the state; 0 before the first frame.
     pub fn stamps(&self) -> ArrayView1<'_, f64> {
         self.frames.stamps()
     }
