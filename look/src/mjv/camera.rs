@@ -9,9 +9,9 @@ pub struct MjvCamera {
     pub orthographic: bool,
     /// Position in the world \[m\].
     pub position: [f64; 3],
-    /// Viewing direction.
+    /// Viewing direction, in world axes; of any length but 0.
     pub forward: [f64; 3],
-    /// Upward direction of the image.
+    /// Upward direction of the image, in world axes; it may lean toward the viewing direction.
     pub up: [f64; 3],
     /// Horizontal center of the frustum in the near plane \[m\].
     pub center: f64,

@@ -558,7 +558,7 @@ impl<M: VisualModel> MjvReader<M> {
         self.shapes.get(kind, &size.map(f64::from), data).map_err(str::to_string)
     }
 
-    /// An image of one pixel.
+    /// An image of one pixel, of a color in display values 0 to 1; kept for later frames.
     fn one_color(&mut self, rgb: [f32; 3]) -> Option<Arc<Texture>> {
         if self.colors.len() > MAX_WRAPPED {
             self.colors.clear();

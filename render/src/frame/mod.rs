@@ -285,7 +285,7 @@ fn unknown_channel(name: &str, known: &[(&'static str, &[&'static str])]) -> Unk
     UnknownName { what: "channel", name: name.into(), candidates }
 }
 
-/// Splits off the first pixels of one channel.
+/// Splits off the first pixels of one channel; `None` without a buffer.
 fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Element]>, pixels: usize) -> Option<&'a mut [C::Element]> {
     let all = buffer.take()?;
     let (first, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));

@@ -121,7 +121,7 @@ impl LightSource {
     }
 
     /// Vector to a sampled point of the light's disc; `to` is the vector to its center, `normal` the unit normal of the
-    /// disc.
+    /// disc. Without a radius this is `to`.
     fn disc_point(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
         if self.radius == 0.0 {
             return Some(to);

@@ -284,7 +284,7 @@ fn bounds(
 }
 
 /// Bounds of a box around a point of the optical frame, through a lens, and its largest nearness: the whole image if
-/// the depth range allows it. Blocks are tested later.
+/// the depth range allows it, else `None`. Blocks are tested later.
 fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
     let everywhere = full_rect(projection);
     let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();

@@ -322,7 +322,8 @@ impl Mirrors<'_> {
         hit_lanes
     }
 
-    /// The next surface along a mirrored ray, without backs of transparent surfaces.
+    /// The next surface along a mirrored ray, without backs of transparent surfaces; `None` without one, and after
+    /// [`MAX_PASSES`] such backs.
     #[inline(always)]
     fn next<S: Simd>(
         &self,

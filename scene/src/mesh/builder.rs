@@ -61,7 +61,8 @@ impl Builder {
     /// Groups triangles by material (in order of first use), drops degenerate triangles, merges equal vertices.
     ///
     /// If only some corners have a normal, the others get the normal of their triangle. Missing texture coordinates
-    /// become 0 if other corners have some. If every triangle is degenerate, all are kept.
+    /// become 0 if other corners have some. If every triangle is degenerate, all are kept. No triangles at all is an
+    /// error.
     pub(super) fn finish(mut self, ctx: &ReadContext<'_>) -> Result<TriMesh, MeshError> {
         if self.corners.is_empty() {
             return Err(MeshError::Empty { path: ctx.path.to_owned() });

@@ -53,7 +53,7 @@ impl<'a> Gltf<'a> {
         number.map(Some).ok_or_else(|| self.ctx.invalid(at, format!("{key:?} is not a whole number")))
     }
 
-    /// Element that an index refers to.
+    /// Element of a top-level array of the document that an index refers to; an error if it is missing.
     pub(super) fn element_at(&self, array: &str, index: usize, at: &str) -> Result<&'a Value, MeshError> {
         let found = item(self.json, array, index);
         found.ok_or_else(|| self.ctx.index(format!("{at}, index into {array}"), index as i64, len(self.json, array)))

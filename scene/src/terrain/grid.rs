@@ -202,7 +202,7 @@ impl TerrainGrid {
         positive(NAME, "platform", self.platform)
     }
 
-    /// Width of the border in cells.
+    /// Width of the border in cells; an error unless it is a whole number.
     fn border_cells(&self) -> Result<usize, TerrainError> {
         finite(NAME, "border", self.border)?;
         if self.border == 0.0 {

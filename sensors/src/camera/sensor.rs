@@ -350,7 +350,7 @@ impl Camera {
         Ok(self.lens.view(&self.viewpoints.row(row).pixels, PoseF32::from(&pose)))
     }
 
-    /// The row of an environment.
+    /// The row of an environment; an error for an environment that the camera does not see.
     pub(super) fn row(&self, env: usize) -> Result<usize, SensorError> {
         self.viewpoints.envs.row(env)
     }
