@@ -408,7 +408,7 @@ impl<M: VisualModel> MjvReader<M> {
         Some(scene)
     }
 
-    /// Instance of a geom.
+    /// Instance of a geom; an error with the reason why it cannot be rendered.
     fn instance(&mut self, look: &GeomLook, mask_id: i32, memory: &MjvMemory<'_>) -> Result<Instance, String> {
         if !look.is_rigid {
             return Err("a pose is not a rotation and a position".into());

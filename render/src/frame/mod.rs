@@ -139,6 +139,10 @@ macro_rules! channels {
 
             /// Moves the images of `views`, a range of the `all` views, by `by` places toward higher indices. The first
             /// `by` images of the range keep their content; the last `by` are dropped.
+            ///
+            /// # Panics
+            ///
+            /// If the range exceeds `all`.
             pub fn shift_views(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -148,6 +152,10 @@ macro_rules! channels {
             }
 
             /// Fills the images of `views`, a range of the `all` views, with zeros.
+            ///
+            /// # Panics
+            ///
+            /// If the range exceeds `all`.
             pub fn clear_views(&mut self, all: usize, views: Range<usize>) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);

@@ -30,8 +30,8 @@ impl Optics {
     ///
     /// # Errors
     ///
-    /// [`OpticsError::Lens`] for an invalid number, [`OpticsError::LensFolds`] if the mapping folds back or has a pole
-    /// before the lens's `max_angle`.
+    /// [`OpticsError::Lens`] for an invalid number of either, [`OpticsError::LensFolds`] if the mapping folds back or
+    /// has a pole before the lens's `max_angle`.
     pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, OpticsError> {
         let pixels = Intrinsics::from(pixels).to_pixels(1, 1)?;
         Ok(Self { lens, pixels, domain: lens.domain()? })

@@ -223,7 +223,8 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok(())
     }
 
-    /// Transform of a child element of a node; `None` for an element that is not a transform.
+    /// Transform of a child element of a node; `None` for an element that is not a transform. `lookat` and `skew` are
+    /// errors.
     fn element_transform(&self, node: Node<'a, 'i>) -> Result<Option<Affine>, MeshError> {
         Ok(Some(match node.tag_name().name() {
             "matrix" => self.matrix(node)?,

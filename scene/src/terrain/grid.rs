@@ -168,7 +168,8 @@ impl TerrainGrid {
         &found.unwrap_or_else(|| &self.tiles[self.tiles.len() - 1]).tile
     }
 
-    /// Difficulty of a row, from 0 to 1.
+    /// Difficulty of a row: linear from the first to the second number of `difficulty` over the rows; the first for one
+    /// row.
     pub fn row_difficulty(&self, row: usize) -> f64 {
         let [first, last] = self.difficulty;
         if self.rows < 2 { first } else { first + (last - first) * row as f64 / (self.rows - 1) as f64 }
