@@ -136,8 +136,8 @@ pub struct SensorContext {
     pub bodies: Arc<[String]>,
     /// For every body, the index of the body that moves it. For a robot, this is the nearest link, the link itself or
     /// one above it, that no fixed joint attaches to its parent. For a body or site of an MJCF file, it is the body
-    /// that MuJoCo welds it to; a body or site welded to the world has its own index. An object has its own index. As
-    /// long as `bodies`, or empty if unknown.
+    /// that MuJoCo welds it to; a body or site welded to the world has its own index. An object has its own index. The
+    /// list is as long as that of `bodies`, or empty if unknown.
     pub moving_bodies: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`], `uid/joint`: the movable joints of robots
     /// and articulations, and the hinge and slide joints of MJCF files.

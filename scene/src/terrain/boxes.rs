@@ -16,7 +16,7 @@ pub struct Boxes {
     pub size: [f64; 2],
     /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Side of a box \[m\], with the wall to the next one; rounded to whole cells, at least 2.
+    /// Side of a box \[m\], with the wall to the next one; rounded to whole cells, of which fewer than 2 are an error.
     pub side: f64,
     /// Lowest and highest height \[m\], uniformly distributed.
     pub range: [f64; 2],

@@ -14,7 +14,7 @@ pub struct Gap {
     pub size: [f64; 2],
     /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Width of the trench \[m\], rounded to whole cells, at least 2.
+    /// Width of the trench \[m\], rounded to whole cells, of which fewer than 2 are an error.
     pub width: f64,
     /// Depth of the trench \[m\].
     pub depth: f64,

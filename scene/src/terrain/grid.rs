@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 /// A grid of terrain tiles: a type for each column, a difficulty for each row, for curricula of walking robots.
 ///
-/// Rows are along x and columns along y, both from the negative ends. Row 0 is the easiest one. All tiles meet at height
-/// 0: the points between two tiles, and those of a flat border around the grid, have this height.
+/// Rows are along x and columns along y, both from the negative ends. Row 0 has the first difficulty, by default the
+/// easiest. All tiles meet at height 0: the points between two tiles, and those of a flat border around the grid, have
+/// this height.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TerrainGrid {

@@ -16,9 +16,9 @@ pub struct SteppingStones {
     pub size: [f64; 2],
     /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Side of a stone \[m\], rounded to whole cells, at least 1.
+    /// Side of a stone \[m\], rounded to whole cells; 0 cells are an error.
     pub stone: f64,
-    /// Gap between two stones \[m\], rounded to whole cells, at least 2.
+    /// Gap between two stones \[m\], rounded to whole cells, of which fewer than 2 are an error.
     pub distance: f64,
     /// Depth of the ground between the stones \[m\].
     pub depth: f64,
