@@ -62,7 +62,7 @@ impl MjvCamera {
     /// Pose of the optical frame: x to the right of the image, y down, z forward.
     ///
     /// # Errors
-    /// The viewing direction is 0 or parallel to the upward direction.
+    /// The viewing or the upward direction is 0, or they are parallel.
     pub fn world_from_camera(&self) -> Result<PoseF32, MjvCameraError> {
         let [z, up] = [self.forward, self.up].map(nalgebra::Vector3::from);
         let z = z.try_normalize(1e-12).ok_or_else(|| self.error())?;

@@ -359,7 +359,8 @@ fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> 
     Ok(())
 }
 
-/// Texels along the side of a shadow map: about three texels for two pixels of a square image of the same area.
+/// Texels along the side of a shadow map: as configured, or, for 0, about three texels for two pixels of a square image
+/// of the same area.
 fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     match cfg.shadow_size {
         0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),

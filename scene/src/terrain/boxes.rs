@@ -37,8 +37,9 @@ impl Boxes {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, the
-    /// range is not in order, boxes are smaller than two cells, or the platform is larger than the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, the range is not in order, boxes are smaller than two cells, or the platform is larger than the
+    /// field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "boxes";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

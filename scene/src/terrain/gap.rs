@@ -33,8 +33,9 @@ impl Gap {
     /// Heights \[m\], 0 outside the trench; rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, the
-    /// trench is narrower than two cells, or the platform and the trench do not fit into the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, the trench is narrower than two cells, or the platform and the trench do not fit into the
+    /// field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "gap";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

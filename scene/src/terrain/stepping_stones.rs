@@ -50,8 +50,9 @@ impl SteppingStones {
     /// Heights \[m\], rows along y, columns along x. The first stone begins at the negative ends.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, the
-    /// range is not in order, stones or gaps have too few cells, or the platform is larger than the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, the range is not in order, stones or gaps have too few cells, or the platform is larger than
+    /// the field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "stepping stones";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;
