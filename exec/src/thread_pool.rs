@@ -110,7 +110,8 @@ impl fmt::Debug for ThreadPool {
     }
 }
 
-/// Takes the next item. A panic of the iterator surfaces on this thread; the other threads get the remaining items.
+/// Takes the next item; `None` after the last. A panic of the iterator surfaces on this thread; the other threads get
+/// the remaining items.
 fn next_item<I: Iterator>(items: &Mutex<I>) -> Option<I::Item> {
     items.lock().unwrap_or_else(PoisonError::into_inner).next()
 }

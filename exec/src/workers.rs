@@ -101,7 +101,7 @@ impl Workers {
         true
     }
 
-    /// Starts threads until `wanted` threads exist.
+    /// Starts threads until `wanted` threads exist. After an error of the system, those started before it stay.
     pub(crate) fn start(&self, wanted: usize) -> std::io::Result<()> {
         let mut threads = lock(&self.threads);
         while threads.len() < wanted {

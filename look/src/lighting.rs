@@ -7,8 +7,8 @@ use kinetoscope_scene::{Headlight, HorizonHaze, Light, LightKind, LightingSpace,
 /// renderer.
 const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
 
-/// Converts a light, without its pose. An image light becomes inactive. Colors of [`LightingSpace::Linear`] are
-/// converted to linear light.
+/// Converts a light, without its pose. An image light becomes inactive, and a spot with a half angle above 90° a point
+/// light. Colors of [`LightingSpace::Linear`] are converted to linear light.
 pub fn scene_light(light: &LightValues, space: LightingSpace) -> Light {
     let color = |color: [f32; 3]| if space == LightingSpace::Display { color } else { linear_light(color) };
     let spot = LightKind::Spot { cutoff_deg: light.cutoff_deg.min(90.0), exponent: light.exponent };
@@ -51,9 +51,9 @@ pub fn horizon_haze(color: [f32; 3], width: f32, far: f64) -> HorizonHaze {
     HorizonHaze { color, radius: (SKYBOX_RADIUS * far) as f32, width }
 }
 
-/// Converts a light color to linear color space. MuJoCo multiplies colors in display space, the renderer here
-/// multiplies them in linear space. For one light the results agree up to the small linear part of sRGB: (c l)^2.2 =
-/// c^2.2 l^2.2.
+/// Converts a light color to linear color space. MuJoCo multiplies colors in display space; with
+/// [`LightingSpace::Linear`], colors are multiplied in linear space. For one light the results agree up to the small
+/// linear part of sRGB: (c l)^2.2 = c^2.2 l^2.2.
 pub fn linear_light(color: [f32; 3]) -> [f32; 3] {
     color.map(decode_srgb)
 }

@@ -47,6 +47,9 @@ impl ModelMaterials {
 
     /// Render material of a geom of MuJoCo's type number `kind`: its color, and the properties of its MuJoCo material,
     /// if any. Only planes and boxes reflect.
+    ///
+    /// # Panics
+    /// `rgba` has fewer than four numbers.
     pub fn of_geom(&self, kind: i32, rgba: &[f32], material: i32) -> Material {
         let reflectance = match self.get(material) {
             // MuJoCo reflects the scene in planes and in the upper face of boxes only.
@@ -59,7 +62,11 @@ impl ModelMaterials {
         Material { reflectance, ..material }
     }
 
-    /// Render material of an element other than a geom: its color, and the properties of its MuJoCo material, if any.
+    /// Render material of an element other than a geom: its color, and the properties of its MuJoCo material, if any,
+    /// without reflectance.
+    ///
+    /// # Panics
+    /// `rgba` has fewer than four numbers.
     pub fn of_element(&self, rgba: &[f32], material: i32) -> Material {
         let rgba = self.color(rgba, material);
         match self.get(material) {

@@ -78,8 +78,8 @@ impl Axis {
         Self { log: false, low, high, pixel_range: self.pixel_range }.linear_ticks()
     }
 
-    /// Distance between two ticks, in the unit of the range: 1, 2 or 5 times a power of ten, and at least the distance of
-    /// `TICK_SPACING` pixels.
+    /// Distance between two ticks, in the unit of the range: 1, 2 or 5 times a power of ten, and at least the distance
+    /// of `TICK_SPACING` pixels or half the range, if that is shorter.
     fn tick_step(&self) -> f64 {
         let wanted = ((self.pixel_range[1] - self.pixel_range[0]).abs() / TICK_SPACING).clamp(2.0, 20.0);
         let raw = (self.high - self.low) / wanted;

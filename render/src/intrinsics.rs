@@ -53,7 +53,7 @@ pub enum Intrinsics {
     },
 }
 
-/// Pinhole intrinsics \[pixels\].
+/// Pinhole intrinsics \[pixels\]; the center of pixel (u, v) is (u + 0.5, v + 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelIntrinsics {
     /// Focal length along x.

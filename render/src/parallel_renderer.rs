@@ -278,8 +278,8 @@ fn render_jointly(
     });
 }
 
-/// Splits a frame into about `parts` bands: first row of blocks, number of rows of blocks, and the buffers of the band.
-/// Empty if the frame cannot be rendered.
+/// Splits a frame into about `parts` bands, or more if [`PreparedFrame::band_rows`] limits their height: first row of
+/// blocks, number of rows of blocks, and the buffers of the band. Empty if the frame cannot be rendered.
 fn bands<'a>(
     plan: &PreparedFrame,
     render_request: &RenderRequest<'_>,

@@ -31,7 +31,8 @@ struct PathTraceJob<'a> {
     noise: u32,
 }
 
-/// Renders a frame with the threads of several rasterizers. The bits do not depend on the number of threads.
+/// Renders a frame with the threads of several rasterizers. The bits do not depend on the number of threads. Fails if
+/// canceled.
 pub(super) fn path_trace(
     pool: &ThreadPool,
     rasterizers: &mut [ImageRenderer],
@@ -59,7 +60,8 @@ pub(super) fn path_trace(
     result
 }
 
-/// Traces the paths of a prepared frame; writes nothing into the frame.
+/// Traces the paths of a prepared frame, unless it has no color channel; writes nothing into the frame. Fails if
+/// canceled.
 fn trace_colors(
     pool: &ThreadPool,
     rasterizers: &mut [ImageRenderer],

@@ -34,7 +34,7 @@ struct Counters {
 }
 
 impl RenderProgress {
-    /// Number of paths of the batch that are traced.
+    /// Number of paths of the batch that are traced so far.
     pub fn samples(&self) -> u64 {
         self.0.samples.load(Ordering::Relaxed)
     }

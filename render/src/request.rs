@@ -59,7 +59,8 @@ pub struct RasterCfg {
 }
 
 impl Default for RasterCfg {
-    /// Four samples and shadows; geom groups 0, 1 and 2, as in MuJoCo's own viewers: collision shapes are in group 3.
+    /// Four samples, shadows, reflections, levels of detail and the soft tone curve; geom groups 0, 1 and 2, as in
+    /// MuJoCo's own viewers: collision shapes are in group 3.
     fn default() -> Self {
         Self {
             samples: 4,

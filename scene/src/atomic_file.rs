@@ -78,7 +78,8 @@ impl AtomicFile {
         self.keep = true;
     }
 
-    /// True after [`keep`](Self::keep), [`persist`](Self::persist) or [`persist_noclobber`](Self::persist_noclobber).
+    /// True after [`keep`](Self::keep), and after [`persist`](Self::persist) or
+    /// [`persist_noclobber`](Self::persist_noclobber) without an error.
     pub fn is_kept(&self) -> bool {
         self.keep
     }

@@ -53,10 +53,10 @@ const DRAWN_GROUPS: std::ops::Range<u8> = 0..3;
 impl CameraFit {
     /// Returns the nearest placement with the whole scene in the image.
     ///
-    /// Returns `None` if nothing of a finite size is drawn, or if the viewing direction is vertical. The smallest
-    /// distance follows from four supporting planes of the instances, so it is exact. Planes and geom groups above 2
-    /// are ignored, and so are static instances that are much larger than robots and objects, such as terrain and walls
-    /// of a room.
+    /// Returns `None` if nothing of a finite size is drawn, or if the viewing direction is vertical, zero or not
+    /// finite. The smallest distance follows from four supporting planes of the instances, so it is exact. Planes and
+    /// geom groups above 2 are ignored, and so are static instances that are much larger than robots and objects, such
+    /// as terrain and walls of a room.
     pub fn fit(&self, placed: &[PosedScene<'_>]) -> Option<FittedView> {
         let forward = unit(self.forward)?;
         let right = unit([forward[1], -forward[0], 0.0])?;
@@ -88,9 +88,9 @@ impl CameraFit {
 /// A drawn instance: the instance, its pose and its offset.
 type DrawnInstance<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
 
-/// Instances that must fit in the image: visible ones of geom groups 0 to 2. Planes and movable instances beyond
-/// `reach` are left out. If there are bodies, static instances with a bounding box more than twice as large as that of
-/// the bodies are left out, too.
+/// Instances that must fit in the image: visible ones of geom groups 0 to 2 with an opacity above 0. Planes are left
+/// out, and movable instances with a coordinate of `reach` or more. If there are bodies, static instances with a
+/// bounding box more than twice as large as that of the bodies are left out, too.
 fn drawn_instances<'a>(placed: &[PosedScene<'a>]) -> Vec<DrawnInstance<'a>> {
     let each = |placed: &PosedScene<'a>| {
         let PosedScene { scene, poses, origin, reach } = *placed;
@@ -113,13 +113,14 @@ fn is_drawn(instance: &Instance) -> bool {
     seen && !matches!(instance.shape, Shape::Plane(_))
 }
 
-/// True if an instance has a finite pose, and is fixed or within `reach` of the origin.
+/// True if an instance has a finite pose, and is fixed or has coordinates below `reach` in magnitude.
 fn is_within_reach(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
     let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < reach);
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
 }
 
-/// Largest coordinate of the instances along a direction, times the length of the direction \[m\].
+/// Largest coordinate of the instances along a direction, times the length of the direction \[m\]; -inf without
+/// instances.
 fn support(framed: &[DrawnInstance<'_>], direction: [f64; 3]) -> f64 {
     let of = |(instance, pose, origin): &DrawnInstance<'_>| {
         let rotation = pose.rotation.map(|row| row.map(f64::from));

@@ -16,8 +16,8 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// Rotation of a quaternion `[w, x, y, z]`. A unit quaternion keeps its bits, so that a written value is read back
-/// exactly.
+/// Rotation of a quaternion `[w, x, y, z]`, which is normalized; an error if it is zero or not finite. A unit
+/// quaternion keeps its bits, so that a written value is read back exactly.
 fn quaternion<E: Error>([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, E> {
     let quaternion = nalgebra::Quaternion::new(w, x, y, z);
     let length = quaternion.norm();

@@ -40,7 +40,8 @@ pub struct Light {
     /// Unused for directional lights.
     pub attenuation: [f32; 3],
     /// Radius of the light's disc, for soft shadows in path-traced images \[m\]. For a directional light, the radius at
-    /// a distance of 1 m (the tangent of its angular radius). With 0, and in all other renderers, shadows are sharp.
+    /// a distance of 1 m (the tangent of its angular radius). With 0, shadows are sharp. All other renderers ignore the
+    /// radius.
     pub radius: f32,
     /// True if instances in the light cast shadows.
     pub cast_shadow: bool,
@@ -143,9 +144,9 @@ impl OpenGlRules {
 /// Ambient light that depends on the orientation of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hemisphere {
-    /// Color on surfaces that face up (+z).
+    /// Color on surfaces that face up (+z), RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub sky: [f32; 3],
-    /// Color on surfaces that face down.
+    /// Color on surfaces that face down (-z), RGB; linear, or sRGB with [`LightingSpace::Display`].
     pub ground: [f32; 3],
 }
 

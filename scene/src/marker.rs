@@ -104,7 +104,7 @@ impl Marker {
     }
 }
 
-/// A shaft along z with a cone at its end, with 12 sides.
+/// Mesh of an arrow from the origin along z, with 12 sides: a shaft, and a cone over the last quarter of `length`.
 fn arrow(length: f32, radius: f32) -> shape::Shape {
     let (r, head) = (f64::from(radius), f64::from(length) * 0.25);
     let (neck, tip) = (f64::from(length) - head, f64::from(length));

@@ -14,7 +14,7 @@ pub struct Material {
     /// Repetitions of a 2D texture over the shape, or over 2 m with `tex_uniform` and on infinite planes, as in
     /// MuJoCo's renderer. Unused for meshes with texture coordinates; 0 and negative numbers act as 1.
     pub tex_repeat: [f32; 2],
-    /// True if `tex_repeat` is per 2 m instead of per shape.
+    /// True if `tex_repeat` counts images per 2 m, as in MuJoCo's renderer; false if it counts images per shape.
     pub tex_uniform: bool,
     /// Emitted light, as a multiple of the color.
     pub emission: f32,
@@ -273,7 +273,7 @@ impl MipLevel {
         Self::new(width, faces * height, &(0..faces * width * height).map(pixel).collect::<Vec<_>>())
     }
 
-    /// Level of half the size; each pixel is the mean of four in linear light.
+    /// Level of half the size; each pixel is the mean of four in linear light. An odd last row or column is left out.
     fn half_size(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let table = srgb_to_linear();

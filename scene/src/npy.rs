@@ -108,8 +108,8 @@ pub fn header(element: ElementType, shape: &[usize]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Parses a file with such a header: type descriptor, shape, and all bytes after the header, the values in C order,
-/// whose number is not checked. `None` for other files, such as those in Fortran order.
+/// Parses a `.npy` file of version 1.0 in C order: type descriptor, shape, and all bytes after the header. The number
+/// of these bytes is not checked. `None` for other files, such as those in Fortran order.
 pub fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (length, rest) = rest.split_first_chunk::<2>()?;

@@ -75,7 +75,7 @@ macro_rules! quantities {
             ///
             /// It is one MuJoCo step (`physics_dt / substeps`) earlier than [`time`](Self::time). Right after a reset
             /// or a write to the state, both are equal, because accelerations and contacts are then solved for the
-            /// current state.
+            /// current state. Efforts of drives stay those of the last step, 0 after a reset.
             pub force_time: Vec<f64>,
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
             /// Render scenes of environments with their own sizes or colors, shape \[num_envs\]; empty if all

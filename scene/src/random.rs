@@ -33,7 +33,7 @@ impl KeyedRng {
         StandardUniform.sample(&mut self.0)
     }
 
-    /// Uniform number from `low` to `high`.
+    /// Uniform number from `low` (included) to `high` (excluded, except by rounding).
     pub fn uniform_range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }

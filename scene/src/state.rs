@@ -47,8 +47,8 @@ quantities! {
 
     /// Flag of [`SceneState::contacts`].
     CONTACTS = "contacts" {
-        /// Contacts with solved forces at [`force_time`](Self::force_time). Contacts within the margin only, without
-        /// constraints, are left out.
+        /// Contacts with solved forces at [`force_time`](Self::force_time). A contact without a constraint (the
+        /// surfaces are within MuJoCo's `margin`, but in its `gap`) is left out.
         contacts: Contacts,
     }
 
@@ -56,10 +56,10 @@ quantities! {
     JOINT_EFFORTS = "joint_efforts" {
         /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\].
         ///
-        /// For joints without a drive, of robots and MJCF files, MuJoCo's `qfrc_actuator`: the sum of the actuators'
-        /// efforts on the joint, with gravity compensation by actuators (`actuatorgravcomp`), clamped to the joint's
-        /// `actuatorfrcrange` (MuJoCo 2.2.2 has neither of these two). After a reset, it is computed for the current
-        /// state.
+        /// For joints without a drive, of robots, articulations and MJCF files, MuJoCo's `qfrc_actuator`: the sum of
+        /// the actuators' efforts on the joint, with gravity compensation by actuators (`actuatorgravcomp`), clamped to
+        /// the joint's `actuatorfrcrange` (MuJoCo 2.2.2 has neither of these two). After a reset, it is computed for
+        /// the current state.
         joint_efforts: Array2<f64> [joints],
     }
 
@@ -116,7 +116,7 @@ quantities! {
         actuator_activations: Array2<f64> [actuators],
     }
 
-    /// Flag of [`SceneState::markers`], the markers of all other sensors.
+    /// Flag of [`SceneState::markers`]: the markers of all sensors except the one that requires them.
     MARKERS = "markers" {
         /// Markers that visualize sensor measurements, shape \[num_envs\], for cameras that draw them.
         markers: Vec<Vec<Marker>>,
@@ -133,7 +133,7 @@ pub struct StateDims {
     pub bodies: usize,
     /// Number of joints with one degree of freedom: those of robots and articulations, then those of MJCF files.
     pub joints: usize,
-    /// Number of actuators: the drives of robots, then the actuators of MJCF files.
+    /// Number of actuators: the drives of robots and articulations, then the actuators of MJCF files.
     pub actuators: usize,
     /// Number of values of the physics engine's own sensors.
     pub engine_values: usize,

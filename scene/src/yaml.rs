@@ -206,7 +206,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Counts a value of `bytes` bytes, and returns the size before it.
+    /// Counts a value of `bytes` bytes, and returns the size before it; an error above [`MAX_EXPANDED_BYTES`] in total.
     fn count_bytes(&mut self, bytes: usize) -> Result<usize, String> {
         let begin = self.size;
         // Two more for brackets, commas and colons.

@@ -17,8 +17,8 @@ use std::fmt;
 #[serde(default, deny_unknown_fields)]
 pub struct ActuatorStateCfg {
     /// Name patterns of the actuators to measure, in the order they are reported; `None` measures all. The drive of a
-    /// robot joint is named `uid/joint`, an actuator of an MJCF file `uid/actuator`. The part after the first slash is
-    /// enough.
+    /// joint of a robot or articulation is named `uid/joint`, an actuator of an MJCF file `uid/actuator`. The part
+    /// after the first slash is enough.
     pub actuators: Option<Vec<String>>,
     /// Rate, history, latency, dropout and noise; the channels are `controls`, `forces` and `activations`.
     pub sampling: SamplingCfg,

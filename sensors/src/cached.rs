@@ -28,7 +28,7 @@ impl<T> Cached<T> {
         Self { current: OnceLock::new(), outdated: Mutex::new(Some(value)) }
     }
 
-    /// Returns the value if it is up to date.
+    /// Returns the value if it is up to date, else `None`.
     pub(crate) fn get(&self) -> Option<&T> {
         self.current.get()
     }

@@ -75,7 +75,8 @@ impl<T: Clone> History<T> {
         self.rows.as_slice()?.get(first..first + width).filter(|_| age < self.filled[env])
     }
 
-    /// Clears the rows of environment `env`; their memory is reused by [`push_reused`](Self::push_reused).
+    /// Marks the rows of environment `env` as not filled. [`view`](Self::view) still shows their values until
+    /// [`push_reused`](Self::push_reused) overwrites them.
     #[track_caller]
     pub(crate) fn clear(&mut self, env: usize) {
         self.filled[env] = 0;

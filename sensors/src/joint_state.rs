@@ -20,7 +20,8 @@ use std::fmt;
 #[serde(default, deny_unknown_fields)]
 pub struct JointStateCfg {
     /// Name patterns of the joints to measure (`uid/joint`, or `joint` alone), in the order they are reported; `None`
-    /// measures all. These are the movable joints of robots, and the hinge and slide joints of MJCF files.
+    /// measures all. These are the movable joints of robots and articulations, and the hinge and slide joints of MJCF
+    /// files.
     pub joints: Option<Vec<String>>,
     /// Rate, history, latency, dropout and noise; the channels are `positions`, `velocities` and `efforts`.
     pub sampling: SamplingCfg,

@@ -159,7 +159,8 @@ impl NoiseState {
     }
 }
 
-/// Returns the columns of the channel `name`, and its smallest and largest value.
+/// Returns the columns of the channel `name`, and its smallest and largest value; an error for an unknown channel, and
+/// for one that cannot have noise.
 fn columns(name: &str, channels: &[SampleChannel]) -> Result<(Range<usize>, [f64; 2]), SensorError> {
     let mut first = 0;
     for channel in channels {

@@ -92,8 +92,9 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
     /// Markers that visualize the current value in environment `env`, in the frame of the environment: rendered in
-    /// viewers, never measured. They are shown initially if [`SensorCfg::debug_vis`] returns true. `pose` returns the
-    /// current pose of a body, given its index on the body axis, where a viewer draws the body.
+    /// viewers and in the color of cameras with `draw_markers`, and not measured by any other sensor. They are shown
+    /// initially if [`SensorCfg::debug_vis`] returns true. `pose` returns the current pose of a body, given its index
+    /// on the body axis, where a viewer draws the body.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let _ = (env, pose);
         Vec::new()
@@ -135,14 +136,14 @@ pub struct SensorContext {
     pub bodies: Arc<[String]>,
     /// For every body, the index of the body that moves it. For a robot, this is the nearest link, the link itself or
     /// one above it, that no fixed joint attaches to its parent. For a body or site of an MJCF file, it is the body
-    /// that MuJoCo welds it to; a body or site welded to the world has its own index. An object has its own index. As
-    /// long as `bodies`, or empty if unknown.
+    /// that MuJoCo welds it to; a body or site welded to the world has its own index. An object has its own index. The
+    /// list is as long as that of `bodies`, or empty if unknown.
     pub moving_bodies: Arc<[usize]>,
-    /// Names of the joints in the order of the joint axis of [`SceneState`], `uid/joint`: the movable joints of robots,
-    /// and the hinge and slide joints of MJCF files.
+    /// Names of the joints in the order of the joint axis of [`SceneState`], `uid/joint`: the movable joints of robots
+    /// and articulations, and the hinge and slide joints of MJCF files.
     pub joints: Arc<[String]>,
-    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot
-    /// joint, `uid/actuator` for an actuator of an MJCF file.
+    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a joint
+    /// of a robot or articulation, `uid/actuator` for an actuator of an MJCF file.
     pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,

@@ -9,9 +9,9 @@ pub struct MjvCamera {
     pub orthographic: bool,
     /// Position in the world \[m\].
     pub position: [f64; 3],
-    /// Viewing direction.
+    /// Viewing direction, in world axes; of any length but 0.
     pub forward: [f64; 3],
-    /// Upward direction of the image.
+    /// Upward direction of the image, in world axes; it may lean toward the viewing direction.
     pub up: [f64; 3],
     /// Horizontal center of the frustum in the near plane \[m\].
     pub center: f64,
@@ -62,7 +62,7 @@ impl MjvCamera {
     /// Pose of the optical frame: x to the right of the image, y down, z forward.
     ///
     /// # Errors
-    /// The viewing direction is 0 or parallel to the upward direction.
+    /// The viewing or the upward direction is 0, or they are parallel.
     pub fn world_from_camera(&self) -> Result<PoseF32, MjvCameraError> {
         let [z, up] = [self.forward, self.up].map(nalgebra::Vector3::from);
         let z = z.try_normalize(1e-12).ok_or_else(|| self.error())?;

@@ -57,7 +57,7 @@ impl Decor {
         all.into_iter().find(|(of, _)| *of == Some(kind)).map(|(_, decor)| decor)
     }
 
-    /// Number of lines that the decoration consists of.
+    /// Number of lines that the decoration consists of; 0 for arrows and triangles.
     pub(super) fn lines(self) -> usize {
         match self {
             Self::Line => 1,

@@ -26,7 +26,7 @@ pub struct MjvFrame {
     pub poses: Vec<PoseF32>,
     /// Lights with their poses.
     pub lights: Vec<Light>,
-    /// Object of each mask id.
+    /// Object of each mask id, indexed by the id; element 0 is the background.
     pub objects: Vec<MjvObject>,
 }
 

@@ -408,7 +408,7 @@ impl<M: VisualModel> MjvReader<M> {
         Some(scene)
     }
 
-    /// Instance of a geom.
+    /// Instance of a geom; an error with the reason why it cannot be rendered.
     fn instance(&mut self, look: &GeomLook, mask_id: i32, memory: &MjvMemory<'_>) -> Result<Instance, String> {
         if !look.is_rigid {
             return Err("a pose is not a rotation and a position".into());
@@ -558,7 +558,7 @@ impl<M: VisualModel> MjvReader<M> {
         self.shapes.get(kind, &size.map(f64::from), data).map_err(str::to_string)
     }
 
-    /// An image of one pixel.
+    /// An image of one pixel, of a color in display values 0 to 1; kept for later frames.
     fn one_color(&mut self, rgb: [f32; 3]) -> Option<Arc<Texture>> {
         if self.colors.len() > MAX_WRAPPED {
             self.colors.clear();

@@ -34,7 +34,7 @@ pub struct PixelGroup {
 pub enum Stage {
     /// After visibility: the surface at each pixel center is found.
     Geometry,
-    /// As [`Geometry`](Self::Geometry), but computed only for cameras with such a channel: few have one.
+    /// As [`Geometry`](Self::Geometry), but computed only for frames with a channel of this stage.
     Surface,
     /// As [`Surface`](Self::Surface), for the base color of surfaces, which reads textures.
     Albedo,

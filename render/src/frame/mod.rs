@@ -139,6 +139,10 @@ macro_rules! channels {
 
             /// Moves the images of `views`, a range of the `all` views, by `by` places toward higher indices. The first
             /// `by` images of the range keep their content; the last `by` are dropped.
+            ///
+            /// # Panics
+            ///
+            /// If the range exceeds `all`.
             pub fn shift_views(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -148,6 +152,10 @@ macro_rules! channels {
             }
 
             /// Fills the images of `views`, a range of the `all` views, with zeros.
+            ///
+            /// # Panics
+            ///
+            /// If the range exceeds `all`.
             pub fn clear_views(&mut self, all: usize, views: Range<usize>) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -242,7 +250,7 @@ macro_rules! channels {
                 Channels { $($field: self.$field.is_some(),)* }
             }
 
-            /// Copies a row of a frame with the same channels and `width` to the first row here.
+            /// Copies a row of a frame with the same channels and `width` to the first row of these buffers.
             pub(crate) fn take_row(&mut self, from: &Frame, row: usize, width: usize) {
                 $(if let (Some(to), Some(from)) = (self.$field.as_deref_mut(), from.$field.as_deref()) {
                     let each = width * $Name::COMPONENTS;
@@ -266,7 +274,8 @@ macro_rules! channels {
                 false $(|| (self.$field.is_some() && $Name::STAGE == stage))*
             }
 
-            /// Writes those pixels of a group that are inside the image; its first pixel is at (x, y).
+            /// Writes the pixels of a group that are inside the image, in the channels of `stage`. `at` is the column
+            /// and row of the first pixel of the group, `size` the width and height of the image.
             #[inline(always)]
             pub(crate) fn write(&mut self, stage: Stage, group: &PixelGroup, at: [usize; 2], size: [usize; 2]) {
                 $(if $Name::STAGE == stage && let Some(buffer) = &mut self.$field {
@@ -284,7 +293,7 @@ fn unknown_channel(name: &str, known: &[(&'static str, &[&'static str])]) -> Unk
     UnknownName { what: "channel", name: name.into(), candidates }
 }
 
-/// Splits off the first pixels of one channel.
+/// Splits off the first pixels of one channel; `None` without a buffer.
 fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Element]>, pixels: usize) -> Option<&'a mut [C::Element]> {
     let all = buffer.take()?;
     let (first, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));

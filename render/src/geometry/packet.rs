@@ -49,7 +49,7 @@ impl Packet {
         }
     }
 
-    /// One ray alone, copied to all lanes.
+    /// One ray alone, copied to all lanes; only lane `k` has a ray.
     #[inline(always)]
     pub(super) fn single(&self, k: usize) -> Self {
         let mut limit = [-1.0; WIDTH];

@@ -322,7 +322,8 @@ impl RayWorld {
 }
 
 impl FixedTargets {
-    /// Casts the rays of a packet against the BVH; keeps hits that are nearer than those in `hits`.
+    /// Casts the rays of a packet against the BVH; keeps hits that are nearer than those in `hits`, or as near and of
+    /// an earlier instance.
     fn cast_bvh<S: Simd>(
         &self,
         s: S,
@@ -371,8 +372,8 @@ impl FixedTargets {
     }
 }
 
-/// Casts all packets against one target; keeps hits that are nearer than those in `hits`. Compiled once for each
-/// instruction set.
+/// Casts all packets against one target; keeps hits that are nearer than those in `hits`, or as near and of an earlier
+/// instance. Compiled once for each instruction set.
 #[inline(never)]
 fn cast_target<S: Simd>(
     s: S,

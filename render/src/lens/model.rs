@@ -73,7 +73,8 @@ pub(super) fn check_finite(numbers: &[(&'static str, f64)]) -> Result<(), Optics
     }
 }
 
-/// Checks the largest angle of a lens.
+/// Checks that the largest angle of a lens is above 0 and at most `most` \[rad\]; `allowed` states this range in the
+/// error.
 pub(super) fn check_max_angle(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
     if max_angle > 0.0 && max_angle <= most {
         return Ok(());

@@ -30,8 +30,8 @@ impl Optics {
     ///
     /// # Errors
     ///
-    /// [`OpticsError::Lens`] for an invalid number, [`OpticsError::LensFolds`] if the mapping folds back or has a pole
-    /// before the lens's `max_angle`.
+    /// [`OpticsError::Lens`] for an invalid number of either, [`OpticsError::LensFolds`] if the mapping folds back or
+    /// has a pole before the lens's `max_angle`.
     pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, OpticsError> {
         let pixels = Intrinsics::from(pixels).to_pixels(1, 1)?;
         Ok(Self { lens, pixels, domain: lens.domain()? })
@@ -95,7 +95,7 @@ impl Optics {
 
     /// Solid angle \[sr\] per unit of area of the normalized image at a point, by differences of rays that are 1e-7 rad
     /// apart near the axis. The step is coarse where rays spread without bound: at a right angle of the orthographic
-    /// fisheye, and where a distortion is about to fold back.
+    /// fisheye, and where a distortion is about to fold back. `None` outside of the domain.
     fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
         const NEAR_THE_AXIS: f64 = 1e-4;
         let [x, y] = self.lens.project(&self.domain, [NEAR_THE_AXIS, 0.0, 1.0])?;

@@ -22,6 +22,10 @@ pub struct LensRayTables {
 impl LensRayTables {
     /// Computes the rays of a lens for `rows` views with the same intrinsics. `size` is the image size (width, height),
     /// `samples` the number of color samples per pixel, 1 or 4.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Lens::domain`], [`Optics::new`] and [`LensRays::new`], and [`OpticsError::LensMemory`].
     pub fn new(
         lens: Lens,
         pixels: &PixelIntrinsics,
@@ -64,6 +68,10 @@ impl LensRayTables {
 
     /// Returns the rays of several intrinsics, once for equal ones. Rays of intrinsics that are in use are not computed
     /// again. The list is empty for a lens without distortion.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`new`](Self::new).
     pub fn compute(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
         if self.lens.is_pinhole() {
             self.lens.domain()?;

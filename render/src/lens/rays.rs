@@ -169,7 +169,7 @@ impl LensRays {
     }
 
     /// Ray of a sample of the pixel in column `at[0]` and row `at[1]`, in the optical frame; 0 if the sample has no
-    /// ray. Plane 0 is the pixel center, planes 1 to 4 are the color samples.
+    /// ray. Plane 0 is the pixel center, planes 1 to 4 are the color samples, if [`samples`](Self::samples) is 4.
     #[inline(always)]
     pub fn direction(&self, plane: usize, at: [usize; 2]) -> [f32; 3] {
         let (group, lane) = self.group_index(plane, at);
@@ -277,7 +277,7 @@ impl LensRays {
     }
 }
 
-/// Returns an error if the pixel has no ray because the mapping folds back.
+/// Returns an error for a pixel without a ray, if the mapping of the lens folds back or has a pole.
 fn check_not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
     let (domain, f) = (optics.domain(), optics.pixels());
     if !domain.folds {

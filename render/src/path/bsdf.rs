@@ -214,7 +214,8 @@ impl Bsdf {
         pdf * self.scattered_fraction()
     }
 
-    /// Samples a visible microfacet and mirrors `o` by it.
+    /// Samples a visible microfacet and mirrors `o` by it; the result may point below the surface. `None` if rounding
+    /// puts the facet edge-on to `o`, or a number is not finite.
     fn sample_microfacet(&self, o: V3, [a, b]: [f64; 2]) -> Option<V3> {
         let alpha = self.alpha2.sqrt();
         let unit = |v: V3| scale(v, 1.0 / dot(v, v).sqrt());

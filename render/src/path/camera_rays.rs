@@ -43,7 +43,7 @@ pub(super) struct CameraRay {
 }
 
 impl ThinLens {
-    /// `None` for a pinhole.
+    /// Creates the thin lens of an aperture; `None` for an aperture without a diameter (a pinhole).
     pub(crate) fn from_aperture(aperture: &Aperture) -> Option<Self> {
         let radius = 0.5 * aperture.diameter();
         (radius > 0.0).then_some(Self { radius, focus: aperture.focus_distance })

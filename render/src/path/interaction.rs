@@ -69,7 +69,7 @@ fn mirrors(instance: &Instance, hit: &Hit) -> bool {
     !matches!(instance.shape, Shape::Box(_)) || dot(hit.normal, up) > 0.5
 }
 
-/// Linear color of an instance's texture.
+/// Linear color of an instance's texture at a point in the frame of the instance; white without a texture.
 fn texture(
     scene: &RenderScene,
     index: usize,

@@ -120,7 +120,8 @@ impl LightSource {
         Some(LightSample { direction, distance, strength })
     }
 
-    /// From the center of the disc to a point of it.
+    /// Vector to a sampled point of the light's disc; `to` is the vector to its center, `normal` the unit normal of the
+    /// disc. Without a radius this is `to`.
     fn disc_point(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
         if self.radius == 0.0 {
             return Some(to);

@@ -222,7 +222,7 @@ fn is_seen_from_below(projection: &Projection, camera: &LocalCamera) -> bool {
     if projection.parallel { pose.rotation[2][2] >= 0.0 } else { pose.translation[2] <= 0.0 }
 }
 
-/// True if a box is in front of the near plane.
+/// True if a whole box is deeper than twice the near limit.
 fn is_in_front(projection: &Projection, camera_from_instance: &PoseF32, lo: [f32; 3], hi: [f32; 3]) -> bool {
     let forward = camera_from_instance.rotation[2];
     let nearest = |k: usize| (forward[k] * lo[k]).min(forward[k] * hi[k]);
@@ -284,7 +284,7 @@ fn bounds(
 }
 
 /// Bounds of a box around a point of the optical frame, through a lens, and its largest nearness: the whole image if
-/// the depth range allows it. Blocks are tested later.
+/// the depth range allows it, else `None`. Blocks are tested later.
 fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
     let everywhere = full_rect(projection);
     let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();

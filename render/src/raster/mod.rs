@@ -145,8 +145,7 @@ fn draw_infinite_plane<S: Simd>(
     }
 }
 
-/// Keeps the samples that are nearer than the stored ones, or as near and of a later instance. Returns true if any is
-/// kept.
+/// Keeps the samples that are nearer than the stored ones, or as near with a larger id. Returns true if any is kept.
 #[inline(always)]
 fn depth_test<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
     let old = load(s, &tile.nearness[at..]);

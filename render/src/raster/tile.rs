@@ -83,7 +83,7 @@ impl Tile {
     }
 
     /// Prepares a block of which every sample will be written; returns the nearness of all samples if the block is
-    /// still empty.
+    /// still empty, else `None`.
     #[inline(always)]
     pub(crate) fn take_cleared(&mut self, block: usize) -> Option<f32> {
         std::mem::take(&mut self.cleared[block]).then_some(self.empty)

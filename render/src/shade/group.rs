@@ -59,7 +59,7 @@ impl<'a> ShadingContext<'a> {
     }
 }
 
-/// Linear colors of sixteen samples.
+/// Colors of sixteen samples, in the [`BlendSpace`](crate::shade::tone::BlendSpace) of the frame.
 pub(crate) type Colors = [[f32; LANES]; 3];
 
 /// Positions of sixteen samples in the image.

@@ -110,8 +110,8 @@ pub(crate) fn cos_deg(deg: f32) -> f32 {
 }
 
 impl PreparedLight {
-    /// Direction to the light (unit) and the fraction of its light that reaches points, without shadows; `None` if no
-    /// point is lit.
+    /// Direction to the light (unit) and the fraction of its light that reaches points, without shadows; `None` if all
+    /// points are outside of the cone of a spot.
     #[inline(always)]
     fn illumination<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
         let (light, zero, one) = (&self.light, splat(s, 0.0), splat(s, 1.0));
@@ -316,7 +316,8 @@ fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>,
     )
 }
 
-/// Linear color of a surface. `tint` multiplies the color of the surface, but not its highlights.
+/// Color of a surface, in the [`BlendSpace`] of the frame. `tint` multiplies the color of the surface, but not its
+/// highlights.
 #[inline(always)]
 pub(crate) fn shade<S: Simd>(
     s: S,

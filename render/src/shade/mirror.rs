@@ -322,7 +322,8 @@ impl Mirrors<'_> {
         hit_lanes
     }
 
-    /// The next surface along a mirrored ray, without backs of transparent surfaces.
+    /// The next surface along a mirrored ray, without backs of transparent surfaces; `None` without one, and after
+    /// [`MAX_PASSES`] such backs.
     #[inline(always)]
     fn next<S: Simd>(
         &self,
@@ -363,7 +364,7 @@ fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
     load(s, &set).simd_gt(splat(s, 0.5))
 }
 
-/// Linear light of a sum of linear light and of sRGB bytes, clamped at white.
+/// Sum of a color and of sRGB bytes, clamped at white; color and sum are in the space `blend`.
 #[inline(always)]
 fn add<S: Simd>(s: S, blend: BlendSpace, light: F<S>, byte: F<S>) -> F<S> {
     blend.color_of_bytes(min(max(blend.to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))

@@ -359,7 +359,8 @@ fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> 
     Ok(())
 }
 
-/// Texels along the side of a shadow map: about three texels for two pixels of a square image of the same area.
+/// Texels along the side of a shadow map: as configured, or, for 0, about three texels for two pixels of a square image
+/// of the same area.
 fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     match cfg.shadow_size {
         0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
@@ -367,7 +368,7 @@ fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     }
 }
 
-/// Number of triangles of all meshes, at their level of detail.
+/// Number of triangles of all meshes; with levels of detail, of the rendered meshes at their levels.
 fn triangle_count(cfg: RasterCfg, render_request: &RenderRequest<'_>) -> usize {
     let RenderRequest { scene, poses, view, .. } = *render_request;
     if !cfg.lod {

@@ -252,8 +252,9 @@ impl ShadowMap {
         load(s, &lit)
     }
 
-    /// Filters sixteen texels around a point. The result is exactly 1 if no texel is nearer to the light, or if the
-    /// nearer ones weigh less than a ninety-thousandth: the same as without reading texels.
+    /// Returns the lit fraction of sixteen texels around a point, filtered. The result is exactly 1 if no texel is
+    /// nearer to the light, or if the nearer ones weigh less than a ninety-thousandth: the same as without reading
+    /// texels.
     #[inline(always)]
     fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
         let width = self.projection.width;
@@ -297,7 +298,7 @@ impl ShadowBand<'_> {
     }
 }
 
-/// Copies blocks into rows.
+/// Copies the blocks of a tile into rows, and writes the smallest and largest nearness of each block to `range`.
 #[inline(always)]
 fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2]]) {
     let side = tile.blocks_x * BLOCK;

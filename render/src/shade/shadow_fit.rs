@@ -317,7 +317,7 @@ fn clip(polygon: [[f32; 3]; 4], planes: &[[f32; 4]; 6], points: &mut [[f32; 3]],
     }
 }
 
-/// Returns, for each light, the extent of the boxes of all `shown` instances in the frustum of a pinhole camera.
+/// Returns, for each light, the extent of the boxes of all `shown` instances in the frustum of a camera without a lens.
 /// Occlusion is ignored; `None` for a light gives an empty extent.
 pub(super) fn visible_extents<const N: usize>(
     projection: &Projection,

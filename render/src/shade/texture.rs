@@ -126,8 +126,8 @@ pub(crate) fn sample_cube<S: Simd>(
     )
 }
 
-/// Width on a cube of half length 1 of pixels that are `width` wide on a surface, in directions that are points of the
-/// surface times `scale`: that on the face of the cube.
+/// Width of pixels on the faces of a cube of half length 1. The pixels are `width` wide \[m\] on the surface, and the
+/// direction `d` is the point of the surface times `scale`.
 #[inline(always)]
 pub(crate) fn face_footprint<S: Simd>(s: S, d: V3<S>, scale: [f32; 3], width: F<S>) -> F<S> {
     let (x, y, z) = (abs(d.x), abs(d.y), abs(d.z));
@@ -192,7 +192,7 @@ fn sample_levels<S: Simd>(
     out
 }
 
-/// Two horizontally adjacent texels.
+/// Two horizontally adjacent texels as eight bytes; 0 beyond the last texel.
 #[inline(always)]
 fn pair(bytes: &[u8], from: usize) -> u64 {
     match bytes.get(from..from + 8) {

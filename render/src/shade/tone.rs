@@ -115,7 +115,7 @@ impl BlendSpace {
         if self.is_display { c } else { decode(c) }
     }
 
-    /// As [`encode`].
+    /// As [`encode`]; display colors have no tone curve.
     #[inline(always)]
     pub(crate) fn encode<S: Simd>(self, s: S, curve: ToneCurve, x: F<S>) -> F<S> {
         if self.is_display { self.to_bytes(s, x) + 0.5 } else { encode(s, curve, x) }

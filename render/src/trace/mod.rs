@@ -300,7 +300,7 @@ impl RayTracer {
         count
     }
 
-    /// Intersects a ray with one instance.
+    /// Nearest hit of a ray and one instance at a distance from 0 to `limit` \[m\], at a time; `None` without one.
     #[inline(always)]
     fn intersect(
         &self,

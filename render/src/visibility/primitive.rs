@@ -41,7 +41,7 @@ fn first_surface<S: Simd>(s: S, i: Interval<S>, near: f32) -> (M<S>, F<S>, M<S>)
     (i.enter.simd_le(i.leave) & t.simd_ge(near) & t.simd_lt(splat(s, f32::MAX)), t, outside)
 }
 
-/// Replaces zero, so that a division is finite or a clean infinity.
+/// Replaces numbers below 1e-18 in magnitude by 1e-18, so that a division is finite or a clean infinity.
 #[inline(always)]
 fn nonzero<S: Simd>(s: S, d: F<S>) -> F<S> {
     select(abs(d).simd_lt(splat(s, 1e-18)), splat(s, 1e-18), d)

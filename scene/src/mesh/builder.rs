@@ -61,7 +61,8 @@ impl Builder {
     /// Groups triangles by material (in order of first use), drops degenerate triangles, merges equal vertices.
     ///
     /// If only some corners have a normal, the others get the normal of their triangle. Missing texture coordinates
-    /// become 0 if other corners have some. If every triangle is degenerate, all are kept.
+    /// become 0 if other corners have some. If every triangle is degenerate, all are kept. No triangles at all is an
+    /// error.
     pub(super) fn finish(mut self, ctx: &ReadContext<'_>) -> Result<TriMesh, MeshError> {
         if self.corners.is_empty() {
             return Err(MeshError::Empty { path: ctx.path.to_owned() });
@@ -111,7 +112,7 @@ impl Builder {
     }
 }
 
-/// Vector scaled to unit length; `None` for a zero or non-finite vector.
+/// Vector scaled to unit length; `None` for a vector that is not finite or not longer than 1e-20.
 pub(super) fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
     let v = v.map(f64::from);
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();

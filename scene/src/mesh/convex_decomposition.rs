@@ -137,7 +137,7 @@ pub fn convex_decomposition(
     Ok(ConvexDecomposition { hulls: done.into_iter().map(|piece| piece.hull).collect(), depth })
 }
 
-/// Triangles of a mesh; for a closed mesh, counter-clockwise seen from outside.
+/// Triangles of a mesh; for a closed mesh, counter-clockwise seen from outside. An invalid mesh is an error.
 pub(super) fn triangles_of(mesh: &TriMesh) -> Result<Vec<Triangle>, HullError> {
     mesh.validate().map_err(|source| HullError::Mesh { source })?;
     let inside_out = mesh.signed_volume() < 0.0 && mesh.is_closed();
@@ -156,7 +156,7 @@ struct SourceSurface {
 }
 
 impl SourceSurface {
-    /// True if a point is in the solid.
+    /// True if a point is in the solid; false for an open surface.
     fn contains(&self, p: V3) -> bool {
         self.all.as_ref().is_some_and(|all| winding_number(all, p) > 0.5)
     }

@@ -167,7 +167,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok(turn.map(|row| row.map(|x| x * unit)))
     }
 
-    /// Element that a `#id` attribute of `node` refers to.
+    /// Element that a `#id` attribute of `node` refers to; an error if the attribute or the element is missing.
     pub(super) fn target(&self, node: Node<'a, 'i>, attribute: &str) -> Result<Node<'a, 'i>, MeshError> {
         let url = node
             .attribute(attribute)
@@ -223,7 +223,8 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok(())
     }
 
-    /// Transform of a child element of a node; `None` for an element that is not a transform.
+    /// Transform of a child element of a node; `None` for an element that is not a transform. `lookat` and `skew` are
+    /// errors.
     fn element_transform(&self, node: Node<'a, 'i>) -> Result<Option<Affine>, MeshError> {
         Ok(Some(match node.tag_name().name() {
             "matrix" => self.matrix(node)?,

@@ -16,7 +16,7 @@ pub(super) struct Binding<'a, 'i> {
 }
 
 impl<'a, 'i> Binding<'a, 'i> {
-    /// Bindings of `<instance_geometry>`, by symbol.
+    /// Bindings of an `<instance_geometry>` or `<instance_controller>`, by symbol.
     pub(super) fn of_instance(instance: Node<'a, 'i>) -> HashMap<&'a str, Self> {
         let materials = children(instance, "bind_material")
             .flat_map(|b| children(b, "technique_common"))
@@ -34,8 +34,8 @@ impl<'a, 'i> Binding<'a, 'i> {
 }
 
 impl<'a, 'i> Dae<'a, 'i> {
-    /// Material of a primitive, `None` if the file does not define one, and the texture coordinate set of its diffuse
-    /// texture, if the file names one.
+    /// Material of a primitive, `None` if the file does not define one or gives it no base color, and the texture
+    /// coordinate set of its diffuse texture, if the file names one.
     pub(super) fn material_of(
         &mut self,
         primitive: Node<'a, 'i>,

@@ -155,7 +155,7 @@ pub(super) fn beside(file: &Path, written: &str) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(plain)
 }
 
-/// Decodes URI escapes such as `%20`. Invalid escapes stay as written.
+/// Decodes URI escapes such as `%20`. Invalid escapes stay as written; bytes that are not UTF-8 become U+FFFD.
 pub(super) fn percent_decoded(uri: &str) -> String {
     percent_encoding::percent_decode_str(uri).decode_utf8_lossy().into_owned()
 }

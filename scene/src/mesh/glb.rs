@@ -265,8 +265,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Returns the handle in the mesh and the texture coordinate set of material `index`. The first call adds the
-    /// material to the mesh. `at` is the location in errors.
+    /// Returns the handle in the mesh and the texture coordinate set of material `index`. The first call for an index
+    /// adds the material to the mesh. `at` is the location in errors.
     fn material(&mut self, index: usize, at: &str) -> Result<(usize, usize), MeshError> {
         let material = self.gltf.element_at("materials", index, at)?;
         if let Some(known) = self.materials[index] {

@@ -54,7 +54,7 @@ impl<'a> Gltf<'a> {
         number.map(Some).ok_or_else(|| self.ctx.invalid(at, format!("{key:?} is not a whole number")))
     }
 
-    /// Element that an index refers to.
+    /// Element of a top-level array of the document that an index refers to; an error if it is missing.
     pub(super) fn element_at(&self, array: &str, index: usize, at: &str) -> Result<&'a Value, MeshError> {
         let found = item(self.json, array, index);
         found.ok_or_else(|| self.ctx.index(format!("{at}, index into {array}"), index as i64, len(self.json, array)))
@@ -216,7 +216,7 @@ fn component(b: &[u8], component: u64, normalized: bool) -> f64 {
     if normalized { (value / largest).max(-1.0) } else { value }
 }
 
-/// Decodes standard base64 with or without padding; white space is skipped. `None` for other characters.
+/// Decodes standard base64 up to the padding, if any; white space is skipped. `None` for other characters.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut held) = (0u32, 0);

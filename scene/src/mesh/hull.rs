@@ -152,7 +152,8 @@ fn simplex(points: &[[f64; 3]]) -> Simplex {
     Simplex { corners: [a, b, c, d], off_line, off_plane, normal, origin }
 }
 
-/// Points projected into their plane, once on each side of it.
+/// Points projected onto two planes parallel to theirs: `thickness` apart, or as far apart as the points are if that is
+/// more.
 fn thicken(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3]> {
     let heights = || points.iter().map(|&p| dot(flat.normal, sub(p, flat.origin)));
     let (lo, hi) = heights().fold((0.0f64, 0.0f64), |(lo, hi), h| (lo.min(h), hi.max(h)));
@@ -278,7 +279,7 @@ impl Quickhull {
         true
     }
 
-    /// Distance of a point in front of a face, in grid steps.
+    /// Distance of a point from the plane of a face, in grid steps; positive in front of it.
     fn distance(&self, face: usize, point: usize) -> f64 {
         let face = &self.faces[face];
         dot(face.normal, sub(self.points[point], self.points[face.corners[0]]))

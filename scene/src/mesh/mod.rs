@@ -81,7 +81,7 @@ pub struct Submesh {
 /// Material of a submesh, as given in the mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMaterial {
-    /// Name in the file.
+    /// Name in the file; without one, the id (COLLADA), or `material` and the index (glTF).
     pub name: String,
     /// Base color rgba in 0..=1, a display color (sRGB, not linear). It multiplies the texture.
     pub rgba: [f32; 4],

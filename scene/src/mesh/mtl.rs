@@ -21,7 +21,7 @@ const MAP_OPTIONS: [(&str, usize); 12] = [
     ("-imfchan", 1),
 ];
 
-/// Reads an MTL file that lies next to an OBJ: `Kd`, `d`, `Tr` and `map_Kd`.
+/// Reads an MTL file that lies next to an OBJ: `Kd`, `d`, `Tr` and `map_Kd`. Numbers are clamped to 0..=1.
 ///
 /// `Kd` multiplies the texture, as the format specifies, unless `Kd` is exactly black. Exporters write black to refer
 /// to the texture.

@@ -105,7 +105,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the libraries of one `mtllib` line. Missing files are skipped.
+    /// Reads the libraries of one `mtllib` line: the line is one file name if that file exists, else a list of names.
+    /// Missing files are skipped.
     fn library(&mut self, ctx: &ReadContext<'_>, names: &str) -> Result<(), MeshError> {
         // `names` is either one name with spaces or several names.
         let whole = std::fs::read(beside(ctx.path, names)).ok().map(|bytes| vec![(names, bytes)]);
@@ -135,7 +136,8 @@ fn floats<const N: usize>(ctx: &ReadContext<'_>, number: usize, rest: &str) -> R
     Ok(out)
 }
 
-/// Element at an OBJ index: counted from 1, or backwards from the newest element if negative.
+/// Element at an OBJ index: counted from 1, or backwards from the newest element if negative. 0 and missing elements
+/// are errors.
 fn look_up<T: Copy>(ctx: &ReadContext<'_>, number: usize, word: &str, all: &[T], what: &str) -> Result<T, MeshError> {
     let at = || format!("line {number}, {what} index");
     let index: i64 =

@@ -8,7 +8,7 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, add_scaled, normalize};
 
-/// A capsule: a cylinder along z with a hemisphere at each end.
+/// A capsule centered at the origin: a cylinder along z with a hemisphere at each end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     /// Radius \[m\].

@@ -84,7 +84,7 @@ pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], faces: &[[f32; 3]],
     normals
 }
 
-/// True if any two triangles around a vertex are within the crease angle, whose cosine is `limit`.
+/// True if every two triangles around a vertex are within the crease angle, whose cosine is `limit`.
 fn smooth(around: &[u32], faces: &[[f32; 3]], limit: f32) -> bool {
     around.iter().enumerate().all(|(i, &corner)| {
         let face = faces[corner as usize / 3];

@@ -8,7 +8,7 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, add_scaled, normalize, to_f64};
 
-/// An ellipsoid with its axes along x, y and z.
+/// An ellipsoid centered at the origin, with its axes along x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ellipsoid {
     /// Half lengths along x, y and z \[m\].

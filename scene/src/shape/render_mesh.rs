@@ -77,8 +77,8 @@ impl RenderMesh {
         Self::prepare(mesh, crease, &welded, &vec![true; mesh.triangles.len()])
     }
 
-    /// `welded` has for each vertex the first vertex at the same position; `closed` is true for triangles of closed
-    /// surfaces.
+    /// Prepares all triangles. `welded` has for each vertex the first vertex at the same position; `closed` is true for
+    /// triangles of closed surfaces.
     fn prepare(mesh: &TriMesh, crease: f32, welded: &[u32], closed: &[bool]) -> Self {
         /// Marks a missing vertex.
         const NONE: u32 = u32::MAX;
@@ -347,7 +347,8 @@ impl RenderMesh {
         self.levels.get_or_init(|| lod::build_levels(self))
     }
 
-    /// Number of the coarsest level whose [`LodLevel::error`] is at most `error` \[m\]; 0 is the mesh itself.
+    /// Number of the coarsest level whose [`LodLevel::error`] is at most `error` \[m\]: 0 is the mesh itself, n the
+    /// element n - 1 of [`levels`](Self::levels).
     ///
     /// Computes the levels only if one of them may qualify.
     pub fn level_within(&self, error: f32) -> usize {
@@ -364,7 +365,7 @@ impl RenderMesh {
     }
 
     /// [`LodLevel::error`] of level `number` \[m\], numbered as in [`level_within`](Self::level_within). 0 for the mesh
-    /// itself and for numbers without a level.
+    /// itself, for numbers without a level, and while the levels are not computed.
     pub fn level_error(&self, number: usize) -> f32 {
         let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
         number.checked_sub(1).and_then(level).map_or(0.0, |level| level.error)

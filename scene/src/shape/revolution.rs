@@ -31,7 +31,8 @@ pub(crate) fn revolve(profile: &[[f64; 2]], segments: usize) -> TriMesh {
     TriMesh::from_triangles(positions, triangles)
 }
 
-/// Profile of an arc: angles from `from` to `to` \[rad\] about the center at height `z`.
+/// Profile of an arc of `radius` \[m\] about the point of the axis at height `z` \[m\]: angles above the horizontal
+/// from `from` to `to` \[rad\].
 pub(super) fn arc(radius: f64, z: f64, from: f64, to: f64, steps: usize) -> Vec<[f64; 2]> {
     (0..=steps)
         .map(|k| {

@@ -11,7 +11,7 @@ use crate::sampling::cos_sin_turns;
 use crate::vector::{V3, add_scaled, dot, normalize, scale};
 use std::f64::consts::PI;
 
-/// A sphere.
+/// A sphere centered at the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Radius \[m\].
@@ -54,7 +54,7 @@ impl ClosedForm for Sphere {
 }
 
 impl Sphere {
-    /// Radius, and squared distance of a point outside from the center; `None` for a point inside.
+    /// Radius, and squared distance of a point outside from the center; `None` for a point inside or on the surface.
     fn outside_distance(&self, from: V3) -> Option<(f64, f64)> {
         let (radius, square) = (f64::from(self.radius), dot(from, from));
         (square > radius * radius * (1.0 + 1e-9)).then_some((radius, square))

@@ -16,7 +16,7 @@ pub struct Boxes {
     pub size: [f64; 2],
     /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Side of a box \[m\], with the wall to the next one; rounded to whole cells, at least 2.
+    /// Side of a box \[m\], with the wall to the next one; rounded to whole cells, of which fewer than 2 are an error.
     pub side: f64,
     /// Lowest and highest height \[m\], uniformly distributed.
     pub range: [f64; 2],
@@ -37,8 +37,9 @@ impl Boxes {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, the
-    /// range is not in order, boxes are smaller than two cells, or the platform is larger than the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, the range is not in order, boxes are smaller than two cells, or the platform is larger than the
+    /// field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "boxes";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

@@ -14,7 +14,7 @@ pub struct Gap {
     pub size: [f64; 2],
     /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Width of the trench \[m\], rounded to whole cells, at least 2.
+    /// Width of the trench \[m\], rounded to whole cells, of which fewer than 2 are an error.
     pub width: f64,
     /// Depth of the trench \[m\].
     pub depth: f64,
@@ -33,8 +33,9 @@ impl Gap {
     /// Heights \[m\], 0 outside the trench; rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, the
-    /// trench is narrower than two cells, or the platform and the trench do not fit into the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, the trench is narrower than two cells, or the platform and the trench do not fit into the
+    /// field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "gap";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 /// A grid of terrain tiles: a type for each column, a difficulty for each row, for curricula of walking robots.
 ///
-/// Rows are along x and columns along y, both from the negative ends. Row 0 is the easiest one. All tiles meet at height
-/// 0: the points between two tiles, and those of a flat border around the grid, have this height.
+/// Rows are along x and columns along y, both from the negative ends. Row 0 has the first difficulty, by default the
+/// easiest. All tiles meet at height 0: the points between two tiles, and those of a flat border around the grid, have
+/// this height.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TerrainGrid {
@@ -169,7 +170,8 @@ impl TerrainGrid {
         &found.unwrap_or_else(|| &self.tiles[self.tiles.len() - 1]).tile
     }
 
-    /// Difficulty of a row, from 0 to 1.
+    /// Difficulty of a row: linear from the first to the second number of `difficulty` over the rows; the first for one
+    /// row.
     pub fn row_difficulty(&self, row: usize) -> f64 {
         let [first, last] = self.difficulty;
         if self.rows < 2 { first } else { first + (last - first) * row as f64 / (self.rows - 1) as f64 }
@@ -203,7 +205,7 @@ impl TerrainGrid {
         positive(NAME, "platform", self.platform)
     }
 
-    /// Width of the border in cells.
+    /// Width of the border in cells; an error unless it is a whole number.
     fn border_cells(&self) -> Result<usize, TerrainError> {
         finite(NAME, "border", self.border)?;
         if self.border == 0.0 {

@@ -94,7 +94,7 @@ pub enum TerrainError {
         /// Error of its generator.
         error: Box<TerrainError>,
     },
-    /// A grid has no tiles.
+    /// A grid has no tile with a share above 0.
     #[error("terrain grid: {field} is empty; name at least one type of tile with a share above 0")]
     NoTiles {
         /// Name of the field.
@@ -127,7 +127,8 @@ fn finite(terrain: &'static str, field: &'static str, value: f64) -> Result<(), 
     value.is_finite().then_some(()).ok_or_else(error)
 }
 
-/// Number of points along x and y of a field of `size`.
+/// Number of points along x and y of a field of `size` \[m\]. An error for a side that is not a whole number of cells,
+/// and for more than [`MAX_POINTS`] points.
 fn grid_size(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize; 2], TerrainError> {
     positive(terrain, "cell", cell)?;
     for side in size {
@@ -158,7 +159,7 @@ fn check_platform(terrain: &'static str, size: [f64; 2], platform: f64) -> Resul
     Ok(smaller)
 }
 
-/// Checks that both ends of a range are finite and in order.
+/// Returns the range; an error if an end is not finite, or if the first end is above the second.
 fn check_range(terrain: &'static str, field: &'static str, range: [f64; 2]) -> Result<[f64; 2], TerrainError> {
     finite(terrain, field, range[0])?;
     finite(terrain, field, range[1])?;
@@ -169,7 +170,7 @@ fn check_range(terrain: &'static str, field: &'static str, range: [f64; 2]) -> R
     Ok(range)
 }
 
-/// Number of cells in a length, rounded, at least `least`.
+/// Number of cells in a length, rounded; an error if they are fewer than `least`.
 fn whole_cells(
     terrain: &'static str,
     field: &'static str,

@@ -40,8 +40,9 @@ impl DiscreteObstacles {
     /// Heights \[m\], 0 beside the obstacles; rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, a range
-    /// is not in order, an obstacle or the platform is larger than the field, or there are more than 100,000 obstacles.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, a range is not in order, an obstacle or the platform is larger than the field, or there are
+    /// more than 100,000 obstacles.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "discrete obstacles";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

@@ -31,8 +31,8 @@ impl PyramidSlope {
     /// Heights \[m\], 0 at the rim; rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, or the
-    /// platform is larger than the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, or the platform is larger than the field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "pyramid slope";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

@@ -34,8 +34,8 @@ impl RoughTerrain {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, or there are too many points.
-    /// Also if the range contains no multiple of the step, or more than 1e15.
+    /// A side, the cell or the step is not positive, a number is not finite, a side is not a whole number of cells, or
+    /// there are too many points. Also if the range contains no multiple of the step, or more than 1e15.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "rough terrain";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

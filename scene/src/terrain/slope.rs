@@ -27,7 +27,8 @@ impl Slope {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, or there are too many points.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, or there are
+    /// too many points.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "slope";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

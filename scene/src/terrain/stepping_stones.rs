@@ -16,9 +16,9 @@ pub struct SteppingStones {
     pub size: [f64; 2],
     /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Side of a stone \[m\], rounded to whole cells, at least 1.
+    /// Side of a stone \[m\], rounded to whole cells; 0 cells are an error.
     pub stone: f64,
-    /// Gap between two stones \[m\], rounded to whole cells, at least 2.
+    /// Gap between two stones \[m\], rounded to whole cells, of which fewer than 2 are an error.
     pub distance: f64,
     /// Depth of the ground between the stones \[m\].
     pub depth: f64,
@@ -50,8 +50,9 @@ impl SteppingStones {
     /// Heights \[m\], rows along y, columns along x. The first stone begins at the negative ends.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, the
-    /// range is not in order, stones or gaps have too few cells, or the platform is larger than the field.
+    /// A horizontal length is not positive, a number is not finite, a side is not a whole number of cells, there are
+    /// too many points, the range is not in order, stones or gaps have too few cells, or the platform is larger than
+    /// the field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "stepping stones";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

@@ -31,8 +31,8 @@ impl Waves {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, or the
-    /// waves are shorter than four cells.
+    /// A side, the cell or the number of waves is not positive, a number is not finite, a side is not a whole number of
+    /// cells, there are too many points, or the waves are shorter than four cells.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "waves";
         let [columns, rows] = grid_size(NAME, self.size, self.cell)?;

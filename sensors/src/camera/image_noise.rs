@@ -25,11 +25,11 @@ pub(crate) struct ImageNoise {
 const BYTE_RANGE: [f64; 2] = [0.0, 255.0];
 
 impl ImageNoise {
-    /// Creates the noise model of `cfg` for images every `period` seconds; `None` if `cfg` has no noise.
+    /// Creates the noise model of `cfg` for images every `period` seconds; `None` if [`CameraCfg::noise`] is empty.
     ///
     /// # Errors
     ///
-    /// Invalid noise, or a channel that is given by two names.
+    /// Invalid noise or dropout, or a channel that is given by two names.
     pub(crate) fn new(cfg: &CameraCfg, period: f64) -> Result<Option<Self>, SensorError> {
         let [near, far] = [f64::from(cfg.near as f32), f64::from(cfg.far as f32)];
         // Rays through corners are longer than their depth, depending on the lens. If near and far are along the ray,

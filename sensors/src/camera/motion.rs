@@ -168,7 +168,7 @@ impl Motion {
         }
     }
 
-    /// Makes the next frame of a row its first frame.
+    /// Makes the next frame of a row its first frame, and drops the poses at shutter opening.
     pub(super) fn reset(&mut self, row: usize) {
         if let Some(previous) = self.previous.get_mut(row) {
             previous.view = None;

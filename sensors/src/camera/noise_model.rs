@@ -22,7 +22,8 @@ pub(super) struct SensorNoiseModel {
 }
 
 impl SensorNoiseModel {
-    /// Creates the model that `cfg` describes, with `period` \[s\] between images; `None` for a perfect camera.
+    /// Creates the model that `cfg` describes, with `period` \[s\] between images; `None` for a camera without
+    /// imperfections and without [`CameraCfg::noise`].
     pub(super) fn new(cfg: &CameraCfg, context: &SensorContext, period: f64) -> Result<Option<Self>, SensorError> {
         let noise = ImageNoise::new(cfg, period)?;
         cfg.imperfections.check(cfg.channels)?;

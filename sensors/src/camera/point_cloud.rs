@@ -19,8 +19,9 @@ pub enum PointFrame {
 
 impl Camera {
     /// Returns the point at every pixel of environment `env` \[m\], shape (H, W, 3); (+inf, +inf, +inf) where nothing
-    /// was hit. Points come from the depth along the ray through the pixel center. If rays of the lens do not all go
-    /// forward ([`Lens::is_forward`](kinetoscope_render::lens::Lens::is_forward)), they come from the distance.
+    /// was hit. A point is on the ray through the pixel center, at the measured depth along the optical axis. If rays
+    /// of the lens do not all go forward ([`Lens::is_forward`](kinetoscope_render::lens::Lens::is_forward)), the point
+    /// is at the measured distance.
     ///
     /// # Errors
     ///

@@ -240,7 +240,7 @@ impl Camera {
     }
 
     /// Time of the shown frames \[s\] since the last reset of the environment, shape (N): that of their capture, or of
-    /// a later write to the state.
+    /// a later write to the state; 0 before the first frame.
     pub fn stamps(&self) -> ArrayView1<'_, f64> {
         self.frames.stamps()
     }
@@ -350,7 +350,7 @@ impl Camera {
         Ok(self.lens.view(&self.viewpoints.row(row).pixels, PoseF32::from(&pose)))
     }
 
-    /// The row of an environment.
+    /// The row of an environment; an error for an environment that the camera does not see.
     pub(super) fn row(&self, env: usize) -> Result<usize, SensorError> {
         self.viewpoints.envs.row(env)
     }

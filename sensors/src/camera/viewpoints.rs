@@ -93,7 +93,7 @@ impl Viewpoints {
     }
 
     /// Sets poses of optical frames: one for each of `rows`, or one for all. `world_from_parent` returns the pose of
-    /// the parent of a row, if known.
+    /// the parent of a row, if known; after an error no pose is set.
     pub(crate) fn place(
         &mut self,
         rows: &[usize],
@@ -145,7 +145,7 @@ impl Viewpoints {
     }
 }
 
-/// Returns values for `count` environments: one each, or one for all.
+/// Returns values for `count` environments: one each, or one for all; an error for another number of values.
 pub(crate) fn one_each<'a, T>(
     what: &'static str,
     values: &'a [T],

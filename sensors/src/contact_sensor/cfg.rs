@@ -147,6 +147,7 @@ impl SensorCfg for ContactSensorCfg {
 }
 
 /// Returns the bodies that a filter matches, as indices of the body axis; the length of the axis stands for the world.
+/// A filter that matches nothing, or just the one sensed body, is an error.
 fn filter_group(filter: &str, bodies: &[usize], context: &SensorContext) -> Result<Vec<usize>, SensorError> {
     let world = context.bodies.len();
     let mut names = context.bodies.to_vec();

@@ -61,7 +61,7 @@ impl Sensor for ContactSensor {
         sampler.refresh(env_ids, state, |env, row| read(pairs, air.as_ref(), state, env, row))
     }
 
-    /// Returns 1 if air times are tracked.
+    /// Returns 1 if air times are tracked, else the steps until the next measurement.
     fn due_in(&self, step: &[u64]) -> u64 {
         if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
     }

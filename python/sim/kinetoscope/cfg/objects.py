@@ -272,7 +272,7 @@ class BoxesTerrain:
     """Distance of neighboring points [m]."""
 
     side: float = 0.5
-    """Side of a box [m], with the wall to the next one; rounded to whole cells, at least 2."""
+    """Side of a box [m], with the wall to the next one; rounded to whole cells, of which fewer than 2 are an error."""
 
     range: Sequence[float] = (-0.1, 0.1)
     """Lowest and highest height [m], uniformly distributed."""
@@ -299,10 +299,10 @@ class SteppingStonesTerrain:
     """Distance of neighboring points [m]."""
 
     stone: float = 0.4
-    """Side of a stone [m], rounded to whole cells, at least 1."""
+    """Side of a stone [m], rounded to whole cells; 0 cells are an error."""
 
     distance: float = 0.2
-    """Gap between two stones [m], rounded to whole cells, at least 2."""
+    """Gap between two stones [m], rounded to whole cells, of which fewer than 2 are an error."""
 
     depth: float = 1.0
     """Depth of the ground between the stones [m]."""
@@ -331,7 +331,7 @@ class GapTerrain:
     """Distance of neighboring points [m]."""
 
     width: float = 0.4
-    """Width of the trench [m], rounded to whole cells, at least 2."""
+    """Width of the trench [m], rounded to whole cells, of which fewer than 2 are an error."""
 
     depth: float = 1.0
     """Depth of the trench [m]."""

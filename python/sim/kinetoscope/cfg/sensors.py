@@ -408,7 +408,8 @@ class JointStateCfg:
 
     joints: Sequence[str] | None = None
     """Name patterns of the joints to measure (``uid/joint``, or ``joint`` alone), in the order they are reported;
-    ``None`` measures all. These are the movable joints of robots, and the hinge and slide joints of MJCF files.
+    ``None`` measures all. These are the movable joints of robots and articulations, and the hinge and slide joints of
+    MJCF files.
     """
 
     sampling: SamplingCfg | Mapping[str, Any] = field(default_factory=SamplingCfg)
@@ -423,8 +424,8 @@ class ActuatorStateCfg:
 
     actuators: Sequence[str] | None = None
     """Name patterns of the actuators to measure, in the order they are reported; ``None`` measures all. The drive of a
-    robot joint is named ``uid/joint``, an actuator of an MJCF file ``uid/actuator``. The part after the first slash is
-    enough.
+    joint of a robot or articulation is named ``uid/joint``, an actuator of an MJCF file ``uid/actuator``. The part
+    after the first slash is enough.
     """
 
     sampling: SamplingCfg | Mapping[str, Any] = field(default_factory=SamplingCfg)

@@ -254,7 +254,7 @@ impl BvhBuilder {
         (Bvh { nodes: std::mem::take(&mut self.nodes), root, bounds: around, padded_bounds }, order)
     }
 
-    /// Adds all groups of primitives, which are in this order.
+    /// Adds all groups; `order` holds the indices of their primitives, group by group.
     #[inline(always)]
     fn add_groups<S: Simd>(&mut self, s: S, order: &[u32]) {
         let mut things = [EMPTY; MAX_GROUP];

@@ -129,8 +129,8 @@ impl HeightGrid {
         [low[0], low[1], high[0], high[1]]
     }
 
-    /// Height and slopes (per cell) of one triangle of a cell, right or left of its diagonal. The triangles are those
-    /// of [`kinetoscope_scene::shape::HeightField`].
+    /// Height at the corner (0, 0) of a cell, and slopes (per cell), of the triangle right or left of its diagonal. The
+    /// triangles are those of [`kinetoscope_scene::shape::HeightField`].
     #[inline(always)]
     fn plane(corners: [f64; 4], right: bool) -> [f64; 3] {
         let [a, b, d, e] = corners;

@@ -296,7 +296,8 @@ impl Camera {
     }
 }
 
-/// Returns the ROS distortion model of a lens and its coefficients.
+/// Returns the ROS distortion model of a lens and its coefficients; an error for a lens that `camera_info` has no model
+/// for.
 fn distortion_of(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
     match *lens {
         Lens::Pinhole(_) => Ok((DistortionModel::PlumbBob, vec![0.0; 5])),

@@ -106,7 +106,7 @@ imperfections! {
 }
 
 impl Imperfections {
-    /// Returns true if the camera is perfect.
+    /// Returns true if all fields are `None`.
     pub(crate) fn is_empty(&self) -> bool {
         !self.of_light() && !self.of_depth()
     }

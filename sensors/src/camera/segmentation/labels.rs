@@ -168,7 +168,8 @@ impl Segmentation {
     }
 }
 
-/// Assigns classes to the entities that labels match.
+/// Assigns classes to the entities that labels match. A pattern that matches nothing, and an entity that two match, are
+/// errors.
 fn assign_classes(things: &mut [SegmentedEntity], labels: &[(String, String)]) -> Result<(), SensorError> {
     let names: Vec<String> = things.iter().map(SegmentedEntity::name).collect();
     let objects: Vec<String> = things.iter().map(|thing| thing.object.clone()).collect();

@@ -92,7 +92,7 @@ impl StereoCameraCfg {
     }
 }
 
-/// Returns the baseline \[m\], from P of both cameras.
+/// Returns the baseline \[m\], from P of both cameras; an error if they are not those of a rectified pair.
 fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, CameraError> {
     let wrong = |what, value: f64, expected: String| {
         Err(CameraError::NotAStereoPair { what, value: value.to_string(), expected })
@@ -129,7 +129,8 @@ fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, Camera
     Ok(-right[(0, 3)] / focal)
 }
 
-/// Returns the rotation nearest to a matrix.
+/// Returns the rotation nearest to a matrix; an error if the matrix is more than [`ROTATION_TOLERANCE`] off, or a
+/// mirror.
 fn nearest_rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, CameraError> {
     let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
     let nearest = matrix.svd(true, true);

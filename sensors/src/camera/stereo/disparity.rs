@@ -71,7 +71,7 @@ impl StereoCamera {
         self.left().channels().depth && self.baseline().is_ok()
     }
 
-    /// Returns the x position of the right camera \[m\] if the images are rectified.
+    /// Returns the x position of the right camera from the left one \[m\]; an error if the images are not rectified.
     fn baseline(&self) -> Result<f64, CameraError> {
         self.left().require_pinhole("disparity")?;
         self.right().require_pinhole("disparity")?;

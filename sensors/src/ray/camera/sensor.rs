@@ -24,7 +24,7 @@ use std::fmt;
 /// A camera in every environment that casts one ray per pixel; [`Sampled`] gives the stamps and counts of its images.
 ///
 /// Images are measured when they are due. The first axis of all arrays is the environment. Poses are in the frame of
-/// the environment, lengths in meters. No value is ever NaN.
+/// the environment, lengths in meters. No value is NaN after the first measurement or reset.
 ///
 /// The measured quantity is the distance along the ray of each pixel. Noise of the channel `distances` is added to it,
 /// and depth and points follow, so all three stay on the ray. Noisy distances are from 0 to the largest distance of the

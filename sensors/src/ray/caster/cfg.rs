@@ -77,7 +77,8 @@ pub struct RayCasterCfg {
 }
 
 impl Default for RayCasterCfg {
-    /// A grid of 17 by 11 rays straight down from the origin of the sensor, at all targets except the parent body.
+    /// A grid of 17 by 11 rays straight down from the origin of the sensor, up to 1000 km long, at all instances of
+    /// geom groups 0, 1 and 2 except the parent body.
     fn default() -> Self {
         Self {
             parent: None,

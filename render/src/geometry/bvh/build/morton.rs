@@ -144,8 +144,8 @@ fn find_groups<S: Simd>(s: S, items: &[BuildItem], keys: &mut [u64], first: u32,
     }
 }
 
-/// Groups keys that the remaining bits cannot distinguish: they are sorted along a curve of their own. Happens for
-/// dense details with an outlier far away.
+/// Groups keys that differ in the lowest [`CROWDED_BITS`] bits only: they are sorted along a curve of their own, or cut
+/// every [`MAX_GROUP`] keys if that curve does not separate them. Happens for dense details with an outlier far away.
 #[cold]
 fn group_crowded<S: Simd>(s: S, items: &[BuildItem], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let numbers = || keys.iter().map(|&key| key as u32);

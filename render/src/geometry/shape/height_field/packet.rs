@@ -15,7 +15,8 @@ struct CellLanes<S: Simd> {
 }
 
 impl<S: Simd> CellLanes<S> {
-    /// Packet version of [`HeightGrid::plane`]: height and slopes of the surface right or left of the diagonal.
+    /// Packet version of [`HeightGrid::plane`]: height at the corner (0, 0) and slopes of the triangle right or left of
+    /// the diagonal.
     #[inline(always)]
     fn plane(&self, right: N<S>) -> D3<S> {
         let [a, b, d, e] = self.corners;

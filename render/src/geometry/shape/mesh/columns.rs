@@ -297,7 +297,7 @@ impl Columns {
         (ends, columns)
     }
 
-    /// Triangles in a run of columns of a row.
+    /// Triangles in the columns from `left` to `right`, both included, of a row; one in several columns is repeated.
     #[inline(always)]
     fn list(&self, row: usize, left: usize, right: usize) -> &[u32] {
         let row = row * self.size[0];
