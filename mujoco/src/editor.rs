@@ -223,8 +223,8 @@ impl ModelEditor {
         Ok(())
     }
 
-    /// Updates the mean inertia and the mean mass in `stat`, as 2.2.2 does in mj_setConst; 4.0 keeps those of its
-    /// compiler. The solver scales by the mean inertia.
+    /// On 4.x, updates the mean inertia and the mean mass in `stat`, as 2.2.2 does itself in mj_setConst; 4.0 keeps
+    /// those of its compiler. The solver scales by the mean inertia.
     fn update_means(&mut self) {
         if cfg!(mj4) {
             // SAFETY: the copy is alive, and only `&mut self` writes to it.

@@ -37,7 +37,7 @@ use toml::{Table, Value};
 /// height = 0.3
 /// ```
 ///
-/// Some keys belong to the kind of a term, not to its type:
+/// Some keys belong to the kind of a term, not to its type; image terms have none of them:
 ///
 /// | kind | keys |
 /// |---|---|

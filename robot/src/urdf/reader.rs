@@ -319,7 +319,7 @@ pub(super) fn format_element(node: Node<'_, '_>, attribute: Option<(&str, &str)>
     }
 }
 
-/// Shortens a text to at most 60 characters on one line.
+/// Shortens a text to its first 60 characters, followed by `...` if there are more, on one line.
 fn truncate(text: &str) -> String {
     let mut short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if text.chars().nth(60).is_some() {
