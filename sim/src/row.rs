@@ -239,7 +239,7 @@ impl StoredRow<'_> {
     }
 }
 
-/// Inputs to write to: those of this environment alone, or new ones if other environments share them.
+/// Inputs to write to: those of this environment alone, or new, empty ones if other environments share them.
 fn own<T: Default>(inputs: &mut Arc<T>) -> &mut T {
     if Arc::get_mut(inputs).is_none() {
         *inputs = Arc::default();

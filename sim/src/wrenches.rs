@@ -42,7 +42,7 @@ pub(crate) struct Wrench {
 /// [`SceneViewMut::set_point_forces`](crate::SceneViewMut::set_point_forces).
 const USER_FORCE_OWNER: usize = MAX_ROBOTS;
 
-/// All external wrenches and weightless bodies of one environment.
+/// All external wrenches and gravity-compensated bodies of one environment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wrenches {
     pub(crate) list: Vec<Wrench>,
@@ -99,7 +99,7 @@ impl Wrenches {
         }
     }
 
-    /// Flat array: the number of wrenches, 14 numbers per wrench, then the weightless bodies.
+    /// Flat array: the number of wrenches, 14 numbers per wrench, then the gravity-compensated bodies.
     pub(crate) fn to_flat(&self) -> Vec<f64> {
         let mut numbers = vec![self.list.len() as f64];
         for Wrench { owner, body, axes, force, torque } in &self.list {

@@ -216,7 +216,8 @@ impl<'a> Robot<'a> {
         FreeBody { simulation: self.simulation, index: self.indexing().root }
     }
 
-    /// Pose of a link, fused links included, in the environment: rows `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
+    /// Pose of a link, fused links included, in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape
+    /// (N, 7).
     ///
     /// # Errors
     /// The link does not exist; the error lists the nearest names.
