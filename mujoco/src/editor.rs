@@ -239,8 +239,8 @@ impl ModelEditor {
         }
     }
 
-    /// Returns the edited model with the buffer sizes of `like`, which must come from the same compilation as this
-    /// editor.
+    /// Returns the edited model with the buffer sizes and, except for gravity, the options of `like`, which must come
+    /// from the same compilation as this editor.
     ///
     /// # Panics
     /// `like` comes from another compilation.

@@ -234,7 +234,8 @@ fn symmetric_part(m: &Matrix3<f64>) -> Matrix3<f64> {
 /// Eigenvalues, largest first, and the rotation whose columns are their eigenvectors.
 ///
 /// Cyclic Jacobi rotations: the vectors stay orthonormal to rounding whatever the eigenvalues, equal ones included, and
-/// small eigenvalues keep their relative accuracy. Source: Golub, Van Loan, Matrix Computations, 4th edition, 8.5.
+/// small eigenvalues keep their relative accuracy. Source: Golub, Van Loan, Matrix Computations, 4th edition, 8.5. A
+/// matrix of zeros or subnormal numbers gives its unsorted diagonal and no rotation.
 fn sorted_eigen(symmetric: &Matrix3<f64>) -> (Vector3<f64>, UnitQuaternion<f64>) {
     // A power of two, so that scaling does not round; without it, products of entries near 1e-160 vanish.
     let scale = symmetric.amax().log2().floor().exp2();

@@ -55,7 +55,7 @@ impl IkSolver {
     ///
     /// # Errors
     /// The chain has no variable, or one that does not move its frame. The length of `limits` differs from the number
-    /// of variables, a lower limit exceeds the upper one, or `cfg` is invalid.
+    /// of variables, no finite position lies within a pair of limits, or `cfg` is invalid.
     pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
         let joints = limits.len();
         if chain.variables() > joints {

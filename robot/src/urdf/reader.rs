@@ -63,8 +63,9 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// The text with commas replaced by spaces if that gives `count` numbers (2 or more); otherwise `None`, as in
-    /// strict reading. Commas must stand beside spaces, or the text must have no spaces: `0,5 0 0` has a decimal comma.
+    /// The text with its commas replaced by spaces if that gives `count` numbers (2 or more); `None` otherwise, without
+    /// commas, and in strict reading. Commas must stand beside spaces, or the text must have no spaces: `0,5 0 0` has a
+    /// decimal comma.
     fn without_commas(&self, node: Node<'_, '_>, attribute: &str, text: &str, count: usize) -> Option<String> {
         let beside_space = |word: &str| word.trim_matches(',').contains(',');
         if self.strictness == Strictness::Strict || !text.contains(',') {

@@ -130,7 +130,7 @@ fn body_name(model: &Model, body: usize) -> String {
 }
 
 /// Assigns a mask id to each body with geoms, and to each visible tendon, skin and flex and each geom of the world.
-/// With `sites`, bodies with sites only and sites of the world have mask ids as well.
+/// With `sites`, bodies with visible sites but no geoms, and visible sites of the world, have mask ids as well.
 pub(super) fn by_body(model: &Model, sites: bool) -> MaskIdMap {
     let mut table: Vec<MaskId> = Vec::new();
     let mut of_body = vec![0; model.nbody()];
