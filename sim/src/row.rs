@@ -86,7 +86,7 @@ impl EnvRow {
         }
     }
 
-    /// Prefetches the arrays that this row does not share with other rows, without waiting for them.
+    /// Prefetches the arrays that rows never share, without waiting for them.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(self.motion.values());
         mj::prefetch(self.solved.values());

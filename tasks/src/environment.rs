@@ -84,7 +84,7 @@ impl Env {
 
     /// The simulation, to serve, record or change it between steps.
     ///
-    /// The next step starts from a state that is written here. If the simulation is reset here or by a viewer, the next
+    /// The next step starts from a state that is written to it. If it is reset, by the caller or by a viewer, the next
     /// step ends the episode ([`EndReason::Reset`](crate::EndReason::Reset)), and a new one begins as
     /// [`EnvCfg::autoreset`] says. To begin a new episode at once, call [`reset`](Self::reset).
     pub fn sim_mut(&mut self) -> &mut SimulationManager {

@@ -198,7 +198,7 @@ impl DatasetWriter for LeRobotWriter {
         Ok(buffer.push(&frame, &self.disk)?)
     }
 
-    /// Writes the Parquet file of the open episode of `env`, if any.
+    /// Writes the Parquet file of the open episode of `env`, if any; `env` counts the recorded environments.
     fn end(&mut self, env: usize) -> WriteResult {
         let Some(buffer) = self.open_episodes[env].take() else { return Ok(()) };
         let (episode, first) = (self.episodes.len() as u64, self.episodes.iter().sum());

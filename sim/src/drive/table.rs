@@ -204,7 +204,7 @@ impl DriveState {
         state
     }
 
-    /// Prefetches the arrays that this environment does not share, without waiting for them.
+    /// Prefetches the arrays that environments never share, without waiting for them.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(&self.position);
         mj::prefetch(&self.effort);

@@ -420,7 +420,8 @@ impl<'a> RobotMut<'a> {
         FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner: self.data.uid() }
     }
 
-    /// Changes the state of each selected environment joint by joint, with one forward pass each.
+    /// Changes the state of each selected environment joint by joint, in one write each, and refreshes the sensors.
+    /// `change` gets the index of the joint in the robot.
     pub(super) fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write_at(env, Stage::Raw, |env| {

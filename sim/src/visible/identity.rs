@@ -82,7 +82,7 @@ impl DeformingElement {
     }
 }
 
-/// Mask id and owner of a rendered element.
+/// Mask id, name and sensor body of a rendered element.
 #[derive(Clone, Debug)]
 pub(super) struct ElementIdentity {
     pub(super) mask_id: i32,
@@ -94,7 +94,7 @@ pub(super) struct ElementIdentity {
 }
 
 impl MaskIdMap {
-    /// Mask id and owner of a geom.
+    /// Mask id, name and sensor body of a geom.
     pub(super) fn of(&self, geom: usize) -> &ElementIdentity {
         &self.of_geom[geom]
     }
