@@ -75,8 +75,8 @@ impl TaskCfg {
     /// Reads a task from TOML.
     ///
     /// # Errors
-    /// The text is not TOML, or has an unknown key; the error has its line. Types and numbers of terms are checked when
-    /// the task is built.
+    /// The text is not TOML, or has an unknown key or a value of a wrong type; the error has its line. Types and
+    /// numbers of terms are checked when the task is built.
     pub fn from_toml(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(|error| EnvError::TaskText { place: "task".into(), error: error.to_string() })
     }

@@ -58,7 +58,7 @@ struct LeRobotWriter {
     fps: u64,
     task: String,
     features: Arc<Features>,
-    /// Frames of the present episode of each environment.
+    /// Frames of the present episode of each recorded environment; `None` without an episode.
     open_episodes: Vec<Option<EpisodeBuffer>>,
     /// Number of frames of each complete episode, in the order of their ends.
     episodes: Vec<u64>,
