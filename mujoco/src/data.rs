@@ -251,7 +251,7 @@ impl Data {
         }
     }
 
-    /// True if the state contains a number that MuJoCo's step rejects: not finite, or above 1e10 in magnitude.
+    /// True if `qpos` or `qvel` contains a number that MuJoCo's step rejects: not finite, or above 1e10 in magnitude.
     pub fn has_bad_state(&self) -> bool {
         // MuJoCo's mjMAXVAL. The comparison is false for NaN.
         const MAX: f64 = mj::mjMAXVAL;

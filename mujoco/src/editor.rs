@@ -223,8 +223,8 @@ impl ModelEditor {
         Ok(())
     }
 
-    /// Updates the mean inertia and the mean mass in `stat`, as 2.2.2 does in mj_setConst; 4.0 keeps those of its
-    /// compiler. The solver scales by the mean inertia.
+    /// On 4.x, updates the mean inertia and the mean mass in `stat`, as 2.2.2 does itself in mj_setConst; 4.0 keeps
+    /// those of its compiler. The solver scales by the mean inertia.
     fn update_means(&mut self) {
         if cfg!(mj4) {
             // SAFETY: the copy is alive, and only `&mut self` writes to it.
@@ -239,8 +239,8 @@ impl ModelEditor {
         }
     }
 
-    /// Returns the edited model with the buffer sizes of `like`, which must come from the same compilation as this
-    /// editor.
+    /// Returns the edited model with the buffer sizes and, except for gravity, the options of `like`, which must come
+    /// from the same compilation as this editor.
     ///
     /// # Panics
     /// `like` comes from another compilation.

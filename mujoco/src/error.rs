@@ -69,7 +69,7 @@ fn includes(file: &std::path::Path) -> bool {
     std::fs::read_to_string(file).is_ok_and(|text| text.contains("<include"))
 }
 
-/// Hint for a name that 2.2.2 does not support: a newer MuJoCo may support it.
+/// Hint for a name that 2.2.2 does not support: a newer MuJoCo may support it. Empty on 4.x and for other messages.
 fn newer_version_hint(message: &str) -> String {
     if BUILD_VERSION != SupportedVersion::V2 {
         return String::new();

@@ -7,14 +7,14 @@ fn keyword(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
     list.iter().find(|(known, _)| *known as i32 == code).map(|(_, word)| *word)
 }
 
-/// Keyword of a joint type.
+/// Keyword of a joint type; `None` for other codes.
 pub fn joint(code: i32) -> Option<&'static str> {
     let list =
         [(mj::mjJNT_FREE, "free"), (mj::mjJNT_BALL, "ball"), (mj::mjJNT_SLIDE, "slide"), (mj::mjJNT_HINGE, "hinge")];
     keyword(&list, code)
 }
 
-/// Keyword of a geom or site type, and the number of values in its `size` attribute.
+/// Keyword of a geom or site type, and the number of values in its `size` attribute; `None` for other codes.
 pub fn geom(code: i32) -> Option<(&'static str, usize)> {
     let list = [
         (mj::mjGEOM_PLANE, "plane", 3),
@@ -29,7 +29,7 @@ pub fn geom(code: i32) -> Option<(&'static str, usize)> {
     list.into_iter().find(|(known, _, _)| *known as i32 == code).map(|(_, word, sizes)| (word, sizes))
 }
 
-/// Keyword of the tracking mode of a camera or light.
+/// Keyword of the tracking mode of a camera or light; `None` for other codes.
 pub fn tracking_mode(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjCAMLIGHT_FIXED, "fixed"),
@@ -41,7 +41,7 @@ pub fn tracking_mode(code: i32) -> Option<&'static str> {
     keyword(&list, code)
 }
 
-/// Keyword of an equality type.
+/// Keyword of an equality type; `None` for other codes.
 pub fn equality(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjEQ_CONNECT, "connect"),
@@ -78,7 +78,7 @@ pub fn wrap_type(code: i32) -> Option<WrapType> {
     list.into_iter().find(|(known, _)| *known as i32 == code).map(|(_, point)| point)
 }
 
-/// Attribute that names the target of an actuator's transmission, such as `joint`.
+/// Attribute that names the target of an actuator's transmission, such as `joint`; `None` for other codes.
 pub fn transmission(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjTRN_JOINT, "joint"),
@@ -91,7 +91,7 @@ pub fn transmission(code: i32) -> Option<&'static str> {
     keyword(&list, code)
 }
 
-/// Keyword of the activation dynamics of an actuator.
+/// Keyword of the activation dynamics of an actuator; `None` for other codes.
 pub fn dynamics(code: i32) -> Option<&'static str> {
     #[cfg(mj4)]
     if code == mj::mjDYN_FILTEREXACT as i32 {
@@ -106,20 +106,20 @@ pub fn dynamics(code: i32) -> Option<&'static str> {
     keyword(&list, code)
 }
 
-/// Keyword of the gain of an actuator.
+/// Keyword of the gain of an actuator; `None` for other codes.
 pub fn gain(code: i32) -> Option<&'static str> {
     let list = [(mj::mjGAIN_FIXED, "fixed"), (mj::mjGAIN_AFFINE, "affine"), (mj::mjGAIN_MUSCLE, "muscle")];
     keyword(&list, code)
 }
 
-/// Keyword of the bias of an actuator.
+/// Keyword of the bias of an actuator; `None` for other codes.
 pub fn bias(code: i32) -> Option<&'static str> {
     let list = [(mj::mjBIAS_NONE, "none"), (mj::mjBIAS_AFFINE, "affine"), (mj::mjBIAS_MUSCLE, "muscle")];
     keyword(&list, code)
 }
 
-/// Keyword of the kind of object that a sensor observes. MuJoCo's `body` is the frame at the center of mass, `xbody`
-/// the body's own frame.
+/// Keyword of the kind of object that a sensor observes; `None` for other codes. MuJoCo's `body` is the frame at the
+/// center of mass, `xbody` the body's own frame.
 pub fn object_type(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjOBJ_BODY, "body"),

@@ -56,8 +56,8 @@ pub struct RecorderCfg {
 }
 
 impl RecorderCfg {
-    /// Creates a configuration that records everything that the format supports, in all environments: states at every
-    /// physics step, sensors whenever they measure.
+    /// Creates a configuration that records [`Topic::Everything`] in all environments: states at every physics step,
+    /// sensors whenever they measure.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), ..Self::default() }
     }

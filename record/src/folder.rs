@@ -20,7 +20,7 @@ pub(crate) struct PartialFolder {
 }
 
 impl PartialFolder {
-    /// Creates the folder, and the file `marker` in it, which is locked while the recorder exists.
+    /// Creates the partial folder, and the file `marker` in it, which is locked while the recorder exists.
     ///
     /// # Errors
     /// The folder or its partial folder exists and is not empty, another recorder writes it, or it cannot be created.

@@ -15,8 +15,8 @@ pub enum Format {
     Mcap,
     /// NumPy archive: arrays (T, N, ...), one for each field, and their times. A killed process leaves no data.
     Npz,
-    /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters (0 for a miss), and
-    /// `times.csv` with their times. Other channels are not supported.
+    /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters (0 for a miss, 65535 from
+    /// 65.535 m on), and `times.csv` with their times. Other channels are not supported.
     Images,
     /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode. An episode lasts from one reset
     /// of an environment to the next. Frames are the rows of the recording, from the first complete one on. Their rate
@@ -24,7 +24,8 @@ pub enum Format {
     LeRobot,
     /// Animated GIF of the color of one camera in one environment: 256 colors per frame, times in 1/100 s.
     Gif,
-    /// MP4 video of the same: H.264 with 4:2:0 chroma subsampling. Width and height must be even.
+    /// MP4 video of the color of one camera in one environment: H.264 with 4:2:0 chroma subsampling. Width and height
+    /// must be even.
     Mp4,
 }
 

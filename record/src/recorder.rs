@@ -322,8 +322,8 @@ impl Recorder {
         })
     }
 
-    /// Records the due streams, and the state streams of environments `changed_envs`. With the `result` of a step of a
-    /// task, records only that result.
+    /// Records the due streams, the state streams of environments `changed_envs`, and changed scenes. With the `result`
+    /// of a step of a task, that result is the only stream.
     fn record_due(
         &mut self,
         sim: &mut SimulationManager,

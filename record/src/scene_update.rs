@@ -179,6 +179,7 @@ impl SceneTracker {
     }
 
     /// Returns updates for those of `envs` that are recorded and whose appearance has changed since their last message.
+    /// Those that exceed the limit for all messages are left out and listed.
     ///
     /// # Errors
     /// There is no such environment.

@@ -14,8 +14,8 @@ pub struct StreamSchema {
     pub element_type: ElementType,
     /// Fields, in their order in a row.
     pub fields: Vec<StreamField>,
-    /// Recorded environments, in ascending order; for the overview image and for animations of all topics, only the
-    /// first one. A row has the values of one environment.
+    /// Recorded environments, in ascending order: for a camera, those that it observes; for the overview image and for
+    /// animations of all topics, only the first one. A row has the values of one environment.
     pub env_ids: Vec<usize>,
 }
 

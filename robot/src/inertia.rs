@@ -174,7 +174,7 @@ impl RigidInertia {
     /// [`check`](Self::check) finds no fault, the mass properties are unchanged and the sentence is empty.
     ///
     /// 1. Numbers that are not finite become 0; the tensor becomes its symmetric part.
-    /// 2. A mass that is not positive becomes 1e-6 kg; the inertia stays (a rotor given by its inertia alone).
+    /// 2. A mass below 1e-15 kg becomes 1e-6 kg; the inertia stays (a rotor given by its inertia alone).
     /// 3. Principal axes are kept. A second moment of the mass (module documentation) below the floor `f = max(m t²/12,
     ///    1e-12 kg m², 1e-9 of the largest)`, t = 1 mm, becomes f: the body is at least as thick as a sheet of 1 mm.
     ///    For a violated triangle inequality A + B < C this adds `(C - A - B)/2 + f` to A and to B and leaves C
@@ -234,7 +234,8 @@ fn symmetric_part(m: &Matrix3<f64>) -> Matrix3<f64> {
 /// Eigenvalues, largest first, and the rotation whose columns are their eigenvectors.
 ///
 /// Cyclic Jacobi rotations: the vectors stay orthonormal to rounding whatever the eigenvalues, equal ones included, and
-/// small eigenvalues keep their relative accuracy. Source: Golub, Van Loan, Matrix Computations, 4th edition, 8.5.
+/// small eigenvalues keep their relative accuracy. Source: Golub, Van Loan, Matrix Computations, 4th edition, 8.5. A
+/// matrix of zeros or subnormal numbers gives its unsorted diagonal and no rotation.
 fn sorted_eigen(symmetric: &Matrix3<f64>) -> (Vector3<f64>, UnitQuaternion<f64>) {
     // A power of two, so that scaling does not round; without it, products of entries near 1e-160 vanish.
     let scale = symmetric.amax().log2().floor().exp2();

@@ -5,7 +5,7 @@
 //! and solved on machines without it.
 //!
 //! ```text
-//! URDF files -> UrdfFile -> RobotDescription -> kinematics::Chain, dynamics::Kinematics
+//! URDF files -> UrdfFile -> RobotDescription -> kinematics::Chain, dynamics::Dynamics
 //!  urdf::parse  urdf::merge  description
 //! ```
 //!

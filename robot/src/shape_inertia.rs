@@ -206,10 +206,10 @@ fn complete_partial(
 
 /// Replaces implausible inertias by those of the shapes.
 ///
-/// If the whole body is invalid, an inertia that is not positive definite is replaced. An inertia that violates the
-/// triangle inequality, or that belongs to a body that moves freely, is replaced if its radius of gyration is too large
-/// for the shapes (see [`MAX_GYRATION_RATIO`]). On a body behind a joint such a large inertia is kept, with a warning:
-/// it may include the rotor of a gear.
+/// If the whole body is invalid, an inertia that is not positive definite is replaced, and so is one that violates the
+/// triangle inequality and whose radius of gyration is too large for the shapes (see [`MAX_GYRATION_RATIO`]). On a body
+/// that moves freely, a valid inertia with such a radius is replaced, too. On a body behind a joint it is kept, with a
+/// warning: it may include the rotor of a gear. Links that would be denser than [`MAX_PLAUSIBLE_DENSITY`] are left out.
 fn replace_implausible_inertias(
     description: &mut RobotDescription,
     body: &RigidBody,
@@ -402,7 +402,7 @@ fn solid_inertia(geometry: &Geometry, hulls: &mut HullSet<'_>) -> Option<(RigidI
     })
 }
 
-/// Formats a number with four digits, for messages.
+/// Formats a number with up to four significant digits, for messages.
 fn format_short(number: f64) -> String {
     if number == 0.0 {
         "0".to_owned()

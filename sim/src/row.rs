@@ -86,7 +86,7 @@ impl EnvRow {
         }
     }
 
-    /// Prefetches the arrays that this row does not share with other rows, without waiting for them.
+    /// Prefetches the arrays that rows never share, without waiting for them.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(self.motion.values());
         mj::prefetch(self.solved.values());
@@ -239,7 +239,7 @@ impl StoredRow<'_> {
     }
 }
 
-/// Inputs to write to: those of this environment alone, or new ones if other environments share them.
+/// Inputs to write to: those of this environment alone, or new, empty ones if other environments share them.
 fn own<T: Default>(inputs: &mut Arc<T>) -> &mut T {
     if Arc::get_mut(inputs).is_none() {
         *inputs = Arc::default();

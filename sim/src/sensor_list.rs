@@ -122,7 +122,7 @@ impl SensorList {
         self.entries.iter().fold(StateFields::NONE, |sum, e| sum | e.requires)
     }
 
-    /// Checks that the name `uid` is free and usable, and that the needed quantities are available.
+    /// Checks that no sensor has the name `uid`, that it is usable, and that the needed quantities are available.
     pub(crate) fn check(&self, uid: &str, requires: StateFields) -> Result<()> {
         if self.entries.iter().any(|e| e.uid == uid) {
             return Err(Error::DuplicateUid(uid.into()));
@@ -283,7 +283,7 @@ impl SensorList {
         markers.flat_map(|(env, markers)| markers.into_iter().map(move |marker| (EnvId(env), marker))).collect()
     }
 
-    /// The same markers, grouped by environment.
+    /// Markers as in [`markers`](Self::markers), grouped by environment.
     fn markers_except(&self, simulation: &Simulation, own: Option<usize>) -> Vec<Vec<Marker>> {
         let others = self.entries.iter().enumerate().filter(|(index, entry)| entry.debug_vis && Some(*index) != own);
         let shown: Vec<&dyn Sensor> = others.filter_map(|(_, entry)| entry.slot.as_ref().ok()?.sensor().ok()).collect();

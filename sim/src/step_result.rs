@@ -10,7 +10,7 @@ use ndarray::Array1;
 pub struct StepResult {
     /// Rewards, shape (N,).
     pub rewards: Array1<f64>,
-    /// True if the episode ended by success or failure of the task, shape (N,).
+    /// True if the episode ended by success or failure of the task, or by divergence, shape (N,).
     pub terminated: Array1<bool>,
     /// True if the episode was cut off, by a time limit or from outside, shape (N,).
     pub truncated: Array1<bool>,

@@ -95,7 +95,7 @@ impl SurfaceCfg {
         Ok(())
     }
 
-    /// Returns `material` with all values that are set here.
+    /// Returns `material` with all values that are set here. A shininess without a roughness removes its roughness.
     pub(crate) fn apply_to(&self, mut material: Material) -> Material {
         let set = |to: &mut f32, value: Option<f64>| {
             if let Some(value) = value {

@@ -42,11 +42,11 @@ pub(crate) struct Wrench {
 /// [`SceneViewMut::set_point_forces`](crate::SceneViewMut::set_point_forces).
 const USER_FORCE_OWNER: usize = MAX_ROBOTS;
 
-/// All external wrenches and weightless bodies of one environment.
+/// All external wrenches and gravity-compensated bodies of one environment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wrenches {
     pub(crate) list: Vec<Wrench>,
-    /// Bodies with compensated gravity.
+    /// Bodies with compensated gravity: indices in the model.
     pub(crate) gravity_compensated: Vec<usize>,
 }
 
@@ -69,7 +69,8 @@ impl Wrenches {
         }
     }
 
-    /// Sets the wrench of user forces on a body, beside other wrenches; a zero wrench removes it.
+    /// Sets the wrench of user forces on a body, in world axes, beside other wrenches; a zero wrench removes it. `body`
+    /// is the index on the body axis, `mujoco_body` the index in the model.
     pub(crate) fn set_user_wrench(
         &mut self,
         body: usize,
@@ -80,7 +81,7 @@ impl Wrenches {
         self.replace(Wrench { owner: (USER_FORCE_OWNER, body), body: mujoco_body, axes: None, force, torque });
     }
 
-    /// Enables or disables gravity compensation of bodies.
+    /// Enables or disables gravity compensation of bodies, by their indices in the model.
     pub(crate) fn set_gravity_compensation(&mut self, bodies: &[usize], weightless: bool) {
         self.gravity_compensated.retain(|body| !bodies.contains(body));
         if weightless {
@@ -99,7 +100,7 @@ impl Wrenches {
         }
     }
 
-    /// Flat array: the number of wrenches, 14 numbers per wrench, then the weightless bodies.
+    /// Flat array: the number of wrenches, 14 numbers per wrench, then the gravity-compensated bodies.
     pub(crate) fn to_flat(&self) -> Vec<f64> {
         let mut numbers = vec![self.list.len() as f64];
         for Wrench { owner, body, axes, force, torque } in &self.list {
@@ -126,8 +127,7 @@ impl Wrenches {
         Some(Self { list, gravity_compensated: weightless.iter().map(|&body| body as usize).collect() })
     }
 
-    /// Writes the wrenches and the gravity compensation to `data`. Bodies that are not listed here keep their
-    /// `xfrc_applied`.
+    /// Writes the wrenches and the gravity compensation to `data`. Bodies without either keep their `xfrc_applied`.
     pub(crate) fn apply(&self, data: &mut Data) {
         self.clear(data);
         for wrench in &self.list {
@@ -143,7 +143,7 @@ impl Wrenches {
         }
     }
 
-    /// Clears `xfrc_applied` of all bodies that are listed here.
+    /// Clears `xfrc_applied` of all bodies with a wrench or gravity compensation.
     pub(crate) fn clear(&self, data: &mut Data) {
         for &body in self.list.iter().map(|wrench| &wrench.body).chain(&self.gravity_compensated) {
             data.xfrc_applied_mut()[6 * body..6 * body + 6].fill(0.0);

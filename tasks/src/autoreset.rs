@@ -14,9 +14,9 @@ use std::str::FromStr;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum AutoresetMode {
-    /// The step after the end of an episode begins the next one, and does nothing else in this environment
-    /// (`NEXT_STEP`). Its action is ignored, its reward is 0, and no episode ends in it. Its observation is the first
-    /// one of the new episode. The step in which the episode ended returns the last observation of that episode.
+    /// The step after the end of an episode only begins the next one (`NEXT_STEP`): its action is ignored, the reset
+    /// discards its physics steps, its reward is 0, and no episode ends in it. Its observation is the first one of the
+    /// new episode. The step in which the episode ended returns the last observation of that episode.
     NextStep,
     /// The step in which an episode ends also begins the next one (`SAME_STEP`). Its observation is the first one of
     /// the new episode; the last one of the old episode is in

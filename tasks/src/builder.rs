@@ -141,7 +141,7 @@ impl EnvBuilder {
     /// Checks the configuration and the terms, as [`build`](Self::build) does.
     ///
     /// # Errors
-    /// The errors of [`build`](Self::build), except those of events and of the initial numbers of curricula.
+    /// The errors of [`build`](Self::build), except failures of startup events and of the initial numbers of curricula.
     pub fn check(&self) -> Result<()> {
         self.spaces().map(drop)
     }

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnvCfg {
-    /// Physics steps in one step of the task.
+    /// Physics steps in one step of the task, at least 1.
     pub decimation: u32,
-    /// Steps of the task after which an episode is truncated; `None` for no limit.
+    /// Steps of the task after which an episode is truncated, at least 1; `None` for no limit.
     pub episode_steps: Option<u64>,
     /// Time at which an environment whose episode ended begins the next one.
     pub autoreset: AutoresetMode,

@@ -28,8 +28,9 @@ pub struct CommandTerm {
 }
 
 impl CommandTerm {
-    /// Creates a term with named columns. `sample` returns the values for one episode of one environment. A value that
-    /// is not finite is an error of the reset or step that draws it.
+    /// Creates a term with named columns. `sample` draws the values of one environment: when an episode begins, and
+    /// again with [`resampled_every`](Self::resampled_every). A value that is not finite is an error of that reset or
+    /// step.
     pub fn new<const K: usize>(
         name: impl Into<String>,
         columns: [&str; K],

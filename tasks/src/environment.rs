@@ -84,9 +84,9 @@ impl Env {
 
     /// The simulation, to serve, record or change it between steps.
     ///
-    /// The next step starts from a state that is written here. If the simulation is reset here or by a viewer, the next
-    /// step ends the episode ([`EndReason::Reset`](crate::EndReason::Reset)) and begins a new one. To begin a new episode at once, call
-    /// [`reset`](Self::reset).
+    /// The next step starts from a state that is written to it. If it is reset, by the caller or by a viewer, the next
+    /// step ends the episode ([`EndReason::Reset`](crate::EndReason::Reset)), and a new one begins as
+    /// [`EnvCfg::autoreset`] says. To begin a new episode at once, call [`reset`](Self::reset).
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.state.sim
     }
@@ -160,7 +160,8 @@ impl Env {
     }
 
     /// Sets the numbers of the curriculum term called `name`, shape (N,): those that
-    /// [`TermContext::curriculum`] returned in an earlier run, to continue it. They take effect at the next resets.
+    /// [`TermContext::curriculum`] returned in an earlier run, to continue it. Terms read them from now on, reset
+    /// events from the next reset on.
     ///
     /// # Errors
     /// There is no such term, the array has another length than N, or a number is not finite. Nothing is changed then.

@@ -37,7 +37,7 @@ use toml::{Table, Value};
 /// height = 0.3
 /// ```
 ///
-/// Some keys belong to the kind of a term, not to its type:
+/// Some keys belong to the kind of a term, not to its type; image terms have none of them:
 ///
 /// | kind | keys |
 /// |---|---|
@@ -75,8 +75,8 @@ impl TaskCfg {
     /// Reads a task from TOML.
     ///
     /// # Errors
-    /// The text is not TOML, or has an unknown key; the error has its line. Types and numbers of terms are checked when
-    /// the task is built.
+    /// The text is not TOML, or has an unknown key or a value of a wrong type; the error has its line. Types and
+    /// numbers of terms are checked when the task is built.
     pub fn from_toml(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(|error| EnvError::TaskText { place: "task".into(), error: error.to_string() })
     }

@@ -149,13 +149,13 @@ pub fn relative_joint_positions(
     }))
 }
 
-/// A reward of 1, times `weight`, in every step, including the last one of an episode.
+/// A reward of 1, times `weight`, in every step of an episode, including the last one.
 pub fn is_alive(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now| Ok(Array1::ones(now.num_envs())))
 }
 
 /// Sum over all action columns of the squared changes since the previous step; the first step of an episode is compared
-/// with 0.
+/// with 0. A penalty needs a negative `weight`.
 pub fn action_rate(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now: &TermContext<'_>| -> TermResult<Array1<f64>> {
         let change = &now.actions() - &now.previous_actions();

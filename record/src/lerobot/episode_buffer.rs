@@ -62,8 +62,8 @@ impl EpisodeBuffer {
         Ok(())
     }
 
-    /// Passes the frames to `take` in their order, then deletes the file. Each frame has this number of values and of
-    /// images.
+    /// Passes the frames to `take` in their order, then deletes the file. Each frame has `values` numbers and
+    /// `images` images.
     pub(super) fn drain<E: From<io::Error>>(
         mut self,
         values: usize,

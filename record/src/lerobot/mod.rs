@@ -58,7 +58,7 @@ struct LeRobotWriter {
     fps: u64,
     task: String,
     features: Arc<Features>,
-    /// Frames of the present episode of each environment.
+    /// Frames of the present episode of each recorded environment; `None` without an episode.
     open_episodes: Vec<Option<EpisodeBuffer>>,
     /// Number of frames of each complete episode, in the order of their ends.
     episodes: Vec<u64>,
@@ -198,7 +198,7 @@ impl DatasetWriter for LeRobotWriter {
         Ok(buffer.push(&frame, &self.disk)?)
     }
 
-    /// Writes the Parquet file of the open episode of `env`, if any.
+    /// Writes the Parquet file of the open episode of `env`, if any; `env` counts the recorded environments.
     fn end(&mut self, env: usize) -> WriteResult {
         let Some(buffer) = self.open_episodes[env].take() else { return Ok(()) };
         let (episode, first) = (self.episodes.len() as u64, self.episodes.iter().sum());

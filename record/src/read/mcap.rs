@@ -101,8 +101,9 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         known: BTreeSet<String>,
         /// The last message, if it was readable.
         last: Option<Value>,
-        /// Number of unreadable messages, and number of the first, counted from 1.
+        /// Number of unreadable messages.
         unread: u64,
+        /// Number of the first unreadable message, counted from 1; 0 without one.
         first_unread: u64,
     }
     let mut all: BTreeMap<String, TopicScan> = BTreeMap::new();

@@ -83,8 +83,8 @@ pub(super) fn topics(archive: &RecordedArrays) -> Result<Vec<RecordedTopic>> {
     Ok(topics)
 }
 
-/// Reads the selected numbers. Skips rows in which an environment repeats its last time, because they have no new
-/// value.
+/// Reads the selected numbers. Skips rows in which an environment repeats its last time without an event, because they
+/// have no new value.
 pub(super) fn samples(archive: &RecordedArrays, wanted: &[FieldSelector]) -> Result<Vec<TimeSeries>> {
     let streams = streams(archive);
     let mut samples = Vec::with_capacity(wanted.len());

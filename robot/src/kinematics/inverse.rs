@@ -10,14 +10,15 @@ use std::f64::consts::{PI, TAU};
 /// Inverse-kinematics solver of a [`Chain`]. Solves can be repeated and allocate no memory.
 ///
 /// A solve descends by damped least squares within the limits. It starts from the initial positions, then from random
-/// positions, until one start reaches the target. Random starts are uniform within the limits; for revolute joints, at
-/// most half a turn from the middle of their limits. Without limits they are uniform about the initial position. The
-/// error is weighted as if the chain's [`reach`](Chain::reach) were two radians. Among positions that differ by full
-/// turns and are within the limits, the result is the one nearest to the posture, or to the initial positions if there
-/// is no posture.
+/// positions, until one start reaches the target. Random starts are uniform within the limits; for a joint whose full
+/// turns leave the frame unchanged, at most half a turn from the middle of its limits. A joint with an infinite limit
+/// starts within half a turn about its initial position, or, if full turns move the frame, within the chain's
+/// [`reach`](Chain::reach) \[rad or m\]. The error is weighted as if that reach were two radians. Among positions that
+/// differ by full turns and are within the limits, the result is the one nearest to the posture, or to the initial
+/// positions if there is no posture.
 ///
-/// A solve takes at most `num_seeds * max_iterations` steps, and some more to refine the result. A target that is not
-/// reached uses all starts.
+/// A solve takes at most `num_seeds * max_iterations` steps, then at most 4 to refine a reached target, or at most `8 *
+/// max_iterations` for a missed one, and those toward the posture. A target that is not reached uses all starts.
 #[derive(Clone, Debug)]
 pub struct IkSolver {
     chain: Chain,
@@ -54,7 +55,7 @@ impl IkSolver {
     ///
     /// # Errors
     /// The chain has no variable, or one that does not move its frame. The length of `limits` differs from the number
-    /// of variables, a lower limit exceeds the upper one, or `cfg` is invalid.
+    /// of variables, no finite position lies within a pair of limits, or `cfg` is invalid.
     pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
         let joints = limits.len();
         if chain.variables() > joints {

@@ -22,8 +22,8 @@ impl NameRegistry {
         Self { what, case, used: HashMap::new(), next: HashMap::new() }
     }
 
-    /// Returns a unique name: with the prefix and in the right case, then with the component's name in front, then with
-    /// `_2`, `_3`...
+    /// Returns a unique name, in the right case: with the prefix; if that is used, with the component's name instead of
+    /// the prefix; if that is used, too, with `_2`, `_3`... at the end. Adds a warning if the first was used.
     pub(super) fn claim(
         &mut self,
         name: &str,

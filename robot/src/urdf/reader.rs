@@ -63,8 +63,9 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// The text with commas replaced by spaces if that gives `count` numbers (2 or more); otherwise `None`, as in
-    /// strict reading. Commas must stand beside spaces, or the text must have no spaces: `0,5 0 0` has a decimal comma.
+    /// The text with its commas replaced by spaces if that gives `count` numbers (2 or more); `None` otherwise, without
+    /// commas, and in strict reading. Commas must stand beside spaces, or the text must have no spaces: `0,5 0 0` has a
+    /// decimal comma.
     fn without_commas(&self, node: Node<'_, '_>, attribute: &str, text: &str, count: usize) -> Option<String> {
         let beside_space = |word: &str| word.trim_matches(',').contains(',');
         if self.strictness == Strictness::Strict || !text.contains(',') {
@@ -319,7 +320,7 @@ pub(super) fn format_element(node: Node<'_, '_>, attribute: Option<(&str, &str)>
     }
 }
 
-/// Shortens a text to at most 60 characters on one line.
+/// Shortens a text to its first 60 characters, followed by `...` if there are more, on one line.
 fn truncate(text: &str) -> String {
     let mut short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if text.chars().nth(60).is_some() {

@@ -211,7 +211,7 @@ impl<'c> Resolver<'c> {
         }
     }
 
-    /// Returns the first candidate that is a file, or else the file in `meshdir`.
+    /// Returns the first candidate that is a file, or else the file in `meshdir`, or else [`Resolved::Missing`].
     fn first_file(&self, candidates: Vec<PathBuf>, path: &str) -> Resolved {
         if let Some(found) = candidates.iter().find(|c| c.is_file()) {
             return Resolved::Found(found.clone());

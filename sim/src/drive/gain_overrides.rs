@@ -111,7 +111,7 @@ impl DriveState {
     }
 
     /// Restores the override of one gain, whatever the value below it, even if both are equal: the override then
-    /// outlasts a change below it.
+    /// outlasts a change below it. `kind` is an index of [`GainKind::ALL`].
     pub(crate) fn restore_override(&mut self, drive: usize, kind: usize, value: f64) {
         self.set_override(drive, GainKind::ALL[kind], value);
     }

@@ -38,7 +38,7 @@ pub struct JointPlan {
     /// drive.
     pub damping: f64,
     /// The joint's own position limits \[rad or m\]; `None` without limits. A mimic joint whose limits leave its driver
-    /// no range has the limits that follow from the driver's range.
+    /// at most 1 % of the driver's own range has the limits that follow from the driver's range.
     pub limit: Option<[f64; 2]>,
     /// Range of position targets \[rad or m\]: the joint's own limits, narrowed by those of joints that mimic it;
     /// infinite without limits.
@@ -193,8 +193,8 @@ const LIMIT_TOLERANCE: f64 = 1e-6;
 /// Fraction of its own range that a driver keeps at least; limits of a follower that would leave less are ignored.
 const MIN_RANGE_FRACTION: f64 = 0.01;
 
-/// Narrows the range of every driver to positions that all its followers can reach. A follower that leaves no range is
-/// released: its limits become those of the driver's range.
+/// Narrows the range of every driver to positions that its followers can reach. A follower that leaves at most
+/// [`MIN_RANGE_FRACTION`] of the driver's own range is released: its limits become those of the driver's range.
 fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], diagnostics: &mut Vec<Diagnostic>) {
     let mut released = Vec::new();
     for i in 0..plans.len() {

@@ -205,7 +205,7 @@ impl DriveState {
         state
     }
 
-    /// Prefetches the arrays that this environment does not share, without waiting for them.
+    /// Prefetches the arrays that environments never share, without waiting for them.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(&self.position);
         mj::prefetch(&self.effort);
@@ -279,8 +279,8 @@ impl DriveState {
         self.position[drive] = self.position[drive].clamp(low, high);
     }
 
-    /// Copies gains, overrides, limits, targets, effort and the memory of the explicit model from drive `from` of
-    /// `other` to drive `to`.
+    /// Copies gains with limits, settings, overrides, the range of targets, targets, effort and the memory of the
+    /// explicit model from drive `from` of `other` to drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
         self.gains.set_if_changed(to, other.gains[from]);
         self.settings.set_if_changed(to, other.settings[from]);

@@ -5,8 +5,8 @@ use super::{poses, velocities};
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
 
-/// Fills `force_poses`, `force_velocities` and `body_accelerations` of environment `i`. If nothing was solved for this
-/// state, poses and velocities are the current ones, and accelerations are 0.
+/// Fills `force_poses`, `force_velocities` and `body_accelerations` of environment `i` of the chunk. If nothing was
+/// solved for this state, poses and velocities are the current ones, and accelerations are 0.
 pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     let solved = env.captured();
     if solved.poses.is_empty() {

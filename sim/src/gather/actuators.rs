@@ -14,7 +14,7 @@ pub(super) fn count(simulation: &Simulation) -> usize {
     drives(simulation).count() + simulation.mjcf_models.iter().map(|part| part.actuators.len()).sum::<usize>()
 }
 
-/// Fills the rows of environment `i`.
+/// Fills the rows of environment `i` of the chunk.
 pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     let (model, data) = (simulation.batch.model(), env.data());
     let of_drives = drives(simulation).map(|drive| [env.drives.position[drive], env.drives.effort[drive], 0.0]);

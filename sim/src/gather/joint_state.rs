@@ -4,7 +4,7 @@ use super::rows::{ChunkRows, fill_joints};
 use crate::env::SimEnv;
 use crate::simulation::Simulation;
 
-/// Fills the rows of environment `i`.
+/// Fills the rows of environment `i` of the chunk.
 pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     let data = env.data();
     fill_joints(&mut state.joint_positions, i, simulation, |joint| data.qpos()[joint.qpos]);

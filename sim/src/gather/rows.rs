@@ -98,7 +98,7 @@ pub(super) fn fill_joints(
     }
 }
 
-/// Copies captured quantities to the rows of an environment; zeros if the capture is empty after a failed step.
+/// Copies captured quantities to row `env`; zeros if nothing was captured, for example after a failed step.
 pub(super) fn fill_captured(values: &[f64], env: usize, array: &mut Option<ArrayViewMut3<'_, f64>>) {
     if let Some(array) = array
         && let Some(row) = array.index_axis_mut(Axis(0), env).into_slice()

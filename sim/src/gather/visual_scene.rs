@@ -16,7 +16,7 @@ pub(super) fn allocate(visible: &VisualScene, num_envs: usize) -> VisibleState {
     }
 }
 
-/// Fills the rows of environment `i`.
+/// Fills the rows of environment `i` of the chunk.
 pub(super) fn fill(simulation: &Simulation, env: &SimEnv, i: usize, state: &mut ChunkRows<'_>) {
     static SHARED_SCENE: EnvScene = EnvScene(None);
     let index = state.first + i;

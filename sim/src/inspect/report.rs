@@ -36,10 +36,10 @@ pub struct RobotReport {
     /// world axes, then the angular velocity in root axes. Floating joints (six entries each) and planar joints (`.vx`,
     /// `.vy`, `.wz`) come last.
     pub columns: Vec<String>,
-    /// Joint-space inertia at `qpos`, with the rotor inertias (`armature`) of an MJCF file on the diagonal; mimic
-    /// joints have columns of their own.
+    /// Joint-space inertia at `qpos` \[kg m², kg m or kg\], with the rotor inertias (`armature`) of an MJCF file on the
+    /// diagonal; mimic joints have columns of their own.
     pub mass_matrix: Vec<Vec<f64>>,
-    /// Generalized force that holds the robot still at `qpos`, for gravity (0, 0, -9.81) m/s².
+    /// Generalized force \[N m or N\] that holds the robot still at `qpos`, for gravity (0, 0, -9.81) m/s².
     pub gravity_torque: Vec<f64>,
     /// Warnings about everything repaired, ignored or missing.
     pub warnings: Vec<ReportWarning>,

@@ -357,7 +357,7 @@ impl Explorer<'_> {
     }
 }
 
-/// Names that `accepts` among those in the message of a refusal, and in the messages about similar names.
+/// Names for which `accepts` succeeds, of those quoted in the message of a refusal and in messages about similar names.
 fn names(message: &str, mut accepts: impl FnMut(&str) -> Result<(), Refusal>) -> Vec<String> {
     let mut known: Vec<String> = Vec::new();
     let mut messages = vec![message.to_owned()];

@@ -118,7 +118,7 @@ pub(crate) struct LinkFrame {
     pub body_from_link: Pose,
 }
 
-/// Adds the bodies, joints and actuators of a robot to `mjcf`, and returns their names.
+/// Adds the bodies, joints and actuators of a robot to `mjcf`, and returns its layout there.
 ///
 /// # Errors
 /// A chain of the tree has more than [`MAX_BODY_DEPTH`] bodies, the root included.

@@ -52,8 +52,8 @@ pub struct ArticulationCfg {
     /// pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
-    /// True if the links collide with each other. Links connected by a joint, and links that overlap in the initial
-    /// pose, do not collide, unless the MJCF file has a `<pair>` of their geoms.
+    /// True if the links collide with each other; false by default, also for an MJCF file. Links connected by a joint,
+    /// and links that overlap in the initial pose, do not collide, unless the MJCF file has a `<pair>` of their geoms.
     pub self_collision: bool,
     /// Settings for the convex hulls of collision meshes of URDF files. No effect on an MJCF file: MuJoCo computes its
     /// hulls.

@@ -216,7 +216,8 @@ impl<'a> Robot<'a> {
         FreeBody { simulation: self.simulation, index: self.indexing().root }
     }
 
-    /// Pose of a link, fused links included, in the environment: rows `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
+    /// Pose of a link, fused links included, in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape
+    /// (N, 7).
     ///
     /// # Errors
     /// The link does not exist; the error lists the nearest names.
@@ -419,7 +420,8 @@ impl<'a> RobotMut<'a> {
         FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner: self.data.uid() }
     }
 
-    /// Changes the state of each selected environment joint by joint, with one forward pass each.
+    /// Changes the state of each selected environment joint by joint, in one write each, and refreshes the sensors.
+    /// `change` gets the index of the joint in the robot.
     pub(super) fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write_at(env, Stage::Raw, |env| {

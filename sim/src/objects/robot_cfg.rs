@@ -109,8 +109,9 @@ pub struct RobotCfg {
     /// Fraction of the range of each joint between its soft limits, 0 to 1: see
     /// [`Robot::soft_qpos_limits`](crate::Robot::soft_qpos_limits).
     pub soft_limit_factor: f64,
-    /// True if the links of this robot collide with each other. Links connected by a joint, and links that overlap in
-    /// the initial pose, do not collide, unless the MJCF file has a `<pair>` of their geoms.
+    /// True if the links of this robot collide with each other; false by default, also for an MJCF file. Links
+    /// connected by a joint, and links that overlap in the initial pose, do not collide, unless the MJCF file has a
+    /// `<pair>` of their geoms.
     pub self_collision: bool,
     /// Settings for the convex hulls of collision meshes of URDF files. No effect on an MJCF file: MuJoCo computes its
     /// hulls.

@@ -82,7 +82,7 @@ impl DeformingElement {
     }
 }
 
-/// Mask id and owner of a rendered element.
+/// Mask id, name and sensor body of a rendered element.
 #[derive(Clone, Debug)]
 pub(super) struct ElementIdentity {
     pub(super) mask_id: i32,
@@ -94,7 +94,7 @@ pub(super) struct ElementIdentity {
 }
 
 impl MaskIdMap {
-    /// Mask id and owner of a geom.
+    /// Mask id, name and sensor body of a geom.
     pub(super) fn of(&self, geom: usize) -> &ElementIdentity {
         &self.of_geom[geom]
     }
@@ -130,7 +130,7 @@ fn body_name(model: &Model, body: usize) -> String {
 }
 
 /// Assigns a mask id to each body with geoms, and to each visible tendon, skin and flex and each geom of the world.
-/// With `sites`, bodies with sites only and sites of the world have mask ids as well.
+/// With `sites`, bodies with visible sites but no geoms, and visible sites of the world, have mask ids as well.
 pub(super) fn by_body(model: &Model, sites: bool) -> MaskIdMap {
     let mut table: Vec<MaskId> = Vec::new();
     let mut of_body = vec![0; model.nbody()];

@@ -50,8 +50,8 @@ impl<'a> Lighting<'a> {
     }
 }
 
-/// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns messages about
-/// active image-based lights, which are not rendered, and about a skybox that cannot be rendered.
+/// Sets the lights of `scene` from the model, and its headlight, ambient light, sky and haze as `look` says. Returns
+/// messages about active image-based lights, which are not rendered, and about a skybox that cannot be rendered.
 pub(super) fn set_lighting(model: &Model, look: &Lighting<'_>, scene: &mut RenderScene) -> Vec<String> {
     let mut left_out = Vec::new();
     let space = look.space();

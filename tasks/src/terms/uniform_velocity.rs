@@ -13,7 +13,7 @@ pub struct UniformVelocityCfg {
     pub lin_vel_x: [f64; 2],
     /// Velocity along the y axis of the root link \[m/s\].
     pub lin_vel_y: [f64; 2],
-    /// Turning rate about the z axis \[rad/s\]. It also bounds the turning rate toward a heading.
+    /// Turning rate about the z axis of the root link \[rad/s\]. It also bounds the turning rate toward a heading.
     pub ang_vel_z: [f64; 2],
     /// Target headings \[rad\], the angle about the world's z of the root link's x axis; `None` for drawn turning rates.
     pub heading: Option<[f64; 2]>,

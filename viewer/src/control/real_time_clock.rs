@@ -22,7 +22,7 @@ pub(super) struct RealTimeClock {
     measured: Option<f64>,
     /// Approximate wall-clock duration of one step, without throttling.
     step_time: Duration,
-    /// End of the last wait: time and step.
+    /// End of the last wait or of the last recorded steps: time and step.
     last_wait_end: (Instant, u64),
 }
 
@@ -50,7 +50,7 @@ impl RealTimeClock {
         self.restart(steps, now);
     }
 
-    /// Restarts the schedule and the measurement, after a pause, a reset or a speed change.
+    /// Restarts the schedule and the measurement, after a pause, a step command or a speed change.
     pub(super) fn restart(&mut self, steps: u64, now: Instant) {
         (self.schedule_start, self.measure_start, self.last_wait_end, self.measured) =
             ((now, steps), (now, steps), (now, steps), None);

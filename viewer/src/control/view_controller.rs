@@ -316,7 +316,8 @@ impl ViewController {
         self.speeds.clear();
     }
 
-    /// Handles completed steps: runs commands, publishes a snapshot, and waits while paused or ahead of schedule.
+    /// Handles completed steps: runs commands, publishes a snapshot, and waits while paused or ahead of schedule,
+    /// unless the caller waits instead.
     fn on_steps(&mut self, sim: &mut SimulationManager) {
         let steps = sim.observers().steps();
         let dt = sim.cfg().physics_dt;

@@ -28,9 +28,9 @@ pub(crate) struct Trails {
 }
 
 impl Trails {
-    /// Appends the current position of each body that moved by more than 1 cm. A trail restarts when its body jumps by
-    /// more than 1 m, as in most resets. All trails restart when the number of bodies changes, and when an environment
-    /// without trails is shown.
+    /// Appends the current position of each body that moved by more than 1 cm, for at most [`MAX_BODIES`] bodies. A
+    /// trail restarts when its body jumps by more than 1 m, as in most resets. All trails restart when the number of
+    /// bodies changes, and when an environment without trails is shown.
     pub(crate) fn add(&mut self, snapshot: &Snapshot, shown: EnvSelection) {
         let bodies = snapshot.names.bodies.len();
         let (first_env, wanted) = match shown {

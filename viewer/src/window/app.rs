@@ -68,8 +68,9 @@ enum DragMode {
 struct Drag {
     button: u8,
     grip: DragMode,
-    /// Position of the press, and last position of the mouse \[pixels\].
+    /// Position of the press \[pixels\].
     start: [f64; 2],
+    /// Last position of the mouse \[pixels\].
     last: [f64; 2],
 }
 

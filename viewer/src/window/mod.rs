@@ -36,7 +36,8 @@ pub struct WindowCfg {
     pub size: [usize; 2],
     /// X display, such as `:0`. `None` uses the environment variable `DISPLAY`.
     pub display: Option<String>,
-    /// Speed of simulated time after the window opens; `update` waits to keep it. `None` keeps the current speed.
+    /// Speed of simulated time after the window opens, real time by default; `update` waits to keep it. `None` keeps
+    /// the current speed.
     pub speed: Option<Speed>,
     /// Maximum number of rendering threads. `None` uses every core. Half of them, but at least one, render while
     /// physics needs all available time ([`App::new`]).

@@ -383,8 +383,8 @@ impl KeyboardMap {
     }
 
     /// Returns the key of a key code, with the upper keysym if Shift is held. With several keyboard layouts, the second
-    /// one is used for keys without a binding in the first, such as Cyrillic letters. Each layout has two keysyms per
-    /// key.
+    /// one is used for keys whose keysym in the first is not supported, such as Cyrillic letters. Each layout has two
+    /// keysyms per key.
     fn get(&self, code: u8, shift: bool) -> Option<Key> {
         let at = usize::from(code.checked_sub(self.first_keycode)?) * self.keysyms_per_keycode;
         let signs = self.keysyms.get(at..at + self.keysyms_per_keycode)?;

@@ -347,8 +347,9 @@ class RobotCfg:
     """Fraction of the range of each joint between its soft limits, 0 to 1: see ``Robot.soft_qpos_limits``."""
 
     self_collision: bool = False
-    """True if the links of this robot collide with each other. Links connected by a joint, and links that overlap in
-    the initial pose, do not collide, unless the MJCF file has a ``<pair>`` of their geoms.
+    """True if the links of this robot collide with each other; false by default, also for an MJCF file. Links connected
+    by a joint, and links that overlap in the initial pose, do not collide, unless the MJCF file has a ``<pair>`` of
+    their geoms.
     """
 
     hull: HullCfg | Mapping[str, Any] = field(default_factory=HullCfg)
@@ -413,8 +414,8 @@ class ArticulationCfg:
     """
 
     self_collision: bool = False
-    """True if the links collide with each other. Links connected by a joint, and links that overlap in the initial
-    pose, do not collide, unless the MJCF file has a ``<pair>`` of their geoms.
+    """True if the links collide with each other; false by default, also for an MJCF file. Links connected by a joint,
+    and links that overlap in the initial pose, do not collide, unless the MJCF file has a ``<pair>`` of their geoms.
     """
 
     hull: HullCfg | Mapping[str, Any] = field(default_factory=HullCfg)

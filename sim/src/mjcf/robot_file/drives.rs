@@ -174,7 +174,8 @@ pub(super) fn is_single_dof(model: &Model, joint: usize) -> bool {
     matches!(mjcf_keywords::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
 }
 
-/// Adds an actuator to a joint; `limit` is infinite without a limit.
+/// Adds an actuator to a joint; its effort `limit` is infinite without a limit. The limit of the `first` actuator
+/// replaces the one in `acting`, and those of further actuators are added.
 fn add_actuator(acting: &mut JointActuation, first: bool, stiffness: f64, damping: f64, limit: f64) {
     let old = if first { 0.0 } else { acting.effort.unwrap_or(f64::INFINITY) };
     acting.effort = Some(old + limit).filter(|effort| effort.is_finite());

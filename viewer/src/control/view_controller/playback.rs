@@ -128,7 +128,7 @@ impl Playhead {
         }
     }
 
-    /// Returns the time until the next frame.
+    /// Returns the time until the next frame, at most [`MAX_WAIT`]; that much while paused.
     fn time_to_next_frame(&self) -> Duration {
         match (self.playing, self.speed) {
             (false, _) => MAX_WAIT,
