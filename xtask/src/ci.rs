@@ -66,13 +66,13 @@ const STAGES: &[Stage] = &[
     Stage { name: "setup", what: "what the machine lacks", when: When::Always, run: install },
     Stage { name: "fmt", what: "formatting", when: When::Always, run: fmt },
     Stage {
-        name: "arrows",
+        name: "dependencies",
         what: "dependencies between crates",
         when: When::Always,
         run: |c| dependencies::run(c.repo),
     },
     Stage {
-        name: "circles",
+        name: "cycles",
         what: "import cycles between files",
         when: When::Always,
         run: |c| import_cycles::run(c.repo),
@@ -363,7 +363,7 @@ mod tests {
     fn quick_run() {
         assert_eq!(
             names(true, None),
-            ["setup", "fmt", "arrows", "circles", "rules", "language", "docs", "clippy", "unit"]
+            ["setup", "fmt", "dependencies", "cycles", "rules", "language", "docs", "clippy", "unit"]
         );
     }
 

@@ -95,7 +95,7 @@ impl ServerHandle {
 
     /// Number of connected viewers; 0 after the view has ended.
     pub fn viewers(&self) -> usize {
-        self.context.upgrade().map_or(0, |house| house.viewers())
+        self.context.upgrade().map_or(0, |context| context.viewers())
     }
 
     /// Disconnects all viewers and stops listening.

@@ -61,7 +61,7 @@ impl ServerContext {
 
 /// A running server. Dropping the server closes every connection and joins all threads.
 pub(super) struct Server {
-    house: Arc<ServerContext>,
+    context: Arc<ServerContext>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -75,7 +75,7 @@ impl Server {
     ) -> Result<Self, ServeError> {
         let failed = |what: &'static str| move |error: std::io::Error| ServeError::System(format!("{what}: {error}"));
         listener.set_nonblocking(true).map_err(failed("cannot make the socket non-blocking"))?;
-        let house = Arc::new(ServerContext {
+        let context = Arc::new(ServerContext {
             policy,
             backend,
             max_viewers,
@@ -83,33 +83,33 @@ impl Server {
             stop: AtomicBool::new(false),
             connections: Mutex::default(),
         });
-        let inside = Arc::clone(&house);
+        let inside = Arc::clone(&context);
         let thread = std::thread::Builder::new().name("view-listen".into());
         let thread = thread.spawn(move || listen(&listener, &inside)).map_err(failed("cannot start a thread"))?;
-        Ok(Self { house, thread: Some(thread) })
+        Ok(Self { context, thread: Some(thread) })
     }
 
     /// Number of connected viewers.
     pub(super) fn viewers(&self) -> usize {
-        self.house.viewers()
+        self.context.viewers()
     }
 
     /// Returns the state shared by all connections.
     pub(super) fn context(&self) -> Weak<ServerContext> {
-        Arc::downgrade(&self.house)
+        Arc::downgrade(&self.context)
     }
 }
 
 impl Drop for Server {
     fn drop(&mut self) {
-        self.house.stop.store(true, Ordering::Release);
+        self.context.stop.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
             thread.thread().unpark();
             // A thread that panicked has ended as well.
             let _ = thread.join();
         }
         let threads = {
-            let mut connections = self.house.connections();
+            let mut connections = self.context.connections();
             for stream in connections.open.values() {
                 // An error means that the connection is already closed.
                 let _ = stream.shutdown(Shutdown::Both);
@@ -122,35 +122,35 @@ impl Drop for Server {
     }
 }
 
-fn listen(listener: &TcpListener, house: &Arc<ServerContext>) {
+fn listen(listener: &TcpListener, context: &Arc<ServerContext>) {
     // Time at which a viewer was last connected; `None` if no settings have to be undone.
     let mut seen: Option<Instant> = None;
-    while !house.is_closing() {
+    while !context.is_closing() {
         // An error comes from the connecting client or from a temporary lack of file descriptors.
         match listener.accept() {
-            Ok((stream, _)) => spawn_connection(stream, house),
+            Ok((stream, _)) => spawn_connection(stream, context),
             Err(_) => std::thread::park_timeout(ACCEPT_INTERVAL),
         }
-        house.connections().threads.retain(|thread| !thread.is_finished());
-        if house.viewers() > 0 {
+        context.connections().threads.retain(|thread| !thread.is_finished());
+        if context.viewers() > 0 {
             seen = Some(Instant::now());
         } else if seen.is_some_and(|seen| seen.elapsed() > IDLE_TIMEOUT) {
             seen = None;
-            house.backend.on_idle();
+            context.backend.on_idle();
         }
     }
 }
 
 /// Starts the thread of a connection; closes the connection without a response if there are too many.
-fn spawn_connection(mut stream: TcpStream, house: &Arc<ServerContext>) {
+fn spawn_connection(mut stream: TcpStream, context: &Arc<ServerContext>) {
     // Accepted sockets may inherit the non-blocking mode of the listener on some systems (not on Linux).
     if stream.set_nonblocking(false).is_err() || stream.set_nodelay(true).is_err() {
         return;
     }
     let Ok(waker) = stream.try_clone() else { return };
     let number = {
-        let mut connections = house.connections();
-        if connections.open.len() >= house.max_viewers + MAX_OTHER_CONNECTIONS {
+        let mut connections = context.connections();
+        if connections.open.len() >= context.max_viewers + MAX_OTHER_CONNECTIONS {
             drop(connections);
             // The connection is closed without a response, which could block. So many connections do not come from
             // browsers.
@@ -161,29 +161,29 @@ fn spawn_connection(mut stream: TcpStream, house: &Arc<ServerContext>) {
         connections.open.insert(number, waker);
         number
     };
-    let entry = ConnectionEntry { house: Arc::clone(house), number };
+    let entry = ConnectionEntry { context: Arc::clone(context), number };
     let thread = std::thread::Builder::new().name("view-talk".into());
     let talk = move || {
-        serve_connection(&mut stream, &entry.house);
+        serve_connection(&mut stream, &entry.context);
         // Closes the connection for the client too, although `waker` still holds the socket.
         let _ = stream.shutdown(Shutdown::Both);
         drop(entry);
     };
     // If no thread can be started, the entry is dropped here.
     if let Ok(thread) = thread.spawn(talk) {
-        house.connections().threads.push(thread);
+        context.connections().threads.push(thread);
     }
 }
 
 /// Entry of a connection in the list of open sockets. Dropping it removes the entry, even if the thread panics.
 struct ConnectionEntry {
-    house: Arc<ServerContext>,
+    context: Arc<ServerContext>,
     number: u64,
 }
 
 impl Drop for ConnectionEntry {
     fn drop(&mut self) {
-        self.house.connections().open.remove(&self.number);
+        self.context.connections().open.remove(&self.number);
     }
 }
 
@@ -191,10 +191,10 @@ impl Drop for ConnectionEntry {
 struct ViewerSlot<'a>(&'a ServerContext);
 
 impl<'a> ViewerSlot<'a> {
-    fn acquire(house: &'a ServerContext) -> Option<Self> {
-        let free = |seated: usize| (seated < house.max_viewers).then_some(seated + 1);
-        let taken = house.viewers.fetch_update(Ordering::AcqRel, Ordering::Acquire, free);
-        taken.ok().map(|_| Self(house))
+    fn acquire(context: &'a ServerContext) -> Option<Self> {
+        let free = |seated: usize| (seated < context.max_viewers).then_some(seated + 1);
+        let taken = context.viewers.fetch_update(Ordering::AcqRel, Ordering::Acquire, free);
+        taken.ok().map(|_| Self(context))
     }
 }
 
@@ -204,7 +204,7 @@ impl Drop for ViewerSlot<'_> {
     }
 }
 
-fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
+fn serve_connection(stream: &mut TcpStream, context: &ServerContext) {
     let head = match RequestHead::read(stream) {
         Ok(Some(head)) => head,
         Ok(None) => return,
@@ -212,7 +212,7 @@ fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
         Err(status) => return response::send_error(stream, status, true),
     };
     let with_body = head.method != "HEAD";
-    if let Err(status) = house.policy.check(&head) {
+    if let Err(status) = context.policy.check(&head) {
         return response::send_error(stream, status, with_body);
     }
     match (head.method.as_str(), head.path.as_str()) {
@@ -220,14 +220,14 @@ fn serve_connection(stream: &mut TcpStream, house: &ServerContext) {
             Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, with_body),
             Err(_) => response::send_error(stream, Status::InternalError, with_body),
         },
-        ("GET", WEBSOCKET_PATH) => upgrade(stream, house, head),
+        ("GET", WEBSOCKET_PATH) => upgrade(stream, context, head),
         ("GET" | "HEAD", _) => response::send_error(stream, Status::NotFound, with_body),
         _ => response::send_error(stream, Status::MethodNotAllowed, with_body),
     }
 }
 
 /// Upgrades the connection to a WebSocket (RFC 6455, section 4.2) and runs its session to the end.
-fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
+fn upgrade(stream: &mut TcpStream, context: &ServerContext, head: RequestHead) {
     let asks = head.header_contains("connection", "upgrade") && head.header_contains("upgrade", "websocket");
     let version = head.header("sec-websocket-version").ok().flatten();
     // Sixteen bytes in base64.
@@ -235,7 +235,7 @@ fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
         return response::send_error(stream, Status::UpgradeRequired, true);
     };
-    let Some(slot) = ViewerSlot::acquire(house) else {
+    let Some(slot) = ViewerSlot::acquire(context) else {
         return response::send_error(stream, Status::ServiceUnavailable, true);
     };
     let switch = format!(
@@ -246,7 +246,7 @@ fn upgrade(stream: &mut TcpStream, house: &ServerContext, head: RequestHead) {
         .set_write_timeout(Some(websocket_session::WRITE_TIMEOUT))
         .and_then(|()| stream.write_all(switch.as_bytes()));
     if sent.is_ok() {
-        websocket_session::run_session(stream, head.rest, house, house.backend.open_session());
+        websocket_session::run_session(stream, head.rest, context, context.backend.open_session());
     }
     drop(slot);
 }
