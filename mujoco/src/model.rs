@@ -399,7 +399,7 @@ impl Model {
         self.header().opt.timestep
     }
 
-    /// Gravity in world axes \[m/s²\] (`opt.gravity`), also if it is disabled.
+    /// Gravity in world axes \[m/s²\] (`opt.gravity`), even if a flag disables gravity.
     pub fn gravity(&self) -> [f64; 3] {
         self.header().opt.gravity
     }

@@ -65,7 +65,7 @@ impl Topic {
         [Self::JointStates(uid.into()), Self::Targets(uid.into()), Self::LinkPoses(uid.into())]
     }
 
-    /// One channel of a camera.
+    /// One channel of a camera: see [`Channel`](Self::Channel).
     pub fn channel(sensor: impl Into<String>, channel: impl Into<String>) -> Self {
         Self::Channel { sensor: sensor.into(), channel: channel.into() }
     }

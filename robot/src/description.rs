@@ -22,7 +22,8 @@ pub struct JointId(pub usize);
 /// A robot: a tree of links joined by joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotDescription {
-    /// Name of the robot.
+    /// Name of the robot: for URDF files, [`UrdfCfg::name`](crate::urdf::UrdfCfg::name), else the names in the files
+    /// joined by `_`, else `robot`; for an MJCF file, the uid.
     pub name: String,
     /// All links; [`root`](Self::root) is the only one without a parent joint. [Auxiliary
     /// frames](Link::is_auxiliary_frame) come last.

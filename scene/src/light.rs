@@ -141,7 +141,7 @@ impl OpenGlRules {
     pub const BACK_GROUP: u8 = 30;
 }
 
-/// Ambient light that depends on the orientation of a surface.
+/// Ambient light, interpolated between two colors by the height (z) of the surface normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hemisphere {
     /// Color on surfaces that face up (+z), RGB; linear, or sRGB with [`LightingSpace::Display`].

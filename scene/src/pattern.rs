@@ -2,7 +2,7 @@
 //!
 //! The dialect is that of the `regex` crate. Matching is case-sensitive and against the full name, as in Python's
 //! `re.fullmatch`. A pattern without a match is an error, and so is a name that is matched twice. A typing error in a
-//! script thus never drives fewer joints without an error.
+//! pattern is therefore an error, and never silently selects fewer joints.
 
 use regex::Regex;
 use std::collections::BTreeMap;

@@ -176,7 +176,7 @@ impl RenderScene {
     /// Largest number of ids.
     pub(crate) const MAX_IDS: u32 = u32::MAX / 2;
 
-    /// Creates a scene with the default lights: one from above and the headlight.
+    /// Creates a scene with the default lights (one from above, the headlight, ambient light) and the default sky.
     ///
     /// # Errors
     ///

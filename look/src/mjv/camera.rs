@@ -13,7 +13,7 @@ pub struct MjvCamera {
     pub forward: [f64; 3],
     /// Upward direction of the image, in world axes; it may lean toward the viewing direction.
     pub up: [f64; 3],
-    /// Horizontal center of the frustum in the near plane \[m\].
+    /// Horizontal center of the frustum in the near plane, positive to the right \[m\].
     pub center: f64,
     /// Half width of the frustum in the near plane \[m\]; 0 for square pixels.
     pub half_width: f64,

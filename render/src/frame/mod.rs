@@ -179,7 +179,8 @@ macro_rules! channels {
                 })*
             }
 
-            /// Mutable frames of all views, in order; `views` is their number.
+            /// Mutable frames of all views, in order. `views` must be the number of views that the images were made
+            /// for.
             pub fn frames_mut(&mut self, views: usize) -> impl Iterator<Item = FrameMut<'_>> {
                 $(let mut $field = self.$field.as_mut().and_then(|array| array.as_slice_mut()).map(|numbers| {
                     let each = (numbers.len() / views.max(1)).max(1);

@@ -4,7 +4,7 @@
 //! Sources: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified sampling for
 //! stochastic transparency, 2011, section 4.1; Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020.
 
-/// The random sequence of a pixel.
+/// Random sequence of a pixel, or of a surface point in shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SobolSequence {
     seed: u32,
@@ -53,7 +53,8 @@ fn sobol_second(mut first: u32) -> u32 {
 }
 
 impl SobolSequence {
-    /// The sequence of a pixel, in images of a seed.
+    /// Creates the sequence of a key: the pixel and the seed of the image, or the bits of the coordinates of a surface
+    /// point.
     pub(crate) fn new([x, y]: [usize; 2], seed: u32) -> Self {
         Self { seed: combine(combine(mix(seed), x as u32), y as u32) }
     }

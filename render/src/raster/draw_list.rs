@@ -245,7 +245,9 @@ fn faces_away(projection: &Projection, placed: &PlacedInstance, cluster: &Cluste
     dot(to, cluster.cone_axis) > sine * dot(to, to).sqrt() + 1.01 * cluster.radius
 }
 
-/// Bounds of a box in the image, and its largest nearness; `None` if it is not visible.
+/// Returns the blocks that a box may touch, as [`DrawItem::rect`], and an upper bound of its nearness; `None` if the
+/// box is outside of the image or the depth range. `middle` and `half` (center and half lengths) are in the frame of
+/// the instance. An infinite box, and in perspective a box that crosses the near plane, get all blocks and `f32::MAX`.
 fn bounds(
     projection: &Projection,
     camera_from_instance: &PoseF32,
@@ -300,7 +302,7 @@ fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half:
     Some((everywhere, if near < projection.near { f32::MAX } else { projection.nearness(near) }))
 }
 
-/// Bounds of a ball in the image, and its largest nearness; `None` if it is not visible.
+/// As [`bounds`], for a ball around a point of the optical frame.
 fn ball_bounds(projection: &Projection, c: [f32; 3], radius: f32) -> Option<([u16; 4], f32)> {
     box_bounds(projection, c, [radius; 3])
 }

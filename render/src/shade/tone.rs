@@ -1,6 +1,6 @@
 //! Conversion of linear light for the screen: a tone curve, then the sRGB transfer function. The transfer function is a
-//! polynomial of √x, within 0.2 of 255 of the standard (square roots and products round the same on every machine;
-//! powers do not).
+//! polynomial of √x. It differs from the standard by at most 0.2 on the scale 0..=255. Unlike powers, square roots and
+//! products round the same on every machine.
 
 use crate::simd::{F, Scalar, Simd, max, min, select, splat};
 use serde::{Deserialize, Serialize};
@@ -54,8 +54,8 @@ impl ToneCurve {
 }
 
 impl ToneCurve {
-    /// The sRGB value of linear light after this curve, 0..=255, plus 0.5 and at most 255: its integer part is the sRGB
-    /// byte.
+    /// Applies this curve and the sRGB transfer function to linear light. Returns the sRGB value on the scale 0..=255,
+    /// plus 0.5, at most 255: its integer part is the sRGB byte.
     pub fn encode(self, intensity: f32) -> f32 {
         encode(Scalar, self, splat(Scalar, intensity)).array()[0]
     }

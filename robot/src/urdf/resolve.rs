@@ -3,8 +3,9 @@
 //! Search order by form of the URI:
 //!
 //! - `package://pkg/rest`, `model://pkg/rest`: the folder given for `pkg` in the configuration, and only there. Without
-//!   one: `ROS_PACKAGE_PATH`, `AMENT_PREFIX_PATH` (`share/pkg`), then every folder above the URDF. Each such folder
-//!   offers itself, its `pkg`, and its children, where the name or the `<name>` of `package.xml` is `pkg`.
+//!   one: `ROS_PACKAGE_PATH`, `AMENT_PREFIX_PATH` (`share/pkg`), then every folder above the URDF. In each folder of
+//!   the first and the last, these match in this order: the folder itself if its name or the `<name>` of its
+//!   `package.xml` is `pkg`, its subfolder `pkg`, and subfolders whose `package.xml` has that `<name>`.
 //! - `file://...`: the absolute path; a relative path starts at the URDF.
 //! - Absolute path: this path.
 //! - Relative path: the folder of the URDF, then the asset root of the configuration.
@@ -12,7 +13,7 @@
 //! The asset root is also the last folder that is searched for packages. `package:///path` has no package: in lenient
 //! reading it is an absolute path or, if that does not exist, `package://path`.
 //!
-//! Files that are not found so far are searched in `meshdir` of `<mujoco><compiler>`: the whole path, then only its
+//! A file that these rules do not find is searched in `meshdir` of `<mujoco><compiler>`: the whole path, then only its
 //! last part, as MuJoCo does. `%20` and similar escapes are decoded in URIs, and in plain paths if the path as written
 //! does not exist.
 //!

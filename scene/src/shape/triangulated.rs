@@ -44,7 +44,7 @@ impl TriangleSampling {
         &self.mesh
     }
 
-    /// Memory in use, without the mesh \[bytes\].
+    /// Heap memory \[bytes\], without the shared mesh.
     pub fn bytes(&self) -> usize {
         self.sums.capacity() * size_of::<f64>()
     }

@@ -89,8 +89,8 @@ pub struct CameraCfg {
     /// Environments that the camera renders, in the order of the first axis of its arrays; `None` is all environments.
     /// No index may repeat.
     pub env_ids: Option<Vec<usize>>,
-    /// Renders images when they are read (and only then), not when they are due. The images are the same, because the
-    /// state is captured when they are due.
+    /// If true, an image is rendered when it is read, and only then; if false, when it is due. The images are the same,
+    /// because the state is captured when the image is due.
     pub lazy: bool,
     /// Number of images in the history, the newest included: see [`Camera::history`](super::Camera::history). A lazy
     /// camera renders them when the history is read.

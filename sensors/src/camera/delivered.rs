@@ -1,8 +1,8 @@
 //! Delivered frames of a camera: the latest one, shown or not, and the frame history.
 //!
 //! After a write to the state, a camera shows the state as written. Frames in flight at that time are still delivered
-//! later. They are counted but not shown, because they are older. A reader of every frame, such as a recorder, uses
-//! [`Camera::latest_delivered`].
+//! later. These frames are counted but not shown, because they are older than the write. A reader of every frame, such
+//! as a recorder, uses [`Camera::latest_delivered`].
 
 use super::cfg::CameraCfg;
 use super::error::CameraError;
@@ -44,7 +44,8 @@ impl HistoryImages {
         row * self.length..(row + 1) * self.length
     }
 
-    /// Shifts the images of each row to make room for the frames delivered since.
+    /// Shifts the images of each row toward older entries, by the number of frames delivered since the last call. The
+    /// first entries become outdated.
     fn move_up(&mut self) {
         for row in 0..self.delivered_since.len() {
             let by = std::mem::take(&mut self.delivered_since[row]);
