@@ -149,7 +149,7 @@ impl SensorSlot {
         }
     }
 
-    /// The sensor, for reading; measures the stored state first.
+    /// Returns the sensor for reading. A lazy sensor measures its stored state first.
     ///
     /// # Errors
     ///
@@ -170,7 +170,7 @@ impl SensorSlot {
         }
     }
 
-    /// The sensor, for changes; measures the stored state first.
+    /// Returns the sensor for changes. A lazy sensor measures its stored state first.
     ///
     /// # Errors
     ///

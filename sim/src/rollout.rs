@@ -83,8 +83,9 @@ fn without_welds(env: &SimEnv) -> mj::Model {
     if env.welds().is_empty() { model.clone() } else { model.with_welds(&[]) }
 }
 
-/// Steps one row in `env`, which has the model of the row, and writes the states after each physics step to `states`.
-/// Returns the final state, and the error text of a diverged row.
+/// Simulates one row in `env`, which has the model of the row: one physics step (`substeps` MuJoCo steps) for each row
+/// of `controls`. Writes qpos and qvel after that step to the same row of `states`. Returns the final state, and the
+/// error text of a diverged row.
 fn step_row(
     env: &mut SimEnv,
     row: &RolloutRow,

@@ -40,8 +40,8 @@ pub struct EventTerm {
 }
 
 impl EventTerm {
-    /// Creates an event. `act` gets one random number generator for each environment in which the event happens, and
-    /// must change these environments only.
+    /// Creates an event. `act` gets one random number generator for each environment in which the event happens
+    /// ([`env_ids`](crate::env_ids) returns these environments), and must change these environments only.
     pub fn new(
         name: impl Into<String>,
         mode: EventMode,
@@ -50,8 +50,8 @@ impl EventTerm {
         Self::with_context(name, mode, move |now, rngs| act(now.sim_mut(), rngs))
     }
 
-    /// Creates an event that reads commands or curricula of the task besides the simulation. `act` is called as in
-    /// [`new`](Self::new).
+    /// Creates an event whose `act` gets an [`EventContext`]: the simulation, which it may change, and the commands and
+    /// curricula of the task. The rules of [`new`](Self::new) apply to `act`.
     pub fn with_context(
         name: impl Into<String>,
         mode: EventMode,

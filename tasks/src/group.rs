@@ -42,12 +42,12 @@ impl Group {
 pub(crate) struct GroupBuffers {
     /// Shape (N, columns).
     values: Array2<f64>,
-    /// Observations that the last step led to, same shape.
+    /// Observations at the end of the last step, before environments are reset; same shape.
     final_values: Array2<f64>,
     /// Noise generators by environment, then by term; `None` for a term without noise.
     noise: Vec<Vec<Option<KeyedRng>>>,
     images: Vec<ImageBatch>,
-    /// Images that the last step led to; `None` if they are those of `images`.
+    /// Images at the end of the last step, before environments are reset; `None` if they are those of `images`.
     final_images: Option<Vec<ImageBatch>>,
 }
 
@@ -130,8 +130,9 @@ impl<'e> ObservationGroup<'e> {
         self.buffers.values.view()
     }
 
-    /// Observations that the last step led to, same shape. In an environment whose episode ended, its last observation;
-    /// elsewhere, and after a reset, equal to [`observations`](Self::observations).
+    /// Observations at the end of the last step, before environments are reset; same shape. In an environment whose
+    /// episode ended, its last observation; elsewhere, and after a reset, equal to
+    /// [`observations`](Self::observations).
     pub fn final_observations(&self) -> ArrayView2<'e, f64> {
         self.buffers.final_values.view()
     }
@@ -178,8 +179,9 @@ impl<'e> ObservationGroup<'e> {
         Ok(&self.buffers.images[self.image_index(name)?])
     }
 
-    /// Images that the last step led to. In an environment whose episode ended, its last image; elsewhere, and after a
-    /// reset, equal to [`image`](Self::image).
+    /// Images of the term called `name` at the end of the last step, before environments are reset. In an environment
+    /// whose episode ended, the last image of that episode; elsewhere, and after a reset, equal to
+    /// [`image`](Self::image).
     ///
     /// # Errors
     /// The group has no such images; the error lists the existing ones.

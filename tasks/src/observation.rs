@@ -44,7 +44,8 @@ impl Noise {
     }
 }
 
-/// A group of observation columns. Noise is added to the values first, then they are clipped, then scaled.
+/// Observation columns that one function computes. Noise is added to the values first, then they are clipped, then
+/// scaled.
 pub struct ObservationTerm {
     pub(crate) name: String,
     pub(crate) columns: Vec<String>,

@@ -47,14 +47,14 @@ impl<'a> RigidObject<'a> {
         self.data.mass_properties.mass
     }
 
-    /// Pose of its frame in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    /// Pose of the object's frame in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     #[doc(alias = "get_pose")]
     pub fn pose(&self) -> Array2<f64> {
         self.body().poses()
     }
 
-    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 for an object that
-    /// is not dynamic.
+    /// Velocity of the origin of the object's frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6);
+    /// 0 for an object that is not dynamic.
     #[doc(alias = "get_velocity")]
     pub fn velocity(&self) -> Array2<f64> {
         self.body().velocities()

@@ -166,7 +166,8 @@ impl ViewController {
         self.published_at.map_or(Duration::ZERO, |shown| period.saturating_sub(shown.elapsed()))
     }
 
-    /// Runs the queued commands. Returns `false` if no viewer is left.
+    /// Runs the queued commands, and ends the mouse springs, pauses, speeds and recordings of dropped viewers. Returns
+    /// `false` if no viewer is left.
     fn handle_commands(&mut self, sim: &mut SimulationManager) -> bool {
         let CollectedCommands { commands, viewers, wants } = self.hub.collect();
         self.dirty |= wants != self.request;

@@ -129,8 +129,8 @@ fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, Camera
     Ok(-right[(0, 3)] / focal)
 }
 
-/// Returns the rotation nearest to a matrix; an error if the matrix is more than [`ROTATION_TOLERANCE`] off, or a
-/// mirror.
+/// Returns the rotation nearest to a matrix M. An error if an element of M Mᵀ is off the identity by more than
+/// [`ROTATION_TOLERANCE`], or the determinant is not positive; `what` names the matrix in it.
 fn nearest_rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, CameraError> {
     let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
     let nearest = matrix.svd(true, true);

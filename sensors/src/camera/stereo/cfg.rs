@@ -125,7 +125,7 @@ impl StereoCameraCfg {
     /// # Errors
     ///
     /// [`CameraError::Pose`] for an invalid pose of the rig or of the right camera; [`CameraError::LookAt`] if eye and
-    /// target of the rig coincide or are not finite.
+    /// target of the rig coincide, or a number of eye, target or up is not finite.
     pub fn camera_cfgs(&self) -> Result<[CameraCfg; 2], CameraError> {
         let Rig { left_from_right, origin_from_left } = self.rig()?;
         let left = self.camera.extrinsics.parent_from_camera()? * origin_from_left;

@@ -30,7 +30,7 @@ pub struct Grid {
     pub direction: [f64; 3],
     /// Order of the rays.
     pub order: GridOrder,
-    /// Centers the rays at the sensor for any size.
+    /// If true, the rays are centered at the sensor, even if a length is not a multiple of the resolution.
     pub centered: bool,
 }
 

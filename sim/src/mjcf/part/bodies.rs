@@ -10,7 +10,8 @@ use kinetoscope_scene::pose::{from_row, to_row};
 /// MuJoCo's gray of geoms without a color; it lets the color of the material show through.
 const DEFAULT_GEOM_RGBA: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
 
-/// Indices of the elements of one kind in each body. `of` has the body of each element.
+/// Indices of the elements of one kind, one list for each body. `of[i]` is the body of element i; elements with a
+/// negative body are skipped.
 fn by_body(bodies: usize, of: &[i32]) -> Vec<Vec<usize>> {
     let mut lists = vec![Vec::new(); bodies];
     for (index, body) in of.iter().enumerate() {
