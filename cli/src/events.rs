@@ -4,8 +4,9 @@ use std::io::IsTerminal as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
 
-/// Prints events of the libraries to the standard error stream. `RUST_LOG` selects them (`RUST_LOG=kinetoscope_sim=debug`);
-/// without it, only errors are printed, because the command itself reports warnings.
+/// Installs a subscriber that prints events of the libraries to the standard error stream. Panics if there already is
+/// one. `RUST_LOG` selects the events (`RUST_LOG=kinetoscope_sim=debug`); without it, only errors are printed, because
+/// the command itself reports warnings.
 pub(crate) fn print_to_stderr() {
     let errors = || EnvFilter::builder().with_default_directive(LevelFilter::ERROR.into());
     let filter = errors().from_env().unwrap_or_else(|error| {

@@ -14,7 +14,8 @@ pub struct Event {
     pub times: Vec<f64>,
     /// Physics steps since the recording began.
     pub step: u64,
-    /// Time on the clock of the recording \[s\], which continues over resets.
+    /// Time on the clock of the recording \[s\]. The clock starts at the simulation time of environment 0 and continues
+    /// over resets.
     pub recorded_time: f64,
     /// Text of a note, or reason of a divergence; else empty.
     pub text: String,

@@ -8,7 +8,7 @@ use kinetoscope_sensors::{SampleChannel, Stamp};
 pub struct StreamSchema {
     /// Name without the environment, such as `arm/joint_states` or `camera/color`.
     pub name: String,
-    /// Meaning of the values.
+    /// Meaning of the values, such as joint states, poses or an image.
     pub kind: StreamKind,
     /// Type of the values.
     pub element_type: ElementType,

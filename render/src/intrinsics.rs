@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 /// 0.5).
 ///
 /// OpenCV and ROS put the center of that pixel at (u, v): add half a pixel to their calibrated cx and cy. `CameraInfo`
-/// does so when it reads and writes files of ROS.
+/// has the numbers of ROS's calibration files, and converts between both conventions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -105,8 +105,8 @@ impl Intrinsics {
         Ok(Self::Pixels { fx, fy, cx, cy })
     }
 
-    /// The same intrinsics in pixels of an image of `width` by `height`. [`Pixels`](Self::Pixels) are not scaled to the
-    /// image size.
+    /// Converts the intrinsics to pixels of an image of `width` by `height` pixels. [`Pixels`](Self::Pixels) are not
+    /// scaled to the image size.
     ///
     /// # Errors
     ///

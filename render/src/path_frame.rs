@@ -31,8 +31,8 @@ struct PathTraceJob<'a> {
     noise: u32,
 }
 
-/// Renders a frame with the threads of several rasterizers. The bits do not depend on the number of threads. Fails if
-/// canceled.
+/// Renders a path-traced frame on the thread pool, with one rasterizer per thread. The result is bit-identical for any
+/// number of threads. Fails for an invalid request, or if canceled.
 pub(super) fn path_trace(
     pool: &ThreadPool,
     rasterizers: &mut [ImageRenderer],

@@ -6,8 +6,8 @@ use crate::visibility::View;
 use kinetoscope_scene::{Light, PoseF32, RenderScene};
 use serde::{Deserialize, Serialize};
 
-/// Options of a renderer. The rasterizer uses all of them except `occlusion_rays`; each field names its exceptions for
-/// the other renderers.
+/// Options of a renderer. The rasterizer uses all options except `occlusion_rays`. Each option lists the other
+/// renderers that ignore it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RasterCfg {
@@ -22,8 +22,8 @@ pub struct RasterCfg {
     /// scene: one ray from each sample on a mirror, shaded at its hit. In MuJoCo's light model, only the first mirror
     /// of the scene reflects. Path tracing always reflects.
     pub reflections: bool,
-    /// Texels along the side of a shadow map; 0 selects 128 to 1024 by the image size. Other values are clamped to
-    /// 64..=8192 and rounded up to a multiple of 8.
+    /// Texels along the side of a shadow map, for the renderers with shadow maps (see [`shadows`](Self::shadows)); 0
+    /// selects 128 to 1024 by the image size. Other values are clamped to 64..=8192 and rounded up to a multiple of 8.
     pub shadow_size: usize,
     /// Rays per color sample for ambient occlusion, in [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0
     /// disables it. Path tracing ignores this number; with the other renderers, a number above 0 is an error. With

@@ -9,14 +9,13 @@ use serde::{Deserialize, Serialize};
 /// collects light for `exposure_time` before it is read. The last row is read at the time stamp of the image, so
 /// exposure starts [`span`](Self::span) before the stamp. With both times 0, the default, an image shows one instant.
 ///
-/// Moving objects are sheared by the first (rolling shutter) and blurred by the second (motion blur). Cameras use two
-/// poses of each object: at the physics step at or just before shutter opening, and at the time stamp. Between them,
-/// objects move straight and rotate steadily. An object that is set to another pose in between counts as having been
-/// there since the shutter opened; its motion after that is spread over the whole span. Lights have their poses at the
-/// stamp.
+/// `row_time` shears moving objects (rolling shutter), `exposure_time` blurs them (motion blur). Cameras use two poses
+/// of each object: at the physics step at or just before shutter opening, and at the time stamp. Between them, objects
+/// move straight and rotate steadily. A write to the state while the shutter is open replaces the poses at shutter
+/// opening; the motion after the write is spread over the whole span. Lights have their poses at the stamp.
 ///
-/// A shutter needs [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced). Color integrates the whole exposure;
-/// all other channels show its middle, row by row.
+/// A shutter needs [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced). Color integrates the whole exposure.
+/// In all other channels, each row shows the middle of its exposure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Shutter {

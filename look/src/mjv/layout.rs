@@ -98,9 +98,9 @@ pub struct GeomLayout {
     pub shininess: usize,
     /// `reflectance`.
     pub reflectance: usize,
-    /// Numbers of the types of skins and flexes.
+    /// Values of `type` for skins and flexes, not offsets.
     pub soft: SoftTypes,
-    /// Numbers of the types of signed distance fields and of decoration.
+    /// Values of `type` for signed distance fields and decoration, not offsets.
     pub decor: DecorTypes,
 }
 
@@ -108,7 +108,7 @@ impl GeomLayout {
     /// Checks that all fields are inside the structure.
     ///
     /// # Errors
-    /// The first field that is not.
+    /// [`LayoutError::Outside`] for the first field that ends behind the structure.
     pub fn validate(&self) -> Result<(), LayoutError> {
         let required = [
             ("type", self.kind, 4),
@@ -183,7 +183,7 @@ impl LightLayout {
     /// Checks that all fields are inside the structure.
     ///
     /// # Errors
-    /// The first field that is not.
+    /// [`LayoutError::Outside`] for the first field that ends behind the structure.
     pub fn validate(&self) -> Result<(), LayoutError> {
         let required = [
             ("pos", self.pos, 12),

@@ -408,7 +408,8 @@ impl<M: VisualModel> MjvReader<M> {
         Some(scene)
     }
 
-    /// Instance of a geom; an error with the reason why it cannot be rendered.
+    /// Converts a geom to an instance with the mask id `mask_id`; an error with the reason if the geom cannot be
+    /// rendered.
     fn instance(&mut self, look: &GeomLook, mask_id: i32, memory: &MjvMemory<'_>) -> Result<Instance, String> {
         if !look.is_rigid {
             return Err("a pose is not a rotation and a position".into());

@@ -1,8 +1,8 @@
-//! Documentation in the words of Python: names of Rust in code spans, and the width of lines.
+//! Conversion of Rust documentation to Python: replaces Rust names in code spans and wraps lines.
 
 use crate::source::snake_case;
 
-/// Names without a counterpart in Python, with the text in their place.
+/// Rust names without a counterpart in Python, and their replacements.
 const WORDS: &[(&str, &str)] = &[
     ("ActuatorState", "actuator state"),
     ("Camera", "camera"),
@@ -37,7 +37,7 @@ const WORDS: &[(&str, &str)] = &[
     ("stiffness: 100.0.into()", "``stiffness=100.0``"),
 ];
 
-/// Phrases about items that Python does not have, with the text in their place. Spaces stand for any white space.
+/// Phrases about items that Python does not have, and their replacements. Spaces stand for any white space.
 const PHRASES: &[(&str, &str)] = &[
     (" (``Sensor::markers``)", ""),
     (" (``SensorCfg::lazy``)", ""),
@@ -58,8 +58,8 @@ const PHRASES: &[(&str, &str)] = &[
     ("the part of ``RenderScene::ambient`` that", "the part of the light from all directions that"),
 ];
 
-/// Replaces the names of Rust. `is_literal` tells for an enumeration whether its values are texts in Python; `None` for
-/// other types.
+/// Replaces Rust names. `is_literal` returns true for an enumeration whose values are strings in Python, and `None` for
+/// types that are no enumerations.
 ///
 /// # Errors
 /// A name has no counterpart.
@@ -94,7 +94,8 @@ fn replaced_phrases(paragraph: &str) -> String {
     text
 }
 
-/// Position of a phrase in which a space stands for any white space.
+/// Byte range of the first match of `phrase`. A space in `phrase` matches one or more spaces and line breaks, or the
+/// end of `text`.
 fn find_phrase(text: &str, phrase: &str) -> Option<(usize, usize)> {
     let mut starts = text.char_indices().map(|(at, _)| at);
     starts.find_map(|start| Some((start, start + length_of_phrase(&text[start..], phrase)?)))

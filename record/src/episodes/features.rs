@@ -165,7 +165,8 @@ impl Features {
 }
 
 impl Feature {
-    /// Values of the feature in the present rows of all streams, if all of them exist.
+    /// Values of the feature. `rows` has the current row of each stream; `None` if a stream of the feature has no row
+    /// yet.
     pub(crate) fn values(&self, rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
         let mut values = Vec::with_capacity(self.names.len());
         for StreamRange { stream, range } in &self.parts {

@@ -159,7 +159,8 @@ impl RayTargets {
         self.moving.len()
     }
 
-    /// Poses of the targets that may move, selected from the poses of all instances.
+    /// Poses of the targets that may move, in ascending order of their instances. `poses` has one pose for every
+    /// instance of the scene.
     pub fn moving_poses(&self, poses: &[PoseF64]) -> impl Iterator<Item = PoseF64> {
         self.moving.iter().map(|&index| self.pose_of(index, poses))
     }

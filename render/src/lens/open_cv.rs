@@ -23,9 +23,10 @@ const CONTINUATION_STEPS: usize = 32;
 /// Source: OpenCV, module calib3d, "Camera Calibration and 3D Reconstruction". ROS's `plumb_bob` uses k1, k2, p1, p2,
 /// k3; its `rational_polynomial` adds k4 to k6. OpenCV's tilted sensor (tau) is not supported.
 ///
-/// Newton's method inverts the mapping. In each direction, the inverse reaches from the optical axis to the angle where
-/// the mapping folds back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's formula has
-/// several directions for a pixel, the one within that range is used; `cv::undistortPoints` may find another.
+/// Newton's method inverts the mapping. At each azimuth around the optical axis, the inverse reaches from the axis to
+/// the angle at which the mapping folds back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's
+/// formula has several directions for a pixel, the one within that range is used; `cv::undistortPoints` may find
+/// another.
 ///
 /// **Poles.** The fraction g may have a pole that a nearby zero nearly cancels. Calibrations with k4 to k6 often have
 /// such a pole in the image. Within a ring of directions around it, OpenCV's formula runs to infinity and back, and

@@ -52,7 +52,8 @@ impl Accumulator {
             + self.lights.bytes()
     }
 
-    /// Allocates the memory of an image.
+    /// Resizes the memory to an image of `width` by `height` pixels; `smooth` is true with denoising. Existing values
+    /// are not cleared.
     pub(crate) fn resize(&mut self, [width, height]: [usize; 2], smooth: bool) {
         self.width = width;
         let count = width * height;

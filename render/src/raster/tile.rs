@@ -39,7 +39,7 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// Reserves memory for tiles of up to `samples` samples.
+    /// Reserves memory for tiles of up to `samples` samples in total, over all pixels and planes.
     pub(crate) fn reserve(&mut self, samples: usize) {
         let blocks = samples.div_ceil(BLOCK_AREA);
         self.nearness.reserve_exact(samples.saturating_sub(self.nearness.len()));

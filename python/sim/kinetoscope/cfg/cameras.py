@@ -17,7 +17,7 @@ class Intrinsics:
     0.5).
 
     OpenCV and ROS put the center of that pixel at (u, v): add half a pixel to their calibrated cx and cy.
-    ``CameraInfo`` does so when it reads and writes files of ROS.
+    ``CameraInfo`` has the numbers of ROS's calibration files, and converts between both conventions.
     """
 
     @staticmethod
@@ -142,14 +142,13 @@ class Shutter:
     collects light for ``exposure_time`` before it is read. The last row is read at the time stamp of the image, so
     exposure starts ``span`` before the stamp. With both times 0, the default, an image shows one instant.
 
-    Moving objects are sheared by the first (rolling shutter) and blurred by the second (motion blur). Cameras use two
+    ``row_time`` shears moving objects (rolling shutter), ``exposure_time`` blurs them (motion blur). Cameras use two
     poses of each object: at the physics step at or just before shutter opening, and at the time stamp. Between them,
-    objects move straight and rotate steadily. An object that is set to another pose in between counts as having been
-    there since the shutter opened; its motion after that is spread over the whole span. Lights have their poses at the
-    stamp.
+    objects move straight and rotate steadily. A write to the state while the shutter is open replaces the poses at
+    shutter opening; the motion after the write is spread over the whole span. Lights have their poses at the stamp.
 
-    A shutter needs ``"ray_traced"``. Color integrates the whole exposure; all other channels show its middle, row by
-    row.
+    A shutter needs ``"ray_traced"``. Color integrates the whole exposure. In all other channels, each row shows the
+    middle of its exposure.
     """
 
     row_time: float = 0.0
@@ -185,8 +184,8 @@ class Aperture:
 
 @dataclass(kw_only=True, slots=True)
 class RasterCfg:
-    """Options of a renderer. The rasterizer uses all of them except ``occlusion_rays``; each field names its exceptions
-    for the other renderers.
+    """Options of a renderer. The rasterizer uses all options except ``occlusion_rays``. Each option lists the other
+    renderers that ignore it.
     """
 
     samples: int = 4
@@ -204,8 +203,8 @@ class RasterCfg:
     """
 
     shadow_size: int = 0
-    """Texels along the side of a shadow map; 0 selects 128 to 1024 by the image size. Other values are clamped to
-    64..=8192 and rounded up to a multiple of 8.
+    """Texels along the side of a shadow map, for the renderers with shadow maps (see ``shadows``); 0 selects 128 to
+    1024 by the image size. Other values are clamped to 64..=8192 and rounded up to a multiple of 8.
     """
 
     occlusion_rays: int = 0
@@ -256,9 +255,10 @@ class OpenCvLens:
     Source: OpenCV, module calib3d, "Camera Calibration and 3D Reconstruction". ROS's ``plumb_bob`` uses k1, k2, p1, p2,
     k3; its ``rational_polynomial`` adds k4 to k6. OpenCV's tilted sensor (tau) is not supported.
 
-    Newton's method inverts the mapping. In each direction, the inverse reaches from the optical axis to the angle where
-    the mapping folds back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's formula has
-    several directions for a pixel, the one within that range is used; ``cv::undistortPoints`` may find another.
+    Newton's method inverts the mapping. At each azimuth around the optical axis, the inverse reaches from the axis to
+    the angle at which the mapping folds back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's
+    formula has several directions for a pixel, the one within that range is used; ``cv::undistortPoints`` may find
+    another.
 
     **Poles.** The fraction g may have a pole that a nearby zero nearly cancels. Calibrations with k4 to k6 often have
     such a pole in the image. Within a ring of directions around it, OpenCV's formula runs to infinity and back, and
@@ -450,8 +450,8 @@ class CameraCfg:
     """
 
     lazy: bool = True
-    """Renders images when they are read (and only then), not when they are due. The images are the same, because the
-    state is captured when they are due.
+    """If true, an image is rendered when it is read, and only then; if false, when it is due. The images are the same,
+    because the state is captured when the image is due.
     """
 
     history_length: int = 0

@@ -169,7 +169,7 @@ class RoughTerrain:
     """Terrain with independent random heights at its points. Every multiple of ``step`` within the range is equally
     likely.
 
-    Isaac's name is random uniform terrain.
+    In Isaac Lab, this is the random uniform terrain.
     """
 
     size: Sequence[float] = (8.0, 8.0)
@@ -182,7 +182,7 @@ class RoughTerrain:
     """Lowest and highest height [m]."""
 
     step: float = 0.02
-    """Step between heights, which are its multiples [m]."""
+    """Step between heights [m]; all heights are multiples of it."""
 
     seed: int = 0
     """Seed. Equal seeds give the same heights, bit for bit, on every machine."""

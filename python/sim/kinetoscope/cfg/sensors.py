@@ -106,7 +106,7 @@ class GridPattern:
     """Order of the rays."""
 
     centered: bool = False
-    """Centers the rays at the sensor for any size."""
+    """If true, the rays are centered at the sensor, even if a length is not a multiple of the resolution."""
 
 
 @dataclass(kw_only=True, slots=True)
