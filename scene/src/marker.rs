@@ -104,7 +104,8 @@ impl Marker {
     }
 }
 
-/// Mesh of an arrow from the origin along z, with 12 sides: a shaft, and a cone over the last quarter of `length`.
+/// Mesh of an arrow from the origin along z, with 12 sides: a shaft of `radius` \[m\], and a cone with a base of 2.5
+/// `radius` over the last quarter of `length` \[m\].
 fn arrow(length: f32, radius: f32) -> shape::Shape {
     let (r, head) = (f64::from(radius), f64::from(length) * 0.25);
     let (neck, tip) = (f64::from(length) - head, f64::from(length));

@@ -117,8 +117,8 @@ impl ActuatorState {
         &self.names
     }
 
-    /// Controls (inputs) of the actuators, shape \[num_envs, actuators\]: the position target of a drive \[rad or m\],
-    /// the control of an actuator of an MJCF file in the unit of the file.
+    /// Controls (inputs) of the actuators, shape \[num_envs, actuators\]. For a drive, its position target \[rad or
+    /// m\]. For an actuator of an MJCF file, its control in the unit of the file, before clamping to `ctrlrange`.
     pub fn controls(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("controls")
     }

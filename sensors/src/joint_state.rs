@@ -138,8 +138,9 @@ impl JointState {
         self.sampler.values("velocities")
     }
 
-    /// Efforts of the drives or actuators on the joints \[N m or N\], shape \[num_envs, joints\]: see
-    /// [`SceneState::joint_efforts`]. 0 before the first measurement or reset.
+    /// Efforts of the drives or actuators on the joints in the last step \[N m or N\], shape \[num_envs, joints\],
+    /// captured at [`effort_stamps`](Self::effort_stamps): see [`SceneState::joint_efforts`]. 0 before the first
+    /// measurement or reset.
     pub fn efforts(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("efforts")
     }

@@ -301,8 +301,8 @@ impl SimulationManager {
         }
     }
 
-    /// Returns the visual scene. The first call builds it and reads the visual meshes; unreadable meshes are left out
-    /// with a diagnostic.
+    /// Returns the visual scene. The first call after a change of the scene builds it and reads the visual meshes. An
+    /// unreadable mesh is omitted with a diagnostic.
     pub(crate) fn visual_scene(&mut self) -> Arc<VisualScene> {
         let visible = self.simulation.build_visual_scene(&self.cfg, &self.entities, &mut self.visuals);
         let diagnostics = self.visuals.take_diagnostics();

@@ -46,7 +46,7 @@ pub struct EndedEpisode {
     pub reason: EndReason,
     /// Number of task steps of the episode.
     pub steps: u64,
-    /// Sum of the weighted rewards of each term over the episode, in the order of
+    /// Sum of the weighted rewards of each term over the episode, not multiplied by the time step, in the order of
     /// [`Env::reward_names`](crate::Env::reward_names).
     pub reward_sums: Vec<f64>,
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Terrain with independent random heights at its points. Every multiple of `step` within the range is equally likely.
 ///
-/// Isaac's name is random uniform terrain.
+/// In Isaac Lab, this is the random uniform terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoughTerrain {
@@ -17,7 +17,7 @@ pub struct RoughTerrain {
     pub cell: f64,
     /// Lowest and highest height \[m\].
     pub range: [f64; 2],
-    /// Step between heights, which are its multiples \[m\].
+    /// Step between heights \[m\]; all heights are multiples of it.
     pub step: f64,
     /// Seed. Equal seeds give the same heights, bit for bit, on every machine.
     pub seed: u64,

@@ -219,7 +219,7 @@ impl Camera {
         self.cfg.channels
     }
 
-    /// Period between images in physics steps.
+    /// Period of captures, in physics steps.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
     }
@@ -338,7 +338,8 @@ impl Camera {
         )
     }
 
-    /// View of environment `env` (pose, intrinsics, near and far) at the captured instant, as the renderer uses it.
+    /// View of environment `env` at the captured instant: pose, pinhole intrinsics, near and far. The view has no
+    /// distortion: for a lens other than a pinhole, [`optics`](Self::optics) converts between directions and pixels.
     ///
     /// # Errors
     ///

@@ -223,15 +223,15 @@ impl ContactSensor {
         self.optional_values("contact_counts")
     }
 
-    /// Mean of the contact points between the bodies of each filter and each body, with equal weights \[m\], shape
-    /// (N, B, M, 3), in the frame of the environment; `None` unless points are tracked. Without a contact,
+    /// Mean of the contact points between each body and the bodies of each filter, with equal weights \[m\], shape (N,
+    /// B, M, 3), in the frame of the environment; `None` unless points are tracked. Without a contact,
     /// [`contact_count_matrix`](Self::contact_count_matrix) is 0, and the point is meaningless, as in
     /// [`contact_points_w`](Self::contact_points_w).
     pub fn contact_point_matrix_w(&self) -> Option<ArrayView4<'_, f64>> {
         self.sampler.has("contact_point_matrix_w").then(|| self.pairs("contact_point_matrix_w"))
     }
 
-    /// Number of contact points between the bodies of each filter and each body, shape (N, B, M), whole numbers; `None`
+    /// Number of contact points between each body and the bodies of each filter, shape (N, B, M), whole numbers; `None`
     /// unless points are tracked.
     pub fn contact_count_matrix(&self) -> Option<ArrayView3<'_, f64>> {
         let shape = (self.sampler.num_envs(), self.names.len(), self.filters.len());

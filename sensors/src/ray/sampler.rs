@@ -51,7 +51,7 @@ pub(crate) struct RaySamplerCfg<'a, R> {
 }
 
 /// Rays of a sensor and the sampler of their hits, in all environments. The channels are `distances`, `normals` and
-/// `ids`, then those of the frame.
+/// `ids`, then the frame channels of the sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct RaySampler<R: Rays> {
     scan: Scan<R>,

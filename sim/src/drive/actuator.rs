@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Sets the control so that the actuator's force is the drive law: `ctrl = q* + (kd v* + tau_ff) / kp`.
 ///
-/// Without stiffness, the actuator's gain is the damping (`ctrl = v* + tau_ff / kd`); without both, it is 1
-/// (`ctrl = tau_ff`). `mjcf::robot` writes the gain.
+/// With `kp = 0`, the actuator's gain is `kd`, and `ctrl = v* + tau_ff / kd`. With `kp = kd = 0`, the gain is 1, and
+/// `ctrl = tau_ff`. `mjcf::robot` writes the gain.
 pub(super) fn apply(drive: &Drive, gains: &Gains, target: &Target, data: &mut mj::Data) {
     data.ctrl_mut()[drive.ctrl] = if gains.kp > 0.0 {
         target.position + (gains.kd * target.velocity + target.feedforward) / gains.kp

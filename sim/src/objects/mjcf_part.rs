@@ -48,29 +48,29 @@ impl<'a> MjcfPart<'a> {
         self.data.model()
     }
 
-    /// Names of its joints without the prefix `uid/`, in MuJoCo's order. An element without a name is called by its
-    /// kind and its index: `joint3`, `body2`, `actuator0`.
+    /// Names of the part's joints without the prefix `uid/`, in MuJoCo's order. An element without a name is named by
+    /// its kind and its index in the file's own [`model`](Self::model): `joint3`, `body2`, `actuator0`.
     pub fn joint_names(&self) -> &'a [String] {
         &self.data.names.joints
     }
 
-    /// Names of its bodies without the prefix `uid/`, in MuJoCo's order, without the world.
+    /// Names of the part's bodies without the prefix `uid/`, in MuJoCo's order, without the world.
     pub fn body_names(&self) -> &'a [String] {
         &self.data.names.bodies[1..]
     }
 
-    /// Names of its sites without the prefix `uid/`, in MuJoCo's order.
+    /// Names of the part's sites without the prefix `uid/`, in MuJoCo's order.
     pub fn site_names(&self) -> &'a [String] {
         &self.data.names.sites
     }
 
-    /// Names of its actuators without the prefix `uid/`, in MuJoCo's order: the columns of [`ctrl`](Self::ctrl).
+    /// Names of the part's actuators without the prefix `uid/`, in MuJoCo's order: the columns of [`ctrl`](Self::ctrl).
     pub fn actuator_names(&self) -> &'a [String] {
         &self.data.names.actuators
     }
 
-    /// Names of MuJoCo's own sensors in it without the prefix `uid/`. Sensors that a part cannot have are left out; a
-    /// diagnostic names each.
+    /// Names of MuJoCo's own sensors in the part without the prefix `uid/`. Sensors that a part cannot have are left
+    /// out; a diagnostic names each.
     pub fn sensor_names(&self) -> &'a [String] {
         &self.data.sensor_names
     }

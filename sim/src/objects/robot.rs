@@ -110,7 +110,7 @@ impl<'a> Robot<'a> {
         Ok(self.plan(joint)?.mimic.is_some())
     }
 
-    /// Plan of a joint of the description, by its column.
+    /// Drive plan of the joint in a column; an error if there is no such column.
     pub(super) fn plan(&self, joint: JointIndex) -> Result<&JointPlan> {
         let (what, index, count) = ("joint", joint.0, self.data.plans.len());
         self.data.plans.get(index).ok_or(Error::UnknownIndex { what, index, count })

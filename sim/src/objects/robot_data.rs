@@ -211,7 +211,8 @@ fn file_error(cfg: &RobotCfg, robot: EntityLabel, error: RobotFileError) -> Erro
 
 /// Describes a robot from its files, with completed inertias and without payloads. Returns its MJCF file (`None` for a
 /// robot from URDF files), the description, and diagnostics about the files. With a `scene`, the diagnostics include
-/// settings of its MJCF file that differ from the scene's.
+/// settings of its MJCF file that differ from the scene's. `named` and `index` (position in the simulation) identify
+/// the robot in messages and file names; `hulls` caches convex hulls.
 pub(crate) fn describe_robot(
     cfg: &RobotCfg,
     named: &EntityLabel,

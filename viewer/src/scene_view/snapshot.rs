@@ -96,7 +96,8 @@ pub struct Timeline {
 /// Names of bodies, joints and cameras. They stay the same until an entity is added to the simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// Links (`uid/link`), objects, and bodies of MJCF files.
+    /// Links (`uid/link`), objects (`uid`), and bodies and named sites of MJCF files (`uid/body`, `uid/site`), in the
+    /// order of [`Entities::body_names`](kinetoscope_sim::Entities::body_names).
     pub bodies: Arc<[String]>,
     /// Joints of all robots and articulations, one after the other.
     pub joints: Vec<JointEntry>,

@@ -228,7 +228,7 @@ impl App {
         self.selection.as_ref()
     }
 
-    /// Returns the snapshot contents that the window needs.
+    /// Returns the rate and contents of the snapshots that the window needs.
     pub fn snapshot_request(&self) -> SnapshotRequest {
         let contacts = required_contacts(self.visible_envs(), &self.overlays, self.selection.as_ref());
         SnapshotRequest { rate: MAX_FPS, contacts, markers: self.overlays.sensors, ..SnapshotRequest::default() }

@@ -90,10 +90,10 @@ impl DistortionModel {
 
 /// Calibration of a camera, with the numbers of a calibration file.
 ///
-/// In a file, the *center* of the first pixel is at (0, 0), as in OpenCV. In [`Intrinsics`] and [`Lens`], its corner
-/// is. So principal points are half a pixel less here: that of a centered camera of 640 pixels is 319.5.
-/// [`from_intrinsics`](Self::from_intrinsics), [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to)
-/// convert between the two.
+/// In a file, the *center* of the first pixel is at (0, 0), as in OpenCV. In [`Intrinsics`] and [`Lens`], the corner of
+/// the first pixel is at (0, 0). So principal points of this type are half a pixel less: cx of a centered camera with
+/// 640 columns is 319.5. [`from_intrinsics`](Self::from_intrinsics), [`intrinsics`](Self::intrinsics) and
+/// [`apply_to`](Self::apply_to) convert between the two.
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{CameraCfg, CameraInfo};

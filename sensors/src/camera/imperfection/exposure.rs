@@ -4,11 +4,11 @@ use super::{PixelContext, RadianceEffect, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Longer or shorter exposure, relative to the exposure at which a fully lit white surface has radiance 1.
+/// Exposure compensation. At 0 stops, a fully lit white surface has radiance 1.
 ///
-/// The renderers multiply radiance by this factor before the tone curve
+/// The renderers multiply radiance by 2 to the power of `stops` before the tone curve
 /// ([`ImageRenderer::exposure_compensation`](kinetoscope_render::ImageRenderer::exposure_compensation)), so highlights
-/// that clip at 0 stops keep their detail at fewer stops. All other imperfections are applied after it.
+/// that clip at 0 stops keep their detail at negative stops. All other imperfections are applied after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Exposure {

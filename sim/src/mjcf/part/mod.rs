@@ -2,8 +2,8 @@
 //!
 //! The lines have the values of the compiled model in full precision. MuJoCo has resolved includes, default classes,
 //! angle units, local or global coordinates, composite bodies and compiler settings, so they do not affect the rest of
-//! the scene. Every name is prefixed by the part's uid and a slash. Geoms of the file's world and its bodies are in the
-//! scene's world, moved by the pose of the part. A static body named by the uid is the frame of the part.
+//! the scene. Every name is prefixed by the part's uid and a slash. Geoms and bodies of the file's world are in the
+//! scene's world, at the pose of the part. A static body, named by the uid, is the frame of the part.
 
 mod actuators;
 mod assets;
@@ -35,7 +35,7 @@ pub struct PartDocument {
     omitted_sensors: Vec<(usize, OmittedElement)>,
 }
 
-/// XML lines of a part, by section of the document.
+/// XML lines of a part for one MuJoCo version, by section of the document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartLines {
     /// Location of the MJCF file.
@@ -56,7 +56,8 @@ pub struct PartLines {
     pub stateful_actuators: Vec<String>,
     /// Sensors.
     pub sensors: Vec<String>,
-    /// Elements and attributes of the file that this MuJoCo version does not support.
+    /// Elements and attributes that are omitted, because the MuJoCo version of these lines does not support them.
+    /// Sensors omitted for both versions are not included.
     pub omitted: Vec<OmittedElement>,
 }
 

@@ -1,4 +1,4 @@
-//! Elements of the file's world, which a robot leaves out, and elements that depend on them.
+//! Elements of the file's `<worldbody>`, which are omitted from a robot, and elements that refer to them.
 
 use super::error::RobotFileError;
 use super::locations::SourceLocations;
@@ -168,7 +168,8 @@ pub(super) fn pair_only_geoms(model: &Model) -> BTreeSet<usize> {
     geoms
 }
 
-/// Geom pairs that are left out: pairs with geoms of the file's world, and all pairs of a robot without self-collision.
+/// Indices of the `<pair>` elements that are omitted: pairs with geoms of the file's world, and all pairs of a robot
+/// without self-collision.
 pub(super) fn omitted_pairs(model: &Model, self_collision: bool) -> BTreeSet<usize> {
     let of_world = |geom: i32| mj_index(geom).is_some_and(|geom| model.geom_bodyid()[geom] == 0);
     let is_left_out =
