@@ -140,7 +140,7 @@ class RigidObjectCfg:
     """Initial pose in the environment."""
 
     rgba: Sequence[float] = (0.6, 0.6, 0.6, 1.0)
-    """RGBA color in 0..=1; for a mesh, it applies where the file gives no color."""
+    """RGBA color (sRGB) in 0..=1; for a mesh, it applies where the file gives no color."""
 
     surface: SurfaceCfg | Mapping[str, Any] = field(default_factory=SurfaceCfg)
     """Surface properties besides the color, for rendering only."""
@@ -429,7 +429,7 @@ class TerrainCfg:
     """
 
     rgba: Sequence[float] = (0.52, 0.47, 0.4, 1.0)
-    """RGBA color in 0..=1."""
+    """RGBA color (sRGB) in 0..=1."""
 
     surface: SurfaceCfg | Mapping[str, Any] = field(default_factory=SurfaceCfg)
     """Surface properties besides the color, for rendering only."""

@@ -287,8 +287,8 @@ class RobotCfg:
     - **Equalities** that couple two joints linearly are mimics. A joint with any other joint equality has no drive. Its
       initial position is the value of the equality's polynomial at the initial position of the followed joint;
       ``init_qpos`` does not apply to it. Kinematics treat it as an independent joint, and ``compute_ik`` refuses to
-      move it or the joint that it follows. A joint with several equalities, or in a cycle of equalities, starts at its
-      own ``ref``.
+      move it or the joint that it follows. A joint with several equalities, or in a cycle of equalities, is not moved
+      by them at the start: ``init_qpos`` or its own ``ref`` applies.
     - **The base** is fixed or free according to ``fix_base``: the file's free joint is left out, or a free joint is
       added.
     - **Contacts**: geoms that collide in the file collide like the geoms of every robot; their ``contype`` and

@@ -408,8 +408,8 @@ class JointStateCfg:
 
     joints: Sequence[str] | None = None
     """Name patterns of the joints to measure (``uid/joint``, or ``joint`` alone), in the order they are reported;
-    ``None`` measures all. These are the movable joints of robots and articulations, and the hinge and slide joints of
-    MJCF files.
+    ``None`` measures all. These are the movable joints of robots and articulations, and the hinge and slide joints
+    of MJCF files.
     """
 
     sampling: SamplingCfg | Mapping[str, Any] = field(default_factory=SamplingCfg)

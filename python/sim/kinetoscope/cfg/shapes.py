@@ -41,7 +41,7 @@ class MeshCollision:
         surface: a ball of 5 cm radius that slides along a smooth valley at 0.5 m/s, over an edge every 5 cm on both
         sides, still has more than 0.3 m/s after 0.6 m. Triangles too thin for MuJoCo are omitted, with a diagnostic.
 
-        thickness: Thickness of the prisms [m].
+        thickness: Thickness of the prisms [m], 1e-5 to 1e3.
         """
         return {"triangles": {"thickness": thickness}}
 
@@ -153,7 +153,7 @@ class SurfaceCfg:
 
     transmission: float | None = None
     """Fraction of light that is refracted through the surface, as by glass, 0..=1. Only path-traced frames apply it,
-    and only to closed shapes; other renderers draw an opaque surface.
+    and only to closed shapes; other renderers draw the surface as with 0.
     """
 
     refractive_index: float | None = None

@@ -40,7 +40,9 @@ class LightKindCfg:
     """Parallel rays along the direction, such as sunlight."""
 
     point: ClassVar[str] = "point"
-    """Light in all directions from the position. The rasterizer computes no shadow for it."""
+    """Light in all directions from the position. The rasterizer's shadow maps have no shadows of it; ray-traced shadows
+    and path-traced images have them.
+    """
 
     @staticmethod
     def spot(*, cutoff_deg: float, exponent: float) -> dict[str, Any]:
@@ -115,17 +117,17 @@ class LightCfg:
     """
 
     color: Sequence[float] = (0.8, 0.8, 0.8)
-    """Color, 0..=1."""
+    """RGB color (sRGB), 0..=1."""
 
     attenuation: Sequence[float] = (1.0, 0.0, 0.0)
-    """Constant, linear [1/m] and quadratic [1/m²] attenuation: the intensity at distance d is 1 / (c + l d + q d²).
-    Unused by directional lights and domes.
+    """Constant, linear [1/m] and quadratic [1/m²] attenuation: the intensity at distance d is divided by c + l d + q
+    d². Unused by directional lights and domes.
     """
 
     radius: float = 0.0
-    """Size for soft shadows in ray-traced images: the radius of the light's disc [m]. For a directional light, the
-    radius at a distance of 1 m (the tangent of its angular radius, 0.00465 for the sun). 0 is a point, which casts
-    sharp shadows.
+    """Size for soft shadows in path-traced images: the radius of the light's disc [m]. All other renderers ignore it.
+    For a directional light, the radius at a distance of 1 m (the tangent of its angular radius, 0.00465 for the
+    sun). 0 is a point, which casts sharp shadows.
     """
 
     cast_shadow: bool = True
