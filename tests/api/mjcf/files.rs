@@ -270,6 +270,8 @@ fn exported_for_2_2_2() {
         "body \"arm\": gravcomp 1",
         "joint \"hinge\": actuatorfrcrange [-3.0, 3.0]",
         "equality \"hold\": the whole weld, because it connects sites",
+        "light \"bulb\": type point",
+        "tendon \"string\": upper end 0.4 of springlength",
         "tendon \"string\": armature 0.2",
         "tendon \"string\": actuatorfrcrange [-2.0, 2.0]",
         "actuator \"late\": dyntype filterexact (replaced by filter)",

@@ -305,7 +305,7 @@ impl PartWriter<'_> {
             .opt("target", mj_index(m.light_targetbodyid()[light]).map(|body| self.body(body)));
         let element = match (values.kind, self.target) {
             (LightType::Image, _) => return Ok(None),
-            (LightType::Point, SupportedVersion::V4) => element.attr("type", "point"),
+            (LightType::Point, _) if self.supports_v4("light", light, "type point") => element.attr("type", "point"),
             (kind, _) => element.attr("directional", kind == LightType::Directional),
         };
         let element = element

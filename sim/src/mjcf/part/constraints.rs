@@ -106,7 +106,9 @@ impl PartWriter<'_> {
         };
         let rest = row_of(m.tendon_lengthspring(), m.ntendon(), t);
         // 2.2.2 has one rest length; 4.x has a range of lengths without force.
-        let rest = if self.target == SupportedVersion::V2 { &rest[..1] } else { rest };
+        let is_range = rest.windows(2).any(|ends| ends[0] != ends[1]);
+        let keeps_range = is_range && self.supports_v4("tendon", t, &format!("upper end {} of springlength", rest[1]));
+        let rest = if keeps_range || self.target == SupportedVersion::V4 { rest } else { &rest[..1] };
         element = element
             .numbers("springlength", rest)
             .numbers("solreflimit", row_of(m.tendon_solref_lim(), m.ntendon(), t))
