@@ -1,0 +1,138 @@
+//! Environments with models of their own, which a row keeps as differences, against whole copies of the model.
+
+use super::*;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco::{IntegrationState, ModelEditor, UserInputs, Weld};
+
+/// A tree of joints with a tendon and an actuator, and free bodies on the ground, two of which can be welded.
+const SCENE: &str = r#"<mujoco><option timestep="0.003"/><worldbody><geom type="plane" size="5 5 1"/>
+    <body pos="0 1 0.5"><joint type="ball" damping="0.01"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
+      <body pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01" armature="0.01" frictionloss="0.01"/>
+        <site name="tip" pos="0.1 0 0"/><geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
+    <body name="a" pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+    <body name="b" pos="1 0 0.32"><freejoint/><geom type="ellipsoid" size="0.1 0.08 0.1"/></body>
+    <body pos="2 0 0"><geom type="box" size="0.3 0.3 0.02"/></body>
+    <body pos="2 0 0.2"><freejoint/><geom type="cylinder" size="0.1 0.1"/></body></worldbody>
+    <tendon><fixed name="t" frictionloss="0.01"><joint joint="hinge" coef="1"/></fixed></tendon>
+    <equality><weld body1="a" body2="b" active="false"/></equality>
+    <actuator><motor joint="hinge" gear="2"/></actuator>
+    <sensor><framepos objtype="site" objname="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
+
+/// Edits of one environment, of all arrays that properties change.
+fn edit(editor: &mut ModelEditor, kind: usize, factor: f64) {
+    let scale = |values: &mut [f64]| values.iter_mut().for_each(|value| *value *= factor);
+    match kind % 8 {
+        0 => return,
+        1 => {
+            scale(editor.body_mass_mut());
+            scale(editor.body_inertia_mut());
+        }
+        2 => scale(editor.geom_friction_mut()),
+        3 => {
+            scale(editor.body_mass_mut());
+            editor.geom_friction_mut()[6] = 0.3 * factor;
+            editor.set_gravity([0.1, 0.0, -9.0]);
+        }
+        4 => editor.set_gravity([0.0, 0.3, -9.81 * factor]),
+        5 => {
+            editor.set_geom_size(3, [0.1, 0.1 * factor, 0.1]);
+            editor.geom_rgba_mut()[7] = 0.5;
+            editor.set_center_of_mass(2, [0.11 * factor, 0.01, 0.0]).expect("not diagonal");
+        }
+        6 => {
+            scale(editor.dof_damping_mut());
+            scale(editor.dof_armature_mut());
+            scale(editor.dof_frictionloss_mut());
+            scale(editor.tendon_frictionloss_mut());
+        }
+        _ => {
+            editor.body_pos_mut()[3 * 5 + 2] = 0.05 * factor;
+            editor.body_quat_mut()[20..24].copy_from_slice(&[0.8, 0.0, 0.6, 0.0]);
+        }
+    }
+    editor.set_constants().expect("fits");
+}
+
+fn bits_of(data: &mj::Data) -> Vec<u64> {
+    let state = [&[data.time()], data.qpos(), data.qvel(), data.qacc_warmstart(), data.qacc(), data.qfrc_constraint()];
+    let computed = [data.sensordata(), data.xpos(), data.xquat(), data.cvel(), data.qfrc_bias(), data.efc_pos()];
+    state.into_iter().chain(computed).flatten().map(|x| x.to_bits()).chain([data.contact().len() as u64]).collect()
+}
+
+/// Plain MuJoCo on a whole copy of the model.
+fn step(data: &mut mj::Data) {
+    data.step1().expect("fits");
+    data.step2().expect("fits");
+}
+
+/// Bits with a forward pass done, which changes no later step.
+fn bits_of_plain(data: &mut mj::Data) -> Vec<u64> {
+    let before = data.qpos().to_vec();
+    data.step1().expect("fits");
+    let bits = bits_of(data);
+    data.qpos_mut().copy_from_slice(&before);
+    bits
+}
+
+/// The same state in the data of another model.
+fn moved(data: &mj::Data, model: &Model) -> mj::Data {
+    let (mut motion, mut inputs) = (IntegrationState::default(), UserInputs::default());
+    motion.save(data);
+    inputs.save(data);
+    let mut new = mj::Data::new(model).expect("small");
+    inputs.restore(&mut new);
+    motion.restore(&mut new);
+    new
+}
+
+/// Models change between blocks of steps, in rows and in working memory, and threads take the environments in turn.
+#[test]
+fn whole_models() {
+    const ENVS: usize = 17;
+    let model = mj::compile(SCENE, &[]).expect("compiles").into_model();
+    let mut editor = ModelEditor::new(&model).expect("small");
+    let weld = |i: usize| Weld { equality: 0, pose: [0.0, 0.0, 0.21 + 0.001 * i as f64, 1.0, 0.0, 0.0, 0.0] };
+    for threads in [1, 2] {
+        let mut plain: Vec<mj::Data> = (0..ENVS).map(|_| mj::Data::new(&model).expect("small")).collect();
+        let small = crate::env::with_small_buffers(&model);
+        let mut batch = Batch::new(&small, &Arc::default(), ENVS, threads, ThreadPool::new()).expect("small");
+        for i in 0..ENVS {
+            let start = |data: &mut mj::Data| {
+                data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
+                data.ctrl_mut()[0] = 0.1 * i as f64;
+            };
+            start(&mut plain[i]);
+            batch.write_at(i, Stage::Raw, |env| env.write_state(start));
+        }
+        for (block, count) in [1, 5, 30, 1, 2, 60, 9, 1].into_iter().enumerate() {
+            for (i, plain) in plain.iter_mut().enumerate() {
+                editor.load(&model);
+                // Some environments keep their model for a while.
+                let (kind, is_welded) = (i + block / (1 + i % 2), (i + block) % 3 == 0);
+                edit(&mut editor, kind, 1.0 + 0.01 * (kind + i) as f64);
+                let whole = editor.to_compiled().expect("small").into_model().with_buffers(model.buffers());
+                let welds = if is_welded { vec![weld(i)] } else { Vec::new() };
+                *plain = moved(plain, &whole.with_welds(&welds));
+                plain.set_equality_active(0, is_welded);
+                let patch = editor.patch();
+                if i % 4 == 0 {
+                    batch.write_at(i, Stage::Raw, |env| env.set_welds(welds.clone()));
+                    batch.write_at(i, Stage::Forward, |env| env.set_patch(patch.as_ref()));
+                } else {
+                    batch.edit_row(i, |row, model| row.set_patch(patch.as_ref(), model));
+                    batch.write_at(i, Stage::Raw, |env| env.set_welds(welds));
+                }
+                (0..count).for_each(|_| step(plain));
+            }
+            batch.step(count);
+            batch.visit(Stage::State, |_, _| ());
+            let expected: Vec<_> = plain.iter_mut().map(bits_of_plain).collect();
+            batch.for_each(|i, env| {
+                assert!(bits_of(env.data()) == expected[i], "environment {i} after block {block}, {threads} threads");
+            });
+        }
+        let ends: Vec<_> = plain.iter_mut().map(bits_of_plain).collect();
+        assert!((1..ENVS).all(|i| ends[i] != ends[0]), "environments differ");
+        assert!(batch.read(3, |env| env.data().contact().len()) >= 4);
+    }
+}
