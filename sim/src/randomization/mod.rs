@@ -242,9 +242,9 @@ mod tests {
     fn memory() {
         assert!(check_memory(1000, 2000, Some(2_000_000)).is_ok());
         assert!(check_memory(1 << 20, usize::MAX / 2, None).is_ok());
-        let refused = check_memory(10_000_000, 2048, Some(20 << 30)).expect_err("19 GiB fit");
+        let refused = check_memory(10_000_000, 2048, Some(16 << 30)).expect_err("19 GiB do not fit");
         assert!(refused.to_string().contains("19531 MiB"), "{refused}");
         assert!(check_memory(1000, 2001, Some(2_000_000)).is_err());
-        assert!(check_memory(usize::MAX, 2, Some(20 << 30)).is_err());
+        assert!(check_memory(usize::MAX, 2, Some(16 << 30)).is_err());
     }
 }
