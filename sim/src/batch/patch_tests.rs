@@ -140,3 +140,31 @@ fn whole_models() {
         assert!(contacts >= 4, "{contacts}");
     }
 }
+
+/// A model that a closure sets ends with the closure, also for an environment that stays in working memory.
+#[test]
+fn model_of_a_closure() {
+    let model = mj::compile(SCENE, &[]).expect("compiles").into_model();
+    let mut editor = ModelEditor::new(&model).expect("small");
+    let mut patch = |factor: f64| {
+        editor.load(&model);
+        edit(&mut editor, 1, factor);
+        editor.patch().expect("differs")
+    };
+    let (heavy, light) = (patch(2.0), patch(0.5));
+    let mut batch = Batch::new(&model, &Arc::default(), 3, 1, ThreadPool::new()).expect("small");
+    let mass = |batch: &Batch| batch.read(1, |env| env.data().model().body_mass()[2]);
+    let nominal = model.body_mass()[2];
+    for (own, expected) in [(None, nominal), (Some(&light), 0.5 * nominal)] {
+        batch.edit_row(1, |row, model| row.set_patch(own, model));
+        let within = batch.write_at(1, Stage::Raw, |env| {
+            env.lend(|data| {
+                let other = data.model().clone().patched(&heavy);
+                data.set_model(other);
+                data.model().body_mass()[2]
+            })
+        });
+        assert_eq!(within, Some(2.0 * nominal));
+        assert_eq!(mass(&batch), expected);
+    }
+}
