@@ -128,6 +128,7 @@ fn whole_models() {
             batch.visit(Stage::State, |_, _| ());
             let expected: Vec<_> = plain.iter_mut().map(bits_of_plain).collect();
             batch.for_each(|i, env| {
+                contacts = contacts.max(env.data().contact().len());
                 assert!(
                     bits_of(env.data()) == expected[i],
                     "environment {i} of {envs} after block {block}, {threads} threads"
